@@ -197,7 +197,7 @@ fn errors_in_a_camera_name_their_place() {
     for (camera, says) in [
         ("positon: (0, 0, 3)", "--camera:1:1: unknown field `positon`, did you mean `position`?"),
         ("position: (0, 0, 3)", "--camera: camera: `position` and `target`"),
-        ("position: (0, 0, 3), target: (0, 0, 3)", "--camera: target: the camera looks nowhere"),
+        ("position: (0, 0, 3), target: (0, 0, 3)", "--camera: target: the camera has no direction"),
         ("position: (0, 0, 3), target: (0, 0, 0), fov_deg: 200", "0.1 to 175 degrees"),
         ("position: (0, 0, 3), target: (0, 0, 0), shift: (1, 0)", "shift: only `quintile visibility`"),
         ("upside", "camera: there is no camera `upside`: known here: scene; give `inside` or `outside`"),

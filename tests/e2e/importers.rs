@@ -167,7 +167,7 @@ fn ignored_features_give_one_line_per_kind_with_a_count() {
     let inputs = Inputs::new();
     let results = run(&inputs.put("a.glb", demanding().bytes()), &[]);
     let kinds = [
-        ("alpha-ignored", 3, "3 see-through materials drawn opaque"),
+        ("alpha-ignored", 3, "3 blended materials drawn opaque"),
         ("emissive-ignored", 3, "3 emissive materials"),
         ("extension-ignored", 1, "1 extension ignored"),
         ("light-ignored", 3, "3 point lights ignored"),

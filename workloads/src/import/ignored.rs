@@ -16,24 +16,19 @@ pub(super) fn normal_map(material: &str) -> Warning {
 
 /// An emissive material.
 pub(super) fn emissive(material: &str) -> Warning {
-    about_material(
-        Code::EmissiveIgnored,
-        "emissive material",
-        "drawn without the light that it sheds",
-        material,
-    )
+    about_material(Code::EmissiveIgnored, "emissive material", "drawn without emitting light", material)
 }
 
 /// A material with an alpha cut-out.
 pub(super) fn cut_out(material: &str) -> Warning {
-    let what = "drawn whole, with what should be cut away";
+    let what = "drawn without its cut-outs";
     about_material(Code::AlphaIgnored, "cut-out material", what, material)
 }
 
 /// A material with alpha blending.
 pub(super) fn blended(material: &str) -> Warning {
-    let what = "drawn opaque: what is behind is hidden";
-    about_material(Code::AlphaIgnored, "see-through material", what, material)
+    let what = "drawn opaque: surfaces behind are hidden";
+    about_material(Code::AlphaIgnored, "blended material", what, material)
 }
 
 /// A texture that cannot be read, for the reason `why`.
@@ -44,7 +39,7 @@ pub(super) fn texture(material: &str, why: &str) -> Warning {
 
 /// A material that is metallic.
 pub(super) fn metallic(material: &str) -> Warning {
-    let what = "drawn as matt ones with a faint highlight";
+    let what = "drawn as diffuse ones with a faint highlight";
     about_material(Code::MetallicIgnored, "metallic material", what, material)
 }
 

@@ -58,7 +58,7 @@ impl Layout {
         let uvs = if self.uvs { 2 } else { 0 };
         let least = 3 + if self.normals { 3 } else { 0 } + if self.colors { 3 } else { 0 } + uvs;
         if numbers.len() < least {
-            return Err(format!("a vertex of {} numbers where {least} are due", numbers.len()));
+            return Err(format!("a vertex of {} numbers instead of {least}", numbers.len()));
         }
         soup.positions.push(DVec3::from_slice(&numbers[..3]));
         let mut at = 3;
@@ -82,8 +82,7 @@ impl Layout {
 
 /// Adds a face, a number of corners and then these; says whether it has a colour.
 fn face_of(words: &[String], vertices: usize, soup: &mut Soup) -> Result<bool, String> {
-    let index =
-        |word: &String| word.parse::<u32>().map_err(|_| format!("`{word}` where a whole number is due"));
+    let index = |word: &String| word.parse::<u32>().map_err(|_| format!("`{word}` is not a whole number"));
     let count = words.first().map_or(Ok(0), index)? as usize;
     let corners = words.get(1..=count).filter(|_| count > 0);
     let corners = corners
@@ -97,7 +96,7 @@ fn face_of(words: &[String], vertices: usize, soup: &mut Soup) -> Result<bool, S
 }
 
 fn number(word: &str) -> Result<f64, String> {
-    let number: f64 = word.parse().map_err(|_| format!("`{word}` where a number is due"))?;
+    let number: f64 = word.parse().map_err(|_| format!("`{word}` is not a number"))?;
     if number.is_finite() {
         Ok(number)
     } else {
@@ -142,7 +141,7 @@ impl Words<'_> {
 
     fn take(&mut self, what: &str) -> Result<Vec<String>, LoadError> {
         let next = self.next()?;
-        next.ok_or_else(|| self.broken(&format!("the file ends where {what} is due: it may be truncated")))
+        next.ok_or_else(|| self.broken(&format!("the file ends before {what}: it may be truncated")))
     }
 
     /// What vertices have, and the numbers of vertices and faces.
@@ -170,7 +169,7 @@ impl Words<'_> {
         match [count(0), count(1)] {
             [Some(vertices), Some(faces)] => Ok((layout, [vertices, faces])),
             _ => Err(self.broken(&format!(
-                "`{}` where the numbers of vertices and faces are due, each up to {MOST}",
+                "`{}` is not the numbers of vertices and faces, each up to {MOST}",
                 counts.join(" ")
             ))),
         }
@@ -223,19 +222,19 @@ mod tests {
     #[test]
     fn broken_files_are_errors_with_a_line() {
         let cases = [
-            ("", "line 0: the file ends where its header is due"),
+            ("", "line 0: the file ends before its header"),
             ("PLY\n", "line 1: `PLY`: not an OFF file"),
             ("4OFF\n1 0 0\n", "line 1: `4OFF`: this kind of OFF file is not read; convert it"),
             ("OFF BINARY\n", "line 1: binary OFF files are not read"),
             ("OFF\n4294967295 1 0\n", "line 2: `4294967295 1 0` where the numbers"),
             ("OFF\n-1 1 0\n", "line 2: `-1 1 0` where"),
-            ("OFF\n100000000 1 0\n0 0 0\n", "line 3: the file ends where a vertex is due"),
-            ("OFF\n1 1 0\n0 0\n", "line 3: a vertex of 2 numbers where 3 are due"),
+            ("OFF\n100000000 1 0\n0 0 0\n", "line 3: the file ends before a vertex"),
+            ("OFF\n1 1 0\n0 0\n", "line 3: a vertex of 2 numbers instead of 3"),
             ("OFF\n1 1 0\n0 nan 0\n", "line 3: a coordinate that is NaN"),
             ("OFF\n1 1 0\n0 0 0\n3 0 0 1\n", "line 4: a face uses vertex 1, but there are only 1"),
             ("OFF\n1 1 0\n0 0 0\n4294967295 0 0 0\n", "line 4: a face of 4294967295 corners, 3 follow"),
-            ("OFF\n1 1 0\n0 0 0\n3 0 x 0\n", "line 4: `x` where a whole number is due"),
-            ("OFF\n1 2 0\n0 0 0\n3 0 0 0\n", "line 4: the file ends where a face is due"),
+            ("OFF\n1 1 0\n0 0 0\n3 0 x 0\n", "line 4: `x` is not a whole number"),
+            ("OFF\n1 2 0\n0 0 0\n3 0 0 0\n", "line 4: the file ends before a face"),
         ];
         for (text, expected) in cases {
             let error = parse(text).unwrap_err();

@@ -102,7 +102,7 @@ fn ascii(bytes: &[u8], welded: &mut Welded) -> Result<(), (usize, String)> {
             }
             "endfacet" if corners.is_empty() => {}
             "endloop" | "endfacet" => {
-                return Err((line, format!("a facet of {} corners where 3 are due", corners.len())));
+                return Err((line, format!("a facet of {} corners instead of 3", corners.len())));
             }
             "endsolid" => ended = true,
             "solid" => ended = false,
@@ -114,12 +114,12 @@ fn ascii(bytes: &[u8], welded: &mut Welded) -> Result<(), (usize, String)> {
 }
 
 fn position<'a>(words: impl Iterator<Item = &'a str>) -> Result<DVec3, String> {
-    let number = |word: &'a str| word.parse().map_err(|_| format!("`{word}` where a number is due"));
+    let number = |word: &'a str| word.parse().map_err(|_| format!("`{word}` is not a number"));
     let numbers: Vec<f64> = words.map(number).collect::<Result<_, _>>()?;
     match numbers[..] {
         [x, y, z] if numbers.iter().all(|number| number.is_finite()) => Ok(DVec3::new(x, y, z)),
         [_, _, _] => Err("a coordinate that is NaN or infinite".to_owned()),
-        _ => Err(format!("a vertex of {} numbers where 3 are due", numbers.len())),
+        _ => Err(format!("a vertex of {} numbers instead of 3", numbers.len())),
     }
 }
 
@@ -221,7 +221,7 @@ mod tests {
                 "line 6: a coordinate that is NaN or infinite",
             ),
             (in_ascii().replacen("1 1 0", "1 1", 1).into_bytes(), "line 6: a vertex of 2 numbers"),
-            (in_ascii().replacen("1 1 0", "1 x 0", 1).into_bytes(), "line 6: `x` where a number is due"),
+            (in_ascii().replacen("1 1 0", "1 x 0", 1).into_bytes(), "line 6: `x` is not a number"),
             (in_ascii().replacen("facet normal", "faucet", 1).into_bytes(), "line 2: `faucet`"),
         ];
         for (bytes, expected) in cases {

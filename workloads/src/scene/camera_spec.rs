@@ -265,7 +265,7 @@ impl CameraSpec {
     /// Checks that the direction of the view is defined at the start and at the end.
     fn check_sight(&self) -> Result<(), Wrong> {
         let Some(position) = self.position else { return Ok(()) };
-        let message = "the camera looks nowhere, because it coincides with its target or is too far from it: move one of them";
+        let message = "the camera has no direction, because it coincides with its target or is too far from it: move one of them";
         let looks = |place: &'static str, eye: [f64; 3], target: Option<[f64; 3]>| {
             let along = match (target, self.direction) {
                 (Some(target), _) => DVec3::from(target) - DVec3::from(eye),

@@ -79,7 +79,7 @@ impl Graph {
         for instance in &self.instances {
             let skinned = instance.skin.is_none_or(|skin| skin < self.skins.len());
             ensure(instance.node < nodes && instance.mesh < self.meshes.len() && skinned, || {
-                format!("{instance:?} names something that is not there")
+                format!("{instance:?} has an index out of range")
             })?;
         }
         for mesh in &self.meshes {

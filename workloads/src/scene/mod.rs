@@ -251,7 +251,7 @@ impl Scene {
         let ends = [(&interval.open, open_at), (&interval.close, close_at)];
         let [Some(open), Some(close)] = ends.map(|(pose, at)| self.camera.stand(pose, at)) else {
             let message =
-                "it looks nowhere, because position and target coincide or are not finite: move one of them"
+                "it has no direction, because position and target coincide or are not finite: move one of them"
                     .to_owned();
             return Err(FrameError::Camera { frame: interval.frame, message });
         };

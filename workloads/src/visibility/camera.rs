@@ -110,7 +110,7 @@ impl CameraSpec {
             (Some(target), _) => DVec3::from(target) - eye,
             (None, direction) => DVec3::from(direction.unwrap_or([f64::NAN; 3])),
         };
-        let message = "the camera looks nowhere, because it coincides with its target or is too far from it: move one of them";
+        let message = "the camera has no direction, because it coincides with its target or is too far from it: move one of them";
         Stand::new(eye, along, up.map_or(DVec3::Y, DVec3::from)).ok_or_else(|| (place, message.to_owned()))
     }
 

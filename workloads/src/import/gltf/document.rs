@@ -55,7 +55,7 @@ fn split<'b>(source: Source, bytes: &'b [u8]) -> Result<(&'b [u8], Option<&'b [u
         match (bytes.get(at + 4..at + 8), bytes.get(start..end)) {
             (Some(found), Some(body)) if found == kind => Ok((body, end)),
             (Some(found), Some(_)) if found != kind => {
-                Err(source.broken(what, format!("a chunk of type {found:?} where {kind:?} is due")))
+                Err(source.broken(what, format!("a chunk of type {found:?} instead of {kind:?}")))
             }
             _ => Err(truncated(what, end)),
         }

@@ -164,7 +164,7 @@ fn maps(described: &Described, name: &str) -> Vec<Warning> {
     let rough = surface.metallic_roughness_texture.is_some();
     let glossy = surface.metallic_factor.0 <= 0.0 && surface.roughness_factor.0 < 1.0 && !rough;
     let gloss = "ignored: every surface has the same faint highlight";
-    let shaded = "ignored: nothing darkens the corners";
+    let shaded = "ignored: ambient occlusion is not drawn";
     let found = [
         normal.then(|| ignored::normal_map(name)),
         emissive.then(|| ignored::emissive(name)),

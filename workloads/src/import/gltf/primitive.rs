@@ -290,11 +290,11 @@ impl Document<'_> {
             return Err("its type is not known".to_owned());
         };
         if !kinds.contains(kind) {
-            return Err(format!("it holds {kind:?}, {kinds:?} is due"));
+            return Err(format!("it has the type {kind:?} instead of {kinds:?}"));
         }
         let (width, count) = (kind.multiplicity(), accessor.count.0);
         if count.saturating_mul(width as u64) > MOST_NUMBERS {
-            return Err(format!("{count} elements are absurdly many"));
+            return Err(format!("{count} elements are too many"));
         }
         let layout = Layout { width, component: component.0, normalized: accessor.normalized };
         let mut numbers = match accessor.buffer_view {
@@ -303,7 +303,7 @@ impl Document<'_> {
                 layout.read(self.bytes(view.value(), offset, count, layout.size())?)
             }
             None if count <= MOST_ZEROS => vec![0.0; count as usize * width],
-            None => return Err(format!("{count} elements without a buffer are absurdly many")),
+            None => return Err(format!("{count} elements without a buffer are too many")),
         };
         if let Some(sparse) = &accessor.sparse {
             self.overlay(sparse, layout, &mut numbers)?;

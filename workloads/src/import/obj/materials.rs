@@ -288,7 +288,7 @@ fn color(text: &str) -> Result<Option<[f32; 3]>, String> {
     match numbers[..] {
         [grey] => Ok(Some([grey; 3])),
         [red, green, blue, ..] => Ok(Some([red, green, blue])),
-        _ => Err(format!("a colour of {} numbers where 1 or 3 are due", numbers.len())),
+        _ => Err(format!("a colour of {} numbers instead of 1 or 3", numbers.len())),
     }
 }
 
@@ -299,7 +299,7 @@ fn opacity(text: &str) -> Result<f32, String> {
 
 fn number(word: &str) -> Result<f32, String> {
     let number = word.parse().ok().filter(|number: &f32| number.is_finite());
-    number.ok_or_else(|| format!("`{word}` where a number is due"))
+    number.ok_or_else(|| format!("`{word}` is not a number"))
 }
 
 impl Map {
@@ -383,7 +383,7 @@ mod tests {
         assert!(wall.material.texture.is_some() && wall.material.double_sided);
         assert_eq!((wall.scale, wall.offset), (Vec2::splat(2.0), Vec2::new(0.0, -1.0)));
         let [alpha, missing, bump] = &warnings[..] else { panic!("{warnings:#?}") };
-        assert!(alpha.starts_with("[alpha-ignored] 1 see-through material"), "{alpha}");
+        assert!(alpha.starts_with("[alpha-ignored] 1 blended material"), "{alpha}");
         assert!(missing.contains("missing-material") && missing.contains("`gone`"), "{missing}");
         assert!(bump.contains("1 normal map ignored") && bump.contains("`red`"), "{bump}");
     }
@@ -485,8 +485,8 @@ mod tests {
         for (text, expected) in [
             ("newmtl a\nKd 1 2\n", "line 2: a colour of 2 numbers"),
             ("newmtl a\n\nKd\n", "line 3: a colour of 0 numbers"),
-            ("newmtl a\nd x\n", "line 2: `x` where a number is due"),
-            ("newmtl a\nKd 1 nan 0\n", "line 2: `nan` where a number is due"),
+            ("newmtl a\nd x\n", "line 2: `x` is not a number"),
+            ("newmtl a\nKd 1 nan 0\n", "line 2: `nan` is not a number"),
             ("newmtl a\nmap_Kd\n", "line 2: a map without a file"),
         ] {
             let error = parse(text).unwrap_err();

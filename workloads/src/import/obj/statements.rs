@@ -158,10 +158,7 @@ impl Reading {
             [weight] => (place / weight, None),
             [red, green, blue] | [_, red, green, blue] => (place, Some([red, green, blue].map(|c| c as f32))),
             _ => {
-                return Err(format!(
-                    "a vertex of {} numbers, 3 are due, and 3 more for a colour",
-                    values.len()
-                ));
+                return Err(format!("a vertex of {} numbers instead of 3, or 6 with a colour", values.len()));
             }
         };
         if color.is_some() {
@@ -197,12 +194,9 @@ impl Reading {
         let mut parts = word.split('/');
         let mut next = |count: usize| match parts.next() {
             None | Some("") => Ok(None),
-            Some(text) => {
-                number(text, count).map(Some).ok_or_else(|| format!("a corner `{word}` that is none"))
-            }
+            Some(text) => number(text, count).map(Some).ok_or_else(|| format!("`{word}` is not a corner")),
         };
-        let position =
-            next(found.positions.len())?.ok_or_else(|| format!("a corner `{word}` that is none"))?;
+        let position = next(found.positions.len())?.ok_or_else(|| format!("`{word}` is not a corner"))?;
         Ok(Corner { position, uv: next(found.uvs.len())?, normal: next(found.normals.len())? })
     }
 
@@ -228,7 +222,7 @@ fn number(text: &str, count: usize) -> Option<u32> {
 /// The numbers of a line, at least `least`, all finite.
 fn numbers<T: std::str::FromStr + Into<f64> + Copy>(text: &str, least: usize) -> Result<Vec<T>, String> {
     let number = |word: &str| {
-        let number: Result<T, String> = word.parse().map_err(|_| format!("`{word}` where a number is due"));
+        let number: Result<T, String> = word.parse().map_err(|_| format!("`{word}` is not a number"));
         let number = number?;
         let value: f64 = number.into();
         if value.is_finite() {
@@ -238,11 +232,7 @@ fn numbers<T: std::str::FromStr + Into<f64> + Copy>(text: &str, least: usize) ->
         }
     };
     let found: Vec<T> = text.split_ascii_whitespace().map(number).collect::<Result<_, _>>()?;
-    if found.len() < least {
-        Err(format!("{} numbers where {least} are due", found.len()))
-    } else {
-        Ok(found)
-    }
+    if found.len() < least { Err(format!("{} numbers instead of {least}", found.len())) } else { Ok(found) }
 }
 
 impl Statements {
@@ -327,20 +317,20 @@ mod tests {
     #[test]
     fn broken_lines_are_named() {
         let cases = [
-            ("v 0 0\n", "line 1: 2 numbers where 3 are due"),
+            ("v 0 0\n", "line 1: 2 numbers instead of 3"),
             ("v 0 0 nan\n", "line 1: a coordinate that is NaN or infinite (`nan`)"),
             ("v 0 0 1e999\n", "line 1: a coordinate that is NaN or infinite (`1e999`)"),
-            ("\nv 0 0 x\n", "line 2: `x` where a number is due"),
+            ("\nv 0 0 x\n", "line 2: `x` is not a number"),
             ("v 1 2 3 0\n", "line 1: the weight of a vertex is 0"),
             ("v 1 2 3 4 5\n", "line 1: a vertex of 5 numbers"),
             ("v 0 0 0\nf 1 1 9\n", "line 2: a face uses vertex 9, but there are only 1"),
             ("v 0 0 0\nf 1/1 1 1\n", "line 2: a face uses texture coordinate 1, but there are only 0"),
             ("v 0 0 0\nf 1//3 1 1\n", "line 2: a face uses normal 3, but there are only 0"),
-            ("v 0 0 0\nf 0 1 1\n", "line 2: a corner `0` that is none"),
-            ("v 0 0 0\nf -2 1 1\n", "line 2: a corner `-2` that is none"),
-            ("f 1/9223372036854775808 1 1\n", "line 1: a corner"),
-            ("f 99999999999 1 1\n", "line 1: a corner"),
-            ("v 0 0 0\nf /1/1 1 1\n", "line 2: a corner"),
+            ("v 0 0 0\nf 0 1 1\n", "line 2: `0` is not a corner"),
+            ("v 0 0 0\nf -2 1 1\n", "line 2: `-2` is not a corner"),
+            ("f 1/9223372036854775808 1 1\n", "line 1: `"),
+            ("f 99999999999 1 1\n", "line 1: `"),
+            ("v 0 0 0\nf /1/1 1 1\n", "line 2: `"),
         ];
         for (text, expected) in cases {
             let error = read(text).unwrap_err();
