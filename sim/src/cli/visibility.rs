@@ -57,9 +57,9 @@ pub(super) fn run(args: &VisibilityArgs, terminal: &Terminal) -> Result<(), Fail
         found.rates.threads,
         found.rates.end_to_end_samples_per_s / 1e6
     );
-    let remarks: String = std::iter::once(rates).chain(camera).collect();
+    let notes: String = std::iter::once(rates).chain(camera).collect();
     print(&format!(
-        "{} triangles, {}x{} pixels of {} samples: {} of {} samples see a triangle{remarks}",
+        "{} triangles, {}x{} pixels of {} samples: {} of {} samples see a triangle{notes}",
         found.triangles, found.width, found.height, found.samples_per_pixel, found.hits, found.samples
     ))
 }

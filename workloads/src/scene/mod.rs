@@ -327,7 +327,7 @@ impl Scene {
         &self.settings
     }
 
-    /// Remarks of the importer, with stable codes.
+    /// Warnings of the importer, with stable codes.
     pub fn warnings(&self) -> &[Warning] {
         &self.warnings
     }

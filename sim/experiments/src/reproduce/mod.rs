@@ -1,4 +1,4 @@
-//! What the papers report, computed from scratch and compared with them: a module for each paper, a function for each row of the
+//! Reproduction of papers: their claims, computed from scratch and compared with them: a module for each paper, a function for each row of the
 //! list of claims.
 //!
 //! ```text

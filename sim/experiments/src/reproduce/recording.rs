@@ -127,7 +127,7 @@ impl Recording {
         self.truth.frames.iter().map(|frame| integral.energy_j(frame.start_s, frame.finish_s)).collect()
     }
 
-    /// The recorded power over a stretch of time, as points from its start on.
+    /// The recorded power over an interval, as points from its start on.
     pub fn points(&self, from_s: f64, to_s: f64) -> Vec<(f64, f64)> {
         let place =
             |time_s: f64| self.trace.position(time_s).clamp(0.0, self.trace.samples() as f64) as usize;

@@ -114,7 +114,7 @@ pub(super) fn family(report: &Report, family: &Family, measure: &Measure, look: 
             .on(Scale::Even, measure.scale.clone())
             .along(family.parameter, &values(&rows))
     };
-    let title = format!("Where methods fail: {}, {}", family.name, measure.title);
+    let title = format!("Failure modes: {}, {}", family.name, measure.title);
     let subject = format!(
         "{}; grey: all other methods; {} samples lost",
         family.what,

@@ -78,7 +78,7 @@ impl PowerRun<'_> {
         self.start_s + self.power_w.len() as f64 / self.rate_hz
     }
 
-    /// The part of the run that is shown; nothing where there is no time.
+    /// The part of the run that is shown; `None` for a run without duration.
     fn shown(&self) -> Option<Self> {
         if !(self.rate_hz > 0.0 && is_drawable(self.start_s, self.end_s())) {
             return None;
@@ -140,10 +140,10 @@ impl PowerRun<'_> {
         let columns = extremes(self.power_w, (panel.right - panel.left) as usize);
         let width = (panel.right - panel.left) / columns.len() as f64;
         let mut first = 0;
-        for stretch in columns.split(Option::is_none) {
-            let values: Vec<Extremes> = stretch.iter().flatten().copied().collect();
+        for segment in columns.split(Option::is_none) {
+            let values: Vec<Extremes> = segment.iter().flatten().copied().collect();
             let left = panel.left + first as f64 * width;
-            first += stretch.len() + 1;
+            first += segment.len() + 1;
             if values.is_empty() {
                 continue;
             }

@@ -1,4 +1,4 @@
-//! How a series is told apart: colour, marker and strokes.
+//! How a series is distinguished: colour, marker and strokes.
 
 use super::palette::{BACKGROUND, Colour, SERIES};
 use super::picture::{Picture, Point};
@@ -14,7 +14,7 @@ pub(super) enum Marker {
     Diamond,
 }
 
-/// Colour, marker and strokes of a series: what tells it apart on paper without colours, too.
+/// Colour, marker and strokes of a series. Marker and strokes distinguish it also without colours.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Style {
     pub colour: Colour,

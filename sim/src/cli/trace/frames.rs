@@ -114,7 +114,7 @@ fn text(frames: &Frames, table: &FrameTable, summary: Option<Summary>, pixels: O
     let mut lines = String::new();
     if let Some(p) = &frames.proposal {
         lines += &format!(
-            "proposed mark: {} s, the most even of {} rises: {} alike divide {:.0} % of the stretch evenly\n",
+            "proposed mark: {} s, the most even of {} rises: {} similar ones divide {:.0} % of the trace evenly\n",
             p.mark_s,
             p.tried,
             p.alike,

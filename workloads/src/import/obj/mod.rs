@@ -59,7 +59,7 @@ fn geometry(found: &Statements) -> Soup {
     if !colors.is_empty() {
         soup.colors = corners.iter().map(|corner| colors[of_position(corner)]).collect();
     }
-    // A vertex without a normal among those that have one is seldom meant: all are made from the faces then.
+    // A vertex without a normal among those that have one is rarely meant: all are made from the faces then.
     let normals = corners.iter().map(|corner| corner.normal.map(|normal| found.normals[normal as usize]));
     soup.normals = normals.collect::<Option<_>>().unwrap_or_default();
     if corners.iter().any(|corner| corner.uv.is_some()) {

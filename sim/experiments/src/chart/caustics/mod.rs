@@ -148,7 +148,7 @@ impl Study for CausticsChart {
             "light in the water under {} generator triangles; the image is the same by every method",
             2 * self.effort.sweep_cells * self.effort.sweep_cells
         );
-        to.chart("caustics", ["Caustics: beams and bodies about them", &subject], self.costs())?;
+        to.chart("caustics", ["Caustics: light volumes and their bounding volumes", &subject], self.costs())?;
         let title = "Where caustics fail: coarse surfaces and crossed sides";
         let subject = format!(
             "light on the floor in squares of 8x8 pixels against {} photons, refracted at the waves themselves; for crossed sides the light and the number of \

@@ -27,10 +27,10 @@ pub struct Effort {
     pub gaps: &'static [f64],
     /// Ways in which they lie, for each gap.
     pub slides: usize,
-    /// Cases of each kind of the yardsticks of the book, of two objects and of many.
-    pub yardsticks: [usize; 2],
+    /// Reference cases of each kind, of two objects and of many.
+    pub reference_cases: [usize; 2],
     /// Bins of time in a pixel for these.
-    pub yardstick_bins: &'static [u32],
+    pub reference_bins: &'static [u32],
 }
 
 /// A method of collision detection.
@@ -69,8 +69,8 @@ impl Way {
 pub enum Set {
     /// The families.
     Families,
-    /// Cases like those that the yardsticks of the book were measured over.
-    LikeYardsticks,
+    /// Cases like the reference cases of the book.
+    LikeReference,
 }
 
 impl Set {
@@ -78,7 +78,7 @@ impl Set {
     pub fn name(self) -> &'static str {
         match self {
             Self::Families => "families",
-            Self::LikeYardsticks => "like_yardsticks",
+            Self::LikeReference => "like_reference",
         }
     }
 }
@@ -120,9 +120,9 @@ pub struct CollisionChart {
     pub effort: Effort,
     /// Pairs that collide and pairs that do not, of two objects and of many.
     pub pairs: [[usize; 2]; 2],
-    /// The same of the cases like those of the yardsticks.
-    pub yardstick_pairs: [[usize; 2]; 2],
-    /// Way by way: over the families, then over cases like those of the yardsticks.
+    /// The same of the cases like the reference cases.
+    pub reference_pairs: [[usize; 2]; 2],
+    /// Way by way: over the families, then over cases like the reference cases.
     pub rows: Vec<Row>,
     /// Plates that slide, looked at closer.
     pub slides: Vec<Slide>,
@@ -134,14 +134,14 @@ fn all_cases(effort: &Effort) -> Vec<Case> {
     two.chain(cases(301, effort.cases[1]).into_iter().filter(|case| case.objects.len() > 2)).collect()
 }
 
-/// Pixels across at which the yardsticks were measured.
-const YARDSTICK_PIXELS: u32 = 128;
+/// Pixels across of the reference cases.
+const REFERENCE_PIXELS: u32 = 128;
 
-/// The ways of the yardsticks.
-fn yardstick_ways(effort: &Effort) -> Vec<Way> {
-    let once = Search { resolution: YARDSTICK_PIXELS, bins: 1, method: Method::FragmentBox, zoom: false };
+/// The ways of the reference cases.
+fn reference_ways(effort: &Effort) -> Vec<Way> {
+    let once = Search { resolution: REFERENCE_PIXELS, bins: 1, method: Method::FragmentBox, zoom: false };
     let depth_only = Search { method: Method::DepthOnly, ..once };
-    let binned = effort.yardstick_bins.iter().map(|&bins| Search { bins, ..once });
+    let binned = effort.reference_bins.iter().map(|&bins| Search { bins, ..once });
     let images = [depth_only].into_iter().chain(binned).chain([Search::default()]).map(Way::Images);
     [Way::ObjectBoxes, Way::TriangleBoxes].into_iter().chain(images).collect()
 }
@@ -176,8 +176,8 @@ impl Study for CollisionChart {
         bins: &[1, 4, 16],
         gaps: &[0.3, 0.1, 0.03, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 1e-5, 1e-6],
         slides: 16,
-        yardsticks: [12, 3],
-        yardstick_bins: &[1, 16, 64],
+        reference_cases: [12, 3],
+        reference_bins: &[1, 16, 64],
     };
     const QUICK: Effort = Effort {
         cases: [3, 1],
@@ -185,17 +185,17 @@ impl Study for CollisionChart {
         bins: &[1, 4],
         gaps: &[0.3, 0.1, 1e-2, 1e-3],
         slides: 6,
-        yardsticks: [1, 1],
-        yardstick_bins: &[1, 16],
+        reference_cases: [1, 1],
+        reference_bins: &[1, 16],
     };
 
     fn measure(effort: Effort, _scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
         let sets = [
             (Set::Families, all_cases(&effort), ways(&effort)),
             (
-                Set::LikeYardsticks,
-                reference_cases(1, effort.yardsticks[0], effort.yardsticks[1]),
-                yardstick_ways(&effort),
+                Set::LikeReference,
+                reference_cases(1, effort.reference_cases[0], effort.reference_cases[1]),
+                reference_ways(&effort),
             ),
         ];
         let bar = progress.bar("ways", sets.iter().map(|(_, _, ways)| ways.len() as u64).sum());
@@ -207,8 +207,8 @@ impl Study for CollisionChart {
             }
         }
         let slides = measure::slides(&effort, progress);
-        let [pairs, yardstick_pairs] = sets.each_ref().map(|(_, cases, _)| measure::pairs(cases));
-        Ok(Self { effort, pairs, yardstick_pairs, rows, slides })
+        let [pairs, reference_pairs] = sets.each_ref().map(|(_, cases, _)| measure::pairs(cases));
+        Ok(Self { effort, pairs, reference_pairs, rows, slides })
     }
 
     fn draw(&self, to: &Gallery<'_>) -> Result<(), OutputError> {
@@ -232,8 +232,8 @@ impl Study for CollisionChart {
                 .after(below)
         };
         let families = ways(Set::Families, format!("{}\n", subject(&self.pairs)));
-        let below = format!("{}, cases like those of the yardsticks\n", subject(&self.yardstick_pairs));
-        let yardsticks = ways(Set::LikeYardsticks, below);
+        let below = format!("{}, cases like the reference cases\n", subject(&self.reference_pairs));
+        let reference = ways(Set::LikeReference, below);
         let slides = Table::of(&self.slides)
             .shown("plates that slide: gap", |slide| slide.gap, |gap| format!("{gap:e}"))
             .shown("px", |slide| slide.resolution, plain)
@@ -247,7 +247,7 @@ impl Study for CollisionChart {
             .data("missed", |row| row.missed)
             .data("pair_s", |row| row.pair_s)
             .csv("collision.csv");
-        vec![families.sheet(), yardsticks.sheet(), slides.sheet(), rows.sheet()]
+        vec![families.sheet(), reference.sheet(), slides.sheet(), rows.sheet()]
     }
 
     fn tradeoff(&self) -> Vec<TradeoffPoint> {

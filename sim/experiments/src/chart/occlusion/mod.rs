@@ -27,7 +27,7 @@ pub struct Effort {
     pub samples: &'static [u32],
     /// Sides of tiles in pixels.
     pub tiles: &'static [u32],
-    /// Slats that a wall is made of where methods fail.
+    /// Slats that a wall is made of for failure modes.
     pub slats: &'static [u32],
 }
 

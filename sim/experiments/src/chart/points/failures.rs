@@ -1,4 +1,4 @@
-//! Where it fails: voids thinner than the spacing of numbers, and densities that columns do not follow.
+//! Failure modes: voids thinner than an ulp, and densities that columns do not follow.
 
 use serde::Serialize;
 use workloads::points::poisson::{Domain, PoissonError, PoissonSpec, Spacing, poisson_disk};

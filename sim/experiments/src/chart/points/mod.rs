@@ -40,7 +40,7 @@ pub struct PointsChart {
     pub effort: Effort,
     /// Dimension by dimension, method by method.
     pub rows: Vec<Row>,
-    /// Voids thinner than the spacing of numbers.
+    /// Voids thinner than an ulp.
     pub coarse: Vec<Coarse>,
     /// Candidates for a point that follows a density.
     pub columns: Vec<Columns>,
@@ -199,7 +199,7 @@ impl PointsChart {
         };
         let columns = (1..=4).map(of).collect();
         vec![
-            coarse("voids thinner than the spacing of numbers", "voids without a number, a point", |c| {
+            coarse("voids thinner than an ulp", "voids without a number, a point", |c| {
                 c.thin_voids as f64 / c.points as f64
             }),
             coarse("what that costs: holes", "largest hole beyond r, share of r", |c| c.beyond),

@@ -111,9 +111,9 @@ impl Stage {
 
 /// Seeds of references start here.
 const REFERENCE_SEED: u64 = 1_000;
-/// Samples a pixel of each of their tables, and places on the light when biases are compared.
+/// Samples a pixel of each of their tables, and light samples when biases are compared.
 const MOST: u32 = 256;
-/// Places on the light when biases are compared.
+/// Light samples when biases are compared.
 const BIAS_POINTS: u32 = 16;
 /// Biases in widths of a texel.
 const BIASES: [f64; 9] = [0.0, 0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 16.0, 64.0];

@@ -1,7 +1,7 @@
 //! `quintile chart shadows`: soft shadows from a five-dimensional shadow map against accumulation buffering.
 //!
 //! Error is the root of the mean squared difference to an image in which every sample asks the light by rays, over all pixels and
-//! channels in linear light. Cost is that of making the map, in one pass and in as many passes as places on the light.
+//! channels in linear light. Cost is that of making the map, in one pass and in as many passes as light samples.
 
 mod measure;
 
@@ -38,7 +38,7 @@ pub struct ShadowsChart {
     pub effort: Effort,
     /// Samples per pixel of the reference.
     pub reference_samples_per_pixel: u32,
-    /// By places on the light, from few to many.
+    /// By light samples, from few to many.
     pub rows: Vec<Row>,
     /// Where it does not work: too small and too large a bias, by its size.
     pub biases: Vec<Bias>,
@@ -47,7 +47,7 @@ pub struct ShadowsChart {
 impl Study for ShadowsChart {
     const NAME: &'static str = "shadows";
     const ABOUT: &'static str =
-        "Soft shadows: error over places on the light, one pass against accumulation, and the bias";
+        "Soft shadows: error over light samples, one pass against accumulation, and the bias";
     const PICTURES: &'static [&'static str] = &["shadows_error", "shadows_cost", "shadows_failures"];
     const FILES: &'static [&'static str] = &["shadows.csv", "shadows.json"];
 
@@ -127,7 +127,7 @@ impl Study for ShadowsChart {
 
     fn tradeoff(&self) -> Vec<TradeoffPoint> {
         let point = |(row, method, cost): (&Row, &str, &Cost)| {
-            let level = format!("{} places on the light", row.points);
+            let level = format!("{} light samples", row.points);
             let host_s = Metric::host_s(cost.host_s).beside(row.accumulation.host_s);
             TradeoffPoint::new("soft shadows", [method, &level], [Metric::rmse(row.rmse), host_s])
         };
@@ -144,7 +144,7 @@ fn methods(row: &Row) -> [(&Row, &'static str, &Cost); 2] {
     [(row, "one pass", &row.one_pass), (row, "accumulation", &row.accumulation)]
 }
 
-/// So many places on the light, and a run does not warn any more.
+/// Light samples from which on a run does not warn.
 const BANDS_BELOW: f64 = 16.0;
 
 fn panel(title: &str, up: &str, curves: Vec<Series>) -> ChartPanel {

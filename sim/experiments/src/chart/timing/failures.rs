@@ -36,7 +36,7 @@ pub struct FailureRow {
 /// The level that is chosen where so many percent are asked for.
 #[derive(Clone, Debug, Serialize)]
 pub struct Chosen {
-    /// What is asked for.
+    /// Requested error, percent.
     pub asked_percent: f64,
     /// The cheapest level within it.
     pub level: Level,

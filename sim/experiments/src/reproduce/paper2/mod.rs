@@ -60,7 +60,7 @@ fn ran(recording: &Recording, found: usize) -> Vec<Number> {
     ])
 }
 
-/// Energies of the stretches of a frame over all frames, with the mean idle power taken off as in the paper, J per pixel.
+/// Energies of the segments of a frame over all frames, with the mean idle power taken off as in the paper, J per pixel.
 struct Split {
     drawing: f64,
     rest: f64,

@@ -48,7 +48,7 @@ pub enum TraceCommand {
     Sample(Box<SampleArgs>),
     /// Draw a trace or its frames
     Plot(Box<PlotArgs>),
-    /// Which settings of a table no other beats in time and energy
+    /// Pareto-optimal settings of a table, by time and energy
     Pareto(ParetoArgs),
 }
 
