@@ -20,9 +20,8 @@ pub mod plot;
 pub mod progress;
 pub mod protobuf;
 pub mod report;
-mod stats;
 pub mod table;
 pub mod terminal;
 
 pub use dir::{Claim, Destination, OutDir, OutputError};
-pub use stats::MeanSd;
+pub use table::MeanSd;

@@ -12,7 +12,7 @@ use workloads::stress::{Size, family};
 use crate::stress::intervals::Pairs;
 use crate::stress::measure::Work;
 use crate::stress::methods::{SWITCHES, combinations};
-use crate::stress::subject::{self, Subject, differing};
+use crate::stress::methods::{Subject, differing, on_subject};
 use crate::study::table::{Sheet, Table, fixed, plain, share};
 use crate::study::tradeoff::{Metric, TradeoffPoint, front};
 use crate::study::{Gallery, Study, StudyError};
@@ -171,7 +171,7 @@ fn of_family(name: &'static str, value: f64, effort: &Effort, gpu: &GpuSpec) -> 
     let label = format!("{name} at {value}");
     let family =
         family(name).ok_or_else(|| RunError::Setting(format!("{label}: there is no such family")))?;
-    subject::on(family, value, (effort.families, 1), gpu, |subject| rows(&label, subject, effort.pairs))
+    on_subject(family, value, (effort.families, 1), gpu, |subject| rows(&label, subject, effort.pairs))
 }
 
 fn of_scene(name: &str, effort: &Effort, gpu: &GpuSpec) -> Result<Vec<Row>, RunError> {

@@ -9,12 +9,10 @@
 //! settings for each paper; a row is judged over all that is left open (`Band`).
 
 mod band;
-mod earlier;
 mod figure;
 mod paper2;
 mod paper3;
 mod paper6;
-mod recording;
 mod report;
 mod row;
 mod scenes;
@@ -167,7 +165,7 @@ pub fn reproduce(
     progress: &Progress,
 ) -> Result<Report, RunError> {
     options.check(paper)?;
-    earlier::check(paper, options, out)?;
+    report::check_earlier(paper, options, out)?;
     // The folder first: that it cannot be made is better known before the work than after it.
     let mut dir = out.open([report::claim(paper)])?;
     let report = compute(paper, options, progress)?;

@@ -1,13 +1,18 @@
 //! All rows of a paper as text, JSON and files.
+//!
+//! What a folder already holds: rows of an earlier call that this one would lose.
 
-use serde::Serialize;
+use std::fs;
+
+use output::table::Table;
+use output::{Claim, Destination, OutDir, OutputError};
+use run::RunError;
+use serde::{Deserialize, Serialize};
 
 use super::row::Row;
 use super::settings::{Form, Listed, Origin};
 use super::verdict::Verdict;
-use super::{Done, Figure, Paper};
-use output::table::Table;
-use output::{Claim, OutDir, OutputError};
+use super::{Done, Figure, Options, Paper};
 
 /// The rows of a paper.
 #[derive(Serialize)]
@@ -189,6 +194,46 @@ fn stem_of(path: &str) -> &str {
     path.strip_suffix(".svg").unwrap_or(path)
 }
 
+/// As much of a report as is asked for here.
+#[derive(Deserialize)]
+struct Earlier {
+    form: Form,
+    rows: Vec<Id>,
+}
+
+#[derive(Deserialize)]
+struct Id {
+    id: String,
+}
+
+/// Refuses a folder with a result of `paper` that has rows which are not computed now, or all of them in full where this is the quick
+/// form. What cannot be read is no result.
+pub(super) fn check_earlier(paper: Paper, options: &Options, out: &Destination) -> Result<(), RunError> {
+    let file = out.folder.join(format!("{}.json", stem(paper)));
+    let text = if out.force { None } else { fs::read_to_string(file).ok() };
+    let Some(Earlier { form, rows }) = text.and_then(|text| serde_json::from_str(&text).ok()) else {
+        return Ok(());
+    };
+    let lost = rows.iter().filter(|row| !options.wants(&row.id)).count();
+    let smaller = form == Form::Full && options.quick;
+    if lost == 0 && !smaller {
+        return Ok(());
+    }
+    let ids: Vec<&str> = rows.iter().map(|row| row.id.as_str()).collect();
+    let why = match lost {
+        0 => "this is the quick form".to_owned(),
+        lost => format!("{lost} of them are not computed now"),
+    };
+    Err(RunError::Setting(format!(
+        "{}: holds a {} result of Paper {} with {} rows ({}), and {why}; give another folder with --out, or --force to lose it",
+        out.folder.display(),
+        form.name(),
+        paper.number(),
+        ids.len(),
+        ids.join(", ")
+    )))
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::row::tests::row;
@@ -242,5 +287,36 @@ mod tests {
         assert_eq!((&json["paper"], &json["form"]), (&"III".into(), &"quick".into()));
         assert_eq!(json["rows"][0]["settings_sha256"], json["settings"]["sha256"]);
         assert!(report.markdown().contains("| III-9 | O,F | one | two | *differs*: because |"));
+    }
+
+    #[test]
+    fn a_larger_result_is_not_replaced_by_a_smaller_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let out = Destination::new(folder.path());
+        let options = |quick, rows: &[&str]| Options {
+            quick,
+            rows: rows.iter().map(|row| (*row).to_owned()).collect(),
+            ..Options::default()
+        };
+        let refusal =
+            |options: &Options| check_earlier(Paper::Six, options, &out).err().map(|error| error.to_string());
+        assert_eq!(refusal(&options(true, &["VI-2"])), None, "an empty folder");
+        let file = folder.path().join("reproduce_VI.json");
+        fs::write(&file, r#"{"form": "full", "rows": [{"id": "VI-1"}, {"id": "VI-2"}]}"#).unwrap();
+        for (smaller, why) in [
+            (options(false, &["vi-2"]), "1 of them are not computed now"),
+            (options(true, &[]), "this is the quick form"),
+        ] {
+            let message = refusal(&smaller).unwrap();
+            assert!(message.contains("a full result of Paper VI with 2 rows (VI-1, VI-2)"), "{message}");
+            assert!(message.contains(why) && message.contains("--force"), "{message}");
+        }
+        assert_eq!(refusal(&options(false, &[])), None, "all rows anew");
+        assert_eq!(refusal(&options(false, &["VI-1", "vi-2"])), None);
+        let forced = Destination { force: true, ..out.clone() };
+        assert!(check_earlier(Paper::Six, &options(true, &["VI-2"]), &forced).is_ok());
+        assert!(check_earlier(Paper::Two, &options(true, &[]), &out).is_ok(), "a result of another paper");
+        fs::write(&file, "mine").unwrap();
+        assert_eq!(refusal(&options(true, &["VI-2"])), None, "no result; whose it is is asked elsewhere");
     }
 }

@@ -176,25 +176,67 @@ impl<T: Debug + PartialEq> Setting<T> {
 /// Declares the settings of rows. A line is a field, the type of its value, and the check that every value of it has to pass. Before
 /// them is what a row says whatever comes out.
 macro_rules! row_settings {
-    ($($(#[$doc:meta])* $row:ident { $($field:ident: $type:ty, $check:ident($($would_do:expr),+);)+ })+) => {$(
-        $(#[$doc])*
-        #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
-        #[serde(deny_unknown_fields)]
-        pub(super) struct $row {
-            pub about: About,
-            $(pub $field: Setting<$type>,)+
-        }
-
-        impl $row {
-            /// Checks every value; `row` is its name in the file.
-            fn check(&self, row: &str) -> Result<(), String> {
-                $(self.$field.$check(&format!("{row}.{}", stringify!($field)), $($would_do),+)?;)+
-                Ok(())
-            }
-        }
+    ($($(#[$doc:meta])* $row:ident { $($fields:tt)+ })+) => {$(
+        $crate::reproduce::settings::settings_group! { $(#[$doc])* $row { pub about: About, } { $($fields)+ } }
     )+};
 }
 pub(super) use row_settings;
+
+/// Declares one group of settings, after fields that are not checked.
+macro_rules! settings_group {
+    (
+        $(#[$doc:meta])* $group:ident { $($unchecked:tt)* }
+        { $($field:ident: $type:ty, $check:ident($($would_do:expr),+);)+ }
+    ) => {
+        $(#[$doc])*
+        #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
+        #[serde(deny_unknown_fields)]
+        pub(super) struct $group {
+            $($unchecked)*
+            $(pub $field: Setting<$type>,)+
+        }
+
+        impl $group {
+            /// Checks every value; `group` is its name in the file.
+            fn check(&self, group: &str) -> Result<(), String> {
+                $(self.$field.$check(&format!("{group}.{}", stringify!($field)), $($would_do),+)?;)+
+                Ok(())
+            }
+        }
+    };
+}
+pub(super) use settings_group;
+
+/// Declares the settings file of a paper: its number, its name in `sim/experiments/papers`, and its groups in order.
+macro_rules! paper_settings {
+    ($paper:expr, $file:literal { $($group:ident: $type:ty,)+ }) => {
+        /// The file.
+        #[derive(Clone, Debug, serde::Deserialize)]
+        #[serde(deny_unknown_fields)]
+        pub(super) struct Settings {
+            paper: String,
+            #[allow(dead_code, reason = "names what passages refer to, for readers of the file")]
+            source: String,
+            $(pub $group: $type,)+
+        }
+
+        impl $crate::reproduce::settings::PaperSettings for Settings {
+            const PAPER: $crate::reproduce::Paper = $paper;
+            const FILE: &str = concat!("sim/experiments/papers/", $file);
+            const TEXT: &str = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/papers/", $file));
+
+            fn paper(&self) -> &str {
+                &self.paper
+            }
+
+            fn check(&self) -> Result<(), String> {
+                $(self.$group.check(stringify!($group))?;)+
+                Ok(())
+            }
+        }
+    };
+}
+pub(super) use paper_settings;
 
 /// All settings of a paper.
 pub trait PaperSettings: DeserializeOwned {

@@ -9,7 +9,7 @@ use serde::Serialize;
 use workloads::stress::set_up_all;
 
 use super::methods::Place;
-use super::subject::Subject;
+use super::methods::Subject;
 use super::truth::{Hulls, Truth};
 
 /// Pairs of a triangle and a tile, with what is true of each.

@@ -5,8 +5,7 @@ use serde::Serialize;
 use workloads::stress::{Family, Size};
 
 use super::intervals::{Intervals, Pairs};
-use super::methods::Method;
-use super::subject::{self, differing};
+use super::methods::{Method, differing, on_subject};
 use run::GpuSpec;
 use run::RunError;
 
@@ -84,7 +83,7 @@ pub fn measure(
     gpu: &GpuSpec,
     methods: &[Method],
 ) -> Result<Vec<Row>, RunError> {
-    subject::on(family, value, (size, super::SEED), gpu, |subject| {
+    on_subject(family, value, (size, super::SEED), gpu, |subject| {
         let pairs = Pairs::of(subject, PAIRS[usize::from(size != Size::FULL)]);
         let (reference, brute) = subject.reference()?;
         let row = |method: &Method| {

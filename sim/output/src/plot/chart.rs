@@ -3,11 +3,10 @@
 use std::ops::Range;
 
 use super::axis::{Axis, AxisSpec, Extent, Scale, Way};
-use super::labels::{self, Label};
 use super::legend::{Key, LEGEND_LINE, LEGEND_PX, legend_column, legend_lines, plate};
 use super::look::Look;
 use super::palette::{INK, MARK, MUTED};
-use super::panel::{BELOW, Panel, aside};
+use super::panel::{self, BELOW, Label, Panel, aside};
 use super::picture::{Across, Picture, Text, text};
 use super::series::{Mark, Series};
 use super::text::text_width;
@@ -417,7 +416,7 @@ impl ChartPanel {
             labels.extend(names.map(|(at, radius, name)| Label { name, at, radius, colour, bold }));
         }
         let obstacles: Vec<_> = self.series.iter().flat_map(|series| series.mark.obstacles(area)).collect();
-        let left_out = labels::write(picture, area, &labels, &obstacles);
+        let left_out = panel::write(picture, area, &labels, &obstacles);
         if left_out > 0 {
             let at = (area.right, area.bottom + 38.0);
             let words = format!("{left_out} {} without room", if left_out == 1 { "name" } else { "names" });

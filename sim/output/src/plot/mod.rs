@@ -21,10 +21,9 @@
 mod axis;
 mod chart;
 mod columns;
-mod frame_energy;
-mod frame_power;
+mod frame_plots;
 mod heat_map;
-mod labels;
+mod lanes;
 mod legend;
 mod look;
 mod matrix;
@@ -34,16 +33,15 @@ mod picture;
 mod power_run;
 mod render;
 mod series;
-mod stalls;
-mod style;
 mod text;
-mod unit_busy;
 
 pub use axis::{AxisSpec, Scale};
 pub use chart::{Chart, ChartPanel};
-pub use frame_energy::{FrameEnergy, FrameEnergyPoint};
-pub use frame_power::{FramePower, PowerPart};
+pub use frame_plots::{FrameEnergy, FrameEnergyPoint};
+pub use frame_plots::{FramePower, PowerPart};
 pub use heat_map::{HeatMapPlot, HeatTile, Shading};
+pub use lanes::{StallLane, StallLanes};
+pub use lanes::{UnitBusy, UnitLane};
 pub use look::{COLUMN_MM, Look};
 pub use matrix::{Matrix, MatrixPanel};
 pub use palette::{Colour, part_colour};
@@ -51,8 +49,6 @@ pub use picture::Picture;
 pub use power_run::PowerRun;
 pub use render::PlotError;
 pub use series::{Mark, Paint, Series, Spread};
-pub use stalls::{StallLane, StallLanes};
-pub use unit_busy::{UnitBusy, UnitLane};
 
 #[cfg(test)]
 mod tests;

@@ -1,10 +1,10 @@
 //! Series: what is drawn within a panel, each with its style.
 
 use super::legend::Key;
+use super::legend::Style;
 use super::palette::{BACKGROUND, FAINT, INK};
 use super::panel::Panel;
 use super::picture::{Picture, Point};
-use super::style::Style;
 
 /// Something to draw.
 #[derive(Clone, Debug)]

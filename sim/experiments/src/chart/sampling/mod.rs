@@ -4,15 +4,13 @@
 //! pixels and the three channels, in linear light. Host time is that of one frame through the pipeline, caches and all; the
 //! table is made before.
 
-mod failures;
 mod measure;
-mod stages;
 
 use glam::Vec3;
 use pipeline::SampleSpec;
 use serde::Serialize;
 
-use super::fit::exponent;
+use super::statistics::exponent;
 use crate::study::table::{Sheet, Table, fixed, optional, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
 use crate::study::{Gallery, Study, StudyError};
@@ -20,8 +18,8 @@ use output::OutputError;
 use output::plot::{ChartPanel, Scale, Series};
 use output::progress::Progress;
 
-pub use failures::{Failures, Shared};
 pub use measure::Point;
+pub use measure::{Failures, Shared};
 
 /// How much is measured.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -107,11 +105,11 @@ impl Study for SamplingChart {
     };
 
     fn measure(effort: Effort, _scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
-        let stages = stages::scenes(&effort)?;
+        let stages = measure::scenes(&effort)?;
         let references = stages.iter().map(|stage| measure::reference(stage, &effort));
         let references: Vec<Vec<Vec3>> = references.collect::<Result<_, _>>()?;
         let tables: Vec<&str> = SampleSpec::names().map(|(name, _)| name).collect();
-        let bar = progress.bar("sampling", ((stages.len() * tables.len()) + failures::STEPS) as u64);
+        let bar = progress.bar("sampling", ((stages.len() * tables.len()) + measure::STEPS) as u64);
         let mut rows = Vec::new();
         for (stage, reference) in stages.iter().zip(&references) {
             for &table in &tables {
@@ -120,7 +118,7 @@ impl Study for SamplingChart {
                 bar.inc();
             }
         }
-        let failures = failures::measure(&stages, &references, &effort, &bar)?;
+        let failures = measure::failures(&stages, &references, &effort, &bar)?;
         Ok(Self { effort, reference_samples_per_pixel: effort.reference(), rows, failures })
     }
 
@@ -241,4 +239,82 @@ fn fitted(points: &[Point]) -> Option<f64> {
 }
 
 #[cfg(test)]
-mod tests;
+mod tests {
+    use super::*;
+    use crate::chart::statistics::neighbours;
+    use crate::study::written;
+
+    /// Small enough for a test.
+    const SMALL: Effort = Effort {
+        scene: ("tiny", 1),
+        size: [64, 48],
+        most_samples: 32,
+        reference_frames: 4,
+        reference_samples: 256,
+        seeds: 2,
+        every_up_to: 2,
+    };
+
+    /// No more than there has to be.
+    const LEAST: Effort =
+        Effort { size: [16, 9], most_samples: 2, reference_frames: 1, reference_samples: 8, ..SMALL };
+
+    fn row<'a>(rows: &'a [Row], scene: &str, table: &str) -> &'a Row {
+        rows.iter().find(|row| row.scene == scene && row.table == table).unwrap()
+    }
+
+    #[test]
+    fn random_converges_as_theory_says_and_the_default_faster() {
+        let chart = SamplingChart::measure(SMALL, &[], &Progress::new(true)).unwrap();
+        for scene in ["motion", "defocus", "motion and defocus"] {
+            // Independent samples: the error of the mean falls with the root of their number.
+            let random = row(&chart.rows, scene, "random").exponent.unwrap();
+            assert!((random + 0.5).abs() < 0.06, "{scene}: {random}");
+            let owen = row(&chart.rows, scene, "owen");
+            assert!(owen.exponent.unwrap() < -0.6, "{scene}: {:?}", owen.exponent);
+            let last = |row: &Row| row.points[row.points.len() - 1].rmse;
+            assert!(last(owen) < 0.8 * last(row(&chart.rows, scene, "random")), "{scene}");
+        }
+        // The fence: half of it seen at random, so one sample errs by a half in every channel.
+        let fence = row(&chart.failures.many_edges, "fence", "random");
+        assert!((fence.points[0].rmse - 0.5).abs() < 0.02, "{}", fence.points[0].rmse);
+        let owen = row(&chart.failures.many_edges, "fence", "owen").exponent.unwrap();
+        assert!(owen > -0.6, "the default table has nothing to gain there: {owen}");
+    }
+
+    #[test]
+    fn the_numbers_do_not_depend_on_threads() {
+        let with = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            let chart = pool.install(|| SamplingChart::measure(LEAST, &[], &Progress::new(true))).unwrap();
+            let errors = chart.rows.iter().flat_map(|row| &row.points).map(|point| point.rmse.to_bits());
+            errors.collect::<Vec<_>>()
+        };
+        assert_eq!(with(1), with(3));
+    }
+
+    #[test]
+    fn equal_errors_are_alike_and_alternating_ones_opposite() {
+        let row = |signs: [f64; 4]| signs.iter().flat_map(|s| [*s; 3]).collect::<Vec<_>>();
+        assert_eq!(neighbours(&row([1.0; 4]), 4), 1.0);
+        assert_eq!(neighbours(&row([1.0, -1.0, 1.0, -1.0]), 4), -1.0);
+        assert_eq!(neighbours(&row([0.0; 4]), 4), 0.0);
+        assert_eq!(neighbours(&row([1.0; 4]), 1), 0.0, "a column has no neighbours");
+    }
+
+    #[test]
+    fn the_files_are_all_there_and_agree() {
+        let (folder, chart, _) = written::<SamplingChart>(LEAST);
+        let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
+        let json: serde_json::Value = serde_json::from_str(&read("sampling.json")).unwrap();
+        assert_eq!(json["rows"].as_array().unwrap().len(), chart.rows.len());
+        assert_eq!(json["reference_samples_per_pixel"], 8);
+        let (three, five, two) = (3, 5, 2);
+        // Header; scene, table, samples; numbers of samples one by one; the fence.
+        assert_eq!(read("sampling.csv").lines().count(), 1 + three * five * two + three * two + five * two);
+        assert!(read("sampling.md").contains("| motion | owen |"));
+        for stem in SamplingChart::PICTURES {
+            assert!(read(&format!("{stem}.svg")).ends_with("</svg>\n"));
+        }
+    }
+}

@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 use timing::streams;
 
+use super::animations::Packets;
 use super::measure::{self, Row, Speed, Written};
-use super::subjects::Packets;
 use run::GpuSpec;
 use run::{RunError, cheapest_level};
 use timing::Level;

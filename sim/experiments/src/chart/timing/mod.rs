@@ -1,17 +1,15 @@
 //! `quintile chart timing`: every level of timing against the reference, over scenes and GPUs.
 
-mod added;
 mod animations;
 mod failures;
 mod measure;
 mod picture;
-mod subjects;
 
 use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::quantiles::quantiles;
+use super::statistics::quantiles;
 use crate::study::table::{Sheet, Table, fixed, percent, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
 use crate::study::{Gallery, Study, StudyError};
@@ -22,9 +20,9 @@ use run::GpuSpec;
 use run::RunError;
 use timing::Level;
 
-pub use added::AddedRow;
 pub use animations::AnimationRow;
 pub use failures::{Chosen, FailedLevel, FailureRow, RateRow};
+pub use measure::AddedRow;
 pub use measure::Row;
 
 /// GPUs in the chart: small, integrated, large.
@@ -110,7 +108,7 @@ impl Study for TimingChart {
 
     fn measure(Quick(quick): Quick, files: &[String], progress: &Progress) -> Result<Self, StudyError> {
         let gpus: Vec<GpuSpec> = GPUS.iter().map(GpuSpec::load).collect::<Result<_, _>>()?;
-        let subjects = subjects::all(files, quick)?;
+        let subjects = animations::all(files, quick)?;
         let bar = progress.bar("scenes", (subjects.len() * gpus.len()) as u64);
         // One after another: host times are part of what is measured.
         let (mut rows, mut added, mut reference) = (Vec::new(), Vec::new(), measure::Speed::default());
@@ -118,7 +116,7 @@ impl Study for TimingChart {
             for gpu in &gpus {
                 let stream = subject.stream(gpu)?;
                 rows.extend(measure::rows(subject.name(), gpu, &stream, &mut reference)?);
-                added.extend(added::rows(subject, gpu)?);
+                added.extend(measure::added(subject, gpu)?);
                 bar.inc();
             }
         }
@@ -183,7 +181,7 @@ fn animated(
 ) -> Result<Vec<AnimationRow>, RunError> {
     let extent = animations::Extent::of(quick);
     let mut rows = Vec::new();
-    for scene in subjects::SCENES.into_iter().chain(files.iter().map(String::as_str)) {
+    for scene in animations::SCENES.into_iter().chain(files.iter().map(String::as_str)) {
         for gpu in gpus {
             rows.extend(animations::rows(scene, gpu, extent, progress)?);
         }

@@ -2,7 +2,7 @@
 
 use super::animations::SAMPLED;
 use super::{Row, TimingChart};
-use crate::chart::quantiles::quantiles;
+use crate::chart::statistics::quantiles;
 use crate::study::tradeoff::front;
 use output::plot::{AxisSpec, Chart, ChartPanel, Look, Mark, Paint, Picture, Scale, Series, Spread};
 use timing::Level;

@@ -12,7 +12,7 @@ use workloads::multiview::{Layout, Rig, Target, Views};
 use workloads::{Frame, Overrides, Scene};
 
 use super::{SAMPLES, line, stereo};
-use crate::chart::image::{errors, mean_square};
+use crate::chart::statistics::{errors, mean_square};
 use crate::study::StudyError;
 use run::GpuSpec;
 

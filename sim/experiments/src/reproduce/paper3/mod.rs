@@ -1,21 +1,22 @@
 //! Paper III, "Per-frame Energy Measurement Methodology for Computer Graphics".
+//!
+//! Settings of Paper III's rows.
 
 mod blocking;
 mod disturbance;
 mod finding;
 mod launch;
-mod settings;
 
-use power_model::{Circumstances, FramePower, Pacing};
-
-use super::recording::{Recording, looped};
-use super::row::With;
-use super::settings::{Form, Origin, load, reduced};
-use super::stage::Stage;
-use super::{Done, Options};
 use output::progress::Progress;
+use power_model::{Circumstances, FramePower, Pacing};
 use run::RunError;
-use settings::Settings;
+
+use super::row::With;
+use super::settings::{
+    About, Form, Origin, Setting, load, paper_settings, reduced, row_settings, settings_group,
+};
+use super::stage::{Recording, Stage, looped};
+use super::{Done, Options, Paper};
 
 /// Both machines, with their frames drawn once.
 struct Bench<'a> {
@@ -128,4 +129,82 @@ pub(super) fn rows(options: &Options, progress: &Progress) -> Result<(Origin, Ve
         bar.inc();
     }
     Ok((bench.origin, done))
+}
+
+paper_settings!(Paper::Three, "paper3.ron" {
+    work: Work,
+    iii_1: Finding,
+    iii_2: Sums,
+    iii_3: WarmUp,
+    iii_4: BlockingPhone,
+    iii_5: BlockingPc,
+    iii_6: Disturbance,
+});
+
+settings_group! {
+    /// How much is simulated and recorded for all rows.
+    Work {} {
+        pc_frames: u32, within(1..=36);
+        phone_step: u32, within(1..=8);
+        recorded_frames: usize, within(24..=10_000);
+        still_frames: usize, within(200..=10_000);
+        repeats: u64, within(1..=1000);
+    }
+}
+
+row_settings! {
+    Finding {
+        marked: usize, within(1..=8);
+        found_vsync: f64, within(0.0..=1.0);
+        found_free: f64, within(0.0..=1.0);
+        within_ms: f64, within(0.001..=10.0);
+    }
+
+    Sums {
+        same: f64, within(0.0..=1.0);
+    }
+
+    WarmUp {
+        frames: u32, within(1..=1000);
+        planted_s: f64, within(0.1..=4.0);
+        near: f64, within(0.0..=100.0);
+        recorded: usize, within(150..=10_000);
+    }
+
+    BlockingPhone {
+        waiting_w: f64, within(0.0..=10.0);
+        idle_w: f64, within(0.01..=10.0);
+        edge: f64, within(0.01..=1.0);
+    }
+
+    BlockingPc {
+        with_mj: (f64, f64), must(energy, ENERGY);
+        without_mj: (f64, f64), must(energy, ENERGY);
+        waiting_w: f64, within(0.0..=100.0);
+        background_w: f64, within(0.0..=100.0);
+    }
+
+    Disturbance {
+        extra_w: f64, within(0.0..=10.0);
+        frames: (usize, usize), must(|(low, high)| low <= high, "fewest and most");
+        shorts: u64, within(2..=1000);
+    }
+}
+
+fn energy((mean, deviation): &(f64, f64)) -> bool {
+    *mean > 0.0 && *deviation > 0.0
+}
+
+const ENERGY: &str = "a mean and a deviation above 0";
+
+#[cfg(test)]
+mod tests {
+    use super::super::settings::load;
+    use super::*;
+
+    #[test]
+    fn the_committed_file_is_valid() {
+        let (_, origin) = load::<Settings>(None).unwrap();
+        assert!(origin.committed && origin.sha256.len() == 64);
+    }
 }
