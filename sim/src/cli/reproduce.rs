@@ -6,7 +6,7 @@ use std::time::Instant;
 use clap::Args;
 
 use super::Failure;
-use super::terminal::{print, print_json};
+use super::outputs::{print, print_json};
 use experiments::reproduce::{Options, Paper, reproduce};
 use output::Destination;
 use output::progress::Progress;

@@ -9,7 +9,7 @@ use serde::Serialize;
 use workloads::Overrides;
 use workloads::stress::{Size, family};
 
-use crate::stress::intervals::Pairs;
+use crate::stress::measure::Pairs;
 use crate::stress::measure::Work;
 use crate::stress::methods::{SWITCHES, combinations};
 use crate::stress::methods::{Subject, differing, on_subject};

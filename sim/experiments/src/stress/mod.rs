@@ -1,18 +1,15 @@
 //! `quintile stress`: the failure catalogue, each method on each family.
 //!
 //! - [`methods`]: the sets of tests compared, what they are tried on, and what every sample has to see.
-//! - [`sweep`], [`truth`]: when a triangle truly touches a tile.
-//! - [`intervals`]: the boxes of tile tests against that.
-//! - [`measure`]: all of it for one value of a family.
+//! - [`truth`]: when a triangle truly touches a tile.
+//! - [`measure`]: the boxes of tile tests against that, and all of it for one value of a family.
 //! - [`choice`]: `auto` against every fixed choice of tests.
 //! - [`Report`]: every row, as a study with tables, CSV and pictures.
 
 pub mod choice;
-pub mod intervals;
 pub mod measure;
 pub mod methods;
 mod picture;
-pub mod sweep;
 pub mod truth;
 
 use rayon::prelude::*;

@@ -4,9 +4,9 @@ use std::ops::Range;
 
 use super::axis::{Axis, AxisSpec, Extent, Scale, Way};
 use super::legend::{Key, LEGEND_LINE, LEGEND_PX, legend_column, legend_lines, plate};
-use super::look::Look;
 use super::palette::{INK, MARK, MUTED};
 use super::panel::{self, BELOW, Label, Panel, aside};
+use super::picture::Look;
 use super::picture::{Across, Picture, Text, text};
 use super::series::{Mark, Series};
 use super::text::text_width;

@@ -2,9 +2,9 @@
 
 use super::axis::{Axis, Way, is_drawable};
 use super::legend::{Key, legend_lines};
-use super::look::Look;
 use super::palette::{AXIS, CLASSES, Colour, INK, heat};
 use super::panel::tick_label;
+use super::picture::Look;
 use super::picture::{Across, Picture, Text, text};
 use crate::table::digits;
 

@@ -5,9 +5,9 @@
 use super::axis::{Axis, Way, is_drawable};
 use super::columns::means;
 use super::legend::{Key, legend_lines};
-use super::look::Look;
 use super::palette::{INK, MUTED, STATES, heat, named_unit_colour};
 use super::panel::{BELOW, Panel};
+use super::picture::Look;
 use super::picture::{Across, Picture, Text, text};
 use super::text::{shortened, text_width};
 use crate::table::si;

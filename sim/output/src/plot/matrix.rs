@@ -1,7 +1,7 @@
 //! Costs or errors of methods by what they were tried on, as shaded cells.
 
-use super::look::Look;
 use super::palette::{BACKGROUND, INK, MUTED, heat};
+use super::picture::Look;
 use super::picture::{Across, Picture, Text, text};
 use super::text::shortened;
 use super::text::text_width;

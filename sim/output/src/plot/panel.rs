@@ -238,8 +238,8 @@ fn nearest(label: &Label<'_>, panel: &Panel, taken: &[Box4]) -> Option<(Box4, f6
 #[cfg(test)]
 mod tests {
     use super::super::axis::{Axis, Way};
-    use super::super::look::Look;
     use super::super::palette::INK;
+    use super::super::picture::Look;
     use super::super::picture::Shape;
     use super::*;
 

@@ -3,9 +3,9 @@
 use super::axis::{Axis, Way, is_drawable};
 use super::columns::{Extremes, extremes, moving_mean};
 use super::legend::{Key, legend_lines};
-use super::look::Look;
 use super::palette::{INK, MARK, MEASURED, MUTED, TRUTH};
 use super::panel::{BELOW, Panel, aside};
+use super::picture::Look;
 use super::picture::{Across, Picture, Text, text};
 use crate::table::si;
 

@@ -1,10 +1,10 @@
 //! Text in pictures: its width, and what is done where it is too wide.
+//!
+//! Font of the plots: an embedded subset of DejaVu Sans, so that no system font is needed.
 
 use std::sync::OnceLock;
 
 use plotters::style::{FontFamily, FontStyle, IntoFont, register_font};
-
-use crate::font;
 
 /// How much finer than the picture text is measured and SVG is drawn, and PNG before it is halved.
 pub(super) const SCALE: f64 = 2.0;
@@ -16,15 +16,15 @@ pub(super) const SIZE_OVER_EM: f64 = 1.24;
 pub(super) fn register() -> bool {
     static DONE: OnceLock<bool> = OnceLock::new();
     *DONE.get_or_init(|| {
-        register_font(font::FAMILY, FontStyle::Normal, font::REGULAR).is_ok()
-            && register_font(font::FAMILY, FontStyle::Bold, font::BOLD).is_ok()
+        register_font(FAMILY, FontStyle::Normal, REGULAR).is_ok()
+            && register_font(FAMILY, FontStyle::Bold, BOLD).is_ok()
     })
 }
 
 /// The font with an em of `size` steps of the backend.
 pub(super) fn plotters_font(size: f64, bold: bool) -> plotters::style::FontDesc<'static> {
     let style = if bold { FontStyle::Bold } else { FontStyle::Normal };
-    (FontFamily::Name(font::FAMILY), size * SIZE_OVER_EM, style).into_font()
+    (FontFamily::Name(FAMILY), size * SIZE_OVER_EM, style).into_font()
 }
 
 /// The width in pixels of `text` in letters of `size`.
@@ -66,4 +66,45 @@ pub(super) fn shortened(label: &str, size: f64, room: f64) -> String {
         }
     }
     String::new()
+}
+
+/// Regular font with Latin-1, Latin Extended-A and the symbols of plots. See `assets/README.md`.
+pub(super) const REGULAR: &[u8] = include_bytes!("../../assets/DejaVuSans-subset.ttf");
+
+/// Bold font with the same characters.
+pub(super) const BOLD: &[u8] = include_bytes!("../../assets/DejaVuSans-Bold-subset.ttf");
+
+/// Font family in SVG: DejaVu if installed, otherwise fonts of similar width.
+pub(super) const FAMILY: &str = "DejaVu Sans, Verdana, Segoe UI, Helvetica, Arial, sans-serif";
+
+/// Characters of the subset beyond the Latin letters.
+const SYMBOLS: &str = "–—…→←−≤≥≈ΩσμΔ∞";
+
+/// Whether the subset has `letter`.
+fn has(letter: char) -> bool {
+    matches!(letter, ' '..='~' | '\u{a0}'..='\u{17f}') || SYMBOLS.contains(letter)
+}
+
+/// Replaces every character that the subset lacks with `?`.
+pub(super) fn drawable(text: &str) -> String {
+    text.chars().map(|c| if has(c) { c } else { '?' }).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use ab_glyph::{Font, FontRef};
+
+    use super::*;
+
+    #[test]
+    fn the_subset_has_all_declared_letters() {
+        for font in [REGULAR, BOLD].map(|bytes| FontRef::try_from_slice(bytes).unwrap()) {
+            let named = |letter: char| font.glyph_id(letter).0 != 0;
+            let lacking: String =
+                ('\0'..'\u{3000}').filter(|&letter| has(letter) && !named(letter)).collect();
+            assert_eq!(lacking, "");
+            assert!(!has('\u{4e2d}') && !named('\u{4e2d}'));
+        }
+        assert_eq!(drawable("Größe Łódź 中"), "Größe Łódź ?");
+    }
 }

@@ -7,7 +7,7 @@ use clap::Args;
 use serde::Serialize;
 use workloads::points::white::{Density, ImageDensity, Named, Numbers, WhiteSpec, columns_for, white_noise};
 
-use super::file::Points;
+use super::Points;
 use super::{Common, Failure, usage};
 
 /// Arguments of `sample white`.

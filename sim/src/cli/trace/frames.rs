@@ -1,22 +1,52 @@
 //! `quintile trace frames`.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
+use clap::Args;
+use output::table::{Table, counted, si, si_digits};
+use output::terminal::Terminal;
 use serde::Serialize;
 use serde_json::{Value, json};
 use traces::energy::{FrameTable, InverseUnits, Summary, whole};
 use traces::frames::{Rule, Threshold};
+use warnings::Code;
 
-use super::failure::wrong;
 use super::input::Frames;
 use super::report;
-use crate::cli::args::trace::FramesArgs;
+use super::wrong;
 use crate::cli::outputs::may_hold_results;
-use crate::cli::terminal::print_json;
+use crate::cli::outputs::print_json;
+use crate::cli::trace::input::{FindArgs, InputArgs};
 use crate::cli::{Failure, threads};
-use output::table::{Table, counted, si, si_digits};
-use output::terminal::Terminal;
-use warnings::Code;
+
+/// Arguments of `trace frames`.
+#[derive(Clone, Debug, Args)]
+#[command(
+    after_help = "Example:\n  quintile trace frames meter.parquet --mark 2.513 --pixels 921600 --out frames.csv"
+)]
+pub struct FramesArgs {
+    /// The trace.
+    #[command(flatten)]
+    pub input: InputArgs,
+    /// The frames.
+    #[command(flatten)]
+    pub find: FindArgs,
+    /// File for the table of frames; `-` prints it and nothing else
+    #[arg(long, value_name = "FRAMES.csv")]
+    pub out: Option<PathBuf>,
+    /// Also give inverse units, with what is wrong about averaging them
+    #[arg(long)]
+    pub inverse: bool,
+    /// Worker threads [default: all cores]; results do not depend on it
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+    /// Print everything as JSON and nothing else
+    #[arg(long)]
+    pub json: bool,
+    /// Whether the result goes to standard output.
+    #[arg(skip)]
+    pub piped: bool,
+}
 
 /// Frames shown on the terminal.
 const SHOWN: usize = 12;

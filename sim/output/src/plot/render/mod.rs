@@ -1,7 +1,7 @@
 //! Pictures into files: SVG through `plotters`' backend, PNG through its rasterizer into a buffer of our own.
 //!
 //! Both are drawn on a grid twice as fine as the picture; for PNG two by two pixels are then averaged, and a pixel of the layout is as
-//! many of the file as the picture's [`Paper`](super::look::Paper) says.
+//! many of the file as the picture's [`Paper`](super::picture::Paper) says.
 
 mod pdf;
 
@@ -17,9 +17,9 @@ use plotters_backend::{
 
 use super::palette::{BACKGROUND, Colour};
 use super::picture::{Across, Picture, Point, Shape, Text};
-use super::text::{SCALE, plotters_font, register};
+use super::text::{SCALE, drawable, plotters_font, register};
 use crate::dir::{OutDir, OutputError};
-use crate::{font, image};
+use crate::image;
 
 /// Why a plot could not be rendered.
 #[derive(Debug, thiserror::Error)]
@@ -45,7 +45,7 @@ impl Picture {
         let mut svg = String::new();
         self.play(&mut SVGBackend::with_string(&mut svg, (width, height)), SCALE)?;
         let fine = format!("width=\"{width}\" height=\"{height}\"");
-        let label = attribute(&font::drawable(&self.title));
+        let label = attribute(&drawable(&self.title));
         let size = |side: f64| match self.paper.width_mm {
             Some(width_mm) => format!("{:.2}mm", side / self.width() * width_mm),
             None => format!("{:.0}", side * self.paper.zoom),
