@@ -1,15 +1,33 @@
-//! Flags that several commands share: style of pictures, messages, changes to a scene.
+//! Flags that several commands share: worker threads, style of pictures, messages, changes to a scene.
 
 use std::ffi::OsString;
 use std::ops::Range;
 
 use clap::{Args, ColorChoice, ValueEnum};
 use output::plot::{COLUMN_MM, Look};
-use output::terminal::{Terminal, Verbosity};
+use output::terminal::{self, Terminal, Verbosity};
+use rayon::{ThreadPool, ThreadPoolBuilder};
 use workloads::Overrides;
 
+use super::Failure;
 use crate::cli::parse::{depth, frames, lens, per_pixel, shutter, size};
 use crate::cli::quantity::rate;
+
+/// Worker threads.
+#[derive(Clone, Copy, Debug, Args)]
+pub struct ThreadArgs {
+    /// Worker threads [default: all cores]; only times depend on it
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+}
+
+impl ThreadArgs {
+    /// Pool of worker threads; one per core without a number.
+    pub(in crate::cli) fn pool(self) -> Result<ThreadPool, Failure> {
+        let pool = ThreadPoolBuilder::new().num_threads(usize::from(self.threads.unwrap_or(0))).build();
+        pool.map_err(|error| Failure { message: format!("starting worker threads: {error}"), code: 1 })
+    }
+}
 
 /// Style of pictures. The default is a width of their own and letters for a screen.
 #[derive(Clone, Debug, Default, Args)]
@@ -75,7 +93,12 @@ impl MessageArgs {
             (false, true) => Verbosity::Verbose,
             (false, false) => Verbosity::Normal,
         };
-        Terminal::new(verbosity, self.color)
+        let color = match self.color {
+            ColorChoice::Auto => terminal::ColorChoice::Auto,
+            ColorChoice::Always => terminal::ColorChoice::Always,
+            ColorChoice::Never => terminal::ColorChoice::Never,
+        };
+        Terminal::new(verbosity, color)
     }
 }
 

@@ -13,6 +13,7 @@ use workloads::collision::{Answer, CaseFiles, Method, Object, Search, Verdict, c
 
 use super::Failure;
 use super::outputs::{print, print_json};
+use crate::cli::args::ThreadArgs;
 use crate::cli::outputs;
 
 /// Arguments of `ccd`.
@@ -41,9 +42,9 @@ pub struct CcdArgs {
     /// File for every pair of every case: case_id,a,b,may_collide; `-` prints that and nothing else
     #[arg(long, value_name = "FILE")]
     pub csv: Option<PathBuf>,
-    /// Worker threads [default: all cores]; results do not depend on it
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
-    pub threads: Option<u16>,
+    /// Worker threads.
+    #[command(flatten)]
+    pub threads: ThreadArgs,
     /// Print the result as one line of JSON
     #[arg(long)]
     pub json: bool,
@@ -168,7 +169,7 @@ fn pair(answer: &Answer) -> Option<Pair> {
 pub(super) fn run(args: &CcdArgs, terminal: &Terminal) -> Result<(), Failure> {
     let (search, rows) = (args.search(), Rows::of(args)?);
     let cases = CaseFiles::of(&args.files)?;
-    let pool = super::threads(args.threads)?;
+    let pool = args.threads.pool()?;
     let progress = Progress::on(terminal, args.json);
     if !search.zoom && search.resolution * search.bins > MAX_FAST_PIXEL_BINS {
         progress.note(

@@ -6,7 +6,7 @@ use std::time::Instant;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use experiments::catalog::{ALL, CHARTS, all};
-use experiments::stress::{Effort, Report, family_named};
+use experiments::stress::{Report, StressEffort, family_named};
 use experiments::study::index::{self, Index, Section};
 use experiments::study::{Done, Entry, Request, Study, StudyError};
 use output::plot::Look;
@@ -18,7 +18,7 @@ use serde_json::{Map, Value};
 
 use super::Failure;
 use super::outputs::{print, print_json};
-use crate::cli::args::LookArgs;
+use crate::cli::args::{LookArgs, ThreadArgs};
 
 /// Arguments of `stress`.
 #[derive(Debug, Args)]
@@ -36,9 +36,9 @@ pub struct StressArgs {
     /// Smaller images, fewer triangles
     #[arg(long)]
     pub quick: bool,
-    /// Worker threads; all cores without it. The results do not depend on it
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
-    pub threads: Option<u16>,
+    /// Worker threads.
+    #[command(flatten)]
+    pub threads: ThreadArgs,
     /// Print summary.json to standard output and nothing else
     #[arg(long)]
     pub json: bool,
@@ -67,9 +67,9 @@ pub struct ChartArgs {
     /// Overwrite files in DIR that Quintile did not write
     #[arg(long)]
     pub force: bool,
-    /// Worker threads; all cores without it. Only times depend on it
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
-    pub threads: Option<u16>,
+    /// Worker threads.
+    #[command(flatten)]
+    pub threads: ThreadArgs,
     /// Print the numbers as JSON and nothing else
     #[arg(long)]
     pub json: bool,
@@ -127,7 +127,7 @@ pub(super) fn run(args: &ChartArgs, terminal: &Terminal) -> Result<(), Failure> 
     for scene in &args.scene {
         workloads::load(scene).map_err(RunError::from)?;
     }
-    let pool = super::threads(args.threads)?;
+    let pool = args.threads.pool()?;
     let (look, progress) = (args.look.look(), Progress::on(terminal, args.json));
     let make = |study: &Entry, dir: &OutDir| {
         let request =
@@ -211,10 +211,10 @@ pub(super) fn stress(args: &StressArgs, terminal: &Terminal) -> Result<(), Failu
     // The folder first: that it cannot be written is better known before the work than after it.
     let out = Destination { folder: args.out.clone(), force: args.force };
     let mut dir = out.open([Report::claim()])?;
-    let pool = super::threads(args.threads)?;
+    let pool = args.threads.pool()?;
     let progress = Progress::on(terminal, args.json);
     let only = args.family.as_deref().map(family_named).transpose()?;
-    let effort = Effort { only, quick: args.quick };
+    let effort = StressEffort { only, quick: args.quick };
     let report = pool.install(|| Report::measure(effort, &[], &progress))?;
     let done = Done::new(&report, &dir, &args.look.look())?;
     dir.publish()?;

@@ -169,12 +169,6 @@ impl From<workloads::LoadError> for Failure {
     }
 }
 
-/// Pool of worker threads; one per core without a number.
-fn threads(number: Option<u16>) -> Result<rayon::ThreadPool, Failure> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(usize::from(number.unwrap_or(0))).build();
-    pool.map_err(|error| Failure { message: format!("starting worker threads: {error}"), code: 1 })
-}
-
 fn dispatch(cli: &Cli, terminal: &Terminal) -> Result<(), Failure> {
     match &cli.command {
         Command::Run(args) => run::run(args, terminal),

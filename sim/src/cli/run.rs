@@ -22,7 +22,7 @@ use workloads::job::OptionSource;
 
 use super::Failure;
 use super::outputs::{print, print_json};
-use crate::cli::args::{LookArgs, SceneArgs};
+use crate::cli::args::{LookArgs, SceneArgs, ThreadArgs};
 use crate::cli::parse::{duration, percent, setting, share_below_one};
 use crate::cli::quantity::rate;
 
@@ -110,9 +110,9 @@ pub struct RunArgs {
     /// Write heat maps of a counter, as PNG, EXR and CSV in heat/; may be given several times
     #[arg(long, value_name = "COUNTER", value_parser = counter)]
     pub heat: Vec<Event>,
-    /// Worker threads [default: all cores]; results do not depend on it
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
-    pub threads: Option<u16>,
+    /// Worker threads.
+    #[command(flatten)]
+    pub threads: ThreadArgs,
     /// Print what the run would do, with the expected time, and stop before anything is simulated or written
     #[arg(long)]
     pub dry_run: bool,
@@ -195,7 +195,7 @@ pub(super) fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), Failure> {
     let started = Instant::now();
     let progress = Progress::on(terminal, args.json);
     let out = Destination { folder: args.out.clone(), force: args.force };
-    let pool = super::threads(args.threads)?;
+    let pool = args.threads.pool()?;
     let (options, recorded) = match &args.again {
         Some(summary) => again(summary, args.force, REVISION)?,
         None => (options(args), None),

@@ -17,6 +17,7 @@ use workloads::visibility::{self, CameraSpec, FixedSamples, VisibilityScene, wri
 
 use super::Failure;
 use super::outputs::{print, print_json};
+use crate::cli::args::ThreadArgs;
 use crate::cli::parse::tests;
 
 /// Arguments of `visibility`.
@@ -49,9 +50,9 @@ pub struct VisibilityArgs {
     /// File for the triangle and depth of every sample
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
-    /// Worker threads [default: all cores]; results do not depend on it
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
-    pub threads: Option<u16>,
+    /// Worker threads.
+    #[command(flatten)]
+    pub threads: ThreadArgs,
     /// Print the result as one line of JSON
     #[arg(long)]
     pub json: bool,
@@ -82,7 +83,7 @@ pub(super) fn run(args: &VisibilityArgs, terminal: &Terminal) -> Result<(), Fail
     if args.print_camera {
         return print_camera(args, &scene);
     }
-    let pool = super::threads(args.threads)?;
+    let pool = args.threads.pool()?;
     let found = pool.install(|| see(args, scene))?;
     if args.json {
         return print_json(&found, false);

@@ -17,7 +17,7 @@ use crate::study::{Gallery, Study, StudyError};
 
 /// How much is measured.
 #[derive(Clone, Copy, Debug, Serialize)]
-pub struct Effort {
+pub struct CollisionEffort {
     /// Cases of each family of two objects, and of each of many.
     pub cases: [usize; 2],
     /// Pixels across.
@@ -86,7 +86,7 @@ impl Set {
 
 /// What a way makes of all cases of a set.
 #[derive(Clone, Debug, Serialize)]
-pub struct Row {
+pub struct CollisionRow {
     /// The set.
     pub cases: Set,
     /// The way.
@@ -118,19 +118,19 @@ pub struct Slide {
 #[derive(Clone, Debug, Serialize)]
 pub struct CollisionChart {
     /// How much was measured.
-    pub effort: Effort,
+    pub effort: CollisionEffort,
     /// Pairs that collide and pairs that do not, of two objects and of many.
     pub pairs: [[usize; 2]; 2],
     /// The same of the cases like the reference cases.
     pub reference_pairs: [[usize; 2]; 2],
     /// Way by way: over the families, then over cases like the reference cases.
-    pub rows: Vec<Row>,
+    pub rows: Vec<CollisionRow>,
     /// Plates that slide, looked at closer.
     pub slides: Vec<Slide>,
 }
 
 /// Two-object cases, then those of many.
-fn all_cases(effort: &Effort) -> Vec<Case> {
+fn all_cases(effort: &CollisionEffort) -> Vec<Case> {
     let two = cases(301, effort.cases[0]).into_iter().filter(|case| case.objects.len() == 2);
     two.chain(cases(301, effort.cases[1]).into_iter().filter(|case| case.objects.len() > 2)).collect()
 }
@@ -139,7 +139,7 @@ fn all_cases(effort: &Effort) -> Vec<Case> {
 const REFERENCE_PIXELS: u32 = 128;
 
 /// The ways of the reference cases.
-fn reference_ways(effort: &Effort) -> Vec<Way> {
+fn reference_ways(effort: &CollisionEffort) -> Vec<Way> {
     let once = Search { resolution: REFERENCE_PIXELS, bins: 1, method: Method::FragmentBox, zoom: false };
     let depth_only = Search { method: Method::DepthOnly, ..once };
     let binned = effort.reference_bins.iter().map(|&bins| Search { bins, ..once });
@@ -148,7 +148,7 @@ fn reference_ways(effort: &Effort) -> Vec<Way> {
 }
 
 /// All ways, from the cheapest on.
-fn ways(effort: &Effort) -> Vec<Way> {
+fn ways(effort: &CollisionEffort) -> Vec<Way> {
     let search = Search { resolution: 0, bins: 1, method: Method::FragmentBox, zoom: false };
     let each = effort.resolutions.iter().flat_map(|&resolution| {
         let search = Search { resolution, ..search };
@@ -170,8 +170,8 @@ impl Study for CollisionChart {
     const PICTURES: &'static [&'static str] = &["collision", "collision_failures"];
     const FILES: &'static [&'static str] = &["collision.csv", "collision.json"];
 
-    type Effort = Effort;
-    const FULL: Effort = Effort {
+    type Effort = CollisionEffort;
+    const FULL: CollisionEffort = CollisionEffort {
         cases: [12, 2],
         resolutions: &[8, 16, 32, 64],
         bins: &[1, 4, 16],
@@ -180,7 +180,7 @@ impl Study for CollisionChart {
         reference_cases: [12, 3],
         reference_bins: &[1, 16, 64],
     };
-    const QUICK: Effort = Effort {
+    const QUICK: CollisionEffort = CollisionEffort {
         cases: [3, 1],
         resolutions: &[4, 16],
         bins: &[1, 4],
@@ -190,7 +190,7 @@ impl Study for CollisionChart {
         reference_bins: &[1, 16],
     };
 
-    fn measure(effort: Effort, _scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
+    fn measure(effort: CollisionEffort, _scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
         let sets = [
             (Set::Families, all_cases(&effort), ways(&effort)),
             (
@@ -252,7 +252,7 @@ impl Study for CollisionChart {
     }
 
     fn tradeoff(&self) -> Vec<TradeoffPoint> {
-        let both = |row: &Row| {
+        let both = |row: &CollisionRow| {
             let level = if row.resolution == 0 { String::new() } else { format!("{} px", row.resolution) };
             [("two objects", row.two), ("many objects", row.many)].map(|(kind, rate)| {
                 let rate = Metric::new("false positive rate", "", rate).beside(0.0);
@@ -293,17 +293,17 @@ impl CollisionChart {
                 names.push(&row.way);
             }
         }
-        let curves = |point: &dyn Fn(&Row) -> (f64, f64)| -> Vec<Series> {
+        let curves = |point: &dyn Fn(&CollisionRow) -> (f64, f64)| -> Vec<Series> {
             let of = |name: &&str| {
                 let rows = in_images().filter(|row| row.way == *name);
                 Series::curve(*name, rows.map(point))
             };
             names.iter().map(of).collect()
         };
-        let panel = |title: &str, across: &str, scale, point: &dyn Fn(&Row) -> (f64, f64)| {
+        let panel = |title: &str, across: &str, scale, point: &dyn Fn(&CollisionRow) -> (f64, f64)| {
             ChartPanel::new(title, [across, "false positive rate"], curves(point)).on(scale, Scale::Even)
         };
-        let pixels = |row: &Row| f64::from(row.resolution);
+        let pixels = |row: &CollisionRow| f64::from(row.resolution);
         vec![
             panel("two objects", "pixels across", Scale::Doublings, &|row| (pixels(row), row.two)),
             panel("many objects", "pixels across", Scale::Doublings, &|row| (pixels(row), row.many)),
@@ -351,7 +351,7 @@ fn pairs(cases: &[Case]) -> [[usize; 2]; 2] {
 }
 
 /// All cases by one way, on a thread of its own so that its time is its own.
-fn row(way: &Way, set: Set, cases: &[Case]) -> Result<Row, StudyError> {
+fn row(way: &Way, set: Set, cases: &[Case]) -> Result<CollisionRow, StudyError> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
     Ok(pool.install(|| {
         let (mut vain, mut missed, mut candidates) = ([0; 2], 0, 0);
@@ -366,7 +366,7 @@ fn row(way: &Way, set: Set, cases: &[Case]) -> Result<Row, StudyError> {
         let of = pairs(cases);
         let share = |kind: usize| f64::from(vain[kind] as u32) / of[kind][1].max(1) as f64;
         let (two, many) = (share(0), share(1));
-        Row { cases: set, way: way.name(), resolution: way.resolution(), two, many, missed, pair_s }
+        CollisionRow { cases: set, way: way.name(), resolution: way.resolution(), two, many, missed, pair_s }
     }))
 }
 
@@ -392,7 +392,7 @@ fn kept(way: &Way, case: &Case, touching: &mut u32) -> Vec<(usize, usize)> {
 }
 
 /// Plates that slide at each gap and resolution, by looking closer.
-fn slides(effort: &Effort, progress: &Progress) -> Vec<Slide> {
+fn slides(effort: &CollisionEffort, progress: &Progress) -> Vec<Slide> {
     let bar = progress.bar("sliding plates", (effort.resolutions.len() * effort.gaps.len()) as u64);
     let each = effort.resolutions.iter().flat_map(|&resolution| {
         effort.gaps.iter().map(move |&gap| (Search { resolution, ..Search::default() }, gap))

@@ -25,7 +25,7 @@ use crate::study::{Gallery, Study, StudyError};
 
 /// How much is measured.
 #[derive(Clone, Copy, Debug, Serialize)]
-pub struct Effort {
+pub struct GlossyEffort {
     /// Rows of texels of the map.
     pub texels: u32,
     /// Samples per texel go from 1 to this, doubling.
@@ -44,9 +44,9 @@ pub const EFFECTS: [(&str, Effect); 2] =
 #[derive(Clone, Debug, Serialize)]
 pub struct GlossyChart {
     /// How much was measured.
-    pub effort: Effort,
+    pub effort: GlossyEffort,
     /// By effect and samples.
-    pub rows: Vec<Row>,
+    pub rows: Vec<GlossyRow>,
     /// Contact hardening: blur by height.
     pub blurs: Vec<Blur>,
     /// Where it does not work: a lens as wide as the receiver, and wider.
@@ -60,12 +60,12 @@ impl Study for GlossyChart {
     const PICTURES: &'static [&'static str] = &["glossy_error", "glossy_blur", "glossy_failures"];
     const FILES: &'static [&'static str] = &["glossy.csv", "glossy.json"];
 
-    type Effort = Effort;
+    type Effort = GlossyEffort;
     /// A reference of 4096 samples.
-    const FULL: Effort = Effort { texels: 32, most_samples: 256, reference_tables: 16 };
-    const QUICK: Effort = Effort { texels: 16, most_samples: 64, reference_tables: 2 };
+    const FULL: GlossyEffort = GlossyEffort { texels: 32, most_samples: 256, reference_tables: 16 };
+    const QUICK: GlossyEffort = GlossyEffort { texels: 16, most_samples: 64, reference_tables: 2 };
 
-    fn measure(effort: Effort, _scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
+    fn measure(effort: GlossyEffort, _scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
         let counts: Vec<u32> = (0..=effort.most_samples.ilog2()).map(|power| 1 << power).collect();
         let bar = progress.bar("glossy", (EFFECTS.len() * counts.len() + 2) as u64);
         let mut rows = Vec::new();
@@ -122,7 +122,7 @@ impl Study for GlossyChart {
     }
 
     fn tradeoff(&self) -> Vec<TradeoffPoint> {
-        let both = |row: &Row| {
+        let both = |row: &GlossyRow| {
             let level = format!("{} samples a texel", row.samples);
             let point = |method, rmse, host_s| {
                 let metrics = [Metric::rmse(rmse), Metric::host_s(host_s)];
@@ -143,18 +143,18 @@ const WARNED: f64 = 1.0;
 impl GlossyChart {
     /// For each effect the error over samples and over cost.
     fn errors(&self) -> Vec<ChartPanel> {
-        let both = |effect: &'static str, of: fn(&Row) -> [(f64, f64); 2]| {
+        let both = |effect: &'static str, of: fn(&GlossyRow) -> [(f64, f64); 2]| {
             let of_effect = move || self.rows.iter().filter(move |row| row.effect == effect);
             vec![
                 Series::curve("one pass", of_effect().map(|row| of(row)[0])),
                 Series::curve("accumulation", of_effect().map(|row| of(row)[1])),
             ]
         };
-        let samples: fn(&Row) -> [(f64, f64); 2] = |row| {
+        let samples: fn(&GlossyRow) -> [(f64, f64); 2] = |row| {
             let n = f64::from(row.samples);
             [(n, row.rmse), (n, row.accumulated_rmse)]
         };
-        let tests: fn(&Row) -> [(f64, f64); 2] = |row| {
+        let tests: fn(&GlossyRow) -> [(f64, f64); 2] = |row| {
             let [one, many] = [row.samples_tested, row.accumulated_samples_tested].map(|tests| tests as f64);
             [(one, row.rmse), (many, row.accumulated_rmse)]
         };
@@ -199,7 +199,7 @@ impl GlossyChart {
 
 /// One number of samples.
 #[derive(Clone, Copy, Debug, Serialize)]
-pub struct Row {
+pub struct GlossyRow {
     /// Reflection or refraction.
     pub effect: &'static str,
     /// Samples of a texel.
@@ -250,7 +250,7 @@ pub struct Bench {
     frame: Frame,
     gpu: GpuSpec,
     effect: (&'static str, Effect),
-    effort: Effort,
+    effort: GlossyEffort,
     radius: f64,
 }
 
@@ -267,7 +267,7 @@ impl Bench {
     ///
     /// # Errors
     /// None that is expected.
-    pub fn new(effect: (&'static str, Effect), effort: Effort) -> Result<Self, StudyError> {
+    pub fn new(effect: (&'static str, Effect), effort: GlossyEffort) -> Result<Self, StudyError> {
         let scene = stage(effect.1 != Effect::Reflection)?;
         let frame = scene.frame(0)?;
         Ok(Self { scene, frame, gpu: GpuSpec::load("reference")?, effect, effort, radius: ROUGHNESS })
@@ -313,7 +313,7 @@ impl Bench {
     ///
     /// # Errors
     /// When the hardware cannot be built.
-    pub fn row(&self, samples: u32, reference: &[Vec3]) -> Result<Row, StudyError> {
+    pub fn row(&self, samples: u32, reference: &[Vec3]) -> Result<GlossyRow, StudyError> {
         let (map, draws) = (self.map(self.radius, self.effort.texels)?, self.draws()?);
         let look = (&self.gpu.pipeline, self.scene.background());
         let table = SampleTable::new(&SampleSpec::default(), samples, 1)?;
@@ -324,7 +324,7 @@ impl Bench {
         let started = Instant::now();
         let (many, many_counts) = map.accumulated(&draws, &set, look, &mut |_, _| ())?;
         let rmse = |image: &[Vec3]| mean_square(&errors(image, reference)).sqrt();
-        Ok(Row {
+        Ok(GlossyRow {
             effect: self.effect.0,
             samples,
             rmse: rmse(&one),
@@ -398,7 +398,7 @@ mod tests {
 
     #[test]
     fn more_samples_err_less_contact_hardens_and_wide_lenses_fail() {
-        let least = Effort { texels: 10, most_samples: 16, reference_tables: 1 };
+        let least = GlossyEffort { texels: 10, most_samples: 16, reference_tables: 1 };
         let (_folder, chart, _) = written::<GlossyChart>(least);
         for rows in chart.rows.chunks_exact(5) {
             assert!(rows[4].rmse < 0.6 * rows[0].rmse, "{rows:?}");

@@ -20,7 +20,7 @@ use crate::study::{Gallery, Study, StudyError};
 
 /// How much is measured.
 #[derive(Clone, Copy, Debug, Serialize)]
-pub struct Effort {
+pub struct GrowthEffort {
     /// Side of the image in pixels, a power of two.
     pub side_px: u32,
     /// Times are medians of so many.
@@ -74,7 +74,7 @@ pub enum Kind {
 
 /// One curve.
 #[derive(Clone, Debug, Serialize)]
-pub struct Row {
+pub struct GrowthRow {
     /// What grows.
     pub sweep: Sweep,
     /// What blurs.
@@ -93,9 +93,9 @@ pub struct Row {
 #[derive(Clone, Debug, Serialize)]
 pub struct GrowthChart {
     /// How much was measured.
-    pub effort: Effort,
+    pub effort: GrowthEffort,
     /// Curve by curve.
-    pub rows: Vec<Row>,
+    pub rows: Vec<GrowthRow>,
 }
 
 impl Sweep {
@@ -120,7 +120,7 @@ impl Sweep {
     }
 
     /// What is resolved, from little to much.
-    fn trials(self, effort: &Effort) -> Vec<Base> {
+    fn trials(self, effort: &GrowthEffort) -> Vec<Base> {
         let base = effort.base;
         match self {
             Self::Triangles => effort.triangles.iter().map(|&triangles| Base { triangles, ..base }).collect(),
@@ -161,8 +161,8 @@ impl Study for GrowthChart {
     const PICTURES: &'static [&'static str] = &["growth"];
     const FILES: &'static [&'static str] = &["growth.csv", "growth.md", "growth.json"];
 
-    type Effort = Effort;
-    const FULL: Effort = Effort {
+    type Effort = GrowthEffort;
+    const FULL: GrowthEffort = GrowthEffort {
         side_px: 256,
         repeats: 5,
         triangles: &[1_000, 3_000, 10_000, 30_000, 100_000, 300_000, 1_000_000],
@@ -170,7 +170,7 @@ impl Study for GrowthChart {
         blur_px: &[0.0, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0, 256.0, 512.0],
         base: Base { triangles: 10_000, samples: 16, blur_px: 16.0 },
     };
-    const QUICK: Effort = Effort {
+    const QUICK: GrowthEffort = GrowthEffort {
         side_px: 128,
         repeats: 3,
         triangles: &[1_000, 3_000, 10_000, 30_000, 100_000],
@@ -179,7 +179,7 @@ impl Study for GrowthChart {
         base: Base { triangles: 3_000, samples: 16, blur_px: 16.0 },
     };
 
-    fn measure(effort: Effort, _scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
+    fn measure(effort: GrowthEffort, _scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
         let curves = || Sweep::ALL.into_iter().flat_map(|sweep| Kind::ALL.map(|kind| (sweep, kind)));
         // What stands still has no blur to sweep.
         let curves = || curves().filter(|curve| *curve != (Sweep::Blur, Kind::Still));
@@ -192,7 +192,7 @@ impl Study for GrowthChart {
                 point
             };
             let points = sweep.trials(&effort).into_iter().map(point).collect::<Result<_, _>>()?;
-            Ok(Row::new(sweep, kind, points))
+            Ok(GrowthRow::new(sweep, kind, points))
         };
         let rows = curves().map(row).collect::<Result<_, StudyError>>()?;
         Ok(Self { effort, rows })
@@ -270,7 +270,7 @@ impl GrowthChart {
     }
 }
 
-impl Row {
+impl GrowthRow {
     fn new(sweep: Sweep, kind: Kind, points: Vec<Point>) -> Self {
         let across = || points.iter().map(|point| sweep.of(point)).filter(|x| *x > 0.0);
         let ends = across().reduce(f64::min).zip(across().reduce(f64::max));
@@ -316,12 +316,12 @@ const SEED: u64 = 1;
 
 /// Times the engine on a thread of its own; samples are sorted on all others.
 struct Timer<'a> {
-    effort: &'a Effort,
+    effort: &'a GrowthEffort,
     thread: ThreadPool,
 }
 
 impl<'a> Timer<'a> {
-    pub fn new(effort: &'a Effort) -> Result<Self, StudyError> {
+    pub fn new(effort: &'a GrowthEffort) -> Result<Self, StudyError> {
         Ok(Self { effort, thread: ThreadPoolBuilder::new().num_threads(1).build()? })
     }
 
@@ -371,7 +371,7 @@ mod tests {
     use crate::study::written;
 
     /// No more than there has to be.
-    const LEAST: Effort = Effort {
+    const LEAST: GrowthEffort = GrowthEffort {
         side_px: 32,
         repeats: 1,
         triangles: &[50, 100, 200],
@@ -390,17 +390,17 @@ mod tests {
         // A floor of 1 s up to a hundred, beyond it n^1.5.
         let time = |n: u32| (n, f64::from(n).powf(1.5) / 1e3);
         let points = [1, 10, 100, 1_000, 10_000].map(time).map(|(n, s)| point(n, s.max(1.0)));
-        let row = Row::new(Sweep::Triangles, Kind::Still, points.into());
+        let row = GrowthRow::new(Sweep::Triangles, Kind::Still, points.into());
         assert!((row.fitted_from - 100.0).abs() < 1e-9);
         assert!((row.exponent.unwrap() - 1.5).abs() < 1e-12, "{:?}", row.exponent);
         assert!(row.tests_exponent.unwrap().abs() < 1e-12);
-        assert_eq!(Row::new(Sweep::Triangles, Kind::Still, Vec::new()).exponent, None);
+        assert_eq!(GrowthRow::new(Sweep::Triangles, Kind::Still, Vec::new()).exponent, None);
     }
 
     #[test]
     fn what_is_counted_is_the_same_each_time_and_grows_with_blur() {
         let tests = |chart: &GrowthChart| -> Vec<Vec<u64>> {
-            let points = |row: &Row| row.points.iter().map(|point| point.sample_tests).collect();
+            let points = |row: &GrowthRow| row.points.iter().map(|point| point.sample_tests).collect();
             chart.rows.iter().map(points).collect()
         };
         let with = |threads| {

@@ -25,7 +25,7 @@ use crate::study::{Gallery, Study, StudyError};
 
 /// How much is measured.
 #[derive(Clone, Copy, Debug, Serialize)]
-pub struct Effort {
+pub struct OcclusionEffort {
     /// Pixels of the image.
     pub size: [u32; 2],
     /// Boxes queried in each scene.
@@ -68,7 +68,7 @@ impl Kind {
 
 /// A kind of query on one kind of scene. Costs are means over all objects.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Row {
+pub struct OcclusionRow {
     /// What blurs.
     pub kind: Kind,
     /// Slats of a wall.
@@ -97,7 +97,7 @@ pub struct Row {
     pub madds: f64,
 }
 
-impl Row {
+impl OcclusionRow {
     /// The share of what is hidden that is found.
     pub fn rate(&self) -> f64 {
         if self.hidden == 0 { 0.0 } else { self.found as f64 / self.hidden as f64 }
@@ -112,13 +112,13 @@ impl Row {
 #[derive(Clone, Debug, Serialize)]
 pub struct OcclusionChart {
     /// How much was measured.
-    pub effort: Effort,
+    pub effort: OcclusionEffort,
     /// By intervals, over boxes and tiles.
-    pub intervals: Vec<Row>,
+    pub intervals: Vec<OcclusionRow>,
     /// Both ways over samples.
-    pub samples: Vec<Row>,
+    pub samples: Vec<OcclusionRow>,
     /// Walls of more and more slats.
-    pub failing: Vec<Row>,
+    pub failing: Vec<OcclusionRow>,
 }
 
 impl Study for OcclusionChart {
@@ -127,8 +127,8 @@ impl Study for OcclusionChart {
     const PICTURES: &'static [&'static str] = &["occlusion", "occlusion_failures"];
     const FILES: &'static [&'static str] = &["occlusion.csv", "occlusion.json"];
 
-    type Effort = Effort;
-    const FULL: Effort = Effort {
+    type Effort = OcclusionEffort;
+    const FULL: OcclusionEffort = OcclusionEffort {
         size: [192, 108],
         boxes: 96,
         yards: 3,
@@ -136,7 +136,7 @@ impl Study for OcclusionChart {
         tiles: &[4, 8, 16, 32],
         slats: &[1, 2, 4, 8, 16, 32, 64],
     };
-    const QUICK: Effort = Effort {
+    const QUICK: OcclusionEffort = OcclusionEffort {
         size: [128, 72],
         boxes: 48,
         yards: 1,
@@ -145,7 +145,7 @@ impl Study for OcclusionChart {
         slats: &[1, 4, 16],
     };
 
-    fn measure(effort: Effort, _scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
+    fn measure(effort: OcclusionEffort, _scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
         measure(effort, progress)
     }
 
@@ -192,7 +192,7 @@ impl Study for OcclusionChart {
     }
 
     fn tradeoff(&self) -> Vec<TradeoffPoint> {
-        let point = |row: &Row| {
+        let point = |row: &OcclusionRow| {
             let method = row.tile_px.map_or("sampled queries".to_owned(), |px| format!("{px}-pixel tiles"));
             let level = match row.boxes {
                 Some(_) => format!("{} boxes, {} samples a pixel", row.way(), row.samples),
@@ -217,7 +217,7 @@ impl Study for OcclusionChart {
 }
 
 impl OcclusionChart {
-    fn rows(&self) -> impl Iterator<Item = &Row> {
+    fn rows(&self) -> impl Iterator<Item = &OcclusionRow> {
         self.intervals.iter().chain(&self.samples).chain(&self.failing)
     }
 
@@ -237,7 +237,7 @@ impl OcclusionChart {
 
     /// Walls of more and more slats: what is found, and why not more is.
     fn failures(&self) -> Vec<ChartPanel> {
-        let panel = |title: &str, up: &str, of: fn(&Row) -> f64, ways: &[Option<u32>]| {
+        let panel = |title: &str, up: &str, of: fn(&OcclusionRow) -> f64, ways: &[Option<u32>]| {
             let curve = |tile_px: &Option<u32>| {
                 let rows = self.failing.iter().filter(|row| row.tile_px == *tile_px);
                 let name = tile_px.map_or("sampled queries".to_owned(), |px| format!("{px}-pixel tiles"));
@@ -249,7 +249,7 @@ impl OcclusionChart {
         };
         let [small, large] = FAILING_TILES.map(Some);
         vec![
-            panel("what is found", "share of hidden boxes found", Row::rate, &[small, large, None]),
+            panel("what is found", "share of hidden boxes found", OcclusionRow::rate, &[small, large, None]),
             panel(
                 "tiles that most samples but not all find covered",
                 "share of tiles",
@@ -262,7 +262,7 @@ impl OcclusionChart {
     /// The number of slats from which on a run with the smaller tiles warns.
     fn warned(&self) -> Option<f64> {
         let small = Some(FAILING_TILES[0]);
-        let warned = |row: &&Row| row.tile_px == small && row.half_covered > MAX_HALF_COVERED_SHARE;
+        let warned = |row: &&OcclusionRow| row.tile_px == small && row.half_covered > MAX_HALF_COVERED_SHARE;
         self.failing.iter().find(warned).map(|row| f64::from(row.slats))
     }
 }
@@ -364,14 +364,14 @@ impl Drawn {
 type Answered = (bool, [u64; 3]);
 
 /// A row from the answers for all objects, and whether it is truly hidden.
-fn row(like: Row, answers: &[(Answered, bool)]) -> Row {
+fn row(like: OcclusionRow, answers: &[(Answered, bool)]) -> OcclusionRow {
     let count = |of: &dyn Fn(bool, bool) -> bool| {
         answers.iter().filter(|((says, _), truly)| of(*says, *truly)).count() as u64
     };
     let mean = |of: usize| {
         answers.iter().map(|((_, cost), _)| cost[of]).sum::<u64>() as f64 / answers.len().max(1) as f64
     };
-    Row {
+    OcclusionRow {
         objects: answers.len() as u64,
         hidden: count(&|_, truly| truly),
         found: count(&|says, truly| says && truly),
@@ -383,8 +383,8 @@ fn row(like: Row, answers: &[(Answered, bool)]) -> Row {
     }
 }
 
-fn blank(kind: Kind, slats: u32, samples: u32) -> Row {
-    Row {
+fn blank(kind: Kind, slats: u32, samples: u32) -> OcclusionRow {
+    OcclusionRow {
         kind,
         slats,
         samples,
@@ -401,7 +401,7 @@ fn blank(kind: Kind, slats: u32, samples: u32) -> Row {
     }
 }
 
-fn by_intervals(yards: &[Drawn], like: Row, boxes: [u32; 3], tile_px: u32) -> Row {
+fn by_intervals(yards: &[Drawn], like: OcclusionRow, boxes: [u32; 3], tile_px: u32) -> OcclusionRow {
     let (mut answered, mut half_covered) = (Vec::new(), 0.0);
     for drawn in yards {
         let (answers, half) = drawn.ask(boxes, tile_px);
@@ -411,10 +411,10 @@ fn by_intervals(yards: &[Drawn], like: Row, boxes: [u32; 3], tile_px: u32) -> Ro
         });
         answered.extend(all);
     }
-    row(Row { tile_px: Some(tile_px), boxes: Some(boxes), half_covered, ..like }, &answered)
+    row(OcclusionRow { tile_px: Some(tile_px), boxes: Some(boxes), half_covered, ..like }, &answered)
 }
 
-fn by_samples(yards: &[Drawn], like: Row) -> Row {
+fn by_samples(yards: &[Drawn], like: OcclusionRow) -> OcclusionRow {
     let all = yards.iter().flat_map(|drawn| &drawn.seen).map(|seen| {
         let hidden = seen.passed == 0;
         ((hidden, [seen.tests(), seen.bytes(), seen.madds]), hidden)
@@ -422,7 +422,7 @@ fn by_samples(yards: &[Drawn], like: Row) -> Row {
     row(like, &all.collect::<Vec<_>>())
 }
 
-fn measure(effort: Effort, progress: &Progress) -> Result<OcclusionChart, StudyError> {
+fn measure(effort: OcclusionEffort, progress: &Progress) -> Result<OcclusionChart, StudyError> {
     let bar = progress.bar("occlusion", (3 * effort.samples.len() + effort.slats.len()) as u64);
     let mut chart =
         OcclusionChart { effort, intervals: Vec::new(), samples: Vec::new(), failing: Vec::new() };
@@ -450,7 +450,13 @@ fn measure(effort: Effort, progress: &Progress) -> Result<OcclusionChart, StudyE
     Ok(chart)
 }
 
-fn drawn(effort: &Effort, kind: Kind, slats: u32, samples: u32, bar: &Bar) -> Result<Vec<Drawn>, StudyError> {
+fn drawn(
+    effort: &OcclusionEffort,
+    kind: Kind,
+    slats: u32,
+    samples: u32,
+    bar: &Bar,
+) -> Result<Vec<Drawn>, StudyError> {
     let gaps = if slats > 1 { GAPS } else { 0.0 };
     let drawn = |seed| {
         let scene = WallSceneSpec { slats, gaps, ..kind.spec(effort.boxes, seed) };
@@ -468,8 +474,14 @@ mod tests {
 
     #[test]
     fn nothing_seen_is_called_hidden() {
-        let least =
-            Effort { size: [64, 36], boxes: 24, yards: 1, samples: &[4, 8], tiles: &[8], slats: &[1, 8] };
+        let least = OcclusionEffort {
+            size: [64, 36],
+            boxes: 24,
+            yards: 1,
+            samples: &[4, 8],
+            tiles: &[8],
+            slats: &[1, 8],
+        };
         let (folder, chart, done) = written::<OcclusionChart>(least);
         let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
         let json: serde_json::Value = serde_json::from_str(&read("occlusion.json")).unwrap();

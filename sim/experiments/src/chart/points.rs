@@ -23,7 +23,7 @@ use crate::study::{Gallery, Study, StudyError};
 
 /// How much is measured.
 #[derive(Clone, Copy, Debug, Serialize)]
-pub struct Effort {
+pub struct PointsEffort {
     /// Least distance in the plane and in space.
     pub radius: [f64; 2],
     /// Places tried to find what is still free.
@@ -40,9 +40,9 @@ pub struct Effort {
 #[derive(Clone, Debug, Serialize)]
 pub struct PointsChart {
     /// How much was measured.
-    pub effort: Effort,
+    pub effort: PointsEffort,
     /// Dimension by dimension, method by method.
-    pub rows: Vec<Row>,
+    pub rows: Vec<PointsRow>,
     /// Voids thinner than an ulp.
     pub coarse: Vec<Coarse>,
     /// Candidates for a point that follows a density.
@@ -56,13 +56,13 @@ impl Study for PointsChart {
     const PICTURES: &'static [&'static str] = &["points_quality", "points_spectra", "points_failures"];
     const FILES: &'static [&'static str] = &["points.csv", "points.md", "points.json"];
 
-    type Effort = Effort;
-    const FULL: Effort =
-        Effort { radius: [0.01, 0.06], darts: 1_000_000, seeds: 4, finest_bits: 26, white: 200_000 };
-    const QUICK: Effort =
-        Effort { radius: [0.025, 0.1], darts: 100_000, seeds: 2, finest_bits: 22, white: 20_000 };
+    type Effort = PointsEffort;
+    const FULL: PointsEffort =
+        PointsEffort { radius: [0.01, 0.06], darts: 1_000_000, seeds: 4, finest_bits: 26, white: 200_000 };
+    const QUICK: PointsEffort =
+        PointsEffort { radius: [0.025, 0.1], darts: 100_000, seeds: 2, finest_bits: 22, white: 20_000 };
 
-    fn measure(effort: Effort, _scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
+    fn measure(effort: PointsEffort, _scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
         let bar = progress.bar("points", 14);
         let [plane, space] = effort.radius;
         let mut rows = measured::<2>(&effort, plane, &bar).map_err(StudyError::pipeline)?;
@@ -119,7 +119,7 @@ impl Study for PointsChart {
     }
 
     fn tradeoff(&self) -> Vec<TradeoffPoint> {
-        let both = |row: &Row| {
+        let both = |row: &PointsRow| {
             let cost = Metric::new("CPU time of a million points", "s", 1e6 / row.points_per_s);
             let errors = [
                 Metric::new("largest hole beyond r", "r", (row.hole_over_r - 1.0).max(0.0)),
@@ -135,7 +135,7 @@ impl Study for PointsChart {
     }
 }
 
-impl Row {
+impl PointsRow {
     /// Method and effort.
     fn name(&self) -> String {
         if self.effort == 0 { self.method.to_owned() } else { format!("{} {}", self.method, self.effort) }
@@ -152,14 +152,14 @@ fn long_name(method: &str) -> &str {
 
 impl PointsChart {
     /// Rows of a dimension, a method's beside each other.
-    fn by_method(&self, dimensions: usize) -> impl Iterator<Item = &[Row]> {
-        let same = |a: &Row, b: &Row| (a.dimensions, a.method) == (b.dimensions, b.method);
+    fn by_method(&self, dimensions: usize) -> impl Iterator<Item = &[PointsRow]> {
+        let same = |a: &PointsRow, b: &PointsRow| (a.dimensions, a.method) == (b.dimensions, b.method);
         self.rows.chunk_by(same).filter(move |rows| rows[0].dimensions == dimensions)
     }
 
     fn quality(&self) -> Vec<ChartPanel> {
-        let panel = |dimensions, up: &str, of: fn(&Row) -> f64| {
-            let curve = |rows: &[Row]| {
+        let panel = |dimensions, up: &str, of: fn(&PointsRow) -> f64| {
+            let curve = |rows: &[PointsRow]| {
                 Series::curve(long_name(rows[0].method), rows.iter().map(|row| (row.points_per_s, of(row))))
             };
             let title = format!("{up}, {dimensions}D");
@@ -175,8 +175,8 @@ impl PointsChart {
 
     fn spectra(&self) -> Vec<ChartPanel> {
         let panel = |dimensions| {
-            let last = self.by_method(dimensions).filter_map(<[Row]>::last);
-            let curve = |row: &Row| Series {
+            let last = self.by_method(dimensions).filter_map(<[PointsRow]>::last);
+            let curve = |row: &PointsRow| Series {
                 note: format!("peak {:.2}", row.peak.1),
                 ..Series::curve(row.method, row.spectrum.iter().copied())
             };
@@ -218,7 +218,7 @@ impl PointsChart {
 
 /// One method.
 #[derive(Clone, Debug, Serialize)]
-pub struct Row {
+pub struct PointsRow {
     /// In how many dimensions.
     pub dimensions: usize,
     /// Its name.
@@ -271,7 +271,11 @@ fn points<const D: usize>(
 }
 
 /// Every method at one least distance on the torus.
-fn measured<const D: usize>(effort: &Effort, radius: f64, bar: &Bar) -> Result<Vec<Row>, PoissonError> {
+fn measured<const D: usize>(
+    effort: &PointsEffort,
+    radius: f64,
+    bar: &Bar,
+) -> Result<Vec<PointsRow>, PoissonError> {
     let spec = |seed| PoissonSpec { radius, domain: Domain::Torus, seed, spacing: Spacing::Double };
     let row = |method: (&'static str, u64)| {
         // The first is for the caches.
@@ -304,14 +308,14 @@ fn judged<const D: usize>(
     radius: f64,
     sets: &[Vec<[f64; D]>],
     points_per_s: f64,
-    asked: &Effort,
-) -> Row {
+    asked: &PointsEffort,
+) -> PointsRow {
     let (set, torus) = (&sets[0], Domain::Torus);
     let rate = (set.len() as f64).powf(1.0 / D as f64);
     let most = (3.0 * rate).min(if D == 2 { 160.0 } else { 40.0 }) as usize;
     let spectra: Vec<Spectrum> = sets.iter().map(|set| Spectrum::new(set, most)).collect();
     let spectrum = Spectrum::mean(&spectra);
-    Row {
+    PointsRow {
         dimensions: D,
         method,
         effort,
@@ -350,7 +354,7 @@ const COARSE_RADIUS: f64 = 1.0 / 64.0;
 const COARSEST_BITS: u32 = 12;
 
 /// Finer and finer numbers, from disks on that are as few numbers wide as may be.
-fn coarse(effort: &Effort) -> Result<Vec<Coarse>, PoissonError> {
+fn coarse(effort: &PointsEffort) -> Result<Vec<Coarse>, PoissonError> {
     let each = (COARSEST_BITS..=effort.finest_bits).step_by(2).map(|bits| {
         let spacing = Spacing::Bits(bits);
         let spec = PoissonSpec { radius: COARSE_RADIUS, domain: Domain::Torus, seed: 1, spacing };
@@ -383,7 +387,7 @@ pub struct Columns {
 }
 
 /// More and more columns in one to four dimensions.
-fn columns(effort: &Effort) -> Result<Vec<Columns>, WhiteError> {
+fn columns(effort: &PointsEffort) -> Result<Vec<Columns>, WhiteError> {
     let mut all = of::<1>(effort, &[1, 4, 16, 64, 256, 1024], 64)?;
     all.extend(of::<2>(effort, &[1, 4, 16, 64, 256], 24)?);
     all.extend(of::<3>(effort, &[1, 4, 8, 16, 32], 8)?);
@@ -391,7 +395,7 @@ fn columns(effort: &Effort) -> Result<Vec<Columns>, WhiteError> {
     Ok(all)
 }
 
-fn of<const D: usize>(effort: &Effort, across: &[u32], cells: u64) -> Result<Vec<Columns>, WhiteError> {
+fn of<const D: usize>(effort: &PointsEffort, across: &[u32], cells: u64) -> Result<Vec<Columns>, WhiteError> {
     let bell: &dyn Density<D> = &Named::Gauss;
     let expected = shares(bell, cells, 8);
     let measure = |&across: &u32| {
@@ -417,7 +421,8 @@ mod tests {
 
     #[test]
     fn a_quick_chart_is_written_and_the_maximal_method_alone_is_maximal() {
-        let effort = Effort { radius: [0.06, 0.2], darts: 5000, seeds: 1, finest_bits: 16, white: 2000 };
+        let effort =
+            PointsEffort { radius: [0.06, 0.2], darts: 5000, seeds: 1, finest_bits: 16, white: 2000 };
         let (_folder, chart, _) = written::<PointsChart>(effort);
         for row in &chart.rows {
             let maximal = row.hole_over_r <= 1.0 + 1e-9;

@@ -22,7 +22,7 @@ use crate::study::{Gallery, Study, StudyError};
 
 /// How much is done.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-pub struct Effort {
+pub struct SampledEffort {
     /// Frames of each animation.
     pub frames: u32,
     /// Width and height of the image in pixels.
@@ -105,7 +105,7 @@ pub struct Figures {
 #[derive(Clone, Debug, Serialize)]
 pub struct SampledChart {
     /// How much was done.
-    pub effort: Effort,
+    pub effort: SampledEffort,
     /// Over all animations, by quantity and together.
     pub figures: Vec<Figures>,
     /// What each animation cost.
@@ -123,12 +123,12 @@ impl Study for SampledChart {
     /// They have to be animated.
     const TAKES_SCENES: bool = true;
 
-    type Effort = Effort;
+    type Effort = SampledEffort;
     /// Hundreds of frames: minutes.
-    const FULL: Effort = Effort { frames: 300, size: (640, 360), samples: 8, seeds: 100 };
-    const QUICK: Effort = Effort { frames: 100, size: (320, 180), samples: 4, seeds: 100 };
+    const FULL: SampledEffort = SampledEffort { frames: 300, size: (640, 360), samples: 8, seeds: 100 };
+    const QUICK: SampledEffort = SampledEffort { frames: 100, size: (320, 180), samples: 4, seeds: 100 };
 
-    fn measure(effort: Effort, scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
+    fn measure(effort: SampledEffort, scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
         let (mut costs, mut trials) = (Vec::new(), Vec::new());
         for scene in std::iter::once("default").chain(scenes.iter().map(String::as_str)) {
             let measured = animation(scene, effort, progress)?;
@@ -241,7 +241,11 @@ impl SampledChart {
 }
 
 /// What it cost, and every trial.
-fn animation(scene: &str, effort: Effort, progress: &Progress) -> Result<(Cost, Vec<Trial>), RunError> {
+fn animation(
+    scene: &str,
+    effort: SampledEffort,
+    progress: &Progress,
+) -> Result<(Cost, Vec<Trial>), RunError> {
     let plan = plan(scene, effort)?;
     let numbers: Vec<u32> = plan.work.settings().frames.clone().collect();
     let started = ProcessTime::now();
@@ -285,7 +289,7 @@ fn animation(scene: &str, effort: Effort, progress: &Progress) -> Result<(Cost, 
     Ok((cost, trials))
 }
 
-fn plan(scene: &str, effort: Effort) -> Result<Plan, RunError> {
+fn plan(scene: &str, effort: SampledEffort) -> Result<Plan, RunError> {
     let overrides = Overrides {
         size: Some(effort.size),
         samples: Some(effort.samples),

@@ -27,7 +27,7 @@ use crate::study::{Gallery, Study, StudyError};
 
 /// How much is measured.
 #[derive(Clone, Copy, Debug, Serialize)]
-pub struct Effort {
+pub struct ShadowsEffort {
     /// Pixels of the image, across and down.
     pub size: [u32; 2],
     /// Texels of the map across and down.
@@ -44,11 +44,11 @@ pub struct Effort {
 #[derive(Clone, Debug, Serialize)]
 pub struct ShadowsChart {
     /// How much was measured.
-    pub effort: Effort,
+    pub effort: ShadowsEffort,
     /// Samples per pixel of the reference.
     pub reference_samples_per_pixel: u32,
     /// By light samples, from few to many.
-    pub rows: Vec<Row>,
+    pub rows: Vec<ShadowsRow>,
     /// Where it does not work: too small and too large a bias, by its size.
     pub biases: Vec<Bias>,
 }
@@ -60,13 +60,13 @@ impl Study for ShadowsChart {
     const PICTURES: &'static [&'static str] = &["shadows_error", "shadows_cost", "shadows_failures"];
     const FILES: &'static [&'static str] = &["shadows.csv", "shadows.json"];
 
-    type Effort = Effort;
-    const FULL: Effort =
-        Effort { size: [96, 54], map_px: 256, most_points: 256, reference_tables: 4, bias: 0.06 };
-    const QUICK: Effort =
-        Effort { size: [48, 27], map_px: 128, most_points: 64, reference_tables: 1, bias: 0.1 };
+    type Effort = ShadowsEffort;
+    const FULL: ShadowsEffort =
+        ShadowsEffort { size: [96, 54], map_px: 256, most_points: 256, reference_tables: 4, bias: 0.06 };
+    const QUICK: ShadowsEffort =
+        ShadowsEffort { size: [48, 27], map_px: 128, most_points: 64, reference_tables: 1, bias: 0.1 };
 
-    fn measure(effort: Effort, _scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
+    fn measure(effort: ShadowsEffort, _scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
         let counts: Vec<u32> = (0..=effort.most_points.ilog2()).map(|power| 1 << power).collect();
         let bar = progress.bar("shadows", counts.len() as u64 + 2);
         let stage = Stage::new(&effort)?;
@@ -135,7 +135,7 @@ impl Study for ShadowsChart {
     }
 
     fn tradeoff(&self) -> Vec<TradeoffPoint> {
-        let point = |(row, method, cost): (&Row, &str, &Cost)| {
+        let point = |(row, method, cost): (&ShadowsRow, &str, &Cost)| {
             let level = format!("{} light samples", row.points);
             let host_s = Metric::host_s(cost.host_s).beside(row.accumulation.host_s);
             TradeoffPoint::new("soft shadows", [method, &level], [Metric::rmse(row.rmse), host_s])
@@ -149,7 +149,7 @@ impl Study for ShadowsChart {
 }
 
 /// Both ways to make a map, with what they cost.
-fn methods(row: &Row) -> [(&Row, &'static str, &Cost); 2] {
+fn methods(row: &ShadowsRow) -> [(&ShadowsRow, &'static str, &Cost); 2] {
     [(row, "one pass", &row.one_pass), (row, "accumulation", &row.accumulation)]
 }
 
@@ -166,13 +166,13 @@ impl ShadowsChart {
         self.rows.iter().all(|row| row.equal)
     }
 
-    fn curve(&self, name: &str, y: impl Fn(&Row) -> f64) -> Series {
+    fn curve(&self, name: &str, y: impl Fn(&ShadowsRow) -> f64) -> Series {
         Series::curve(name, self.rows.iter().map(|row| (f64::from(row.points), y(row))))
     }
 
     fn errors(&self) -> Vec<ChartPanel> {
         let name = "both methods: equal to the bit";
-        let over_cost = |method: fn(&Row) -> &Cost, name: &str| {
+        let over_cost = |method: fn(&ShadowsRow) -> &Cost, name: &str| {
             Series::curve(name, self.rows.iter().map(|row| (method(row).madds as f64, row.rmse)))
         };
         let banding = vec![self.curve(name, |row| row.neighbour_correlation)];
@@ -239,7 +239,7 @@ pub struct Cost {
 
 /// One size of the set.
 #[derive(Clone, Copy, Debug, Serialize)]
-pub struct Row {
+pub struct ShadowsRow {
     /// Places `(u, v, t)`.
     pub points: u32,
     /// Error against rays, linear light.
@@ -267,7 +267,7 @@ pub struct Bias {
 
 /// The scene and the hardware.
 struct Stage {
-    effort: Effort,
+    effort: ShadowsEffort,
     scene: Scene,
     frame: Frame,
     light: AreaLight,
@@ -283,7 +283,7 @@ struct Bench<'a> {
 }
 
 impl Stage {
-    pub fn new(effort: &Effort) -> Result<Self, StudyError> {
+    pub fn new(effort: &ShadowsEffort) -> Result<Self, StudyError> {
         let size = Some((effort.size[0], effort.size[1]));
         let scene = stage()?.with_overrides(&Overrides { size, ..Overrides::default() })?;
         let frame = scene.frame(1)?;
@@ -355,7 +355,7 @@ impl Bench<'_> {
     }
 
     /// Both maps over a set of so many places, and the image of one of them.
-    pub fn row(&self, points: u32, reference: &[Vec3]) -> Result<Row, StudyError> {
+    pub fn row(&self, points: u32, reference: &[Vec3]) -> Result<ShadowsRow, StudyError> {
         let set = SharedSamples::interleaved(&SampleSpec::default(), points, 1)?;
         let (map, one_pass) = self.map(&set, Method::OnePass)?;
         let (other, accumulation) = self.map(&set, Method::Accumulation)?;
@@ -364,7 +364,7 @@ impl Bench<'_> {
         let shadows = Shadows::Map { map: &map, bias: self.stage.effort.bias };
         let image = self.world.image(&set, &seen, shadows);
         let errors = errors(&image, reference);
-        Ok(Row {
+        Ok(ShadowsRow {
             points,
             rmse: mean_square(&errors).sqrt(),
             neighbour_correlation: neighbours(&errors, self.viewport.width() as usize),
@@ -423,7 +423,8 @@ mod tests {
 
     #[test]
     fn more_places_err_less_one_pass_costs_less_and_is_equal() {
-        let least = Effort { size: [32, 18], map_px: 64, most_points: 16, reference_tables: 1, bias: 0.2 };
+        let least =
+            ShadowsEffort { size: [32, 18], map_px: 64, most_points: 16, reference_tables: 1, bias: 0.2 };
         let (_folder, chart, _) = written::<ShadowsChart>(least);
         assert!(chart.is_equal());
         let (first, last) = (&chart.rows[0], chart.rows.last().unwrap());

@@ -17,7 +17,7 @@ use super::truth::{Hulls, Truth};
 
 /// What one method made of one value of a family.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Row {
+pub struct StressRow {
     /// The family.
     pub family: &'static str,
     /// The value of its parameter.
@@ -88,13 +88,13 @@ pub fn measure(
     size: Size,
     gpu: &GpuSpec,
     methods: &[Method],
-) -> Result<Vec<Row>, RunError> {
+) -> Result<Vec<StressRow>, RunError> {
     on_subject(family, value, (size, super::SEED), gpu, |subject| {
         let pairs = Pairs::of(subject, PAIRS[usize::from(size != Size::FULL)]);
         let (reference, brute) = subject.reference()?;
         let row = |method: &Method| {
             let seen = subject.seen(method.features)?;
-            Ok(Row {
+            Ok(StressRow {
                 family: family.name,
                 value,
                 method: method.name,
@@ -112,7 +112,7 @@ pub fn measure(
 }
 
 /// With the cost of each over that of the best.
-fn compared(mut rows: Vec<Row>) -> Vec<Row> {
+fn compared(mut rows: Vec<StressRow>) -> Vec<StressRow> {
     let best = rows.iter().map(|row| row.work.madds()).min().unwrap_or(0).max(1) as f64;
     rows.iter_mut().for_each(|row| row.over_best = row.work.madds().max(1) as f64 / best);
     rows

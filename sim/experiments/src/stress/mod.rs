@@ -19,7 +19,7 @@ use workloads::stress::{Family, Size, families, family};
 use crate::study::table::{Sheet, Table, fixed, optional, plain, share};
 use crate::study::{Gallery, Study, StudyError};
 use choice::{Choice, Choices, Trial};
-use measure::Row;
+use measure::StressRow;
 use methods::METHODS;
 use output::dir::SUMMARY;
 use output::progress::Progress;
@@ -44,7 +44,7 @@ pub fn family_named(name: &str) -> Result<&'static Family, RunError> {
 
 /// How much is measured.
 #[derive(Clone, Copy, Debug)]
-pub struct Effort {
+pub struct StressEffort {
     /// One family; all where there is none.
     pub only: Option<&'static Family>,
     /// Fewer values, and smaller scenes.
@@ -58,7 +58,7 @@ pub struct Report {
     /// How large their scenes are.
     pub size: Size,
     /// A row for each family, value and method, in this order.
-    pub rows: Vec<Row>,
+    pub rows: Vec<StressRow>,
     /// `auto` against every fixed choice of tests.
     pub auto: Choices,
 }
@@ -75,7 +75,7 @@ pub struct Summary<'a> {
     /// `auto` against the best fixed choice of tests.
     pub auto: &'a Choices,
     /// Every row.
-    pub rows: &'a [Row],
+    pub rows: &'a [StressRow],
 }
 
 /// As JSON a report is its summary.
@@ -93,11 +93,11 @@ impl Study for Report {
     const PICTURES: &'static [&'static str] = &[];
     const FILES: &'static [&'static str] = &["stress.csv", "auto.csv", SUMMARY];
 
-    type Effort = Effort;
-    const FULL: Effort = Effort { only: None, quick: false };
-    const QUICK: Effort = Effort { only: None, quick: true };
+    type Effort = StressEffort;
+    const FULL: StressEffort = StressEffort { only: None, quick: false };
+    const QUICK: StressEffort = StressEffort { only: None, quick: true };
 
-    fn measure(effort: Effort, _scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
+    fn measure(effort: StressEffort, _scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
         let quick = effort.quick;
         let chosen = effort.only.map_or_else(|| families().collect(), |family| vec![family]);
         let size = if quick { Size::QUICK } else { Size::FULL };
@@ -114,7 +114,7 @@ impl Study for Report {
             bar.inc();
             Ok((rows, trial))
         };
-        let measured: Vec<(Vec<Row>, Option<Trial>)> =
+        let measured: Vec<(Vec<StressRow>, Option<Trial>)> =
             cases.par_iter().map(measure).collect::<Result<_, RunError>>()?;
         let (rows, trials): (Vec<_>, Vec<_>) = measured.into_iter().unzip();
         let trials: Vec<Trial> = trials.into_iter().flatten().collect();
@@ -184,7 +184,7 @@ impl Report {
     }
 
     /// The rows of one family.
-    pub fn of(&self, family: &Family) -> impl Iterator<Item = &Row> + use<'_> {
+    pub fn of(&self, family: &Family) -> impl Iterator<Item = &StressRow> + use<'_> {
         let name = family.name;
         self.rows.iter().filter(move |row| row.family == name)
     }
@@ -222,7 +222,7 @@ impl Report {
 
     /// Every number of one family.
     fn of_family(&self, family: &Family) -> Sheet {
-        let of = |count: u64, row: &Row| count as f64 / row.intervals.pairs.max(1) as f64;
+        let of = |count: u64, row: &StressRow| count as f64 / row.intervals.pairs.max(1) as f64;
         Table::of(self.of(family))
             .shown(family.parameter, |row| row.value, plain)
             .shown("method", |row| row.method, plain)
@@ -288,7 +288,7 @@ fn choice_sheet<'a>(choices: impl Iterator<Item = &'a Choice>) -> Sheet {
 
 #[cfg(test)]
 mod tests {
-    use super::intervals::Pairs;
+    use super::measure::Pairs;
     use super::methods::{METHODS, combinations};
     use super::methods::{Subject, differing};
     use super::*;

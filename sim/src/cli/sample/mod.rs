@@ -19,6 +19,7 @@ use serde::Serialize;
 
 use super::Failure;
 use super::outputs::{print, print_json};
+use crate::cli::args::ThreadArgs;
 
 /// Arguments of `sample`.
 #[derive(Debug, Args)]
@@ -57,9 +58,9 @@ pub struct Common {
     /// Coordinates in single precision
     #[arg(long)]
     pub single: bool,
-    /// Worker threads [default: all cores]; the points do not depend on it
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
-    pub threads: Option<u16>,
+    /// Worker threads.
+    #[command(flatten)]
+    pub threads: ThreadArgs,
     /// Print a description as one line of JSON instead of the points
     #[arg(long)]
     pub json: bool,
@@ -78,7 +79,7 @@ struct Made<T: Serialize> {
 impl Common {
     /// Writes the file and prints the result.
     fn deliver(&self, points: &Points, facts: impl Serialize, line: &str) -> Result<(), Failure> {
-        let pool = super::threads(self.threads)?;
+        let pool = self.threads.pool()?;
         if let Some(path) = &self.out {
             pool.install(|| points.write(path, self.single))?;
         } else if !self.json {

@@ -85,7 +85,7 @@ fn make<const D: usize>(
     args: &PoissonArgs,
     terminal: &Terminal,
 ) -> Result<PoissonDisk<D>, Failure> {
-    let pool = crate::cli::threads(args.common.threads)?;
+    let pool = args.common.threads.pool()?;
     let volume = ball(D) * spec.radius.powi(D as i32);
     let progress = Progress::on(terminal, false);
     let points = saturation(D) / volume;

@@ -71,7 +71,7 @@ struct Facts {
 
 pub(super) fn run(args: &VolumeArgs) -> Result<(), Failure> {
     args.common.check(args.mesh.as_deref())?;
-    let pool = crate::cli::threads(args.common.threads)?;
+    let pool = args.common.threads.pool()?;
     pool.install(|| match &args.mesh {
         Some(path) => {
             let mesh = load_surface(path)?;

@@ -14,10 +14,11 @@ use warnings::Code;
 use super::input::Frames;
 use super::report;
 use super::wrong;
+use crate::cli::Failure;
+use crate::cli::args::ThreadArgs;
 use crate::cli::outputs::may_hold_results;
 use crate::cli::outputs::print_json;
 use crate::cli::trace::input::{FindArgs, InputArgs};
-use crate::cli::{Failure, threads};
 
 /// Arguments of `trace frames`.
 #[derive(Clone, Debug, Args)]
@@ -37,9 +38,9 @@ pub struct FramesArgs {
     /// Also give inverse units, with what is wrong about averaging them
     #[arg(long)]
     pub inverse: bool,
-    /// Worker threads [default: all cores]; results do not depend on it
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
-    pub threads: Option<u16>,
+    /// Worker threads.
+    #[command(flatten)]
+    pub threads: ThreadArgs,
     /// Print everything as JSON and nothing else
     #[arg(long)]
     pub json: bool,
@@ -55,7 +56,7 @@ pub(super) fn run(args: &FramesArgs, terminal: &Terminal) -> Result<(), Failure>
     let inputs = args.find.mark_file.as_deref().into_iter().chain([args.input.trace.as_path()]);
     may_hold_results(("--out", args.out.as_deref()), inputs)?;
     args.out.as_deref().map_or(Ok(()), is_table)?;
-    let (frames, table, summary, pixels) = threads(args.threads)?.install(|| {
+    let (frames, table, summary, pixels) = args.threads.pool()?.install(|| {
         let mut frames = args.find.frames(&args.input, &args.input.trace, terminal)?;
         let pixels = args.find.pixels.or(frames.metadata.pixels);
         let table = FrameTable::new(std::mem::take(&mut frames.energies), pixels);

@@ -14,7 +14,7 @@ use workloads::caustics::{
 };
 
 use super::view::{SIDE_M, SQUARE_PX, above, aside, aside_of, from_the_side, water};
-use super::{CausticsChart, Coarse, Effort, Row};
+use super::{CausticsChart, CausticsEffort, CausticsRow, Coarse};
 use crate::study::StudyError;
 
 /// Slopes of the oceans that get coarser.
@@ -63,7 +63,7 @@ pub fn ocean(
     })
 }
 
-pub(super) fn measure(effort: Effort, progress: &Progress) -> Result<CausticsChart, StudyError> {
+pub(super) fn measure(effort: CausticsEffort, progress: &Progress) -> Result<CausticsChart, StudyError> {
     let ocean = ocean(effort.ocean_cells, [SLOPE, DEPTH_M], effort.ocean_px, progress)?;
     let steps = effort.slopes.len() * 4
         + COARSE_SLOPES.len() * effort.coarse_cells.len()
@@ -83,7 +83,12 @@ pub(super) fn measure(effort: Effort, progress: &Progress) -> Result<CausticsCha
 }
 
 /// Every method on one surface: the light in the volume.
-fn by_method(effort: &Effort, slope: f64, thread: &ThreadPool, bar: &Bar) -> Result<Vec<Row>, StudyError> {
+fn by_method(
+    effort: &CausticsEffort,
+    slope: f64,
+    thread: &ThreadPool,
+    bar: &Bar,
+) -> Result<Vec<CausticsRow>, StudyError> {
     let (beams, eye) = (water(effort.sweep_cells, slope).beams(0.0), aside(effort.sweep_px)?);
     let ours = draw(&beams, &eye, Method::Moving, Some(Light::Volume));
     let crossing = crossing(&beams);
@@ -98,7 +103,7 @@ fn by_method(effort: &Effort, slope: f64, thread: &ThreadPool, bar: &Bar) -> Res
         runs.sort_by(|a, b| a.0.total_cmp(&b.0));
         let (cpu_s, picture) = &runs[runs.len() / 2];
         bar.inc();
-        Row {
+        CausticsRow {
             slope,
             crossing,
             method,
@@ -112,7 +117,7 @@ fn by_method(effort: &Effort, slope: f64, thread: &ThreadPool, bar: &Bar) -> Res
 }
 
 /// One surface of fewer and fewer triangles against photons that are refracted at the waves themselves: the light on the floor.
-fn by_cells(effort: &Effort, slope: f64, bar: &Bar) -> Result<Vec<Coarse>, StudyError> {
+fn by_cells(effort: &CausticsEffort, slope: f64, bar: &Bar) -> Result<Vec<Coarse>, StudyError> {
     let eye = above(effort.floor_px)?;
     let squares = Squares { eye: &eye, side_px: SQUARE_PX };
     let floor = Floor { height_m: -DEPTH_M };
@@ -185,7 +190,7 @@ struct Bench {
 }
 
 /// Every pleat of every number of triangles.
-fn crossed(effort: &Effort, bar: &Bar) -> Result<Vec<Crossed>, StudyError> {
+fn crossed(effort: &CausticsEffort, bar: &Bar) -> Result<Vec<Crossed>, StudyError> {
     let mut rows = Vec::new();
     for &cells in effort.pleated_cells {
         let bench = Bench::new(effort, cells)?;
@@ -202,7 +207,7 @@ fn floor() -> Floor {
 }
 
 impl Bench {
-    fn new(effort: &Effort, cells: u32) -> Result<Self, StudyError> {
+    fn new(effort: &CausticsEffort, cells: u32) -> Result<Self, StudyError> {
         let surface = Water { overshoot: OVERSHOOT, depth_m: DEPTH_M, ..water(cells, SLOPE) };
         let middle = DVec3::new(1.5, -0.6 * DEPTH_M, 1.0);
         let aside = from_the_side(middle, DEPTH_M, effort.sweep_px)?;

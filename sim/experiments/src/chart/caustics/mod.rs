@@ -18,7 +18,7 @@ pub use measure::{Crossed, Ocean, ocean};
 
 /// How much is measured.
 #[derive(Clone, Copy, Debug, Serialize)]
-pub struct Effort {
+pub struct CausticsEffort {
     /// Squares along a side of the ocean of the paper's figure; 255 are 130,050 volumes.
     pub ocean_cells: u32,
     /// Pixels of its image.
@@ -45,7 +45,7 @@ pub struct Effort {
 
 /// One method on one surface.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Row {
+pub struct CausticsRow {
     /// Root mean square of the slope of the surface.
     pub slope: f64,
     /// For how much of their length sides of beams cross.
@@ -83,13 +83,13 @@ pub struct Coarse {
 #[derive(Clone, Debug, Serialize)]
 pub struct CausticsChart {
     /// How much was measured.
-    pub effort: Effort,
+    pub effort: CausticsEffort,
     /// The ocean of the paper's figure.
     pub ocean: Ocean,
     /// Squares along a side of the coarser oceans from which on a run does not warn that they are too few.
     pub resolved_cells: f64,
     /// By slope and method.
-    pub rows: Vec<Row>,
+    pub rows: Vec<CausticsRow>,
     /// By slope and number of triangles.
     pub coarse: Vec<Coarse>,
     /// By number of triangles and pleat.
@@ -110,8 +110,8 @@ impl Study for CausticsChart {
         &["caustics", "caustics_failures", MAPS[0], MAPS[1], MAPS[2], MAPS[3]];
     const FILES: &'static [&'static str] = &["caustics.csv", "caustics.json"];
 
-    type Effort = Effort;
-    const FULL: Effort = Effort {
+    type Effort = CausticsEffort;
+    const FULL: CausticsEffort = CausticsEffort {
         ocean_cells: 255,
         ocean_px: [512, 288],
         sweep_cells: 24,
@@ -124,7 +124,7 @@ impl Study for CausticsChart {
         floor_px: 512,
         repeats: 3,
     };
-    const QUICK: Effort = Effort {
+    const QUICK: CausticsEffort = CausticsEffort {
         ocean_cells: 48,
         ocean_px: [192, 108],
         sweep_cells: 10,
@@ -138,7 +138,7 @@ impl Study for CausticsChart {
         repeats: 1,
     };
 
-    fn measure(effort: Effort, _scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
+    fn measure(effort: CausticsEffort, _scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
         measure::measure(effort, progress)
     }
 
@@ -224,7 +224,7 @@ struct Line {
 }
 
 impl Line {
-    fn of_slope(row: &Row, cells: u32) -> Self {
+    fn of_slope(row: &CausticsRow, cells: u32) -> Self {
         let place = Method::ALL.iter().position(|method| *method == row.method).unwrap_or(0);
         Self {
             sweep: "slope",
@@ -283,7 +283,7 @@ impl CausticsChart {
     }
 
     fn costs(&self) -> Vec<ChartPanel> {
-        let by_method = |of: fn(&Row) -> f64| {
+        let by_method = |of: fn(&CausticsRow) -> f64| {
             let curve = |method: Method| {
                 let rows = self.rows.iter().filter(move |row| row.method == method);
                 Series::curve(method.name(), rows.map(|row| (row.slope, of(row))))
@@ -426,7 +426,7 @@ mod tests {
 
     #[test]
     fn the_files_are_all_there_and_agree() {
-        let least = Effort {
+        let least = CausticsEffort {
             ocean_cells: 6,
             ocean_px: [48, 27],
             sweep_cells: 4,

@@ -23,7 +23,7 @@ pub const FAILS_BELOW: f64 = 0.9;
 
 /// How much is measured.
 #[derive(Clone, Copy, Debug, Serialize)]
-pub struct Effort {
+pub struct FramesEffort {
     /// Frames of each scene.
     pub frames: usize,
     /// Rates, Hz.
@@ -102,7 +102,7 @@ impl Axis {
         }
     }
 
-    fn recordings(self, effort: &Effort) -> Vec<(f64, Recording)> {
+    fn recordings(self, effort: &FramesEffort) -> Vec<(f64, Recording)> {
         let usual = Recording::default();
         match self {
             Self::Rate => {
@@ -120,7 +120,7 @@ impl Axis {
 
 /// One method on one scene recorded in one way, over all seeds.
 #[derive(Clone, Debug, Serialize)]
-pub struct Row {
+pub struct FramesRow {
     /// What is changed.
     pub axis: Axis,
     /// To what.
@@ -140,9 +140,9 @@ pub struct Row {
 #[derive(Clone, Debug, Serialize)]
 pub struct FramesChart {
     /// How much was measured.
-    pub effort: Effort,
+    pub effort: FramesEffort,
     /// By axis, value, scene and method.
-    pub rows: Vec<Row>,
+    pub rows: Vec<FramesRow>,
 }
 
 impl Study for FramesChart {
@@ -153,15 +153,15 @@ impl Study for FramesChart {
     const FILES: &'static [&'static str] = &["frames.csv", "frames.md", "frames.json"];
     const SHOWS_TIME: bool = true;
 
-    type Effort = Effort;
-    const FULL: Effort = Effort {
+    type Effort = FramesEffort;
+    const FULL: FramesEffort = FramesEffort {
         frames: 200,
         rates_hz: &[1e3, 2e3, 5e3, 10e3, 20e3, 50e3, 200e3, 1e6],
         snrs_db: &[40.0, 30.0, 20.0, 10.0, 5.0, 0.0],
         bits: &[4, 6, 8, 10, 12, 14, 16],
         seeds: &[1, 2],
     };
-    const QUICK: Effort = Effort {
+    const QUICK: FramesEffort = FramesEffort {
         frames: 60,
         rates_hz: &[2e3, 10e3, 50e3],
         snrs_db: &[40.0, 10.0, 0.0],
@@ -169,7 +169,7 @@ impl Study for FramesChart {
         seeds: &[1],
     };
 
-    fn measure(effort: Effort, _scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
+    fn measure(effort: FramesEffort, _scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
         let subjects = SCENARIOS.iter().map(|scenario| Subject::new(scenario, &effort));
         let subjects: Vec<Subject> = subjects.collect::<Result<_, _>>()?;
         let settings = Axis::ALL.into_iter().flat_map(|axis| {
@@ -184,7 +184,7 @@ impl Study for FramesChart {
                 for (way, outcomes) in subject.analyse(&recording)? {
                     let outcome = joined(&outcomes);
                     let fails = outcome.f1 < FAILS_BELOW;
-                    rows.push(Row { axis, value, scene: subject.name, way, outcome, fails });
+                    rows.push(FramesRow { axis, value, scene: subject.name, way, outcome, fails });
                 }
                 bar.inc();
             }
@@ -264,7 +264,7 @@ impl FramesChart {
     }
 
     /// The rows of one method at one value, a row for each scene.
-    fn at(&self, axis: Axis, value: f64, way: Way) -> impl Iterator<Item = &Row> {
+    fn at(&self, axis: Axis, value: f64, way: Way) -> impl Iterator<Item = &FramesRow> {
         self.rows.iter().filter(move |row| row.axis == axis && row.value == value && row.way == way)
     }
 
@@ -365,7 +365,7 @@ impl FramesChart {
     fn by_scene(&self) -> Sheet {
         let usual = self.values(Axis::Rate).into_iter().rfind(|&rate_hz| rate_hz <= 50e3).unwrap_or(0.0);
         let at = |way: Way| self.at(Axis::Rate, usual, way).collect::<Vec<_>>();
-        let f1 = |row: &Row| format!("{:.3}{}", row.outcome.f1, if row.fails { "*" } else { "" });
+        let f1 = |row: &FramesRow| format!("{:.3}{}", row.outcome.f1, if row.fails { "*" } else { "" });
         let mut table =
             Table::of(at(Way::Auto).into_iter().enumerate()).detail("scene", |(_, row)| row.scene, plain);
         for way in Way::ALL {
@@ -383,8 +383,8 @@ mod tests {
     use super::*;
     use crate::study::written;
 
-    const SMALL: Effort =
-        Effort { frames: 40, rates_hz: &[1e3, 20e3], snrs_db: &[30.0], bits: &[], seeds: &[1] };
+    const SMALL: FramesEffort =
+        FramesEffort { frames: 40, rates_hz: &[1e3, 20e3], snrs_db: &[30.0], bits: &[], seeds: &[1] };
 
     fn small() -> (tempfile::TempDir, FramesChart) {
         let (dir, chart, _) = written::<FramesChart>(SMALL);

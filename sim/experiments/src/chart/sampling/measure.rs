@@ -15,7 +15,7 @@ use run::GpuSpec;
 use serde::Serialize;
 use workloads::{Frame, Overrides, Scene};
 
-use super::{Effort, Row, fitted};
+use super::{SamplingEffort, SamplingRow, fitted};
 use crate::chart::statistics::{White, errors, mean_square, neighbours};
 use crate::study::StudyError;
 
@@ -51,7 +51,7 @@ pub(super) fn image(stage: &Stage, samples: &dyn SampleSource) -> Result<Vec<Vec
 }
 
 /// The mean of several images of the default table with seeds of their own.
-pub(super) fn reference(stage: &Stage, effort: &Effort) -> Result<Vec<Vec3>, StudyError> {
+pub(super) fn reference(stage: &Stage, effort: &SamplingEffort) -> Result<Vec<Vec3>, StudyError> {
     let frames = (0..effort.reference_frames).into_par_iter().map(|frame| {
         image(stage, &*table("owen", effort.reference_samples, REFERENCE_SEED + u64::from(frame))?)
     });
@@ -69,7 +69,7 @@ pub(super) fn point(
     name: &str,
     samples_per_pixel: u32,
     reference: &[Vec3],
-    effort: &Effort,
+    effort: &SamplingEffort,
 ) -> Result<Point, StudyError> {
     let (mut squares, mut host_s) = (0.0, f64::INFINITY);
     for seed in 1..=u64::from(effort.seeds) {
@@ -87,7 +87,7 @@ pub(super) fn sweep(
     stage: &Stage,
     name: &str,
     reference: &[Vec3],
-    effort: &Effort,
+    effort: &SamplingEffort,
 ) -> Result<Vec<Point>, StudyError> {
     let counts = (0..=effort.most_samples.ilog2()).map(|power| 1 << power);
     counts.map(|count| point(stage, name, count, reference, effort)).collect()
@@ -110,7 +110,7 @@ pub(super) struct SceneStage {
 }
 
 /// The scenes of the chart.
-pub(super) fn scenes(effort: &Effort) -> Result<Vec<Stage>, StudyError> {
+pub(super) fn scenes(effort: &SamplingEffort) -> Result<Vec<Stage>, StudyError> {
     let ([width, height], (file, frame)) = (effort.size, effort.scene);
     let scene = |name, lens_radius, shutter| -> Result<Stage, StudyError> {
         let size = Some((width, height));
@@ -210,9 +210,9 @@ impl Fence {
 #[derive(Clone, Debug, Serialize)]
 pub struct Failures {
     /// Moving scene, every number of samples one by one: low-discrepancy points come out even at powers of two only.
-    pub every_number: Vec<Row>,
+    pub every_number: Vec<SamplingRow>,
     /// More edges in a pixel than samples: stratification finds nothing to hold on to.
-    pub many_edges: Vec<Row>,
+    pub many_edges: Vec<SamplingRow>,
     /// Tables that all pixels share: what one pixel gets wrong its neighbours get wrong alike.
     pub shared: Vec<Shared>,
 }
@@ -239,7 +239,7 @@ const SHARED_SAMPLES: u32 = 16;
 pub(super) fn failures(
     stages: &[Stage],
     references: &[Vec<Vec3>],
-    effort: &Effort,
+    effort: &SamplingEffort,
     bar: &Bar,
 ) -> Result<Failures, StudyError> {
     let every_number = every_number(&stages[0], &references[0], effort)?;
@@ -255,28 +255,32 @@ fn names() -> impl Iterator<Item = &'static str> {
     SampleSpec::names().map(|(name, _)| name)
 }
 
-fn every_number(stage: &Stage, reference: &[Vec3], effort: &Effort) -> Result<Vec<Row>, StudyError> {
+fn every_number(
+    stage: &Stage,
+    reference: &[Vec3],
+    effort: &SamplingEffort,
+) -> Result<Vec<SamplingRow>, StudyError> {
     let row = |table| {
         let counts = (1..=effort.every_up_to).into_par_iter();
         let points = counts.map(|n| point(stage, table, n, reference, effort));
         let points: Vec<Point> = points.collect::<Result<_, _>>()?;
-        Ok(Row { scene: stage.name(), table, exponent: fitted(&points), points })
+        Ok(SamplingRow { scene: stage.name(), table, exponent: fitted(&points), points })
     };
     ["owen", "random", "jittered"].into_iter().map(row).collect()
 }
 
-fn many_edges(effort: &Effort) -> Result<Vec<Row>, StudyError> {
+fn many_edges(effort: &SamplingEffort) -> Result<Vec<SamplingRow>, StudyError> {
     // Every pixel is like every other: a small image does.
     let stage = Stage::Fence(Fence::new([32, 18])?);
     let reference = reference(&stage, effort)?;
     let row = |table| {
         let points = sweep(&stage, table, &reference, effort)?;
-        Ok(Row { scene: stage.name(), table, exponent: fitted(&points), points })
+        Ok(SamplingRow { scene: stage.name(), table, exponent: fitted(&points), points })
     };
     names().map(row).collect()
 }
 
-fn shared(stage: &Stage, reference: &[Vec3], effort: &Effort) -> Result<Vec<Shared>, StudyError> {
+fn shared(stage: &Stage, reference: &[Vec3], effort: &SamplingEffort) -> Result<Vec<Shared>, StudyError> {
     let row = |name| {
         let image = image(stage, &*table(name, SHARED_SAMPLES, 1)?)?;
         let errors = errors(&image, reference);

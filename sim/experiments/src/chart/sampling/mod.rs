@@ -1,6 +1,6 @@
 //! `quintile chart sampling`: image error against cost, for every sample table.
 //!
-//! Error is the root of the mean squared difference to a reference of [`Effort::reference`] samples per pixel, over all
+//! Error is the root of the mean squared difference to a reference of [`SamplingEffort::reference`] samples per pixel, over all
 //! pixels and the three channels, in linear light. Host time is that of one frame through the pipeline, caches and all; the
 //! table is made before.
 
@@ -23,7 +23,7 @@ pub use measure::{Failures, Shared};
 
 /// How much is measured.
 #[derive(Clone, Copy, Debug, Serialize)]
-pub struct Effort {
+pub struct SamplingEffort {
     /// The built-in scene, and its frame.
     pub scene: (&'static str, u32),
     /// Pixels of each image, across and down.
@@ -40,7 +40,7 @@ pub struct Effort {
     pub every_up_to: u32,
 }
 
-impl Effort {
+impl SamplingEffort {
     /// Samples per pixel of the reference.
     pub fn reference(&self) -> u32 {
         self.reference_frames * self.reference_samples
@@ -49,7 +49,7 @@ impl Effort {
 
 /// Error over cost of one table on one scene.
 #[derive(Clone, Debug, Serialize)]
-pub struct Row {
+pub struct SamplingRow {
     /// The scene.
     pub scene: &'static str,
     /// The sample table.
@@ -67,11 +67,11 @@ pub const FIT_FROM: u32 = 4;
 #[derive(Clone, Debug, Serialize)]
 pub struct SamplingChart {
     /// How much was measured.
-    pub effort: Effort,
+    pub effort: SamplingEffort,
     /// Samples per pixel of the references.
     pub reference_samples_per_pixel: u32,
     /// Scene by scene, table by table.
-    pub rows: Vec<Row>,
+    pub rows: Vec<SamplingRow>,
     /// Where it does not work.
     pub failures: Failures,
 }
@@ -84,8 +84,8 @@ impl Study for SamplingChart {
     const FILES: &'static [&'static str] = &["sampling.csv", "sampling.md", "sampling.json"];
     const SHOWS_TIME: bool = true;
 
-    type Effort = Effort;
-    const FULL: Effort = Effort {
+    type Effort = SamplingEffort;
+    const FULL: SamplingEffort = SamplingEffort {
         scene: ("default", 18),
         size: [96, 54],
         most_samples: 256,
@@ -94,7 +94,7 @@ impl Study for SamplingChart {
         seeds: 1,
         every_up_to: 40,
     };
-    const QUICK: Effort = Effort {
+    const QUICK: SamplingEffort = SamplingEffort {
         size: [48, 27],
         most_samples: 32,
         reference_frames: 4,
@@ -104,7 +104,7 @@ impl Study for SamplingChart {
         ..Self::FULL
     };
 
-    fn measure(effort: Effort, _scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
+    fn measure(effort: SamplingEffort, _scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
         let stages = measure::scenes(&effort)?;
         let references = stages.iter().map(|stage| measure::reference(stage, &effort));
         let references: Vec<Vec<Vec3>> = references.collect::<Result<_, _>>()?;
@@ -114,7 +114,7 @@ impl Study for SamplingChart {
         for (stage, reference) in stages.iter().zip(&references) {
             for &table in &tables {
                 let points = measure::sweep(stage, table, reference, &effort)?;
-                rows.push(Row { scene: stage.name(), table, exponent: fitted(&points), points });
+                rows.push(SamplingRow { scene: stage.name(), table, exponent: fitted(&points), points });
                 bar.inc();
             }
         }
@@ -167,7 +167,7 @@ impl Study for SamplingChart {
     }
 
     fn tradeoff(&self) -> Vec<TradeoffPoint> {
-        let point = |(row, point): (&Row, &Point)| {
+        let point = |(row, point): (&SamplingRow, &Point)| {
             let level = format!("{} samples a pixel", point.samples_per_pixel);
             let metrics = [Metric::rmse(point.rmse), Metric::host_s(point.host_s)];
             TradeoffPoint::new(format!("an image ({})", row.scene), [row.table, &level], metrics)
@@ -179,7 +179,7 @@ impl Study for SamplingChart {
 
 impl SamplingChart {
     /// Every measurement with the part of the chart that it is for.
-    fn points(&self) -> impl Iterator<Item = (&'static str, &Row, &Point)> {
+    fn points(&self) -> impl Iterator<Item = (&'static str, &SamplingRow, &Point)> {
         let groups = [
             ("error", &self.rows),
             ("every_number", &self.failures.every_number),
@@ -217,17 +217,17 @@ impl Point {
 }
 
 /// A panel for each scene.
-fn panels(rows: &[Row], across: &str, doubling: bool, x: fn(&Point) -> f64) -> Vec<ChartPanel> {
+fn panels(rows: &[SamplingRow], across: &str, doubling: bool, x: fn(&Point) -> f64) -> Vec<ChartPanel> {
     let scenes = rows.chunk_by(|a, b| a.scene == b.scene);
     let scale = if doubling { Scale::Doublings } else { Scale::Decades };
-    let panel = |rows: &[Row]| {
+    let panel = |rows: &[SamplingRow]| {
         let curves = rows.iter().map(|row| curve(row, doubling, |p| (x(p), p.rmse))).collect();
         ChartPanel::new(rows[0].scene, [across, "RMSE"], curves).on(scale.clone(), Scale::Decades)
     };
     scenes.map(panel).collect()
 }
 
-fn curve(row: &Row, noted: bool, place: impl Fn(&Point) -> (f64, f64)) -> Series {
+fn curve(row: &SamplingRow, noted: bool, place: impl Fn(&Point) -> (f64, f64)) -> Series {
     let note = row.exponent.filter(|_| noted).map_or(String::new(), |p| format!("{p:.2}"));
     Series { note, ..Series::curve(row.table, row.points.iter().map(place)) }
 }
@@ -245,7 +245,7 @@ mod tests {
     use crate::study::written;
 
     /// Small enough for a test.
-    const SMALL: Effort = Effort {
+    const SMALL: SamplingEffort = SamplingEffort {
         scene: ("tiny", 1),
         size: [64, 48],
         most_samples: 32,
@@ -256,10 +256,10 @@ mod tests {
     };
 
     /// No more than there has to be.
-    const LEAST: Effort =
-        Effort { size: [16, 9], most_samples: 2, reference_frames: 1, reference_samples: 8, ..SMALL };
+    const LEAST: SamplingEffort =
+        SamplingEffort { size: [16, 9], most_samples: 2, reference_frames: 1, reference_samples: 8, ..SMALL };
 
-    fn row<'a>(rows: &'a [Row], scene: &str, table: &str) -> &'a Row {
+    fn row<'a>(rows: &'a [SamplingRow], scene: &str, table: &str) -> &'a SamplingRow {
         rows.iter().find(|row| row.scene == scene && row.table == table).unwrap()
     }
 
@@ -272,7 +272,7 @@ mod tests {
             assert!((random + 0.5).abs() < 0.06, "{scene}: {random}");
             let owen = row(&chart.rows, scene, "owen");
             assert!(owen.exponent.unwrap() < -0.6, "{scene}: {:?}", owen.exponent);
-            let last = |row: &Row| row.points[row.points.len() - 1].rmse;
+            let last = |row: &SamplingRow| row.points[row.points.len() - 1].rmse;
             assert!(last(owen) < 0.8 * last(row(&chart.rows, scene, "random")), "{scene}");
         }
         // The fence: half of it seen at random, so one sample errs by a half in every channel.

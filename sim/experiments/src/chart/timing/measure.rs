@@ -24,7 +24,7 @@ const TIMES: usize = 5;
 
 /// A level on a stream.
 #[derive(Clone, Debug, Serialize)]
-pub struct Row {
+pub struct TimingRow {
     /// The scene.
     pub scene: String,
     /// The GPU.
@@ -86,7 +86,7 @@ pub(super) fn rows(
     gpu: &GpuSpec,
     stream: &Packets,
     speed: &mut Speed,
-) -> Result<Vec<Row>, RunError> {
+) -> Result<Vec<TimingRow>, RunError> {
     let model = PowerModel::new(&EnergyTable::builtin("28nm")?, &Platform::builtin("reference")?)?;
     let power = |timed: &Timed| {
         model.frame(&timed.timeline).map_err(|source| RunError::Timeline { frame: 0, source })
@@ -104,7 +104,7 @@ pub(super) fn rows(
             host_s = host_s.min(timed(level, gpu, &written)?.1);
         }
         let found_power = power(&found)?;
-        rows.push(Row {
+        rows.push(TimingRow {
             scene: scene.to_owned(),
             gpu: gpu.name.clone(),
             level,

@@ -23,7 +23,7 @@ use timing::Level;
 pub use animations::AnimationRow;
 pub use failures::{Chosen, FailedLevel, FailureRow, RateRow};
 pub use measure::AddedRow;
-pub use measure::Row;
+pub use measure::TimingRow;
 
 /// GPUs in the chart: small, integrated, large.
 const GPUS: [&str; 3] = ["mobile", "reference", "discrete"];
@@ -84,7 +84,7 @@ pub struct TimingChart {
     /// Animations at every level, drawn and timed, on every GPU.
     pub animations: Vec<AnimationRow>,
     /// A row for each scene, GPU and level but the reference.
-    pub rows: Vec<Row>,
+    pub rows: Vec<TimingRow>,
     /// What the cheap levels add to a run that only draws, scenes by GPUs.
     pub added: Vec<AddedRow>,
     /// Streams made to break levels, on each GPU; not in the figures of the levels.
@@ -189,11 +189,11 @@ fn animated(
     Ok(rows)
 }
 
-fn figures(level: Level, rows: &[Row], added: &[AddedRow]) -> Figures {
+fn figures(level: Level, rows: &[TimingRow], added: &[AddedRow]) -> Figures {
     if level == Level::Stepped {
         return Figures { speedup_over_stepped: 1.0, speedup_over_stepped_least: 1.0, ..Figures::default() };
     }
-    let of = |pick: fn(&Row) -> f64| quantiles(rows.iter().filter(|row| row.level == level).map(pick));
+    let of = |pick: fn(&TimingRow) -> f64| quantiles(rows.iter().filter(|row| row.level == level).map(pick));
     let added = quantiles(added.iter().filter(|row| row.level == level).map(|row| row.added_percent));
     let (cycles, energy) =
         (of(|row| row.cycle_error_percent.abs()), of(|row| row.energy_error_percent.abs()));
