@@ -1,6 +1,4 @@
 //! Report: one HTML page about a run that opens from disk and needs no network.
-//!
-//! Rows of the report's tables.
 
 use std::borrow::Cow;
 

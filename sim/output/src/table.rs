@@ -1,6 +1,4 @@
-//! Numbers as text with SI prefixes, and aligned tables for the terminal.
-//!
-//! Mean and standard deviation, for plots and report.
+//! Numbers as text with SI prefixes, means with standard deviations, and aligned tables for the terminal.
 
 use std::fmt;
 

@@ -1,6 +1,4 @@
-//! Simulation of all frames of a run.
-//!
-//! One small frame on a machine given as text, for tests and fuzz targets of its files.
+//! Simulation of all frames of a run, and of one small frame on a machine given as text (for tests and fuzz targets).
 
 use output::OutDir;
 use output::progress::Progress;

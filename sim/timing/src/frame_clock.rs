@@ -1,6 +1,4 @@
-//! Timing levels, and a clock for any of them.
-//!
-//! Known inaccuracies of a level, detected in its own results.
+//! Timing levels, a clock for any of them, and warnings about inaccuracies detected in their results.
 
 use activity::{LineAccess, Packet};
 use serde::{Deserialize, Serialize};

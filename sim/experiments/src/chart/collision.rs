@@ -1,7 +1,4 @@
-//! `quintile chart collision`: false positives of collision detection, over resolution, bins of time and cost, and where all of its
-//! methods fail.
-//!
-//! Pairs kept and missed, and what that takes.
+//! `quintile chart collision`: false positives of collision detection over resolution, time bins and cost, and failure modes.
 
 use cpu_time::ThreadTime;
 use output::OutputError;

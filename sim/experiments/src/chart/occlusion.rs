@@ -1,6 +1,5 @@
-//! `quintile chart occlusion`: what is found hidden, and what that costs, over boxes of lens and time, tiles and samples.
-//!
-//! Yards, and what queries find in them.
+//! `quintile chart occlusion`: hidden boxes found by occlusion queries, and their cost, over boxes of lens and time, tiles and
+//! samples.
 
 use glam::Vec3;
 use output::OutputError;

@@ -1,8 +1,6 @@
-//! `quintile chart points`: quality of points that keep their distance over points a second, spectra, and where it fails.
+//! `quintile chart points`: quality of Poisson disk points over points per second, spectra, and failure modes.
 //!
-//! Times are of the CPU, of one thread.
-//!
-//! Points of every method, how fast they came and how good they are.
+//! Times are CPU times of one thread.
 
 use cpu_time::ThreadTime;
 use output::OutputError;

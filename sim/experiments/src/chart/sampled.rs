@@ -1,6 +1,6 @@
-//! `quintile chart sampled`: frames predicted from few against all of them simulated, and how often intervals hold the truth.
+//! `quintile chart sampled`: prediction of frames from a few simulated ones, and coverage of the intervals.
 //!
-//! One animation simulated whole, then predicted again and again from a few of its frames.
+//! An animation is simulated whole, then predicted repeatedly from some of its frames.
 
 use std::path::Path;
 

@@ -1,6 +1,4 @@
 //! Paper II, "Performance per What? Energy-Efficiency Units for Graphics".
-//!
-//! Settings of Paper II's rows.
 
 use output::progress::Progress;
 use power_model::{Circumstances, FramePower};
@@ -49,7 +47,7 @@ pub(super) fn rows(options: &Options, progress: &Progress) -> Result<(Origin, Ve
     Ok((origin, done))
 }
 
-/// What was drawn and recorded.
+/// Recorded frames.
 fn ran(recording: &Recording, found: usize) -> Vec<Number> {
     numbers([
         ("frames_drawn", recording.truth.frames.len() as f64),
@@ -109,7 +107,7 @@ fn passes(with: &With<'_, Passes>, recording: &Recording, frames: &[FramePower],
     Done { row, figures: vec![figure(recording, idle_w)] }
 }
 
-/// The largest difference of a frame's parts to the power that was drawn, relative.
+/// Largest relative difference between the sum of a frame's parts and its power.
 fn parts_error(frames: &[FramePower]) -> f64 {
     let error = |frame: &FramePower| {
         let drawn_j: f64 = frame.bins().map(|(length_s, watts)| length_s * watts.iter().sum::<f64>()).sum();
@@ -178,7 +176,7 @@ paper_settings!(Paper::Two, "paper2.ron" {
 });
 
 settings_group! {
-    /// What is recorded for both rows.
+    /// Recordings of both rows.
     Work {} {
         pc_frames: u32, within(1..=36);
         recorded_frames: usize, within(8..=10_000);

@@ -1,6 +1,4 @@
-//! All rows of a paper as text, JSON and files.
-//!
-//! What a folder already holds: rows of an earlier call that this one would lose.
+//! All rows of a paper as text, JSON and files. A larger result of an earlier call is not replaced by a smaller one.
 
 use std::fs;
 
@@ -29,7 +27,7 @@ pub struct Report {
     pub equalities_hold: bool,
     /// The rows in order.
     pub rows: Vec<Row>,
-    /// What was drawn.
+    /// Figures.
     #[serde(skip)]
     figures: Vec<Figure>,
 }
@@ -64,7 +62,7 @@ impl Report {
         self.rows.iter().filter(|row| row.fails()).map(|row| row.about.id.as_str()).collect()
     }
 
-    /// What is printed: a table, and below it the reasons.
+    /// Text for the terminal: a table, and the reasons below it.
     pub fn text(&self) -> String {
         let mut table = Table::new(["claim", "kind", "verdict"]);
         for row in &self.rows {
@@ -83,14 +81,14 @@ impl Report {
         text + &format!("\n{holds} hold, {differs} differ, {depends} depend, {not_yet} not yet{where_}\n")
     }
 
-    /// Which settings these are.
+    /// File and hash of the settings.
     fn settings_text(&self) -> String {
         let whose = if self.settings.committed { "" } else { ", which is NOT the committed one" };
         let form = if self.form == Form::Quick { ", quick form" } else { "" };
         format!("settings {} (SHA-256 {}){whose}{form}", self.settings.file, self.settings.sha256)
     }
 
-    /// The table of the book's chapter, and what each row was computed with.
+    /// The table of the book's chapter, and the settings of each row.
     fn markdown(&self) -> String {
         let mut text = format!("{}\n\n", self.settings_text());
         text += "| id | kind | paper | ours | verdict |\n|---|---|---|---|---|\n";
@@ -143,7 +141,7 @@ impl Report {
     }
 }
 
-/// A row as it is printed.
+/// Text of a row.
 fn said(row: &Row) -> String {
     let about = &row.about;
     let mut text = format!("\n{}: {}\n", about.id, row.verdict_text);
@@ -167,13 +165,13 @@ fn said(row: &Row) -> String {
     text
 }
 
-/// How much was run.
+/// Amount of work of a row.
 fn ran(row: &Row) -> String {
     let each = row.ran.iter().map(|number| format!("{} {}", number.name.replace('_', " "), number.value));
     each.collect::<Vec<_>>().join(", ")
 }
 
-/// Settings of one kind with what was tried.
+/// Settings of one kind with the values tried.
 fn settings(all: &[Listed], basis: &str) -> String {
     let one = |one: &Listed| {
         let tried: Vec<String> = one.tried.iter().map(ToString::to_string).collect();
@@ -183,7 +181,7 @@ fn settings(all: &[Listed], basis: &str) -> String {
     all.iter().filter(|listed| listed.basis == basis).map(one).collect::<Vec<_>>().join("; ")
 }
 
-/// Letters of the row's kind, with an F where there are figures.
+/// Letter of the row's kind, with an F if it has figures.
 fn letters(row: &Row) -> String {
     let drawn = if row.figures.is_empty() { "" } else { ",F" };
     format!("{}{drawn}", row.about.kind.letter())
@@ -194,7 +192,7 @@ fn stem_of(path: &str) -> &str {
     path.strip_suffix(".svg").unwrap_or(path)
 }
 
-/// As much of a report as is asked for here.
+/// The fields of an earlier report that are compared.
 #[derive(Deserialize)]
 struct Earlier {
     form: Form,
@@ -206,8 +204,8 @@ struct Id {
     id: String,
 }
 
-/// Refuses a folder with a result of `paper` that has rows which are not computed now, or all of them in full where this is the quick
-/// form. What cannot be read is no result.
+/// Refuses a folder whose result of `paper` has rows that are not computed now, or is of the full form if this is the quick form. A
+/// file that cannot be read is no result.
 pub(super) fn check_earlier(paper: Paper, options: &Options, out: &Destination) -> Result<(), RunError> {
     let file = out.folder.join(format!("{}.json", stem(paper)));
     let text = if out.force { None } else { fs::read_to_string(file).ok() };

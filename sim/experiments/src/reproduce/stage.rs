@@ -1,6 +1,4 @@
-//! A machine that draws.
-//!
-//! Frames as a recorder sees them, and what the analysis finds in the trace.
+//! A machine that draws frames, its recorder, and the analysis of the recorded trace.
 
 use glam::{Vec3, Vec4};
 use output::progress::Progress;
@@ -31,7 +29,7 @@ pub(super) struct Stage {
     model: PowerModel,
 }
 
-/// What the papers put into the supply to measure the current.
+/// Current sensors of the papers.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sensor {
     /// Largest current, A.
@@ -42,14 +40,14 @@ pub(super) struct Sensor {
 
 impl Sensor {
     /// "Two shunt current sensors measuring up to 1 A, suitable for the current of cellular phones" (thesis, section 3.1.1). The
-    /// noise is assumed to be that of the usual recorder, as a part of the range.
+    /// noise is assumed to be that of the default recorder, relative to the range.
     const SHUNT: Self = Self { range_a: 1.0, noise_a: 0.005 / 30.0 };
     /// "ACS710 Hall effect current sensors, capable of measuring up to 12 A" (thesis, section 3.1.1). Such a sensor is far noisier
     /// than a shunt; 0.4 % of its range is assumed.
     const HALL: Self = Self { range_a: 12.0, noise_a: 0.05 };
 }
 
-/// Bins of a frame at most: finer than the recorder for frames of up to a tenth of a second.
+/// Largest number of bins of a frame: finer than the recorder for frames of up to 0.1 s.
 const MOST_BINS: usize = 4096;
 
 impl Stage {
@@ -69,7 +67,8 @@ impl Stage {
         Self::new("hd_4000", "hd_4000", Sensor::HALL)
     }
 
-    /// The phone with another draw between frames. Its processor feeds the driver on top of that while a frame runs, so that goes with it.
+    /// The phone with another power between frames. Its processor also feeds the driver while a frame runs, so that power changes by
+    /// the same amount.
     pub fn phone_idling(idle_w: f64) -> Result<Self, RunError> {
         let mut stage = Self::phone()?;
         let platform = &mut stage.platform;
@@ -80,21 +79,21 @@ impl Stage {
         Ok(stage)
     }
 
-    /// The same machine, its waiting processor drawing another power on top.
+    /// The same machine with another added power of the waiting processor.
     pub fn waiting(mut self, waiting_w: f64) -> Result<Self, RunError> {
         let finish = Finish { waiting_w: swept(Watts::new(waiting_w))?, ..self.finish()?.clone() };
         self.platform.system.finish = Some(finish);
         Ok(self)
     }
 
-    /// The same machine, drawing more for another time after launch.
+    /// The same machine with another duration of the added power after launch.
     pub fn launching(mut self, duration_s: f64) -> Result<Self, RunError> {
         let launch = Launch { duration_s: swept(Seconds::new(duration_s))?, ..self.launch()?.clone() };
         self.platform.system.launch = Some(launch);
         Ok(self)
     }
 
-    /// The same machine, the disturbances of the kind that is listed first drawing another power on top.
+    /// The same machine with another added power of the first kind of disturbance.
     pub fn disturbed(mut self, extra_w: f64) -> Result<Self, RunError> {
         let first = self.platform.system.disturbances.first_mut();
         let Some(first) = first else { return Err(self.without("disturbances")) };
@@ -102,13 +101,13 @@ impl Stage {
         Ok(self)
     }
 
-    /// V-sync at the rate at which the platform's applications are capped.
+    /// V-sync at the frame rate cap of the platform.
     pub fn capped(&self) -> Result<Pacing, RunError> {
         let cap = self.platform.system.frame_cap_hz.as_ref();
         Ok(Pacing::Vsync { rate: *cap.ok_or_else(|| self.without("frame_cap_hz"))?.get() })
     }
 
-    /// The time from one tick to the next at that rate, s.
+    /// Period of that V-sync, s.
     pub fn capped_period_s(&self) -> Result<f64, RunError> {
         match self.capped()? {
             Pacing::Vsync { rate } => Ok(1.0 / rate.value()),
@@ -116,12 +115,12 @@ impl Stage {
         }
     }
 
-    /// What the platform draws more after launch.
+    /// Added power of the platform after launch.
     pub fn launch(&self) -> Result<&Launch, RunError> {
         self.platform.system.launch.as_ref().ok_or_else(|| self.without("launch"))
     }
 
-    /// What a blocking finish costs on the platform.
+    /// Cost of a blocking finish on the platform.
     pub fn finish(&self) -> Result<&Finish, RunError> {
         self.platform.system.finish.as_ref().ok_or_else(|| self.without("finish"))
     }
@@ -130,7 +129,7 @@ impl Stage {
         RunError::Setting(format!("platform `{}` has no `system.{what}`", self.platform.name))
     }
 
-    /// Watts over time of frame `number` of a scene, with shaders of the given cost.
+    /// Power over time of frame `number` of a scene, with shaders of the given cost.
     pub fn frame(&self, scene: &Scene, number: u32, cost: ShaderCost) -> Result<FramePower, RunError> {
         let options = scene.settings();
         let viewport = Viewport::new(options.width, options.height);
@@ -181,14 +180,14 @@ impl Stage {
     }
 }
 
-/// A quantity that a row varies.
+/// A quantity of the platform that a row varies.
 fn swept<T>(value: Result<T, impl std::fmt::Display>) -> Result<Sourced<T>, RunError> {
     let value = value.map_err(RunError::setting)?;
     let source = Source::try_from("varied by `quintile reproduce`".to_owned()).map_err(RunError::setting)?;
     Ok(Sourced::Assumed(value, source))
 }
 
-/// A shader that looks like another one at a cost of its own.
+/// A shader with the colours of another one and its own cost.
 struct Costed<'a> {
     looks: &'a dyn Shader,
     cost: ShaderCost,
@@ -208,26 +207,27 @@ impl Shader for Costed<'_> {
     }
 }
 
-/// Samples a second of the papers' station (Paper II, section 3).
+/// Samples per second of the papers' recorder (Paper II, section 3).
 const RATE_HZ: f64 = 40e3;
 
-/// Tracking outright: where frames are all alike but for a clock that touches every fifteenth, the sum of squares takes those
-/// alone to be starts, and `Auto` then leaves it at that.
+/// Tracking, not `auto`: if frames are equal except for a timer that disturbs every fifteenth, the sum of squares finds only the
+/// disturbed ones, and `Auto` accepts this.
 const METHOD: Method = Method::Tracking;
 
-/// How many starts are marked on the PC where one is not the point: from a single one the finder at times takes 15 frames for
-/// one, as the timer of 64 Hz touches every fifteenth frame of 30 Hz at the same place. On the phone one does.
+/// Number of marked starts on the PC, unless the row is about a single mark. From a single one the finder sometimes takes 15
+/// frames for one, because the timer of 64 Hz disturbs every fifteenth frame of 30 Hz at the same position. On the phone one mark
+/// is enough.
 pub(super) const MARKED: usize = 3;
 
-/// A trace and the truth behind it.
+/// A trace and its ground truth.
 pub(super) struct Recording {
-    /// What was drawn, and when: the application's own timestamps.
+    /// Drawn frames with the timestamps of the application.
     pub truth: Surrounded,
-    /// What was recorded of it.
+    /// Recorded trace.
     pub trace: Trace,
 }
 
-/// The frames that were found in a trace.
+/// Frames found in a trace.
 pub(super) struct Frames {
     /// With their energies from start to start.
     pub found: Vec<FrameEnergy>,
@@ -268,7 +268,7 @@ impl Recording {
         Ok(Frames { end_s: found.end_s, found: PowerIntegral::new(&self.trace).frames(&found) })
     }
 
-    /// Found starts against the true ones, and how many of those missed had a disturbance on them; a start may be so far off.
+    /// Found starts compared with true ones within a tolerance, and the number of missed starts under a disturbance.
     pub fn score(&self, frames: &Frames, within_s: f64) -> (Score, usize) {
         let truth = self.truth.frames.iter();
         let truth: Vec<_> =
@@ -287,8 +287,7 @@ impl Recording {
         disturbances.into_iter().any(|pulse| pulse.overlap_s(from_s, to_s) > 0.0)
     }
 
-    /// `count` starts in a row from the middle on are marked, as an analyst would in the steady part, and the end of the last
-    /// frame.
+    /// Marks `count` consecutive starts from the middle on, in the steady part, and the end of the last frame.
     fn marks(&self, count: usize) -> Marks {
         let frames = &self.truth.frames;
         let lengths = frames.iter().map(|frame| frame.end_s - frame.start_s);
@@ -299,8 +298,8 @@ impl Recording {
         }
     }
 
-    /// For each frame that was drawn, the energy of the one found in its place, J; none where there is none, or where the
-    /// analysis itself says that it is merged with another or a part of one.
+    /// For each drawn frame, the energy of the frame found at its position, J. `None` if no frame was found there, or if the
+    /// analysis flags it as merged or split.
     pub fn by_true_frame_j(&self, frames: &Frames) -> Vec<Option<f64>> {
         let found: Vec<f64> = frames.found.iter().map(|frame| frame.start_s).collect();
         let truth: Vec<f64> = self.truth.frames.iter().map(|frame| frame.start_s).collect();
@@ -313,19 +312,19 @@ impl Recording {
         beside.into_iter().map(|place| place.and_then(whole_j)).collect()
     }
 
-    /// From start to start by the application's own timestamps, in the recorded power, J.
+    /// Recorded energy from start to start by the timestamps of the application, J.
     pub fn by_timestamps_j(&self) -> Vec<f64> {
         let integral = PowerIntegral::new(&self.trace);
         self.truth.frames.iter().map(|frame| integral.energy_j(frame.start_s, frame.end_s)).collect()
     }
 
-    /// The old method: from begin to finish by the application's timestamps, in the recorded power, J.
+    /// The old method: recorded energy from begin to finish by the timestamps of the application, J.
     pub fn begin_to_finish_j(&self) -> Vec<f64> {
         let integral = PowerIntegral::new(&self.trace);
         self.truth.frames.iter().map(|frame| integral.energy_j(frame.start_s, frame.finish_s)).collect()
     }
 
-    /// The recorded power over an interval, as points from its start on.
+    /// Recorded power over an interval, as points from its start on.
     pub fn points(&self, from_s: f64, to_s: f64) -> Vec<(f64, f64)> {
         let place =
             |time_s: f64| self.trace.position(time_s).clamp(0.0, self.trace.samples() as f64) as usize;
@@ -335,7 +334,7 @@ impl Recording {
     }
 }
 
-/// The papers' station on the platform's rail: current and voltage at 40 kHz.
+/// The papers' recorder on the rail of the platform: current and voltage at 40 kHz.
 fn recorder(stage: &Stage, seed: u64) -> Result<Device, RunError> {
     let default = DeviceSpec::default();
     let rail_v = stage.platform.rail.voltage_v.value();
@@ -353,7 +352,7 @@ fn recorder(stage: &Stage, seed: u64) -> Result<Device, RunError> {
     })?)
 }
 
-/// `frames` again and again, `count` in all.
+/// `frames` repeated, `count` in all.
 pub(super) fn looped(frames: &[FramePower], count: usize) -> Vec<&FramePower> {
     frames.iter().cycle().take(count).collect()
 }

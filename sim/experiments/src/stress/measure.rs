@@ -1,6 +1,4 @@
-//! One family at one value, all methods: what is lost, what it costs, how tight the boxes are.
-//!
-//! How wide the boxes of tile tests are, compared with the true ones.
+//! All methods for one value of a family: lost samples, cost, and the boxes of tile tests compared with the true ones.
 
 use activity::{Counts, Event};
 use pipeline::geometry::Projection;

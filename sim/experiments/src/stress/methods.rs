@@ -1,6 +1,4 @@
-//! What is compared: named sets of tests, and what each leaves of a tile.
-//!
-//! What methods are tried on: draws, a camera and samples.
+//! Compared methods: named sets of tests. Their subject: draws, a camera and samples.
 
 use activity::Counts;
 use glam::Vec3;

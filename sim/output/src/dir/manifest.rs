@@ -1,6 +1,5 @@
-//! Manifest: list of the results in a folder, which Quintile may replace.
-//!
-//! Claim: the files that a command may write, declared before its work.
+//! Manifest: list of the results in a folder, which Quintile may replace. Claim: the files that a command may write, declared
+//! before its work.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};

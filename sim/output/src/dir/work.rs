@@ -1,6 +1,4 @@
-//! Locked folder of unfinished results.
-//!
-//! Replacement of older results with new ones.
+//! Locked folder of unfinished results, and replacement of older results.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File, OpenOptions, TryLockError};

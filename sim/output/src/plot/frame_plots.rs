@@ -1,6 +1,4 @@
-//! One frame's power over time, stacked by part.
-//!
-//! Energy of each frame, measured against true.
+//! Power of one frame over time, stacked by part, and energy of each frame, measured and true.
 
 use power_model::Part;
 
@@ -14,42 +12,42 @@ use super::picture::{Picture, Text, text};
 use crate::MeanSd;
 use crate::table::{si, si_mean_sd};
 
-/// A part of a frame's power. Overheads, drawn whether or not any unit works, are greys at the bottom.
+/// A part of the power of a frame. Power that does not depend on activity is grey, at the bottom.
 #[derive(Clone, Debug)]
 pub struct PowerPart {
     /// The part.
     pub part: Part,
-    /// Its mean power in each bin of time.
+    /// Mean power of each bin, W.
     pub power_w: Vec<f64>,
 }
 
-/// The power of one frame over time.
+/// Power of one frame over time.
 #[derive(Clone, Debug)]
 pub struct FramePower<'a> {
-    /// What was run, for the line below the title: scene, GPU, platform.
+    /// Scene, GPU and platform, for the line below the title.
     pub subject: &'a str,
     /// The number of the frame.
     pub frame: u64,
     /// Length of a bin in seconds.
     pub bin_s: f64,
-    /// The parts, which add up to the total. All have as many bins as the longest; missing ones count as 0 W.
+    /// Parts; their sum is the total. Missing bins count as 0 W.
     pub parts: Vec<PowerPart>,
-    /// Samples of the trace in this frame: time from the frame's start in seconds, and power in watts.
+    /// Samples of the trace in this frame: time from its start, s, and power, W.
     pub samples: &'a [(f64, f64)],
-    /// Energy of the frame from its start to the next, what is drawn while idle included, in joules; `None` where it is not known.
+    /// Energy from its start to the next start, idle time included, J; `None` if unknown.
     pub frame_j: Option<f64>,
 }
 
-/// Columns of power at most.
+/// Largest number of columns.
 const MOST_COLUMNS: usize = 480;
-/// The total has a line of its own up to so many bins; more of them would be a black strip.
+/// Largest number of bins with a line for the total; with more, it would be a black band.
 const MOST_BINS_OUTLINED: usize = 160;
-/// Width of the legend, and the width of a picture from which on there is room for it beside the panel.
+/// Width of the legend, and the smallest width of a picture with room for it beside the panel.
 const LEGEND: f64 = 240.0;
 const BESIDE: f64 = 760.0;
 
 impl FramePower<'_> {
-    /// Areas stacked in the order of the parts, overheads first, with the samples over them.
+    /// Draws stacked areas in the order of parts, power without activity first, and the samples over them.
     pub fn picture(&self, look: &Look) -> Picture {
         let title = format!("Power of frame {} by part", self.frame);
         let bins = self.parts.iter().map(|part| part.power_w.len()).max().unwrap_or(0);
@@ -75,7 +73,7 @@ impl FramePower<'_> {
         picture
     }
 
-    /// Dots with a white rim, seen on any colour.
+    /// Draws dots with a white rim, visible on any colour.
     fn draw_samples(&self, panel: &Panel, picture: &mut Picture) {
         let per_px = self.samples.len() as f64 / (panel.right - panel.left);
         let radius = if per_px > 1.0 {
@@ -91,7 +89,8 @@ impl FramePower<'_> {
         places.iter().for_each(|&at| picture.dot(at, radius, INK));
     }
 
-    /// Overheads, then units, each with its mean power over the frame, its mean power per column and the tops of what is below.
+    /// Layers from bottom to top, power without activity first. Each has its mean power over the frame, its mean power per column
+    /// and the top of the layer below.
     fn layers(&self, bins: usize) -> Vec<Layer> {
         let columns = bins.min(MOST_COLUMNS);
         let mut floor = vec![0.0; columns];
@@ -127,7 +126,7 @@ impl FramePower<'_> {
         Some(Panel { left, top, right, bottom: top + height, x, y })
     }
 
-    /// Beside the panel where there is room, else below it.
+    /// Draws the legend beside the panel if there is room, otherwise below it.
     fn legend(&self, layers: &[Layer], duration_s: f64, panel: &Panel, picture: &mut Picture) {
         let joules = |watts: f64| si(watts * duration_s, "J");
         let mut entries: Vec<_> = layers
@@ -178,7 +177,7 @@ impl FramePower<'_> {
     }
 }
 
-/// Whether a part is drawn whether or not any unit works.
+/// Whether the power of a part does not depend on activity.
 fn is_overhead(part: Part) -> bool {
     !matches!(part, Part::Unit(_))
 }
@@ -198,39 +197,39 @@ fn draw_layers(layers: &[Layer], panel: &Panel, duration_s: f64, picture: &mut P
     }
 }
 
-/// A column of constant value each, as a stair.
+/// Columns of constant value as a staircase.
 fn steps(panel: &Panel, duration_s: f64, values: &[f64]) -> Vec<(f64, f64)> {
     let time = |index: usize| duration_s * index as f64 / values.len() as f64;
     let stair = values.iter().enumerate();
     stair.flat_map(|(i, value)| [panel.at(time(i), *value), panel.at(time(i + 1), *value)]).collect()
 }
 
-/// The energy of one frame.
+/// Energy of one frame.
 #[derive(Clone, Copy, Debug)]
 pub struct FrameEnergyPoint {
     /// The number of the frame.
     pub frame: u64,
-    /// What the analysis of the trace says, in joules; `None` where it found no such frame.
+    /// Energy measured in the trace, J; `None` if the frame was not found.
     pub measured_j: Option<f64>,
-    /// What the simulator says, in joules; `None` for a recording.
+    /// Ground truth of the simulator, J; `None` for a recording.
     pub true_j: Option<f64>,
 }
 
-/// The energy of each frame of a run.
+/// Energy of each frame of a run.
 #[derive(Clone, Copy, Debug)]
 pub struct FrameEnergy<'a> {
-    /// What was run, for the line below the title: scene, GPU, platform.
+    /// Scene, GPU and platform, for the line below the title.
     pub subject: &'a str,
     /// The frames in order.
     pub frames: &'a [FrameEnergyPoint],
-    /// Mean and standard deviation of the measured energies, in joules, over the frames that count for it.
+    /// Mean and standard deviation of the measured energies, J, over the frames that count.
     pub measured_j: Option<MeanSd>,
-    /// Pixels of a frame, for the axis in joules per pixel; 0 leaves that axis out.
+    /// Pixels of a frame, for the axis in joules per pixel; 0 for no such axis.
     pub pixels: u64,
 }
 
 impl FrameEnergy<'_> {
-    /// Points and lines over the number of the frame, with the mean and its band.
+    /// Draws points and lines over frame numbers, with the mean and its band.
     pub fn picture(&self, look: &Look) -> Picture {
         let mut picture = Picture::titled(look, (1200.0, 300.0), ["Energy per frame", self.subject]);
         let Some(mut panel) = self.panel(&picture) else { return picture.nothing("no frames to show") };
@@ -264,7 +263,7 @@ impl FrameEnergy<'_> {
         })
     }
 
-    /// The panel, at the top of the picture.
+    /// Panel at the top of the picture.
     fn panel(&self, picture: &Picture) -> Option<Panel> {
         let all = || self.values(true).chain(self.values(false));
         let (first, last) = (all().map(|p| p.0).reduce(f64::min)?, all().map(|p| p.0).reduce(f64::max)?);

@@ -1,6 +1,4 @@
-//! How busy each unit was over one frame.
-//!
-//! Where the units' time went over one frame, and which of them held it up.
+//! Units of one frame over time, a lane for each: how busy they were, and what they waited for.
 
 use super::axis::{Axis, Way, is_drawable};
 use super::columns::means;
@@ -17,20 +15,20 @@ use crate::table::si;
 pub struct UnitLane<'a> {
     /// The unit.
     pub name: &'a str,
-    /// The fraction of each bin in which it was serving work, 0 to 1.
+    /// Busy fraction of each bin, 0 to 1.
     pub busy: Vec<f64>,
 }
 
 /// The units of one frame over time.
 #[derive(Clone, Debug)]
 pub struct UnitBusy<'a> {
-    /// What was run, for the line below the title: scene, GPU, platform.
+    /// Scene, GPU and platform, for the line below the title.
     pub subject: &'a str,
     /// The number of the frame.
     pub frame: u64,
     /// Length of a bin in seconds.
     pub bin_s: f64,
-    /// The units, top to bottom; bins that a lane lacks count as idle.
+    /// Units from top to bottom. Missing bins count as idle.
     pub units: Vec<UnitLane<'a>>,
 }
 
@@ -38,7 +36,7 @@ pub struct UnitBusy<'a> {
 const SHADES: f64 = 32.0;
 
 impl UnitBusy<'_> {
-    /// A lane for each unit, shaded by how busy it was, with its mean to the right.
+    /// Draws a lane for each unit, shaded by its busy fraction, with the mean on the right.
     pub fn picture(&self, look: &Look) -> Picture {
         let title = format!("How busy the units were in frame {}", self.frame);
         let bins = self.units.iter().map(|unit| unit.busy.len()).max().unwrap_or(0);
@@ -63,10 +61,10 @@ impl UnitBusy<'_> {
     }
 }
 
-/// Room right of the lanes for the mean.
+/// Room for the mean, right of the lanes.
 const MEAN: f64 = 60.0;
 
-/// Lanes of units below one another: names to the left, each with the colour of its unit beside its lane.
+/// Layout of lanes, one below the other. Names and colours of units are on the left.
 pub(super) struct Lanes {
     left: f64,
     right: f64,
@@ -86,7 +84,7 @@ impl Lanes {
         Self { left, right: picture.width() - picture.margin() - 6.0, top, pitch }
     }
 
-    /// The area of so many lanes over a time, which leaves `aside` free to the right.
+    /// Area of `lanes` over a time, which leaves `aside` free on the right.
     pub fn panel(&self, duration_s: f64, lanes: usize, aside: f64) -> Panel {
         let right = self.right - aside;
         let x = Axis::new("time in the frame", "s", (0.0, duration_s), (Way::Across, right - self.left));
@@ -94,12 +92,12 @@ impl Lanes {
         Panel { left: self.left, top: self.top, right, bottom: self.top + self.pitch * lanes as f64, x, y }
     }
 
-    /// Where lane `index` begins.
+    /// Top of lane `index`.
     pub fn top(&self, index: usize) -> f64 {
         self.top + self.pitch * index as f64
     }
 
-    /// The name of lane `index` and the colour of its unit.
+    /// Draws the name of lane `index` and the colour of its unit.
     pub fn name(&self, picture: &mut Picture, index: usize, name: &str) {
         let (top, bottom) = (self.top(index) + 2.0, self.top(index) + self.pitch - 2.0);
         if let Some(colour) = named_unit_colour(name) {
@@ -177,7 +175,7 @@ pub struct StallLanes<'a> {
 const KEYS: [&str; 3] = ["busy", "starved", "blocked"];
 
 impl StallLanes<'_> {
-    /// A lane for each unit, filled from below by what it did, underlined where it is the bottleneck.
+    /// Draws a lane for each unit, filled by the shares of its states, and underlined where it is the bottleneck.
     pub fn picture(&self, look: &Look) -> Picture {
         let title = format!("What the units waited for in frame {}", self.frame);
         let intervals = self.units.iter().map(|unit| unit.shares.len()).max().unwrap_or(0);

@@ -1,12 +1,10 @@
-//! Legends, and words cut and wrapped to the room there is.
-//!
-//! How a series is distinguished: colour, marker and strokes.
+//! Legends, and the styles that distinguish series: colour, marker and strokes.
 
 use super::palette::{BACKGROUND, Colour, INK, MUTED, SERIES};
 use super::picture::{Across, Picture, Point, Text, text};
 use super::text::{shortened, text_width};
 
-/// How an entry of a legend is drawn.
+/// Symbol of a legend entry.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Key {
     Area(Colour),
@@ -23,11 +21,11 @@ pub(super) enum Key {
     Tick(Colour),
 }
 
-/// Size of the names in a legend, where there is room.
+/// Font size of a legend with enough room.
 pub(super) const LEGEND_PX: f64 = 12.5;
 /// Distance of the lines of a legend.
 pub(super) const LEGEND_LINE: f64 = 22.0;
-/// Room of a key, and between entries.
+/// Width of a key, and gap between entries.
 const KEY: f64 = 22.0;
 const GAP: f64 = 24.0;
 
@@ -60,7 +58,7 @@ impl Key {
     }
 }
 
-/// A legend in as many lines as it takes within the margins, the first around `top`; returns the height of all.
+/// Draws a legend between the margins, in as many lines as needed, the first around `top`. Returns the height of all lines.
 pub(super) fn legend_lines(picture: &mut Picture, top: f64, entries: &[(Key, String)]) -> f64 {
     let (left, right) = (picture.margin() + 2.0, picture.width() - picture.margin());
     let (mut x, mut y) = (left, top);
@@ -77,7 +75,7 @@ pub(super) fn legend_lines(picture: &mut Picture, top: f64, entries: &[(Key, Str
     if entries.is_empty() { 0.0 } else { y - top + LEGEND_LINE }
 }
 
-/// A legend in one column within `height`, top entry at `from`; each entry has a label and a value that ends at `right`.
+/// Draws a legend in one column within `height`, top entry at `from`. Each entry has a label, and a value that ends at `right`.
 pub(super) fn legend_column(
     picture: &mut Picture,
     from: Point,
@@ -97,7 +95,7 @@ pub(super) fn legend_column(
     }
 }
 
-/// A white plate under a legend that stands within a panel.
+/// White background of a legend inside a panel.
 pub(super) fn plate(picture: &mut Picture, from: Point, to: Point) {
     picture.rect(from, to, BACKGROUND.alpha(0.85));
 }
@@ -118,12 +116,12 @@ pub(super) enum Marker {
 pub(super) struct Style {
     pub colour: Colour,
     pub marker: Marker,
-    /// Lengths of strokes and of gaps between them; a whole line without.
+    /// Lengths of strokes and gaps; empty for a solid line.
     pub dash: Option<[f64; 2]>,
 }
 
 impl Style {
-    /// The style of series number `index`: as many as there are colours, then again with strokes.
+    /// Style of series number `index`. Colours repeat with other strokes.
     pub fn of(index: usize) -> Self {
         let dash = [None, Some([7.0, 4.0]), Some([2.0, 3.0])][index / SERIES.len() % 3];
         Self { colour: SERIES[index % SERIES.len()], marker: MARKERS[index % MARKERS.len()], dash }

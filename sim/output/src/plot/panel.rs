@@ -1,13 +1,11 @@
-//! The area that data are drawn in, with its axes.
-//!
-//! Names beside points, where they hide nothing and nothing hides them.
+//! Plot area with its axes, and labels beside points that overlap nothing.
 
 use super::axis::{Axis, RAISED, TICK_PX, Tick, label_width};
 use super::palette::{AXIS, Colour, GRID, MUTED};
 use super::picture::{Across, Picture, Point, Text, text};
 use super::text::text_width;
 
-/// A rectangle of the picture and the values at its edges.
+/// Rectangle of the picture, and its two axes.
 #[derive(Clone, Debug)]
 pub(super) struct Panel {
     pub left: f64,
@@ -18,12 +16,12 @@ pub(super) struct Panel {
     pub y: Axis,
 }
 
-/// Height of what is written below a panel.
+/// Height of the labels below a panel.
 pub(super) const BELOW: f64 = 50.0;
-/// Lengths of ticks, of those with and without a label.
+/// Lengths of ticks with and without a label.
 const TICKS: [f64; 2] = [5.0, 3.0];
 
-/// The room left of a panel for the labels of its axis and its name.
+/// Room left of a panel for labels and name of its axis.
 pub(super) fn aside(y: &Axis) -> f64 {
     y.widest() + if y.label.is_empty() { 14.0 } else { 34.0 }
 }
@@ -41,7 +39,7 @@ impl Panel {
         (self.x_px(x), self.y_px(y))
     }
 
-    /// Where a point is; nothing where an axis has no place for it.
+    /// Position of a point; `None` if an axis cannot show it.
     pub fn place(&self, (x, y): (f64, f64)) -> Option<Point> {
         (self.x.place(x).is_some() && self.y.place(y).is_some()).then(|| self.at(x, y))
     }
@@ -54,7 +52,7 @@ impl Panel {
         self.bottom - (self.bottom - self.top) * self.y.fraction_at(tick.at)
     }
 
-    /// Lines across at the labelled ticks of `y`, to be drawn before the data, and a break above the row of zero.
+    /// Draws grid lines at the labelled ticks of `y`, and a break above the row of zero. Called before the data are drawn.
     pub fn grid(&self, picture: &mut Picture) {
         for tick in self.y.ticks.iter().filter(|tick| !tick.label.is_empty()) {
             let y = self.tick_y(tick);
@@ -66,7 +64,7 @@ impl Panel {
         }
     }
 
-    /// Lines up at the labelled ticks of `x`.
+    /// Draws grid lines at the labelled ticks of `x`.
     pub fn grid_up(&self, picture: &mut Picture) {
         for tick in self.x.ticks.iter().filter(|tick| !tick.label.is_empty()) {
             let x = self.tick_x(tick);
@@ -78,13 +76,13 @@ impl Panel {
         }
     }
 
-    /// Axis lines, ticks, labels and names; `gap` is how far below the panel the axis across stands.
+    /// Draws axis lines, ticks, labels and names. The horizontal axis is `gap` below the panel.
     pub fn axes(&self, picture: &mut Picture, gap: f64) {
         self.axis_across(picture, gap);
         self.axis_up(picture);
     }
 
-    /// The axis up alone; a logarithmic one with its line and all its ticks.
+    /// Draws only the vertical axis; a logarithmic one with its line and all ticks.
     pub fn axis_up(&self, picture: &mut Picture) {
         if self.y.is_logarithmic() {
             let end = self.y.broken_at.map_or(self.bottom, |broken| {
@@ -104,7 +102,7 @@ impl Panel {
         picture.text(Text { across: Across::Centre, upwards: true, ..text(&self.y.label, middle) });
     }
 
-    /// The axis across alone.
+    /// Draws only the horizontal axis.
     pub fn axis_across(&self, picture: &mut Picture, gap: f64) {
         let line = self.bottom + gap;
         picture.line((self.left, line), (self.right, line), AXIS, 1.0);
@@ -117,7 +115,7 @@ impl Panel {
         picture.text(Text { across: Across::Centre, ..text(&self.x.label, middle) });
     }
 
-    /// A second axis to the right with its own labels: that of `y` times a factor, made by `axis`.
+    /// Draws a second vertical axis on the right, with its own labels: `y` times a factor, made by `axis`.
     pub fn right_axis(&self, picture: &mut Picture, axis: &Axis) {
         for tick in &axis.ticks {
             let y = self.bottom - (self.bottom - self.top) * axis.fraction_at(tick.at);
@@ -129,7 +127,7 @@ impl Panel {
     }
 }
 
-/// The label of a tick; what stands behind a `^` is raised.
+/// Draws a tick label. Digits after `^` are raised.
 pub(super) fn tick_label(picture: &mut Picture, label: &str, (x, y): Point, across: Across) {
     let (base, raised) = label.split_once('^').unwrap_or((label, ""));
     if base.is_empty() {
@@ -161,13 +159,13 @@ pub(super) struct Label<'a> {
 
 /// Size of names in pixels.
 const NAME_PX: f64 = 11.5;
-/// Half the height of the box kept free around a name.
+/// Half the height of the free box around a name.
 const HALF: f64 = 6.5;
-/// Distances from the marker at which there may be a name, from near to far.
+/// Distances tried between marker and name, from near to far.
 const REACHES: [f64; 6] = [3.0, 8.0, 16.0, 28.0, 44.0, 64.0];
 /// Directions tried at each distance.
 const DIRECTIONS: u32 = 16;
-/// From this distance on a line leads from the name to its point.
+/// Names at this distance or farther have a line to their point.
 const LEADER: f64 = 12.0;
 
 /// Left, top, right, bottom.
@@ -177,8 +175,8 @@ fn overlaps(a: &Box4, b: &Box4) -> bool {
     a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3]
 }
 
-/// Writes the names, the first ones first: each at the nearest place within the panel where it is on no name, no marker and no line
-/// (`obstacles`). Returns how many found no place and are left out.
+/// Writes the names in order. Each is at the nearest position in the panel that overlaps no name, marker or line (`obstacles`).
+/// Returns the number of names without such a position; they are omitted.
 pub(super) fn write(
     picture: &mut Picture,
     panel: &Panel,
@@ -208,7 +206,7 @@ pub(super) fn write(
     left_out
 }
 
-/// The nearest free box for a name, and how far it is from its marker.
+/// Nearest free box of a name, and its distance from the marker.
 fn nearest(label: &Label<'_>, panel: &Panel, taken: &[Box4]) -> Option<(Box4, f64)> {
     let width = text_width(label.name, NAME_PX, label.bold) + 2.0;
     let is_free = |place: &Box4| {

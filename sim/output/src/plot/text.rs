@@ -1,18 +1,18 @@
-//! Text in pictures: its width, and what is done where it is too wide.
+//! Text in pictures: the embedded font, text width, and shortening of text that is too wide.
 //!
-//! Font of the plots: an embedded subset of DejaVu Sans, so that no system font is needed.
+//! The font is a subset of DejaVu Sans, so no system font is needed.
 
 use std::sync::OnceLock;
 
 use plotters::style::{FontFamily, FontStyle, IntoFont, register_font};
 
-/// How much finer than the picture text is measured and SVG is drawn, and PNG before it is halved.
+/// Resolution of text measurement and SVG over that of the picture; PNG is drawn with it and then halved.
 pub(super) const SCALE: f64 = 2.0;
 
-/// What `plotters` calls a font's size over its em.
+/// Font size of `plotters` over the em of the font.
 pub(super) const SIZE_OVER_EM: f64 = 1.24;
 
-/// Makes the embedded fonts known to `plotters`, once; whether it could.
+/// Registers the embedded fonts with `plotters`, once. Returns whether this succeeded.
 pub(super) fn register() -> bool {
     static DONE: OnceLock<bool> = OnceLock::new();
     *DONE.get_or_init(|| {
@@ -37,7 +37,7 @@ pub(super) fn text_width(text: &str, size: f64, bold: bool) -> f64 {
     plotters_font(size * SCALE, bold).box_size(text).map_or(guess, |(width, _)| f64::from(width) / SCALE)
 }
 
-/// `label` in lines of at most `room` pixels, broken between words.
+/// Breaks `label` between words into lines of at most `room` pixels.
 pub(super) fn wrapped(label: &str, size: f64, bold: bool, room: f64) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for word in label.split_whitespace() {
@@ -52,7 +52,7 @@ pub(super) fn wrapped(label: &str, size: f64, bold: bool, room: f64) -> Vec<Stri
     lines
 }
 
-/// `label`, cut with `…` where it is wider than `room` pixels.
+/// Shortens `label` with `…` if it is wider than `room` pixels.
 pub(super) fn shortened(label: &str, size: f64, room: f64) -> String {
     let mut short: Vec<char> = label.chars().collect();
     if text_width(label, size, false) <= room {

@@ -1,6 +1,4 @@
 //! Comparison of two results: runs, tables of frames, images, or folders of images.
-//!
-//! Comparison of numbers, and of the means of two tables of frames.
 
 mod images;
 mod runs;

@@ -1,6 +1,4 @@
-//! `quintile sample`.
-//!
-//! Files of points.
+//! `quintile sample`, and files of points.
 
 mod poisson;
 mod volume;

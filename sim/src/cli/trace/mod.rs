@@ -1,6 +1,4 @@
 //! `quintile trace`: analysis of any power trace, recorded or synthetic.
-//!
-//! Errors of the library as failures of the command, with exit codes: 2 for wrong arguments, 1 for the rest.
 
 mod align;
 mod convert;

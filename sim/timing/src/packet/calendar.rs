@@ -1,6 +1,4 @@
-//! Calendar of a shared resource: how much of each time slot is taken.
-//!
-//! Bounded queue of the level `packet`, seen from its input: when it has room.
+//! Availability of shared resources at the level `packet`: calendars of time slots, and queues seen from their input.
 
 use crate::clock::Time;
 

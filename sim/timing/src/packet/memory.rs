@@ -1,6 +1,5 @@
-//! L2 and memory of the level `packet`: runs of lines enter calendars.
-//!
-//! Memory chips of the level `packet`: a calendar per bus, and the latest rows of each bank.
+//! L2 and memory of the level `packet`: runs of lines enter calendars. Memory has a calendar per bus, and the latest rows of
+//! each bank.
 
 use activity::{LineAccess, LineKind};
 

@@ -1,6 +1,4 @@
-//! All units of a machine, cycle by cycle.
-//!
-//! Sources of packets: the command stream, and the bins, which are double buffered.
+//! All units of a machine, cycle by cycle, and the sources of packets: the command stream and the double-buffered bins.
 
 use activity::{LineAccess, Unit};
 

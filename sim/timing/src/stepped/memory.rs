@@ -1,6 +1,5 @@
-//! Path to memory and back: requests in front of the L2, the L2, and readers waiting for lines.
-//!
-//! Memory chips: channels, banks and rows, first ready first come (Rixner et al. 2000).
+//! Path to memory and back: requests in front of the L2, the L2, memory chips (first ready first come, Rixner et al. 2000), and
+//! readers waiting for lines.
 
 use activity::{Event, LineAccess, LineKind, Unit};
 

@@ -1,6 +1,5 @@
-//! Bounded queue between two units, like a register: changes of a cycle are visible in the next one.
-//!
-//! Pending line reads of packets and warps.
+//! Bounded queue between two units, like a register: changes of a cycle are visible in the next one. Pending line reads of
+//! packets and warps.
 
 use std::collections::VecDeque;
 

@@ -1,6 +1,5 @@
-//! Oceans, and what methods do for them.
-//!
-//! Sides that cross: the same light through the same number of triangles, which stand ever more along it.
+//! Caustics of an ocean by every method, and of crossed light volumes: the same light through the same number of triangles, on
+//! increasingly crossed sides.
 
 use cpu_time::ThreadTime;
 use glam::DVec3;

@@ -1,6 +1,5 @@
-//! `quintile chart caustics`: shader executions and images of caustics, by how beams are bounded, and where beams fail.
-//!
-//! Where beams fail: too few triangles, and sides that cross.
+//! `quintile chart caustics`: shader executions and images of caustics by bounding volume, and failure modes: too few triangles,
+//! and crossed sides.
 
 mod measure;
 pub(crate) mod view;

@@ -1,8 +1,4 @@
-//! Images, their errors and how long they took.
-//!
-//! What is drawn: the built-in scene moving, out of focus and both, and a fence that no table is a match for.
-//!
-//! Where sampling fails: three regimes, each measured.
+//! Images of scenes, their errors and times, and failure modes of sampling.
 
 use std::time::Instant;
 

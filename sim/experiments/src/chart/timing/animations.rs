@@ -1,6 +1,4 @@
-//! Animations at every level, simulated whole: drawn and timed, as a run does.
-//!
-//! What is timed: one frame of each scene.
+//! Workloads of the timing chart: one frame of each scene, and animations at every level, drawn and timed as in a run.
 
 use std::path::Path;
 

@@ -1,6 +1,4 @@
-//! One stream at every level: how far from the reference, and how fast.
-//!
-//! What time costs on top of a run that only draws.
+//! One stream at every level: error against the reference, host time, and the cost of timing added to drawing.
 
 use activity::{Event, Timeline, Unit};
 use cpu_time::{ProcessTime, ThreadTime};

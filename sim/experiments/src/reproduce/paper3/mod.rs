@@ -1,6 +1,4 @@
 //! Paper III, "Per-frame Energy Measurement Methodology for Computer Graphics".
-//!
-//! Settings of Paper III's rows.
 
 mod blocking;
 mod disturbance;
@@ -18,7 +16,7 @@ use super::settings::{
 use super::stage::{Recording, Stage, looped};
 use super::{Done, Options, Paper};
 
-/// Both machines, with their frames drawn once.
+/// Both machines, with their simulated frames.
 struct Bench<'a> {
     settings: Settings,
     form: Form,
@@ -26,12 +24,12 @@ struct Bench<'a> {
     pc: Stage,
     pc_frames: Vec<FramePower>,
     phone: Stage,
-    /// The phone's sequence; where not all of it is simulated, what is.
+    /// Simulated frames of the phone's sequence.
     phone_frames: Vec<FramePower>,
     progress: &'a Progress,
 }
 
-/// The frame of the phone's sequence that the paper looks at closely (Figure 7).
+/// The frame of the phone's sequence in Figure 7.
 const FRAME: usize = 9;
 
 /// Long after launch, without blocking.
@@ -39,7 +37,7 @@ fn settled(seed: u64) -> Circumstances {
     Circumstances { launch: false, blocking_finish: false, seed }
 }
 
-/// The energies that are not flagged.
+/// Energies of frames without flags.
 fn unflagged(energies_j: &[f64], flags: &[bool]) -> Vec<f64> {
     energies_j.iter().zip(flags).filter(|(_, flag)| !**flag).map(|(energy, _)| *energy).collect()
 }
@@ -55,7 +53,7 @@ impl Bench<'_> {
         }
     }
 
-    /// Recordings of the same thing.
+    /// Number of recordings of the same frames.
     fn repeats(&self) -> u64 {
         *self.settings.work.repeats.get(self.form)
     }
@@ -65,7 +63,7 @@ impl Bench<'_> {
         *self.settings.work.recorded_frames.get(self.form)
     }
 
-    /// Every how many frames of the phone's sequence one is simulated.
+    /// One frame of the phone's sequence is simulated for each so many.
     fn phone_step(&self) -> u32 {
         *self.settings.work.phone_step.get(self.form)
     }
@@ -75,12 +73,12 @@ impl Bench<'_> {
         &self.phone_frames[FRAME / self.phone_step() as usize]
     }
 
-    /// The phone draws `frames` at its cap.
+    /// Recording of the phone, which draws `frames` at its frame rate cap.
     fn on_phone(&self, frames: &[&FramePower], circumstances: Circumstances) -> Result<Recording, RunError> {
         self.on(&self.phone, frames, circumstances)
     }
 
-    /// A machine draws `frames` at its cap.
+    /// Recording of a machine, which draws `frames` at its frame rate cap.
     fn on(
         &self,
         stage: &Stage,
@@ -90,7 +88,7 @@ impl Bench<'_> {
         Recording::new(stage, frames, stage.capped()?, circumstances)
     }
 
-    /// The PC draws its animation.
+    /// Recording of the PC, which draws its animation.
     fn on_pc(&self, pacing: Pacing, circumstances: Circumstances) -> Result<Recording, RunError> {
         let shown = looped(&self.pc_frames, self.recorded_frames());
         Recording::new(&self.pc, &shown, pacing, circumstances)
@@ -142,7 +140,7 @@ paper_settings!(Paper::Three, "paper3.ron" {
 });
 
 settings_group! {
-    /// How much is simulated and recorded for all rows.
+    /// Amount of simulation and recording, shared by all rows.
     Work {} {
         pc_frames: u32, within(1..=36);
         phone_step: u32, within(1..=8);

@@ -1,7 +1,7 @@
-//! Pictures into files: SVG through `plotters`' backend, PNG through its rasterizer into a buffer of our own.
+//! Pictures as files: SVG by the backend of `plotters`, PNG by its rasterizer and an own buffer.
 //!
-//! Both are drawn on a grid twice as fine as the picture; for PNG two by two pixels are then averaged, and a pixel of the layout is as
-//! many of the file as the picture's [`Paper`](super::picture::Paper) says.
+//! Both are drawn at twice the resolution of the picture. For PNG, two by two pixels are averaged. The picture's
+//! [`Paper`](super::picture::Paper) gives the pixels of the file for a pixel of the layout.
 
 mod pdf;
 
