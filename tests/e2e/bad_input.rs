@@ -198,7 +198,7 @@ fn indices_out_of_range() {
     let mut glb = Glb::square();
     let indices = glb.binary.len() - 2;
     glb.binary[indices] = 77;
-    refusals.file("index.glb", glb.bytes(), 1, &["meshes[0].primitives[0]", "77"], "fix the file");
+    refusals.file("index.glb", glb.bytes(), 1, &["meshes[0].primitives[0]", "77"], "export it again");
     let mut glb = Glb::square();
     glb.primitive()["indices"] = json!(9);
     refusals.file(
