@@ -13,7 +13,12 @@ fn results_that_cannot_be_written() {
     let file = inputs.put("taken", "not a folder");
     for out in [file.clone(), inputs.path("taken/below")] {
         let ended = quintile().call(["run", "tiny", "--out", &out]);
-        refusals.check(&ended, 1, &[&out, "--out"]);
+        refusals.check(
+            &ended,
+            1,
+            &[&out, "cannot use it as the folder for results"],
+            "name another with --out",
+        );
     }
     assert_eq!(fs::read_to_string(&file).ok().as_deref(), Some("not a folder"));
 }
@@ -38,7 +43,7 @@ fn unwritable_files_leave_previous_results_unchanged() {
         assert!(before.contains_key(Path::new("summary.json")));
         for force in [&[][..], &["--force"]] {
             let ended = quintile().call(["run", "tiny", "--out", &out].iter().chain(force));
-            refusals.check(&ended, 2, &[&format!("out/{name}: "), "--out", "move it away"]);
+            refusals.check(&ended, 2, &[&format!("out/{name}: "), "--out"], "move it away");
             assert!(before == results.files(), "{name}: something was changed");
         }
     }
@@ -66,7 +71,7 @@ fn a_usage_error_leaves_previous_results_unchanged() {
     let out = results.folder().display().to_string();
     let before = results.files();
     let ended = quintile().call(["run", "tiny", "--samples", "0", "--out", &out]);
-    refusals.check(&ended, 2, &["samples"]);
+    refusals.check(&ended, 2, &["--samples"], "it has to be 1 to 256");
     assert!(before == results.files());
 }
 
@@ -79,17 +84,17 @@ fn runs_that_exceed_memory() {
     let inputs = Inputs::new();
     let still =
         inputs.put("still.ron", "(settings: (width: 16, height: 16), objects: [(shape: Sphere(radius: 1))])");
-    let cases: [(&[&str], &str); 3] = [
-        (&[&still, "--frames", "0..10000000"], "frames"),
-        (&[&still, "--size", "16384x16384", "--samples", "256"], "size"),
-        (&["tiny", "--rate", "0.2", "--trace-rate", "1e7"], "--trace-rate"),
+    let cases: [(&[&str], &str, &str); 3] = [
+        (&[&still, "--frames", "0..10000000"], "frames", "at most 100000, ask for fewer"),
+        (&[&still, "--size", "16384x16384", "--samples", "256"], "size and samples", "ask for fewer"),
+        (&["tiny", "--rate", "0.2", "--trace-rate", "1e7"], "the trace", "a lower --trace-rate"),
     ];
-    for (args, says) in cases {
+    for (args, says, remedy) in cases {
         let out = inputs.path("out");
         let program = env!("CARGO_BIN_EXE_quintile");
         let limited = ["-c", "ulimit -v 4000000; exec timeout 20 \"$0\" run \"$@\"", program];
         let ended =
             crate::support::Quintile::new("sh").call(limited.iter().chain(args).chain(&["--out", &out]));
-        refusals.check(&ended, 2, &[says]);
+        refusals.check(&ended, 2, &[says], remedy);
     }
 }

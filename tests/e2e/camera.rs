@@ -188,30 +188,52 @@ fn workloads_with_a_scene_take_a_camera_and_others_refuse_it() {
         |more: &[&str]| quintile().run("glossy", &[&args, more].concat()).bytes("images/frame_0000.png");
     assert!(bytes(&[]) != bytes(&["--camera", camera]));
     let mut refusals = Refusals::default();
-    refusals.call(&["ccd", "--camera", camera], 2, &["--camera: the workload `ccd` has no use for it"]);
+    refusals.call(
+        &["ccd", "--camera", camera],
+        2,
+        &["--camera: the workload `ccd` has no use for it"],
+        "leave it out",
+    );
 }
 
 #[test]
 fn errors_in_a_camera_name_their_place() {
     let mut refusals = Refusals::default();
-    for (camera, says) in [
-        ("positon: (0, 0, 3)", "--camera:1:1: unknown field `positon`, did you mean `position`?"),
-        ("position: (0, 0, 3)", "--camera: camera: `position` and `target`"),
-        ("position: (0, 0, 3), target: (0, 0, 3)", "--camera: target: the camera has no direction"),
-        ("position: (0, 0, 3), target: (0, 0, 0), fov_deg: 200", "0.1 to 175 degrees"),
-        ("position: (0, 0, 3), target: (0, 0, 0), shift: (1, 0)", "shift: only `quintile visibility`"),
-        ("upside", "camera: there is no camera `upside`: known here: scene; give `inside` or `outside`"),
-        ("scen", "did you mean `scene`?"),
-        ("7", "there is no camera `7`"),
+    for (camera, says, remedy) in [
+        ("positon: (0, 0, 3)", "--camera:1:1: unknown field `positon`", "did you mean `position`?"),
+        ("position: (0, 0, 3)", "--camera: camera: `position` and `target`", "give both, or none"),
+        (
+            "position: (0, 0, 3), target: (0, 0, 3)",
+            "--camera: target: the camera has no direction",
+            "move one of them",
+        ),
+        (
+            "position: (0, 0, 3), target: (0, 0, 0), fov_deg: 200",
+            "--camera:1:50: `fov_deg`: 200",
+            "from 0.1 to 175 degrees",
+        ),
+        (
+            "position: (0, 0, 3), target: (0, 0, 0), shift: (1, 0)",
+            "shift: only `quintile visibility`",
+            "leave it out",
+        ),
+        ("upside", "camera: there is no camera `upside`: known here: scene", "give `inside` or `outside`"),
+        ("scen", "camera: there is no camera `scen`", "did you mean `scene`?"),
+        ("7", "camera: there is no camera `7`", "give `inside` or `outside`"),
     ] {
-        refusals.call(&["tiny", "--camera", camera], 2, &[says]);
+        refusals.call(&["tiny", "--camera", camera], 2, &[says], remedy);
     }
-    refusals.call(&["tiny", "--camera", "/nowhere/c.ron"], 1, &["/nowhere/c.ron: cannot read it"]);
+    refusals.call(
+        &["tiny", "--camera", "/nowhere/c.ron"],
+        1,
+        &["/nowhere/c.ron: cannot read it"],
+        "check the path",
+    );
     let twice = "(settings: (lens_radius: 1), camera: (position: (0, 0, 3), target: (0, 0, 0), lens_radius: 1), \
                  objects: [(shape: Sphere(radius: 1))])";
-    refusals.file("twice.ron", twice, 2, &["camera.lens_radius", "remove one of them"]);
+    refusals.file("twice.ron", twice, 2, &["camera.lens_radius"], "remove one of them");
     let image = "(camera: (position: (0, 0, 3), target: (0, 0, 0), width: 64), objects: [(shape: Sphere(radius: 1))])";
-    refusals.file("image.ron", image, 2, &["camera.width", "`settings`"]);
+    refusals.file("image.ron", image, 2, &["camera.width"], "put `width` there");
 }
 
 #[test]

@@ -150,18 +150,38 @@ fn results_of_different_kinds_are_refused() {
     let text = inputs.put("text.txt", "hello");
     let gone = inputs.path("gone.png");
     let mut refusals = Refusals::default();
-    for (args, code, says) in [
-        (vec![&a, &wide], 2, vec!["a.png has 40x30 pixels", "wide.png 41x30", "give images of one size"]),
-        (vec![&a, &broken], 1, vec!["broken.png", "cannot be decoded"]),
-        (vec![&a, &number], 2, vec!["is an image and", "a run"]),
-        (vec![&number, &number], 1, vec!["number.json", "not the summary of `quintile run`"]),
-        (vec![&text, &text], 2, vec!["text.txt", "give one of these"]),
-        (vec![&a, &gone], 1, vec!["gone.png: cannot read it", "check the path"]),
+    for (args, code, says, remedy) in [
+        (vec![&a, &wide], 2, vec!["a.png has 40x30 pixels", "wide.png 41x30"], "give images of one size"),
+        (
+            vec![&a, &broken],
+            1,
+            vec!["broken.png", "cannot be decoded"],
+            "give a PNG or an EXR file that is whole",
+        ),
+        (vec![&a, &number], 2, vec!["is an image and", "a run"], "give two of a kind"),
+        (
+            vec![&number, &number],
+            1,
+            vec!["number.json", "not the summary of `quintile run`"],
+            "give the folder of a run",
+        ),
+        (vec![&text, &text], 2, vec!["text.txt", "it is neither a run"], "give one of these"),
+        (vec![&a, &gone], 1, vec!["gone.png: cannot read it"], "check the path"),
     ] {
         let args: Vec<&str> = args.into_iter().map(String::as_str).collect();
-        refusals.check(&compare(&args), code, &says);
+        refusals.check(&compare(&args), code, &says, remedy);
     }
-    refusals.check(&compare(&[&a, &a, "--out", &a]), 2, &["--out", "a.png is what is read", "name another"]);
+    refusals.check(
+        &compare(&[&a, &a, "--out", &a]),
+        2,
+        &["--out", "a.png is what is read"],
+        "name another file",
+    );
     let other = inputs.path("d.tif");
-    refusals.check(&compare(&[&a, &a, "--out", &other]), 2, &["d.tif", ".png or .exr", "give a name"]);
+    refusals.check(
+        &compare(&[&a, &a, "--out", &other]),
+        2,
+        &["d.tif"],
+        "give a name that ends in .png or .exr",
+    );
 }

@@ -271,20 +271,27 @@ fn other_formats_are_refused_with_a_remedy() {
         ("car.DAE", "a COLLADA file"),
         ("car.blend", "a Blender file"),
     ] {
-        let says = [name, what, "convert it to glTF", "File > Export > glTF 2.0"];
-        refusals.call(&[&inputs.put(name, "x")], 2, &says);
+        let says = [name, what, "File > Export > glTF 2.0"];
+        let remedy = "convert it to glTF";
+        refusals.call(&[&inputs.put(name, "x")], 2, &says, remedy);
         let scene = inputs.put("s.ron", format!("(objects: [(file: {name:?})])"));
-        refusals.call(&[&scene], 2, &says);
+        refusals.call(&[&scene], 2, &says, remedy);
     }
     refusals.call(
         &[&inputs.put("notes.txt", "x")],
         2,
-        &["notes.txt: its ending is not one of a scene file", ".gltf"],
+        &["notes.txt: its ending is not one of a scene file"],
+        "give a .ron, .gltf",
     );
-    refusals.call(&[&inputs.put("bare", "x")], 2, &["bare: its ending is not one of a scene file"]);
+    refusals.call(
+        &[&inputs.put("bare", "x")],
+        2,
+        &["bare: its ending is not one of a scene file"],
+        "give a .ron, .gltf",
+    );
     let folder = inputs.path("folder");
     fs::create_dir(&folder).expect("a folder can be made");
-    refusals.call(&[&folder], 2, &["folder: it is a folder", ".gltf"]);
+    refusals.call(&[&folder], 2, &["folder: it is a folder"], "give a .ron, .gltf");
 }
 
 /// A patch of 1 m with bumps, its middle at `x` and `z`; every coordinate is a multiple of 1/64.

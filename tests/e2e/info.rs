@@ -112,12 +112,12 @@ fn meshes_samples_and_workloads_are_described_too() {
 fn unreadable_files_are_refused() {
     let mut refusals = Refusals::default();
     let inputs = Inputs::new();
-    for (scene, code, says) in [
-        ("nothing".to_owned(), 2, "nothing"),
-        (inputs.path("gone.obj"), 1, "gone.obj"),
-        (inputs.put("broken.glb", "glTF"), 1, "broken.glb"),
-        (inputs.put("broken.mts", "MTS1"), 1, "broken.mts"),
+    for (scene, code, says, remedy) in [
+        ("nothing".to_owned(), 2, "no scene called `nothing`", "built in: default, tiny"),
+        (inputs.path("gone.obj"), 1, "gone.obj: cannot read it", "check the path"),
+        (inputs.put("broken.glb", "glTF"), 1, "broken.glb: GLB header", "get the file again"),
+        (inputs.put("broken.mts", "MTS1"), 1, "broken.mts: byte 4", "get the file again"),
     ] {
-        refusals.check(&quintile().call(["info", &scene]), code, &[says]);
+        refusals.check(&quintile().call(["info", &scene]), code, &[says], remedy);
     }
 }

@@ -34,3 +34,4 @@ mod trace_refusals;
 mod visibility;
 mod visibility_inputs;
 mod warnings;
+mod words;

@@ -421,7 +421,7 @@ mod tests {
     }
 
     #[test]
-    fn clock_steps_stretch_frames_and_lower_power() {
+    fn clock_steps_lengthen_frames_and_lower_power() {
         let steady = Scenario { content: 0.0, ..SCENARIOS[1] };
         let ratio = |gaps: &[f64]| {
             let ends = gaps.iter().fold((f64::INFINITY, 0.0_f64), |(a, b), &g| (a.min(g), b.max(g)));

@@ -19,7 +19,7 @@ struct Entry {
 const JOBS: &[Entry] = &[
     Entry {
         name: "caustics",
-        what: "light refracted by waves: beams drawn as moving triangles, or in the bodies that others put around them",
+        what: "light refracted by waves: light volumes drawn as moving triangles, or within bounding volumes",
         flags: crate::caustics::FLAGS,
         make: crate::caustics::job,
     },

@@ -53,7 +53,7 @@ pub enum TableError {
     #[error("{0} blades; an iris has 3 to 64")]
     Blades(u32),
     /// Given points are lens positions, which cannot be divided among regions.
-    #[error("given points are places on the lens as they are: leave `regions` out")]
+    #[error("given points are lens samples as they are: leave `regions` out")]
     GivenRegions,
 }
 

@@ -2,7 +2,7 @@
 //!
 //! - [`dir`]: the folder of results; results appear together when all are complete.
 //! - [`image`]: frames as PNG and EXR, thumbnails.
-//! - [`plot`]: the plots as SVG and PNG, with the embedded [`font`].
+//! - [`plot`]: the plots as SVG and PNG, with an embedded font.
 //! - [`perfetto`]: a timeline that the Perfetto viewer opens, written with [`protobuf`].
 //! - [`report`]: one HTML page that works without network.
 //! - [`table`]: numbers with SI prefixes and aligned tables.
@@ -13,16 +13,14 @@
 //! only on these inputs.
 
 pub mod dir;
-pub mod font;
 pub mod image;
 pub mod perfetto;
 pub mod plot;
 pub mod progress;
 pub mod protobuf;
 pub mod report;
-mod stats;
 pub mod table;
 pub mod terminal;
 
 pub use dir::{Claim, Destination, OutDir, OutputError};
-pub use stats::MeanSd;
+pub use table::MeanSd;

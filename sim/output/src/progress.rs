@@ -5,7 +5,7 @@ use std::io::{IsTerminal, stderr};
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use warnings::Warning;
 
-use super::terminal::{Terminal, Verbosity};
+use super::terminal::{ColorChoice, Terminal, Verbosity};
 
 /// Progress bars and messages on standard error; usable from any thread.
 #[derive(Clone, Debug)]
@@ -18,7 +18,7 @@ impl Progress {
     /// Bars without colours on standard error; `quiet` hides bars and messages.
     pub fn new(quiet: bool) -> Self {
         let verbosity = if quiet { Verbosity::Quiet } else { Verbosity::Normal };
-        Self::on(&Terminal::new(verbosity, clap::ColorChoice::Never), quiet)
+        Self::on(&Terminal::new(verbosity, ColorChoice::Never), quiet)
     }
 
     /// Bars on standard error. They are hidden if the terminal is quiet, if `hidden`, or if standard error is

@@ -3,10 +3,10 @@
 use std::io::{Write, stderr};
 
 use anstream::AutoStream;
-use clap::ColorChoice;
-use clap::builder::Styles;
-use clap::builder::styling::{AnsiColor, Style};
+use anstyle::{AnsiColor, Style};
 use warnings::{Code, Warning};
+
+pub use anstream::ColorChoice;
 
 /// Amount of messages on standard error. Results on standard output do not depend on it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
@@ -33,9 +33,9 @@ impl Terminal {
     /// the variables `NO_COLOR`, `CLICOLOR`, `CLICOLOR_FORCE` and `TERM`.
     pub fn new(verbosity: Verbosity, color: ColorChoice) -> Self {
         let colored = match color {
-            ColorChoice::Always => true,
+            ColorChoice::Always | ColorChoice::AlwaysAnsi => true,
             ColorChoice::Never => false,
-            ColorChoice::Auto => AutoStream::choice(&stderr()) != anstream::ColorChoice::Never,
+            ColorChoice::Auto => AutoStream::choice(&stderr()) != ColorChoice::Never,
         };
         Self { verbosity, colored }
     }
@@ -47,7 +47,7 @@ impl Terminal {
 
     /// Prints an error.
     pub fn error(&self, message: &str) {
-        self.line("error", *Styles::styled().get_error(), message);
+        self.line("error", AnsiColor::Red.on_default().bold(), message);
     }
 
     /// Prints a warning with its code on one line, unless quiet. Under `--verbose` each detail has a line,

@@ -157,7 +157,7 @@ const TRACE_SAMPLE_S: f64 = 0.9e-6;
 const TRACE_SAMPLE_BYTES: f64 = 70.0;
 /// Time of a preview over the time of a frame.
 const PREVIEW_TIME_RATIO: f64 = 0.05;
-/// Least number of differing frames of a workload for which the estimate costs less than it tells.
+/// Least number of differing frames of a workload from which on the estimate is worth its cost.
 pub(super) const MIN_WORKLOAD_FRAMES: usize = 4;
 /// Memory of the program with a small scene, in bytes.
 const PROGRAM_BYTES: u64 = 30_000_000;

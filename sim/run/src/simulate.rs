@@ -1,13 +1,14 @@
-//! Simulation of all frames of a run.
+//! Simulation of all frames of a run, and of one small frame on a machine given as text (for tests and fuzz targets).
 
-use rayon::prelude::*;
-
-use super::frame::{FrameSimulator, SimulatedFrame, max_bins_per_frame};
-use super::sampled;
-use super::{Distinct, Plan, RunError, Simulated};
-use crate::Sampling;
 use output::OutDir;
 use output::progress::Progress;
+use power_model::{EnergyTable, Platform};
+use rayon::prelude::*;
+use timing::Level;
+use workloads::Overrides;
+
+use crate::frame::{FrameSimulator, SimulatedFrame, max_bins_per_frame};
+use crate::{Distinct, GpuSpec, Plan, RunError, RunOptions, Sampling, Simulated, measure, sampled};
 
 /// Simulates the frames that the plan requires and writes each image when its frame is done.
 pub(super) fn simulate(
@@ -60,4 +61,41 @@ fn every(simulator: &FrameSimulator<'_>, progress: &Progress) -> Result<Simulate
     }
     let frames = simulator.distinct.groups().to_vec();
     Ok(Simulated { distinct, frames, pictures, heat, sampled: None })
+}
+
+/// Files of a machine as RON text; `None` for those of the reference.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct MachineTexts<'a> {
+    /// The GPU file.
+    pub gpu: Option<&'a str>,
+    /// The platform file.
+    pub platform: Option<&'a str>,
+    /// The energy table.
+    pub table: Option<&'a str>,
+}
+
+impl MachineTexts<'_> {
+    /// Simulates one frame of the scene `tiny` at 16x12 pixels at `level`, records it and finds it in the
+    /// trace. Returns its energy in the trace in joules and writes no files. Messages name the files
+    /// `gpu.ron`, `platform.ron` and `table.ron`.
+    ///
+    /// # Errors
+    /// If a file is invalid, or the files do not match.
+    pub fn one_frame(&self, level: Level) -> Result<f64, RunError> {
+        let gpu =
+            self.gpu.map_or_else(|| GpuSpec::load("reference"), |text| GpuSpec::parse(text, "gpu.ron"))?;
+        let platform = self
+            .platform
+            .map_or_else(|| Platform::builtin("reference"), |text| Platform::parse(text, "platform.ron"))?;
+        let table = self
+            .table
+            .map_or_else(|| EnergyTable::builtin("28nm"), |text| EnergyTable::parse(text, "table.ron"))?;
+        let overrides =
+            Overrides { size: Some((16, 12)), samples: Some(1), frames: Some(0..1), ..Overrides::default() };
+        let options = RunOptions { scene: "tiny".into(), overrides, timing: level, ..RunOptions::default() };
+        let plan = Plan::resolve(options)?.on(gpu, platform, table)?;
+        let simulated = without_files(&plan, &Progress::new(true))?;
+        let measurement = measure::measure(&plan, &simulated)?;
+        Ok(measurement.frames.iter().map(|frame| frame.energy_j).sum())
+    }
 }

@@ -1,15 +1,12 @@
 //! `quintile chart` and `quintile stress`: studies, opened, made, written and printed.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use serde_json::{Map, Value};
-
-use super::Failure;
-use super::args::{ChartArg, ChartArgs, StressArgs};
-use super::terminal::{print, print_json};
-use experiments::catalog::{CHARTS, all};
-use experiments::stress::{Effort, Report, family_named};
+use clap::Args;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use experiments::catalog::{ALL, CHARTS, all};
+use experiments::stress::{Report, StressEffort, family_named};
 use experiments::study::index::{self, Index, Section};
 use experiments::study::{Done, Entry, Request, Study, StudyError};
 use output::plot::Look;
@@ -17,6 +14,88 @@ use output::progress::Progress;
 use output::terminal::Terminal;
 use output::{Destination, OutDir, OutputError};
 use run::RunError;
+use serde_json::{Map, Value};
+
+use super::Failure;
+use super::outputs::{print, print_json};
+use crate::cli::args::{LookArgs, ThreadArgs};
+
+/// Arguments of `stress`.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  quintile stress slivers --out slivers\n\n\
+    Results are in DIR: plots/, stress.csv and summary.json. Ends with 1 if any method loses a sample.")]
+pub struct StressArgs {
+    /// One family; all without it
+    pub family: Option<String>,
+    /// Folder for the results; made where it is missing
+    #[arg(long, value_name = "DIR", default_value = "out/stress")]
+    pub out: PathBuf,
+    /// Overwrite files in DIR that Quintile did not write
+    #[arg(long)]
+    pub force: bool,
+    /// Smaller images, fewer triangles
+    #[arg(long)]
+    pub quick: bool,
+    /// Worker threads.
+    #[command(flatten)]
+    pub threads: ThreadArgs,
+    /// Print summary.json to standard output and nothing else
+    #[arg(long)]
+    pub json: bool,
+    /// How pictures look.
+    #[command(flatten)]
+    pub look: LookArgs,
+}
+
+/// Arguments of `chart`.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  quintile chart sampling --quick --out charts\n\n\
+    Results are in DIR: pictures as SVG and PNG, NAME.csv, NAME.json and NAME.md.")]
+pub struct ChartArgs {
+    /// Which chart
+    #[arg(value_parser = charts(), value_name = "NAME")]
+    pub chart: ChartArg,
+    /// Another scene for `sampled`, `tile-tests` or `timing`, by name or file; may be given several times
+    #[arg(long, value_name = "SCENE")]
+    pub scene: Vec<String>,
+    /// Smaller images, fewer samples and a coarser reference: seconds instead of minutes
+    #[arg(long)]
+    pub quick: bool,
+    /// Folder for the results; made where it is missing
+    #[arg(long, value_name = "DIR", default_value = "out/charts")]
+    pub out: PathBuf,
+    /// Overwrite files in DIR that Quintile did not write
+    #[arg(long)]
+    pub force: bool,
+    /// Worker threads.
+    #[command(flatten)]
+    pub threads: ThreadArgs,
+    /// Print the numbers as JSON and nothing else
+    #[arg(long)]
+    pub json: bool,
+    /// How pictures look.
+    #[command(flatten)]
+    pub look: LookArgs,
+}
+
+/// A chart, or all of them.
+#[derive(Clone, Copy, Debug)]
+pub enum ChartArg {
+    /// Every chart and the failure catalogue.
+    All,
+    /// One chart.
+    One(&'static Entry),
+}
+
+/// The names of the charts, each with its line of help.
+fn charts() -> impl TypedValueParser<Value = ChartArg> {
+    let values = CHARTS.iter().map(|chart| (chart.name, chart.about));
+    let values = std::iter::once(ALL).chain(values).map(|(name, help)| PossibleValue::new(name).help(help));
+    PossibleValuesParser::new(values).map(|name: String| {
+        let chart = CHARTS.iter().find(|chart| chart.name == name);
+        chart.map_or(ChartArg::All, ChartArg::One)
+    })
+}
 
 impl From<StudyError> for Failure {
     fn from(error: StudyError) -> Self {
@@ -48,7 +127,7 @@ pub(super) fn run(args: &ChartArgs, terminal: &Terminal) -> Result<(), Failure> 
     for scene in &args.scene {
         workloads::load(scene).map_err(RunError::from)?;
     }
-    let pool = super::threads(args.threads)?;
+    let pool = args.threads.pool()?;
     let (look, progress) = (args.look.look(), Progress::on(terminal, args.json));
     let make = |study: &Entry, dir: &OutDir| {
         let request =
@@ -132,10 +211,10 @@ pub(super) fn stress(args: &StressArgs, terminal: &Terminal) -> Result<(), Failu
     // The folder first: that it cannot be written is better known before the work than after it.
     let out = Destination { folder: args.out.clone(), force: args.force };
     let mut dir = out.open([Report::claim()])?;
-    let pool = super::threads(args.threads)?;
+    let pool = args.threads.pool()?;
     let progress = Progress::on(terminal, args.json);
     let only = args.family.as_deref().map(family_named).transpose()?;
-    let effort = Effort { only, quick: args.quick };
+    let effort = StressEffort { only, quick: args.quick };
     let report = pool.install(|| Report::measure(effort, &[], &progress))?;
     let done = Done::new(&report, &dir, &args.look.look())?;
     dir.publish()?;

@@ -1,11 +1,14 @@
-//! Report of a crash: its place, and the command that repeats the frame.
+//! Unusual ends: the report of a crash (its place, and the command that repeats the frame), and interrupts (Ctrl-C).
 
 use std::any::Any;
 use std::backtrace::{Backtrace, BacktraceStatus};
+use std::io::{IsTerminal, Write, stderr};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use output::table::shell_line;
+use output::terminal::Terminal;
 use run::CrashedFrame;
+use traces::io::unfinished;
 
 /// Panics in all threads of this process.
 #[derive(Clone, Default)]
@@ -89,6 +92,27 @@ fn alone(arguments: &[String], frame: u32) -> Vec<String> {
     let frames = format!("{frame}..{}", frame.saturating_add(1));
     kept.extend(["--frames".to_owned(), frames, "--out".to_owned(), format!("frame_{frame}")]);
     kept
+}
+
+/// Exit code after an interrupt, as in shells: 128 plus the number of the signal.
+const EXIT_CODE: i32 = 130;
+
+/// Installs a handler for interrupt, termination and hang-up. It removes unfinished files, prints a message
+/// and ends the process.
+pub(super) fn handle(terminal: Terminal) {
+    let end = move || {
+        // No file is created while this guard is held.
+        let _held = unfinished::remove_all();
+        if stderr().is_terminal() {
+            // Leave the line of the progress bar.
+            let _ = writeln!(stderr());
+        }
+        terminal.error("interrupted: unfinished results were removed, earlier ones are as they were");
+        std::process::exit(EXIT_CODE);
+    };
+    // Signals that are already ignored or handled (nohup) stay so. The next process with the same folder then
+    // removes unfinished files.
+    let _ = ctrlc::try_set_handler(end);
 }
 
 #[cfg(test)]

@@ -3,8 +3,8 @@
 use serde::Serialize;
 
 use super::Failure;
-use super::args::ListArgs;
-use super::terminal::{print, print_json};
+use super::ListArgs;
+use super::outputs::{print, print_json};
 use experiments::catalog::{ALL, CHARTS};
 use run::GpuSpec;
 

@@ -7,9 +7,9 @@ use clap::CommandFactory;
 use clap_mangen::Man;
 use traces::io::atomic;
 
-use super::Failure;
-use super::args::{Cli, CompletionsArgs, ManArgs};
-use super::terminal::print;
+use super::{Cli, CompletionsArgs, Failure, ManArgs};
+
+use super::outputs::print;
 
 pub(super) fn completions(args: &CompletionsArgs) -> Result<(), Failure> {
     let mut script = Vec::new();

@@ -6,7 +6,6 @@ mod chart;
 mod compare;
 mod crash;
 mod info;
-mod interrupt;
 mod list;
 mod manual;
 mod outputs;
@@ -16,28 +15,113 @@ mod reproduce;
 mod run;
 mod sample;
 mod samples;
-mod terminal;
 mod trace;
 mod visibility;
 
 use std::ffi::OsString;
 use std::panic::AssertUnwindSafe;
+use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::error::ErrorKind;
-use clap::{CommandFactory, FromArgMatches};
-
 use ::run::RunError;
+use clap::error::ErrorKind;
+use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 use crash::Crashes;
 use output::terminal::Terminal;
 
-pub use args::{Cli, Command};
+use args::MessageArgs;
+use chart::{ChartArgs, StressArgs};
+use compare::CompareArgs;
+use info::InfoArgs;
+use run::RunArgs;
+use samples::SamplesArgs;
+use trace::TraceArgs;
+use visibility::VisibilityArgs;
+
+/// A cycle-approximate simulator of a tile-based 5D rasterization pipeline, with an energy trace for every frame.
+#[derive(Debug, Parser)]
+#[command(name = "quintile", version, arg_required_else_help = true, max_term_width = 100)]
+pub struct Cli {
+    /// The subcommand.
+    #[command(subcommand)]
+    pub command: Command,
+    /// Amount and colours of messages.
+    #[command(flatten)]
+    pub messages: MessageArgs,
+}
+
+/// The subcommand.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Render a scene, time it, turn it into watts, record a trace and find the energy of every frame in it
+    Run(Box<RunArgs>),
+    /// Describe a scene: contents, camera in use, ignored features
+    Info(InfoArgs),
+    /// Compare two runs, two images or two folders of images
+    Compare(CompareArgs),
+    /// Compute the visible triangle and depth of every sample, for comparison with another renderer
+    Visibility(VisibilityArgs),
+    /// Find the pairs of moving objects that may collide
+    Ccd(ccd::CcdArgs),
+    /// Generate points: Poisson disk, following a density, or uniform in a volume
+    Sample(sample::SampleArgs),
+    /// Write a sample table to a file
+    Samples(SamplesArgs),
+    /// Try each tile test on families of triangles from easy to hard: samples lost, efficiency, width of
+    /// intervals, cost
+    Stress(StressArgs),
+    /// Measure and draw a chart of the book
+    Chart(ChartArgs),
+    /// Compute what a paper reports and compare it with the paper, row by row
+    Reproduce(reproduce::ReproduceArgs),
+    /// Analyse a power trace, recorded or synthetic: frames, energies, alignment, formats, plots, Pareto frontiers
+    Trace(TraceArgs),
+    /// Print a script that completes commands and options in a shell
+    Completions(CompletionsArgs),
+    /// Print the manual page, or write one for each command into a folder
+    Man(ManArgs),
+    /// List the built-in scenes, GPUs, platforms, energy tables, workloads and figures
+    List(ListArgs),
+}
+
+/// Arguments of `completions`.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  quintile completions bash > ~/.local/share/bash-completion/completions/quintile\n  \
+    quintile completions zsh > ~/.zfunc/_quintile\n  quintile completions fish > ~/.config/fish/completions/quintile.fish"
+)]
+pub struct CompletionsArgs {
+    /// The shell
+    #[arg(value_enum, value_name = "SHELL")]
+    pub shell: clap_complete::Shell,
+}
+
+/// Arguments of `man`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  quintile man | man -l -\n  quintile man ~/.local/share/man/man1")]
+pub struct ManArgs {
+    /// Folder for the pages of all commands, such as quintile-run.1; without it the main page is printed
+    #[arg(value_name = "DIR")]
+    pub folder: Option<PathBuf>,
+    /// The same as DIR
+    #[arg(long, value_name = "FOLDER", conflicts_with = "folder")]
+    pub out: Option<PathBuf>,
+}
+
+/// Arguments of `list`.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  quintile list --json")]
+pub struct ListArgs {
+    /// Print as JSON
+    #[arg(long)]
+    pub json: bool,
+}
 
 /// Executes the command line of this process. Exit code: 0 for success, 2 for a usage error, 1 for a failure.
 pub fn main() -> ExitCode {
     let cli = parse(std::env::args_os().collect()).unwrap_or_else(|error| error.exit());
     let terminal = cli.messages.terminal();
-    interrupt::handle(terminal.clone());
+    crash::handle(terminal.clone());
     let crashes = Crashes::record();
     match std::panic::catch_unwind(AssertUnwindSafe(|| dispatch(&cli, &terminal))) {
         Ok(Ok(())) => ExitCode::SUCCESS,
@@ -85,12 +169,6 @@ impl From<workloads::LoadError> for Failure {
     }
 }
 
-/// Pool of worker threads; one per core without a number.
-fn threads(number: Option<u16>) -> Result<rayon::ThreadPool, Failure> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(usize::from(number.unwrap_or(0))).build();
-    pool.map_err(|error| Failure { message: format!("starting worker threads: {error}"), code: 1 })
-}
-
 fn dispatch(cli: &Cli, terminal: &Terminal) -> Result<(), Failure> {
     match &cli.command {
         Command::Run(args) => run::run(args, terminal),
@@ -107,5 +185,15 @@ fn dispatch(cli: &Cli, terminal: &Terminal) -> Result<(), Failure> {
         Command::Chart(args) => chart::run(args, terminal),
         Command::Reproduce(args) => reproduce::run(args, terminal),
         Command::Trace(args) => trace::run(args, terminal),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_declarations_are_consistent() {
+        Cli::command().debug_assert();
     }
 }

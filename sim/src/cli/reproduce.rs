@@ -6,7 +6,8 @@ use std::time::Instant;
 use clap::Args;
 
 use super::Failure;
-use super::terminal::{print, print_json};
+use super::outputs::{print, print_json};
+use crate::cli::args::ThreadArgs;
 use experiments::reproduce::{Options, Paper, reproduce};
 use output::Destination;
 use output::progress::Progress;
@@ -46,9 +47,9 @@ pub struct ReproduceArgs {
     /// Overwrite files in DIR that Quintile did not write, and a result of the paper with more rows or in full
     #[arg(long)]
     pub force: bool,
-    /// Worker threads [default: all cores]; results do not depend on it
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
-    pub threads: Option<u16>,
+    /// Worker threads.
+    #[command(flatten)]
+    pub threads: ThreadArgs,
     /// Print only the JSON to standard output
     #[arg(long)]
     pub json: bool,
@@ -56,7 +57,7 @@ pub struct ReproduceArgs {
 
 pub(super) fn run(args: &ReproduceArgs, terminal: &Terminal) -> Result<(), Failure> {
     let started = Instant::now();
-    let pool = super::threads(args.threads)?;
+    let pool = args.threads.pool()?;
     let progress = Progress::on(terminal, args.json);
     let out = Destination { folder: args.out.clone(), force: args.force };
     let options = Options {

@@ -1,18 +1,192 @@
 //! `quintile run`.
 
+use std::path::PathBuf;
 use std::time::Instant;
 
-use serde::Serialize;
-use workloads::job::OptionSource;
-
-use super::Failure;
-use super::args::RunArgs;
-use super::terminal::{print, print_json};
+use activity::Event;
+use activity::spec::suggestion;
+use clap::Args;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use output::progress::Progress;
 use output::table::{Table, count_or_digits, counted, si, si_mean_sd};
 use output::terminal::{Terminal, Verbosity};
 use output::{Destination, MeanSd};
-use run::{DryRun, Outcome, Plan, Prepared, Requested, RunError, RunOptions, Summary, again, open, prepare};
+use pipeline::frame::HeatMap;
+use power_model::Bound;
+use run::{
+    DryRun, Method, Outcome, PacingChoice, Plan, Prepared, Requested, RunError, RunOptions, Summary, again,
+    open, prepare,
+};
+use serde::Serialize;
+use workloads::job::OptionSource;
+
+use super::Failure;
+use super::outputs::{print, print_json};
+use crate::cli::args::{LookArgs, SceneArgs, ThreadArgs};
+use crate::cli::parse::{duration, percent, setting, share_below_one};
+use crate::cli::quantity::rate;
+
+/// Arguments of `run`.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Example:\n  quintile run Fox.glb --clip Run --frames 0..60 --lens 2 --samples 16 --out fox\n  \
+    quintile run Fox.glb --frames 0..300 --accuracy 2% --verify --out fox\n  \
+    quintile run ccd --set resolution=64 --set bins=8 --out ccd\n\n\
+    The chapter of a workload lists its options and defaults; `--set` lists them when one is misspelled. It takes no\n\
+    --accuracy, --budget, --timing sampled or --heat, which need a scene, and refuses flags of scenes that would change nothing.\n\n\
+    Results are in DIR: images/, report.html, summary.json, frames.csv, trace.parquet, trace.csv, plots/ and\n\
+    timeline.perfetto-trace (open it at ui.perfetto.dev). They appear together when all are whole; results of an earlier run\n\
+    are replaced then, and other files in DIR are left alone."
+)]
+pub struct RunArgs {
+    /// A built-in scene or a workload (see `quintile list`), or a .ron, .gltf, .glb, .obj, .ply, .off or .stl file
+    #[arg(default_value = "default", value_name = "SCENE|WORKLOAD|FILE")]
+    pub scene: PathBuf,
+    /// Repeat the run that wrote this summary.json, to the same bytes; only --out, --force, --threads and
+    /// --json can be added. Refused if the program version or an input differs, unless with --force
+    #[arg(long, value_name = "SUMMARY", conflicts_with_all = SETTINGS)]
+    pub again: Option<PathBuf>,
+    /// Options of a workload in a .ron file
+    #[arg(long, value_name = "FILE.ron")]
+    pub options: Option<PathBuf>,
+    /// An option of a workload; may be given several times, and overrides --options
+    #[arg(long, value_name = "NAME=VALUE", value_parser = setting)]
+    pub set: Vec<(String, String)>,
+    /// Folder for the results; created if missing
+    #[arg(long, value_name = "DIR", default_value = "out")]
+    pub out: PathBuf,
+    /// Overwrite files in DIR that Quintile did not write; with --again, repeat although the program or an
+    /// input differs
+    #[arg(long)]
+    pub force: bool,
+    /// Changes to the scene
+    #[command(flatten)]
+    pub view: SceneArgs,
+    /// A built-in GPU or a .ron file; its file names the platform and the energy table that belong to it (see `quintile list`)
+    #[arg(long, value_name = "NAME|FILE", default_value = "reference")]
+    pub gpu: PathBuf,
+    /// A built-in platform or a .ron file [default: the GPU's own]
+    #[arg(long, value_name = "NAME|FILE")]
+    pub platform: Option<PathBuf>,
+    /// A built-in energy table or a .ron file [default: the GPU's own]
+    #[arg(long, value_name = "NAME|FILE")]
+    pub energy: Option<PathBuf>,
+    /// Which values of the energy table to use
+    #[arg(long, value_name = "BOUND", default_value = "nominal", value_parser = bound())]
+    pub bound: Bound,
+    /// Timing level; `quintile chart timing` shows its accuracy
+    #[arg(long, value_enum, default_value_t)]
+    pub timing: Method,
+    /// Let a probe choose level, frames and dimensions so that the error of cycles and energy is at most this, for example 2%;
+    /// for scenes, not for workloads
+    #[arg(long, value_name = "P%", value_parser = percent, conflicts_with = "timing", allow_hyphen_values = true)]
+    pub accuracy: Option<f64>,
+    /// Let a probe choose the most accurate options that take no longer than this, for example 30s, 500ms or
+    /// 2min; for scenes, not for workloads
+    #[arg(long, value_name = "T", value_parser = duration, conflicts_with = "timing", allow_hyphen_values = true)]
+    pub budget: Option<f64>,
+    /// Simulate every frame at the reference as well, and report the actual error
+    #[arg(long)]
+    pub verify: bool,
+    /// When the next frame starts
+    #[arg(long, value_enum, default_value_t)]
+    pub pacing: PacingChoice,
+    /// Samples per second of the recorder, 1 to 10 million: a number in Hz, or with its unit, such as 50kHz or 1MHz [default: 50kHz,
+    /// or up to 1MHz where frames are shorter than two samples or, without idle time between them, than fifty]
+    #[arg(long, value_name = "HZ", allow_hyphen_values = true, value_parser = rate)]
+    pub trace_rate: Option<f64>,
+    /// Samples in one packet of the recorder; a packet is lost as a whole
+    #[arg(long, value_name = "N", default_value_t = 512, value_parser = clap::value_parser!(u32).range(1..=i64::from(traces::device::MAX_PACKET_SAMPLES)))]
+    pub packet_samples: u32,
+    /// Share of packets that are lost, 0 to below 1: gaps in trace.parquet
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0, allow_hyphen_values = true, value_parser = share_below_one)]
+    pub packet_loss: f64,
+    /// Seed of samples, noise and packet losses
+    #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true, value_parser = crate::cli::parse::seed)]
+    pub seed: u64,
+    /// Also write every frame as EXR (linear light)
+    #[arg(long)]
+    pub exr: bool,
+    /// Write heat maps of a counter, as PNG, EXR and CSV in heat/; may be given several times
+    #[arg(long, value_name = "COUNTER", value_parser = counter)]
+    pub heat: Vec<Event>,
+    /// Worker threads.
+    #[command(flatten)]
+    pub threads: ThreadArgs,
+    /// Print what the run would do, with the expected time, and stop before anything is simulated or written
+    #[arg(long)]
+    pub dry_run: bool,
+    /// Print only summary.json to standard output
+    #[arg(long)]
+    pub json: bool,
+    /// Style of pictures.
+    #[command(flatten)]
+    pub look: LookArgs,
+}
+
+/// Arguments that `--again` takes from the summary.
+const SETTINGS: [&str; 31] = [
+    "scene",
+    "options",
+    "set",
+    "frames",
+    "samples",
+    "table",
+    "size",
+    "rate",
+    "lens",
+    "focus",
+    "shutter",
+    "clip",
+    "camera",
+    "gpu",
+    "platform",
+    "energy",
+    "bound",
+    "timing",
+    "accuracy",
+    "budget",
+    "verify",
+    "pacing",
+    "trace_rate",
+    "packet_samples",
+    "packet_loss",
+    "seed",
+    "exr",
+    "heat",
+    "width",
+    "title",
+    "font_size",
+];
+
+/// Parser of `--bound`: the name of a column of the energy table.
+fn bound() -> impl TypedValueParser<Value = Bound> {
+    let names = [
+        PossibleValue::new("low").help("The lowest that sources support"),
+        PossibleValue::new("nominal").help("The most likely"),
+        PossibleValue::new("high").help("The highest that sources support"),
+    ];
+    PossibleValuesParser::new(names).map(|name| match name.as_str() {
+        "low" => Bound::Low,
+        "high" => Bound::High,
+        _ => Bound::Nominal,
+    })
+}
+
+/// Parser of `--heat`: a counter that has a position in the image.
+fn counter(text: &str) -> Result<Event, String> {
+    let placed = || Event::ALL.into_iter().filter(|&event| HeatMap::is_of(event));
+    match Event::from_name(text) {
+        Some(event) if HeatMap::is_of(event) => Ok(event),
+        Some(_) => {
+            Err(format!("`{text}` is counted before it is known where in the image; samples_tested is not"))
+        }
+        None => {
+            let known: Vec<&str> = placed().map(Event::name).collect();
+            Err(format!("unknown counter `{text}`; {}", suggestion(text, &known)))
+        }
+    }
+}
 
 /// The git revision of this program.
 const REVISION: Option<&str> = option_env!("QUINTILE_REVISION");
@@ -21,7 +195,7 @@ pub(super) fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), Failure> {
     let started = Instant::now();
     let progress = Progress::on(terminal, args.json);
     let out = Destination { folder: args.out.clone(), force: args.force };
-    let pool = super::threads(args.threads)?;
+    let pool = args.threads.pool()?;
     let (options, recorded) = match &args.again {
         Some(summary) => again(summary, args.force, REVISION)?,
         None => (options(args), None),
@@ -152,4 +326,20 @@ fn figures(outcome: &Outcome) -> Table {
         table.row([row.label.clone(), cell(row.measured), cell(row.truth)]);
     }
     table
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::{Args as _, Command};
+
+    use super::*;
+
+    #[test]
+    fn again_takes_every_setting_from_the_summary() {
+        let command = RunArgs::augment_args(Command::new("run"));
+        let beside = ["again", "out", "force", "dry_run", "threads", "json"];
+        for argument in command.get_arguments().map(|argument| argument.get_id().as_str()) {
+            assert!(SETTINGS.contains(&argument) != beside.contains(&argument), "{argument}");
+        }
+    }
 }

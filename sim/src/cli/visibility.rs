@@ -4,19 +4,59 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use pipeline::SampleTable;
+use clap::Args;
+use output::terminal::Terminal;
 use pipeline::sampling::SampleSource;
 use pipeline::visibility::VisibleTriangle;
+use pipeline::{Features, SampleTable};
+use run::fits_memory;
+use run::visibility::{Rates, find};
 use serde::Serialize;
 use warnings::{Code, Warning};
 use workloads::visibility::{self, CameraSpec, FixedSamples, VisibilityScene, write_hits};
 
 use super::Failure;
-use super::args::VisibilityArgs;
-use super::terminal::{print, print_json};
-use output::terminal::Terminal;
-use run::fits_memory;
-use run::visibility::{Rates, find};
+use super::outputs::{print, print_json};
+use crate::cli::args::ThreadArgs;
+use crate::cli::parse::tests;
+
+/// Arguments of `visibility`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  quintile visibility s7_soup5d_10k.m5d --out ours.hit\n  \
+    quintile visibility start.ply end.ply --camera camera.ron --json\n  \
+    quintile visibility cloth-ball.mts.gz --print-camera > camera.ron\n\n\
+    The layouts of all files, and the hashed samples, are described in docs/formats.md.")]
+pub struct VisibilityArgs {
+    /// A moving mesh: an .m5d or .mts file, a .ply, .obj, .off or .stl file, or two of equal topology as the ends of the shutter
+    #[arg(value_name = "FILE", required = true, num_args = 1..=2)]
+    pub files: Vec<PathBuf>,
+    /// A .ron file, or a description such as 'position: (1, 2, 3), target: (0, 0, 0)'; without it an .m5d
+    /// file uses its own camera, other files a fitted one
+    #[arg(long, value_name = "CAMERA", allow_hyphen_values = true)]
+    pub camera: Option<String>,
+    /// Print the fitted camera as RON, and stop
+    #[arg(long, conflicts_with_all = ["camera", "json", "out"])]
+    pub print_camera: bool,
+    /// `hash` (of the camera's seed), `table` (the built-in table) or a sample table in a file
+    #[arg(long, value_name = "SAMPLES", default_value = "hash")]
+    pub samples: String,
+    /// Rasterize as the modelled hardware, with these tile tests: `all`, `none`, `auto`, or names separated
+    /// by commas. Without it the fastest engine is used; the result is the same
+    #[arg(long, value_name = "LIST", value_parser = tests)]
+    pub tests: Option<Features>,
+    /// Rasterize N times and report the median
+    #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1000))]
+    pub repeat: u16,
+    /// File for the triangle and depth of every sample
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+    /// Worker threads.
+    #[command(flatten)]
+    pub threads: ThreadArgs,
+    /// Print the result as one line of JSON
+    #[arg(long)]
+    pub json: bool,
+}
 
 /// Result for `--json`.
 #[derive(Serialize)]
@@ -43,7 +83,7 @@ pub(super) fn run(args: &VisibilityArgs, terminal: &Terminal) -> Result<(), Fail
     if args.print_camera {
         return print_camera(args, &scene);
     }
-    let pool = super::threads(args.threads)?;
+    let pool = args.threads.pool()?;
     let found = pool.install(|| see(args, scene))?;
     if args.json {
         return print_json(&found, false);
@@ -57,9 +97,9 @@ pub(super) fn run(args: &VisibilityArgs, terminal: &Terminal) -> Result<(), Fail
         found.rates.threads,
         found.rates.end_to_end_samples_per_s / 1e6
     );
-    let remarks: String = std::iter::once(rates).chain(camera).collect();
+    let notes: String = std::iter::once(rates).chain(camera).collect();
     print(&format!(
-        "{} triangles, {}x{} pixels of {} samples: {} of {} samples see a triangle{remarks}",
+        "{} triangles, {}x{} pixels of {} samples: {} of {} samples see a triangle{notes}",
         found.triangles, found.width, found.height, found.samples_per_pixel, found.hits, found.samples
     ))
 }

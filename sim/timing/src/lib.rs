@@ -28,11 +28,11 @@ mod spec;
 mod stalls;
 pub mod stepped;
 pub mod streams;
-mod warning;
 
 pub use bound::{BoundClock, Totals, bound};
 pub use clock::{Clocks, Time};
 pub use demand::{CLIENTS, DemandBuilder, ServiceDemand, Station};
+pub use frame_clock::AccuracyWarning;
 pub use frame_clock::{FrameClock, Level, Machine, TimingError};
 pub use packet::{MAX_CYCLES, PacketClock};
 pub use recorder::Recorder;
@@ -41,7 +41,6 @@ pub use spec::{
     ShaderSpec, UnitSpec, WaitCycles, Width,
 };
 pub use stalls::{Reason, Stalls, UnitTime};
-pub use warning::AccuracyWarning;
 
 /// Bytes of a memory line.
 pub const LINE_BYTES: u32 = 64;

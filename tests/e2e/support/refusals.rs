@@ -4,50 +4,6 @@ use std::fs;
 
 use super::{Ended, Inputs, quintile};
 
-/// Beginnings of remedies: a message has to state what to do.
-const REMEDIES: [&str; 40] = [
-    "--help",
-    "0 to 1",
-    "; up to ",
-    "above 0",
-    "above zero",
-    "add ",
-    "ask for",
-    "at least",
-    "built in:",
-    "check ",
-    "choose ",
-    "convert it",
-    "create it",
-    "did you mean",
-    "due",
-    "end of RON",
-    "Expected ",
-    "export it",
-    "finite",
-    "fix ",
-    "from ",
-    "get it again",
-    "get the file again",
-    "give ",
-    "go up to",
-    "has to",
-    "have to",
-    "known here",
-    "leave it out",
-    "fix ",
-    "move one",
-    "name a file",
-    "name another",
-    "needs",
-    "put ",
-    "remove ",
-    "takes",
-    "to 256",
-    "with anything in it",
-    "write it as",
-];
-
 /// Collects the problems of all checked messages and panics with the list when dropped.
 #[derive(Default)]
 pub struct Refusals {
@@ -55,8 +11,9 @@ pub struct Refusals {
 }
 
 impl Refusals {
-    /// Checks that a call failed with `code` and one message that contains every part of `says` and a remedy.
-    pub fn check(&mut self, ended: &Ended, code: i32, says: &[&str]) {
+    /// Checks that a call failed with `code` and one message. The message has to contain every part of `says` (the file, the
+    /// place and what is wrong), and `remedy`: what to do.
+    pub fn check(&mut self, ended: &Ended, code: i32, says: &[&str], remedy: &str) {
         let Ended { stdout, stderr, .. } = ended;
         let mut complain = |holds: bool, what: &str| {
             if !holds {
@@ -76,25 +33,26 @@ impl Refusals {
         // The parser of the command line adds usage lines.
         let of_parser = stderr.contains("For more information, try '--help'");
         complain(of_parser || stderr.lines().count() == 1, "one line is due");
-        complain(REMEDIES.iter().any(|remedy| stderr.contains(remedy)), "it names no remedy");
+        assert!(!remedy.is_empty(), "the test has to state the remedy");
+        complain(stderr.contains(remedy), &format!("it does not give the remedy `{remedy}`"));
     }
 
     /// Checks `quintile run ARGS` with a new folder, which has to stay empty.
-    pub fn call(&mut self, args: &[&str], code: i32, says: &[&str]) {
+    pub fn call(&mut self, args: &[&str], code: i32, says: &[&str], remedy: &str) {
         let inputs = Inputs::new();
         let out = inputs.path("out");
         let ended = quintile().call(["run"].iter().chain(args).chain(&["--out", &out]));
-        self.check(&ended, code, says);
+        self.check(&ended, code, says, remedy);
         if fs::read_dir(&out).is_ok_and(|mut left| left.next().is_some()) {
             self.complaints.push(format!("{args:?} left files in its folder"));
         }
     }
 
     /// Checks a run of a scene file with these bytes; the message has to name the file.
-    pub fn file(&mut self, name: &str, bytes: impl AsRef<[u8]>, code: i32, says: &[&str]) {
+    pub fn file(&mut self, name: &str, bytes: impl AsRef<[u8]>, code: i32, says: &[&str], remedy: &str) {
         let inputs = Inputs::new();
         let scene = inputs.put(name, bytes);
-        self.call(&[&scene], code, &[&[scene.as_str()], says].concat());
+        self.call(&[&scene], code, &[&[scene.as_str()], says].concat(), remedy);
     }
 }
 

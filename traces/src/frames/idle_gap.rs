@@ -225,7 +225,7 @@ mod tests {
     }
 
     #[test]
-    fn a_rest_that_has_grown_by_more_than_a_start_may_be_off_is_a_doubt() {
+    fn an_idle_gap_that_has_grown_by_more_than_the_tolerance_of_a_start_is_suspect() {
         // From 15 samples at the mark to 45: 0.12 of the window.
         let suspect = suspect(120, 10, |frame| if frame < 60 { 15 } else { 45 });
         assert!(suspect.iter().all(|frame| (50..120).contains(frame)), "{suspect:?}");
@@ -264,7 +264,7 @@ mod tests {
     }
 
     #[test]
-    fn a_few_doubts_make_all_near_them_doubtful_and_one_does_not() {
+    fn a_few_suspect_starts_spread_to_their_neighbours_and_one_does_not() {
         let mut left = vec![1.0; 60];
         left[50] = 0.3;
         assert_eq!(spread_to_neighbours(left.clone()), left);
@@ -289,7 +289,7 @@ mod tests {
 }
 
 #[cfg(test)]
-mod unrested_tests {
+mod no_idle_gap_tests {
     use super::*;
     use crate::random::Random;
 

@@ -202,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn a_flat_stretch_moves_nothing() {
+    fn a_flat_window_moves_nothing() {
         assert_eq!(align(&[1.0; 50], &[1.0; 10], 20, 2), 20.0);
     }
 

@@ -200,13 +200,13 @@ mod tests {
     }
 
     #[test]
-    fn known_limit_a_second_edge_at_the_end_of_the_stretch_costs_up_to_a_quarter_of_a_sample() {
+    fn known_limit_a_second_edge_at_the_end_of_the_window_costs_up_to_a_quarter_of_a_sample() {
         // The segment compared ends 12 samples after the start; an edge there enters at some shifts only.
         assert!(worst_error(13.4) < 0.25, "{}", worst_error(13.4));
     }
 
     #[test]
-    fn a_stretch_that_is_off_by_a_tenth_of_the_window_is_brought_back() {
+    fn a_window_off_by_a_tenth_of_itself_is_brought_back() {
         // 15 of 60 frames were found 20 of 250 samples late, as after a clock step; links across its ends
         // show it.
         let at: Vec<f64> = (0..60).map(|i| 100.0 + 400.37 * f64::from(i)).collect();

@@ -230,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn few_starts_or_none_are_no_doubt() {
+    fn few_starts_or_none_are_not_flagged() {
         let (power, starts) = frames(0.5);
         for count in 0..5 {
             assert_eq!(

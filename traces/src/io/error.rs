@@ -37,7 +37,7 @@ pub enum ReadError {
         remedy: &'static str,
     },
     /// Input that cannot be repaired.
-    #[error("{path}: {reason}; cut the stretch out by hand", path = path.display())]
+    #[error("{path}: {reason}; cut that part out by hand", path = path.display())]
     Repair {
         /// The file.
         path: PathBuf,

@@ -95,7 +95,7 @@ mod tests {
     }
 
     #[test]
-    fn what_no_trace_is_made_of_is_named_with_its_row_and_mended_on_request() {
+    fn unusable_values_are_named_with_their_row_and_repaired_on_request() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("t.csv");
         let (plain, repair) =

@@ -337,7 +337,7 @@ mod tests {
     }
 
     #[test]
-    fn a_short_stretch_shows_every_sample() {
+    fn a_short_range_shows_every_sample() {
         let amps: Vec<f32> = (0..5000_u16).map(|i| f32::from(i % 97)).collect();
         let trace = Trace::new(vec![2.0; 5000], amps.clone(), 1e3, 1.0, Default::default()).unwrap();
         let folder = tempfile::tempdir().unwrap();

@@ -116,9 +116,9 @@ def mended():
     with open(path("pyjls.jls"), "rb") as file:
         whole = file.read()
     for length in 19_000, 44_500:
-        with open(path(f"pyjls_mended_{length}.jls"), "wb") as file:
+        with open(path(f"pyjls_repaired_{length}.jls"), "wb") as file:
             file.write(whole[:length])
-        with Reader(path(f"pyjls_mended_{length}.jls")) as reader:
+        with Reader(path(f"pyjls_repaired_{length}.jls")) as reader:
             assert reader.signals[3].length > reader.signals[4].length
 
 

@@ -159,7 +159,7 @@ fn signals_that_are_missing_or_of_other_types_are_named() {
 }
 
 #[test]
-fn a_recording_that_was_not_closed_says_what_mends_it() {
+fn a_recording_that_was_not_closed_names_the_remedy() {
     refused(
         &foreign("pyjls_unclosed.jls"),
         &ReadOptions::default(),
@@ -171,7 +171,7 @@ fn a_recording_that_was_not_closed_says_what_mends_it() {
 fn a_recording_that_was_cut_and_repaired_gives_what_all_its_signals_have() {
     // What pyjls finds in them: current and voltage (m2_*.npz of `make_jls.py`'s reader).
     for (name, current, voltage) in
-        [("pyjls_mended_19000.jls", 960, 640), ("pyjls_mended_44500.jls", 2560, 1920)]
+        [("pyjls_repaired_19000.jls", 960, 640), ("pyjls_repaired_44500.jls", 2560, 1920)]
     {
         let (path, whole) = (foreign(name), whole());
         refused(

@@ -23,7 +23,7 @@ fn packed_pages_hold_the_same_samples_as_the_text_beside_them() {
 }
 
 #[test]
-fn packed_tables_are_read_and_others_named_with_the_mend() {
+fn packed_tables_are_read_and_others_named_with_the_remedy() {
     for packing in ["zstd", "gzip", "lz4"] {
         let table = Table::read(&foreign(&format!("table_{packing}.parquet"))).unwrap();
         assert_eq!(table.texts("algorithm").unwrap(), ["VB", "TF", ""], "{packing}");

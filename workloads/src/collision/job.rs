@@ -145,7 +145,7 @@ impl Draws for Collision {
 fn near_everywhere(pairs: usize, kept: u32) -> Option<Warning> {
     (pairs >= MIN_CANDIDATES && f64::from(kept) > MAX_KEPT_SHARE * pairs as f64).then(|| {
         let message = format!(
-            "{kept} of {pairs} pairs whose swept boxes touch may collide: images tell hardly any apart, as where surfaces slide along \
+            "{kept} of {pairs} pairs whose swept boxes touch may collide: images separate hardly any of them, as where surfaces slide along \
              each other; raise `resolution` and `bins`, or use `quintile ccd`, which looks closer"
         );
         Warning::new(Code::CollisionNearEverywhere, message)

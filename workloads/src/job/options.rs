@@ -95,7 +95,7 @@ fn check_fields(
     };
     for (name, value_of_it) in typed {
         if !known.contains_key(name) {
-            return Err(format!("there is no `{name}`; {}", suggestion(name, &names)));
+            return Err(format!("unknown option `{name}`; {}", suggestion(name, &names)));
         }
         let mut changed = known.clone();
         changed.insert(name.clone(), value_of_it.clone());
@@ -138,7 +138,7 @@ fn user_message(value: &str, error: &str) -> String {
     let value = &*shortened(value);
     if error.starts_with("unknown variant") {
         let names: Vec<&str> = expected.split('`').skip(1).step_by(2).collect();
-        return format!("there is no `{value}`; {}", suggestion(value, &names));
+        return format!("unknown value `{value}`; {}", suggestion(value, &names));
     }
     if expected == "fewer elements in array" {
         return format!("`{value}` has too many values in a list");
@@ -317,7 +317,7 @@ mod tests {
         assert_eq!(set(&[("boxs", "8")]).unwrap_err(), "set: unknown option `boxs`, did you mean `boxes`?");
         assert!(set(&[("boxes", "-1")]).unwrap_err().starts_with("set: boxes: `-1` is not a whole number"));
         let unknown = set(&[("method", "convex-hull")]).unwrap_err();
-        assert_eq!(unknown, "set: method: there is no `convex-hull`; did you mean `convex_hull`?");
+        assert_eq!(unknown, "set: method: unknown value `convex-hull`; did you mean `convex_hull`?");
     }
 
     #[test]
@@ -346,7 +346,7 @@ mod tests {
                 "light: `(1, 2)` names no value: write it as (radius: 0.0); known here: radius, target",
             ),
             ("5", "light: `5` names no value"),
-            ("(raduis: 1)", "light: there is no `raduis`; did you mean `radius`?"),
+            ("(raduis: 1)", "light: unknown option `raduis`; did you mean `radius`?"),
             (
                 "(radius: 1, target: (1, 2, 3))",
                 "light: target: `(radius: 1, target: (1, 2, 3))` has too many values",

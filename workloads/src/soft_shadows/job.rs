@@ -141,8 +141,7 @@ impl SoftShadows {
             None => format!("--samples {fewest} or more"),
         };
         (count < fewest).then(|| {
-            let message =
-                format!("{count} places on the light: penumbras show as {count} steps (bands); {remedy}");
+            let message = format!("{count} light samples: penumbras show as {count} steps (bands); {remedy}");
             Warning::new(Code::ShadowBanding, message)
         })
     }

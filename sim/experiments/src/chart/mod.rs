@@ -13,21 +13,19 @@
 //! - [`tile_tests`]: what each combination of tile tests gains over what it costs.
 //! - [`timing`]: every level of timing against the reference.
 //! - [`views`]: stereo and multi-view in one pass against view by view and accumulation.
-//! - [`fit`]: exponents of curves.
+//! - [`statistics`]: power laws, quantiles, errors of images.
 
 pub mod caustics;
 pub mod collision;
-pub mod fit;
 pub mod frames;
 pub mod glossy;
 pub mod growth;
-mod image;
 pub mod occlusion;
 pub mod points;
-mod quantiles;
 pub mod sampled;
 pub mod sampling;
 pub mod shadows;
+pub mod statistics;
 pub mod tile_tests;
 pub mod timing;
 pub mod views;

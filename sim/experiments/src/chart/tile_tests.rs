@@ -9,10 +9,10 @@ use serde::Serialize;
 use workloads::Overrides;
 use workloads::stress::{Size, family};
 
-use crate::stress::intervals::Pairs;
+use crate::stress::measure::Pairs;
 use crate::stress::measure::Work;
 use crate::stress::methods::{SWITCHES, combinations};
-use crate::stress::subject::{self, Subject, differing};
+use crate::stress::methods::{Subject, differing, on_subject};
 use crate::study::table::{Sheet, Table, fixed, plain, share};
 use crate::study::tradeoff::{Metric, TradeoffPoint, front};
 use crate::study::{Gallery, Study, StudyError};
@@ -38,7 +38,7 @@ const SCENES: [&str; 2] = ["default", "tiny"];
 
 /// One combination of tests on one scene.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Row {
+pub struct TileTestsRow {
     /// The scene.
     pub scene: String,
     /// Letters of the tests that are on, `-` for none.
@@ -61,7 +61,7 @@ pub struct Row {
 
 /// How much is measured.
 #[derive(Clone, Copy, Debug)]
-pub struct Effort {
+pub struct TileTestsEffort {
     /// How large the scenes of families are.
     pub families: Size,
     /// Pixels of scenes, across and down.
@@ -74,7 +74,7 @@ pub struct Effort {
 #[derive(Clone, Debug, Serialize)]
 pub struct TileTests {
     /// A row for each scene and combination.
-    pub rows: Vec<Row>,
+    pub rows: Vec<TileTestsRow>,
 }
 
 impl Study for TileTests {
@@ -85,11 +85,11 @@ impl Study for TileTests {
     const FILES: &'static [&'static str] = &["tile_tests.csv", "tile_tests.json"];
     const TAKES_SCENES: bool = true;
 
-    type Effort = Effort;
-    const FULL: Effort = Effort { families: Size::FULL, size: (320, 180), pairs: 400 };
-    const QUICK: Effort = Effort { families: Size::QUICK, size: (160, 90), pairs: 60 };
+    type Effort = TileTestsEffort;
+    const FULL: TileTestsEffort = TileTestsEffort { families: Size::FULL, size: (320, 180), pairs: 400 };
+    const QUICK: TileTestsEffort = TileTestsEffort { families: Size::QUICK, size: (160, 90), pairs: 60 };
 
-    fn measure(effort: Effort, files: &[String], progress: &Progress) -> Result<Self, StudyError> {
+    fn measure(effort: TileTestsEffort, files: &[String], progress: &Progress) -> Result<Self, StudyError> {
         let gpu = GpuSpec::load("reference")?;
         let scenes = SCENES.map(str::to_owned);
         let bar = progress.bar("scenes", (FAMILIES.len() + scenes.len() + files.len()) as u64);
@@ -103,7 +103,7 @@ impl Study for TileTests {
             bar.inc();
             rows
         });
-        let rows: Vec<Vec<Row>> = families.chain(loaded).collect::<Result<_, RunError>>()?;
+        let rows: Vec<Vec<TileTestsRow>> = families.chain(loaded).collect::<Result<_, RunError>>()?;
         Ok(Self { rows: rows.into_iter().flatten().collect() })
     }
 
@@ -122,7 +122,7 @@ impl Study for TileTests {
     }
 
     fn tables(&self) -> Vec<Sheet> {
-        let best = |row: &&Row| row.on_efficiency_front || row.on_tightness_front;
+        let best = |row: &&TileTestsRow| row.on_efficiency_front || row.on_tightness_front;
         let fronts = Table::of(self.rows.iter().filter(best))
             .shown("scene", |row| row.scene.as_str(), plain)
             .shown("tests", |row| row.tests.as_str(), plain)
@@ -147,12 +147,12 @@ impl Study for TileTests {
 
     fn tradeoff(&self) -> Vec<TradeoffPoint> {
         // Of combinations that cost and gain the same, the first.
-        let same = |a: &&Row, b: &&Row| {
+        let same = |a: &&TileTestsRow, b: &&TileTestsRow| {
             (&a.scene, a.madds_per_triangle, a.efficiency) == (&b.scene, b.madds_per_triangle, b.efficiency)
         };
-        let mut front: Vec<&Row> = self.rows.iter().filter(|row| row.on_efficiency_front).collect();
+        let mut front: Vec<&TileTestsRow> = self.rows.iter().filter(|row| row.on_efficiency_front).collect();
         front.dedup_by(|a, b| same(a, b));
-        let point = |row: &Row| {
+        let point = |row: &TileTestsRow| {
             let wasted = Metric::new("share of tested samples that miss", "", 1.0 - row.efficiency);
             let cost = Metric::new("multiply-adds a triangle", "", row.madds_per_triangle);
             let subject = format!("samples of a triangle ({})", row.scene);
@@ -167,14 +167,19 @@ impl Study for TileTests {
     }
 }
 
-fn of_family(name: &'static str, value: f64, effort: &Effort, gpu: &GpuSpec) -> Result<Vec<Row>, RunError> {
+fn of_family(
+    name: &'static str,
+    value: f64,
+    effort: &TileTestsEffort,
+    gpu: &GpuSpec,
+) -> Result<Vec<TileTestsRow>, RunError> {
     let label = format!("{name} at {value}");
     let family =
         family(name).ok_or_else(|| RunError::Setting(format!("{label}: there is no such family")))?;
-    subject::on(family, value, (effort.families, 1), gpu, |subject| rows(&label, subject, effort.pairs))
+    on_subject(family, value, (effort.families, 1), gpu, |subject| rows(&label, subject, effort.pairs))
 }
 
-fn of_scene(name: &str, effort: &Effort, gpu: &GpuSpec) -> Result<Vec<Row>, RunError> {
+fn of_scene(name: &str, effort: &TileTestsEffort, gpu: &GpuSpec) -> Result<Vec<TileTestsRow>, RunError> {
     let size = effort.size;
     let overrides = Overrides { size: Some(size), samples: Some(4), ..Overrides::default() };
     let scene = workloads::load(name)?.with_overrides(&overrides)?;
@@ -190,12 +195,12 @@ fn of_scene(name: &str, effort: &Effort, gpu: &GpuSpec) -> Result<Vec<Row>, RunE
     rows.map_err(|error| RunError::Setting(format!("{label}: {error}")))
 }
 
-fn rows(scene: &str, subject: &Subject<'_>, pairs: u64) -> Result<Vec<Row>, CacheError> {
+fn rows(scene: &str, subject: &Subject<'_>, pairs: u64) -> Result<Vec<TileTestsRow>, CacheError> {
     let pairs = Pairs::of(subject, pairs);
     let (reference, _) = subject.reference()?;
     let row = |(tests, features)| {
         let work = Work::new(&subject.counts(features)?);
-        Ok(Row {
+        Ok(TileTestsRow {
             scene: scene.to_owned(),
             tests,
             madds_per_triangle: work.madds() as f64 / subject.triangles().max(1) as f64,
@@ -210,7 +215,7 @@ fn rows(scene: &str, subject: &Subject<'_>, pairs: u64) -> Result<Vec<Row>, Cach
     combinations().into_iter().map(row).collect::<Result<_, _>>().map(with_fronts)
 }
 
-fn with_fronts(mut rows: Vec<Row>) -> Vec<Row> {
+fn with_fronts(mut rows: Vec<TileTestsRow>) -> Vec<TileTestsRow> {
     let efficiency: Vec<_> = rows.iter().map(|row| (row.madds_per_triangle, row.efficiency)).collect();
     let tightness: Vec<_> = rows.iter().map(|row| (row.madds_per_triangle, row.tightness)).collect();
     for (row, (a, b)) in rows.iter_mut().zip(front(&efficiency).into_iter().zip(front(&tightness))) {
@@ -226,7 +231,7 @@ impl TileTests {
     }
 
     /// Every combination as one point: cost and gain over those of the best of each scene, means over scenes.
-    fn panel(&self, up: &str, of: fn(&Row) -> f64) -> ChartPanel {
+    fn panel(&self, up: &str, of: fn(&TileTestsRow) -> f64) -> ChartPanel {
         let means = self.means(of);
         let front = front(&means.iter().map(|mean| (mean.cost, mean.gain)).collect::<Vec<_>>());
         let point = |mean: &Mean, name: String| (mean.cost, 100.0 * mean.gain, name);
@@ -261,8 +266,8 @@ impl TileTests {
     }
 
     /// Cost and gain of every combination, over the least cost and the greatest gain of each scene: geometric and arithmetic means.
-    fn means(&self, of: fn(&Row) -> f64) -> Vec<Mean> {
-        let scenes: Vec<&[Row]> = self.rows.chunk_by(|a, b| a.scene == b.scene).collect();
+    fn means(&self, of: fn(&TileTestsRow) -> f64) -> Vec<Mean> {
+        let scenes: Vec<&[TileTestsRow]> = self.rows.chunk_by(|a, b| a.scene == b.scene).collect();
         let combinations = scenes.first().map_or(0, |rows| rows.len());
         let count = scenes.len().max(1) as f64;
         let mean = |place: usize| {
@@ -279,7 +284,7 @@ impl TileTests {
     }
 }
 
-impl Row {
+impl TileTestsRow {
     fn best_in(&self) -> &'static str {
         match (self.on_efficiency_front, self.on_tightness_front) {
             (true, true) => "both",

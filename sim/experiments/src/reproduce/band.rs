@@ -1,51 +1,51 @@
-//! What a condition comes to over the settings that a paper leaves open.
+//! Sensitivity of a condition to the settings that a paper leaves open.
 
 use serde::Serialize;
 
 use super::verdict::Verdict;
 
-/// One setting of everything, and what came out.
+/// Result of one combination of settings.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Case {
-    /// The setting that was varied; empty where all stand as given.
+    /// The varied setting; empty if all have their given values.
     pub setting: String,
-    /// Its value there.
+    /// Its value.
     pub value: String,
-    /// The number that is judged.
+    /// The number in the condition.
     pub number: f64,
     /// Whether the condition is met.
     pub holds: bool,
-    /// Whether every setting stands as given: the same case ends up in several sweeps and counts once.
+    /// Whether all settings have their given values. Several sweeps contain this case; it counts once.
     pub base: bool,
 }
 
-/// Two values of a setting next to each other between which the condition turns.
+/// Two neighbouring values of a setting between which the condition changes.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Turn {
     /// The setting.
     pub setting: String,
-    /// The values, in the order they were tried in.
+    /// The values, in the order of the sweep.
     pub between: [String; 2],
 }
 
-/// All that was tried.
+/// Summary of all cases.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Band {
-    /// What `number` is, with its unit.
+    /// Name and unit of `number`.
     pub of: &'static str,
-    /// Which settings were varied, and how: one at a time or jointly.
+    /// Varied settings, and whether they were varied one at a time or jointly.
     pub varied: &'static str,
-    /// Least number.
+    /// Smallest number.
     pub min: f64,
-    /// Greatest number.
+    /// Largest number.
     pub max: f64,
-    /// How many different cases there are.
+    /// Number of different cases.
     pub tried: usize,
-    /// How many the full form tries.
+    /// Number of cases of the full form.
     pub full: usize,
-    /// At how many of them the condition is met.
+    /// Number of cases that meet the condition.
     pub held: usize,
-    /// Where it turns.
+    /// Where the condition changes.
     pub turns: Vec<Turn>,
     /// Every case.
     pub cases: Vec<Case>,
@@ -61,12 +61,13 @@ pub(super) struct Cases {
 }
 
 impl Cases {
-    /// None yet; `of` names the number and its unit, `varied` the settings that are varied, and how.
+    /// No cases yet. `of` names the number and its unit; `varied` names the varied settings, and how they vary.
     pub fn new(of: &'static str, varied: &'static str) -> Self {
         Self { of, varied, cases: Vec::new(), turns: Vec::new() }
     }
 
-    /// Adds all values of one setting, in order, the others standing: each with its number and whether the condition is met.
+    /// Adds a sweep of one setting, in order, with given values of the others. Each case has its number, and whether it meets the
+    /// condition.
     pub fn along<V: std::fmt::Display>(
         &mut self,
         setting: &str,
@@ -88,7 +89,7 @@ impl Cases {
         self
     }
 
-    /// Of the setting added last, `value` is that at which it stands while others vary.
+    /// Sets the given value of the setting added last, which it has while others vary.
     pub fn standing_at(&mut self, value: impl std::fmt::Display) {
         let Some(setting) = self.cases.last().map(|case| case.setting.clone()) else { return };
         let value = value.to_string();
@@ -119,7 +120,7 @@ impl Band {
         }
     }
 
-    /// In a sentence: the range, how many cases hold, and where it turns.
+    /// A sentence: the range, the number of cases that hold, and where the condition changes.
     pub fn text(&self) -> String {
         let turns: Vec<String> = self
             .turns
@@ -140,12 +141,12 @@ impl Band {
     }
 }
 
-/// How many cases there are where settings with so many values each are varied one at a time about the same point.
+/// Number of cases if settings with these numbers of values are varied one at a time about one point.
 pub(super) fn one_at_a_time<const N: usize>(values: [usize; N]) -> usize {
     values.into_iter().sum::<usize>() + 1 - N
 }
 
-/// Four digits that count.
+/// A number with four significant digits.
 pub(super) fn short(number: f64) -> String {
     let size = number.abs();
     let digits =

@@ -1,4 +1,4 @@
-//! Figures of the papers, drawn anew.
+//! Figures of the papers, from results of the simulator.
 
 use output::plot::{AxisSpec, Chart, ChartPanel, Look, Mark, Picture, Scale, Series};
 
@@ -6,17 +6,17 @@ use output::plot::{AxisSpec, Chart, ChartPanel, Look, Mark, Picture, Scale, Seri
 pub struct Figure {
     /// Its name without ending, for example `III_fig3`.
     pub name: &'static str,
-    /// What is drawn.
+    /// Picture.
     pub picture: Picture,
 }
 
 impl Figure {
-    /// Where it is below the folder of results, as SVG.
+    /// Path of the SVG below the folder of results.
     pub(super) fn path(&self) -> String {
         format!("plots/{}.svg", self.name)
     }
 
-    /// Series over two axes, each `(what, unit)`.
+    /// Series on two axes, each `(quantity, unit)`.
     pub(super) fn lines(
         name: &'static str,
         title: &str,
@@ -28,19 +28,19 @@ impl Figure {
         Self::of(name, [title, subject], ChartPanel::over("", axes, series))
     }
 
-    /// Points in a plane with two axes of these names, distances the same across and up.
+    /// Points in a plane: both axes have the same scale.
     pub(super) fn plane(name: &'static str, titles: [&str; 2], axes: [&str; 2], series: Vec<Series>) -> Self {
         let axes = axes.map(|name| AxisSpec::even(name, ""));
         Self::of(name, titles, ChartPanel::over("", axes, series).equal())
     }
 
-    /// One panel.
+    /// A figure of one panel.
     pub(super) fn of(name: &'static str, [title, subject]: [&str; 2], panel: ChartPanel) -> Self {
         Self { name, picture: Chart::new(title, subject, vec![panel]).picture(&Look::default()) }
     }
 }
 
-/// Curves over a number that doubles, `axes` saying what goes across and up.
+/// Curves over a number that doubles; `axes` are the names of the horizontal and the vertical axis.
 pub(super) fn over_doublings(
     name: &'static str,
     titles: [&str; 2],
@@ -69,12 +69,12 @@ pub(super) fn dots(name: &str, points: Vec<(f64, f64)>) -> Series {
     Series::new(name, Mark::Dots(dots))
 }
 
-/// A level line across from one place to another.
+/// A horizontal line.
 pub(super) fn level(name: &str, from: f64, to: f64, height: f64) -> Series {
     line(name, vec![(from, height), (to, height)])
 }
 
-/// Values over their place in the list, from 0.
+/// Values over their index.
 pub(super) fn by_place(values: &[f64]) -> Vec<(f64, f64)> {
     values.iter().enumerate().map(|(place, value)| (place as f64, *value)).collect()
 }

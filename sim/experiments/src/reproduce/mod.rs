@@ -1,20 +1,18 @@
-//! What the papers report, computed from scratch and compared with them: a module for each paper, a function for each row of the
-//! list of claims.
+//! Reproduction of papers: each claim is computed from scratch and compared with the paper. A paper is a module; a row of the list of
+//! claims is a function.
 //!
 //! ```text
 //! settings -> scenes -> Stage (pipeline, clock, watts) -> Recording (pacing, surroundings, recorder, analysis) -> Row, Figure
 //! ```
 //!
-//! Nothing is looked up but what the papers themselves say. What they state and what they leave open is in one committed file of
-//! settings for each paper; a row is judged over all that is left open (`Band`).
+//! Inputs come from the papers only. A committed file of settings for each paper has what it states and what it leaves open. The
+//! verdict of a row is over all values of open settings (`Band`).
 
 mod band;
-mod earlier;
 mod figure;
 mod paper2;
 mod paper3;
 mod paper6;
-mod recording;
 mod report;
 mod row;
 mod scenes;
@@ -39,7 +37,7 @@ pub use row::{Number, Row};
 pub use settings::{About, Listed, Origin};
 pub use verdict::{Kind, Verdict};
 
-/// The papers whose rows there are.
+/// Papers with reproduced claims.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, clap::ValueEnum)]
 pub enum Paper {
     /// Performance per What? Energy-Efficiency Units for Graphics
@@ -87,12 +85,12 @@ impl Paper {
     }
 }
 
-/// How, and how much, to compute.
+/// Options of a reproduction.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
-    /// Fewer values and less work: less than a minute.
+    /// Quick form: fewer values and less work, less than a minute.
     pub quick: bool,
-    /// Rows to compute, by their ids; all of them where it is empty.
+    /// Ids of the rows to compute; empty for all.
     pub rows: Vec<String>,
     /// A file of settings in place of the committed one.
     pub settings: Option<PathBuf>,
@@ -105,12 +103,12 @@ impl Options {
         if self.quick { Form::Quick } else { Form::Full }
     }
 
-    /// Whether a row is asked for.
+    /// Whether a row is requested.
     fn wants(&self, id: &str) -> bool {
         self.rows.is_empty() || self.rows.iter().any(|row| row.eq_ignore_ascii_case(id))
     }
 
-    /// Refuses rows that the paper does not have, and data that no row reads.
+    /// Refuses unknown rows, and data that no requested row reads.
     fn check(&self, paper: Paper) -> Result<(), RunError> {
         let ids = paper.rows();
         let unknown = self.rows.iter().find(|row| !ids.iter().any(|id| id.eq_ignore_ascii_case(row)));
@@ -129,7 +127,7 @@ impl Options {
     }
 }
 
-/// A row and what it draws.
+/// A row with its figures.
 struct Done {
     row: Row,
     figures: Vec<Figure>,
@@ -142,10 +140,10 @@ impl Done {
     }
 }
 
-/// Computes the rows of `paper` that are asked for.
+/// Computes the requested rows of `paper`.
 ///
 /// # Errors
-/// When settings cannot be used or a part of the line fails; a row that differs is none.
+/// If settings are invalid or a simulation fails. A row that differs is no error.
 pub fn compute(paper: Paper, options: &Options, progress: &Progress) -> Result<Report, RunError> {
     options.check(paper)?;
     let (origin, done) = match paper {
@@ -156,10 +154,10 @@ pub fn compute(paper: Paper, options: &Options, progress: &Progress) -> Result<R
     Ok(Report::new(paper, options.form(), origin, done))
 }
 
-/// Computes them and writes table and figures into `out`.
+/// Computes the requested rows and writes table and figures into `out`.
 ///
 /// # Errors
-/// As [`compute`], and when `out` cannot be written or holds a larger result that was not told to go.
+/// As [`compute`], and if `out` cannot be written, or has a larger result and `--force` is missing.
 pub fn reproduce(
     paper: Paper,
     options: &Options,
@@ -167,7 +165,7 @@ pub fn reproduce(
     progress: &Progress,
 ) -> Result<Report, RunError> {
     options.check(paper)?;
-    earlier::check(paper, options, out)?;
+    report::check_earlier(paper, options, out)?;
     // The folder first: that it cannot be made is better known before the work than after it.
     let mut dir = out.open([report::claim(paper)])?;
     let report = compute(paper, options, progress)?;

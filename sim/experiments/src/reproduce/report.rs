@@ -1,13 +1,16 @@
-//! All rows of a paper as text, JSON and files.
+//! All rows of a paper as text, JSON and files. A larger result of an earlier call is not replaced by a smaller one.
 
-use serde::Serialize;
+use std::fs;
+
+use output::table::Table;
+use output::{Claim, Destination, OutDir, OutputError};
+use run::RunError;
+use serde::{Deserialize, Serialize};
 
 use super::row::Row;
 use super::settings::{Form, Listed, Origin};
 use super::verdict::Verdict;
-use super::{Done, Figure, Paper};
-use output::table::Table;
-use output::{Claim, OutDir, OutputError};
+use super::{Done, Figure, Options, Paper};
 
 /// The rows of a paper.
 #[derive(Serialize)]
@@ -24,7 +27,7 @@ pub struct Report {
     pub equalities_hold: bool,
     /// The rows in order.
     pub rows: Vec<Row>,
-    /// What was drawn.
+    /// Figures.
     #[serde(skip)]
     figures: Vec<Figure>,
 }
@@ -59,7 +62,7 @@ impl Report {
         self.rows.iter().filter(|row| row.fails()).map(|row| row.about.id.as_str()).collect()
     }
 
-    /// What is printed: a table, and below it the reasons.
+    /// Text for the terminal: a table, and the reasons below it.
     pub fn text(&self) -> String {
         let mut table = Table::new(["claim", "kind", "verdict"]);
         for row in &self.rows {
@@ -78,14 +81,14 @@ impl Report {
         text + &format!("\n{holds} hold, {differs} differ, {depends} depend, {not_yet} not yet{where_}\n")
     }
 
-    /// Which settings these are.
+    /// File and hash of the settings.
     fn settings_text(&self) -> String {
         let whose = if self.settings.committed { "" } else { ", which is NOT the committed one" };
         let form = if self.form == Form::Quick { ", quick form" } else { "" };
         format!("settings {} (SHA-256 {}){whose}{form}", self.settings.file, self.settings.sha256)
     }
 
-    /// The table of the book's chapter, and what each row was computed with.
+    /// The table of the book's chapter, and the settings of each row.
     fn markdown(&self) -> String {
         let mut text = format!("{}\n\n", self.settings_text());
         text += "| id | kind | paper | ours | verdict |\n|---|---|---|---|---|\n";
@@ -138,7 +141,7 @@ impl Report {
     }
 }
 
-/// A row as it is printed.
+/// Text of a row.
 fn said(row: &Row) -> String {
     let about = &row.about;
     let mut text = format!("\n{}: {}\n", about.id, row.verdict_text);
@@ -162,13 +165,13 @@ fn said(row: &Row) -> String {
     text
 }
 
-/// How much was run.
+/// Amount of work of a row.
 fn ran(row: &Row) -> String {
     let each = row.ran.iter().map(|number| format!("{} {}", number.name.replace('_', " "), number.value));
     each.collect::<Vec<_>>().join(", ")
 }
 
-/// Settings of one kind with what was tried.
+/// Settings of one kind with the values tried.
 fn settings(all: &[Listed], basis: &str) -> String {
     let one = |one: &Listed| {
         let tried: Vec<String> = one.tried.iter().map(ToString::to_string).collect();
@@ -178,7 +181,7 @@ fn settings(all: &[Listed], basis: &str) -> String {
     all.iter().filter(|listed| listed.basis == basis).map(one).collect::<Vec<_>>().join("; ")
 }
 
-/// Letters of the row's kind, with an F where there are figures.
+/// Letter of the row's kind, with an F if it has figures.
 fn letters(row: &Row) -> String {
     let drawn = if row.figures.is_empty() { "" } else { ",F" };
     format!("{}{drawn}", row.about.kind.letter())
@@ -187,6 +190,46 @@ fn letters(row: &Row) -> String {
 /// A figure's path without its ending.
 fn stem_of(path: &str) -> &str {
     path.strip_suffix(".svg").unwrap_or(path)
+}
+
+/// The fields of an earlier report that are compared.
+#[derive(Deserialize)]
+struct Earlier {
+    form: Form,
+    rows: Vec<Id>,
+}
+
+#[derive(Deserialize)]
+struct Id {
+    id: String,
+}
+
+/// Refuses a folder whose result of `paper` has rows that are not computed now, or is of the full form if this is the quick form. A
+/// file that cannot be read is no result.
+pub(super) fn check_earlier(paper: Paper, options: &Options, out: &Destination) -> Result<(), RunError> {
+    let file = out.folder.join(format!("{}.json", stem(paper)));
+    let text = if out.force { None } else { fs::read_to_string(file).ok() };
+    let Some(Earlier { form, rows }) = text.and_then(|text| serde_json::from_str(&text).ok()) else {
+        return Ok(());
+    };
+    let lost = rows.iter().filter(|row| !options.wants(&row.id)).count();
+    let smaller = form == Form::Full && options.quick;
+    if lost == 0 && !smaller {
+        return Ok(());
+    }
+    let ids: Vec<&str> = rows.iter().map(|row| row.id.as_str()).collect();
+    let why = match lost {
+        0 => "this is the quick form".to_owned(),
+        lost => format!("{lost} of them are not computed now"),
+    };
+    Err(RunError::Setting(format!(
+        "{}: holds a {} result of Paper {} with {} rows ({}), and {why}; give another folder with --out, or --force to lose it",
+        out.folder.display(),
+        form.name(),
+        paper.number(),
+        ids.len(),
+        ids.join(", ")
+    )))
 }
 
 #[cfg(test)]
@@ -242,5 +285,36 @@ mod tests {
         assert_eq!((&json["paper"], &json["form"]), (&"III".into(), &"quick".into()));
         assert_eq!(json["rows"][0]["settings_sha256"], json["settings"]["sha256"]);
         assert!(report.markdown().contains("| III-9 | O,F | one | two | *differs*: because |"));
+    }
+
+    #[test]
+    fn a_larger_result_is_not_replaced_by_a_smaller_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let out = Destination::new(folder.path());
+        let options = |quick, rows: &[&str]| Options {
+            quick,
+            rows: rows.iter().map(|row| (*row).to_owned()).collect(),
+            ..Options::default()
+        };
+        let refusal =
+            |options: &Options| check_earlier(Paper::Six, options, &out).err().map(|error| error.to_string());
+        assert_eq!(refusal(&options(true, &["VI-2"])), None, "an empty folder");
+        let file = folder.path().join("reproduce_VI.json");
+        fs::write(&file, r#"{"form": "full", "rows": [{"id": "VI-1"}, {"id": "VI-2"}]}"#).unwrap();
+        for (smaller, why) in [
+            (options(false, &["vi-2"]), "1 of them are not computed now"),
+            (options(true, &[]), "this is the quick form"),
+        ] {
+            let message = refusal(&smaller).unwrap();
+            assert!(message.contains("a full result of Paper VI with 2 rows (VI-1, VI-2)"), "{message}");
+            assert!(message.contains(why) && message.contains("--force"), "{message}");
+        }
+        assert_eq!(refusal(&options(false, &[])), None, "all rows anew");
+        assert_eq!(refusal(&options(false, &["VI-1", "vi-2"])), None);
+        let forced = Destination { force: true, ..out.clone() };
+        assert!(check_earlier(Paper::Six, &options(true, &["VI-2"]), &forced).is_ok());
+        assert!(check_earlier(Paper::Two, &options(true, &[]), &out).is_ok(), "a result of another paper");
+        fs::write(&file, "mine").unwrap();
+        assert_eq!(refusal(&options(true, &["VI-2"])), None, "no result; whose it is is asked elsewhere");
     }
 }

@@ -1,4 +1,4 @@
-//! One claim of a paper beside what came out here.
+//! One claim of a paper, and the result of the reproduction.
 
 use serde::Serialize;
 
@@ -9,28 +9,28 @@ use super::verdict::{Kind, Verdict};
 /// A row of the list of claims.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Row {
-    /// The claim, and the condition it is judged by.
+    /// The claim, and the condition of the verdict.
     #[serde(flatten)]
     pub about: About,
-    /// What came out here.
+    /// Result of this program.
     pub ours: String,
-    /// Whether that agrees.
+    /// Verdict.
     pub verdict: Verdict,
-    /// The verdict as it is printed: that of the quick form says at how many of all settings it was reached.
+    /// Printed verdict. That of the quick form includes the number of settings tried.
     pub verdict_text: String,
     /// How much was computed.
     pub form: Form,
-    /// The amounts of work that the quick form reduces.
+    /// Amounts of work that the quick form reduced.
     pub less_work: Vec<String>,
-    /// Over what the verdict was reached, where settings were varied.
+    /// Cases of the verdict, if settings were varied.
     pub band: Option<Band>,
-    /// Why it differs, where it turns, or what it waits for.
+    /// Why it differs, where the condition changes, or which part is missing.
     pub note: String,
-    /// How much was run: draws, passes, fragments, samples. A row of which any is 0 has shown nothing.
+    /// Amount of work: draws, passes, fragments, samples. A row with a 0 shows nothing.
     pub ran: Vec<Number>,
     /// The numbers behind `ours`, by name.
     pub numbers: Vec<Number>,
-    /// What it was computed with.
+    /// Settings of the row.
     pub settings: Vec<Listed>,
     /// SHA-256 of the file of these settings.
     pub settings_sha256: String,
@@ -50,7 +50,7 @@ pub struct Number {
 }
 
 impl Number {
-    /// Whether nothing was counted.
+    /// Whether the count is 0.
     fn is_nothing(&self) -> bool {
         self.value.is_nan() || self.value <= 0.0
     }
@@ -61,18 +61,18 @@ pub(super) fn numbers<const N: usize>(pairs: [(&'static str, f64); N]) -> Vec<Nu
     pairs.into_iter().map(|(name, value)| Number { name, value }).collect()
 }
 
-/// What a row is computed with, and how much of it.
+/// Settings and form of a row.
 pub(super) struct With<'a, S> {
     pub settings: &'a S,
     pub form: Form,
     /// SHA-256 of the file.
     pub sha256: &'a str,
-    /// Amounts of work that all rows share and the form reduces.
+    /// Amounts of work, shared by all rows, that the form reduces.
     pub shared_less: Vec<String>,
 }
 
 impl<S: Serialize> With<'_, S> {
-    /// The row with what came out: `ours`, the verdict and a note.
+    /// The row with its result: `ours`, the verdict and a note.
     pub fn row(&self, about: &About, (ours, verdict, note): (String, Verdict, String)) -> Row {
         let own = reduced(self.settings, self.form);
         Row {
@@ -93,7 +93,7 @@ impl<S: Serialize> With<'_, S> {
         }
     }
 
-    /// The same with a verdict by the band over all settings that were tried.
+    /// The same with the verdict of the band over all settings tried.
     pub fn banded(&self, about: &About, ours: String, band: Band) -> Row {
         let row = self.row(about, (ours, band.verdict(), band.text()));
         Row { band: Some(band), ..row }
@@ -101,7 +101,7 @@ impl<S: Serialize> With<'_, S> {
 }
 
 impl Row {
-    /// Whether nothing was run of something that had to be.
+    /// Whether a required amount of work is 0.
     pub fn ran_nothing(&self) -> bool {
         self.ran.is_empty() || self.ran.iter().any(Number::is_nothing)
     }
@@ -111,19 +111,19 @@ impl Row {
         self.about.kind == Kind::Equality && self.verdict != Verdict::Holds
     }
 
-    /// Whether the row is one that has to hold and does not, or that has run nothing.
+    /// Whether the row must hold and does not, or did no work.
     pub fn fails(&self) -> bool {
         self.is_unequal() || self.ran_nothing()
     }
 
-    /// The row with another sentence on what it does not show.
+    /// The row with another sentence on its limits.
     #[must_use]
     pub(super) fn limited(mut self, more: &str) -> Self {
         self.about.limits = format!("{} {more}", self.about.limits);
         self
     }
 
-    /// The row as it is reported: with its verdict in words, and without numbers that were not measured.
+    /// The row as reported: with the printed verdict, and without numbers that were not measured.
     #[must_use]
     pub(super) fn judged(self) -> Self {
         let mut row = self.shown();
@@ -132,7 +132,7 @@ impl Row {
         row
     }
 
-    /// The verdict; of the quick form, at how many of the settings of the full one.
+    /// Printed verdict; that of the quick form with its number of settings of those of the full form.
     fn verdict_text(&self) -> String {
         let verdict = self.verdict.name();
         let less = if self.less_work.is_empty() { "quick form" } else { "quick form, less work" };
@@ -143,7 +143,7 @@ impl Row {
         }
     }
 
-    /// A row that has run nothing has shown nothing, whatever its condition says.
+    /// A row without work shows nothing, even if its condition holds.
     fn shown(self) -> Self {
         if !self.ran_nothing() || self.verdict == Verdict::NotYet {
             return self;
@@ -201,7 +201,7 @@ pub(super) mod tests {
         assert_eq!(good.clone().judged(), Row { verdict_text: "holds".to_owned(), ..good });
     }
 
-    /// The quick form may leave out the very values at which a row turns.
+    /// The quick form may omit the values at which a condition changes.
     #[test]
     fn a_quick_verdict_says_at_how_many_settings_it_was_reached() {
         let quick = Row { form: Form::Quick, ..row("X-1", Kind::Order, Verdict::Holds) };

@@ -1,4 +1,4 @@
-//! What is drawn: the workloads of the papers, as far as they are described.
+//! Workloads of the papers, as far as the papers describe them.
 
 use std::f64::consts::{FRAC_1_SQRT_2, TAU};
 use std::sync::Arc;
@@ -20,7 +20,7 @@ const CELLS: u32 = 32;
 /// mipmaps.
 pub(super) const PHONE_COST: ShaderCost = ShaderCost { vertex_ops: 48, pixel_ops: 15 };
 
-/// How many objects there are in a frame of the phone's sequence: from fewest to most and back.
+/// Number of objects in a frame of the phone's sequence: from fewest to most and back.
 pub(super) fn objects(frame: u32) -> u32 {
     let [fewest, most] = OBJECTS.map(f64::from);
     let wave = 0.5 - 0.5 * libm::cos(TAU * f64::from(frame) / f64::from(PHONE_FRAMES));

@@ -1,7 +1,7 @@
-//! Settings of the rows: what the thesis states, what it leaves open, and what is ours; one committed file for each paper.
+//! Settings of the rows: stated by the thesis, left open by it, or ours. Each paper has one committed file.
 //!
-//! A row holds where its condition is met at every value that the thesis leaves open, differs where it is met at none, and
-//! depends otherwise. The files are in `sim/experiments/papers`; every result names the SHA-256 of the one it was computed with.
+//! A row holds if its condition is met at every value of the open settings. It differs if it is met at none, and depends
+//! otherwise. The files are in `sim/experiments/papers`; every result names the SHA-256 of its file.
 
 use std::fmt::Debug;
 use std::ops::RangeInclusive;
@@ -16,11 +16,11 @@ use super::verdict::Kind;
 use output::dir::sha256_of_text;
 use run::RunError;
 
-/// How much is computed.
+/// Amount of computation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Form {
-    /// All of it: minutes.
+    /// Everything: minutes.
     Full,
     /// Fewer values and less work: less than a minute.
     Quick,
@@ -36,45 +36,45 @@ impl Form {
     }
 }
 
-/// What a row says whatever comes out.
+/// Description of a row, independent of its result.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct About {
     /// Its name in the list of claims.
     pub id: String,
-    /// What has to agree.
+    /// Kind of agreement.
     pub kind: Kind,
     /// The claim, in full.
     pub claim: String,
-    /// What the paper says, with the passage.
+    /// Statement of the paper, with the passage.
     pub paper: String,
-    /// The condition it is judged by.
+    /// Condition of the verdict.
     pub holds_when: String,
-    /// What is not exercised, and what the outcome follows from by construction.
+    /// What is not tested, and what follows by construction.
     pub limits: String,
 }
 
-/// A setting of a row with where it comes from.
+/// A setting of a row with its source.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub enum Setting<T> {
     /// The thesis states it.
     Stated {
-        /// What it states.
+        /// Stated value.
         value: T,
-        /// What the quick form has in its place.
+        /// Value of the quick form, if different.
         #[serde(default = "none")]
         quick: Option<T>,
-        /// Section or figure, and its words.
+        /// Section or figure, and the quoted words.
         passage: String,
     },
     /// The thesis leaves it open.
     Open {
-        /// What stands while other settings vary.
+        /// Value while other settings vary.
         value: T,
         /// All values tried, `value` among them.
         over: Vec<T>,
-        /// Those of the quick form, of which the first stands for `value`.
+        /// Values of the quick form; the first replaces `value`.
         #[serde(default = "Vec::new")]
         quick: Vec<T>,
         /// Why this range.
@@ -82,9 +82,9 @@ pub enum Setting<T> {
     },
     /// An amount of work, a tolerance or a scene of ours that is not varied.
     Ours {
-        /// What it is.
+        /// Value.
         value: T,
-        /// What the quick form has in its place.
+        /// Value of the quick form, if different.
         #[serde(default = "none")]
         quick: Option<T>,
         /// Why.
@@ -97,7 +97,7 @@ fn none<T>() -> Option<T> {
 }
 
 impl<T> Setting<T> {
-    /// What stands while other settings vary.
+    /// Value while other settings vary.
     pub fn get(&self, form: Form) -> &T {
         match self {
             Self::Stated { value, quick, .. } | Self::Ours { value, quick, .. } => {
@@ -116,12 +116,12 @@ impl<T> Setting<T> {
         }
     }
 
-    /// How many values the full form tries.
+    /// Number of values of the full form.
     pub fn values(&self) -> usize {
         self.all(Form::Full).len()
     }
 
-    /// Every value that the file has for it.
+    /// All values in the file.
     fn written(&self) -> Vec<&T> {
         match self {
             Self::Stated { value, quick, .. } | Self::Ours { value, quick, .. } => {
@@ -135,10 +135,10 @@ impl<T> Setting<T> {
 }
 
 impl<T: Debug + PartialEq> Setting<T> {
-    /// Checks every value of the setting called `name` and that it says where it comes from.
+    /// Checks all values of the setting called `name`, and that it has a source.
     ///
     /// # Errors
-    /// Names the first value that cannot be, and what would do.
+    /// Names the first invalid value, and what is valid.
     pub fn must(&self, name: &str, holds: impl Fn(&T) -> bool, would_do: &str) -> Result<(), String> {
         if let Some(value) = self.written().into_iter().find(|value| !holds(value)) {
             return Err(format!("`{name}` is {value:?}; it has to be {would_do}"));
@@ -173,28 +173,70 @@ impl<T: Debug + PartialEq> Setting<T> {
     }
 }
 
-/// Declares the settings of rows. A line is a field, the type of its value, and the check that every value of it has to pass. Before
-/// them is what a row says whatever comes out.
+/// Declares the settings of rows. A line is a field, the type of its value, and the check that every value of it has to pass. The
+/// first field is the description of the row.
 macro_rules! row_settings {
-    ($($(#[$doc:meta])* $row:ident { $($field:ident: $type:ty, $check:ident($($would_do:expr),+);)+ })+) => {$(
-        $(#[$doc])*
-        #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
-        #[serde(deny_unknown_fields)]
-        pub(super) struct $row {
-            pub about: About,
-            $(pub $field: Setting<$type>,)+
-        }
-
-        impl $row {
-            /// Checks every value; `row` is its name in the file.
-            fn check(&self, row: &str) -> Result<(), String> {
-                $(self.$field.$check(&format!("{row}.{}", stringify!($field)), $($would_do),+)?;)+
-                Ok(())
-            }
-        }
+    ($($(#[$doc:meta])* $row:ident { $($fields:tt)+ })+) => {$(
+        $crate::reproduce::settings::settings_group! { $(#[$doc])* $row { pub about: About, } { $($fields)+ } }
     )+};
 }
 pub(super) use row_settings;
+
+/// Declares one group of settings, after fields that are not checked.
+macro_rules! settings_group {
+    (
+        $(#[$doc:meta])* $group:ident { $($unchecked:tt)* }
+        { $($field:ident: $type:ty, $check:ident($($would_do:expr),+);)+ }
+    ) => {
+        $(#[$doc])*
+        #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
+        #[serde(deny_unknown_fields)]
+        pub(super) struct $group {
+            $($unchecked)*
+            $(pub $field: Setting<$type>,)+
+        }
+
+        impl $group {
+            /// Checks every value; `group` is its name in the file.
+            fn check(&self, group: &str) -> Result<(), String> {
+                $(self.$field.$check(&format!("{group}.{}", stringify!($field)), $($would_do),+)?;)+
+                Ok(())
+            }
+        }
+    };
+}
+pub(super) use settings_group;
+
+/// Declares the settings file of a paper: its number, its name in `sim/experiments/papers`, and its groups in order.
+macro_rules! paper_settings {
+    ($paper:expr, $file:literal { $($group:ident: $type:ty,)+ }) => {
+        /// The file.
+        #[derive(Clone, Debug, serde::Deserialize)]
+        #[serde(deny_unknown_fields)]
+        pub(super) struct Settings {
+            paper: String,
+            #[allow(dead_code, reason = "names what passages refer to, for readers of the file")]
+            source: String,
+            $(pub $group: $type,)+
+        }
+
+        impl $crate::reproduce::settings::PaperSettings for Settings {
+            const PAPER: $crate::reproduce::Paper = $paper;
+            const FILE: &str = concat!("sim/experiments/papers/", $file);
+            const TEXT: &str = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/papers/", $file));
+
+            fn paper(&self) -> &str {
+                &self.paper
+            }
+
+            fn check(&self) -> Result<(), String> {
+                $(self.$group.check(stringify!($group))?;)+
+                Ok(())
+            }
+        }
+    };
+}
+pub(super) use paper_settings;
 
 /// All settings of a paper.
 pub trait PaperSettings: DeserializeOwned {
@@ -202,7 +244,7 @@ pub trait PaperSettings: DeserializeOwned {
     const PAPER: Paper;
     /// The committed file, from the root of the repository.
     const FILE: &str;
-    /// What is in it.
+    /// Its text.
     const TEXT: &str;
 
     /// The number of the paper that the file names.
@@ -211,14 +253,14 @@ pub trait PaperSettings: DeserializeOwned {
     /// Checks every value.
     ///
     /// # Errors
-    /// Names the first that cannot be, and what would do.
+    /// Names the first invalid value, and what is valid.
     fn check(&self) -> Result<(), String>;
 }
 
-/// Which settings a result was computed with.
+/// Settings file of a result.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Origin {
-    /// The file as it was named.
+    /// Name of the file, as given.
     pub file: String,
     /// SHA-256 of its bytes, as `sha256sum` prints it.
     pub sha256: String,
@@ -229,7 +271,7 @@ pub struct Origin {
 /// Settings from `file`, or those that are committed.
 ///
 /// # Errors
-/// When the file cannot be read or a value cannot be, with its place.
+/// If the file cannot be read or a value is invalid, with its place.
 pub fn load<T: PaperSettings>(file: Option<&Path>) -> Result<(T, Origin), RunError> {
     let Some(path) = file else { return parse(T::TEXT, T::FILE) };
     let name = path.display().to_string();
@@ -256,9 +298,9 @@ pub struct Listed {
     pub name: String,
     /// `stated`, `open` or `ours`.
     pub basis: &'static str,
-    /// What stands while others vary.
+    /// Value while others vary.
     pub value: serde_json::Value,
-    /// Every value tried, where that is more than one.
+    /// All values tried, if more than one.
     pub tried: Vec<serde_json::Value>,
     /// The passage, or the reason.
     pub source: String,
@@ -270,7 +312,7 @@ pub fn listed(row: &impl Serialize, form: Form) -> Vec<Listed> {
     fields.into_iter().filter_map(|(name, value)| one(name, value, form)).collect()
 }
 
-/// The amounts of work of a row that the form reduces, by name; values to try are none.
+/// Names of the amounts of work of a row that the form reduces. Values to try are no amounts of work.
 pub fn reduced(row: &impl Serialize, form: Form) -> Vec<String> {
     let Ok(serde_json::Value::Object(fields)) = serde_json::to_value(row) else { return Vec::new() };
     let less = |(name, value)| {

@@ -1,20 +1,24 @@
-//! A machine that draws.
+//! A machine that draws frames, its recorder, and the analysis of the recorded trace.
 
 use glam::{Vec3, Vec4};
+use output::progress::Progress;
 use pipeline::frame::render_with_heat;
 use pipeline::{Draw, Settings, Shader, ShaderCost, ShadingPoint, Texture, Viewport};
 use power_model::{
-    EnergyTable, Finish, FramePower, Launch, Pacing, Platform, PowerModel, Seconds, Source, Sourced, Watts,
+    Cause, Circumstances, EnergyTable, Finish, FramePower, Launch, Pacing, Platform, PowerModel, Seconds,
+    Source, Sourced, Surrounded, Watts, pace,
 };
 use rayon::prelude::*;
-use timing::Recorder;
+use run::{BIN_PS, GpuSpec, RunError};
+use timing::{FrameClock, Level, Recorder};
+use traces::Trace;
+use traces::device::{Device, DeviceSpec};
+use traces::energy::{FrameEnergy, PowerIntegral, TrueFrame};
+use traces::frames::{Flag, Marks, Method, Options, Window, default_window, find_with};
+use traces::score::{self, Score, TOLERANCE_S};
 use workloads::{SampleChoice, Scene};
 
 use super::scenes;
-use output::progress::Progress;
-use run::GpuSpec;
-use run::{BIN_PS, RunError};
-use timing::{FrameClock, Level};
 
 /// GPU, platform and energies.
 #[derive(Clone)]
@@ -25,7 +29,7 @@ pub(super) struct Stage {
     model: PowerModel,
 }
 
-/// What the papers put into the supply to measure the current.
+/// Current sensors of the papers.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sensor {
     /// Largest current, A.
@@ -36,14 +40,14 @@ pub(super) struct Sensor {
 
 impl Sensor {
     /// "Two shunt current sensors measuring up to 1 A, suitable for the current of cellular phones" (thesis, section 3.1.1). The
-    /// noise is assumed to be that of the usual recorder, as a part of the range.
+    /// noise is assumed to be that of the default recorder, relative to the range.
     const SHUNT: Self = Self { range_a: 1.0, noise_a: 0.005 / 30.0 };
     /// "ACS710 Hall effect current sensors, capable of measuring up to 12 A" (thesis, section 3.1.1). Such a sensor is far noisier
     /// than a shunt; 0.4 % of its range is assumed.
     const HALL: Self = Self { range_a: 12.0, noise_a: 0.05 };
 }
 
-/// Bins of a frame at most: finer than the recorder for frames of up to a tenth of a second.
+/// Largest number of bins of a frame: finer than the recorder for frames of up to 0.1 s.
 const MOST_BINS: usize = 4096;
 
 impl Stage {
@@ -63,7 +67,8 @@ impl Stage {
         Self::new("hd_4000", "hd_4000", Sensor::HALL)
     }
 
-    /// The phone with another draw between frames. Its processor feeds the driver on top of that while a frame runs, so that goes with it.
+    /// The phone with another power between frames. Its processor also feeds the driver while a frame runs, so that power changes by
+    /// the same amount.
     pub fn phone_idling(idle_w: f64) -> Result<Self, RunError> {
         let mut stage = Self::phone()?;
         let platform = &mut stage.platform;
@@ -74,21 +79,21 @@ impl Stage {
         Ok(stage)
     }
 
-    /// The same machine, its waiting processor drawing another power on top.
+    /// The same machine with another added power of the waiting processor.
     pub fn waiting(mut self, waiting_w: f64) -> Result<Self, RunError> {
         let finish = Finish { waiting_w: swept(Watts::new(waiting_w))?, ..self.finish()?.clone() };
         self.platform.system.finish = Some(finish);
         Ok(self)
     }
 
-    /// The same machine, drawing more for another time after launch.
+    /// The same machine with another duration of the added power after launch.
     pub fn launching(mut self, duration_s: f64) -> Result<Self, RunError> {
         let launch = Launch { duration_s: swept(Seconds::new(duration_s))?, ..self.launch()?.clone() };
         self.platform.system.launch = Some(launch);
         Ok(self)
     }
 
-    /// The same machine, the disturbances of the kind that is listed first drawing another power on top.
+    /// The same machine with another added power of the first kind of disturbance.
     pub fn disturbed(mut self, extra_w: f64) -> Result<Self, RunError> {
         let first = self.platform.system.disturbances.first_mut();
         let Some(first) = first else { return Err(self.without("disturbances")) };
@@ -96,13 +101,13 @@ impl Stage {
         Ok(self)
     }
 
-    /// V-sync at the rate at which the platform's applications are capped.
+    /// V-sync at the frame rate cap of the platform.
     pub fn capped(&self) -> Result<Pacing, RunError> {
         let cap = self.platform.system.frame_cap_hz.as_ref();
         Ok(Pacing::Vsync { rate: *cap.ok_or_else(|| self.without("frame_cap_hz"))?.get() })
     }
 
-    /// The time from one tick to the next at that rate, s.
+    /// Period of that V-sync, s.
     pub fn capped_period_s(&self) -> Result<f64, RunError> {
         match self.capped()? {
             Pacing::Vsync { rate } => Ok(1.0 / rate.value()),
@@ -110,12 +115,12 @@ impl Stage {
         }
     }
 
-    /// What the platform draws more after launch.
+    /// Added power of the platform after launch.
     pub fn launch(&self) -> Result<&Launch, RunError> {
         self.platform.system.launch.as_ref().ok_or_else(|| self.without("launch"))
     }
 
-    /// What a blocking finish costs on the platform.
+    /// Cost of a blocking finish on the platform.
     pub fn finish(&self) -> Result<&Finish, RunError> {
         self.platform.system.finish.as_ref().ok_or_else(|| self.without("finish"))
     }
@@ -124,7 +129,7 @@ impl Stage {
         RunError::Setting(format!("platform `{}` has no `system.{what}`", self.platform.name))
     }
 
-    /// Watts over time of frame `number` of a scene, with shaders of the given cost.
+    /// Power over time of frame `number` of a scene, with shaders of the given cost.
     pub fn frame(&self, scene: &Scene, number: u32, cost: ShaderCost) -> Result<FramePower, RunError> {
         let options = scene.settings();
         let viewport = Viewport::new(options.width, options.height);
@@ -175,14 +180,14 @@ impl Stage {
     }
 }
 
-/// A quantity that a row varies.
+/// A quantity of the platform that a row varies.
 fn swept<T>(value: Result<T, impl std::fmt::Display>) -> Result<Sourced<T>, RunError> {
     let value = value.map_err(RunError::setting)?;
     let source = Source::try_from("varied by `quintile reproduce`".to_owned()).map_err(RunError::setting)?;
     Ok(Sourced::Assumed(value, source))
 }
 
-/// A shader that looks like another one at a cost of its own.
+/// A shader with the colours of another one and its own cost.
 struct Costed<'a> {
     looks: &'a dyn Shader,
     cost: ShaderCost,
@@ -200,4 +205,154 @@ impl Shader for Costed<'_> {
     fn shade(&self, at: &ShadingPoint, texel: Vec4) -> Vec3 {
         self.looks.shade(at, texel)
     }
+}
+
+/// Samples per second of the papers' recorder (Paper II, section 3).
+const RATE_HZ: f64 = 40e3;
+
+/// Tracking, not `auto`: if frames are equal except for a timer that disturbs every fifteenth, the sum of squares finds only the
+/// disturbed ones, and `Auto` accepts this.
+const METHOD: Method = Method::Tracking;
+
+/// Number of marked starts on the PC, unless the row is about a single mark. From a single one the finder sometimes takes 15
+/// frames for one, because the timer of 64 Hz disturbs every fifteenth frame of 30 Hz at the same position. On the phone one mark
+/// is enough.
+pub(super) const MARKED: usize = 3;
+
+/// A trace and its ground truth.
+pub(super) struct Recording {
+    /// Drawn frames with the timestamps of the application.
+    pub truth: Surrounded,
+    /// Recorded trace.
+    pub trace: Trace,
+}
+
+/// Frames found in a trace.
+pub(super) struct Frames {
+    /// With their energies from start to start.
+    pub found: Vec<FrameEnergy>,
+    /// Where the last one ends.
+    pub end_s: f64,
+}
+
+impl Frames {
+    /// Energies in order, J.
+    pub fn energies_j(&self) -> Vec<f64> {
+        self.found.iter().map(|frame| frame.energy_j).collect()
+    }
+}
+
+impl Recording {
+    /// Draws `frames` on the stage and records them.
+    pub fn new(
+        stage: &Stage,
+        frames: &[&FramePower],
+        pacing: Pacing,
+        circumstances: Circumstances,
+    ) -> Result<Self, RunError> {
+        let run = pace(frames, &stage.platform, pacing)?;
+        let truth = stage.platform.system.surround(&run, &circumstances)?;
+        let trace =
+            recorder(stage, circumstances.seed)?.sample(&truth.curve, 0.0, truth.curve.end_s())?.trace;
+        Ok(Self { truth, trace })
+    }
+
+    /// Finds the frames again, by tracking from `marked` starts in a row.
+    pub fn find(&self, marked: usize) -> Result<Frames, RunError> {
+        self.find_by(METHOD, marked)
+    }
+
+    /// The same by another method.
+    pub fn find_by(&self, method: Method, marked: usize) -> Result<Frames, RunError> {
+        let found = find_with(&self.trace, &self.marks(marked), &Options { method })?;
+        Ok(Frames { end_s: found.end_s, found: PowerIntegral::new(&self.trace).frames(&found) })
+    }
+
+    /// Found starts compared with true ones within a tolerance, and the number of missed starts under a disturbance.
+    pub fn score(&self, frames: &Frames, within_s: f64) -> (Score, usize) {
+        let truth = self.truth.frames.iter();
+        let truth: Vec<_> =
+            truth.map(|frame| TrueFrame { start_s: frame.start_s, energy_j: frame.energy_j }).collect();
+        let beside = score::truth_beside(&frames.found, &truth, within_s);
+        let missed = truth.iter().filter(|frame| !beside.contains(&Some(**frame)));
+        let Window { pre_s, post_s } = self.marks(1).window;
+        let disturbed =
+            missed.filter(|frame| self.is_disturbed(frame.start_s - pre_s, frame.start_s + post_s));
+        (score::score(&frames.found, &truth, within_s), disturbed.count())
+    }
+
+    fn is_disturbed(&self, from_s: f64, to_s: f64) -> bool {
+        let disturbances =
+            self.truth.pulses.iter().filter(|pulse| matches!(pulse.cause, Cause::Disturbance(_)));
+        disturbances.into_iter().any(|pulse| pulse.overlap_s(from_s, to_s) > 0.0)
+    }
+
+    /// Marks `count` consecutive starts from the middle on, in the steady part, and the end of the last frame.
+    fn marks(&self, count: usize) -> Marks {
+        let frames = &self.truth.frames;
+        let lengths = frames.iter().map(|frame| frame.end_s - frame.start_s);
+        Marks {
+            starts_s: frames.iter().skip(frames.len() / 2).take(count).map(|frame| frame.start_s).collect(),
+            window: default_window(lengths.fold(f64::INFINITY, f64::min), self.trace.rate_hz()),
+            end_s: self.truth.end_s.min(self.trace.end_s()),
+        }
+    }
+
+    /// For each drawn frame, the energy of the frame found at its position, J. `None` if no frame was found there, or if the
+    /// analysis flags it as merged or split.
+    pub fn by_true_frame_j(&self, frames: &Frames) -> Vec<Option<f64>> {
+        let found: Vec<f64> = frames.found.iter().map(|frame| frame.start_s).collect();
+        let truth: Vec<f64> = self.truth.frames.iter().map(|frame| frame.start_s).collect();
+        let whole_j = |place: usize| {
+            let frame = &frames.found[place];
+            let parts = [Flag::Merged, Flag::Split, Flag::Long, Flag::Short];
+            (!parts.iter().any(|flag| frame.flags.contains(*flag))).then_some(frame.energy_j)
+        };
+        let beside = score::found_beside_true(&found, &truth, TOLERANCE_S);
+        beside.into_iter().map(|place| place.and_then(whole_j)).collect()
+    }
+
+    /// Recorded energy from start to start by the timestamps of the application, J.
+    pub fn by_timestamps_j(&self) -> Vec<f64> {
+        let integral = PowerIntegral::new(&self.trace);
+        self.truth.frames.iter().map(|frame| integral.energy_j(frame.start_s, frame.end_s)).collect()
+    }
+
+    /// The old method: recorded energy from begin to finish by the timestamps of the application, J.
+    pub fn begin_to_finish_j(&self) -> Vec<f64> {
+        let integral = PowerIntegral::new(&self.trace);
+        self.truth.frames.iter().map(|frame| integral.energy_j(frame.start_s, frame.finish_s)).collect()
+    }
+
+    /// Recorded power over an interval, as points from its start on.
+    pub fn points(&self, from_s: f64, to_s: f64) -> Vec<(f64, f64)> {
+        let place =
+            |time_s: f64| self.trace.position(time_s).clamp(0.0, self.trace.samples() as f64) as usize;
+        (place(from_s)..place(to_s))
+            .map(|index| (self.trace.time_s(index) - from_s, self.trace.power_w(index)))
+            .collect()
+    }
+}
+
+/// The papers' recorder on the rail of the platform: current and voltage at 40 kHz.
+fn recorder(stage: &Stage, seed: u64) -> Result<Device, RunError> {
+    let default = DeviceSpec::default();
+    let rail_v = stage.platform.rail.voltage_v.value();
+    let (range_a, range_v) = (stage.sensor.range_a, 1.5 * rail_v);
+    Ok(Device::new(DeviceSpec {
+        name: "station of the papers".to_owned(),
+        rate_hz: RATE_HZ,
+        rail_v,
+        current_range_a: [-range_a, range_a],
+        voltage_range_v: [-range_v, range_v],
+        current_noise_a: stage.sensor.noise_a,
+        voltage_noise_v: default.voltage_noise_v * range_v / default.voltage_range_v[1],
+        seed,
+        ..default
+    })?)
+}
+
+/// `frames` repeated, `count` in all.
+pub(super) fn looped(frames: &[FramePower], count: usize) -> Vec<&FramePower> {
+    frames.iter().cycle().take(count).collect()
 }

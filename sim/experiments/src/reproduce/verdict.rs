@@ -1,15 +1,15 @@
-//! What a claim asks for, and what became of it.
+//! Kind and verdict of a claim.
 
 use serde::{Deserialize, Serialize, Serializer};
 
-/// What has to agree for a row to hold.
+/// Kind of agreement that a row needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 pub enum Kind {
     /// An equality that holds exactly.
     Equality,
-    /// A number to be close to.
+    /// A number with a tolerance.
     Number,
-    /// An order or a sign that comes out.
+    /// An order or a sign.
     Order,
 }
 
@@ -30,19 +30,19 @@ impl Serialize for Kind {
     }
 }
 
-/// What became of a claim.
+/// Verdict of a claim.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub enum Verdict {
-    /// It came out, at every setting that the paper leaves open.
+    /// The condition is met at every value of the open settings.
     #[serde(rename = "holds")]
     Holds,
-    /// It did not, at any.
+    /// The condition is met at no value.
     #[serde(rename = "differs")]
     Differs,
-    /// It comes out at some settings that the paper leaves open and not at others.
+    /// The condition is met at some values of the open settings and not at others.
     #[serde(rename = "depends")]
     Depends,
-    /// It waits for a part that does not exist.
+    /// A part that the row needs is missing.
     #[serde(rename = "not yet")]
     NotYet,
 }

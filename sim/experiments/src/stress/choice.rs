@@ -6,7 +6,7 @@ use workloads::stress::{Family, Size};
 
 use super::measure::Work;
 use super::methods::combinations;
-use super::subject;
+use super::methods::on_subject;
 use run::GpuSpec;
 use run::RunError;
 
@@ -56,7 +56,7 @@ pub fn trial(
     seed: u64,
     gpu: &GpuSpec,
 ) -> Result<Trial, RunError> {
-    subject::on(family, value, (size, seed), gpu, |subject| {
+    on_subject(family, value, (size, seed), gpu, |subject| {
         let madds = |features| Ok(Work::new(&subject.counts(features)?).madds());
         let auto = madds(Features { auto: true, ..Features::ALL })?;
         let fixed = fixed(subject.camera.lens().is_some(), madds)?;

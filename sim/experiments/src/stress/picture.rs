@@ -4,7 +4,7 @@ use workloads::stress::Family;
 
 use super::Report;
 use super::choice::{Choice, Choices};
-use super::measure::Row;
+use super::measure::StressRow;
 use super::methods::{METHODS, Method};
 use output::plot::{Chart, ChartPanel, Look, Mark, Matrix, MatrixPanel, Paint, Picture, Scale, Series};
 
@@ -78,7 +78,7 @@ pub(super) struct Measure {
     /// The name of the axis.
     name: &'static str,
     scale: Scale,
-    of: fn(&Row) -> Option<f64>,
+    of: fn(&StressRow) -> Option<f64>,
 }
 
 /// Cost and efficiency.
@@ -101,7 +101,7 @@ pub(super) const MEASURES: [Measure; 2] = [
 
 /// A measure of one family along its parameter: a small panel for each method, the other methods as grey lines behind it.
 pub(super) fn family(report: &Report, family: &Family, measure: &Measure, look: &Look) -> Picture {
-    let rows: Vec<&Row> = report.of(family).collect();
+    let rows: Vec<&StressRow> = report.of(family).collect();
     let line = |name: &str| -> Vec<(f64, f64)> {
         let values = rows.iter().filter(|row| row.method == name).map(|row| (measure.of)(row)).enumerate();
         values.filter_map(|(place, value)| Some((place as f64, value?))).collect()
@@ -114,7 +114,7 @@ pub(super) fn family(report: &Report, family: &Family, measure: &Measure, look: 
             .on(Scale::Even, measure.scale.clone())
             .along(family.parameter, &values(&rows))
     };
-    let title = format!("Where methods fail: {}, {}", family.name, measure.title);
+    let title = format!("Failure modes: {}, {}", family.name, measure.title);
     let subject = format!(
         "{}; grey: all other methods; {} samples lost",
         family.what,
@@ -124,7 +124,7 @@ pub(super) fn family(report: &Report, family: &Family, measure: &Measure, look: 
     Chart::new(&title, &subject, panels).small(ACROSS).picture(look)
 }
 
-fn values(rows: &[&Row]) -> Vec<String> {
+fn values(rows: &[&StressRow]) -> Vec<String> {
     let mut values: Vec<String> = rows.iter().map(|row| row.value.to_string()).collect();
     values.dedup();
     values
@@ -132,8 +132,8 @@ fn values(rows: &[&Row]) -> Vec<String> {
 
 /// Width of the boxes that the side planes leave, and of the true ones.
 pub(super) fn intervals(report: &Report, family: &Family, look: &Look) -> Picture {
-    let rows: Vec<&Row> = report.of(family).collect();
-    let curve = |name: &str, of: fn(&Row) -> f64| {
+    let rows: Vec<&StressRow> = report.of(family).collect();
+    let curve = |name: &str, of: fn(&StressRow) -> f64| {
         let sides = rows.iter().filter(|row| row.method == "sides").enumerate();
         Series::curve(name, sides.map(|(place, row)| (place as f64, 100.0 * of(row))))
     };

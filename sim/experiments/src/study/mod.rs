@@ -5,7 +5,6 @@
 //! - [`tradeoff`]: speed against accuracy, the same few numbers for every method.
 //! - [`index`]: one page of all studies.
 
-mod error;
 pub mod index;
 pub mod table;
 pub mod tradeoff;
@@ -15,9 +14,8 @@ use std::time::Instant;
 use output::plot::{Chart, ChartPanel, Look, Picture};
 use output::progress::Progress;
 use output::{Claim, OutDir, OutputError};
+use run::{GpuError, RunError};
 use serde::Serialize;
-
-pub use error::StudyError;
 use table::Sheet;
 use tradeoff::TradeoffPoint;
 
@@ -221,4 +219,43 @@ pub(crate) fn written<S: Study>(effort: S::Effort) -> (tempfile::TempDir, S, Don
     }
     assert!(foreign.exists(), "a file that no study wrote is gone");
     (folder, found, done)
+}
+
+/// Why a study could not be made.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the variants are the sources, documented there")]
+pub enum StudyError {
+    #[error(transparent)]
+    Scene(#[from] workloads::LoadError),
+    #[error(transparent)]
+    Frame(#[from] workloads::FrameError),
+    #[error(transparent)]
+    Samples(#[from] pipeline::sampling::TableError),
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+    #[error(transparent)]
+    Soup(#[from] workloads::stress::StressError),
+    #[error(transparent)]
+    Curve(#[from] traces::CurveError),
+    #[error(transparent)]
+    Recording(#[from] traces::synth::SynthError),
+    #[error(transparent)]
+    Mark(#[from] traces::frames::MarkError),
+    #[error("starting the thread that is timed: {0}")]
+    Thread(#[from] rayon::ThreadPoolBuildError),
+    #[error("the pipeline does not take the scene: {0}")]
+    Pipeline(String),
+    #[error(transparent)]
+    Job(#[from] workloads::job::JobError),
+    #[error(transparent)]
+    Run(#[from] RunError),
+    #[error(transparent)]
+    Output(#[from] OutputError),
+}
+
+impl StudyError {
+    /// The pipeline refused what it was given.
+    pub(crate) fn pipeline(why: impl std::fmt::Display) -> Self {
+        Self::Pipeline(why.to_string())
+    }
 }

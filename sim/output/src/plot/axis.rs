@@ -1,39 +1,39 @@
-//! Axes: what they show, the range of it, and ticks that have room.
+//! Axes: quantity, range and ticks. Only ticks with room for their labels are labelled.
 
 use super::text::text_width;
 use crate::table::{Prefix, power_of_ten};
 
-/// How values lie along an axis.
+/// Scale of an axis.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Scale {
-    /// By their logarithm, ticks at powers of ten.
+    /// Logarithmic, ticks at powers of ten.
     #[default]
     Decades,
-    /// By their logarithm, ticks at powers of two.
+    /// Logarithmic, ticks at powers of two.
     Doublings,
-    /// As they are, from zero on where that is not far.
+    /// Linear; starts at zero if zero is near the data.
     Even,
-    /// As they are, always from zero on.
+    /// Linear from zero.
     FromZero,
     /// Places 0, 1, 2, ... with these names.
     Listed(Vec<String>),
 }
 
-/// What an axis shows, and how.
+/// Quantity and scale of an axis.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct AxisSpec {
-    /// What it shows; with its unit, where `unit` is empty.
+    /// Name of the quantity. It includes the unit if `unit` is empty.
     pub name: String,
-    /// The plain unit, whose prefix is chosen by the values.
+    /// Unit without prefix; the values choose the prefix.
     pub unit: String,
-    /// How values lie along it.
+    /// Scale.
     pub scale: Scale,
-    /// What zero is called on a logarithmic scale, where it has a row of its own; `0` where this is empty.
+    /// Label of zero on a logarithmic scale, where zero has its own row; `0` if empty.
     pub zero: String,
 }
 
 impl AxisSpec {
-    /// An axis of `name` in `unit`, values as they are.
+    /// Linear axis of `name` in `unit`.
     pub fn even(name: &str, unit: &str) -> Self {
         Self { name: name.to_owned(), unit: unit.to_owned(), scale: Scale::Even, zero: String::new() }
     }
@@ -44,41 +44,41 @@ impl Scale {
         matches!(self, Self::Decades | Self::Doublings)
     }
 
-    /// The coordinate of a value; `None` where the scale has no place for it.
+    /// Coordinate of a value; `None` if the scale cannot show it.
     fn coordinate(&self, value: f64) -> Option<f64> {
         let coordinate = if self.is_logarithmic() { libm::log10(value) } else { value };
         coordinate.is_finite().then_some(coordinate)
     }
 }
 
-/// Which way an axis goes, as labels need room along it.
+/// Direction of an axis; labels need room along it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Way {
     Across,
     Up,
 }
 
-/// A tick: its coordinate and what is written at it, nothing at a small one. `10^5` is written with a raised 5.
+/// A tick: coordinate and label. Small ticks have no label. `10^5` is written with a raised 5.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Tick {
     pub at: f64,
     pub label: String,
 }
 
-/// A range of coordinates and how it is labelled.
+/// A range of coordinates with its labels.
 #[derive(Clone, Debug)]
 pub(super) struct Axis {
     scale: Scale,
     pub low: f64,
     pub high: f64,
     pub ticks: Vec<Tick>,
-    /// What the axis shows, with prefix and unit: `power (mW)`.
+    /// Name with prefix and unit: `power (mW)`.
     pub label: String,
-    /// The coordinate at which a logarithmic axis is broken, below which zero has its row.
+    /// Coordinate of the break of a logarithmic axis. The row of zero is below it.
     pub broken_at: Option<f64>,
 }
 
-/// The range of some values on a scale, and whether zero is among them and needs a row of its own.
+/// Range of values on a scale, and whether zero is among them and needs its own row.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Extent {
     pub low: f64,
@@ -88,17 +88,17 @@ pub(super) struct Extent {
 
 /// Size of the labels of ticks in pixels.
 pub(super) const TICK_PX: f64 = 12.0;
-/// Share of a logarithmic axis that is left to zero.
+/// Share of a logarithmic axis reserved for zero.
 const ZERO_ROW: f64 = 0.13;
 
-/// Whether an axis can be drawn from `low` to `high`: finite, and with room for a sum of them in f64.
+/// Whether an axis can be drawn from `low` to `high`: both are finite, and so is their sum.
 pub(super) fn is_drawable(low: f64, high: f64) -> bool {
     low.abs() < 1e100 && high.abs() < 1e100
 }
 
 impl AxisSpec {
-    /// The range of those of `values` that have a place, `pad` of it added at either end; `None` where none has one. An axis from zero
-    /// on begins a little below where there are `markers` that a zero could hide.
+    /// Range of the drawable `values`, with `pad` of it added at either end; `None` without any. An axis from zero begins a
+    /// little below zero if there are `markers`, which the axis line would hide.
     pub(super) fn extent(
         &self,
         values: impl IntoIterator<Item = f64>,
@@ -193,7 +193,7 @@ impl AxisSpec {
 }
 
 impl Axis {
-    /// An axis of `name` in `unit` over `low..high`, which must be drawable ([`is_drawable`]); an empty range is widened.
+    /// Axis of `name` in `unit` over `low..high`, which must be drawable ([`is_drawable`]). An empty range is widened.
     pub fn new(name: &str, unit: &str, (low, high): (f64, f64), (way, length): (Way, f64)) -> Self {
         let (low, high) = widened(low, high);
         let prefix = if unit.is_empty() { Prefix::NONE } else { Prefix::of(low.abs().max(high.abs())) };
@@ -218,37 +218,37 @@ impl Axis {
         axis
     }
 
-    /// Where `value` lies, 0 at the low end and 1 at the high one, held to [0, 1]; `None` where the scale has no place for it. Zero has
-    /// one on a logarithmic scale that was made for it.
+    /// Position of `value`, clamped to [0, 1]: 0 is the low end, 1 the high end. `None` if the scale cannot show it. A
+    /// logarithmic scale with a row for zero can show zero.
     pub fn place(&self, value: f64) -> Option<f64> {
         let zero_at = self.broken_at.map(|broken| 0.5 * (self.low + broken)).filter(|_| value == 0.0);
         let coordinate = zero_at.or_else(|| self.scale.coordinate(value))?;
         Some(self.fraction_at(coordinate))
     }
 
-    /// The same where every value has a place; what has none is at the low end.
+    /// The same for any value; a value that the scale cannot show is at the low end.
     pub fn fraction(&self, value: f64) -> f64 {
         self.place(value).unwrap_or(0.0)
     }
 
-    /// Where a coordinate lies, such as that of a tick.
+    /// Position of a coordinate, for example of a tick.
     pub fn fraction_at(&self, coordinate: f64) -> f64 {
         let fraction = (coordinate - self.low) / (self.high - self.low);
         if fraction.is_nan() { 0.0 } else { fraction.clamp(0.0, 1.0) }
     }
 
-    /// Whether values lie by their logarithm.
+    /// Whether the scale is logarithmic.
     pub fn is_logarithmic(&self) -> bool {
         self.scale.is_logarithmic()
     }
 
-    /// The width of the widest label of a tick.
+    /// Width of the widest tick label.
     pub fn widest(&self) -> f64 {
         self.ticks.iter().map(|tick| label_width(&tick.label)).fold(0.0, f64::max)
     }
 }
 
-/// The width of the label of a tick; what is raised is smaller.
+/// Width of a tick label. Raised digits are smaller.
 pub(super) fn label_width(label: &str) -> f64 {
     let (base, raised) = label.split_once('^').unwrap_or((label, ""));
     text_width(base, TICK_PX, false) + text_width(raised, RAISED * TICK_PX, false)
@@ -266,7 +266,7 @@ fn have_room(ticks: &[Tick], (low, high): (f64, f64), (way, length): (Way, f64))
     written.windows(2).all(|pair| length * (pair[1].at - pair[0].at) / (high - low) >= needs(pair))
 }
 
-/// The first set with at least two labels and room for all of them; the last one where none has.
+/// First set with at least two labels and room for all of them; otherwise the last set.
 fn first_with_room(mut sets: Vec<Vec<Tick>>, fits: impl Fn(&[Tick]) -> bool) -> Vec<Tick> {
     let labels = |ticks: &[Tick]| ticks.iter().filter(|tick| !tick.label.is_empty()).count();
     let first = |least: usize| sets.iter().position(|ticks| labels(ticks) >= least && fits(ticks));
@@ -274,7 +274,7 @@ fn first_with_room(mut sets: Vec<Vec<Tick>>, fits: impl Fn(&[Tick]) -> bool) -> 
     sets.swap_remove(best)
 }
 
-/// Powers of ten with small ticks between them; plain numbers where the range is within about a decade.
+/// Powers of ten with small ticks between them; plain numbers if the range is about a decade or less.
 fn decades(low: f64, high: f64, fits: impl Fn(&[Tick]) -> bool) -> Vec<Tick> {
     let (first, last) = (libm::ceil(low) as i32, libm::floor(high) as i32);
     let mut sets = Vec::new();
@@ -307,7 +307,7 @@ fn decades(low: f64, high: f64, fits: impl Fn(&[Tick]) -> bool) -> Vec<Tick> {
     ticks
 }
 
-/// Every `step`-th power of ten: plain where all of them are short, else as 10 with an exponent.
+/// Every `step`-th power of ten: as plain numbers if all are short, otherwise as 10 with an exponent.
 fn powers(first: i32, last: i32, step: i32) -> Vec<Tick> {
     let plain = first >= -3 && last <= 4;
     let label = |power: i32| if plain { format!("{}", power_of_ten(power)) } else { format!("10^{power}") };

@@ -3,11 +3,10 @@
 use std::ops::Range;
 
 use super::axis::{Axis, AxisSpec, Extent, Scale, Way};
-use super::labels::{self, Label};
 use super::legend::{Key, LEGEND_LINE, LEGEND_PX, legend_column, legend_lines, plate};
-use super::look::Look;
 use super::palette::{INK, MARK, MUTED};
-use super::panel::{BELOW, Panel, aside};
+use super::panel::{self, BELOW, Label, Panel, aside};
+use super::picture::Look;
 use super::picture::{Across, Picture, Text, text};
 use super::series::{Mark, Series};
 use super::text::text_width;
@@ -16,38 +15,38 @@ use super::text::{shortened, wrapped};
 /// Series over two axes.
 #[derive(Clone, Debug)]
 pub struct ChartPanel {
-    /// What is shown.
+    /// Title.
     pub title: String,
-    /// What goes across and up.
+    /// Horizontal and vertical axis.
     pub axes: [AxisSpec; 2],
-    /// What is drawn, the first at the bottom.
+    /// Series; the first is at the bottom.
     pub series: Vec<Series>,
-    /// Where what is shown does not work, as a range across, and what to call it.
+    /// Range of the horizontal axis in which the method fails, and its label.
     pub failing: Option<(Range<f64>, String)>,
-    /// Whether a step across is as long as one up.
+    /// Whether both axes have the same scale in pixels.
     pub equal: bool,
 }
 
 impl ChartPanel {
-    /// Series on logarithmic scales, `[across, up]` saying what these show.
+    /// Series on logarithmic axes with these names, `[horizontal, vertical]`.
     pub fn new(title: &str, names: [&str; 2], series: Vec<Series>) -> Self {
         let axes = names.map(|name| AxisSpec { name: name.to_owned(), ..AxisSpec::default() });
         Self::over(title, axes, series)
     }
 
-    /// Series over these axes.
+    /// Series on these axes.
     pub fn over(title: &str, axes: [AxisSpec; 2], series: Vec<Series>) -> Self {
         Self { title: title.to_owned(), axes, series, failing: None, equal: false }
     }
 
-    /// The same with these scales across and up.
+    /// Sets the scales of both axes.
     #[must_use]
     pub fn on(mut self, across: Scale, up: Scale) -> Self {
         (self.axes[0].scale, self.axes[1].scale) = (across, up);
         self
     }
 
-    /// The same over places 0, 1, ... across that stand for these values of `name`.
+    /// Makes the horizontal axis a list of these values of `name`, at positions 0, 1, ...
     #[must_use]
     pub fn along(mut self, name: &str, values: &[String]) -> Self {
         self.axes[0] =
@@ -55,52 +54,52 @@ impl ChartPanel {
         self
     }
 
-    /// The same with a range marked in which what is shown does not work.
+    /// Marks the range in which the method fails.
     #[must_use]
     pub fn failing(self, range: Option<Range<f64>>, name: &str) -> Self {
         Self { failing: range.map(|range| (range, name.to_owned())), ..self }
     }
 
-    /// The same with equal axes, for points in a plane.
+    /// Gives both axes the same scale in pixels, for points in a plane.
     #[must_use]
     pub fn equal(self) -> Self {
         Self { equal: true, ..self }
     }
 }
 
-/// Panels with a title. Panels whose axes up show the same have the same range there.
+/// Panels with a title. Panels whose vertical axes have the same quantity share its range.
 #[derive(Clone, Debug)]
 pub struct Chart<'a> {
-    /// What is shown.
+    /// Title.
     pub title: &'a str,
-    /// Of what, for the lines below the title.
+    /// Subject, for the lines below the title.
     pub subject: &'a str,
     /// The panels, row by row.
     pub panels: Vec<ChartPanel>,
-    /// Small panels, so many in a row, all over the same range across, with labels at the outer ones alone.
+    /// Number of small panels in a row. They share the horizontal range, and only the outer ones have labels.
     pub small: Option<usize>,
 }
 
-/// Widths of a picture of one panel, of two, and of more.
+/// Picture widths for one panel, two panels, and more.
 const WIDTHS: [f64; 3] = [820.0, 900.0, 1240.0];
-/// The least width of a panel and of a small one, with its labels.
+/// Smallest widths of a panel and of a small panel, with labels.
 const LEAST: [f64; 2] = [290.0, 120.0];
-/// Room beside the name of a series in a legend below a panel.
+/// Room for the key of a series in a legend below a panel.
 const NAME_ASIDE: f64 = 44.0;
-/// Panels in a row at most, unless they are small.
+/// Largest number of panels in a row, unless they are small.
 const MOST_ACROSS: usize = 3;
-/// Distance of lines of a panel's title.
+/// Line height of a panel's title.
 const LINE: f64 = 18.0;
-/// What is left free right of a panel.
+/// Free space right of a panel.
 const RIGHT: f64 = 18.0;
 /// Distance of small panels.
 const SMALL_GAP: f64 = 16.0;
-/// The highest panel with equal axes.
+/// Largest height of a panel with equal axes.
 const MOST_HIGH: f64 = 640.0;
-/// Size of the name of a marked range.
+/// Font size of the label of a marked range.
 const MARK_PX: f64 = 11.5;
 
-/// Where a panel is, and what it shares with others.
+/// Position of a panel, and what it shares with others.
 struct Cell<'a> {
     panel: &'a ChartPanel,
     left: f64,
@@ -108,11 +107,11 @@ struct Cell<'a> {
     /// Height of the panel itself.
     height: f64,
     extents: Option<[Extent; 2]>,
-    /// Whether its axis across and its axis up are labelled.
+    /// Whether its horizontal and its vertical axis are labelled.
     labelled: [bool; 2],
-    /// Whether it is one of many small ones.
+    /// Whether it is a small panel.
     small: bool,
-    /// Whether it has a legend of its own.
+    /// Whether it has its own legend.
     legend: bool,
 }
 
@@ -122,13 +121,13 @@ impl<'a> Chart<'a> {
         Self { title, subject, panels, small: None }
     }
 
-    /// The same with small panels, so many in a row.
+    /// Makes the panels small, with this many in a row.
     #[must_use]
     pub fn small(self, across: usize) -> Self {
         Self { small: Some(across), ..self }
     }
 
-    /// One legend above all panels where they show the same series, else one below each.
+    /// Draws one legend above all panels if they show the same series, otherwise one below each.
     pub fn picture(&self, look: &Look) -> Picture {
         let usual = WIDTHS[self.panels.len().clamp(1, 3) - 1];
         let mut picture = Picture::titled(look, (usual, 300.0), [self.title, self.subject]);
@@ -176,7 +175,7 @@ impl<'a> Chart<'a> {
         aside(&panel.axes[1].axis(up, (Way::Up, 100.0)))
     }
 
-    /// The names of the axes of small panels, once for all of them.
+    /// Draws the axis names of small panels, once for all.
     fn small_names(&self, picture: &mut Picture, top: f64) {
         let [across, up] = &self.panels[0].axes;
         picture.height += 20.0;
@@ -188,7 +187,7 @@ impl<'a> Chart<'a> {
         picture.text(Text { across: Across::Centre, upwards: true, ..text(&name, at) });
     }
 
-    /// Panels in a row: as many as there is room for, that of names in legends of their own included.
+    /// Number of panels in a row: as many as fit, with the legends below them.
     fn across(&self, picture: &Picture, legends: bool) -> usize {
         let room = picture.width() - 2.0 * picture.margin();
         let names = self.panels.iter().flat_map(|panel| &panel.series).filter(|_| legends);
@@ -211,7 +210,7 @@ impl<'a> Chart<'a> {
         }
     }
 
-    /// The ranges of all panels; those of axes that show the same are one.
+    /// Ranges of all panels. Axes of the same quantity share a range.
     fn extents(&self) -> Vec<Option<[Extent; 2]>> {
         let values: Vec<[Vec<f64>; 2]> = self.panels.iter().map(ChartPanel::values).collect();
         let extent = |place: usize, axis: usize| {
@@ -243,8 +242,8 @@ impl<'a> Chart<'a> {
         (0..self.panels.len()).map(|place| both(place).filter(|_| own(place))).collect()
     }
 
-    /// The series of the panel with the most, where those of all others are called like the first of them; no legend for small panels,
-    /// whose titles name what they show.
+    /// Series of a shared legend: those of the panel with the most, if the series of all other panels have the same names in the
+    /// same order. Small panels have no legend; their titles name the series.
     fn shared_legend(&self) -> Option<Vec<(Key, String)>> {
         let longest = self.panels.iter().max_by_key(|panel| panel.series.len())?;
         let is_alike = |panel: &ChartPanel| {
@@ -257,7 +256,7 @@ impl<'a> Chart<'a> {
     }
 }
 
-/// Draws panels side by side below what there is, and makes the picture as high as they need.
+/// Draws panels side by side at the bottom of the picture, and increases its height.
 fn draw_row(picture: &mut Picture, cells: &[Cell<'_>]) {
     let titles = cells.iter().map(|cell| cell.heading().len()).max().unwrap_or(0);
     let top = picture.height + 8.0 + LINE * titles as f64;
@@ -281,7 +280,7 @@ impl Cell<'_> {
         if self.small { 11.0 } else { 13.0 }
     }
 
-    /// Draws the panel whose area begins at `top`; returns where what is below it ends.
+    /// Draws the panel whose area begins at `top`. Returns the bottom of its labels and legend.
     fn draw(&self, picture: &mut Picture, top: f64) -> f64 {
         let Some(area) = self.area(top) else {
             let at = (self.left + 20.0, top + 0.5 * self.height);
@@ -319,7 +318,7 @@ impl Cell<'_> {
         }
     }
 
-    /// The area of the panel with its axes; nothing where there is nothing to show.
+    /// Area of the panel with its axes; `None` without data.
     fn area(&self, top: f64) -> Option<Panel> {
         let [across, up] = self.extents?;
         let y = self.panel.axes[1].axis(up, (Way::Up, self.height));
@@ -352,7 +351,7 @@ impl Cell<'_> {
         area.axis_up(picture);
     }
 
-    /// A legend below the panel; returns its height.
+    /// Draws a legend below the panel. Returns its height.
     fn own_legend(&self, picture: &mut Picture, area: &Panel) -> f64 {
         if !self.legend {
             return 0.0;
@@ -367,7 +366,7 @@ impl Cell<'_> {
 }
 
 impl ChartPanel {
-    /// Every value across and up.
+    /// All values of both axes.
     fn values(&self) -> [Vec<f64>; 2] {
         let mut all = [Vec::new(), Vec::new()];
         for series in &self.series {
@@ -378,14 +377,14 @@ impl ChartPanel {
         all
     }
 
-    /// The series that are named, with their keys.
+    /// Named series with their keys.
     fn named(&self) -> impl Iterator<Item = (Key, &Series)> {
         let all = self.series.iter().enumerate();
         all.filter(|(_, series)| !series.name.is_empty())
             .map(|(index, series)| (series.mark.key(series.style(index)), series))
     }
 
-    /// Marks the range in which what is shown does not work; what it is called is to be drawn over the grid.
+    /// Marks the range in which the method fails. Returns its label, which is drawn over the grid.
     fn mark(&self, picture: &mut Picture, area: &Panel) -> Option<Text> {
         let (range, name) = self.failing.as_ref()?;
         let end = |value: f64, beyond: f64| {
@@ -407,7 +406,7 @@ impl ChartPanel {
         Some(Text { size: MARK_PX, colour: MUTED, across, ..text(&name, (x, area.top + 10.0)) })
     }
 
-    /// The names of points, those of the last series first.
+    /// Labels of points; those of the last series first.
     fn write_names(&self, picture: &mut Picture, area: &Panel) {
         let mut labels = Vec::new();
         for series in self.series.iter().rev() {
@@ -417,7 +416,7 @@ impl ChartPanel {
             labels.extend(names.map(|(at, radius, name)| Label { name, at, radius, colour, bold }));
         }
         let obstacles: Vec<_> = self.series.iter().flat_map(|series| series.mark.obstacles(area)).collect();
-        let left_out = labels::write(picture, area, &labels, &obstacles);
+        let left_out = panel::write(picture, area, &labels, &obstacles);
         if left_out > 0 {
             let at = (area.right, area.bottom + 38.0);
             let words = format!("{left_out} {} without room", if left_out == 1 { "name" } else { "names" });
@@ -425,7 +424,7 @@ impl ChartPanel {
         }
     }
 
-    /// The notes of the series, in the corner where they hide least.
+    /// Draws the notes of the series, in the corner where they cover least.
     fn write_notes(&self, picture: &mut Picture, area: &Panel) {
         let noted = self.named().filter(|(_, series)| !series.note.is_empty());
         let entries: Vec<_> =
@@ -483,7 +482,7 @@ mod tests {
         picture.shapes.iter().filter_map(centre).collect()
     }
 
-    /// A set of points of the book was drawn twice as wide as high, in a figure about distances.
+    /// In a figure about distances both axes need the same scale.
     #[test]
     fn distances_are_the_same_both_ways_on_equal_axes() {
         let points = [(0.0, 0.0), (0.8, 0.0), (0.0, 0.4), (0.8, 0.4)];
@@ -496,7 +495,7 @@ mod tests {
         }
     }
 
-    /// Two panels of the same quantity had each a range of its own.
+    /// Panels of the same quantity share a range.
     #[test]
     fn panels_of_the_same_quantity_share_their_range() {
         let panel = |high: f64| even(vec![dots(&[(0.0, 0.0), (1.0, high)])]);

@@ -1,4 +1,4 @@
-//! Many samples into few columns.
+//! Reduction of many samples to few columns.
 
 /// Lowest and highest finite value of the samples in a column.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -7,10 +7,10 @@ pub(super) struct Extremes {
     pub high: f64,
 }
 
-/// Splits `values` into `columns` stretches of (almost) equal length and gives the extremes of each; `None` where a
-/// stretch has no finite value. No value is in none of them. There are never more stretches than values.
+/// Splits `values` into `columns` segments of (almost) equal length and gives the extremes of each; `None` where a
+/// segment has no finite value. Every value is in a segment. There are at most as many segments as values.
 pub(super) fn extremes(values: &[f64], columns: usize) -> Vec<Option<Extremes>> {
-    stretches(values.len(), columns)
+    segments(values.len(), columns)
         .map(|(from, to)| {
             let finite = || values[from..to].iter().copied().filter(|value| value.is_finite());
             let low = finite().reduce(f64::min)?;
@@ -20,15 +20,15 @@ pub(super) fn extremes(values: &[f64], columns: usize) -> Vec<Option<Extremes>> 
         .collect()
 }
 
-/// Splits `values` likewise and gives the mean of each stretch; what is not finite counts as 0.
+/// Splits `values` in the same way and gives the mean of each segment. Values that are not finite count as 0.
 pub(super) fn means(values: &[f64], columns: usize) -> Vec<f64> {
-    stretches(values.len(), columns)
+    segments(values.len(), columns)
         .map(|(from, to)| values[from..to].iter().filter(|v| v.is_finite()).sum::<f64>() / (to - from) as f64)
         .collect()
 }
 
-/// The mean of the finite ones of `values` over a window of `width` samples around each of `columns` stretches'
-/// middles, with the middle in samples.
+/// Moving mean of the finite `values`: for the middle of each of `columns` segments, its position in samples and the mean
+/// over `width` samples around it.
 pub(super) fn moving_mean(values: &[f64], width: usize, columns: usize) -> Vec<(f64, f64)> {
     let width = width.clamp(1, values.len().max(1));
     let mut sums = Vec::with_capacity(values.len() + 1);
@@ -40,7 +40,7 @@ pub(super) fn moving_mean(values: &[f64], width: usize, columns: usize) -> Vec<(
         }
         sums.push(sum);
     }
-    stretches(values.len(), columns)
+    segments(values.len(), columns)
         .filter_map(|(from, to)| {
             let middle = (from + to) / 2;
             // At the ends the window stays whole and stops moving: a shorter one would show a part of a frame.
@@ -52,7 +52,7 @@ pub(super) fn moving_mean(values: &[f64], width: usize, columns: usize) -> Vec<(
         .collect()
 }
 
-fn stretches(length: usize, columns: usize) -> impl Iterator<Item = (usize, usize)> {
+fn segments(length: usize, columns: usize) -> impl Iterator<Item = (usize, usize)> {
     let columns = columns.min(length);
     let edge = move |i: usize| (i as u128 * length as u128 / columns.max(1) as u128) as usize;
     (0..columns).map(move |i| (edge(i), edge(i + 1)))

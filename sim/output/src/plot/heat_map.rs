@@ -1,10 +1,10 @@
-//! Where in the image something happens.
+//! Heat map of a value over the image.
 
 use super::axis::{Axis, Way, is_drawable};
 use super::legend::{Key, legend_lines};
-use super::look::Look;
 use super::palette::{AXIS, CLASSES, Colour, INK, heat};
 use super::panel::tick_label;
+use super::picture::Look;
 use super::picture::{Across, Picture, Text, text};
 use crate::table::digits;
 
@@ -19,52 +19,52 @@ pub struct HeatTile {
     pub value: f64,
 }
 
-/// What the colours stand for.
+/// Mapping of values to colours.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Shading<'a> {
-    /// From nothing to the largest value.
+    /// 0 to the largest value.
     #[default]
     Even,
-    /// From nothing to this value, and all above: the same for maps that are compared.
+    /// 0 to this value; larger values are clamped. Compared maps use the same value.
     UpTo(f64),
-    /// From nothing to the 99th percentile of what is above nothing, and all above: a few hot pixels do not make all others white.
+    /// 0 to the 99th percentile of values above 0; larger values are clamped, so that a few hot pixels do not make all others white.
     Clipped,
     /// Classes 0, 1, ... with these names, at most four.
     Classes(&'a [&'a str]),
 }
 
-/// A map of a value over the image, with a bar of its colours.
+/// Heat map with a colour bar.
 #[derive(Clone, Copy, Debug)]
 pub struct HeatMapPlot<'a> {
-    /// What is shown.
+    /// Title.
     pub title: &'a str,
-    /// What was run, for the line below the title.
+    /// Scene, GPU and platform, for the line below the title.
     pub subject: &'a str,
-    /// What the values are.
+    /// Quantity, for the label of the colour bar.
     pub label: &'a str,
-    /// Pixels of the image across and down.
+    /// Width and height of the image in pixels.
     pub size: [u32; 2],
     /// The rectangles, which cover the image.
     pub tiles: &'a [HeatTile],
-    /// How they are coloured.
+    /// Mapping to colours.
     pub shading: Shading<'a>,
-    /// Brightness of each pixel of the image, 0 to 1 as displayed, whose outlines are drawn over the map; empty for none.
+    /// Displayed brightness of each pixel, 0 to 1. Its outlines are drawn over the map; empty for none.
     pub brightness: &'a [f32],
 }
 
-/// Room for the map at most.
+/// Largest size of the map.
 const ROOM: (f64, f64) = (960.0, 640.0);
-/// Room for the bar of colours.
+/// Width of the colour bar.
 const BAR: f64 = 110.0;
-/// Steps of the bar of colours.
+/// Steps of the colour bar.
 const STEPS: u32 = 120;
-/// Steps of brightness between neighbours from which on there is an outline, and with which it is darkest.
+/// Brightness steps between neighbours at which an outline starts, and at which it is darkest.
 const OUTLINE: [f32; 2] = [0.05, 0.4];
 /// Opacity of the darkest outline.
 const OUTLINE_ALPHA: f32 = 0.5;
 
 impl HeatMapPlot<'_> {
-    /// The map.
+    /// Draws the map.
     pub fn picture(&self, look: &Look) -> Picture {
         let [width, height] = self.size.map(|side| f64::from(side.max(1)));
         let most = self.tiles.iter().map(|tile| tile.value).fold(0.0, f64::max);
@@ -111,7 +111,7 @@ impl HeatMapPlot<'_> {
         matches!(self.shading, Shading::Classes(_))
     }
 
-    /// The value of the darkest colour.
+    /// Value of the darkest colour.
     fn high(&self, most: f64) -> f64 {
         match self.shading {
             Shading::Even | Shading::Classes(_) => most,
@@ -140,7 +140,7 @@ impl HeatMapPlot<'_> {
         }
     }
 
-    /// Where neighbours in the image differ in brightness, in a few shades, alike pixels of a row as one.
+    /// Draws outlines where neighbouring pixels differ in brightness. Equal pixels of a row are one rectangle.
     fn draw_outlines(&self, picture: &mut Picture, (left, top): (f64, f64), scale: f64) {
         let width = self.size[0] as usize;
         if width == 0 || self.brightness.len() != width * self.size[1] as usize {
@@ -168,7 +168,7 @@ impl HeatMapPlot<'_> {
     }
 }
 
-/// The bar of colours from `bottom` up to `top`; its upper end says so where there are values beyond it.
+/// Draws the colour bar from `bottom` up to `top`. Its upper label says if larger values exist.
 fn bar(picture: &mut Picture, axis: &Axis, (left, top, bottom): (f64, f64, f64), beyond: bool) {
     let y = |fraction: f64| bottom - fraction * (bottom - top);
     for step in 0..STEPS {
@@ -211,7 +211,7 @@ mod tests {
         picture.shapes.iter().filter_map(fill).collect()
     }
 
-    /// In the book a few hot pixels left all others white.
+    /// A few hot pixels must not make all others white.
     #[test]
     fn one_hot_pixel_leaves_the_others_their_colours() {
         let tiles = row(|x| if x == 7 { 820.0 } else { f64::from(x % 10) + 1.0 });

@@ -1,11 +1,10 @@
-//! Legends, and words cut and wrapped to the room there is.
+//! Legends, and the styles that distinguish series: colour, marker and strokes.
 
-use super::palette::{BACKGROUND, Colour, INK, MUTED};
+use super::palette::{BACKGROUND, Colour, INK, MUTED, SERIES};
 use super::picture::{Across, Picture, Point, Text, text};
-use super::style::Style;
 use super::text::{shortened, text_width};
 
-/// How an entry of a legend is drawn.
+/// Symbol of a legend entry.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Key {
     Area(Colour),
@@ -22,11 +21,11 @@ pub(super) enum Key {
     Tick(Colour),
 }
 
-/// Size of the names in a legend, where there is room.
+/// Font size of a legend with enough room.
 pub(super) const LEGEND_PX: f64 = 12.5;
 /// Distance of the lines of a legend.
 pub(super) const LEGEND_LINE: f64 = 22.0;
-/// Room of a key, and between entries.
+/// Width of a key, and gap between entries.
 const KEY: f64 = 22.0;
 const GAP: f64 = 24.0;
 
@@ -59,7 +58,7 @@ impl Key {
     }
 }
 
-/// A legend in as many lines as it takes within the margins, the first around `top`; returns the height of all.
+/// Draws a legend between the margins, in as many lines as needed, the first around `top`. Returns the height of all lines.
 pub(super) fn legend_lines(picture: &mut Picture, top: f64, entries: &[(Key, String)]) -> f64 {
     let (left, right) = (picture.margin() + 2.0, picture.width() - picture.margin());
     let (mut x, mut y) = (left, top);
@@ -76,7 +75,7 @@ pub(super) fn legend_lines(picture: &mut Picture, top: f64, entries: &[(Key, Str
     if entries.is_empty() { 0.0 } else { y - top + LEGEND_LINE }
 }
 
-/// A legend in one column within `height`, top entry at `from`; each entry has a label and a value that ends at `right`.
+/// Draws a legend in one column within `height`, top entry at `from`. Each entry has a label, and a value that ends at `right`.
 pub(super) fn legend_column(
     picture: &mut Picture,
     from: Point,
@@ -96,7 +95,77 @@ pub(super) fn legend_column(
     }
 }
 
-/// A white plate under a legend that stands within a panel.
+/// White background of a legend inside a panel.
 pub(super) fn plate(picture: &mut Picture, from: Point, to: Point) {
     picture.rect(from, to, BACKGROUND.alpha(0.85));
+}
+
+const MARKERS: [Marker; 4] = [Marker::Circle, Marker::Square, Marker::Triangle, Marker::Diamond];
+
+/// The outline of a marker.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Marker {
+    Circle,
+    Square,
+    Triangle,
+    Diamond,
+}
+
+/// Colour, marker and strokes of a series. Marker and strokes distinguish it also without colours.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Style {
+    pub colour: Colour,
+    pub marker: Marker,
+    /// Lengths of strokes and gaps; empty for a solid line.
+    pub dash: Option<[f64; 2]>,
+}
+
+impl Style {
+    /// Style of series number `index`. Colours repeat with other strokes.
+    pub fn of(index: usize) -> Self {
+        let dash = [None, Some([7.0, 4.0]), Some([2.0, 3.0])][index / SERIES.len() % 3];
+        Self { colour: SERIES[index % SERIES.len()], marker: MARKERS[index % MARKERS.len()], dash }
+    }
+
+    /// A line in its colour and strokes.
+    pub fn line(&self, picture: &mut Picture, points: &[Point], width: f64) {
+        match self.dash {
+            Some(dash) => picture.dashed(points, self.colour, width, dash),
+            None => picture.polyline(points.to_vec(), self.colour, width),
+        }
+    }
+
+    /// A filled marker.
+    pub fn marker(&self, picture: &mut Picture, at: Point, radius: f64) {
+        match self.marker {
+            Marker::Circle => picture.dot(at, radius, self.colour),
+            _ => picture.polygon(self.corners(at, radius), self.colour),
+        }
+    }
+
+    /// A hollow marker.
+    pub fn hollow(&self, picture: &mut Picture, at: Point, radius: f64) {
+        let mut inner = *self;
+        inner.colour = BACKGROUND;
+        self.marker(picture, at, radius + 0.4);
+        inner.marker(picture, at, radius - 1.0);
+    }
+
+    fn corners(&self, (x, y): Point, r: f64) -> Vec<Point> {
+        // As large in area as the circle.
+        match self.marker {
+            Marker::Circle | Marker::Square => {
+                let r = 0.89 * r;
+                vec![(x - r, y - r), (x + r, y - r), (x + r, y + r), (x - r, y + r)]
+            }
+            Marker::Triangle => {
+                let r = 1.25 * r;
+                vec![(x, y - r), (x + 0.95 * r, y + 0.7 * r), (x - 0.95 * r, y + 0.7 * r)]
+            }
+            Marker::Diamond => {
+                let r = 1.25 * r;
+                vec![(x, y - r), (x + r, y), (x, y + r), (x - r, y)]
+            }
+        }
+    }
 }

@@ -1,32 +1,32 @@
-//! Costs or errors of methods by what they were tried on, as shaded cells.
+//! Matrix of costs or errors: methods by test cases, as shaded cells.
 
-use super::look::Look;
 use super::palette::{BACKGROUND, INK, MUTED, heat};
+use super::picture::Look;
 use super::picture::{Across, Picture, Text, text};
 use super::text::shortened;
 use super::text::text_width;
 
-/// Cells of rows by columns, each a number of which more is worse: a cost over that of the best of its column, say.
+/// Shaded cells; a larger number is worse. Example: cost relative to the best of the column.
 #[derive(Clone, Debug)]
 pub struct Matrix<'a> {
     /// The title.
     pub title: &'a str,
     /// The line below the title.
     pub subject: &'a str,
-    /// What the lightest shade stands for, 1 and all below, and the darkest, 32 and all above.
+    /// Meaning of the lightest shade (1 and below) and of the darkest (32 and above).
     pub scale: [&'a str; 2],
     /// Names of the columns.
     pub columns: Vec<&'a str>,
-    /// One block of rows below the other, all with the same columns.
+    /// Blocks of rows, from top to bottom, with the same columns.
     pub panels: Vec<MatrixPanel<'a>>,
 }
 
 /// A block of rows.
 #[derive(Clone, Debug)]
 pub struct MatrixPanel<'a> {
-    /// What the block shows.
+    /// Title of the block.
     pub name: &'a str,
-    /// Name of each row with its cells; a cell without a value stays white.
+    /// Rows: name and cells. A cell without a value is white.
     pub rows: Vec<(&'a str, Vec<Option<f64>>)>,
 }
 
@@ -34,13 +34,13 @@ pub struct MatrixPanel<'a> {
 const CELL: [f64; 2] = [38.0, 120.0];
 const ROW: f64 = 26.0;
 const HEADING: f64 = 34.0;
-/// Room for the columns' names, which read upwards.
+/// Room for the names of columns, which are rotated.
 const NAMES: f64 = 150.0;
-/// The darkest shade stands for this and all above.
+/// Value of the darkest shade; larger values have it too.
 const DARKEST: f64 = 32.0;
 
 impl Matrix<'_> {
-    /// The blocks from top to bottom, columns named below the last.
+    /// Draws the blocks from top to bottom, with the names of columns below the last.
     pub fn picture(&self, look: &Look) -> Picture {
         let rows: usize = self.panels.iter().map(|panel| panel.rows.len()).sum();
         let names = self.panels.iter().flat_map(|panel| panel.rows.iter().map(|(name, _)| *name));
@@ -88,12 +88,12 @@ fn draw_cells(name: &str, cells: &[Option<f64>], (left, top, width): (f64, f64, 
     }
 }
 
-/// The place of a cost on the scale of shades: as the logarithm.
+/// Position of a cost on the scale of shades, which is logarithmic.
 fn shade(over_best: f64) -> f64 {
     (libm::log2(over_best.max(1.0)) / libm::log2(DARKEST)).clamp(0.0, 1.0)
 }
 
-/// A cost in at most four letters.
+/// A cost in at most four characters.
 fn number(value: f64) -> String {
     if value < 1.995 {
         format!("{value:.2}")
@@ -106,7 +106,7 @@ fn number(value: f64) -> String {
     }
 }
 
-/// The scale of shades from `left` on.
+/// Draws the scale of shades from `left` on.
 fn scale([least, most]: [&str; 2], (left, middle): (f64, f64), picture: &mut Picture) {
     let note = |text: Text| Text { size: 12.0, colour: MUTED, ..text };
     picture.text(note(text(least, (left, middle))));

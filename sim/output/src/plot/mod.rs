@@ -1,32 +1,30 @@
-//! The plots of a run and of charts. Each is described once as a [`Picture`] and rendered into SVG, PNG and PDF from there, as wide
-//! and with letters as large as a [`Look`] asks for.
+//! Plots of runs and charts. Each is described once as a [`Picture`], and rendered as SVG, PNG and PDF. A [`Look`] sets the width
+//! and the font size.
 //!
-//! Of a run:
+//! Plots of a run:
 //!
 //! - [`PowerRun`]: power over the whole run, with every spike.
-//! - [`FramePower`]: one frame's power over time, stacked by part.
-//! - [`FrameEnergy`]: energy of each frame, measured against true.
+//! - [`FramePower`]: power of one frame over time, stacked by part.
+//! - [`FrameEnergy`]: energy of each frame, measured and true.
 //! - [`UnitBusy`]: how busy each unit was over one frame.
 //! - [`StallLanes`]: what each unit waited for over one frame.
-//! - [`HeatMapPlot`]: where in the image something happens.
+//! - [`HeatMapPlot`]: a value over the image.
 //!
-//! Of anything else:
+//! Other plots:
 //!
 //! - [`Chart`]: panels of [`Series`] over axes of any [`Scale`].
-//! - [`Matrix`]: costs of methods by what they were tried on.
+//! - [`Matrix`]: costs of methods by test case.
 //!
-//! A unit has one colour in all of them ([`part_colour`]). Nothing to draw (no samples, no frames, nothing finite) is a plot that says
-//! so, never an error. All use of the `plotters` crate is in `render`.
+//! A unit has the same colour in all plots ([`part_colour`]). Without anything to draw (no samples, no frames, no finite value) the
+//! plot says so; this is no error. Only `render` and `text` use the crate `plotters`.
 
 mod axis;
 mod chart;
 mod columns;
-mod frame_energy;
-mod frame_power;
+mod frame_plots;
 mod heat_map;
-mod labels;
+mod lanes;
 mod legend;
-mod look;
 mod matrix;
 mod palette;
 mod panel;
@@ -34,25 +32,22 @@ mod picture;
 mod power_run;
 mod render;
 mod series;
-mod stalls;
-mod style;
 mod text;
-mod unit_busy;
 
 pub use axis::{AxisSpec, Scale};
 pub use chart::{Chart, ChartPanel};
-pub use frame_energy::{FrameEnergy, FrameEnergyPoint};
-pub use frame_power::{FramePower, PowerPart};
+pub use frame_plots::{FrameEnergy, FrameEnergyPoint};
+pub use frame_plots::{FramePower, PowerPart};
 pub use heat_map::{HeatMapPlot, HeatTile, Shading};
-pub use look::{COLUMN_MM, Look};
+pub use lanes::{StallLane, StallLanes};
+pub use lanes::{UnitBusy, UnitLane};
 pub use matrix::{Matrix, MatrixPanel};
 pub use palette::{Colour, part_colour};
 pub use picture::Picture;
+pub use picture::{COLUMN_MM, Look};
 pub use power_run::PowerRun;
 pub use render::PlotError;
 pub use series::{Mark, Paint, Series, Spread};
-pub use stalls::{StallLane, StallLanes};
-pub use unit_busy::{UnitBusy, UnitLane};
 
 #[cfg(test)]
 mod tests;

@@ -1,4 +1,4 @@
-//! The colours of plots and report. Those of units and of series can be told apart with any of the usual kinds of colour vision.
+//! Colours of plots and report. Colours of units and series are distinguishable under common colour vision deficiencies.
 
 use activity::Unit;
 use power_model::Part;
@@ -35,13 +35,13 @@ pub(super) const INK: Colour = Colour::hex(0x1f_2430);
 pub(super) const MUTED: Colour = Colour::hex(0x5b_6472);
 pub(super) const GRID: Colour = Colour::hex(0xe6_e9ee);
 pub(super) const AXIS: Colour = Colour::hex(0x9a_a2ae);
-/// Lines behind others.
+/// Grid and background lines.
 pub(super) const FAINT: Colour = Colour::hex(0xc4_cad3);
 pub(super) const MEASURED: Colour = Colour::hex(0x2f_6db3);
 pub(super) const TRUTH: Colour = Colour::hex(0xd9_5f0e);
 pub(super) const MARK: Colour = Colour::hex(0xf2_c14e);
 
-/// The colour of a unit in every plot. Neighbours in the order of units, which are neighbours in stacks, differ most.
+/// Colour of a unit in every plot. Neighbouring units, which are neighbours in stacks, differ most.
 const fn unit_colour(unit: Unit) -> Colour {
     Colour::hex(match unit {
         Unit::Command => 0x8f_e7c0,
@@ -59,7 +59,7 @@ const fn unit_colour(unit: Unit) -> Colour {
     })
 }
 
-/// The colour of a part in every plot and in the report: greys for what is drawn whether or not any unit works.
+/// Colour of a part in every plot and in the report. Power that does not depend on activity is grey.
 pub const fn part_colour(part: Part) -> Colour {
     match part {
         Part::Unit(unit) => unit_colour(unit),
@@ -70,12 +70,12 @@ pub const fn part_colour(part: Part) -> Colour {
     }
 }
 
-/// The colour of the unit called `name`; none where no unit is called so.
+/// Colour of the unit called `name`; `None` for an unknown name.
 pub(super) fn named_unit_colour(name: &str) -> Option<Colour> {
     Unit::ALL.into_iter().find(|unit| unit.name() == name).map(unit_colour)
 }
 
-/// Colours of series, in the order in which they are given out. The first four are neither red nor green beside one another.
+/// Colours of series, in order. The first four avoid red beside green.
 pub(super) const SERIES: [Colour; 8] = [
     Colour::hex(0x05_4aa1),
     Colour::hex(0xe4_8e1b),
@@ -87,18 +87,18 @@ pub(super) const SERIES: [Colour; 8] = [
     Colour::hex(0x97_464f),
 ];
 
-/// What a unit's time went to: busy, starved, blocked.
+/// Colours of the states of a unit: busy, starved, blocked.
 pub(super) const STATES: [Colour; 3] = [MEASURED, Colour::hex(0xf0_b64a), Colour::hex(0x7a_2a4f)];
 
-/// Colours of classes of a map, the first for where there is none.
+/// Colours of classes of a map; the first is that of no class.
 pub(super) const CLASSES: [Colour; 4] =
     [Colour::hex(0xf0_f2f5), Colour::hex(0xf0_b64a), Colour::hex(0x05_4aa1), Colour::hex(0x7a_2a4f)];
 
-/// Stops of the scale from idle to busy, light to dark so that it also reads in grey.
+/// Stops of the scale from idle to busy: light to dark, so that it also works in greyscale.
 const HEAT: [[u8; 3]; 6] =
     [[246, 248, 251], [208, 225, 242], [137, 190, 220], [66, 146, 198], [23, 92, 162], [10, 40, 92]];
 
-/// The colour of a `fraction` in [0, 1] on the scale from idle to busy.
+/// Colour of a `fraction` in [0, 1] on the scale from idle to busy.
 pub(super) fn heat(fraction: f64) -> Colour {
     let place = fraction.clamp(0.0, 1.0) * (HEAT.len() - 1) as f64;
     let below = (place as usize).min(HEAT.len() - 2);
@@ -117,7 +117,7 @@ mod tests {
     type Rgb = [f64; 3];
     type Matrix = [[f64; 3]; 3];
 
-    /// Usual vision and complete protanopia and deuteranopia, on linear RGB: Machado, Oliveira and Fernandes, "A
+    /// Normal vision, complete protanopia and deuteranopia, on linear RGB: Machado, Oliveira and Fernandes, "A
     /// Physiologically-based Model for Simulation of Color Vision Deficiency", 2009, severity 1.
     const VISIONS: [Matrix; 3] = [
         [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
@@ -164,7 +164,7 @@ mod tests {
         )
     }
 
-    /// How different two colours look in the vision in which they look most alike.
+    /// Smallest difference of two colours over all kinds of vision.
     fn distance(a: Colour, b: Colour) -> f64 {
         let in_vision = |vision: &Matrix| {
             let [a, b] = [a, b].map(|colour| oklab(product(vision, linear(colour))));
@@ -179,8 +179,7 @@ mod tests {
         pairs.fold(f64::INFINITY, f64::min)
     }
 
-    /// The eight colours of Okabe and Ito, made for this, are 0.076 apart by this measure; the list before had three greens and three
-    /// reds, 0.012 apart.
+    /// For comparison: the eight colours of Okabe and Ito are 0.076 apart by this measure.
     #[test]
     fn units_differ_in_every_vision() {
         let units = Unit::ALL.map(unit_colour);

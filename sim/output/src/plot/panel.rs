@@ -1,10 +1,11 @@
-//! The area that data are drawn in, with its axes.
+//! Plot area with its axes, and labels beside points that overlap nothing.
 
 use super::axis::{Axis, RAISED, TICK_PX, Tick, label_width};
-use super::palette::{AXIS, GRID, MUTED};
+use super::palette::{AXIS, Colour, GRID, MUTED};
 use super::picture::{Across, Picture, Point, Text, text};
+use super::text::text_width;
 
-/// A rectangle of the picture and the values at its edges.
+/// Rectangle of the picture, and its two axes.
 #[derive(Clone, Debug)]
 pub(super) struct Panel {
     pub left: f64,
@@ -15,12 +16,12 @@ pub(super) struct Panel {
     pub y: Axis,
 }
 
-/// Height of what is written below a panel.
+/// Height of the labels below a panel.
 pub(super) const BELOW: f64 = 50.0;
-/// Lengths of ticks, of those with and without a label.
+/// Lengths of ticks with and without a label.
 const TICKS: [f64; 2] = [5.0, 3.0];
 
-/// The room left of a panel for the labels of its axis and its name.
+/// Room left of a panel for labels and name of its axis.
 pub(super) fn aside(y: &Axis) -> f64 {
     y.widest() + if y.label.is_empty() { 14.0 } else { 34.0 }
 }
@@ -38,7 +39,7 @@ impl Panel {
         (self.x_px(x), self.y_px(y))
     }
 
-    /// Where a point is; nothing where an axis has no place for it.
+    /// Position of a point; `None` if an axis cannot show it.
     pub fn place(&self, (x, y): (f64, f64)) -> Option<Point> {
         (self.x.place(x).is_some() && self.y.place(y).is_some()).then(|| self.at(x, y))
     }
@@ -51,7 +52,7 @@ impl Panel {
         self.bottom - (self.bottom - self.top) * self.y.fraction_at(tick.at)
     }
 
-    /// Lines across at the labelled ticks of `y`, to be drawn before the data, and a break above the row of zero.
+    /// Draws grid lines at the labelled ticks of `y`, and a break above the row of zero. Called before the data are drawn.
     pub fn grid(&self, picture: &mut Picture) {
         for tick in self.y.ticks.iter().filter(|tick| !tick.label.is_empty()) {
             let y = self.tick_y(tick);
@@ -63,7 +64,7 @@ impl Panel {
         }
     }
 
-    /// Lines up at the labelled ticks of `x`.
+    /// Draws grid lines at the labelled ticks of `x`.
     pub fn grid_up(&self, picture: &mut Picture) {
         for tick in self.x.ticks.iter().filter(|tick| !tick.label.is_empty()) {
             let x = self.tick_x(tick);
@@ -75,13 +76,13 @@ impl Panel {
         }
     }
 
-    /// Axis lines, ticks, labels and names; `gap` is how far below the panel the axis across stands.
+    /// Draws axis lines, ticks, labels and names. The horizontal axis is `gap` below the panel.
     pub fn axes(&self, picture: &mut Picture, gap: f64) {
         self.axis_across(picture, gap);
         self.axis_up(picture);
     }
 
-    /// The axis up alone; a logarithmic one with its line and all its ticks.
+    /// Draws only the vertical axis; a logarithmic one with its line and all ticks.
     pub fn axis_up(&self, picture: &mut Picture) {
         if self.y.is_logarithmic() {
             let end = self.y.broken_at.map_or(self.bottom, |broken| {
@@ -101,7 +102,7 @@ impl Panel {
         picture.text(Text { across: Across::Centre, upwards: true, ..text(&self.y.label, middle) });
     }
 
-    /// The axis across alone.
+    /// Draws only the horizontal axis.
     pub fn axis_across(&self, picture: &mut Picture, gap: f64) {
         let line = self.bottom + gap;
         picture.line((self.left, line), (self.right, line), AXIS, 1.0);
@@ -114,7 +115,7 @@ impl Panel {
         picture.text(Text { across: Across::Centre, ..text(&self.x.label, middle) });
     }
 
-    /// A second axis to the right with its own labels: that of `y` times a factor, made by `axis`.
+    /// Draws a second vertical axis on the right, with its own labels: `y` times a factor, made by `axis`.
     pub fn right_axis(&self, picture: &mut Picture, axis: &Axis) {
         for tick in &axis.ticks {
             let y = self.bottom - (self.bottom - self.top) * axis.fraction_at(tick.at);
@@ -126,7 +127,7 @@ impl Panel {
     }
 }
 
-/// The label of a tick; what stands behind a `^` is raised.
+/// Draws a tick label. Digits after `^` are raised.
 pub(super) fn tick_label(picture: &mut Picture, label: &str, (x, y): Point, across: Across) {
     let (base, raised) = label.split_once('^').unwrap_or((label, ""));
     if base.is_empty() {
@@ -142,6 +143,151 @@ pub(super) fn tick_label(picture: &mut Picture, label: &str, (x, y): Point, acro
         return picture.text(Text { across, ..plain(base, (x, y)) });
     }
     picture.text(plain(base, (left, y)));
-    let behind = left + super::text::text_width(base, TICK_PX, false);
+    let behind = left + text_width(base, TICK_PX, false);
     picture.text(Text { size: RAISED * TICK_PX, ..plain(raised, (behind + 0.5, y - 5.0)) });
+}
+
+/// A name, the point it belongs to, and the radius of the point's marker.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Label<'a> {
+    pub name: &'a str,
+    pub at: Point,
+    pub radius: f64,
+    pub colour: Colour,
+    pub bold: bool,
+}
+
+/// Size of names in pixels.
+const NAME_PX: f64 = 11.5;
+/// Half the height of the free box around a name.
+const HALF: f64 = 6.5;
+/// Distances tried between marker and name, from near to far.
+const REACHES: [f64; 6] = [3.0, 8.0, 16.0, 28.0, 44.0, 64.0];
+/// Directions tried at each distance.
+const DIRECTIONS: u32 = 16;
+/// Names at this distance or farther have a line to their point.
+const LEADER: f64 = 12.0;
+
+/// Left, top, right, bottom.
+type Box4 = [f64; 4];
+
+fn overlaps(a: &Box4, b: &Box4) -> bool {
+    a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3]
+}
+
+/// Writes the names in order. Each is at the nearest position in the panel that overlaps no name, marker or line (`obstacles`).
+/// Returns the number of names without such a position; they are omitted.
+pub(super) fn write(
+    picture: &mut Picture,
+    panel: &Panel,
+    labels: &[Label<'_>],
+    obstacles: &[Point],
+) -> usize {
+    let mut taken: Vec<Box4> = obstacles.iter().map(|(x, y)| [x - 2.5, y - 2.5, x + 2.5, y + 2.5]).collect();
+    taken.extend(labels.iter().map(|Label { at: (x, y), radius: r, .. }| [x - r, y - r, x + r, y + r]));
+    let mut left_out = 0;
+    for label in labels {
+        let Some((place, reach)) = nearest(label, panel, &taken) else {
+            left_out += 1;
+            continue;
+        };
+        if reach >= LEADER {
+            let (x, y) = label.at;
+            let end = (x.clamp(place[0], place[2]), y.clamp(place[1], place[3]));
+            let length = libm::hypot(end.0 - x, end.1 - y).max(1.0);
+            let start = (x + (end.0 - x) / length * label.radius, y + (end.1 - y) / length * label.radius);
+            picture.line(start, end, AXIS, 0.8);
+        }
+        let at = (place[0] + 1.0, 0.5 * (place[1] + place[3]));
+        let (colour, bold) = (label.colour, label.bold);
+        picture.text(Text { size: NAME_PX, colour, bold, ..text(label.name, at) });
+        taken.push(place);
+    }
+    left_out
+}
+
+/// Nearest free box of a name, and its distance from the marker.
+fn nearest(label: &Label<'_>, panel: &Panel, taken: &[Box4]) -> Option<(Box4, f64)> {
+    let width = text_width(label.name, NAME_PX, label.bold) + 2.0;
+    let is_free = |place: &Box4| {
+        let inside = place[0] >= panel.left
+            && place[2] <= panel.right
+            && place[1] >= panel.top
+            && place[3] <= panel.bottom;
+        inside && !taken.iter().any(|other| overlaps(place, other))
+    };
+    REACHES.iter().find_map(|&reach| {
+        let from_marker = label.radius + reach;
+        (0..DIRECTIONS).find_map(|number| {
+            // To the right first, then on both sides of it.
+            let turn = if number % 2 == 0 { number / 2 } else { DIRECTIONS - 1 - number / 2 };
+            let angle = std::f64::consts::TAU * f64::from(turn) / f64::from(DIRECTIONS);
+            let (sin, cos) = libm::sincos(angle);
+            let (x, y) = (label.at.0 + from_marker * cos, label.at.1 - (from_marker + 0.5 * HALF) * sin);
+            // The box touches the circle with the side that faces it.
+            let left = x - 0.5 * width * (1.0 - cos);
+            let middle = y - 0.7 * HALF * sin;
+            let place = [left, middle - HALF, left + width, middle + HALF];
+            is_free(&place).then_some((place, reach))
+        })
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::axis::{Axis, Way};
+    use super::super::palette::INK;
+    use super::super::picture::Look;
+    use super::super::picture::Shape;
+    use super::*;
+
+    fn panel() -> Panel {
+        let x = Axis::new("x", "", (0.0, 1.0), (Way::Across, 400.0));
+        let y = Axis::new("y", "", (0.0, 1.0), (Way::Up, 300.0));
+        Panel { left: 0.0, top: 0.0, right: 400.0, bottom: 300.0, x, y }
+    }
+
+    fn placed(points: &[Point]) -> (usize, Vec<Box4>) {
+        let mut picture = Picture::titled(&Look::default(), (400.0, 300.0), ["", ""]);
+        let labels: Vec<Label<'_>> = points
+            .iter()
+            .map(|&at| Label { name: "lens-and-motion", at, radius: 3.0, colour: INK, bold: false })
+            .collect();
+        let left_out = write(&mut picture, &panel(), &labels, points);
+        let boxes = picture.shapes.iter().filter_map(|shape| match shape {
+            Shape::Text(text) => {
+                let (x, y) = text.at;
+                Some([x, y - 5.0, x + text_width(&text.text, text.size, text.bold), y + 5.0])
+            }
+            _ => None,
+        });
+        (left_out, boxes.collect())
+    }
+
+    #[test]
+    fn names_are_on_no_other_name_and_on_no_point() {
+        // Points in a heap, along an edge and in a corner.
+        let heap = (0..8).map(|i| (200.0 + f64::from(i % 3) * 9.0, 150.0 + f64::from(i) * 4.0));
+        let edge = (0..6).map(|i| (398.0, 20.0 + f64::from(i) * 15.0));
+        let points: Vec<Point> = heap.chain(edge).chain([(1.0, 299.0), (0.0, 0.0)]).collect();
+        let (left_out, boxes) = placed(&points);
+        assert_eq!((left_out, boxes.len()), (0, points.len()));
+        for (index, place) in boxes.iter().enumerate() {
+            assert!(boxes[..index].iter().all(|other| !overlaps(place, other)), "{place:?}");
+            assert!(
+                points.iter().all(|(x, y)| !overlaps(place, &[x - 1.0, y - 1.0, x + 1.0, y + 1.0])),
+                "{place:?}"
+            );
+            assert!(
+                place[0] >= 0.0 && place[2] <= 400.0 && place[1] >= 0.0 && place[3] <= 300.0,
+                "{place:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn names_without_room_are_counted() {
+        let (left_out, boxes) = placed(&[(200.0, 150.0); 300]);
+        assert!(left_out > 100 && left_out + boxes.len() == 300);
+    }
 }

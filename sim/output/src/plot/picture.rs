@@ -1,13 +1,14 @@
-//! A plot as a list of shapes, before it is any kind of file.
+//! A plot as a list of shapes, independent of the file format; its width, font size and title.
 
-use super::look::{Look, Paper};
+use serde::{Deserialize, Serialize};
+
 use super::palette::{Colour, INK, MUTED};
 use super::text::wrapped;
 
 /// A point in pixels of the layout, from the top left.
 pub(super) type Point = (f64, f64);
 
-/// Which point of a text its position names, across.
+/// Horizontal alignment of a text at its position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Across {
     Left,
@@ -15,21 +16,21 @@ pub(super) enum Across {
     Right,
 }
 
-/// A line of text; its position is half way up its capitals.
+/// A line of text. Its position is at half the height of capitals.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Text {
     pub text: String,
     pub at: Point,
-    /// Height of the letters' em in pixels.
+    /// Font size (em) in pixels.
     pub size: f64,
     pub colour: Colour,
     pub bold: bool,
     pub across: Across,
-    /// Turned a quarter to read upwards.
+    /// Whether the text is rotated to read upwards.
     pub upwards: bool,
 }
 
-/// Something to draw.
+/// A shape.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Shape {
     Rect { from: Point, to: Point, fill: Colour },
@@ -49,16 +50,16 @@ pub struct Picture {
     pub(super) shapes: Vec<Shape>,
 }
 
-/// Width below which margins and titles are those of a paper's column.
+/// Pictures narrower than this have margins and titles for a column of a paper.
 const NARROW: f64 = 600.0;
-/// Size of the line below the title.
+/// Font size of the line below the title.
 const SUBTITLE_PX: f64 = 13.0;
-/// Distance of its lines.
+/// Line height of it.
 const SUBTITLE_LINE: f64 = 18.0;
 
 impl Picture {
-    /// A picture with its title and a line below it, `usual` pixels wide unless `look` says otherwise, and `least` at least. It ends below
-    /// these; whatever is drawn under them sets the height anew.
+    /// A picture with a title and a line below it. It is `usual` pixels wide unless `look` sets the width, and at least `least`. Its
+    /// height is that of the titles; later drawing increases it.
     pub(super) fn titled(look: &Look, (usual, least): (f64, f64), [title, subtitle]: [&str; 2]) -> Self {
         let title = look.title.as_deref().unwrap_or(title);
         let paper = look.paper(usual, least);
@@ -89,7 +90,7 @@ impl Picture {
         self.paper.width
     }
 
-    /// Whether it is for a paper's column rather than a page or a screen.
+    /// Whether it is for a column of a paper.
     pub(super) fn is_narrow(&self) -> bool {
         self.width() < NARROW
     }
@@ -99,7 +100,7 @@ impl Picture {
         if self.is_narrow() { 8.0 } else { 24.0 }
     }
 
-    /// Says why there is nothing to see.
+    /// Shows why the plot is empty.
     pub(super) fn nothing(mut self, why: &str) -> Self {
         let at = (self.width() / 2.0, self.height + 60.0);
         self.height += 120.0;
@@ -119,7 +120,7 @@ impl Picture {
         self.shapes.push(Shape::Polyline { points, stroke, width });
     }
 
-    /// A path in strokes of `[on, off]` pixels.
+    /// A path with strokes of `[on, off]` pixels.
     pub(super) fn dashed(&mut self, points: &[Point], stroke: Colour, width: f64, dash: [f64; 2]) {
         let mut place = 0.0;
         for pair in points.windows(2) {
@@ -158,15 +159,85 @@ impl Picture {
     }
 }
 
-/// A text with the usual looks: 13 px, ink, from the left.
+/// A text in the default style: 13 px, ink, left-aligned.
 pub(super) fn text(text: &str, at: Point) -> Text {
     Text {
-        text: super::super::font::drawable(text),
+        text: super::text::drawable(text),
         at,
         size: 13.0,
         colour: INK,
         bold: false,
         across: Across::Left,
         upwards: false,
+    }
+}
+
+/// Width of a column in a two-column paper.
+pub const COLUMN_MM: f64 = 85.0;
+/// Font size of pictures of a given width, in points.
+const PAPER_LETTERS_PT: f64 = 8.0;
+/// Font size of ordinary text, in pixels of the layout.
+const LETTERS_PX: f64 = 13.0;
+/// PNG pixels per inch for pictures of a given width.
+const PNG_PER_INCH: f64 = 300.0;
+/// Pixels per inch of a screen.
+const SCREEN_PER_INCH: f64 = 96.0;
+
+/// Width, font size and title of pictures, as set by the user. The default is each picture's own.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Look {
+    /// Width in millimetres.
+    pub width_mm: Option<f64>,
+    /// Font size of ordinary text in points.
+    pub font_pt: Option<f64>,
+    /// Title in place of the picture's own. An empty one omits title and subtitle, for papers with captions.
+    pub title: Option<String>,
+}
+
+/// Size of one picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Paper {
+    /// Width in pixels of the layout, in which ordinary text is 13 pixels high.
+    pub width: f64,
+    /// PNG pixels per pixel of the layout.
+    pub zoom: f64,
+    /// Width in millimetres, if the user set it.
+    pub width_mm: Option<f64>,
+}
+
+impl Look {
+    /// Size of a picture that is `usual` pixels wide by default and needs at least `least`. For a narrower one the font is
+    /// smaller than requested.
+    pub(super) fn paper(&self, usual: f64, least: f64) -> Paper {
+        let Some(width_mm) = self.width_mm else {
+            let zoom = self.font_pt.map_or(1.0, |pt| pt / 72.0 * SCREEN_PER_INCH / LETTERS_PX);
+            return Paper { width: libm::round((usual / zoom).max(least)), zoom, width_mm: None };
+        };
+        let inches = width_mm / 25.4;
+        let letters = self.font_pt.unwrap_or(PAPER_LETTERS_PT);
+        let width = libm::round((72.0 * inches * LETTERS_PX / letters).max(least));
+        Paper { width, zoom: inches * PNG_PER_INCH / width, width_mm: Some(width_mm) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn letters_of_a_column_are_eight_points() {
+        let paper = Look { width_mm: Some(COLUMN_MM), ..Look::default() }.paper(1200.0, 300.0);
+        let points_per_px = COLUMN_MM / 25.4 * 72.0 / paper.width;
+        assert!((LETTERS_PX * points_per_px - PAPER_LETTERS_PT).abs() < 0.05, "{paper:?}");
+        assert!((paper.width * paper.zoom - COLUMN_MM / 25.4 * 300.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn larger_letters_leave_less_room_on_the_same_screen() {
+        assert_eq!(Look::default().paper(1200.0, 300.0), Paper { width: 1200.0, zoom: 1.0, width_mm: None });
+        let paper = Look { font_pt: Some(19.5), ..Look::default() }.paper(1200.0, 300.0);
+        assert_eq!((paper.width, paper.zoom), (600.0, 2.0));
+        assert_eq!(Look { font_pt: Some(39.0), ..Look::default() }.paper(1200.0, 700.0).width, 700.0);
     }
 }

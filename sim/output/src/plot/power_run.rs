@@ -3,22 +3,22 @@
 use super::axis::{Axis, Way, is_drawable};
 use super::columns::{Extremes, extremes, moving_mean};
 use super::legend::{Key, legend_lines};
-use super::look::Look;
 use super::palette::{INK, MARK, MEASURED, MUTED, TRUTH};
 use super::panel::{BELOW, Panel, aside};
+use super::picture::Look;
 use super::picture::{Across, Picture, Text, text};
 use crate::table::si;
 
-/// The sampled power of a run, with where its frames start.
+/// Sampled power of a run, with frame starts.
 #[derive(Clone, Copy, Debug)]
 pub struct PowerRun<'a> {
-    /// What was run, for the line below the title: scene, GPU, platform.
+    /// Scene, GPU and platform, for the line below the title.
     pub subject: &'a str,
     /// Samples per second.
     pub rate_hz: f64,
-    /// The time of the first sample in seconds.
+    /// Time of the first sample in seconds.
     pub start_s: f64,
-    /// The samples; what is not finite is left out.
+    /// Samples, W. Values that are not finite are omitted.
     pub power_w: &'a [f64],
     /// Frame starts found by the analysis, in seconds.
     pub found_starts_s: &'a [f64],
@@ -31,14 +31,14 @@ pub struct PowerRun<'a> {
 /// Height of a lane of frame starts in pixels.
 const LANE: f64 = 15.0;
 
-/// Frames that take up less of the run than this are shown without the idle time before and after them.
+/// If frames cover less of the run than this, the idle time before and after them is not shown.
 const SPARSE: f64 = 0.6;
-/// Frames' worth of time shown before the first start and after the last.
+/// Time shown before the first start and after the last, in frames.
 const MARGIN: [f64; 2] = [0.6, 1.6];
 
 impl PowerRun<'_> {
-    /// Every spike of the run: lowest and highest sample per column of pixels, with a mean over about one frame, the marked window, and
-    /// lanes below for the starts of frames. Where frames take up little of the run, only their part of it is shown.
+    /// Draws the lowest and highest sample per column of pixels, so that every spike is visible, a mean over about one frame, the
+    /// marked window, and lanes of frame starts. If frames cover little of the run, only their part is shown.
     pub fn picture(&self, look: &Look) -> Picture {
         let rate = format!("{} samples at {}", self.power_w.len(), si(self.rate_hz, "Hz"));
         let shown = self.shown();
@@ -78,7 +78,7 @@ impl PowerRun<'_> {
         self.start_s + self.power_w.len() as f64 / self.rate_hz
     }
 
-    /// The part of the run that is shown; nothing where there is no time.
+    /// The part of the run that is shown; `None` for a run without duration.
     fn shown(&self) -> Option<Self> {
         if !(self.rate_hz > 0.0 && is_drawable(self.start_s, self.end_s())) {
             return None;
@@ -86,7 +86,7 @@ impl PowerRun<'_> {
         Some(self.around_frames().unwrap_or(*self))
     }
 
-    /// The part with frames, where these take up little of the run.
+    /// The part with frames, if they cover little of the run.
     fn around_frames(&self) -> Option<Self> {
         let starts = if self.true_starts_s.is_empty() { self.found_starts_s } else { self.true_starts_s };
         let inside = |start: &&f64| (self.start_s..self.end_s()).contains(*start);
@@ -106,7 +106,7 @@ impl PowerRun<'_> {
         })
     }
 
-    /// The panel, at the top of the picture.
+    /// Panel at the top of the picture.
     fn panel(&self, picture: &Picture) -> Option<Panel> {
         let finite = || self.power_w.iter().copied().filter(|power| power.is_finite());
         let (low, high) = (finite().reduce(f64::min)?, finite().reduce(f64::max)?);
@@ -140,10 +140,10 @@ impl PowerRun<'_> {
         let columns = extremes(self.power_w, (panel.right - panel.left) as usize);
         let width = (panel.right - panel.left) / columns.len() as f64;
         let mut first = 0;
-        for stretch in columns.split(Option::is_none) {
-            let values: Vec<Extremes> = stretch.iter().flatten().copied().collect();
+        for segment in columns.split(Option::is_none) {
+            let values: Vec<Extremes> = segment.iter().flatten().copied().collect();
             let left = panel.left + first as f64 * width;
-            first += stretch.len() + 1;
+            first += segment.len() + 1;
             if values.is_empty() {
                 continue;
             }
@@ -155,7 +155,7 @@ impl PowerRun<'_> {
         }
     }
 
-    /// The window of the low-pass line and its points; none where that would be one sample.
+    /// Window of the low-pass line, and its points; `None` for a window of one sample.
     fn mean(&self, panel: &Panel) -> Option<(f64, Vec<(f64, f64)>)> {
         let wanted_s = self.typical_frame_s().unwrap_or((self.end_s() - self.start_s) / 60.0);
         let width = (libm::round(wanted_s * self.rate_hz) as usize).min(self.power_w.len());
@@ -167,7 +167,7 @@ impl PowerRun<'_> {
         Some((width as f64 / self.rate_hz, points.collect()))
     }
 
-    /// The median distance of starts, found or true.
+    /// Median distance of starts, found or true.
     fn typical_frame_s(&self) -> Option<f64> {
         let starts = if self.found_starts_s.len() > 1 { self.found_starts_s } else { self.true_starts_s };
         let mut gaps: Vec<f64> = starts.windows(2).map(|pair| pair[1] - pair[0]).collect();
@@ -176,7 +176,7 @@ impl PowerRun<'_> {
         gaps.get(gaps.len() / 2).copied()
     }
 
-    /// Draws a lane of ticks for each kind of start and returns the height they take.
+    /// Draws a lane of ticks for each kind of start. Returns their height.
     fn lanes(&self, panel: &Panel, picture: &mut Picture) -> f64 {
         let mut top = panel.bottom + 9.0;
         let lanes = [("true", self.true_starts_s, TRUTH), ("found", self.found_starts_s, MEASURED)];
@@ -210,7 +210,7 @@ impl PowerRun<'_> {
     }
 }
 
-/// Fewer samples than columns of pixels: a line from sample to sample, with dots while there is room for them.
+/// For fewer samples than columns of pixels: a line through the samples, with dots if there is room.
 fn draw_each(panel: &Panel, values: &[Extremes], left: f64, width: f64, picture: &mut Picture) {
     let places = values.iter().enumerate();
     let points: Vec<_> =
@@ -221,8 +221,8 @@ fn draw_each(panel: &Panel, values: &[Extremes], left: f64, width: f64, picture:
     picture.polyline(points, MEASURED, 1.5);
 }
 
-/// The outline of columns from their lowest to their highest value, each at least a pixel high and touching its
-/// neighbours, so that a jump between two samples shows as a line.
+/// Outline of columns from lowest to highest value. Each is at least a pixel high and touches its neighbours, so that a
+/// jump between two samples is a line.
 fn outline(panel: &Panel, values: &[Extremes], left: f64, width: f64) -> Vec<(f64, f64)> {
     let mut upper = Vec::with_capacity(values.len() * 4);
     let mut lower = Vec::with_capacity(values.len() * 2);
@@ -280,7 +280,7 @@ mod tests {
         assert_eq!(polygons, 2);
     }
 
-    /// Four frames in the middle of a recording took up an eighth of the axis.
+    /// Four frames in a long recording: the idle time around them is not shown.
     #[test]
     fn frames_fill_the_axis_however_long_the_lead_in() {
         let power_w = vec![1.0; 28_333];

@@ -1,15 +1,15 @@
-//! Series: what is drawn within a panel, each with its style.
+//! Series: the data drawn in a panel, each with its style.
 
 use super::legend::Key;
+use super::legend::Style;
 use super::palette::{BACKGROUND, FAINT, INK};
 use super::panel::Panel;
 use super::picture::{Picture, Point};
-use super::style::Style;
 
-/// Something to draw.
+/// Kind and data of a series.
 #[derive(Clone, Debug)]
 pub enum Mark {
-    /// From a lowest to a highest value at each place, as a filled strip.
+    /// A filled band from the lowest to the highest value at each position.
     Band(Vec<(f64, f64, f64)>),
     /// A line through points.
     Line(Vec<(f64, f64)>),
@@ -21,26 +21,26 @@ pub enum Mark {
     Dots(Vec<(f64, f64, String)>),
     /// Hollow markers, each with a name that may be empty.
     Rings(Vec<(f64, f64, String)>),
-    /// Large markers, each with a cross as long as its spread.
+    /// Large markers, each with a cross that shows its spread.
     Spreads(Vec<Spread>),
-    /// The frontier of points of which less across is better: level until the next point, then straight to it.
+    /// Pareto frontier as a staircase: level until the next point.
     Steps(Vec<(f64, f64)>),
     /// Bars from zero, `(from, to, height)`.
     Bars(Vec<(f64, f64, f64)>),
-    /// Lines from bottom to top.
+    /// Vertical lines.
     Uprights(Vec<f64>),
 }
 
 /// A point with its spread.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Spread {
-    /// Where it is.
+    /// Position.
     pub at: (f64, f64),
-    /// From where to where across.
+    /// Horizontal range.
     pub across: [f64; 2],
-    /// From where to where up.
+    /// Vertical range.
     pub up: [f64; 2],
-    /// Its name; it may be empty.
+    /// Name; may be empty.
     pub name: String,
 }
 
@@ -52,35 +52,35 @@ impl Spread {
     }
 }
 
-/// Which colour and marker a series has.
+/// Choice of colour and marker of a series.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Paint {
-    /// Those of its place in the panel.
+    /// By its index in the panel.
     #[default]
     Own,
-    /// Those of the series at a place.
+    /// Those of the series with this index.
     Like(usize),
-    /// The colour of letters.
+    /// The colour of text.
     Ink,
-    /// That of lines behind others.
+    /// The colour of background lines.
     Grey,
 }
 
 /// A named mark.
 #[derive(Clone, Debug)]
 pub struct Series {
-    /// Its name in the legend; empty for one that is not in it.
+    /// Name in the legend; without a name the series is not in the legend.
     pub name: String,
-    /// What the panel says of it, for example its exponent.
+    /// Note in the panel, for example an exponent.
     pub note: String,
-    /// Its points, from left to right where they are connected; those that an axis has no place for are left out.
+    /// Data. Connected points are ordered from left to right. Points that an axis cannot show are omitted.
     pub mark: Mark,
     /// Its colour and marker.
     pub paint: Paint,
 }
 
 impl Series {
-    /// A mark with a name and the usual style.
+    /// A series in the default style.
     pub fn new(name: impl Into<String>, mark: Mark) -> Self {
         Self { name: name.into(), note: String::new(), mark, paint: Paint::Own }
     }
@@ -96,7 +96,7 @@ impl Series {
         Self { paint, ..self }
     }
 
-    /// How it is drawn as number `index` of a panel.
+    /// Style of the series with this index in a panel.
     pub(super) fn style(&self, index: usize) -> Style {
         match self.paint {
             Paint::Own => Style::of(index),
@@ -109,11 +109,11 @@ impl Series {
 
 /// Radius of a marker of a point among many, of a named one, and of the middle of a spread.
 const RADII: [f64; 3] = [2.4, 3.0, 5.5];
-/// More points than this are drawn smaller.
+/// A series of more points has smaller markers.
 const MANY: usize = 60;
 
 impl Mark {
-    /// Every value of `x` and `y` that the axes have to show.
+    /// All values of `x` and `y` that the axes must include.
     pub(super) fn values(&self) -> [Vec<f64>; 2] {
         let points: Vec<Point> = match self {
             Self::Band(band) => band.iter().flat_map(|&(x, low, high)| [(x, low), (x, high)]).collect(),
@@ -128,7 +128,7 @@ impl Mark {
         finite.unzip::<f64, f64, Vec<f64>, Vec<f64>>().into()
     }
 
-    /// Whether it has markers, which keep off the frame.
+    /// Whether it has markers; axes leave room for them.
     pub(super) fn has_markers(&self) -> bool {
         matches!(self, Self::Curve(_) | Self::Dots(_) | Self::Rings(_) | Self::Spreads(_))
     }
@@ -148,7 +148,7 @@ impl Mark {
         }
     }
 
-    /// Names of points with where these are, and the radius that is kept free around them.
+    /// Names of points with positions, and the radius that stays free around them.
     pub(super) fn names(&self, panel: &Panel) -> Vec<(Point, f64, &str)> {
         let named =
             |x: f64, y: f64, name: &'_ String| (!name.is_empty()).then(|| panel.place((x, y))).flatten();
@@ -165,7 +165,7 @@ impl Mark {
         }
     }
 
-    /// Where its markers are, and along its lines some places: what names keep off.
+    /// Positions of its markers and along its lines, which labels must not overlap.
     pub(super) fn obstacles(&self, panel: &Panel) -> Vec<Point> {
         let path =
             |points: &[(f64, f64)]| points.iter().filter_map(|&point| panel.place(point)).collect::<Vec<_>>();
@@ -182,7 +182,7 @@ impl Mark {
         }
     }
 
-    /// Draws it; `beneath` is how many curves come after it, as one below another is seen beside it where it is thicker.
+    /// Draws it. A curve with `beneath` curves above it is thicker, so that it stays visible beneath them.
     pub(super) fn draw(&self, panel: &Panel, style: Style, beneath: usize, picture: &mut Picture) {
         let path =
             |points: &[(f64, f64)]| points.iter().filter_map(|&point| panel.place(point)).collect::<Vec<_>>();
@@ -244,13 +244,13 @@ impl Mark {
     }
 }
 
-/// Level from each point until the next, then straight up or down to it.
+/// Staircase: level from each point to the next, then vertical.
 fn stairs(points: &[Point]) -> Vec<Point> {
     let corners = points.windows(2).flat_map(|pair| [pair[0], (pair[1].0, pair[0].1)]);
     corners.chain(points.last().copied()).collect()
 }
 
-/// Places along a path, some pixels apart.
+/// Positions along a path, some pixels apart.
 fn along(path: &[Point]) -> Vec<Point> {
     let between = |pair: &[Point]| {
         let ((ax, ay), (bx, by)) = (pair[0], pair[1]);
@@ -263,8 +263,8 @@ fn along(path: &[Point]) -> Vec<Point> {
     path.windows(2).flat_map(between).chain(path.first().copied()).collect()
 }
 
-/// From where to where a place of a band is drawn: halfway to its neighbours, and never thinner than a pixel, so that a
-/// lone spike is still seen.
+/// Horizontal extent of a position of a band: halfway to its neighbours, and at least a pixel, so that a single spike
+/// is visible.
 fn width_px(band: &[(f64, f64, f64)], index: usize, panel: &Panel) -> (f64, f64) {
     let x_px = |index: usize| band.get(index).map(|place| panel.x_px(place.0));
     let x = panel.x_px(band[index].0);

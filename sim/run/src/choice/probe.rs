@@ -9,7 +9,7 @@ use pipeline::frame::render_with_heat;
 use pipeline::{PipelineSpec, Settings, Viewport};
 use timing::{FrameClock, Level, Recorder};
 
-use super::decide::Findings;
+use super::Findings;
 use super::{ProbeSummary, with_blur_thresholds};
 use crate::{Distinct, FrameCost, Plan, RunError, frame};
 

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use serde_json::Value;
 
+use super::Change;
 use super::CompareError;
-use super::numbers::Change;
 
 /// File of a run that is compared.
 pub(super) const SUMMARY: &str = "summary.json";

@@ -8,7 +8,7 @@ use workloads::points::poisson::{
 };
 use workloads::points::thin_regions_warning;
 
-use super::file::Points;
+use super::Points;
 use super::{Common, Failure, usage};
 use output::progress::Progress;
 use output::terminal::Terminal;
@@ -85,7 +85,7 @@ fn make<const D: usize>(
     args: &PoissonArgs,
     terminal: &Terminal,
 ) -> Result<PoissonDisk<D>, Failure> {
-    let pool = crate::cli::threads(args.common.threads)?;
+    let pool = args.common.threads.pool()?;
     let volume = ball(D) * spec.radius.powi(D as i32);
     let progress = Progress::on(terminal, false);
     let points = saturation(D) / volume;
@@ -145,8 +145,8 @@ mod tests {
     use clap::Parser;
 
     use super::*;
-    use crate::cli::args::{Cli, Command};
     use crate::cli::sample::Kind;
+    use crate::cli::{Cli, Command};
 
     fn parsed(rest: &[&str]) -> Result<PoissonArgs, String> {
         let typed = ["quintile", "sample", "poisson"].iter().chain(rest);

@@ -7,7 +7,7 @@ use serde::Serialize;
 use workloads::points::volume::{Bounds, Inside, Sampled, Solid, Torus};
 use workloads::visibility::load_surface;
 
-use super::file::Points;
+use super::Points;
 use super::{Common, Failure, usage};
 
 /// Arguments of `sample volume`.
@@ -71,7 +71,7 @@ struct Facts {
 
 pub(super) fn run(args: &VolumeArgs) -> Result<(), Failure> {
     args.common.check(args.mesh.as_deref())?;
-    let pool = crate::cli::threads(args.common.threads)?;
+    let pool = args.common.threads.pool()?;
     pool.install(|| match &args.mesh {
         Some(path) => {
             let mesh = load_surface(path)?;
@@ -138,7 +138,7 @@ fn sample(args: &VolumeArgs, solid: &dyn Inside, bounds: &Bounds, volume: f64) -
 mod tests {
     use clap::Parser;
 
-    use crate::cli::args::{Cli, Command};
+    use crate::cli::{Cli, Command};
     use output::terminal::Terminal;
 
     #[test]

@@ -7,7 +7,7 @@ use clap::Args;
 use serde::Serialize;
 use workloads::points::white::{Density, ImageDensity, Named, Numbers, WhiteSpec, columns_for, white_noise};
 
-use super::file::Points;
+use super::Points;
 use super::{Common, Failure, usage};
 
 /// Arguments of `sample white`.
@@ -71,7 +71,7 @@ fn sample<const D: usize>(args: &WhiteArgs, density: &dyn Density<D>) -> Result<
     let columns = args.columns.unwrap_or_else(|| columns_for(D));
     let seed = args.common.seed;
     let spec = WhiteSpec { count: args.count as usize, seed, across: columns, numbers };
-    let pool = crate::cli::threads(args.common.threads)?;
+    let pool = args.common.threads.pool()?;
     let found = pool.install(|| white_noise(density, &spec)).map_err(usage)?;
     let line = format!("{} candidates", found.candidates);
     let facts = Facts { seed, candidates: found.candidates, columns, low_discrepancy: args.low_discrepancy };

@@ -1,22 +1,53 @@
 //! `quintile trace align`.
 
 use std::io::Write;
+use std::path::PathBuf;
 
+use clap::Args;
+use output::terminal::Terminal;
 use serde_json::json;
 use traces::align::{AlignError, Alignment};
 use traces::io::TraceHeader;
 use traces::io::atomic::write_file;
 use traces::times::read_times;
 use traces::trace::is_within;
-
-use super::failure::wrong;
-use super::report;
-use crate::cli::Failure;
-use crate::cli::args::trace::AlignArgs;
-use crate::cli::outputs::may_hold_results;
-use crate::cli::terminal::print_json;
-use output::terminal::Terminal;
 use warnings::Code;
+
+use super::report;
+use super::wrong;
+use crate::cli::Failure;
+use crate::cli::outputs::may_hold_results;
+use crate::cli::outputs::print_json;
+use crate::cli::trace::input::{FindArgs, InputArgs, anchor};
+
+/// Arguments of `trace align`.
+#[derive(Clone, Debug, Args)]
+#[command(
+    after_help = "Examples:\n  quintile trace align meter.csv stamps.csv --anchor 0.0=2.513 --anchor 33.1=35.613\n  quintile trace align meter.csv stamps.csv --mark 2.513"
+)]
+pub struct AlignArgs {
+    /// The trace.
+    #[command(flatten)]
+    pub input: InputArgs,
+    /// Recorded stamps: a number in each line, in seconds, or a table with a column start, time, mark or stamp, its unit in its name (time_s, stamp_ms)
+    #[arg(value_name = "STAMPS")]
+    pub stamps: PathBuf,
+    /// A stamp and its time in the trace, twice; without them the best fit to the frames found
+    #[arg(long, value_name = "STAMP=TIME", value_parser = anchor, allow_hyphen_values = true)]
+    pub anchor: Vec<(f64, f64)>,
+    /// The frames.
+    #[command(flatten)]
+    pub find: FindArgs,
+    /// File for the stamps with their times; `-` prints them and nothing else
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+    /// Print as JSON and nothing else
+    #[arg(long)]
+    pub json: bool,
+    /// Whether the result goes to standard output.
+    #[arg(skip)]
+    pub piped: bool,
+}
 
 impl From<AlignError> for Failure {
     fn from(error: AlignError) -> Self {

@@ -2,17 +2,45 @@
 
 use std::path::{Path, PathBuf};
 
+use clap::Args;
+use output::perfetto::{self, CounterTrack, MAX_POINTS, Thinner, Timeline};
+use output::terminal::Terminal;
 use serde_json::json;
 use traces::io::{self, FORMATS, TraceChunk, TraceHeader, TraceReader, TraceWriter, WriteError, atomic, csv};
 
-use super::failure::wrong;
 use super::report;
+use super::wrong;
 use crate::cli::Failure;
-use crate::cli::args::trace::ConvertArgs;
 use crate::cli::outputs::may_hold_results;
-use crate::cli::terminal::print_json;
-use output::perfetto::{self, CounterTrack, MAX_POINTS, Thinner, Timeline};
-use output::terminal::Terminal;
+use crate::cli::outputs::print_json;
+use crate::cli::trace::input::{InputArgs, TraceFormat};
+
+/// Arguments of `trace convert`.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = "Example:\n  quintile trace convert meter.csv.gz meter.parquet --repair")]
+pub struct ConvertArgs {
+    /// The trace.
+    #[command(flatten)]
+    pub input: InputArgs,
+    /// File to write: .parquet, .jls (Joulescope), .csv, .tsv, .csv.gz, .tsv.gz or .perfetto-trace; `-` is standard output
+    #[arg(value_name = "OUT", required_unless_present = "named")]
+    pub last: Option<PathBuf>,
+    /// The same as OUT
+    #[arg(long = "out", id = "named", value_name = "FILE", conflicts_with = "last")]
+    pub named: Option<PathBuf>,
+    /// The file to write, however it was given.
+    #[arg(skip)]
+    pub out: PathBuf,
+    /// Print what was read, repaired and written as JSON
+    #[arg(long)]
+    pub json: bool,
+    /// Format of standard output, where OUT is `-` (default: csv)
+    #[arg(long, value_enum, value_name = "FORMAT")]
+    pub format: Option<TraceFormat>,
+    /// Whether the result goes to standard output.
+    #[arg(skip)]
+    pub piped: bool,
+}
 
 /// About the bytes of a row of CSV. Files of more than [`LARGE_BYTES`] are announced.
 const ROW_BYTES: u64 = 50;

@@ -1,22 +1,53 @@
 //! `quintile trace frames`.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
+use clap::Args;
+use output::table::{Table, counted, si, si_digits};
+use output::terminal::Terminal;
 use serde::Serialize;
 use serde_json::{Value, json};
 use traces::energy::{FrameTable, InverseUnits, Summary, whole};
 use traces::frames::{Rule, Threshold};
+use warnings::Code;
 
-use super::failure::wrong;
 use super::input::Frames;
 use super::report;
-use crate::cli::args::trace::FramesArgs;
+use super::wrong;
+use crate::cli::Failure;
+use crate::cli::args::ThreadArgs;
 use crate::cli::outputs::may_hold_results;
-use crate::cli::terminal::print_json;
-use crate::cli::{Failure, threads};
-use output::table::{Table, counted, si, si_digits};
-use output::terminal::Terminal;
-use warnings::Code;
+use crate::cli::outputs::print_json;
+use crate::cli::trace::input::{FindArgs, InputArgs};
+
+/// Arguments of `trace frames`.
+#[derive(Clone, Debug, Args)]
+#[command(
+    after_help = "Example:\n  quintile trace frames meter.parquet --mark 2.513 --pixels 921600 --out frames.csv"
+)]
+pub struct FramesArgs {
+    /// The trace.
+    #[command(flatten)]
+    pub input: InputArgs,
+    /// The frames.
+    #[command(flatten)]
+    pub find: FindArgs,
+    /// File for the table of frames; `-` prints it and nothing else
+    #[arg(long, value_name = "FRAMES.csv")]
+    pub out: Option<PathBuf>,
+    /// Also give inverse units, with what is wrong about averaging them
+    #[arg(long)]
+    pub inverse: bool,
+    /// Worker threads.
+    #[command(flatten)]
+    pub threads: ThreadArgs,
+    /// Print everything as JSON and nothing else
+    #[arg(long)]
+    pub json: bool,
+    /// Whether the result goes to standard output.
+    #[arg(skip)]
+    pub piped: bool,
+}
 
 /// Frames shown on the terminal.
 const SHOWN: usize = 12;
@@ -25,7 +56,7 @@ pub(super) fn run(args: &FramesArgs, terminal: &Terminal) -> Result<(), Failure>
     let inputs = args.find.mark_file.as_deref().into_iter().chain([args.input.trace.as_path()]);
     may_hold_results(("--out", args.out.as_deref()), inputs)?;
     args.out.as_deref().map_or(Ok(()), is_table)?;
-    let (frames, table, summary, pixels) = threads(args.threads)?.install(|| {
+    let (frames, table, summary, pixels) = args.threads.pool()?.install(|| {
         let mut frames = args.find.frames(&args.input, &args.input.trace, terminal)?;
         let pixels = args.find.pixels.or(frames.metadata.pixels);
         let table = FrameTable::new(std::mem::take(&mut frames.energies), pixels);
@@ -114,7 +145,7 @@ fn text(frames: &Frames, table: &FrameTable, summary: Option<Summary>, pixels: O
     let mut lines = String::new();
     if let Some(p) = &frames.proposal {
         lines += &format!(
-            "proposed mark: {} s, the most even of {} rises: {} alike divide {:.0} % of the stretch evenly\n",
+            "proposed mark: {} s, the most even of {} rises: {} similar ones divide {:.0} % of the trace evenly\n",
             p.mark_s,
             p.tried,
             p.alike,

@@ -1,22 +1,162 @@
 //! Reading a trace, its marks and its frames, by the arguments.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
+use clap::{Args, ValueEnum};
+use output::terminal::Terminal;
 use traces::energy::{FrameEnergy, PowerIntegral};
 use traces::frames::{Found, Marks, Method, Options, Proposal, Window, find_with, propose};
 use traces::io::{ReadOptions, Recording, Repair, Rows, TraceReader, open, rail_of_sums, read};
-use traces::stream;
 use traces::times::read_times;
 use traces::trace::RATE_LIMITS_HZ;
-use traces::{Metadata, Trace};
-
-use super::failure::wrong;
-use super::pipes::shown;
-use crate::cli::Failure;
-use crate::cli::args::trace::{FindArgs, InputArgs};
-use output::terminal::Terminal;
+use traces::{Metadata, Trace, stream};
 use warnings::Code;
+
+use super::pipes::shown;
+use super::wrong;
+use crate::cli::Failure;
+use crate::cli::quantity::{milliseconds, positive_voltage, rate, time};
+
+/// Formats of traces that are written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+#[allow(missing_docs, reason = "the names of the formats")]
+pub enum TraceFormat {
+    Csv,
+    Tsv,
+    #[value(name = "csv.gz")]
+    CsvGz,
+    #[value(name = "tsv.gz")]
+    TsvGz,
+    Parquet,
+    Jls,
+    PerfettoTrace,
+}
+
+impl TraceFormat {
+    /// The ending of files of this format.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Csv => "csv",
+            Self::Tsv => "tsv",
+            Self::CsvGz => "csv.gz",
+            Self::TsvGz => "tsv.gz",
+            Self::Parquet => "parquet",
+            Self::Jls => "jls",
+            Self::PerfettoTrace => "perfetto-trace",
+        }
+    }
+}
+
+/// A trace and how to read it.
+#[derive(Clone, Debug, Args)]
+pub struct InputArgs {
+    /// A trace: Parquet, JLS (Joulescope), CSV or TSV, the latter two also compressed with gzip; `-` reads standard input
+    #[arg(value_name = "TRACE")]
+    pub trace: PathBuf,
+    /// A rail to read, by the name its columns carry; several are added up. All without it
+    #[arg(long, value_name = "NAME")]
+    pub rail: Vec<String>,
+    /// The column of times, by name or number from 1
+    #[arg(long, value_name = "COLUMN")]
+    pub time_column: Option<String>,
+    /// The column of voltages
+    #[arg(long, value_name = "COLUMN")]
+    pub voltage_column: Option<String>,
+    /// The column of currents
+    #[arg(long, value_name = "COLUMN")]
+    pub current_column: Option<String>,
+    /// A column of power instead of voltage and current
+    #[arg(long, value_name = "COLUMN")]
+    pub power_column: Option<String>,
+    /// Voltage by specification instead of a measured one, in V
+    #[arg(long, value_name = "V", allow_hyphen_values = true, value_parser = positive_voltage)]
+    pub voltage: Option<f64>,
+    /// Samples per second, where the file does not say: a number in Hz, or with its unit, such as 50kHz
+    #[arg(long, value_name = "HZ", allow_hyphen_values = true, value_parser = rate)]
+    pub rate: Option<f64>,
+    /// Time of the first sample, where the file has no times: a number in seconds, or with its unit, such as 20ms
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = time)]
+    pub start: Option<f64>,
+    /// The first line holds numbers, not names
+    #[arg(long)]
+    pub no_header: bool,
+    /// Repair the input: drop values that are not finite, sort times, fill gaps; the repairs are listed
+    #[arg(long)]
+    pub repair: bool,
+}
+
+/// Which frames.
+#[derive(Clone, Debug, Args)]
+pub struct FindArgs {
+    /// The start of one frame, in seconds or with its unit; may be given several times
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = time)]
+    pub mark: Vec<f64>,
+    /// A file of starts: a number in each line, in seconds, or a table with a column start or time, its unit in its name (start_s, time_ms)
+    #[arg(long, value_name = "FILE")]
+    pub mark_file: Option<PathBuf>,
+    /// Propose a start
+    #[arg(long, conflicts_with_all = ["mark", "mark_file"])]
+    pub auto: bool,
+    /// Where the last frame ends, in seconds or with its unit; the end of the trace without it
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = time)]
+    pub end: Option<f64>,
+    /// What is compared: times before and after the mark, in milliseconds or with their units
+    #[arg(long, value_name = "PRE,POST", value_parser = window, default_value = "1,4", allow_hyphen_values = true)]
+    pub window: (f64, f64),
+    /// How: `squares`, `normalized`, `tracking`, or `auto`
+    #[arg(long, value_name = "METHOD", default_value_t)]
+    pub method: Method,
+    /// Read in pieces even if the trace would fit into memory (sum of squares)
+    #[arg(long)]
+    pub stream: bool,
+    /// Pixels in a frame, for energy per pixel
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    pub pixels: Option<u64>,
+}
+
+/// Two values separated by `between`; `form` describes them in errors.
+fn two(
+    text: &str,
+    between: &str,
+    form: &str,
+    value: fn(&str) -> Result<f64, String>,
+) -> Result<(f64, f64), String> {
+    let (a, b) = text.split_once(between).ok_or_else(|| format!("`{text}` is not of the form {form}"))?;
+    let value =
+        |part: &str| value(part).map_err(|error| format!("`{text}` is not of the form {form}: {error}"));
+    Ok((value(a)?, value(b)?))
+}
+
+/// Times before and after a mark, s.
+pub(super) fn window(text: &str) -> Result<(f64, f64), String> {
+    two(text, ",", "PRE,POST in milliseconds or with units, for example 1,4 or 500us,4ms", milliseconds)
+}
+
+/// A segment of a trace, s.
+pub(super) fn segment(text: &str) -> Result<(f64, f64), String> {
+    let (a, b) =
+        two(text, "..", "A..B in seconds or with units, for example 0.1..0.4 or 100ms..400ms", time)?;
+    if a < b {
+        Ok((a, b))
+    } else {
+        Err(format!("`{text}` ends before it begins; the earlier time comes first"))
+    }
+}
+
+/// A stamp and its time in the trace, s.
+pub(super) fn anchor(text: &str) -> Result<(f64, f64), String> {
+    two(text, "=", "STAMP=TIME in seconds or with units, for example 0.5=2.513", time)
+}
+
+/// The name of a pass and when it begins after the start of its frame, s.
+pub(super) fn pass(text: &str) -> Result<(String, f64), String> {
+    let form = "NAME=MS, for example light=4.2 or light=4200us";
+    let (name, begins) = text.split_once('=').ok_or_else(|| format!("`{text}` is not of the form {form}"))?;
+    let begins_s =
+        milliseconds(begins).map_err(|error| format!("`{text}` is not of the form {form}: {error}"))?;
+    Ok((name.to_owned(), begins_s))
+}
 
 /// Traces of more samples are read in pieces.
 const MAX_SAMPLES_IN_MEMORY: u64 = 1 << 24;

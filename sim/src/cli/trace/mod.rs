@@ -3,7 +3,6 @@
 mod align;
 mod convert;
 mod energy;
-mod failure;
 mod frames;
 mod input;
 mod pareto;
@@ -11,12 +10,53 @@ mod pipes;
 mod plot;
 mod sample;
 
-use super::Failure;
-use super::args::trace::{TraceArgs, TraceCommand};
-use super::terminal::print;
+use align::AlignArgs;
+use clap::{Args, Subcommand};
+use convert::ConvertArgs;
+use energy::EnergyArgs;
+use frames::FramesArgs;
 use output::terminal::Terminal;
-
+use pareto::ParetoArgs;
 use pipes::Pipes;
+use plot::PlotArgs;
+use sample::SampleArgs;
+use traces::frames::MarkError;
+use traces::io::{ReadError, WriteError};
+use traces::stream::StreamError;
+use traces::times::TimesError;
+
+use super::Failure;
+use super::outputs::print;
+
+/// Arguments of `trace`.
+#[derive(Clone, Debug, Args)]
+#[command(
+    after_help = "Example:\n  quintile trace frames meter.csv --mark 2.513 --out frames.csv\n  quintile trace plot meter.csv --from 2 --to 3 --out curve.svg"
+)]
+pub struct TraceArgs {
+    /// The subcommand.
+    #[command(subcommand)]
+    pub command: TraceCommand,
+}
+
+/// Subcommands of `trace`.
+#[derive(Clone, Debug, Subcommand)]
+pub enum TraceCommand {
+    /// Find every frame that begins like a marked one, and its energy from start to start
+    Frames(Box<FramesArgs>),
+    /// Energy between times, idle taken off, warm-up, outliers, repeated runs, passes within frames
+    Energy(Box<EnergyArgs>),
+    /// Put recorded time stamps onto the time of a trace
+    Align(Box<AlignArgs>),
+    /// Read a trace and write it as Parquet, JLS (Joulescope), CSV, TSV (with .gz if so named) or a Perfetto timeline
+    Convert(ConvertArgs),
+    /// Record a trace anew with a coarser device: rate, range, bits, errors, noise
+    Sample(Box<SampleArgs>),
+    /// Draw a trace or its frames
+    Plot(Box<PlotArgs>),
+    /// Pareto-optimal settings of a table, by time and energy
+    Pareto(ParetoArgs),
+}
 
 pub(super) fn run(args: &TraceArgs, terminal: &Terminal) -> Result<(), Failure> {
     let mut args = args.clone();
@@ -43,4 +83,52 @@ fn run_on_files(args: &TraceArgs, terminal: &Terminal) -> Result<(), Failure> {
         TraceCommand::Plot(args) => plot::run(args, terminal),
         TraceCommand::Pareto(args) => pareto::run(args, terminal),
     }
+}
+
+impl From<ReadError> for Failure {
+    fn from(error: ReadError) -> Self {
+        let wrong = matches!(
+            error,
+            ReadError::MissingColumn { .. } | ReadError::Format { .. } | ReadError::Conflict { .. }
+        ) || matches!(&error, ReadError::Io { source, .. } if source.kind() == std::io::ErrorKind::NotFound);
+        Self { message: error.to_string(), code: if wrong { 2 } else { 1 } }
+    }
+}
+
+impl From<MarkError> for Failure {
+    fn from(error: MarkError) -> Self {
+        Self { message: error.to_string(), code: 2 }
+    }
+}
+
+impl From<TimesError> for Failure {
+    fn from(error: TimesError) -> Self {
+        let failed =
+            matches!(error, TimesError::Io { .. } | TimesError::Folder { .. } | TimesError::Empty { .. });
+        Self { message: error.to_string(), code: if failed { 1 } else { 2 } }
+    }
+}
+
+impl From<StreamError> for Failure {
+    fn from(error: StreamError) -> Self {
+        match error {
+            StreamError::Read(error) => error.into(),
+            StreamError::Mark(error) => error.into(),
+        }
+    }
+}
+
+impl From<WriteError> for Failure {
+    fn from(error: WriteError) -> Self {
+        match error {
+            WriteError::Read(error) => error.into(),
+            WriteError::Source(error) => wrong(error.to_string()),
+            error => Self { message: error.to_string(), code: 1 },
+        }
+    }
+}
+
+/// Wrong arguments.
+fn wrong(message: impl Into<String>) -> Failure {
+    Failure { message: message.into(), code: 2 }
 }

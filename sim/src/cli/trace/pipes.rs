@@ -7,9 +7,9 @@ use std::path::{Path, PathBuf};
 
 use tempfile::TempDir;
 
-use super::failure::wrong;
+use super::wrong;
 use crate::cli::Failure;
-use crate::cli::args::trace::{TraceArgs, TraceCommand};
+use crate::cli::trace::{TraceArgs, TraceCommand};
 
 /// What an input from a pipe is called in messages and plots.
 const INPUT: &str = "standard input";

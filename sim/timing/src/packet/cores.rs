@@ -1,8 +1,8 @@
 //! Shader cores and texture units of the level `packet`.
 
 use super::calendar::Calendar;
+use super::calendar::QueueTimes;
 use super::memory::Memory;
-use super::queue::QueueTimes;
 use super::station::aligned;
 use super::{Span, Visit};
 use crate::clock::{Clocks, Time};

@@ -1,14 +1,14 @@
-//! L2 and memory of the level `packet`: runs of lines enter calendars.
+//! L2 and memory of the level `packet`: runs of lines enter calendars. Memory has a calendar per bus, and the latest rows of
+//! each bank.
 
 use activity::{LineAccess, LineKind};
 
 use super::Span;
-use super::calendar::Calendar;
-use super::dram::Dram;
-use super::queue::QueueTimes;
+use super::calendar::{Calendar, QueueTimes};
+use crate::address::AddressMap;
 use crate::clock::{Clocks, Time};
 use crate::demand::CLIENTS;
-use crate::spec::MachineSpec;
+use crate::spec::{DramSpec, MachineSpec};
 
 /// Cycles per slot of the L2 calendar.
 const SLOT_CYCLES: u32 = 8;
@@ -186,5 +186,233 @@ impl Memory {
     /// Bus calendars of all channels.
     pub fn buses(&self) -> impl Iterator<Item = &Calendar> {
         self.dram.buses()
+    }
+}
+
+/// Lines per slot of a bus calendar. The bus idles while a row opens; longer slots would give that idle time
+/// to lines that come later.
+const BUS_SLOT_LINES: u32 = 4;
+/// Lines per slot of a bank calendar.
+const BANK_SLOT_LINES: u32 = 32;
+
+/// Latest rows remembered per bank.
+const REMEMBERED_ROWS: usize = 4;
+
+/// An opened row.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct OpenRow {
+    row: u32,
+    /// Time of the request that opened it.
+    since: Time,
+    /// When its last line so far is issued.
+    until: Time,
+    /// Lines of the channel before it was opened, plus its own lines.
+    own: u64,
+}
+
+impl OpenRow {
+    const NONE: Self = Self { row: u32::MAX, since: 0, until: 0, own: 0 };
+}
+
+/// A bank: calendar of its row activations, and its latest rows, the newest first.
+#[derive(Clone, Debug)]
+struct Bank {
+    time: Calendar,
+    rows: [OpenRow; REMEMBERED_ROWS],
+}
+
+#[derive(Clone, Debug)]
+struct Channel {
+    bus: Calendar,
+    banks: Vec<Bank>,
+    /// Lines so far.
+    lines: u64,
+}
+
+/// Lines of one row in a bank.
+#[derive(Clone, Copy, Debug)]
+struct RowUse {
+    row: u32,
+    /// When they arrive, and when the last one is issued.
+    seen: Time,
+    issued: Time,
+    /// Lines of the channel before them.
+    lines: u64,
+    /// Their number.
+    count: u64,
+}
+
+/// Times of a transfer over the bus.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Moved {
+    /// When the last line is issued.
+    pub issued: Time,
+    /// When its data has been transferred.
+    pub data: Time,
+}
+
+/// All channels.
+#[derive(Clone, Debug)]
+pub(super) struct Dram {
+    map: AddressMap,
+    channels: Vec<Channel>,
+    burst: Time,
+    cas: Time,
+    activate: Time,
+    precharge: Time,
+    latency: Time,
+    backlog: Time,
+    queue: u64,
+    end: Time,
+}
+
+impl Dram {
+    pub fn new(spec: &DramSpec, clocks: &Clocks) -> Self {
+        let period = clocks.period(spec.clock);
+        let cycles = |count: u32| period * Time::from(count);
+        let burst = cycles(spec.burst_cycles.get());
+        let [bus, time] =
+            [BUS_SLOT_LINES, BANK_SLOT_LINES].map(|lines| Calendar::new(burst * Time::from(lines), 1));
+        let bank = Bank { time, rows: [OpenRow::NONE; REMEMBERED_ROWS] };
+        let channel = Channel { bus, banks: vec![bank; spec.banks.get() as usize], lines: 0 };
+        Self {
+            map: AddressMap::new(spec),
+            channels: vec![channel; spec.channels.get() as usize],
+            burst,
+            cas: cycles(spec.cas_cycles.get()),
+            activate: cycles(spec.activate_cycles.get()),
+            precharge: cycles(spec.precharge_cycles.get()),
+            latency: cycles(spec.latency_cycles.get()),
+            backlog: burst * Time::from(spec.queue),
+            queue: spec.queue.into(),
+            end: 0,
+        }
+    }
+
+    /// Group of a line; all lines of a group are in the same row.
+    pub fn group(&self, line: u32) -> u32 {
+        self.map.group(line)
+    }
+
+    /// Transfer time of a full queue.
+    pub fn backlog(&self) -> Time {
+        self.backlog
+    }
+
+    /// Latency from the end of a transfer to the L2.
+    pub fn latency(&self) -> Time {
+        self.latency
+    }
+
+    /// Transfer `count` lines of one group over the bus of their channel. The first arrives at `seen.from`, the
+    /// last at `seen.to`.
+    pub fn transfer(&mut self, line: u32, count: u32, seen: Span) -> Moved {
+        let address = self.map.locate(line);
+        let channel = &mut self.channels[address.channel];
+        let bank = &mut channel.banks[address.bank];
+        let work = self.burst * Time::from(count);
+        let opens = bank.opens(address.row, seen.from, channel.lines, self.queue);
+        let opens = opens.map(|closes| self.activate + if closes { self.precharge } else { 0 });
+        // The next row can open once the last line is issued.
+        let held = work - self.burst;
+        let closes = bank.closes_at(seen.from).min(seen.from + self.backlog);
+        let ready = opens.map_or(seen.from, |opens| bank.time.reserve(closes, opens + held).0 + opens);
+        let end = channel.bus.reserve(ready, work).1.max(seen.to + self.burst);
+        let used = RowUse {
+            row: address.row,
+            seen: seen.from,
+            issued: end - self.burst,
+            lines: channel.lines,
+            count: count.into(),
+        };
+        bank.note(used, opens.is_some());
+        channel.lines += u64::from(count);
+        self.end = self.end.max(end);
+        Moved { issued: end - self.burst, data: end + self.cas }
+    }
+
+    /// End of the last transfer.
+    pub fn ends_at(&self) -> Time {
+        self.end
+    }
+
+    /// Row time of the busiest bank.
+    pub fn rows(&self) -> Time {
+        let banks = self.channels.iter().flat_map(|channel| &channel.banks);
+        let busy = |bank: &Bank| bank.time.slots().map(|(_, _, used, _)| used).sum();
+        banks.map(busy).max().unwrap_or(0)
+    }
+
+    /// Bus calendars of all channels.
+    pub fn buses(&self) -> impl Iterator<Item = &Calendar> {
+        self.channels.iter().map(|channel| &channel.bus)
+    }
+}
+
+impl Bank {
+    /// Whether a line that arrives at `seen`, after `lines` lines of its channel, opens its row. `Some(true)`
+    /// if another row has to be closed first.
+    ///
+    /// First ready first come (Rixner et al. 2000): a line joins pending lines of its row, ahead of older
+    /// requests to other rows. The exception is a queue full of other lines, which hides the line from the
+    /// scheduler.
+    fn opens(&self, row: u32, seen: Time, lines: u64, queue: u64) -> Option<bool> {
+        let latest = self.rows[0].row;
+        let goes_along = |open: &OpenRow| open.row == row && open.until > seen && lines - open.own < queue;
+        (latest != row && !self.rows.iter().any(goes_along)).then_some(latest != u32::MAX)
+    }
+
+    /// When the open row can be closed for a line that arrives at `seen`: after its own lines are issued.
+    /// Lines that arrive later in time, though earlier in the stream, are ignored.
+    fn closes_at(&self, seen: Time) -> Time {
+        let open = &self.rows[0];
+        if open.since <= seen { open.until.max(seen) } else { seen }
+    }
+
+    /// Record lines of a row; `opened` says whether they opened it.
+    fn note(&mut self, used: RowUse, opened: bool) {
+        let RowUse { row, seen, issued, lines, count } = used;
+        let known = self.rows.iter().position(|open| open.row == row);
+        match known {
+            Some(known) if !opened => {
+                let open = &mut self.rows[known];
+                open.until = open.until.max(issued);
+                open.own += count;
+            }
+            _ => {
+                let until = known.map_or(issued, |known| self.rows[known].until.max(issued));
+                self.rows.copy_within(..known.unwrap_or(REMEMBERED_ROWS - 1), 1);
+                self.rows[0] = OpenRow { row, since: seen, until, own: lines + count };
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_goes_along_with_others_of_its_row_that_have_not_gone() {
+        let used = |row, [seen, issued]: [Time; 2], [lines, count]: [u64; 2]| RowUse {
+            row,
+            seen,
+            issued,
+            lines,
+            count,
+        };
+        let mut bank = Bank { time: Calendar::new(16, 1), rows: [OpenRow::NONE; REMEMBERED_ROWS] };
+        assert_eq!(bank.opens(7, 0, 0, 4), Some(false));
+        bank.note(used(7, [0, 10], [0, 1]), true);
+        assert_eq!((bank.opens(7, 50, 9, 4), bank.opens(8, 5, 1, 4)), (None, Some(true)));
+        bank.note(used(8, [5, 20], [1, 1]), true);
+        assert_eq!((bank.opens(7, 9, 2, 4), bank.opens(7, 10, 2, 4)), (None, Some(true)));
+        bank.note(used(7, [9, 30], [2, 1]), false);
+        let [latest, before, ..] = bank.rows.map(|open| (open.row, open.until));
+        assert_eq!((latest, before), ((8, 20), (7, 30)));
+        assert_eq!([3, 6, 25].map(|seen| bank.closes_at(seen)), [3, 20, 25]);
+        // Four lines of other rows came in between.
+        bank.note(used(8, [40, 60], [3, 3]), false);
+        assert_eq!((bank.opens(7, 9, 5, 4), bank.opens(7, 9, 6, 4)), (None, Some(true)));
     }
 }

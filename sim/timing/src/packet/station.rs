@@ -1,8 +1,8 @@
 //! State of a unit at its station, at the level `packet`.
 
 use super::Visit;
+use super::calendar::QueueTimes;
 use super::memory::{Fetched, Memory};
-use super::queue::QueueTimes;
 use crate::clock::{Clocks, Time};
 use crate::demand::{Station, port};
 use crate::spec::MachineSpec;

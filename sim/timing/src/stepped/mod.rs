@@ -4,15 +4,12 @@
 //! matter; a test permutes it. Cycles in which all units only wait are skipped, which does not change the
 //! result; a test runs with and without skipping.
 
-mod dram;
 mod machine;
 mod memory;
 mod meter;
 mod queue;
 mod shader;
-mod sources;
 mod stage;
-mod waits;
 
 use activity::{LineAccess, PacketCounts, Unit};
 

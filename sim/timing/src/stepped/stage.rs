@@ -7,7 +7,7 @@ use activity::{LineAccess, LineKind, Unit};
 
 use super::memory::{NO_WAIT, Request};
 use super::queue::Queue;
-use super::waits::Waits;
+use super::queue::Waits;
 use crate::clock::Time;
 use crate::stalls::Reason;
 

@@ -264,7 +264,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_another_frame_altogether_tells_nothing() {
+    fn a_different_frame_gives_no_evidence() {
         let (mut power, starts) = trace(12, 1);
         let (other, _) = trace(12, 2);
         let from = starts[12] - 20;

@@ -167,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn doubt_is_on_the_far_side_of_the_slip() {
+    fn confidence_is_low_on_the_far_side_of_the_slip() {
         let offsets = [0, 100, 200, 300, 450, 550, 650];
         assert_eq!(
             confidence_factors(&offsets, &[100], &[100]),
@@ -188,8 +188,8 @@ mod tests {
     }
 
     #[test]
-    fn a_slip_leaves_doubt_on_this_side_of_it_back_to_the_last_clock_step() {
-        // Beats of 100 at the mark, of 150 from 300 on, and a slip at 750.
+    fn a_slip_lowers_confidence_on_this_side_of_it_back_to_the_last_clock_step() {
+        // Periods of 100 at the mark, of 150 from 300 on, and a slip at 750.
         let offsets = [0, 100, 200, 300, 450, 600, 750, 830, 980, 1130];
         let left = confidence_factors(&offsets, &[0], &[0]);
         assert_eq!(left[..3], [1.0; 3]);
@@ -203,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mark_that_is_off_the_beat_of_all_others_leaves_them_in_doubt() {
+    fn a_mark_off_the_period_of_all_others_lowers_their_confidence() {
         let offsets = [0, 100, 200, 330, 400, 500, 600];
         assert!(confidence_factors(&offsets, &[330], &[330]).iter().all(|left| *left <= SLIPPED_CONFIDENCE));
         assert_eq!(confidence_factors(&offsets, &[200], &[200]), [1.0; 7]);

@@ -80,7 +80,7 @@ fn in_pieces(stamps: &Stamps, description: &Description, pieces: &[usize]) -> Re
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(400))]
     #[test]
-    fn property_pieces_of_any_size_tell_what_the_rule_for_all_rows_tells(
+    fn property_pieces_of_any_size_give_what_the_rule_for_all_rows_gives(
         rows in 1_usize..2500,
         rate_hz in prop_oneof![Just(1000.0), Just(44_117.65), Just(1e6 / 3.0), 0.1..1e6_f64],
         whole in any::<bool>(),

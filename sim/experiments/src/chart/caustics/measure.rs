@@ -1,17 +1,20 @@
-//! Oceans, and what methods do for them.
+//! Caustics of an ocean by every method, and of crossed light volumes: the same light through the same number of triangles, on
+//! increasingly crossed sides.
 
 use cpu_time::ThreadTime;
+use glam::DVec3;
+use output::progress::{Bar, Progress};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde::Serialize;
 use workloads::caustics::generator::Ocean as Water;
 use workloads::caustics::{
-    Floor, Light, MIN_SQUARES_PER_WAVE, Method, Picture, Squares, accuracy_warnings, crossing, draw, error,
+    Beam, Eye, Floor, Light, MIN_SQUARES_PER_WAVE, Method, Picture, Squares, accuracy_warnings, crossing,
+    draw, error,
 };
 
-use super::view::{DEPTH_M, SIDE_M, SLOPE, SQUARE_PX, above, aside, aside_of, water};
-use super::{CausticsChart, Coarse, Effort, Row, crossed};
+use super::view::{SIDE_M, SQUARE_PX, above, aside, aside_of, from_the_side, water};
+use super::{CausticsChart, CausticsEffort, CausticsRow, Coarse};
 use crate::study::StudyError;
-use output::progress::{Bar, Progress};
 
 /// Slopes of the oceans that get coarser.
 const COARSE_SLOPES: [f64; 5] = [0.05, 0.15, 0.4, 0.7, 1.0];
@@ -59,7 +62,7 @@ pub fn ocean(
     })
 }
 
-pub(super) fn measure(effort: Effort, progress: &Progress) -> Result<CausticsChart, StudyError> {
+pub(super) fn measure(effort: CausticsEffort, progress: &Progress) -> Result<CausticsChart, StudyError> {
     let ocean = ocean(effort.ocean_cells, [SLOPE, DEPTH_M], effort.ocean_px, progress)?;
     let steps = effort.slopes.len() * 4
         + COARSE_SLOPES.len() * effort.coarse_cells.len()
@@ -74,12 +77,17 @@ pub(super) fn measure(effort: Effort, progress: &Progress) -> Result<CausticsCha
     for slope in COARSE_SLOPES {
         coarse.extend(by_cells(&effort, slope, &bar)?);
     }
-    let crossed = crossed::measure(&effort, &bar)?;
+    let crossed = crossed(&effort, &bar)?;
     Ok(CausticsChart { effort, ocean, resolved_cells: resolved_cells(), rows, coarse, crossed })
 }
 
 /// Every method on one surface: the light in the volume.
-fn by_method(effort: &Effort, slope: f64, thread: &ThreadPool, bar: &Bar) -> Result<Vec<Row>, StudyError> {
+fn by_method(
+    effort: &CausticsEffort,
+    slope: f64,
+    thread: &ThreadPool,
+    bar: &Bar,
+) -> Result<Vec<CausticsRow>, StudyError> {
     let (beams, eye) = (water(effort.sweep_cells, slope).beams(0.0), aside(effort.sweep_px)?);
     let ours = draw(&beams, &eye, Method::Moving, Some(Light::Volume));
     let crossing = crossing(&beams);
@@ -94,7 +102,7 @@ fn by_method(effort: &Effort, slope: f64, thread: &ThreadPool, bar: &Bar) -> Res
         runs.sort_by(|a, b| a.0.total_cmp(&b.0));
         let (cpu_s, picture) = &runs[runs.len() / 2];
         bar.inc();
-        Row {
+        CausticsRow {
             slope,
             crossing,
             method,
@@ -108,7 +116,7 @@ fn by_method(effort: &Effort, slope: f64, thread: &ThreadPool, bar: &Bar) -> Res
 }
 
 /// One surface of fewer and fewer triangles against photons that are refracted at the waves themselves: the light on the floor.
-fn by_cells(effort: &Effort, slope: f64, bar: &Bar) -> Result<Vec<Coarse>, StudyError> {
+fn by_cells(effort: &CausticsEffort, slope: f64, bar: &Bar) -> Result<Vec<Coarse>, StudyError> {
     let eye = above(effort.floor_px)?;
     let squares = Squares { eye: &eye, side_px: SQUARE_PX };
     let floor = Floor { height_m: -DEPTH_M };
@@ -131,4 +139,120 @@ fn by_cells(effort: &Effort, slope: f64, bar: &Bar) -> Result<Vec<Coarse>, Study
 /// So many squares along a side, and a run does not warn of a surface that is too coarse.
 fn resolved_cells() -> f64 {
     MIN_SQUARES_PER_WAVE * SIDE_M / water(1, SLOPE).shortest_m()
+}
+
+/// Depth of the water in metres: half of all beams fold above the floor.
+const DEPTH_M: f64 = 8.0;
+/// Slope of the waves.
+const SLOPE: f64 = 0.3;
+/// Beams go on below the floor, so that it does not lie at their ends, where pleats would not matter.
+const OVERSHOOT: f64 = 0.25;
+/// Photons in the volume, of all beams.
+const PHOTONS: usize = 8_000_000;
+
+/// One pleat of one surface.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Crossed {
+    /// Squares along a side.
+    pub cells: u32,
+    /// How far every other column of corners lies down its light, as a part of its length.
+    pub pleat: f64,
+    /// For how much of their length sides of beams cross.
+    pub crossing: f64,
+    /// Mean difference of the light on the floor from photons refracted at the waves themselves, as a part of its mean.
+    pub floor_error: f64,
+    /// That of other photons of that kind.
+    pub noise: f64,
+    /// Mean difference of the light in the volume from photons through the same triangles, as a part of its mean.
+    pub volume_error: f64,
+    /// The part of the light in the volume that all methods miss, by the same photons.
+    pub missing: f64,
+    /// The part of the light in the volume that the refined bound without cuts loses.
+    pub lost: f64,
+    /// Shader executions by method, in the order of [`Method::ALL`].
+    pub executions: [u64; 4],
+    /// The share of them that finds light, likewise.
+    pub useful: [f64; 4],
+    /// Largest difference of a pixel from the image of the moving triangles, by any method of [`Method::ALL`].
+    pub difference: f64,
+    /// Whether the run warns of crossed sides.
+    pub warned: bool,
+}
+
+/// Surfaces, views and photons of one number of triangles.
+struct Bench {
+    surface: Water,
+    above: Eye,
+    aside: Eye,
+    /// Light on the floor, and by other photons.
+    known: [Vec<f64>; 2],
+}
+
+/// Every pleat of every number of triangles.
+fn crossed(effort: &CausticsEffort, bar: &Bar) -> Result<Vec<Crossed>, StudyError> {
+    let mut rows = Vec::new();
+    for &cells in effort.pleated_cells {
+        let bench = Bench::new(effort, cells)?;
+        for &pleat in effort.pleats {
+            rows.push(bench.row(pleat));
+            bar.inc();
+        }
+    }
+    Ok(rows)
+}
+
+fn floor() -> Floor {
+    Floor { height_m: -DEPTH_M }
+}
+
+impl Bench {
+    fn new(effort: &CausticsEffort, cells: u32) -> Result<Self, StudyError> {
+        let surface = Water { overshoot: OVERSHOOT, depth_m: DEPTH_M, ..water(cells, SLOPE) };
+        let middle = DVec3::new(1.5, -0.6 * DEPTH_M, 1.0);
+        let aside = from_the_side(middle, DEPTH_M, effort.sweep_px)?;
+        let above = above(effort.floor_px)?;
+        let squares = Squares { eye: &above, side_px: SQUARE_PX };
+        let known = [1, 2].map(|seed| squares.on_floor(&surface, 0.0, &floor(), [effort.rays, seed]));
+        Ok(Self { surface, above, aside, known })
+    }
+
+    fn row(&self, pleat: f64) -> Crossed {
+        let surface = Water { pleat, ..self.surface.clone() };
+        let beams = surface.beams(0.0);
+        let pictures = Method::ALL.map(|method| draw(&beams, &self.aside, method, Some(Light::Volume)));
+        let ours = &pictures[0];
+        let uncut = draw(&beams, &self.aside, Method::Uncut, Some(Light::Volume));
+        let sum = |picture: &Picture| picture.light.iter().sum::<f64>();
+        let (volume_error, missing) = self.volume(&beams, ours);
+        Crossed {
+            cells: surface.cells,
+            pleat,
+            crossing: crossing(&beams),
+            floor_error: self.floor_error(&beams),
+            noise: error(&self.known[1], &self.known[0]),
+            volume_error,
+            missing,
+            lost: 1.0 - sum(&uncut) / sum(ours),
+            executions: pictures.each_ref().map(Picture::total_runs),
+            useful: pictures.each_ref().map(Picture::useful_share),
+            difference: pictures.iter().map(|other| ours.farthest(other)).fold(0.0, f64::max),
+            warned: accuracy_warnings(&surface, &beams)
+                .iter()
+                .any(|warning| warning.code == "caustics-crossed"),
+        }
+    }
+
+    fn floor_error(&self, beams: &[Beam]) -> f64 {
+        let squares = Squares { eye: &self.above, side_px: SQUARE_PX };
+        let image = draw(beams, &self.above, Method::Moving, Some(Light::Floor(floor())));
+        error(&squares.of_image(&image.light), &self.known[0])
+    }
+
+    /// The error of the light in the volume, and the part of it that is missing.
+    fn volume(&self, beams: &[Beam], ours: &Picture) -> (f64, f64) {
+        let squares = Squares { eye: &self.aside, side_px: SQUARE_PX };
+        let (found, photons) =
+            (squares.of_image(&ours.light), squares.in_volume(beams, (PHOTONS / beams.len()) as u32));
+        (error(&found, &photons), 1.0 - found.iter().sum::<f64>() / photons.iter().sum::<f64>())
+    }
 }

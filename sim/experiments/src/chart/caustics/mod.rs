@@ -1,25 +1,23 @@
-//! `quintile chart caustics`: shader executions and images of caustics, by how beams are bounded, and where beams fail.
+//! `quintile chart caustics`: shader executions and images of caustics by bounding volume, and failure modes: too few triangles,
+//! and crossed sides.
 
-mod crossed;
-mod failures;
 mod measure;
 pub(crate) mod view;
 
-use serde::Serialize;
-use workloads::caustics::Method;
-
-use crate::study::table::{Sheet, Table, fixed, millis, plain};
-use crate::study::{Gallery, Study, StudyError};
 use output::OutputError;
 use output::plot::{ChartPanel, HeatMapPlot, HeatTile, Look, Picture, Scale, Series, Shading};
 use output::progress::Progress;
+use serde::Serialize;
+use workloads::caustics::{MAX_CROSSED_SHARE, Method};
 
-pub use crossed::Crossed;
-pub use measure::{Ocean, ocean};
+use crate::study::table::{Sheet, Table, fixed, millis, plain};
+use crate::study::{Gallery, Study, StudyError};
+
+pub use measure::{Crossed, Ocean, ocean};
 
 /// How much is measured.
 #[derive(Clone, Copy, Debug, Serialize)]
-pub struct Effort {
+pub struct CausticsEffort {
     /// Squares along a side of the ocean of the paper's figure; 255 are 130,050 volumes.
     pub ocean_cells: u32,
     /// Pixels of its image.
@@ -46,7 +44,7 @@ pub struct Effort {
 
 /// One method on one surface.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Row {
+pub struct CausticsRow {
     /// Root mean square of the slope of the surface.
     pub slope: f64,
     /// For how much of their length sides of beams cross.
@@ -84,13 +82,13 @@ pub struct Coarse {
 #[derive(Clone, Debug, Serialize)]
 pub struct CausticsChart {
     /// How much was measured.
-    pub effort: Effort,
+    pub effort: CausticsEffort,
     /// The ocean of the paper's figure.
     pub ocean: Ocean,
     /// Squares along a side of the coarser oceans from which on a run does not warn that they are too few.
     pub resolved_cells: f64,
     /// By slope and method.
-    pub rows: Vec<Row>,
+    pub rows: Vec<CausticsRow>,
     /// By slope and number of triangles.
     pub coarse: Vec<Coarse>,
     /// By number of triangles and pleat.
@@ -111,8 +109,8 @@ impl Study for CausticsChart {
         &["caustics", "caustics_failures", MAPS[0], MAPS[1], MAPS[2], MAPS[3]];
     const FILES: &'static [&'static str] = &["caustics.csv", "caustics.json"];
 
-    type Effort = Effort;
-    const FULL: Effort = Effort {
+    type Effort = CausticsEffort;
+    const FULL: CausticsEffort = CausticsEffort {
         ocean_cells: 255,
         ocean_px: [512, 288],
         sweep_cells: 24,
@@ -125,7 +123,7 @@ impl Study for CausticsChart {
         floor_px: 512,
         repeats: 3,
     };
-    const QUICK: Effort = Effort {
+    const QUICK: CausticsEffort = CausticsEffort {
         ocean_cells: 48,
         ocean_px: [192, 108],
         sweep_cells: 10,
@@ -139,7 +137,7 @@ impl Study for CausticsChart {
         repeats: 1,
     };
 
-    fn measure(effort: Effort, _scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
+    fn measure(effort: CausticsEffort, _scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
         measure::measure(effort, progress)
     }
 
@@ -148,14 +146,14 @@ impl Study for CausticsChart {
             "light in the water under {} generator triangles; the image is the same by every method",
             2 * self.effort.sweep_cells * self.effort.sweep_cells
         );
-        to.chart("caustics", ["Caustics: beams and bodies about them", &subject], self.costs())?;
+        to.chart("caustics", ["Caustics: light volumes and their bounding volumes", &subject], self.costs())?;
         let title = "Where caustics fail: coarse surfaces and crossed sides";
         let subject = format!(
             "light on the floor in squares of 8x8 pixels against {} photons, refracted at the waves themselves; for crossed sides the light and the number of \
              triangles stay the same, they only stand ever more along the light",
             self.effort.rays * self.effort.rays
         );
-        to.chart("caustics_failures", [title, &subject], failures::panels(self))?;
+        to.chart("caustics_failures", [title, &subject], panels(self))?;
         let mut maps = Method::ALL.into_iter().zip(MAPS);
         maps.try_for_each(|(method, stem)| to.add(stem, &self.ocean.map(method, to.look())))
     }
@@ -225,7 +223,7 @@ struct Line {
 }
 
 impl Line {
-    fn of_slope(row: &Row, cells: u32) -> Self {
+    fn of_slope(row: &CausticsRow, cells: u32) -> Self {
         let place = Method::ALL.iter().position(|method| *method == row.method).unwrap_or(0);
         Self {
             sweep: "slope",
@@ -284,7 +282,7 @@ impl CausticsChart {
     }
 
     fn costs(&self) -> Vec<ChartPanel> {
-        let by_method = |of: fn(&Row) -> f64| {
+        let by_method = |of: fn(&CausticsRow) -> f64| {
             let curve = |method: Method| {
                 let rows = self.rows.iter().filter(move |row| row.method == method);
                 Series::curve(method.name(), rows.map(|row| (row.slope, of(row))))
@@ -354,6 +352,72 @@ impl Ocean {
     }
 }
 
+const CROSSING: &str = "length of beams for which their sides cross (%)";
+
+/// Errors over the number of triangles and over how much sides cross, and what bodies lose there.
+fn panels(chart: &CausticsChart) -> Vec<ChartPanel> {
+    vec![coarse(chart), error(chart), lost(chart), useful(chart)]
+}
+
+fn coarse(chart: &CausticsChart) -> ChartPanel {
+    let of_slope = |slope: f64| {
+        let rows = chart.coarse.iter().filter(move |row: &&Coarse| row.slope == slope);
+        Series::curve(format!("slope {slope}"), rows.map(|row| (f64::from(row.cells), row.error)))
+    };
+    let mut slopes: Vec<f64> = chart.coarse.iter().map(|row| row.slope).collect();
+    slopes.dedup();
+    let curves = slopes.into_iter().map(of_slope).collect();
+    ChartPanel::new("too few triangles", ["squares along a side", "error over mean"], curves)
+        .on(Scale::Doublings, Scale::Decades)
+        .failing(Some(0.0..chart.resolved_cells), "a run warns: caustics-coarse")
+}
+
+/// A curve for each number of triangles.
+fn by_cells(chart: &CausticsChart, of: fn(&Crossed) -> f64) -> impl Iterator<Item = Series> {
+    chart.effort.pleated_cells.iter().map(move |&cells| {
+        let rows = chart.crossed.iter().filter(move |row| row.cells == cells);
+        Series::curve(format!("{cells} squares"), rows.map(|row| (100.0 * row.crossing, of(row))))
+    })
+}
+
+fn over_crossing(title: &str, up: &str, curves: Vec<Series>) -> ChartPanel {
+    ChartPanel::new(title, [CROSSING, up], curves)
+        .on(Scale::Even, Scale::Even)
+        .failing(Some(100.0 * MAX_CROSSED_SHARE..f64::INFINITY), "caustics-crossed")
+}
+
+fn error(chart: &CausticsChart) -> ChartPanel {
+    let floor = by_cells(chart, |row| row.floor_error);
+    let volume = by_cells(chart, |row| row.volume_error)
+        .map(|curve| Series { name: format!("{}: in the volume", curve.name), ..curve });
+    over_crossing(
+        "all methods: on the floor and in the volume",
+        "error over mean",
+        floor.chain(volume).collect(),
+    )
+}
+
+fn lost(chart: &CausticsChart) -> ChartPanel {
+    let named = |of: fn(&Crossed) -> f64, what: &'static str| {
+        by_cells(chart, of).map(move |curve| Series { name: format!("{}: {what}", curve.name), ..curve })
+    };
+    let all = named(|row| 100.0 * row.missing, "all methods");
+    let curves = all.chain(named(|row| 100.0 * row.lost, "lost by the uncut bound")).collect();
+    over_crossing("light in the volume", "light missing (%)", curves)
+}
+
+/// What bodies are worth, at the largest number of triangles.
+fn useful(chart: &CausticsChart) -> ChartPanel {
+    let most = chart.effort.pleated_cells.last().copied().unwrap_or(0);
+    let of = |(place, method): (usize, Method)| {
+        let rows = chart.crossed.iter().filter(move |row| row.cells == most);
+        Series::curve(method.name(), rows.map(move |row| (100.0 * row.crossing, row.useful[place])))
+    };
+    let curves = Method::ALL.into_iter().enumerate().map(of).collect();
+    let title = format!("use, {most} squares along a side");
+    over_crossing(&title, "share of executions that find light", curves)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -361,7 +425,7 @@ mod tests {
 
     #[test]
     fn the_files_are_all_there_and_agree() {
-        let least = Effort {
+        let least = CausticsEffort {
             ocean_cells: 6,
             ocean_px: [48, 27],
             sweep_cells: 4,

@@ -9,7 +9,7 @@ use traces::frames::{Marks, Method, Options, default_window, find_with};
 use traces::score::{TOLERANCE_S, score, true_beside_found};
 use traces::synth::{Recording, Scenario, Scene};
 
-use super::{Effort, Way};
+use super::{FramesEffort, Way};
 use crate::study::StudyError;
 
 /// Places of the marks, as shares of the frames; where one is asked for, it is the first.
@@ -43,7 +43,7 @@ pub(super) struct Subject {
 }
 
 impl Subject {
-    pub fn new(scenario: &Scenario, effort: &Effort) -> Result<Self, StudyError> {
+    pub fn new(scenario: &Scenario, effort: &FramesEffort) -> Result<Self, StudyError> {
         let scene = |&seed: &u64| Ok((seed, scenario.scene(effort.frames, seed)?));
         let scenes = effort.seeds.iter().map(scene).collect::<Result<_, StudyError>>()?;
         Ok(Self { name: scenario.name, scenes })

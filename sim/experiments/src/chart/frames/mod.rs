@@ -23,7 +23,7 @@ pub const FAILS_BELOW: f64 = 0.9;
 
 /// How much is measured.
 #[derive(Clone, Copy, Debug, Serialize)]
-pub struct Effort {
+pub struct FramesEffort {
     /// Frames of each scene.
     pub frames: usize,
     /// Rates, Hz.
@@ -102,7 +102,7 @@ impl Axis {
         }
     }
 
-    fn recordings(self, effort: &Effort) -> Vec<(f64, Recording)> {
+    fn recordings(self, effort: &FramesEffort) -> Vec<(f64, Recording)> {
         let usual = Recording::default();
         match self {
             Self::Rate => {
@@ -120,7 +120,7 @@ impl Axis {
 
 /// One method on one scene recorded in one way, over all seeds.
 #[derive(Clone, Debug, Serialize)]
-pub struct Row {
+pub struct FramesRow {
     /// What is changed.
     pub axis: Axis,
     /// To what.
@@ -140,9 +140,9 @@ pub struct Row {
 #[derive(Clone, Debug, Serialize)]
 pub struct FramesChart {
     /// How much was measured.
-    pub effort: Effort,
+    pub effort: FramesEffort,
     /// By axis, value, scene and method.
-    pub rows: Vec<Row>,
+    pub rows: Vec<FramesRow>,
 }
 
 impl Study for FramesChart {
@@ -153,15 +153,15 @@ impl Study for FramesChart {
     const FILES: &'static [&'static str] = &["frames.csv", "frames.md", "frames.json"];
     const SHOWS_TIME: bool = true;
 
-    type Effort = Effort;
-    const FULL: Effort = Effort {
+    type Effort = FramesEffort;
+    const FULL: FramesEffort = FramesEffort {
         frames: 200,
         rates_hz: &[1e3, 2e3, 5e3, 10e3, 20e3, 50e3, 200e3, 1e6],
         snrs_db: &[40.0, 30.0, 20.0, 10.0, 5.0, 0.0],
         bits: &[4, 6, 8, 10, 12, 14, 16],
         seeds: &[1, 2],
     };
-    const QUICK: Effort = Effort {
+    const QUICK: FramesEffort = FramesEffort {
         frames: 60,
         rates_hz: &[2e3, 10e3, 50e3],
         snrs_db: &[40.0, 10.0, 0.0],
@@ -169,7 +169,7 @@ impl Study for FramesChart {
         seeds: &[1],
     };
 
-    fn measure(effort: Effort, _scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
+    fn measure(effort: FramesEffort, _scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
         let subjects = SCENARIOS.iter().map(|scenario| Subject::new(scenario, &effort));
         let subjects: Vec<Subject> = subjects.collect::<Result<_, _>>()?;
         let settings = Axis::ALL.into_iter().flat_map(|axis| {
@@ -184,7 +184,7 @@ impl Study for FramesChart {
                 for (way, outcomes) in subject.analyse(&recording)? {
                     let outcome = joined(&outcomes);
                     let fails = outcome.f1 < FAILS_BELOW;
-                    rows.push(Row { axis, value, scene: subject.name, way, outcome, fails });
+                    rows.push(FramesRow { axis, value, scene: subject.name, way, outcome, fails });
                 }
                 bar.inc();
             }
@@ -264,7 +264,7 @@ impl FramesChart {
     }
 
     /// The rows of one method at one value, a row for each scene.
-    fn at(&self, axis: Axis, value: f64, way: Way) -> impl Iterator<Item = &Row> {
+    fn at(&self, axis: Axis, value: f64, way: Way) -> impl Iterator<Item = &FramesRow> {
         self.rows.iter().filter(move |row| row.axis == axis && row.value == value && row.way == way)
     }
 
@@ -365,7 +365,7 @@ impl FramesChart {
     fn by_scene(&self) -> Sheet {
         let usual = self.values(Axis::Rate).into_iter().rfind(|&rate_hz| rate_hz <= 50e3).unwrap_or(0.0);
         let at = |way: Way| self.at(Axis::Rate, usual, way).collect::<Vec<_>>();
-        let f1 = |row: &Row| format!("{:.3}{}", row.outcome.f1, if row.fails { "*" } else { "" });
+        let f1 = |row: &FramesRow| format!("{:.3}{}", row.outcome.f1, if row.fails { "*" } else { "" });
         let mut table =
             Table::of(at(Way::Auto).into_iter().enumerate()).detail("scene", |(_, row)| row.scene, plain);
         for way in Way::ALL {
@@ -379,4 +379,53 @@ impl FramesChart {
 }
 
 #[cfg(test)]
-mod tests;
+mod tests {
+    use super::*;
+    use crate::study::written;
+
+    const SMALL: FramesEffort =
+        FramesEffort { frames: 40, rates_hz: &[1e3, 20e3], snrs_db: &[30.0], bits: &[], seeds: &[1] };
+
+    fn small() -> (tempfile::TempDir, FramesChart) {
+        let (dir, chart, _) = written::<FramesChart>(SMALL);
+        (dir, chart)
+    }
+
+    #[test]
+    fn tracking_finds_the_frames_of_every_scene_and_few_samples_leave_hardly_any() {
+        let (dir, chart) = small();
+        assert_eq!(chart.rows.len(), 3 * SCENARIOS.len() * Way::ALL.len());
+        let f1 = |rate_hz| chart.mean(Axis::Rate, rate_hz, Way::Tracking, |o| Some(o.f1)).unwrap();
+        assert!(f1(20e3) > 0.95 && f1(1e3) < f1(20e3), "{} {}", f1(1e3), f1(20e3));
+        for row in &chart.rows {
+            assert_eq!(row.fails, row.outcome.f1 < FAILS_BELOW);
+            assert!(row.outcome.wrong_flagged <= row.outcome.wrong && row.outcome.f1 <= 1.0);
+        }
+        let text = std::fs::read_to_string(dir.path().join("frames.csv")).unwrap();
+        assert_eq!(text.lines().count(), 1 + chart.rows.len());
+    }
+
+    #[test]
+    fn all_but_host_time_is_the_same_every_time() {
+        let without_time = |chart: FramesChart| {
+            let mut rows = chart.rows;
+            rows.iter_mut().for_each(|row| row.outcome.host_s_per_1e6 = 0.0);
+            rows.into_iter().map(|row| row.outcome).collect::<Vec<_>>()
+        };
+        let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+        assert_eq!(without_time(small().1), without_time(one.install(|| small().1)));
+    }
+
+    #[test]
+    fn outcomes_are_joined_by_means_and_sums() {
+        let a = Outcome { f1: 0.5, energy_error: None, wrong: 2, right: 3, ..Outcome::default() };
+        let b =
+            Outcome { f1: 1.0, energy_error: Some(0.1), wrong: 1, right_flagged: 4, ..Outcome::default() };
+        let both = joined(&[a, b]);
+        assert_eq!(
+            (both.f1, both.energy_error, both.wrong, both.right, both.right_flagged),
+            (0.75, Some(0.1), 3, 3, 4)
+        );
+        assert_eq!(joined(&[a]).energy_error, None);
+    }
+}

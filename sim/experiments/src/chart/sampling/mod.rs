@@ -1,18 +1,16 @@
 //! `quintile chart sampling`: image error against cost, for every sample table.
 //!
-//! Error is the root of the mean squared difference to a reference of [`Effort::reference`] samples per pixel, over all
+//! Error is the root of the mean squared difference to a reference of [`SamplingEffort::reference`] samples per pixel, over all
 //! pixels and the three channels, in linear light. Host time is that of one frame through the pipeline, caches and all; the
 //! table is made before.
 
-mod failures;
 mod measure;
-mod stages;
 
 use glam::Vec3;
 use pipeline::SampleSpec;
 use serde::Serialize;
 
-use super::fit::exponent;
+use super::statistics::exponent;
 use crate::study::table::{Sheet, Table, fixed, optional, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
 use crate::study::{Gallery, Study, StudyError};
@@ -20,12 +18,12 @@ use output::OutputError;
 use output::plot::{ChartPanel, Scale, Series};
 use output::progress::Progress;
 
-pub use failures::{Failures, Shared};
 pub use measure::Point;
+pub use measure::{Failures, Shared};
 
 /// How much is measured.
 #[derive(Clone, Copy, Debug, Serialize)]
-pub struct Effort {
+pub struct SamplingEffort {
     /// The built-in scene, and its frame.
     pub scene: (&'static str, u32),
     /// Pixels of each image, across and down.
@@ -42,7 +40,7 @@ pub struct Effort {
     pub every_up_to: u32,
 }
 
-impl Effort {
+impl SamplingEffort {
     /// Samples per pixel of the reference.
     pub fn reference(&self) -> u32 {
         self.reference_frames * self.reference_samples
@@ -51,7 +49,7 @@ impl Effort {
 
 /// Error over cost of one table on one scene.
 #[derive(Clone, Debug, Serialize)]
-pub struct Row {
+pub struct SamplingRow {
     /// The scene.
     pub scene: &'static str,
     /// The sample table.
@@ -69,11 +67,11 @@ pub const FIT_FROM: u32 = 4;
 #[derive(Clone, Debug, Serialize)]
 pub struct SamplingChart {
     /// How much was measured.
-    pub effort: Effort,
+    pub effort: SamplingEffort,
     /// Samples per pixel of the references.
     pub reference_samples_per_pixel: u32,
     /// Scene by scene, table by table.
-    pub rows: Vec<Row>,
+    pub rows: Vec<SamplingRow>,
     /// Where it does not work.
     pub failures: Failures,
 }
@@ -86,8 +84,8 @@ impl Study for SamplingChart {
     const FILES: &'static [&'static str] = &["sampling.csv", "sampling.md", "sampling.json"];
     const SHOWS_TIME: bool = true;
 
-    type Effort = Effort;
-    const FULL: Effort = Effort {
+    type Effort = SamplingEffort;
+    const FULL: SamplingEffort = SamplingEffort {
         scene: ("default", 18),
         size: [96, 54],
         most_samples: 256,
@@ -96,7 +94,7 @@ impl Study for SamplingChart {
         seeds: 1,
         every_up_to: 40,
     };
-    const QUICK: Effort = Effort {
+    const QUICK: SamplingEffort = SamplingEffort {
         size: [48, 27],
         most_samples: 32,
         reference_frames: 4,
@@ -106,21 +104,21 @@ impl Study for SamplingChart {
         ..Self::FULL
     };
 
-    fn measure(effort: Effort, _scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
-        let stages = stages::scenes(&effort)?;
+    fn measure(effort: SamplingEffort, _scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
+        let stages = measure::scenes(&effort)?;
         let references = stages.iter().map(|stage| measure::reference(stage, &effort));
         let references: Vec<Vec<Vec3>> = references.collect::<Result<_, _>>()?;
         let tables: Vec<&str> = SampleSpec::names().map(|(name, _)| name).collect();
-        let bar = progress.bar("sampling", ((stages.len() * tables.len()) + failures::STEPS) as u64);
+        let bar = progress.bar("sampling", ((stages.len() * tables.len()) + measure::STEPS) as u64);
         let mut rows = Vec::new();
         for (stage, reference) in stages.iter().zip(&references) {
             for &table in &tables {
                 let points = measure::sweep(stage, table, reference, &effort)?;
-                rows.push(Row { scene: stage.name(), table, exponent: fitted(&points), points });
+                rows.push(SamplingRow { scene: stage.name(), table, exponent: fitted(&points), points });
                 bar.inc();
             }
         }
-        let failures = failures::measure(&stages, &references, &effort, &bar)?;
+        let failures = measure::failures(&stages, &references, &effort, &bar)?;
         Ok(Self { effort, reference_samples_per_pixel: effort.reference(), rows, failures })
     }
 
@@ -169,7 +167,7 @@ impl Study for SamplingChart {
     }
 
     fn tradeoff(&self) -> Vec<TradeoffPoint> {
-        let point = |(row, point): (&Row, &Point)| {
+        let point = |(row, point): (&SamplingRow, &Point)| {
             let level = format!("{} samples a pixel", point.samples_per_pixel);
             let metrics = [Metric::rmse(point.rmse), Metric::host_s(point.host_s)];
             TradeoffPoint::new(format!("an image ({})", row.scene), [row.table, &level], metrics)
@@ -181,7 +179,7 @@ impl Study for SamplingChart {
 
 impl SamplingChart {
     /// Every measurement with the part of the chart that it is for.
-    fn points(&self) -> impl Iterator<Item = (&'static str, &Row, &Point)> {
+    fn points(&self) -> impl Iterator<Item = (&'static str, &SamplingRow, &Point)> {
         let groups = [
             ("error", &self.rows),
             ("every_number", &self.failures.every_number),
@@ -219,17 +217,17 @@ impl Point {
 }
 
 /// A panel for each scene.
-fn panels(rows: &[Row], across: &str, doubling: bool, x: fn(&Point) -> f64) -> Vec<ChartPanel> {
+fn panels(rows: &[SamplingRow], across: &str, doubling: bool, x: fn(&Point) -> f64) -> Vec<ChartPanel> {
     let scenes = rows.chunk_by(|a, b| a.scene == b.scene);
     let scale = if doubling { Scale::Doublings } else { Scale::Decades };
-    let panel = |rows: &[Row]| {
+    let panel = |rows: &[SamplingRow]| {
         let curves = rows.iter().map(|row| curve(row, doubling, |p| (x(p), p.rmse))).collect();
         ChartPanel::new(rows[0].scene, [across, "RMSE"], curves).on(scale.clone(), Scale::Decades)
     };
     scenes.map(panel).collect()
 }
 
-fn curve(row: &Row, noted: bool, place: impl Fn(&Point) -> (f64, f64)) -> Series {
+fn curve(row: &SamplingRow, noted: bool, place: impl Fn(&Point) -> (f64, f64)) -> Series {
     let note = row.exponent.filter(|_| noted).map_or(String::new(), |p| format!("{p:.2}"));
     Series { note, ..Series::curve(row.table, row.points.iter().map(place)) }
 }
@@ -241,4 +239,82 @@ fn fitted(points: &[Point]) -> Option<f64> {
 }
 
 #[cfg(test)]
-mod tests;
+mod tests {
+    use super::*;
+    use crate::chart::statistics::neighbours;
+    use crate::study::written;
+
+    /// Small enough for a test.
+    const SMALL: SamplingEffort = SamplingEffort {
+        scene: ("tiny", 1),
+        size: [64, 48],
+        most_samples: 32,
+        reference_frames: 4,
+        reference_samples: 256,
+        seeds: 2,
+        every_up_to: 2,
+    };
+
+    /// No more than there has to be.
+    const LEAST: SamplingEffort =
+        SamplingEffort { size: [16, 9], most_samples: 2, reference_frames: 1, reference_samples: 8, ..SMALL };
+
+    fn row<'a>(rows: &'a [SamplingRow], scene: &str, table: &str) -> &'a SamplingRow {
+        rows.iter().find(|row| row.scene == scene && row.table == table).unwrap()
+    }
+
+    #[test]
+    fn random_converges_as_theory_says_and_the_default_faster() {
+        let chart = SamplingChart::measure(SMALL, &[], &Progress::new(true)).unwrap();
+        for scene in ["motion", "defocus", "motion and defocus"] {
+            // Independent samples: the error of the mean falls with the root of their number.
+            let random = row(&chart.rows, scene, "random").exponent.unwrap();
+            assert!((random + 0.5).abs() < 0.06, "{scene}: {random}");
+            let owen = row(&chart.rows, scene, "owen");
+            assert!(owen.exponent.unwrap() < -0.6, "{scene}: {:?}", owen.exponent);
+            let last = |row: &SamplingRow| row.points[row.points.len() - 1].rmse;
+            assert!(last(owen) < 0.8 * last(row(&chart.rows, scene, "random")), "{scene}");
+        }
+        // The fence: half of it seen at random, so one sample errs by a half in every channel.
+        let fence = row(&chart.failures.many_edges, "fence", "random");
+        assert!((fence.points[0].rmse - 0.5).abs() < 0.02, "{}", fence.points[0].rmse);
+        let owen = row(&chart.failures.many_edges, "fence", "owen").exponent.unwrap();
+        assert!(owen > -0.6, "the default table has nothing to gain there: {owen}");
+    }
+
+    #[test]
+    fn the_numbers_do_not_depend_on_threads() {
+        let with = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            let chart = pool.install(|| SamplingChart::measure(LEAST, &[], &Progress::new(true))).unwrap();
+            let errors = chart.rows.iter().flat_map(|row| &row.points).map(|point| point.rmse.to_bits());
+            errors.collect::<Vec<_>>()
+        };
+        assert_eq!(with(1), with(3));
+    }
+
+    #[test]
+    fn equal_errors_are_alike_and_alternating_ones_opposite() {
+        let row = |signs: [f64; 4]| signs.iter().flat_map(|s| [*s; 3]).collect::<Vec<_>>();
+        assert_eq!(neighbours(&row([1.0; 4]), 4), 1.0);
+        assert_eq!(neighbours(&row([1.0, -1.0, 1.0, -1.0]), 4), -1.0);
+        assert_eq!(neighbours(&row([0.0; 4]), 4), 0.0);
+        assert_eq!(neighbours(&row([1.0; 4]), 1), 0.0, "a column has no neighbours");
+    }
+
+    #[test]
+    fn the_files_are_all_there_and_agree() {
+        let (folder, chart, _) = written::<SamplingChart>(LEAST);
+        let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
+        let json: serde_json::Value = serde_json::from_str(&read("sampling.json")).unwrap();
+        assert_eq!(json["rows"].as_array().unwrap().len(), chart.rows.len());
+        assert_eq!(json["reference_samples_per_pixel"], 8);
+        let (three, five, two) = (3, 5, 2);
+        // Header; scene, table, samples; numbers of samples one by one; the fence.
+        assert_eq!(read("sampling.csv").lines().count(), 1 + three * five * two + three * two + five * two);
+        assert!(read("sampling.md").contains("| motion | owen |"));
+        for stem in SamplingChart::PICTURES {
+            assert!(read(&format!("{stem}.svg")).ends_with("</svg>\n"));
+        }
+    }
+}

@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 use timing::streams;
 
-use super::measure::{self, Row, Speed, Written};
-use super::subjects::Packets;
+use super::animations::Packets;
+use super::measure::{self, Speed, TimingRow, Written};
 use run::GpuSpec;
 use run::{RunError, cheapest_level};
 use timing::Level;
@@ -36,7 +36,7 @@ pub struct FailureRow {
 /// The level that is chosen where so many percent are asked for.
 #[derive(Clone, Debug, Serialize)]
 pub struct Chosen {
-    /// What is asked for.
+    /// Requested error, percent.
     pub asked_percent: f64,
     /// The cheapest level within it.
     pub level: Level,
@@ -82,13 +82,13 @@ pub(super) fn failures(gpus: &[GpuSpec]) -> Result<Vec<FailureRow>, RunError> {
     Ok(rows)
 }
 
-fn failure(stream: &'static str, found: Vec<Row>) -> FailureRow {
+fn failure(stream: &'static str, found: Vec<TimingRow>) -> FailureRow {
     let error = |level: Level| {
         let row = found.iter().find(|row| row.level == level);
         row.map_or(0.0, |row| row.cycle_error_percent.abs().max(row.energy_error_percent.abs()))
     };
     let chosen = |asked| Chosen { asked_percent: asked, level: cheapest_level(error, asked) };
-    let level = |row: &Row| FailedLevel {
+    let level = |row: &TimingRow| FailedLevel {
         cycle_error_percent: row.cycle_error_percent,
         energy_error_percent: row.energy_error_percent,
         warns: row.warns.clone(),

@@ -1,17 +1,18 @@
-//! One stream at every level: how far from the reference, and how fast.
+//! One stream at every level: error against the reference, host time, and the cost of timing added to drawing.
 
 use activity::{Event, Timeline, Unit};
-use cpu_time::ThreadTime;
+use cpu_time::{ProcessTime, ThreadTime};
 use power_model::{EnergyTable, FramePower, Platform, PowerModel};
+use run::{GpuSpec, RunError};
 use serde::Serialize;
 use timing::stepped::{self, StepOptions, Stream};
-use timing::{Clocks, DemandBuilder, PacketClock, Recorder, Timed, Totals, bound};
+use timing::{
+    AccuracyWarning, Clocks, DemandBuilder, FrameClock, Level, PacketClock, Recorder, Timed, TimingError,
+    Totals, bound,
+};
 
 use super::Reference;
-use super::subjects::Packets;
-use run::GpuSpec;
-use run::RunError;
-use timing::{AccuracyWarning, Level, TimingError};
+use super::animations::{Packets, Subject};
 
 /// Bins of a microsecond, as in a run.
 pub(super) const BIN_PS: u64 = 1_000_000;
@@ -21,7 +22,7 @@ const TIMES: usize = 5;
 
 /// A level on a stream.
 #[derive(Clone, Debug, Serialize)]
-pub struct Row {
+pub struct TimingRow {
     /// The scene.
     pub scene: String,
     /// The GPU.
@@ -83,7 +84,7 @@ pub(super) fn rows(
     gpu: &GpuSpec,
     stream: &Packets,
     speed: &mut Speed,
-) -> Result<Vec<Row>, RunError> {
+) -> Result<Vec<TimingRow>, RunError> {
     let model = PowerModel::new(&EnergyTable::builtin("28nm")?, &Platform::builtin("reference")?)?;
     let power = |timed: &Timed| {
         model.frame(&timed.timeline).map_err(|source| RunError::Timeline { frame: 0, source })
@@ -101,7 +102,7 @@ pub(super) fn rows(
             host_s = host_s.min(timed(level, gpu, &written)?.1);
         }
         let found_power = power(&found)?;
-        rows.push(Row {
+        rows.push(TimingRow {
             scene: scene.to_owned(),
             gpu: gpu.name.clone(),
             level,
@@ -211,4 +212,52 @@ fn sampled(power: &FramePower, step_s: f64, steps: usize) -> Vec<f64> {
         from_s = to_s;
     }
     joules.into_iter().map(|joules| joules / step_s).collect()
+}
+
+/// Each is measured so often, and the fastest counts.
+const ADDED_TIMES: usize = 3;
+
+/// A frame drawn, and drawn with a clock. Seconds of the host's processor, all threads together.
+#[derive(Clone, Debug, Serialize)]
+pub struct AddedRow {
+    /// The scene.
+    pub scene: String,
+    /// The GPU.
+    pub gpu: String,
+    /// The level.
+    pub level: Level,
+    /// To draw the frame, its packets to nobody.
+    pub drawn_s: f64,
+    /// To draw it, its packets to the clock of the level.
+    pub timed_s: f64,
+    /// What the clock adds.
+    pub added_percent: f64,
+}
+
+/// A frame at the levels that are cheap.
+pub(super) fn added(subject: &Subject, gpu: &GpuSpec) -> Result<Vec<AddedRow>, RunError> {
+    let drawn_s = fastest(|| subject.render(gpu, |_, _| {}))?;
+    let row = |level| {
+        let timed_s = fastest(|| {
+            let mut clock = FrameClock::new(level, gpu.machine()?, Recorder::new(BIN_PS, MOST_BINS));
+            subject.render(gpu, |packet, lines| clock.push(packet, lines))?;
+            clock.finish()?;
+            Ok(())
+        })?;
+        let added_percent = (timed_s / drawn_s - 1.0) * 100.0;
+        let (scene, gpu) = (subject.name().to_owned(), gpu.name.clone());
+        Ok(AddedRow { scene, gpu, level, drawn_s, timed_s, added_percent })
+    };
+    [Level::Packet, Level::Bound].into_iter().map(row).collect()
+}
+
+/// Processor seconds of the fastest of some times.
+fn fastest(mut work: impl FnMut() -> Result<(), RunError>) -> Result<f64, RunError> {
+    let mut least = f64::INFINITY;
+    for _ in 0..ADDED_TIMES {
+        let started = ProcessTime::now();
+        work()?;
+        least = least.min(started.elapsed().as_secs_f64());
+    }
+    Ok(least)
 }

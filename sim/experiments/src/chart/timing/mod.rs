@@ -1,17 +1,15 @@
 //! `quintile chart timing`: every level of timing against the reference, over scenes and GPUs.
 
-mod added;
 mod animations;
 mod failures;
 mod measure;
 mod picture;
-mod subjects;
 
 use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::quantiles::quantiles;
+use super::statistics::quantiles;
 use crate::study::table::{Sheet, Table, fixed, percent, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
 use crate::study::{Gallery, Study, StudyError};
@@ -22,10 +20,10 @@ use run::GpuSpec;
 use run::RunError;
 use timing::Level;
 
-pub use added::AddedRow;
 pub use animations::AnimationRow;
 pub use failures::{Chosen, FailedLevel, FailureRow, RateRow};
-pub use measure::Row;
+pub use measure::AddedRow;
+pub use measure::TimingRow;
 
 /// GPUs in the chart: small, integrated, large.
 const GPUS: [&str; 3] = ["mobile", "reference", "discrete"];
@@ -86,7 +84,7 @@ pub struct TimingChart {
     /// Animations at every level, drawn and timed, on every GPU.
     pub animations: Vec<AnimationRow>,
     /// A row for each scene, GPU and level but the reference.
-    pub rows: Vec<Row>,
+    pub rows: Vec<TimingRow>,
     /// What the cheap levels add to a run that only draws, scenes by GPUs.
     pub added: Vec<AddedRow>,
     /// Streams made to break levels, on each GPU; not in the figures of the levels.
@@ -110,7 +108,7 @@ impl Study for TimingChart {
 
     fn measure(Quick(quick): Quick, files: &[String], progress: &Progress) -> Result<Self, StudyError> {
         let gpus: Vec<GpuSpec> = GPUS.iter().map(GpuSpec::load).collect::<Result<_, _>>()?;
-        let subjects = subjects::all(files, quick)?;
+        let subjects = animations::all(files, quick)?;
         let bar = progress.bar("scenes", (subjects.len() * gpus.len()) as u64);
         // One after another: host times are part of what is measured.
         let (mut rows, mut added, mut reference) = (Vec::new(), Vec::new(), measure::Speed::default());
@@ -118,7 +116,7 @@ impl Study for TimingChart {
             for gpu in &gpus {
                 let stream = subject.stream(gpu)?;
                 rows.extend(measure::rows(subject.name(), gpu, &stream, &mut reference)?);
-                added.extend(added::rows(subject, gpu)?);
+                added.extend(measure::added(subject, gpu)?);
                 bar.inc();
             }
         }
@@ -183,7 +181,7 @@ fn animated(
 ) -> Result<Vec<AnimationRow>, RunError> {
     let extent = animations::Extent::of(quick);
     let mut rows = Vec::new();
-    for scene in subjects::SCENES.into_iter().chain(files.iter().map(String::as_str)) {
+    for scene in animations::SCENES.into_iter().chain(files.iter().map(String::as_str)) {
         for gpu in gpus {
             rows.extend(animations::rows(scene, gpu, extent, progress)?);
         }
@@ -191,11 +189,11 @@ fn animated(
     Ok(rows)
 }
 
-fn figures(level: Level, rows: &[Row], added: &[AddedRow]) -> Figures {
+fn figures(level: Level, rows: &[TimingRow], added: &[AddedRow]) -> Figures {
     if level == Level::Stepped {
         return Figures { speedup_over_stepped: 1.0, speedup_over_stepped_least: 1.0, ..Figures::default() };
     }
-    let of = |pick: fn(&Row) -> f64| quantiles(rows.iter().filter(|row| row.level == level).map(pick));
+    let of = |pick: fn(&TimingRow) -> f64| quantiles(rows.iter().filter(|row| row.level == level).map(pick));
     let added = quantiles(added.iter().filter(|row| row.level == level).map(|row| row.added_percent));
     let (cycles, energy) =
         (of(|row| row.cycle_error_percent.abs()), of(|row| row.energy_error_percent.abs()));

@@ -1,8 +1,8 @@
 //! Speed against accuracy of all levels in one picture.
 
 use super::animations::SAMPLED;
-use super::{Row, TimingChart};
-use crate::chart::quantiles::quantiles;
+use super::{TimingChart, TimingRow};
+use crate::chart::statistics::quantiles;
 use crate::study::tradeoff::front;
 use output::plot::{AxisSpec, Chart, ChartPanel, Look, Mark, Paint, Picture, Scale, Series, Spread};
 use timing::Level;
@@ -58,7 +58,7 @@ impl TimingChart {
     /// Single frames at a level, their packets given; none for the reference, with which they are compared.
     fn frames_at(&self, level: &str) -> Vec<Point> {
         let rows = self.rows.iter().filter(|row| row.level.name() == level);
-        rows.map(|row: &Row| (1.0 / row.speedup_over_stepped, row.cycle_error_percent.abs())).collect()
+        rows.map(|row: &TimingRow| (1.0 / row.speedup_over_stepped, row.cycle_error_percent.abs())).collect()
     }
 
     /// Animations at a level, those of every seed.

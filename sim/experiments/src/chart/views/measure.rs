@@ -12,7 +12,7 @@ use workloads::multiview::{Layout, Rig, Target, Views};
 use workloads::{Frame, Overrides, Scene};
 
 use super::{SAMPLES, line, stereo};
-use crate::chart::image::{errors, mean_square};
+use crate::chart::statistics::{errors, mean_square};
 use crate::study::StudyError;
 use run::GpuSpec;
 
@@ -35,7 +35,7 @@ pub struct Run {
 
 /// One number of views.
 #[derive(Clone, Copy, Debug, Serialize)]
-pub struct Row {
+pub struct ViewsRow {
     /// Views.
     pub views: u32,
     /// Samples for each view of a pixel; fewer where all of them do not fit in a pixel.
@@ -147,7 +147,7 @@ impl Bench {
     }
 
     /// All ways of rendering so many views: two are apart as eyes are, others overlap.
-    pub(super) fn row(&self, views: u32) -> Result<Row, StudyError> {
+    pub(super) fn row(&self, views: u32) -> Result<ViewsRow, StudyError> {
         let layout = if views == 2 { stereo() } else { line(views) };
         let (rig, to) = (self.rig(&layout, SAMPLES)?, self.target(&self.gpu.pipeline));
         let draws = self.frame.draws(&self.scene)?;
@@ -167,7 +167,7 @@ impl Bench {
                 host_s,
             })
         };
-        Ok(Row {
+        Ok(ViewsRow {
             views,
             samples_per_view: rig.samples() / layout.strips() * layout.overlap.max(1),
             one_pass: run(&|| rig.one_pass(&draws, &to, &mut |_, _| ()))?,

@@ -16,11 +16,11 @@ use output::OutputError;
 use output::plot::{ChartPanel, Scale, Series};
 use output::progress::{Bar, Progress};
 
-pub use measure::{Angle, Bench, Cached, Lanes, Row, Run};
+pub use measure::{Angle, Bench, Cached, Lanes, Run, ViewsRow};
 
 /// How much is measured.
 #[derive(Clone, Copy, Debug, Serialize)]
-pub struct Effort {
+pub struct ViewsEffort {
     /// The built-in scene, and its frame.
     pub scene: (&'static str, u32),
     /// Pixels of each view, across and down.
@@ -59,9 +59,9 @@ pub const POLICIES: [(&str, Replacement); 3] =
 #[derive(Clone, Debug, Serialize)]
 pub struct ViewsChart {
     /// How much was measured.
-    pub effort: Effort,
+    pub effort: ViewsEffort,
     /// By number of views.
-    pub rows: Vec<Row>,
+    pub rows: Vec<ViewsRow>,
     /// Views near to each other and far apart, by policy and entries of the cache.
     pub caches: Vec<Case>,
     /// What shading for the middle of the line leaves out, by its length.
@@ -93,15 +93,15 @@ impl Study for ViewsChart {
     const PICTURES: &'static [&'static str] = &["views_cost", "views_cache", "views_failures"];
     const FILES: &'static [&'static str] = &["views.csv", "views_cache.csv", "views.json"];
 
-    type Effort = Effort;
-    const FULL: Effort = Effort {
+    type Effort = ViewsEffort;
+    const FULL: ViewsEffort = ViewsEffort {
         scene: ("default", 18),
         size: [320, 180],
         views: &[1, 2, 7, 9, 64],
         entries: &[4, 8, 16, 32, 64, 128, 256, 512, 1024, 2048, 4096, 8192, 16_384],
         baselines: &[0.02, 0.05, 0.1, 0.2, 0.4, 0.8],
     };
-    const QUICK: Effort = Effort {
+    const QUICK: ViewsEffort = ViewsEffort {
         size: [128, 72],
         views: &[1, 2, 7, 64],
         entries: &[4, 16, 64, 256, 1024, 16_384],
@@ -109,7 +109,7 @@ impl Study for ViewsChart {
         ..Self::FULL
     };
 
-    fn measure(effort: Effort, _scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
+    fn measure(effort: ViewsEffort, _scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
         let steps = effort.views.len() + 3 * POLICIES.len() * effort.entries.len() + effort.baselines.len();
         let bar = progress.bar("views", steps as u64);
         let bench = Bench::new(effort.scene, effort.size)?;
@@ -178,7 +178,7 @@ impl Study for ViewsChart {
 
     /// No method has an error of its own besides that of shading for the middle of the line.
     fn tradeoff(&self) -> Vec<TradeoffPoint> {
-        let point = |row: &Row, method: &str, run: &Run| {
+        let point = |row: &ViewsRow, method: &str, run: &Run| {
             let cost = Metric::new("shader runs over those of one view", "", run.over_one_view);
             let metrics =
                 [Metric::new("error of many views", "", 0.0), cost.beside(row.view_by_view.over_one_view)];
@@ -194,7 +194,7 @@ fn ticked<T>(done: T, bar: &Bar) -> T {
     done
 }
 
-fn runs(row: &Row) -> [(&'static str, &Run); 3] {
+fn runs(row: &ViewsRow) -> [(&'static str, &Run); 3] {
     [("one pass", &row.one_pass), ("view by view", &row.view_by_view), ("accumulation", &row.accumulation)]
 }
 
@@ -266,7 +266,7 @@ mod tests {
     use super::*;
     use crate::study::written;
 
-    const LEAST: Effort = Effort {
+    const LEAST: ViewsEffort = ViewsEffort {
         scene: ("tiny", 1),
         size: [40, 30],
         views: &[1, 2, 7],

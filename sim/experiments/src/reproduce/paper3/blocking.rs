@@ -5,11 +5,11 @@ use traces::energy::{Pooled, pooled};
 
 use super::super::band::{Cases, one_at_a_time};
 use super::super::figure::{ENERGY, POWER, TIME, level, line};
-use super::super::recording::{MARKED, looped};
 use super::super::row::{Row, numbers};
 use super::super::stage::Stage;
+use super::super::stage::{MARKED, looped};
 use super::super::{Done, Figure, scenes};
-use super::settings::BlockingPhone;
+use super::BlockingPhone;
 use super::{Bench, FRAME, settled};
 use output::plot::Series;
 use run::RunError;

@@ -5,8 +5,8 @@ use traces::energy::{Spread, outliers};
 
 use super::super::band::Cases;
 use super::super::figure::{ENERGY, POWER, TIME, by_place, dots, line};
-use super::super::recording::Recording;
 use super::super::row::{Row, numbers};
+use super::super::stage::Recording;
 use super::super::{Done, Figure};
 use super::{Bench, settled, unflagged};
 use run::RunError;

@@ -6,8 +6,8 @@ use traces::frames::Method;
 use traces::score::Score;
 
 use super::super::figure::{POWER, TIME, dots, line};
-use super::super::recording::{Frames, MARKED, Recording};
 use super::super::row::{Row, numbers};
+use super::super::stage::{Frames, MARKED, Recording};
 use super::super::verdict::Verdict;
 use super::super::{Done, Figure};
 use super::{Bench, settled};

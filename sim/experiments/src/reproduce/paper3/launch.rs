@@ -5,8 +5,8 @@ use traces::energy::{WarmUp, mean_over_discarded, outliers, warm_up as knee};
 
 use super::super::band::Cases;
 use super::super::figure::{ENERGY, POWER, TIME, by_place, level, line};
-use super::super::recording::{MARKED, Recording, looped};
 use super::super::row::{Row, numbers};
+use super::super::stage::{MARKED, Recording, looped};
 use super::super::{Done, Figure};
 use super::{Bench, settled, unflagged};
 use run::RunError;

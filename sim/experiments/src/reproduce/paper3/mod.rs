@@ -4,20 +4,19 @@ mod blocking;
 mod disturbance;
 mod finding;
 mod launch;
-mod settings;
 
-use power_model::{Circumstances, FramePower, Pacing};
-
-use super::recording::{Recording, looped};
-use super::row::With;
-use super::settings::{Form, Origin, load, reduced};
-use super::stage::Stage;
-use super::{Done, Options};
 use output::progress::Progress;
+use power_model::{Circumstances, FramePower, Pacing};
 use run::RunError;
-use settings::Settings;
 
-/// Both machines, with their frames drawn once.
+use super::row::With;
+use super::settings::{
+    About, Form, Origin, Setting, load, paper_settings, reduced, row_settings, settings_group,
+};
+use super::stage::{Recording, Stage, looped};
+use super::{Done, Options, Paper};
+
+/// Both machines, with their simulated frames.
 struct Bench<'a> {
     settings: Settings,
     form: Form,
@@ -25,12 +24,12 @@ struct Bench<'a> {
     pc: Stage,
     pc_frames: Vec<FramePower>,
     phone: Stage,
-    /// The phone's sequence; where not all of it is simulated, what is.
+    /// Simulated frames of the phone's sequence.
     phone_frames: Vec<FramePower>,
     progress: &'a Progress,
 }
 
-/// The frame of the phone's sequence that the paper looks at closely (Figure 7).
+/// The frame of the phone's sequence in Figure 7.
 const FRAME: usize = 9;
 
 /// Long after launch, without blocking.
@@ -38,7 +37,7 @@ fn settled(seed: u64) -> Circumstances {
     Circumstances { launch: false, blocking_finish: false, seed }
 }
 
-/// The energies that are not flagged.
+/// Energies of frames without flags.
 fn unflagged(energies_j: &[f64], flags: &[bool]) -> Vec<f64> {
     energies_j.iter().zip(flags).filter(|(_, flag)| !**flag).map(|(energy, _)| *energy).collect()
 }
@@ -54,7 +53,7 @@ impl Bench<'_> {
         }
     }
 
-    /// Recordings of the same thing.
+    /// Number of recordings of the same frames.
     fn repeats(&self) -> u64 {
         *self.settings.work.repeats.get(self.form)
     }
@@ -64,7 +63,7 @@ impl Bench<'_> {
         *self.settings.work.recorded_frames.get(self.form)
     }
 
-    /// Every how many frames of the phone's sequence one is simulated.
+    /// One frame of the phone's sequence is simulated for each so many.
     fn phone_step(&self) -> u32 {
         *self.settings.work.phone_step.get(self.form)
     }
@@ -74,12 +73,12 @@ impl Bench<'_> {
         &self.phone_frames[FRAME / self.phone_step() as usize]
     }
 
-    /// The phone draws `frames` at its cap.
+    /// Recording of the phone, which draws `frames` at its frame rate cap.
     fn on_phone(&self, frames: &[&FramePower], circumstances: Circumstances) -> Result<Recording, RunError> {
         self.on(&self.phone, frames, circumstances)
     }
 
-    /// A machine draws `frames` at its cap.
+    /// Recording of a machine, which draws `frames` at its frame rate cap.
     fn on(
         &self,
         stage: &Stage,
@@ -89,7 +88,7 @@ impl Bench<'_> {
         Recording::new(stage, frames, stage.capped()?, circumstances)
     }
 
-    /// The PC draws its animation.
+    /// Recording of the PC, which draws its animation.
     fn on_pc(&self, pacing: Pacing, circumstances: Circumstances) -> Result<Recording, RunError> {
         let shown = looped(&self.pc_frames, self.recorded_frames());
         Recording::new(&self.pc, &shown, pacing, circumstances)
@@ -128,4 +127,82 @@ pub(super) fn rows(options: &Options, progress: &Progress) -> Result<(Origin, Ve
         bar.inc();
     }
     Ok((bench.origin, done))
+}
+
+paper_settings!(Paper::Three, "paper3.ron" {
+    work: Work,
+    iii_1: Finding,
+    iii_2: Sums,
+    iii_3: WarmUp,
+    iii_4: BlockingPhone,
+    iii_5: BlockingPc,
+    iii_6: Disturbance,
+});
+
+settings_group! {
+    /// Amount of simulation and recording, shared by all rows.
+    Work {} {
+        pc_frames: u32, within(1..=36);
+        phone_step: u32, within(1..=8);
+        recorded_frames: usize, within(24..=10_000);
+        still_frames: usize, within(200..=10_000);
+        repeats: u64, within(1..=1000);
+    }
+}
+
+row_settings! {
+    Finding {
+        marked: usize, within(1..=8);
+        found_vsync: f64, within(0.0..=1.0);
+        found_free: f64, within(0.0..=1.0);
+        within_ms: f64, within(0.001..=10.0);
+    }
+
+    Sums {
+        same: f64, within(0.0..=1.0);
+    }
+
+    WarmUp {
+        frames: u32, within(1..=1000);
+        planted_s: f64, within(0.1..=4.0);
+        near: f64, within(0.0..=100.0);
+        recorded: usize, within(150..=10_000);
+    }
+
+    BlockingPhone {
+        waiting_w: f64, within(0.0..=10.0);
+        idle_w: f64, within(0.01..=10.0);
+        edge: f64, within(0.01..=1.0);
+    }
+
+    BlockingPc {
+        with_mj: (f64, f64), must(energy, ENERGY);
+        without_mj: (f64, f64), must(energy, ENERGY);
+        waiting_w: f64, within(0.0..=100.0);
+        background_w: f64, within(0.0..=100.0);
+    }
+
+    Disturbance {
+        extra_w: f64, within(0.0..=10.0);
+        frames: (usize, usize), must(|(low, high)| low <= high, "fewest and most");
+        shorts: u64, within(2..=1000);
+    }
+}
+
+fn energy((mean, deviation): &(f64, f64)) -> bool {
+    *mean > 0.0 && *deviation > 0.0
+}
+
+const ENERGY: &str = "a mean and a deviation above 0";
+
+#[cfg(test)]
+mod tests {
+    use super::super::settings::load;
+    use super::*;
+
+    #[test]
+    fn the_committed_file_is_valid() {
+        let (_, origin) = load::<Settings>(None).unwrap();
+        assert!(origin.committed && origin.sha256.len() == 64);
+    }
 }

@@ -42,7 +42,7 @@ fn beside() -> Option<Eye> {
     Eye::new([dvec3(1.2, 1.6, 8.0), dvec3(0.2, -1.0, 0.0), DVec3::Y], 2.2, PANEL_PX)
 }
 
-/// Stretches of pixels of a row that are alike: 0 not shaded, 1 in vain, 2 with light.
+/// Runs of equal pixels in a row: 0 not shaded, 1 wasted, 2 with light.
 fn areas_of(panel: u32, picture: &Picture) -> Vec<HeatTile> {
     let width = PANEL_PX[0];
     let kinds = picture.runs.iter().zip(&picture.light);

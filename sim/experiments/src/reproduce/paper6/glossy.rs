@@ -4,7 +4,7 @@ use workloads::glossy::Effect;
 
 use super::Task;
 use super::settings::Glossy;
-use crate::chart::glossy::{Bench, Blur, Effort as Size, Row as Measured};
+use crate::chart::glossy::{Bench, Blur, GlossyEffort as Size, GlossyRow as Measured};
 use crate::reproduce::band::{Cases, one_at_a_time};
 use crate::reproduce::figure::line;
 use crate::reproduce::row::{Row, numbers};

@@ -186,7 +186,7 @@ fn exact(value: f64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::look::Look;
+    use super::super::super::picture::Look;
     use super::*;
 
     #[test]

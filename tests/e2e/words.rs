@@ -1,0 +1,147 @@
+//! Words: the project uses the terms of the glossary. Words of its own that stood for them are refused.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use crate::support::{Inputs, root};
+
+/// Refused words and phrases, each with its replacement. They are compared as whole words, in any case.
+const REFUSED: [(&str, &str); 56] = [
+    ("a fault of the program", "internal error"),
+    ("are told", "are reported; are distinguished"),
+    ("as it wants", "as configured"),
+    ("at hand", "available"),
+    ("beams and bodies", "light volumes, bounding volumes"),
+    ("beaten by", "dominated by"),
+    ("bodies and beams", "bounding volumes, light volumes"),
+    ("doubt", "warning, low confidence"),
+    ("doubted", "flagged"),
+    ("doubts", "warnings"),
+    ("easel", "output"),
+    ("for a look", "for a preview"),
+    ("held against", "compared with"),
+    ("held up to", "validated against"),
+    ("hold against", "compare with"),
+    ("how sure", "confidence"),
+    ("in vain", "false positive, wasted"),
+    ("is no time", "is not a valid time"),
+    ("is to be had", "is available"),
+    ("is told", "is reported"),
+    ("keeps time", "is periodic"),
+    ("leaving the camera aside", "camera motion is not considered"),
+    ("mend", "fix, repair, fill"),
+    ("mended", "fixed, repaired, filled"),
+    ("mending", "repair"),
+    ("mends", "repairs, fixes"),
+    ("numbers apart", "ulp"),
+    ("of the house", "of the project"),
+    ("on the front", "Pareto-optimal"),
+    ("outlook", "expected cost"),
+    ("owe", "service demand"),
+    ("owed", "service demand"),
+    ("owes", "has a service demand of"),
+    ("places on the lens", "lens samples"),
+    ("places on the light", "light samples"),
+    ("pour", "read into"),
+    ("poured", "read into"),
+    ("pours", "reads into"),
+    ("remarkable", "flagged"),
+    ("remarks", "notes, flags"),
+    ("rested", "after an idle gap"),
+    ("seldom", "rarely"),
+    ("spacing of numbers", "ulp"),
+    ("standings", "trade-off points"),
+    ("stretch", "segment, range"),
+    ("tell", "report, print, distinguish"),
+    ("telling", "reporting"),
+    ("tells", "reports, prints, distinguishes"),
+    ("there is no `", "unknown"),
+    ("unrested", "without an idle gap"),
+    ("watcher", "observer"),
+    ("what is asked for", "request, target"),
+    ("what the papers report", "reproduction"),
+    ("where methods fail", "limitations, failure modes"),
+    ("wish", "request, target"),
+    ("yardstick", "reference"),
+];
+
+/// Files that may hold them: this list, and the changelog, which names fields that were renamed.
+const EXEMPT: [&str; 2] = ["tests/e2e/words.rs", "CHANGELOG.md"];
+
+/// Endings of files that are read.
+const ENDINGS: [&str; 4] = ["rs", "md", "ron", "html"];
+
+/// Text files below `folder`, without build results and hidden folders.
+fn texts(folder: &Path) -> Vec<PathBuf> {
+    let mut files = Vec::new();
+    for entry in fs::read_dir(folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display())) {
+        let path = entry.unwrap().path();
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        if path.is_dir() {
+            if !name.starts_with('.') && name != "target" {
+                files.extend(texts(&path));
+            }
+        } else if path.extension().is_some_and(|ending| ENDINGS.iter().any(|known| ending == *known)) {
+            files.push(path);
+        }
+    }
+    files
+}
+
+/// Whether `line`, in small letters, holds `phrase` between characters that are not part of a word.
+fn holds(line: &str, phrase: &str) -> bool {
+    let inside = |c: Option<char>| c.is_some_and(char::is_alphanumeric);
+    line.match_indices(phrase).any(|(at, _)| {
+        let (before, after) = (line[..at].chars().next_back(), line[at + phrase.len()..].chars().next());
+        let open = phrase.ends_with(|c: char| !c.is_alphanumeric());
+        !inside(before) && (open || !inside(after))
+    })
+}
+
+/// Refused words in a file of this name, each as `file:line: what to write`.
+fn refused(name: &str, text: &str) -> Vec<String> {
+    let mut found = Vec::new();
+    for (index, line) in text.lines().enumerate() {
+        let line = line.to_lowercase();
+        let held = REFUSED.iter().filter(|(phrase, _)| holds(&line, phrase));
+        found.extend(held.map(|(phrase, instead)| {
+            format!("{name}:{}: `{phrase}` is not a word of this project: write `{instead}`", index + 1)
+        }));
+    }
+    found
+}
+
+#[test]
+fn texts_use_the_words_of_the_glossary() {
+    let root = root();
+    let files = texts(&root);
+    assert!(files.len() > 300, "only {} files were read", files.len());
+    let mut found = Vec::new();
+    for file in files {
+        let name = file.strip_prefix(&root).unwrap().to_string_lossy().into_owned();
+        if !EXEMPT.contains(&name.as_str()) {
+            found.extend(refused(&name, &fs::read_to_string(&file).unwrap()));
+        }
+    }
+    found.sort();
+    assert!(found.is_empty(), "{}", found.join("\n"));
+}
+
+#[test]
+fn refused_words_are_found_with_file_and_line() {
+    let inputs = Inputs::new();
+    inputs.put("page.md", "Fine.\nIt was Mended, and kept_in_vain is a name.\n");
+    inputs.put("data.csv", "mend");
+    let files = texts(Path::new(&inputs.path("")));
+    assert_eq!(files.len(), 1, "{files:?}");
+    let found = refused("page.md", &fs::read_to_string(&files[0]).unwrap());
+    assert_eq!(found, ["page.md:2: `mended` is not a word of this project: write `fixed, repaired, filled`"]);
+    assert!(refused("a.rs", "a mending, amended, recommend, intelligible\n").len() == 1);
+    assert!(refused("a.rs", "there is no `x`; there is no `\n").len() == 1);
+}
+
+#[test]
+fn the_list_is_sorted_and_in_small_letters() {
+    assert!(REFUSED.is_sorted());
+    assert!(REFUSED.iter().all(|(phrase, instead)| *phrase == phrase.to_lowercase() && !instead.is_empty()));
+}
