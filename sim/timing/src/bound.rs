@@ -227,7 +227,7 @@ impl Totals {
         }
         work[Unit::Shader as usize] += u64::from(counts[Event::ShaderOps]);
         if demand.is_textured() {
-            let cycles = builder.texture_cycles(demand.texels[0], demand.texels[1]);
+            let cycles = builder.texture_cycles(demand.texels);
             work[Unit::Texture as usize] += u64::from(cycles.max(request_cycles(TEXTURE_PORT)));
         }
         work[Unit::L2 as usize] += demand.lines.iter().map(|&lines| u64::from(lines)).sum::<u64>();

@@ -68,6 +68,12 @@ pub fn port(unit: Unit) -> Option<usize> {
     CLIENTS.iter().position(|&client| client == unit)
 }
 
+/// Events of the texture units; each may have a rate.
+pub const TEXELS: usize = {
+    let events = Unit::Texture.events();
+    events.end - events.start
+};
+
 /// Service demand of one packet.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ServiceDemand {
@@ -83,8 +89,8 @@ pub struct ServiceDemand {
     pub threads: u32,
     /// Operations per thread.
     pub ops: u32,
-    /// Bilinear fetches of all threads, and texture cache lines they read.
-    pub texels: [u32; 2],
+    /// Events of the texture units, of all threads, in the order of their declaration.
+    pub texels: [u32; TEXELS],
     /// Index of the first line in the store.
     pub first_line: usize,
     /// Lines requested by each client, in the order of [`CLIENTS`].
@@ -101,7 +107,7 @@ impl ServiceDemand {
 
     /// Whether the threads use the texture units.
     pub fn is_textured(&self) -> bool {
-        self.texels != [0; 2] || self.lines[TEXTURE_PORT] > 0
+        self.texels != [0; TEXELS] || self.lines[TEXTURE_PORT] > 0
     }
 
     /// Number of warps of at most `lanes` threads.
@@ -121,7 +127,8 @@ pub fn share(whole: u32, part: u32, parts: u32) -> Range<u32> {
 pub struct DemandBuilder {
     /// Cycles per event, by station.
     costs: [Vec<(Event, f64)>; Station::COUNT],
-    texel_cycles: [f64; 2],
+    /// Cycles per event of the texture units.
+    texel_cycles: [f64; TEXELS],
     batch_triangles: u32,
     batch: u32,
 }
@@ -138,7 +145,7 @@ impl DemandBuilder {
         };
         Self {
             costs,
-            texel_cycles: [Event::TextureFetches, Event::TextureLines].map(cycles),
+            texel_cycles: texture_events().map(cycles),
             batch_triangles: batch_triangles.max(1),
             batch: 0,
         }
@@ -162,7 +169,7 @@ impl DemandBuilder {
             service: [0; Station::COUNT],
             threads: counts[if front { Event::VertexInvocations } else { Event::PixelInvocations }],
             ops: 0,
-            texels: [counts[Event::TextureFetches], counts[Event::TextureLines]],
+            texels: texture_events().map(|event| counts[event]),
             first_line: store.len(),
             lines: [0; 4],
         };
@@ -181,10 +188,11 @@ impl DemandBuilder {
         demand
     }
 
-    /// Cycles of the texture units for `fetches` and `lines`.
-    pub fn texture_cycles(&self, fetches: u32, lines: u32) -> u32 {
-        let [fetch, line] = self.texel_cycles;
-        whole((f64::from(fetches) * fetch).max(f64::from(lines) * line))
+    /// Cycles of the texture units for `texels`, without line requests. The slowest of their events counts.
+    pub fn texture_cycles(&self, texels: [u32; TEXELS]) -> u32 {
+        let parts =
+            texels.into_iter().zip(self.texel_cycles).map(|(count, cycles)| f64::from(count) * cycles);
+        whole(parts.fold(0.0, f64::max))
     }
 
     /// Cycles of service at `station` for `counts`, without line requests. The parts of a unit work in
@@ -203,6 +211,11 @@ impl DemandBuilder {
         }
         if front { own } else { self.batch }
     }
+}
+
+fn texture_events() -> [Event; TEXELS] {
+    let first = Unit::Texture.events().start;
+    std::array::from_fn(|at| Event::ALL[first + at])
 }
 
 /// Append `lines` to `store`, grouped by client in the order of the ports. Returns the number per client.

@@ -151,8 +151,8 @@ impl Cores {
     ) -> Span {
         let demand = visit.demand;
         let cycles = |part: u32| {
-            let [fetches, lines] = demand.texels.map(|whole| share(whole, part, chunk.of).len() as u32);
-            self.texture_period * Time::from(builder.texture_cycles(fetches, lines))
+            let texels = demand.texels.map(|whole| share(whole, part, chunk.of).len() as u32);
+            self.texture_period * Time::from(builder.texture_cycles(texels))
         };
         let service: Time = (chunk.first..chunk.first + chunk.count).map(cycles).sum();
         let each = service / Time::from(chunk.count);

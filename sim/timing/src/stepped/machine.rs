@@ -324,11 +324,11 @@ impl StageEnv for TextureEnv<'_, '_> {
     fn work(&self, id: u32) -> (u32, std::ops::Range<usize>) {
         let warp = self.shader.warp(id);
         let demand = &self.shared.stream.demands[warp.packet as usize];
-        let [fetches, lines] = warp.texels(demand);
+        let texels = warp.texels(demand);
         let all = demand.lines_of(TEXTURE_PORT);
         let part = crate::demand::share(all.len() as u32, warp.part, warp.parts);
         let range = all.start + part.start as usize..all.start + part.end as usize;
-        (self.shared.builder.texture_cycles(fetches, lines), range)
+        (self.shared.builder.texture_cycles(texels), range)
     }
 
     fn line(&self, at: usize) -> LineAccess {

@@ -6,7 +6,7 @@ use activity::Unit;
 
 use super::queue::Queue;
 use crate::clock::{Clocks, Time};
-use crate::demand::{ServiceDemand, share};
+use crate::demand::{ServiceDemand, TEXELS, share};
 use crate::spec::MachineSpec;
 use crate::stalls::Reason;
 
@@ -305,8 +305,8 @@ pub(super) struct Warp {
 }
 
 impl Warp {
-    /// Its texture fetches and lines of the texture cache.
-    pub fn texels(&self, demand: &ServiceDemand) -> [u32; 2] {
+    /// Its events of the texture units.
+    pub fn texels(&self, demand: &ServiceDemand) -> [u32; TEXELS] {
         demand.texels.map(|whole| share(whole, self.part, self.parts).len() as u32)
     }
 }

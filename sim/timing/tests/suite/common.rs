@@ -22,7 +22,7 @@ fn unit(text: &str) -> UnitSpec {
     UnitSpec { clock: Clock::Core, latency_cycles: size(1), queue: size(64), rates: rates(text) }
 }
 
-fn client(text: &str) -> ClientSpec {
+pub fn client(text: &str) -> ClientSpec {
     let rates = rates(text);
     ClientSpec {
         clock: Clock::Core,

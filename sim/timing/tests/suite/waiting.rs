@@ -3,7 +3,7 @@
 use activity::{Event, LineAccess, LineKind, Packet, PacketKind, Unit};
 use timing::MachineSpec;
 
-use crate::common::{BATCH, Packets, clocks, packet_level, plain, read, size, stepped, tile};
+use crate::common::{BATCH, Packets, client, clocks, packet_level, plain, read, size, stepped, tile};
 
 type Level = fn(&MachineSpec, &Packets) -> u64;
 
@@ -79,6 +79,19 @@ fn a_packet_waits_for_its_lines() {
     });
     for (truth, found) in taken[0].into_iter().zip(taken[1]) {
         assert!(truth.abs_diff(found) * 50 <= truth, "{truth} {found}");
+    }
+}
+
+#[test]
+fn every_event_of_the_texture_units_may_have_a_rate() {
+    for event in Unit::Texture.events().map(|at| Event::ALL[at]) {
+        let mut machine = plain();
+        machine.texture = client(&format!("{{\"{}\": 0.01}}", event.name()));
+        let counts = [(Event::PixelInvocations, 4), (Event::ShaderOps, 4), (event, 4)];
+        let packets = vec![(tile(&counts), Vec::new())];
+        for (name, cycles) in LEVELS {
+            assert!(cycles(&machine, &packets) > 400, "{name} {}", event.name());
+        }
     }
 }
 
