@@ -21,7 +21,7 @@ pub enum ReadError {
     Damaged {
         /// The file.
         path: PathBuf,
-        /// Parquet, JLS or CSV.
+        /// The format, as in `Parquet`.
         format: &'static str,
         /// The error of the reader.
         reason: String,

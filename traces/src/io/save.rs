@@ -4,7 +4,8 @@ use super::samples::TraceReader;
 use super::{WriteError, csv, jls, parquet};
 use std::path::Path;
 
-/// Endings of the names of files that [`save`] writes.
+/// Endings of the names of files that [`save`] writes; those that [`read`](super::read()) reads have a variant of
+/// `Format` in `rows.rs`.
 pub const FORMATS: [&str; 6] = [".parquet", ".jls", ".csv", ".tsv", ".csv.gz", ".tsv.gz"];
 
 /// Writes a trace in the format that the ending of the name stands for, in any case; CSV and TSV with a
@@ -17,6 +18,7 @@ pub fn save(trace: &dyn TraceReader, path: &Path) -> Result<(), WriteError> {
     match FORMATS.into_iter().find(|ending| name.ends_with(ending)) {
         Some(".parquet") => parquet::save(trace, path),
         Some(".jls") => jls::save(trace, path),
+        // All other endings are texts: a new binary format needs an arm above.
         Some(text) => {
             let delimiter = if text.starts_with(".tsv") { b'\t' } else { b',' };
             csv::save_as(trace, path, delimiter, text.ends_with(".gz"))

@@ -13,7 +13,7 @@ use crate::cli::trace::{TraceArgs, TraceCommand};
 
 /// What an input from a pipe is called in messages and plots.
 const INPUT: &str = "standard input";
-/// Formats that a terminal cannot show.
+/// Formats that a terminal cannot show: all that are not text.
 const BINARY: [&str; 7] = ["parquet", "jls", "csv.gz", "tsv.gz", "perfetto-trace", "png", "pdf"];
 
 /// The files that stand in for standard input and standard output.
@@ -160,5 +160,26 @@ fn copy_out(path: &Path) -> Result<(), Failure> {
             Err(Failure { message: format!("standard output: cannot write to it: {error}"), code: 1 })
         }
         _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cli::args::trace::TraceFormat;
+    use clap::ValueEnum;
+    use traces::io::FORMATS;
+
+    #[test]
+    fn every_format_of_traces_has_a_name_for_pipes_and_is_text_or_binary() {
+        for format in FORMATS.map(|ending| ending.trim_start_matches('.')) {
+            let named = TraceFormat::value_variants().iter().any(|known| known.name() == format);
+            assert!(named, "{format}: add it to TraceFormat in args/trace/mod.rs");
+            let text = ["csv", "tsv"].contains(&format);
+            assert!(
+                text != BINARY.contains(&format),
+                "{format}: add it to BINARY, or to the texts of this test"
+            );
+        }
     }
 }
