@@ -166,7 +166,7 @@ fn copy_out(path: &Path) -> Result<(), Failure> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cli::args::trace::TraceFormat;
+    use crate::cli::trace::input::TraceFormat;
     use clap::ValueEnum;
     use traces::io::FORMATS;
 
@@ -174,7 +174,7 @@ mod tests {
     fn every_format_of_traces_has_a_name_for_pipes_and_is_text_or_binary() {
         for format in FORMATS.map(|ending| ending.trim_start_matches('.')) {
             let named = TraceFormat::value_variants().iter().any(|known| known.name() == format);
-            assert!(named, "{format}: add it to TraceFormat in args/trace/mod.rs");
+            assert!(named, "{format}: add it to TraceFormat in trace/input.rs");
             let text = ["csv", "tsv"].contains(&format);
             assert!(
                 text != BINARY.contains(&format),
