@@ -32,7 +32,9 @@ fn only_different_samples_count_against_banding() {
     assert!(one.starts_with("1 light samples") && one.contains("16 or more `points` that differ"), "{one}");
     assert!(warned(Some(many.clone()), 8).unwrap().starts_with("8 light samples"));
     assert!(
-        warned(Some([[(0.0, 0.0, 0.0), (-0.0, 0.0, 0.0)]; 8].concat()), 16).unwrap().starts_with("1 places")
+        warned(Some([[(0.0, 0.0, 0.0), (-0.0, 0.0, 0.0)]; 8].concat()), 16)
+            .unwrap()
+            .starts_with("1 light samples")
     );
     assert_eq!((warned(Some(many), 64), warned(None, 16)), (None, None));
     assert!(warned(None, 8).is_some());
