@@ -18,6 +18,20 @@
 //! Energies are computed first: counts times joules, and watts times the true length of the bin. Power is
 //! derived from them, so a partial last bin loses nothing. The crate contains no geometry and no clock rate,
 //! and also accepts counts from a file ([`PowerModel::counts_energy`]).
+//!
+//! ```
+//! use activity::{Counts, Event};
+//! use power_model::{EnergyTable, Platform, PowerModel};
+//!
+//! let (table, platform) = (EnergyTable::builtin("28nm")?, Platform::builtin("reference")?);
+//! let model = PowerModel::new(&table, &platform)?;
+//! let mut counts = Counts::default();
+//! counts[Event::DramReadBytes] = 1_000_000;
+//! let read_j = model.counts_energy(&counts).total_j();
+//! counts[Event::DramReadBytes] *= 2;
+//! assert!((model.counts_energy(&counts).total_j() - 2.0 * read_j).abs() < 1e-12);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod error;
 mod frame;

@@ -11,6 +11,22 @@
 //!
 //! Every part has input structs of its own and does not depend on the crate `run`. The bytes written depend
 //! only on these inputs.
+//!
+//! ```
+//! use output::table::si;
+//! use output::{Claim, Destination};
+//!
+//! assert_eq!(si(0.01234, "J"), "12.3 mJ");
+//!
+//! let folder = std::env::temp_dir().join(format!("quintile-{}", std::process::id()));
+//! let mut results = Destination::new(&folder).open([Claim::new("example").files(["sums.json"])])?;
+//! results.write_json("sums.json", &[1, 2, 3])?;
+//! // Until here the folder has none of the new files.
+//! results.publish()?;
+//! assert!(folder.join("sums.json").exists());
+//! # std::fs::remove_dir_all(folder)?;
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 pub mod dir;
 pub mod image;

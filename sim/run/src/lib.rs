@@ -3,6 +3,22 @@
 //! ```text
 //! RunOptions -> Plan -> open -> prepare -> Prepared -> run: simulate -> measure -> Outcome -> write
 //! ```
+//!
+//! - [`RunOptions`]: everything that may be asked for; [`Plan`]: with all inputs loaded and checked.
+//! - [`GpuSpec`]: a GPU: its pipeline, its machine, and the platform and energy table it belongs to.
+//! - [`Work`] and [`Distinct`]: what is drawn, and which frames differ.
+//! - [`frames_of`]: frames in cycles and joules, without a trace. [`run()`]: all of it, into a folder.
+//! - [`Summary`]: `summary.json`; [`compare`]: two of them side by side.
+//!
+//! ```
+//! use run::{Plan, RunOptions, frames_of};
+//! use output::progress::Progress;
+//!
+//! let plan = Plan::resolve(RunOptions { scene: "tiny".into(), ..RunOptions::default() })?;
+//! let frames = frames_of(&plan, &[0], &Progress::new(true))?;
+//! assert!(frames[0].cycles > 0 && frames[0].cost().energy_j > 0.0);
+//! # Ok::<(), run::RunError>(())
+//! ```
 
 mod choice;
 pub mod compare;

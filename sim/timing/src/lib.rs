@@ -15,6 +15,18 @@
 //!
 //! The crate contains no geometry and no energy. The activity is fixed before its timing: cache hits and
 //! misses are decided in stream order, and the levels here only add their time.
+//!
+//! ```
+//! use activity::Unit;
+//! use timing::Recorder;
+//!
+//! // Bins of 1000 ps; a rasterizer that works for one and a half of them.
+//! let mut recorder = Recorder::new(1000, 16);
+//! recorder.busy(Unit::Traversal, 500, 2000, 1, 1);
+//! let timeline = recorder.finish();
+//! let busy: Vec<u64> = timeline.bins.iter().map(|bin| bin.busy_ps[Unit::Traversal as usize]).collect();
+//! assert_eq!(busy, [500, 1000]);
+//! ```
 
 mod address;
 mod bound;

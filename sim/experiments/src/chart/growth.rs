@@ -1,6 +1,6 @@
 //! `quintile chart growth`: how the time of the visibility engine grows with triangles, samples and blur.
 //!
-//! Time is CPU time of one thread in [`resolve`](pipeline::visibility::resolve): set-up, binning, tests and depth, the median
+//! Time is CPU time of one thread in [`resolve`]: set-up, binning, tests and depth, the median
 //! of some repeats. Samples are made and sorted before, as they may be before any triangle is known.
 
 use cpu_time::ThreadTime;
