@@ -12,7 +12,7 @@ use workloads::caustics::{
     draw, error,
 };
 
-use super::view::{SIDE_M, SQUARE_PX, above, aside, aside_of, from_the_side, water};
+use super::view::{DEPTH_M, SIDE_M, SLOPE, SQUARE_PX, above, aside, aside_of, from_the_side, water};
 use super::{CausticsChart, CausticsEffort, CausticsRow, Coarse};
 use crate::study::StudyError;
 
@@ -142,9 +142,9 @@ fn resolved_cells() -> f64 {
 }
 
 /// Depth of the water in metres: half of all beams fold above the floor.
-const DEPTH_M: f64 = 8.0;
+const FOLDED_DEPTH_M: f64 = 8.0;
 /// Slope of the waves.
-const SLOPE: f64 = 0.3;
+const FOLDED_SLOPE: f64 = 0.3;
 /// Beams go on below the floor, so that it does not lie at their ends, where pleats would not matter.
 const OVERSHOOT: f64 = 0.25;
 /// Photons in the volume, of all beams.
@@ -202,14 +202,14 @@ fn crossed(effort: &CausticsEffort, bar: &Bar) -> Result<Vec<Crossed>, StudyErro
 }
 
 fn floor() -> Floor {
-    Floor { height_m: -DEPTH_M }
+    Floor { height_m: -FOLDED_DEPTH_M }
 }
 
 impl Bench {
     fn new(effort: &CausticsEffort, cells: u32) -> Result<Self, StudyError> {
-        let surface = Water { overshoot: OVERSHOOT, depth_m: DEPTH_M, ..water(cells, SLOPE) };
-        let middle = DVec3::new(1.5, -0.6 * DEPTH_M, 1.0);
-        let aside = from_the_side(middle, DEPTH_M, effort.sweep_px)?;
+        let surface = Water { overshoot: OVERSHOOT, depth_m: FOLDED_DEPTH_M, ..water(cells, FOLDED_SLOPE) };
+        let middle = DVec3::new(1.5, -0.6 * FOLDED_DEPTH_M, 1.0);
+        let aside = from_the_side(middle, FOLDED_DEPTH_M, effort.sweep_px)?;
         let above = above(effort.floor_px)?;
         let squares = Squares { eye: &above, side_px: SQUARE_PX };
         let known = [1, 2].map(|seed| squares.on_floor(&surface, 0.0, &floor(), [effort.rays, seed]));
