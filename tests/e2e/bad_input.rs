@@ -347,41 +347,42 @@ fn invalid_gpu_and_platform_files() {
     let gpu = source("sim/run/gpus/reference.ron");
     let platform = source("power-model/platforms/reference.ron");
     let table = source("power-model/tables/28nm.ron");
+    let (hertz, range) = ("has to be 1e6 to 1e11 hertz", "give one in that range");
     let cases = [
-        ("--gpu", gpu.replace("tile_px: 8", "tile_sise: 8"), "`tile_sise`", "did you mean `tile_px`?"),
         (
             "--gpu",
-            gpu.replace("core_hz: 400e6", "core_hz: -400e6"),
-            "`core_hz` is -400000000",
-            "has to be 1e6 to 1e11 hertz",
+            gpu,
+            vec![
+                ("tile_px: 8", "tile_sise: 8", "`tile_sise`", "did you mean `tile_px`?"),
+                ("core_hz: 400e6", "core_hz: -400e6", "`core_hz` is -400000000", hertz),
+                ("core_hz: 400e6", "core_hz: NaN", "`core_hz` is NaN", hertz),
+                ("queue: 32", "queue: 0", "`queue`: 0", "it has to be 1 to 65536"),
+            ],
         ),
-        (
-            "--gpu",
-            gpu.replace("core_hz: 400e6", "core_hz: NaN"),
-            "`core_hz` is NaN",
-            "has to be 1e6 to 1e11 hertz",
-        ),
-        ("--gpu", gpu.replace("queue: 32", "queue: 0"), "`queue`: 0", "it has to be 1 to 65536"),
-        ("--platform", platform.replace("idle_w:", "idel_w:"), "`idel_w`", "did you mean `idle_w`?"),
         (
             "--platform",
-            platform.replace("constant_w: Assumed(0.80", "constant_w: Assumed(-0.80"),
-            "`constant_w`: -0.8 W",
-            "give one in that range",
+            platform,
+            vec![
+                ("idle_w:", "idel_w:", "`idel_w`", "did you mean `idle_w`?"),
+                ("constant_w: Assumed(0.80", "constant_w: Assumed(-0.80", "`constant_w`: -0.8 W", range),
+            ],
         ),
         (
             "--energy",
-            table.replace("low_pj: 100,", "low_pj: -100,"),
-            "`low_pj`: -100 pJ",
-            "give one in that range",
+            table,
+            vec![
+                ("low_pj: 100,", "low_pj: -100,", "`low_pj`: -100 pJ", range),
+                ("node_nm: 28", "node_mn: 28", "`node_mn`", "did you mean `node_nm`?"),
+            ],
         ),
-        ("--energy", table.replace("node_nm: 28", "node_mn: 28"), "`node_mn`", "did you mean `node_nm`?"),
     ];
-    for (flag, text, says, remedy) in cases {
-        let inputs = Inputs::new();
-        let file = inputs.put("bad.ron", &text);
-        assert!(text != gpu && text != platform && text != table, "{flag}: nothing was broken");
-        refusals.call(&["tiny", flag, &file], 2, &[&file, ":", says], remedy);
+    for (flag, text, edits) in cases {
+        for (right, wrong, says, remedy) in edits {
+            assert!(text.contains(right), "{flag}: there is no `{right}` to break");
+            let inputs = Inputs::new();
+            let file = inputs.put("bad.ron", &text.replace(right, wrong));
+            refusals.call(&["tiny", flag, &file], 2, &[&file, ":", says], remedy);
+        }
     }
 }
 

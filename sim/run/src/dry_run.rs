@@ -2,8 +2,7 @@
 
 use cpu_time::ProcessTime;
 use output::table::{grouped, si};
-use pipeline::frame::render_with_heat;
-use pipeline::{Draw, Settings, Viewport};
+use pipeline::Viewport;
 use serde::Serialize;
 use timing::{FrameClock, Level, Recorder};
 use warnings::Warning;
@@ -11,7 +10,6 @@ use workloads::job::Request;
 use workloads::{Frame, FrameMesh, Scene, catalog};
 
 use crate::plan::BYTES_PER_SAMPLE;
-use crate::regime::Regime;
 use crate::{Choice, Distinct, Plan, Prepared, RunError, Sampling, Work, frame, gpu};
 
 /// Description of a run before it starts.
@@ -278,29 +276,15 @@ impl<'a> Probe<'a> {
         let recorder = Recorder::new(frame::BIN_PS, frame::MIN_FRAME_BINS);
         let mut clock = FrameClock::new(level, plan.gpu.machine()?, recorder);
         match &self.source {
-            ProbeSource::Scene(scene, frame) => draw_scene(plan, scene, frame, viewport, &mut clock)?,
+            ProbeSource::Scene(scene, frame) => {
+                let emit = |packet: &_, lines: &_| clock.push(packet, lines);
+                frame::draw_scene(plan, scene, frame, viewport, &[], emit)?;
+            }
             &ProbeSource::Job(name, number) => draw_job(plan, name, number, viewport, &mut clock)?,
         }
         clock.finish()?;
         Ok((viewport.pixels() as f64, started.elapsed().as_secs_f64()))
     }
-}
-
-/// Draws and times a frame of a scene at the size of `viewport`.
-fn draw_scene(
-    plan: &Plan,
-    scene: &Scene,
-    frame: &Frame,
-    viewport: Viewport,
-    clock: &mut FrameClock,
-) -> Result<(), RunError> {
-    let draws: Vec<Draw<'_>> = frame.draws(scene)?;
-    let background = scene.background();
-    let settings = Settings { spec: &plan.gpu.pipeline, viewport, samples: &*plan.samples, background };
-    let emit = |packet: &_, lines: &_| clock.push(packet, lines);
-    render_with_heat(&frame.camera, &draws, &settings, &[], emit).map_err(RunError::setting)?;
-    Regime::of(&frame.camera, &draws, viewport, plan.samples.per_pixel());
-    Ok(())
 }
 
 /// Draws and times frame `number` of the workload `name` at the size of `viewport`.

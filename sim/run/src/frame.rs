@@ -8,8 +8,8 @@ use glam::Vec3;
 use output::OutDir;
 use output::image::LinearImage;
 use output::progress::Progress;
-use pipeline::Settings;
 use pipeline::frame::{HeatMap, render_with_heat};
+use pipeline::{Settings, Viewport};
 use rayon::prelude::*;
 use timing::{AccuracyWarning, FrameClock, Recorder};
 use workloads::job::Drawn;
@@ -157,7 +157,7 @@ fn write_image(plan: &Plan, dir: &OutDir, number: u32, image: &[Vec3]) -> Result
 }
 
 /// Result of rendering a frame.
-struct Rendered {
+pub(super) struct Rendered {
     drawn: Drawn,
     regime: Regime,
     heat: Vec<HeatMap>,
@@ -171,7 +171,7 @@ fn draw(
     mut emit: impl FnMut(&Packet, &[LineAccess]),
 ) -> Result<Rendered, RunError> {
     match &plan.work {
-        Work::Scene(scene) => draw_scene(plan, scene, &scene.frame(number)?, events, emit),
+        Work::Scene(scene) => draw_scene(plan, scene, &scene.frame(number)?, plan.viewport, events, emit),
         Work::Job { job, .. } => {
             let drawn = job.frame(number, &plan.gpu.pipeline, &mut emit)?;
             Ok(Rendered { drawn, regime: Regime::default(), heat: Vec::new() })
@@ -179,17 +179,17 @@ fn draw(
     }
 }
 
-/// Renders `frame`. The frame number must have no influence: frames with equal fingerprints are rendered
-/// once.
-fn draw_scene(
+/// Renders `frame` at the size of `viewport`. The frame number must have no influence: frames with equal fingerprints are
+/// rendered once.
+pub(super) fn draw_scene(
     plan: &Plan,
     scene: &Scene,
     frame: &Frame,
+    viewport: Viewport,
     events: &[Event],
     emit: impl FnMut(&Packet, &[LineAccess]),
 ) -> Result<Rendered, RunError> {
     let draws = frame.draws(scene)?;
-    let viewport = plan.viewport;
     let background = scene.background();
     let settings = Settings { spec: &plan.gpu.pipeline, viewport, samples: &*plan.samples, background };
     let (rendered, heat) =

@@ -6,7 +6,7 @@ use power_model::Part;
 use super::{Outcome, RunFrame, stalls};
 use output::MeanSd;
 use output::plot::{
-    FrameEnergy, FrameEnergyPoint, FramePower, Picture, PowerPart, PowerRun, UnitBusy, UnitLane,
+    FrameEnergy, FrameEnergyPoint, FramePower, Picture, PowerPart, PowerRun, UnitLane, UnitPlot,
 };
 
 /// A plot with its file name and caption.
@@ -120,7 +120,7 @@ fn unit_busy(outcome: &Outcome, subject: &str, frame: &RunFrame) -> Picture {
         name: unit.name(),
         busy: frame.busy.iter().map(|shares| f64::from(shares[unit as usize])).collect(),
     };
-    UnitBusy {
+    UnitPlot {
         subject,
         frame: u64::from(frame.index),
         bin_s: frame.power.bin_s(),

@@ -8,7 +8,7 @@ use timing::{Stalls, UnitTime};
 
 use super::{RunFrame, Simulated};
 use output::perfetto::CounterTrack;
-use output::plot::{Look, Picture, StallLane, StallLanes};
+use output::plot::{Look, Picture, StallLane, UnitPlot};
 
 /// Largest number of columns of the plot.
 const MAX_COLUMNS: usize = 128;
@@ -74,8 +74,8 @@ pub(super) fn picture(frame: &RunFrame, subject: &str, look: &Look) -> Option<Pi
         StallLane { name: unit.name(), shares: shares.chunks(group).map(mean).collect(), bottleneck }
     };
     let units = Unit::ALL.into_iter().filter(|&unit| observed.counts.uses(unit)).map(of).collect();
-    let interval_s = stalls.interval_ps() as f64 * 1e-12 * group as f64;
-    Some(StallLanes { subject, frame: u64::from(frame.index), interval_s, units }.picture(look))
+    let bin_s = stalls.interval_ps() as f64 * 1e-12 * group as f64;
+    Some(UnitPlot { subject, frame: u64::from(frame.index), bin_s, units }.picture(look))
 }
 
 /// Names of the tracks, in the order of units.

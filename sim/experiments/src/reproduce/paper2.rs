@@ -196,15 +196,3 @@ row_settings! {
         same: f64, within(0.0..=1.0);
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::super::settings::load;
-    use super::*;
-
-    #[test]
-    fn the_committed_file_is_valid() {
-        let (_, origin) = load::<Settings>(None).unwrap();
-        assert!(origin.committed && origin.sha256.len() == 64);
-    }
-}

@@ -207,9 +207,10 @@ macro_rules! settings_group {
 }
 pub(super) use settings_group;
 
-/// Declares the settings file of a paper: its number, its name in `sim/experiments/papers`, and its groups in order.
+/// Declares the settings file of a paper: its number, its name in `sim/experiments/papers`, and its groups in order, each with the
+/// further check that it has to pass.
 macro_rules! paper_settings {
-    ($paper:expr, $file:literal { $($group:ident: $type:ty,)+ }) => {
+    ($paper:expr, $file:literal { $($group:ident: $type:ty $([$further:ident])?,)+ }) => {
         /// The file.
         #[derive(Clone, Debug, serde::Deserialize)]
         #[serde(deny_unknown_fields)]
@@ -230,9 +231,19 @@ macro_rules! paper_settings {
             }
 
             fn check(&self) -> Result<(), String> {
-                $(self.$group.check(stringify!($group))?;)+
+                $(
+                    self.$group.check(stringify!($group))?;
+                    $(self.$group.$further(stringify!($group))?;)?
+                )+
                 Ok(())
             }
+        }
+
+        #[cfg(test)]
+        #[test]
+        fn the_committed_file_is_valid() {
+            let (_, origin) = $crate::reproduce::settings::load::<Settings>(None).unwrap();
+            assert!(origin.committed && origin.sha256.len() == 64);
         }
     };
 }

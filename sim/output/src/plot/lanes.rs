@@ -19,9 +19,9 @@ pub struct UnitLane<'a> {
     pub busy: Vec<f64>,
 }
 
-/// The units of one frame over time.
+/// The units of one frame over time, with lanes of [`UnitLane`] or of [`StallLane`].
 #[derive(Clone, Debug)]
-pub struct UnitBusy<'a> {
+pub struct UnitPlot<'a, Lane> {
     /// Scene, GPU and platform, for the line below the title.
     pub subject: &'a str,
     /// The number of the frame.
@@ -29,13 +29,13 @@ pub struct UnitBusy<'a> {
     /// Length of a bin in seconds.
     pub bin_s: f64,
     /// Units from top to bottom. Missing bins count as idle.
-    pub units: Vec<UnitLane<'a>>,
+    pub units: Vec<Lane>,
 }
 
 /// Shades of the scale from idle to busy.
 const SHADES: f64 = 32.0;
 
-impl UnitBusy<'_> {
+impl UnitPlot<'_, UnitLane<'_>> {
     /// Draws a lane for each unit, shaded by its busy fraction, with the mean on the right.
     pub fn picture(&self, look: &Look) -> Picture {
         let title = format!("How busy the units were in frame {}", self.frame);
@@ -159,27 +159,14 @@ pub struct StallLane<'a> {
     pub bottleneck: Vec<bool>,
 }
 
-/// The units of one frame.
-#[derive(Clone, Debug)]
-pub struct StallLanes<'a> {
-    /// What was run.
-    pub subject: &'a str,
-    /// The number of the frame.
-    pub frame: u64,
-    /// Length of an interval in seconds.
-    pub interval_s: f64,
-    /// The units, top to bottom.
-    pub units: Vec<StallLane<'a>>,
-}
-
 const KEYS: [&str; 3] = ["busy", "starved", "blocked"];
 
-impl StallLanes<'_> {
+impl UnitPlot<'_, StallLane<'_>> {
     /// Draws a lane for each unit, filled by the shares of its states, and underlined where it is the bottleneck.
     pub fn picture(&self, look: &Look) -> Picture {
         let title = format!("What the units waited for in frame {}", self.frame);
         let intervals = self.units.iter().map(|unit| unit.shares.len()).max().unwrap_or(0);
-        let duration_s = intervals as f64 * self.interval_s;
+        let duration_s = intervals as f64 * self.bin_s;
         let mut picture = Picture::titled(look, (1200.0, 300.0), [&title, self.subject]);
         if intervals == 0 || !(duration_s > 0.0 && is_drawable(0.0, duration_s)) {
             return picture.nothing("no units to show");

@@ -6,8 +6,7 @@
 //! - [`PowerRun`]: power over the whole run, with every spike.
 //! - [`FramePower`]: power of one frame over time, stacked by part.
 //! - [`FrameEnergy`]: energy of each frame, measured and true.
-//! - [`UnitBusy`]: how busy each unit was over one frame.
-//! - [`StallLanes`]: what each unit waited for over one frame.
+//! - [`UnitPlot`]: how busy each unit was over one frame, or what it waited for.
 //! - [`HeatMapPlot`]: a value over the image.
 //!
 //! Other plots:
@@ -39,8 +38,7 @@ pub use chart::{Chart, ChartPanel};
 pub use frame_plots::{FrameEnergy, FrameEnergyPoint};
 pub use frame_plots::{FramePower, PowerPart};
 pub use heat_map::{HeatMapPlot, HeatTile, Shading};
-pub use lanes::{StallLane, StallLanes};
-pub use lanes::{UnitBusy, UnitLane};
+pub use lanes::{StallLane, UnitLane, UnitPlot};
 pub use matrix::{Matrix, MatrixPanel};
 pub use palette::{Colour, part_colour};
 pub use picture::Picture;

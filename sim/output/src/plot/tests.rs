@@ -151,11 +151,11 @@ fn unit_busy_takes_anything() {
     let lane = |bins| UnitLane { name: "a unit whose name goes on and on and on", busy: vec![0.7; bins] };
     for units in [vec![], vec![lane(0)], vec![lane(1)], vec![lane(5000); 14], vec![lane(3), lane(9)]] {
         for bin_s in [1e-6, f64::NAN, 0.0] {
-            check(|look| UnitBusy { subject: "scene", frame: 0, bin_s, units: units.clone() }.picture(look));
+            check(|look| UnitPlot { subject: "scene", frame: 0, bin_s, units: units.clone() }.picture(look));
         }
     }
     let units = vec![UnitLane { name: "odd", busy: vec![f64::NAN, -5.0, 7.0] }];
-    check(|look| UnitBusy { subject: "scene", frame: 0, bin_s: 1e-3, units: units.clone() }.picture(look));
+    check(|look| UnitPlot { subject: "scene", frame: 0, bin_s: 1e-3, units: units.clone() }.picture(look));
 }
 
 #[test]
@@ -166,7 +166,7 @@ fn stalls_take_anything() {
         bottleneck: vec![true; intervals / 2],
     };
     for units in [vec![], vec![lane("dram", 0)], vec![lane("dram", 100), lane("a unit with a name", 3)]] {
-        let lanes = StallLanes { subject: "scene", frame: 1, interval_s: 1e-5, units };
+        let lanes = UnitPlot { subject: "scene", frame: 1, bin_s: 1e-5, units };
         check(|look| lanes.picture(look));
     }
 }
@@ -310,11 +310,11 @@ fn a_unit_has_one_colour_in_every_plot() {
         let parts = parts.collect();
         let power = FramePower { subject: "s", frame: 0, bin_s: 1e-6, parts, samples: &[], frame_j: None };
         let busy = units.iter().map(|unit| UnitLane { name: unit.name(), busy: vec![0.0; 4] }).collect();
-        let busy = UnitBusy { subject: "s", frame: 0, bin_s: 1e-6, units: busy };
+        let busy = UnitPlot { subject: "s", frame: 0, bin_s: 1e-6, units: busy };
         let lane =
             |unit: &Unit| StallLane { name: unit.name(), shares: vec![[0.0; 3]; 4], bottleneck: vec![] };
         let stalls =
-            StallLanes { subject: "s", frame: 0, interval_s: 1e-6, units: units.iter().map(lane).collect() };
+            UnitPlot { subject: "s", frame: 0, bin_s: 1e-6, units: units.iter().map(lane).collect() };
         let look = Look::default();
         for picture in [power.picture(&look), busy.picture(&look), stalls.picture(&look)] {
             let colours = unit_colours(&picture);

@@ -445,6 +445,10 @@ mod tests {
         let coarse = json["coarse"].as_array().unwrap().len();
         assert!(coarse >= 2 * 2, "every slope with every number of triangles");
         assert_eq!(read("caustics.csv").lines().count(), 1 + 2 * 4 + coarse + 2 * 4);
+        let gentle: Vec<f64> =
+            chart.coarse.iter().filter(|row| row.slope == 0.05).map(|row| row.error).collect();
+        let [few, many] = gentle[..] else { panic!("{gentle:?}") };
+        assert!(few < 0.2 && many < 0.5 * few, "more triangles, closer to the photons: {gentle:?}");
         let [straight, crossed] = [&chart.crossed[0], &chart.crossed[1]];
         assert!(crossed.crossing > straight.crossing + 0.02);
         assert!(chart.crossed.iter().all(|row| row.difference == 0.0 && row.floor_error > row.noise));

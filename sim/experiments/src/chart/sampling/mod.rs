@@ -250,9 +250,9 @@ mod tests {
         size: [64, 48],
         most_samples: 32,
         reference_frames: 4,
-        reference_samples: 256,
         seeds: 2,
         every_up_to: 2,
+        ..SamplingChart::FULL
     };
 
     /// No more than there has to be.

@@ -194,15 +194,3 @@ fn energy((mean, deviation): &(f64, f64)) -> bool {
 }
 
 const ENERGY: &str = "a mean and a deviation above 0";
-
-#[cfg(test)]
-mod tests {
-    use super::super::settings::load;
-    use super::*;
-
-    #[test]
-    fn the_committed_file_is_valid() {
-        let (_, origin) = load::<Settings>(None).unwrap();
-        assert!(origin.committed && origin.sha256.len() == 64);
-    }
-}

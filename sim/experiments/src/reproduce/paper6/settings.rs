@@ -4,37 +4,31 @@ use serde::{Deserialize, Serialize};
 use workloads::collision::Method;
 
 use super::super::Paper;
-use super::super::settings::{About, Form, PaperSettings, Setting, row_settings};
+use super::super::settings::{About, Form, Setting, paper_settings, row_settings};
 
 /// Width and height of an image in pixels.
 pub(super) type Size = (u32, u32);
 /// Coordinates, or sizes along the axes.
 pub(super) type Point = (f64, f64, f64);
 
-/// The file.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Settings {
-    paper: String,
-    #[allow(dead_code, reason = "names what passages refer to, for readers of the file")]
-    source: String,
-    pub vi_1: Missed,
-    pub vi_2: Dodged,
-    pub vi_3: Tighter,
-    pub vi_4: Rate,
-    pub vi_5: Cost,
-    pub vi_6: Executions,
-    pub vi_7: Lost,
-    pub vi_8: TorusCount,
-    pub vi_9: Darts,
-    pub vi_10: Noise,
-    pub vi_11: Glossy,
-    pub vi_12: Shadows,
-    pub vi_13: Views,
-    pub vi_14: Views,
-    pub vi_15: Depths,
-    pub vi_16: Culling,
-}
+paper_settings!(Paper::Six, "paper6.ron" {
+    vi_1: Missed,
+    vi_2: Dodged [check_cases],
+    vi_3: Tighter,
+    vi_4: Rate,
+    vi_5: Cost,
+    vi_6: Executions,
+    vi_7: Lost,
+    vi_8: TorusCount,
+    vi_9: Darts,
+    vi_10: Noise,
+    vi_11: Glossy,
+    vi_12: Shadows,
+    vi_13: Views [check_quads],
+    vi_14: Views [check_quads],
+    vi_15: Depths,
+    vi_16: Culling,
+});
 
 row_settings! {
     /// VI-1.
@@ -331,38 +325,6 @@ pub(super) enum Bound {
     LocalPlanes,
 }
 
-impl PaperSettings for Settings {
-    const PAPER: Paper = Paper::Six;
-    const FILE: &str = "sim/experiments/papers/paper6.ron";
-    const TEXT: &str = include_str!("../../../papers/paper6.ron");
-
-    fn paper(&self) -> &str {
-        &self.paper
-    }
-
-    fn check(&self) -> Result<(), String> {
-        self.vi_1.check("vi_1")?;
-        self.vi_2.check("vi_2")?;
-        self.vi_2.check_cases("vi_2")?;
-        self.vi_3.check("vi_3")?;
-        self.vi_4.check("vi_4")?;
-        self.vi_5.check("vi_5")?;
-        self.vi_6.check("vi_6")?;
-        self.vi_7.check("vi_7")?;
-        self.vi_8.check("vi_8")?;
-        self.vi_9.check("vi_9")?;
-        self.vi_10.check("vi_10")?;
-        self.vi_11.check("vi_11")?;
-        self.vi_12.check("vi_12")?;
-        self.vi_13.check("vi_13")?;
-        self.vi_13.check_quads("vi_13")?;
-        self.vi_14.check("vi_14")?;
-        self.vi_14.check_quads("vi_14")?;
-        self.vi_15.check("vi_15")?;
-        self.vi_16.check("vi_16")
-    }
-}
-
 impl TwoObjects {
     /// Whether both are somewhere and have a size.
     fn is_possible(&self) -> bool {
@@ -430,15 +392,3 @@ fn image(size: &Size) -> bool {
 }
 
 const IMAGE: &str = "8 to 4096 pixels across and down";
-
-#[cfg(test)]
-mod tests {
-    use super::super::super::settings::load;
-    use super::*;
-
-    #[test]
-    fn the_committed_file_is_valid() {
-        let (_, origin) = load::<Settings>(None).unwrap();
-        assert!(origin.committed && origin.sha256.len() == 64);
-    }
-}

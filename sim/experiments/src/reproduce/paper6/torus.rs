@@ -119,7 +119,7 @@ impl Scatter {
             )
         } else {
             format!(
-                "not to be told from independent samples, with no sign that {most} standard errors are generous"
+                "consistent with independent samples, so {most} standard errors are not a generous tolerance"
             )
         };
         let counts = [1.0, 2.0, 3.0].map(|errors| self.beyond(errors).to_string()).join(", ");
