@@ -380,8 +380,8 @@ fn invalid_gpu_and_platform_files() {
         for (right, wrong, says, remedy) in edits {
             assert!(text.contains(right), "{flag}: there is no `{right}` to break");
             let inputs = Inputs::new();
-            let file = inputs.put("bad.ron", &text.replace(right, wrong));
-            refusals.call(&["tiny", flag, &file], 2, &[&file, ":", says], remedy);
+            let file = inputs.put("bad.ron", text.replace(right, wrong));
+            refusals.call(&["tiny", flag, &file], 2, &[file.as_str(), ":", says], remedy);
         }
     }
 }

@@ -5,7 +5,7 @@ use activity::{Counts, Event, Packet, PacketKind, Unit};
 fn main() {
     let mut total = Counts::default();
     for tile in 0..4 {
-        let mut packet = Packet::new(PacketKind::Tile, 0, tile, 0);
+        let mut packet = Packet { tile, ..Packet::new(PacketKind::Tile, 0) };
         packet.counts[Event::SamplesTested] = 64;
         packet.counts[Event::SamplesHit] = 10 * tile;
         for (event, count) in packet.counts.iter() {

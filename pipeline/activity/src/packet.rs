@@ -16,6 +16,18 @@ pub enum PacketKind {
     Tile,
     /// The samples of a tile are resolved into pixels.
     Resolve,
+    /// A barrier between passes: all earlier work ends, written lines move to the L2 and textures are read anew. Later packets
+    /// of these kinds wait for it.
+    Barrier(Waits),
+}
+
+/// Packets that wait at a barrier.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Waits {
+    /// Tiles and resolves: a pass reads or overwrites pixels of an earlier one.
+    Tiles,
+    /// Draws and vertices, too: they read what an earlier pass wrote.
+    All,
 }
 
 /// Events caused by one packet. 32 bits per event are enough for a packet.
@@ -73,18 +85,27 @@ pub struct Packet {
     pub kind: PacketKind,
     /// Pass number in the frame, from 0.
     pub pass: u16,
-    /// Tile number, row by row from the top left; unused for draws and vertices.
+    /// Batch of triangles in the pass, from 0. Tiles wait for the vertices of their batch, vertices for the tiles of the batch
+    /// before the last.
+    pub batch: u32,
+    /// Draw number in the pass; [`Self::NONE`] for work of no single draw.
+    pub draw: u32,
+    /// Tile number, row by row from the top left; [`Self::NONE`] for draws and vertices.
     pub tile: u32,
-    /// Triangle number in the pass; for vertices the first of the batch.
+    /// Triangle number in the pass, for vertices the first one; [`Self::NONE`] for work of no single triangle.
     pub triangle: u32,
     /// Events caused in every unit.
     pub counts: PacketCounts,
 }
 
 impl Packet {
-    /// A packet without events.
-    pub fn new(kind: PacketKind, pass: u16, tile: u32, triangle: u32) -> Self {
-        Self { kind, pass, tile, triangle, counts: PacketCounts::default() }
+    /// Stands for no draw, tile or triangle.
+    pub const NONE: u32 = u32::MAX;
+
+    /// A packet without events, in the first batch, of no draw, tile or triangle.
+    pub fn new(kind: PacketKind, pass: u16) -> Self {
+        let (draw, tile, triangle) = (Self::NONE, Self::NONE, Self::NONE);
+        Self { kind, pass, batch: 0, draw, tile, triangle, counts: PacketCounts::default() }
     }
 }
 
@@ -142,7 +163,7 @@ mod tests {
 
     #[test]
     fn packets_add_up_to_counts() {
-        let mut packet = Packet::new(PacketKind::Tile, 0, 3, 7);
+        let mut packet = Packet::new(PacketKind::Tile, 0);
         packet.counts[Event::SamplesTested] = 512;
         let mut total = Counts::default();
         total += &packet.counts;

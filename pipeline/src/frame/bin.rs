@@ -196,6 +196,7 @@ impl SamplesHere {
 /// One triangle in one tile, or tile tests without a packet of their own.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Work {
+    pub draw: u32,
     pub triangle: u32,
     pub tile: u32,
     pub tests: TileWork,

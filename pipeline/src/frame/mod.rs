@@ -15,7 +15,7 @@ mod worker;
 
 use std::ops::Range;
 
-use activity::{Counts, Event, LineAccess, Packet, PacketKind};
+use activity::{Counts, Event, LineAccess, Packet};
 use glam::Vec3;
 use rayon::prelude::*;
 use test_selection::TestSelector;
@@ -177,6 +177,7 @@ pub fn visibility(
 fn rasterize<F: FnMut(Finished<'_>)>(pass: &Pass<'_>, replay: &mut Replay<'_>, done: &mut F) -> Vec<Bin> {
     let mut bins = Bin::all(pass);
     let mut batches = pass.batches();
+    let mut batch = 0;
     // Without triangles there is still an image to resolve.
     let first = batches.next().unwrap_or(0..0);
     let front_end = |batch, replay: &mut Replay<'_>, done: &mut F| {
@@ -195,11 +196,12 @@ fn rasterize<F: FnMut(Finished<'_>)>(pass: &Pass<'_>, replay: &mut Replay<'_>, d
         for ((bin, log), number) in bins.iter().zip(&logs).zip(0..) {
             done(Finished::Tests(number, bin, log));
             let emit = &mut |packet: &Packet, lines: &[LineAccess]| done(Finished::Packet(packet, lines));
-            replay.bin(log, emit);
+            replay.bin(batch, log, emit);
             if next.is_none() {
-                replay.resolve(bin, emit);
+                replay.resolve(batch, bin, emit);
             }
         }
+        batch += 1;
     }
     bins
 }
@@ -232,9 +234,4 @@ fn rasterize_bins(pass: &Pass<'_>, bins: &mut [Bin], ready: &[Ready], lists: &[V
     bins.iter_mut().zip(&first).filter(|(_, first)| !**first).for_each(|(bin, _)| bin.selector = known);
     run(bins, &|bin| !first[bin]);
     logs
-}
-
-/// A packet of pass 0, the only pass so far.
-fn packet(kind: PacketKind, tile: u32, triangle: u32) -> Packet {
-    Packet::new(kind, 0, tile, triangle)
 }

@@ -22,6 +22,8 @@ pub(super) struct Staged {
 
 /// Data of a pass that all stages read and none changes.
 pub(super) struct Pass<'a> {
+    /// Number in the frame.
+    pub number: u16,
     pub draws: &'a [Draw<'a>],
     pub settings: &'a Settings<'a>,
     pub projection: Projection,
@@ -69,6 +71,7 @@ impl<'a> Pass<'a> {
             .collect();
         let viewport = settings.viewport;
         Self {
+            number: 0,
             draws,
             settings,
             vertices,
@@ -86,10 +89,15 @@ impl<'a> Pass<'a> {
     }
 
     /// Ranges of triangles that are binned together.
-    pub fn batches(&self) -> impl Iterator<Item = Range<u32>> + use<'_> {
+    pub fn batches(&self) -> impl ExactSizeIterator<Item = Range<u32>> + use<'_> {
         let total = self.first_triangle[self.draws.len()];
         let size = self.settings.spec.batch_triangles;
         (0..total.div_ceil(size)).map(move |batch| batch * size..total.min(batch * size + size))
+    }
+
+    /// Triangles of a draw.
+    pub fn triangles_of(&self, draw: usize) -> Range<u32> {
+        self.first_triangle[draw]..self.first_triangle[draw + 1]
     }
 
     /// Draw of a triangle, and its index in the draw.

@@ -93,18 +93,24 @@ impl<'a> Replay<'a> {
     }
 
     /// Emit the packets of one bin in one batch.
-    pub fn bin(&mut self, log: &BinLog, emit: &mut impl FnMut(&Packet, &[LineAccess])) {
+    pub fn bin(&mut self, batch: u32, log: &BinLog, emit: &mut impl FnMut(&Packet, &[LineAccess])) {
         let mut first_quad = 0;
         for work in &log.work {
             let quads = &log.quads[first_quad..work.quads_end as usize];
             first_quad = work.quads_end as usize;
-            let packet = self.tile(work, quads);
+            let packet = self.tile(batch, work, quads);
             self.emit(&packet, emit);
         }
     }
 
-    fn tile(&mut self, work: &Work, quads: &[QuadAccess]) -> Packet {
-        let mut packet = super::packet(PacketKind::Tile, work.tile, work.triangle);
+    fn tile(&mut self, batch: u32, work: &Work, quads: &[QuadAccess]) -> Packet {
+        let mut packet = Packet {
+            batch,
+            draw: work.draw,
+            tile: work.tile,
+            triangle: work.triangle,
+            ..Packet::new(PacketKind::Tile, self.pass.number)
+        };
         let counts = &mut packet.counts;
         work.tests.add_to(counts);
         counts[Event::SampleReads] = work.screened.max(work.tested);
@@ -233,19 +239,20 @@ impl<'a> Replay<'a> {
     }
 
     /// Emit the packets that resolve the tiles of a bin; a depth pass has none.
-    pub fn resolve(&mut self, bin: &Bin, emit: &mut impl FnMut(&Packet, &[LineAccess])) {
+    pub fn resolve(&mut self, batch: u32, bin: &Bin, emit: &mut impl FnMut(&Packet, &[LineAccess])) {
         if self.pass.is_depth_only() {
             return;
         }
         for (tile, _, pixels, touched) in bin.inside(self.pass) {
-            let packet = self.resolve_tile(tile, pixels, touched);
+            let packet = Packet { batch, ..self.resolve_tile(tile, pixels, touched) };
             self.emit(&packet, emit);
         }
     }
 
     /// End the frame: the images, or the depths of a depth pass, are written back.
     pub fn finish(&mut self, emit: &mut impl FnMut(&Packet, &[LineAccess])) {
-        let mut last = super::packet(PacketKind::Resolve, 0, u32::MAX);
+        let batch = self.pass.batches().len().max(1) as u32 - 1;
+        let mut last = Packet { batch, ..Packet::new(PacketKind::Resolve, self.pass.number) };
         let at = &self.pass.addresses;
         let end = at.vertices.first().copied().unwrap_or(u64::MAX);
         let kept = if self.pass.is_depth_only() { at.depth..at.colour } else { at.image..end };
@@ -254,7 +261,7 @@ impl<'a> Replay<'a> {
     }
 
     fn resolve_tile(&mut self, tile: u32, pixels: u64, touched: bool) -> Packet {
-        let mut packet = super::packet(PacketKind::Resolve, tile, u32::MAX);
+        let mut packet = Packet { tile, ..Packet::new(PacketKind::Resolve, self.pass.number) };
         let counts = &mut packet.counts;
         counts[Event::PixelsResolved] = pixels.count_ones() * self.pass.views.len() as u32;
         if touched {

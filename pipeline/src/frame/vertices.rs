@@ -39,9 +39,23 @@ pub(super) fn front_end(
 ) -> Vec<Ready> {
     let outcomes: Vec<_> =
         batch.clone().into_par_iter().with_min_len(256).map(|id| outcome(pass, id)).collect();
-    for chunk in outcomes.chunks(PACKET_TRIANGLES as usize).zip(0..) {
-        let first = batch.start + chunk.1 * PACKET_TRIANGLES;
-        emit_packet(pass, first, chunk.0, replay, emit);
+    let new = |kind| Packet {
+        batch: batch.start / pass.settings.spec.batch_triangles,
+        ..Packet::new(kind, pass.number)
+    };
+    let mut first = batch.start;
+    while first < batch.end {
+        let (draw, index) = pass.locate(first);
+        if index == 0 {
+            let mut start = Packet { draw: draw as u32, triangle: first, ..new(PacketKind::Draw) };
+            start.counts[Event::Draws] = 1;
+            emit(&start, &[]);
+        }
+        let end = batch.end.min(first + PACKET_TRIANGLES).min(pass.triangles_of(draw).end);
+        let at = |id: u32| (id - batch.start) as usize;
+        let vertices = Packet { draw: draw as u32, triangle: first, ..new(PacketKind::Vertices) };
+        emit_packet(pass, vertices, &outcomes[at(first)..at(end)], replay, emit);
+        first = end;
     }
     outcomes.into_iter().filter_map(|(_, ready)| ready).collect()
 }
@@ -76,20 +90,14 @@ fn outcome(pass: &Pass<'_>, id: u32) -> (Event, Option<Ready>) {
 
 fn emit_packet(
     pass: &Pass<'_>,
-    first: u32,
+    mut packet: Packet,
     outcomes: &[(Event, Option<Ready>)],
     replay: &mut Replay<'_>,
     emit: &mut impl FnMut(&Packet, &[LineAccess]),
 ) {
-    let mut packet = super::packet(PacketKind::Vertices, 0, first);
+    let draw = packet.draw as usize;
     let Features { still_px, in_focus_px, .. } = pass.settings.spec.features;
-    for ((event, ready), id) in outcomes.iter().zip(first..) {
-        let (draw, index) = pass.locate(id);
-        if index == 0 {
-            let mut start = super::packet(PacketKind::Draw, 0, id);
-            start.counts[Event::Draws] = 1;
-            emit(&start, &[]);
-        }
+    for ((event, ready), id) in outcomes.iter().zip(packet.triangle..) {
         let corners = pass.images(id);
         packet.counts[*event] += 1;
         packet.counts[Event::TrianglesFlat] +=

@@ -1,5 +1,7 @@
 //! Worker: rasterizes the triangles of one bin, through tile tests, sample tests and the shading grid.
 
+use activity::Packet;
+
 use super::bin::Bin;
 use super::bin::{BinLog, SamplesHere, TestsHere, TileWork, Work};
 use super::pass::Pass;
@@ -37,6 +39,8 @@ pub(super) struct Worker<'a, 'p> {
     bin: &'a mut Bin,
     scratch: &'a mut Scratch,
     log: BinLog,
+    /// Draw of the current triangle.
+    draw: u32,
     /// Tile tests since the last packet.
     tests: TileWork,
     /// Division of lens and time for depth culling.
@@ -54,15 +58,23 @@ impl<'a, 'p> Worker<'a, 'p> {
             flags.resize(bin.tiles.len(), false);
         }
         let grid = pass.depth_grid();
-        Self { pass, bin, scratch, log: BinLog::default(), tests: TileWork::default(), grid, bounder: None }
+        let (log, tests) = (BinLog::default(), TileWork::default());
+        Self { pass, bin, scratch, log, draw: Packet::NONE, tests, grid, bounder: None }
     }
 
     /// Rasterize the `listed` triangles of a batch.
     pub fn rasterize(mut self, batch: &[Ready], listed: &[u32]) -> BinLog {
         for &index in listed {
-            self.triangle(&batch[index as usize]);
+            let ready = &batch[index as usize];
+            let draw = self.pass.locate(ready.triangle.id).0 as u32;
+            if draw != self.draw {
+                self.record_tests();
+                self.draw = draw;
+            }
+            self.triangle(ready);
         }
-        self.finish()
+        self.record_tests();
+        self.log
     }
 
     /// Rasterize one triangle in the tiles of the bin.
@@ -270,6 +282,7 @@ impl<'a, 'p> Worker<'a, 'p> {
             self.log.samples[index].get_or_insert_with(SamplesHere::new).add(edge_madds, madds);
         }
         self.log.work.push(Work {
+            draw: self.draw,
             triangle,
             tile: Bin::tile_number(self.pass, origin),
             tests: std::mem::take(&mut self.tests),
@@ -287,20 +300,19 @@ impl<'a, 'p> Worker<'a, 'p> {
         });
     }
 
-    /// Tile tests without a packet of their own go into a last packet.
-    fn finish(mut self) -> BinLog {
-        if !self.tests.is_empty() {
-            let tile = Bin::tile_number(self.pass, self.bin.origin);
-            let quads_end = self.log.quads.len() as u32;
-            self.log.work.push(Work {
-                triangle: u32::MAX,
-                tile,
-                tests: self.tests,
-                quads_end,
-                ..Work::default()
-            });
+    /// Tile tests since the last packet of a draw become a packet of their own.
+    fn record_tests(&mut self) {
+        if self.tests.is_empty() {
+            return;
         }
-        self.log
+        self.log.work.push(Work {
+            draw: self.draw,
+            triangle: Packet::NONE,
+            tile: Bin::tile_number(self.pass, self.bin.origin),
+            tests: std::mem::take(&mut self.tests),
+            quads_end: self.log.quads.len() as u32,
+            ..Work::default()
+        });
     }
 }
 

@@ -21,10 +21,12 @@ impl Stream {
             PacketKind::Vertices => 2,
             PacketKind::Tile => 3,
             PacketKind::Resolve => 4,
+            PacketKind::Barrier(_) => 5,
         };
-        let head = [kind, u64::from(packet.pass), u64::from(packet.tile), u64::from(packet.triangle)];
+        let place = [packet.batch, packet.draw, packet.tile, packet.triangle].map(u64::from);
+        let head = [kind, u64::from(packet.pass)].into_iter().chain(place);
         let counts = packet.counts.iter().map(|(_, count)| u64::from(count));
-        for word in head.into_iter().chain(counts) {
+        for word in head.chain(counts) {
             self.digest = mix(self.digest.rotate_left(7) ^ word).wrapping_add(word);
         }
         self.packets += 1;

@@ -146,7 +146,7 @@ impl GpuSpec {
     /// If the clocks have no common cycle; a loaded GPU is validated.
     pub fn machine(&self) -> Result<Machine<'_>, TimingError> {
         let clocks = self.clocks().ok_or_else(|| TimingError::Clocks(self.name.clone()))?;
-        Ok(Machine { units: &self.units, clocks, batch_triangles: self.pipeline.batch_triangles })
+        Ok(Machine { units: &self.units, clocks })
     }
 
     /// Core and memory clock with a common cycle; `None` if there is none.

@@ -118,9 +118,9 @@ pub struct BoundClock {
 }
 
 impl BoundClock {
-    /// A clock at time 0 for packets in batches of `batch_triangles`, which records into `recorder`.
-    pub fn new(machine: &MachineSpec, clocks: Clocks, batch_triangles: u32, recorder: Recorder) -> Self {
-        let (builder, totals) = (DemandBuilder::new(machine, batch_triangles), Totals::new(machine, &clocks));
+    /// A clock at time 0 which records into `recorder`.
+    pub fn new(machine: &MachineSpec, clocks: Clocks, recorder: Recorder) -> Self {
+        let (builder, totals) = (DemandBuilder::new(machine), Totals::new(machine, &clocks));
         Self { machine: machine.clone(), clocks, builder, totals, recorder, lines: Vec::new() }
     }
 

@@ -79,7 +79,7 @@ pub const TEXELS: usize = {
 pub struct ServiceDemand {
     /// Whether the packet takes the front end (command to set-up) or the tile path (traversal to colour).
     pub front: bool,
-    /// Batch number.
+    /// Batch number in the frame, all passes counted.
     pub batch: u32,
     /// Last station with work.
     pub last: Station,
@@ -129,13 +129,15 @@ pub struct DemandBuilder {
     costs: [Vec<(Event, f64)>; Station::COUNT],
     /// Cycles per event of the texture units.
     texel_cycles: [f64; TEXELS],
-    batch_triangles: u32,
-    batch: u32,
+    /// Pass of the last packet, number of its first batch in the frame, and number of the last batch.
+    pass: u16,
+    first_batch: u32,
+    last_batch: u32,
 }
 
 impl DemandBuilder {
-    /// A builder for packets in batches of `batch_triangles` on `machine`.
-    pub fn new(machine: &MachineSpec, batch_triangles: u32) -> Self {
+    /// A builder for packets on `machine`.
+    pub fn new(machine: &MachineSpec) -> Self {
         let costs = Station::ALL.map(|station| {
             let rates = machine.common(station.unit()).rates;
             rates.iter().flat_map(|rates| rates.iter()).map(|(event, rate)| (event, rate.recip())).collect()
@@ -143,12 +145,7 @@ impl DemandBuilder {
         let cycles = |event| {
             machine.texture.rates.iter().find(|(e, _)| *e == event).map_or(0.0, |(_, rate)| rate.recip())
         };
-        Self {
-            costs,
-            texel_cycles: texture_events().map(cycles),
-            batch_triangles: batch_triangles.max(1),
-            batch: 0,
-        }
+        Self { costs, texel_cycles: texture_events().map(cycles), pass: 0, first_batch: 0, last_batch: 0 }
     }
 
     /// Demand of the next packet of the stream. `lines` are appended to `store`, sorted by client.
@@ -160,7 +157,7 @@ impl DemandBuilder {
     ) -> ServiceDemand {
         let counts = &packet.counts;
         let front = matches!(packet.kind, PacketKind::Draw | PacketKind::Vertices);
-        let batch = self.batch_of(packet, front);
+        let batch = self.batch_of(packet);
         let stations = if front { Station::Command as usize..3 } else { 3..Station::COUNT };
         let mut demand = ServiceDemand {
             front,
@@ -203,13 +200,14 @@ impl DemandBuilder {
         whole(parts.fold(0.0, f64::max))
     }
 
-    fn batch_of(&mut self, packet: &Packet, front: bool) -> u32 {
-        let own = packet.triangle / self.batch_triangles;
-        match packet.kind {
-            PacketKind::Tile if packet.triangle != u32::MAX => self.batch = own,
-            _ => {}
+    /// Number of the packet's batch in the frame: batches of a pass follow those of the pass before.
+    fn batch_of(&mut self, packet: &Packet) -> u32 {
+        if packet.pass != self.pass {
+            (self.pass, self.first_batch) = (packet.pass, self.last_batch + 1);
         }
-        if front { own } else { self.batch }
+        let batch = self.first_batch + packet.batch;
+        self.last_batch = self.last_batch.max(batch);
+        batch
     }
 }
 

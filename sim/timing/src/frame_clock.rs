@@ -58,8 +58,6 @@ pub struct Machine<'a> {
     pub units: &'a MachineSpec,
     /// Both clocks.
     pub clocks: Clocks,
-    /// Triangles per batch; tiles are flushed after each batch.
-    pub batch_triangles: u32,
 }
 
 /// Clock of one frame, at any level.
@@ -77,13 +75,13 @@ enum State {
 impl<'a> FrameClock<'a> {
     /// A clock at time 0.
     pub fn new(level: Level, machine: Machine<'a>, recorder: Recorder) -> Self {
-        let Machine { units, clocks, batch_triangles: batch } = machine;
+        let Machine { units, clocks } = machine;
         let state = match level {
             Level::Stepped => {
-                State::Stepped(Box::new((DemandBuilder::new(units, batch), Stream::default(), recorder)))
+                State::Stepped(Box::new((DemandBuilder::new(units), Stream::default(), recorder)))
             }
-            Level::Packet => State::Packet(Box::new(PacketClock::new(units, clocks, batch, recorder))),
-            Level::Bound => State::Bound(Box::new(BoundClock::new(units, clocks, batch, recorder))),
+            Level::Packet => State::Packet(Box::new(PacketClock::new(units, clocks, recorder))),
+            Level::Bound => State::Bound(Box::new(BoundClock::new(units, clocks, recorder))),
         };
         Self { machine, state }
     }

@@ -15,7 +15,7 @@ fn packet(
     counts: &[(Event, u32)],
     lines: Vec<LineAccess>,
 ) -> (Packet, Vec<LineAccess>) {
-    let mut packet = Packet::new(kind, 0, 0, triangle);
+    let mut packet = Packet { tile: 0, triangle, ..Packet::new(kind, 0) };
     counts.iter().for_each(|&(event, count)| packet.counts[event] = count);
     for line in &lines {
         let reads = matches!(line.kind, LineKind::Hit | LineKind::Fetch);
@@ -133,10 +133,13 @@ fn alternating(triangles: u32) -> Packets {
 /// Packets of all batches, with the front end one batch ahead of the tiles.
 fn in_batches(batches: Vec<(Packets, Packets)>) -> Packets {
     let (mut all, mut waiting) = (Packets::new(), Packets::new());
-    for (fronts, tiles) in batches {
-        all.extend(fronts);
+    for ((fronts, tiles), batch) in batches.into_iter().zip(0..) {
+        let numbered = |packets: Packets| -> Packets {
+            packets.into_iter().map(|(packet, lines)| (Packet { batch, ..packet }, lines)).collect()
+        };
+        all.extend(numbered(fronts));
         all.append(&mut waiting);
-        waiting = tiles;
+        waiting = numbered(tiles);
     }
     all.extend(waiting);
     all

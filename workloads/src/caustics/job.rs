@@ -147,7 +147,7 @@ impl Draws for Caustics {
         let eye = self.eye().ok_or_else(|| JobError::Setting("the view has no extent".to_owned()))?;
         let method = self.options.method;
         let (picture, work) = draw_with_work(&beams, &eye, method, Some(self.light()), true);
-        let mut passes = Passes::new(&spec.memory, emit)?;
+        let mut passes = Passes::new(spec, emit)?;
         self.emit_packets(&beams, &eye, &work, &mut passes);
         let (counts, triangles) = passes.finish();
         Ok(Drawn {

@@ -119,8 +119,7 @@ impl Draws for Collision {
     }
 
     fn draw(&self, (): &(), spec: &PipelineSpec, emit: Emit<'_>) -> Result<Drawn, JobError> {
-        let mut emitter =
-            PacketEmitter::new(&self.search, &self.objects, spec, Passes::new(&spec.memory, emit)?);
+        let mut emitter = PacketEmitter::new(&self.search, &self.objects, spec, Passes::new(spec, emit)?);
         let pairs = candidates(&self.objects);
         let mut scratch = Scratch::default();
         let mut kept = 0_u32;

@@ -1,7 +1,7 @@
 //! Passes of a job: each piece of work as a packet, with its memory accesses.
 
 use activity::{Counts, Event, Packet, PacketCounts, PacketKind};
-use pipeline::MemorySpec;
+use pipeline::PipelineSpec;
 use pipeline::memory::{CacheError, LINE_BYTES, MemorySystem};
 
 use super::Emit;
@@ -56,6 +56,7 @@ impl Touch {
 /// Passes of a frame: emits packets and sums their counts.
 pub struct Passes<'a> {
     memory: MemorySystem,
+    batch_triangles: u32,
     emit: Emit<'a>,
     counts: Counts,
     pass: u16,
@@ -69,9 +70,16 @@ impl<'a> Passes<'a> {
     ///
     /// # Errors
     /// [`CacheError`] if a cache of `spec` cannot be built.
-    pub fn new(spec: &MemorySpec, emit: Emit<'a>) -> Result<Self, CacheError> {
-        let memory = MemorySystem::new(spec)?;
-        Ok(Self { memory, emit, counts: Counts::default(), pass: 0, triangles: 0, triangles_in_all: 0 })
+    pub fn new(spec: &PipelineSpec, emit: Emit<'a>) -> Result<Self, CacheError> {
+        Ok(Self {
+            memory: MemorySystem::new(&spec.memory)?,
+            batch_triangles: spec.batch_triangles,
+            emit,
+            counts: Counts::default(),
+            pass: 0,
+            triangles: 0,
+            triangles_in_all: 0,
+        })
     }
 
     /// Ends the pass; later packets belong to the next.
@@ -81,13 +89,13 @@ impl<'a> Passes<'a> {
 
     /// Emits a draw of `triangles` triangles with three vertices each, which are in memory from `address` on.
     pub fn draw(&mut self, triangles: usize, address: u64, front_end: &FrontEnd) {
-        let mut start = Packet::new(PacketKind::Draw, self.pass, 0, self.triangles);
+        let mut start = self.packet(PacketKind::Draw, Packet::NONE, self.triangles);
         start.counts[Event::Draws] = 1;
         self.emit_packet(&start);
         let bytes = u64::from(front_end.vertex_bytes);
         for first in (0..triangles).step_by(BATCH) {
             let vertices = 3 * BATCH.min(triangles - first) as u32;
-            let mut packet = Packet::new(PacketKind::Vertices, self.pass, 0, self.triangles);
+            let mut packet = self.packet(PacketKind::Vertices, Packet::NONE, self.triangles);
             let counts = &mut packet.counts;
             counts[Event::Indices] = vertices;
             counts[Event::VerticesFetched] = vertices;
@@ -107,7 +115,7 @@ impl<'a> Passes<'a> {
 
     /// Emits work in a tile, with accesses to depth buffers and colour buffers.
     pub fn tile(&mut self, work: &TileWork, depth: &[Touch], colour: &[Touch]) {
-        let mut packet = Packet::new(PacketKind::Tile, self.pass, work.tile, work.triangle);
+        let mut packet = self.packet(PacketKind::Tile, work.tile, work.triangle);
         packet.counts = work.counts;
         for touch in depth {
             let counts = &mut packet.counts;
@@ -126,7 +134,7 @@ impl<'a> Passes<'a> {
         let tile_pixels = u64::from(tile_pixels.max(1));
         for (tile, first) in (0..).zip((0..pixels).step_by(tile_pixels as usize)) {
             let count = tile_pixels.min(pixels - first);
-            let mut packet = Packet::new(PacketKind::Resolve, self.pass, tile, u32::MAX);
+            let mut packet = self.packet(PacketKind::Resolve, tile, Packet::NONE);
             packet.counts[Event::PixelsResolved] = count as u32;
             let (address, bytes) = (address + first * PIXEL_BYTES, count * PIXEL_BYTES);
             let counts = &mut packet.counts;
@@ -134,7 +142,7 @@ impl<'a> Passes<'a> {
             written.lines().for_each(|line| self.memory.colour(line, true, true, counts));
             self.emit_packet(&packet);
         }
-        let mut last = Packet::new(PacketKind::Resolve, self.pass, 0, u32::MAX);
+        let mut last = self.packet(PacketKind::Resolve, Packet::NONE, Packet::NONE);
         self.memory.finish(address..address + pixels * PIXEL_BYTES, &mut last.counts);
         self.emit_packet(&last);
     }
@@ -142,6 +150,11 @@ impl<'a> Passes<'a> {
     /// Event counts and triangles of all passes.
     pub fn finish(self) -> (Counts, usize) {
         (self.counts, self.triangles_in_all)
+    }
+
+    fn packet(&self, kind: PacketKind, tile: u32, triangle: u32) -> Packet {
+        let of = if triangle == Packet::NONE { self.triangles.saturating_sub(1) } else { triangle };
+        Packet { batch: of / self.batch_triangles, draw: 0, tile, triangle, ..Packet::new(kind, self.pass) }
     }
 
     fn emit_packet(&mut self, packet: &Packet) {
@@ -154,18 +167,8 @@ impl<'a> Passes<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::job::testing::hardware;
     use activity::LineAccess;
-    use pipeline::CacheSpec;
-    use pipeline::memory::Compression;
-
-    const LINES: CacheSpec = CacheSpec::lru(256, 4);
-    const MEMORY: MemorySpec = MemorySpec {
-        depth: LINES,
-        colour: LINES,
-        texture: LINES,
-        l2: LINES,
-        compression: Compression { depth: false, colour: false },
-    };
 
     #[test]
     fn counts_are_the_sum_of_packets_and_lines_are_emitted_once() {
@@ -175,7 +178,7 @@ mod tests {
             lines += accesses.len();
             kinds.push((packet.kind, packet.pass));
         };
-        let mut passes = Passes::new(&MEMORY, &mut emit).unwrap();
+        let mut passes = Passes::new(&hardware(), &mut emit).unwrap();
         passes.draw(20, 0, &FrontEnd { vertex_bytes: 24, vertex_ops: 8, setup_madds: 60 });
         passes.next();
         let mut counts = PacketCounts::default();

@@ -173,7 +173,7 @@ impl Draws for Occlusion {
 /// Emits the queries as packets of their own pass. The farthest depths are in fast memory beside the tile
 /// tests, so no cache is accessed.
 fn emit_packets(answers: &[Answer], spec: &PipelineSpec, emit: Emit<'_>) -> Result<Counts, JobError> {
-    let mut passes = Passes::new(&spec.memory, emit)?;
+    let mut passes = Passes::new(spec, emit)?;
     passes.next();
     passes.draw(12 * answers.len(), 0, &FRONT_END);
     for (number, answer) in (0..).zip(answers) {

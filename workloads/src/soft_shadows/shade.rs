@@ -183,7 +183,7 @@ pub fn look_up_packets(
         .step_by(side as usize)
         .flat_map(|y| (0..width).step_by(side as usize).map(move |x| [x, y]));
     for (number, [x0, y0]) in (0..).zip(tiles) {
-        let mut packet = Packet::new(PacketKind::Tile, 0, number, u32::MAX);
+        let mut packet = Packet { tile: number, ..Packet::new(PacketKind::Tile, 0) };
         for [px, py] in
             (y0..height.min(y0 + side)).flat_map(|y| (x0..width.min(x0 + side)).map(move |x| [x, y]))
         {
@@ -205,7 +205,7 @@ pub fn look_up_packets(
         emit(&packet, memory.log());
         memory.clear_log();
     }
-    let mut last = Packet::new(PacketKind::Resolve, 0, 0, u32::MAX);
+    let mut last = Packet::new(PacketKind::Resolve, 0);
     memory.finish(image..image + world.viewport.pixels() as u64 * BYTES, &mut last.counts);
     counts += &last.counts;
     emit(&last, memory.log());

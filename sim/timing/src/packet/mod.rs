@@ -115,13 +115,13 @@ impl Gates {
 }
 
 impl PacketClock {
-    /// A clock at time 0 for packets in batches of `batch_triangles`, which records into `recorder`.
-    pub fn new(machine: &MachineSpec, clocks: Clocks, batch_triangles: u32, recorder: Recorder) -> Self {
+    /// A clock at time 0 which records into `recorder`.
+    pub fn new(machine: &MachineSpec, clocks: Clocks, recorder: Recorder) -> Self {
         let stations: Vec<_> =
             Station::ALL.into_iter().map(|station| StationState::new(station, machine, &clocks)).collect();
         Self {
             clocks,
-            builder: DemandBuilder::new(machine, batch_triangles),
+            builder: DemandBuilder::new(machine),
             clocks_differ: stations.iter().any(|station| station.period() != stations[0].period()),
             stations,
             cores: Cores::new(machine, &clocks),

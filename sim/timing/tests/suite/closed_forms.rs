@@ -120,7 +120,7 @@ fn a_shared_resource_serves_n_clients_in_turn() {
     // A tile requests depth lines meanwhile: twice as many lines. The tile starts four cycles later and has
     // its last line when all 2 m lines are accepted.
     let mut second = packet(PacketKind::Tile, &[(Event::DepthReads, 1)]);
-    second.triangle = super::common::BATCH;
+    second.batch = 1;
     let both = vec![(vertices, lines(Unit::Command, m)), (second, lines(Unit::Depth, m))];
     assert_eq!(cycles(&both), 2 * u64::from(m) + 1 + 1);
 }

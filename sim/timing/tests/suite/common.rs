@@ -7,8 +7,6 @@ use timing::{
     Timed, UnitSpec,
 };
 
-pub const BATCH: u32 = 1000;
-
 pub fn rates(text: &str) -> Rates {
     activity::spec::parse(text, "test").unwrap()
 }
@@ -75,7 +73,7 @@ pub fn plain() -> MachineSpec {
 }
 
 pub fn packet(kind: PacketKind, counts: &[(Event, u32)]) -> Packet {
-    let mut packet = Packet::new(kind, 0, 0, 0);
+    let mut packet = Packet::new(kind, 0);
     counts.iter().for_each(|&(event, count)| packet.counts[event] = count);
     packet
 }
@@ -100,7 +98,7 @@ pub fn recorder() -> Recorder {
 
 pub fn stepped_as(machine: &MachineSpec, clocks: Clocks, packets: &Packets, options: &StepOptions) -> Timed {
     machine.validate().unwrap();
-    let mut builder = DemandBuilder::new(machine, BATCH);
+    let mut builder = DemandBuilder::new(machine);
     let mut stream = Stream::default();
     packets.iter().for_each(|(packet, lines)| stream.push(&mut builder, packet, lines));
     stepped::run(machine, clocks, &builder, &stream, recorder(), options).unwrap()
@@ -117,14 +115,14 @@ pub fn tiles(counts: impl IntoIterator<Item = Vec<(Event, u32)>>) -> Packets {
 
 /// Timing of the packets at the level `packet`.
 pub fn packet_level(machine: &MachineSpec, clocks: Clocks, packets: &Packets) -> Timed {
-    let mut clock = timing::PacketClock::new(machine, clocks, BATCH, recorder());
+    let mut clock = timing::PacketClock::new(machine, clocks, recorder());
     packets.iter().for_each(|(packet, lines)| clock.push(packet, lines));
     clock.finish()
 }
 
 /// Timing of the packets at the level `bound`.
 pub fn bound_level(machine: &MachineSpec, clocks: Clocks, packets: &Packets) -> Timed {
-    let mut clock = timing::BoundClock::new(machine, clocks, BATCH, recorder());
+    let mut clock = timing::BoundClock::new(machine, clocks, recorder());
     packets.iter().for_each(|(packet, lines)| clock.push(packet, lines));
     clock.finish()
 }

@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use timing::stepped::StepOptions;
 use timing::{Clocks, MachineSpec};
 
-use crate::common::{BATCH, Packets, plain, size, stepped_as};
+use crate::common::{Packets, plain, size, stepped_as};
 
 fn line() -> impl Strategy<Value = (u32, LineKind, Option<u32>)> {
     let kind = prop_oneof![
@@ -40,7 +40,7 @@ fn tile_packet(
     depth: &[(u32, LineKind, Option<u32>)],
     batch: u32,
 ) -> (Packet, Vec<LineAccess>) {
-    let mut packet = Packet::new(PacketKind::Tile, 0, 0, batch * BATCH);
+    let mut packet = Packet { batch, ..Packet::new(PacketKind::Tile, 0) };
     let counts = &mut packet.counts;
     counts[Event::TilesVisited] = tiles;
     counts[Event::SamplesTested] = samples;
@@ -63,7 +63,7 @@ fn vertices_packet(
     lines: &[(u32, LineKind, Option<u32>)],
     batch: u32,
 ) -> (Packet, Vec<LineAccess>) {
-    let mut packet = Packet::new(PacketKind::Vertices, 0, 0, batch * BATCH);
+    let mut packet = Packet { batch, ..Packet::new(PacketKind::Vertices, 0) };
     packet.counts[Event::Indices] = 3 * triangles;
     packet.counts[Event::VertexInvocations] = triangles;
     packet.counts[Event::ShaderOps] = 5 * triangles;

@@ -25,7 +25,7 @@ impl Gpu {
     fn run(&self, units: &MachineSpec, packets: &Packets) -> [Timed; 3] {
         let clocks = Clocks::new(self.core_hz, self.memory_hz).unwrap();
         let recorder = || Recorder::new(1_000_000, 1 << 16);
-        let mut builder = DemandBuilder::new(units, BATCH);
+        let mut builder = DemandBuilder::new(units);
         let (mut stream, mut totals) = (Stream::default(), Totals::new(units, &clocks));
         for (packet, lines) in packets {
             stream.push(&mut builder, packet, lines);
@@ -33,7 +33,7 @@ impl Gpu {
         }
         [
             stepped::run(units, clocks, &builder, &stream, recorder(), &StepOptions::default()).unwrap(),
-            PacketClock::new(units, clocks, BATCH, recorder()).run(&stream),
+            PacketClock::new(units, clocks, recorder()).run(&stream),
             bound(units, clocks, &totals, recorder()),
         ]
     }

@@ -3,7 +3,7 @@
 use activity::{Event, LineAccess, LineKind, Packet, PacketKind, Unit};
 use timing::MachineSpec;
 
-use crate::common::{BATCH, Packets, client, clocks, packet_level, plain, read, size, stepped, tile};
+use crate::common::{Packets, client, clocks, packet_level, plain, read, size, stepped, tile};
 
 type Level = fn(&MachineSpec, &Packets) -> u64;
 
@@ -14,7 +14,7 @@ const LEVELS: [(&str, Level); 2] = [
 
 /// A packet of the batch `batch`.
 fn of(batch: u32, kind: PacketKind, counts: &[(Event, u32)]) -> (Packet, Vec<LineAccess>) {
-    let mut packet = Packet::new(kind, 0, 0, batch * BATCH);
+    let mut packet = Packet { batch, ..Packet::new(kind, 0) };
     counts.iter().for_each(|&(event, count)| packet.counts[event] = count);
     (packet, Vec::new())
 }

@@ -141,7 +141,7 @@ impl Written {
     pub fn new(gpu: &GpuSpec, packets: &Packets) -> Result<Self, RunError> {
         let clocks = gpu.clocks().ok_or_else(|| TimingError::Clocks(gpu.name.clone()))?;
         let started = ThreadTime::now();
-        let mut builder = DemandBuilder::new(&gpu.units, gpu.pipeline.batch_triangles);
+        let mut builder = DemandBuilder::new(&gpu.units);
         let (mut stream, mut totals) = (Stream::default(), Totals::new(&gpu.units, &clocks));
         packets.each(|packet, lines| {
             stream.push(&mut builder, packet, lines);
@@ -161,9 +161,7 @@ pub(super) fn timed(level: Level, gpu: &GpuSpec, written: &Written) -> Result<(T
             stepped::run(&gpu.units, *clocks, builder, stream, recorder, &StepOptions::default())
                 .map_err(TimingError::from)?
         }
-        Level::Packet => {
-            PacketClock::new(&gpu.units, *clocks, gpu.pipeline.batch_triangles, recorder).run(stream)
-        }
+        Level::Packet => PacketClock::new(&gpu.units, *clocks, recorder).run(stream),
         Level::Bound => bound(&gpu.units, *clocks, totals, recorder),
     };
     Ok((timed, started.elapsed().as_secs_f64()))
