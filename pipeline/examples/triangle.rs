@@ -4,8 +4,8 @@ use activity::Event;
 use glam::{Affine3A, Vec3, Vec4};
 use pipeline::depth::DepthSpec;
 use pipeline::{
-    CacheSpec, Camera, Cull, Draw, Features, Geometry, Lens, LensShape, MemorySpec, PipelineSpec,
-    SampleTable, Settings, Shader, ShaderCost, Shading, ShadingPoint, Viewport, render,
+    CacheSpec, Camera, Cull, Draw, Features, Geometry, Lens, LensShape, MemorySpec, PipelineSpec, RasterPass,
+    SampleTable, Settings, Shader, ShaderCost, Shading, ShadingPoint, Viewport,
 };
 
 /// A surface of one colour.
@@ -50,9 +50,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let samples = SampleTable::low_discrepancy(16, 1, LensShape::Disk)?;
     let viewport = Viewport::new(64, 64).ok_or("an image without pixels")?;
     let settings = Settings { spec: &hardware(), viewport, samples: &samples, background: Vec3::ZERO };
-    let draws = [Draw { geometry, shader: &White, cull: Cull::None }];
+    let draws = [Draw::new(geometry, &White, Cull::None)];
     let mut packets = 0;
-    let rendered = render(&camera, &draws, &settings, |_| packets += 1)?;
+    let rendered = RasterPass::new(&camera, &draws, &settings).render(|_, _| packets += 1)?;
     println!("{packets} packets, {} samples hit", rendered.counts[Event::SamplesHit]);
     Ok(())
 }

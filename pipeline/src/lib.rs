@@ -57,7 +57,10 @@ pub mod texture;
 pub mod traversal;
 pub mod visibility;
 
-pub use frame::{Draw, Features, PipelineSpec, Rendered, Settings, Shading, render};
+pub use frame::{
+    Draw, Features, FrameReport, Gpu, PassError, PassReport, PipelineSpec, RasterPass, Rendered, Settings,
+    Shading, Target,
+};
 pub use geometry::{
     Camera, CameraError, Clip, Cull, DrawError, Geometry, Lens, MovingVertex, Shear, Viewport,
 };

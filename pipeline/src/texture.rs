@@ -92,6 +92,17 @@ impl Texture {
         self.levels.iter().map(|level| u64::from(level.blocks()) * 64).sum()
     }
 
+    /// Bytes of the whole chain of a texture of `width` x `height` texels.
+    pub fn bytes_of(mut width: u32, mut height: u32) -> u64 {
+        let blocks = |width: u32, height: u32| u64::from(width.div_ceil(4)) * u64::from(height.div_ceil(4));
+        let mut bytes = 64 * blocks(width, height);
+        while width > 1 || height > 1 {
+            (width, height) = ((width / 2).max(1), (height / 2).max(1));
+            bytes += 64 * blocks(width, height);
+        }
+        bytes
+    }
+
     /// Lowest alpha of all texels.
     pub fn min_alpha(&self) -> u8 {
         self.levels[0].texels.iter().map(|texel| texel[3]).min().unwrap_or(u8::MAX)

@@ -2,16 +2,20 @@
 
 use std::ops::Range;
 
+use activity::Event;
 use glam::Vec4;
 
 use super::{Features, Settings};
 use crate::depth::BoxGrid;
 use crate::geometry::{Camera, Clip, Cull, Geometry, MovingVertex, Projection, Viewport};
-use crate::memory::{AddressMap, Allocator};
+use crate::memory::{AddressSpace, Surface};
 use crate::setup::Corner;
 use crate::shading::Shader;
 use crate::texture::Texture;
 use crate::traversal::thresholds::{at_rest, blur_px, motion_px};
+
+/// Bytes of a stored depth or colour of one sample, and of a pixel of an image.
+pub(super) const SAMPLE_BYTES: u64 = 4;
 
 /// A triangle as it is drawn.
 pub(super) struct Staged {
@@ -49,18 +53,10 @@ pub(super) struct Pass<'a> {
 }
 
 impl<'a> Pass<'a> {
-    /// A pass with one image of all samples.
-    pub fn new(camera: &Camera, draws: &'a [Draw<'a>], settings: &'a Settings<'a>) -> Self {
-        Self::with_views(camera, draws, settings, std::iter::once(0..settings.samples.per_pixel()).collect())
-    }
-
-    /// A pass with an image for each range of samples, or with depths only.
-    pub fn with_views(
-        camera: &Camera,
-        draws: &'a [Draw<'a>],
-        settings: &'a Settings<'a>,
-        views: Vec<Range<u32>>,
-    ) -> Self {
+    /// Prepares pass `number` of a frame and gives its surfaces addresses in `space`.
+    pub fn new(pass: &RasterPass<'a>, number: u16, space: &mut AddressSpace) -> Self {
+        let RasterPass { camera, draws, settings, .. } = *pass;
+        let views = pass.target.views(settings.samples.per_pixel());
         let projection = Projection::new(camera, settings.viewport);
         let vertices = draws.iter().map(|draw| projection.images(&draw.geometry)).collect();
         let first_triangle = std::iter::once(0)
@@ -71,18 +67,18 @@ impl<'a> Pass<'a> {
             .collect();
         let viewport = settings.viewport;
         Self {
-            number: 0,
+            number,
             draws,
             settings,
             vertices,
             first_triangle,
-            addresses: addresses(draws, settings, views.len()),
+            addresses: AddressMap::new(pass, views.len(), space),
             origin: [Viewport::edge(0, viewport.width()), Viewport::edge(0, viewport.height())],
             lens: !projection.shear.is_none(),
             clip: camera.clip(),
             still_camera: camera.open() == camera.close(),
             eye: projection.eye(),
-            heat: false,
+            heat: !pass.heat.is_empty(),
             views,
             projection,
         }
@@ -158,33 +154,71 @@ impl<'a> Pass<'a> {
     }
 }
 
-fn addresses(draws: &[Draw<'_>], settings: &Settings<'_>, images: usize) -> AddressMap {
-    let mut memory = Allocator::default();
-    let (viewport, tile_px) = (settings.viewport, settings.spec.tile_px);
-    let tiles =
-        u64::from(viewport.width().div_ceil(tile_px)) * u64::from(viewport.height().div_ceil(tile_px));
-    let pixels = tiles * u64::from(tile_px * tile_px);
-    let samples = pixels * u64::from(settings.samples.per_pixel());
-    let mut known: Vec<(*const Texture, u64)> = Vec::new();
-    let (depth, colour, image) =
-        (memory.take(samples * 4), memory.take(samples * 4), memory.take(pixels * 4 * images as u64));
-    let vertices = draws
-        .iter()
-        .map(|draw| memory.take(draw.geometry.open().len() as u64 * u64::from(draw.geometry.vertex_bytes())))
-        .collect();
-    let textures = draws
+/// Where a pass finds its data.
+#[derive(Clone, Debug)]
+pub(super) struct AddressMap {
+    /// Depths of samples.
+    pub depth: Surface,
+    /// Colours of samples.
+    pub colour: Surface,
+    /// Images, one after the other.
+    pub image: Surface,
+    /// First byte of the vertices of each draw.
+    pub vertices: Vec<u64>,
+    /// First byte of the texture of each draw; draws with the same texture have the same address.
+    pub textures: Vec<u64>,
+}
+
+impl AddressMap {
+    fn new(pass: &RasterPass<'_>, images: usize, space: &mut AddressSpace) -> Self {
+        let settings = pass.settings;
+        let (viewport, tile_px) = (settings.viewport, settings.spec.tile_px);
+        let tiles =
+            u64::from(viewport.width().div_ceil(tile_px)) * u64::from(viewport.height().div_ceil(tile_px));
+        let pixels = tiles * u64::from(tile_px * tile_px);
+        let bytes = pixels * u64::from(settings.samples.per_pixel()) * SAMPLE_BYTES;
+        // The depths of a depth pass are its result.
+        let [depth, colour] = if images == 0 { [space.take(bytes); 2] } else { space.samples(bytes) };
+        let mip_levels = match pass.target {
+            Target::Texture => Texture::bytes_of(viewport.width(), viewport.height()),
+            _ => 0,
+        };
+        let image = space.take((pixels * SAMPLE_BYTES * images as u64).max(mip_levels));
+        let resident: Vec<Resident> = resident(pass.draws, space).collect();
+        let vertices = resident.iter().map(|at| at.vertices.unwrap_or(0)).collect();
+        let textures = resident.iter().map(|at| at.texture.unwrap_or(0)).collect();
+        Self { depth, colour, image, vertices, textures }
+    }
+
+    /// What is left of the pass: its images, or the depths of a depth pass.
+    pub fn result(&self) -> Surface {
+        if self.image.bytes() > 0 { self.image } else { self.depth }
+    }
+}
+
+/// Addresses of the vertices and the texture of each draw. Those without any get new ones.
+pub(super) fn resident<'s>(
+    draws: &'s [Draw<'_>],
+    space: &'s mut AddressSpace,
+) -> impl Iterator<Item = Resident> + use<'s> {
+    let vertices: Vec<u64> = draws
         .iter()
         .map(|draw| {
-            let Some(texture) = draw.shader.texture() else { return 0 };
-            let shared = known.iter().find(|(seen, _)| std::ptr::eq(*seen, texture));
-            shared.map(|&(_, address)| address).unwrap_or_else(|| {
-                let address = memory.take(texture.bytes());
-                known.push((texture, address));
-                address
-            })
+            let bytes = draw.geometry.open().len() as u64 * u64::from(draw.geometry.vertex_bytes());
+            draw.resident.vertices.unwrap_or_else(|| space.take(bytes).address())
         })
         .collect();
-    AddressMap { depth, colour, image, vertices, textures }
+    let mut known: Vec<(*const Texture, u64)> = Vec::new();
+    draws.iter().zip(vertices).map(move |(draw, vertices)| {
+        let texture = draw.shader.texture().map(|texture| {
+            let shared = known.iter().find(|(seen, _)| std::ptr::eq(*seen, texture)).map(|known| known.1);
+            let address = draw.resident.texture.or(shared);
+            let address = address.unwrap_or_else(|| space.take(texture.bytes()).address());
+            known.push((texture, address));
+            address
+        });
+        Resident { vertices: Some(vertices), texture }
+    })
 }
 
 /// Triangles with a shader.
@@ -196,4 +230,107 @@ pub struct Draw<'a> {
     pub shader: &'a dyn Shader,
     /// Culled faces.
     pub cull: Cull,
+    /// Addresses of its data, if an earlier pass of the frame has used them.
+    pub resident: Resident,
+}
+
+impl<'a> Draw<'a> {
+    /// A draw whose data are new to the GPU.
+    pub fn new(geometry: Geometry<'a>, shader: &'a dyn Shader, cull: Cull) -> Self {
+        Self { geometry, shader, cull, resident: Resident::default() }
+    }
+
+    /// The draw with the texture of its shader in `surface`, as an earlier pass wrote it.
+    #[must_use]
+    pub fn reading(self, surface: Surface) -> Self {
+        Self { resident: Resident { texture: Some(surface.address()), ..self.resident }, ..self }
+    }
+}
+
+/// Addresses of a draw's data.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Resident {
+    pub(super) vertices: Option<u64>,
+    pub(super) texture: Option<u64>,
+}
+
+/// Work of one pass: draws seen by a camera.
+#[derive(Clone, Copy)]
+pub struct RasterPass<'a> {
+    /// Name in reports.
+    pub name: &'a str,
+    /// The camera.
+    pub camera: &'a Camera,
+    /// The draws, in order.
+    pub draws: &'a [Draw<'a>],
+    /// Hardware, image size, samples and background.
+    pub settings: &'a Settings<'a>,
+    /// What is drawn.
+    pub target: Target<'a>,
+    /// Whether the result has the visible triangle and the depth of every sample.
+    pub visible: bool,
+    /// Events of which the result has heat maps.
+    pub heat: &'a [Event],
+}
+
+/// Result that a pass leaves in memory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Target<'a> {
+    /// One image of all samples.
+    Image,
+    /// The same, with room for its mip levels, for draws that [read it](Draw::reading).
+    Texture,
+    /// Several images. Image `k` is the mean of the samples of each pixel whose indices are in range `k`. Ranges may overlap;
+    /// indices beyond the samples of a pixel are ignored, and an image without samples is black.
+    Views(&'a [Range<u32>]),
+    /// The depths of all samples, such as a shadow map. Nothing is shaded.
+    Depth,
+}
+
+impl Target<'_> {
+    /// Samples of each image.
+    fn views(&self, per_pixel: u32) -> Vec<Range<u32>> {
+        let within = |run: &Range<u32>| run.start..run.end.min(per_pixel).max(run.start);
+        match self {
+            Self::Image | Self::Texture => std::iter::once(0..per_pixel).collect(),
+            Self::Views(views) => views.iter().map(within).collect(),
+            Self::Depth => Vec::new(),
+        }
+    }
+}
+
+impl<'a> RasterPass<'a> {
+    /// A pass that draws one image.
+    pub fn new(camera: &'a Camera, draws: &'a [Draw<'a>], settings: &'a Settings<'a>) -> Self {
+        Self { name: "draw", camera, draws, settings, target: Target::Image, visible: false, heat: &[] }
+    }
+
+    /// The pass with another name.
+    #[must_use]
+    pub fn named(self, name: &'a str) -> Self {
+        Self { name, ..self }
+    }
+
+    /// The pass with another target.
+    #[must_use]
+    pub fn onto(self, target: Target<'a>) -> Self {
+        Self { target, ..self }
+    }
+
+    /// The pass with visible triangles and depths in its result.
+    #[must_use]
+    pub fn with_visible(self) -> Self {
+        Self { visible: true, ..self }
+    }
+
+    /// The pass with heat maps of `events` in its result.
+    #[must_use]
+    pub fn with_heat(self, events: &'a [Event]) -> Self {
+        Self { heat: events, ..self }
+    }
+
+    /// Triangles of all draws.
+    pub fn triangles(&self) -> usize {
+        self.draws.iter().map(|draw| draw.geometry.triangles().len()).sum()
+    }
 }

@@ -5,20 +5,17 @@ use activity::{Event, LineAccess, Packet, PacketCounts, PacketKind};
 use super::Shading;
 use super::bin::Bin;
 use super::bin::{BinLog, Work};
-use super::pass::Pass;
+use super::pass::{Pass, SAMPLE_BYTES};
 use super::surface::Surface;
 use crate::memory::{Access, Cache, CacheError, LINE_BYTES, MemorySystem};
 use crate::random::mix;
 use crate::sampling::Sample;
 use crate::shading::QuadAccess;
 
-/// Bytes of a stored depth or colour of one sample, and of a pixel of the image.
-const SAMPLE_BYTES: u64 = 4;
-
-/// State of all caches during a frame.
+/// State of a pass, and the caches of the frame.
 pub(super) struct Replay<'a> {
     pass: &'a Pass<'a>,
-    memory: MemorySystem,
+    memory: &'a mut MemorySystem,
     shading: Cache,
     reuse: Reuse,
     /// Depth and colour lines that no longer hold the clear value.
@@ -46,16 +43,15 @@ impl Reuse {
 }
 
 impl<'a> Replay<'a> {
-    pub fn new(pass: &'a Pass<'a>) -> Result<Self, CacheError> {
-        let spec = pass.settings.spec;
-        let lines = ((pass.addresses.colour - pass.addresses.depth) / LINE_BYTES) as usize;
-        let (mut memory, mut small) = (MemorySystem::new(&spec.memory)?, Vec::new());
+    pub fn new(pass: &'a Pass<'a>, memory: &'a mut MemorySystem) -> Result<Self, CacheError> {
+        let (spec, at) = (pass.settings.spec, &pass.addresses);
+        let lines = at.depth.bytes().div_ceil(LINE_BYTES) as usize;
+        let mut small = Vec::new();
         if spec.memory.compression.is_on() {
-            let at = &pass.addresses;
-            memory = memory.with_compression([at.depth, at.colour, at.image]);
+            memory.compress([at.depth.address(), at.colour.address(), at.image.address()]);
             let tile_bytes =
                 u64::from(spec.tile_px.pow(2) * pass.settings.samples.per_pixel()) * SAMPLE_BYTES;
-            small = vec![[0; 2]; (at.colour - at.depth).div_ceil(tile_bytes) as usize];
+            small = vec![[0; 2]; at.depth.bytes().div_ceil(tile_bytes) as usize];
         }
         Ok(Self {
             pass,
@@ -124,7 +120,7 @@ impl<'a> Replay<'a> {
         counts[Event::DepthWrites] = work.written;
         counts[Event::ColourWrites] = if self.pass.is_depth_only() { 0 } else { work.written };
         self.compress(work);
-        let base = self.pass.addresses.depth;
+        let base = self.pass.addresses.depth.address();
         self.lines(work.tile, work.read_pixels, |this, line, pixels| {
             let write = pixels & work.written_pixels != 0;
             let fresh = !std::mem::replace(&mut this.depth_used[line as usize], true);
@@ -139,7 +135,7 @@ impl<'a> Replay<'a> {
         if self.pass.is_depth_only() {
             return packet;
         }
-        let base = self.pass.addresses.colour;
+        let base = self.pass.addresses.colour.address();
         self.lines(work.tile, work.written_pixels, |this, line, _| {
             let fresh = !std::mem::replace(&mut this.colour_used[line as usize], true);
             this.memory.colour(base + line * LINE_BYTES, true, fresh, counts);
@@ -154,7 +150,7 @@ impl<'a> Replay<'a> {
         let now: [u64; 2] =
             std::array::from_fn(|of| small[of] & !work.written_pixels | work.small_pixels[of]);
         *small = now;
-        let bases = [self.pass.addresses.depth, self.pass.addresses.colour];
+        let bases = [self.pass.addresses.depth, self.pass.addresses.colour].map(|surface| surface.address());
         self.lines(work.tile, work.written_pixels, |this, line, _| {
             let pixels = this.pixels_of(work.tile, line);
             for (base, small) in bases.into_iter().zip(now) {
@@ -249,17 +245,6 @@ impl<'a> Replay<'a> {
         }
     }
 
-    /// End the frame: the images, or the depths of a depth pass, are written back.
-    pub fn finish(&mut self, emit: &mut impl FnMut(&Packet, &[LineAccess])) {
-        let batch = self.pass.batches().len().max(1) as u32 - 1;
-        let mut last = Packet { batch, ..Packet::new(PacketKind::Resolve, self.pass.number) };
-        let at = &self.pass.addresses;
-        let end = at.vertices.first().copied().unwrap_or(u64::MAX);
-        let kept = if self.pass.is_depth_only() { at.depth..at.colour } else { at.image..end };
-        self.memory.finish(kept, &mut last.counts);
-        self.emit(&last, emit);
-    }
-
     fn resolve_tile(&mut self, tile: u32, pixels: u64, touched: bool) -> Packet {
         let mut packet = Packet { tile, ..Packet::new(PacketKind::Resolve, self.pass.number) };
         let counts = &mut packet.counts;
@@ -267,7 +252,7 @@ impl<'a> Replay<'a> {
         if touched {
             let samples: u32 = self.pass.views.iter().map(ExactSizeIterator::len).sum::<usize>() as u32;
             counts[Event::SamplesResolved] = pixels.count_ones() * samples;
-            let (colour, depth) = (self.pass.addresses.colour, self.pass.addresses.depth);
+            let (colour, depth) = (self.pass.addresses.colour.address(), self.pass.addresses.depth.address());
             self.lines(tile, pixels, |this, line, _| {
                 let fresh = !this.colour_used[line as usize];
                 this.memory.colour(colour + line * LINE_BYTES, false, fresh, counts);
@@ -278,7 +263,8 @@ impl<'a> Replay<'a> {
         let side = u64::from(self.pass.settings.spec.tile_px);
         let bytes = side * side * SAMPLE_BYTES;
         for view in 0..self.pass.views.len() as u64 {
-            let first = self.pass.addresses.image + (view * self.pass.tiles() + u64::from(tile)) * bytes;
+            let first =
+                self.pass.addresses.image.address() + (view * self.pass.tiles() + u64::from(tile)) * bytes;
             for line in first / LINE_BYTES..=(first + bytes - 1) / LINE_BYTES {
                 self.memory.colour(line * LINE_BYTES, true, true, counts);
             }

@@ -1,8 +1,10 @@
 //! Memory of the pipeline: addresses, caches and traffic to the chips.
 
+mod address;
 mod cache;
 mod system;
 
+pub use address::{AddressSpace, Surface};
 pub use cache::{Access, Cache, CacheError, CacheSpec, Replacement};
-pub use system::{AddressMap, Compression, LINE_BYTES, MemorySpec, MemorySystem};
-pub(crate) use system::{Allocator, depths_fit};
+pub(crate) use system::depths_fit;
+pub use system::{Compression, LINE_BYTES, MemorySpec, MemorySystem};

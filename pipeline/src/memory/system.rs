@@ -4,7 +4,7 @@
 use activity::{Event, LineAccess, LineKind, PacketCounts, Unit};
 use serde::Deserialize;
 
-use super::{Access, Cache, CacheError, CacheSpec};
+use super::{Access, Cache, CacheError, CacheSpec, Surface};
 
 /// Caches of memory, with lines of 64 bytes as entries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
@@ -67,10 +67,9 @@ impl MemorySystem {
         })
     }
 
-    /// The same caches with compression of the depth and colour buffers at these addresses.
-    /// [`Self::set_compressed`] marks lines.
-    pub fn with_compression(self, buffers: [u64; 3]) -> Self {
-        Self { compressed: CompressedLines::new(buffers), ..self }
+    /// Compress the depth and colour buffers at these addresses from now on; [`Self::set_compressed`] marks lines.
+    pub fn compress(&mut self, buffers: [u64; 3]) {
+        self.compressed = CompressedLines::new(buffers);
     }
 
     /// Set whether the line at `address` compresses to half.
@@ -122,18 +121,29 @@ impl MemorySystem {
         (first..=last).for_each(|line| shared(&mut self.l2, Unit::Command, line, false, counts));
     }
 
-    /// End the frame: lines in `kept` (images or depths) are written back, all others are dropped.
-    pub fn finish(&mut self, kept: std::ops::Range<u64>, counts: &mut PacketCounts) {
+    /// Move written lines to the L2, as later passes read them through other caches. Texture lines are dropped.
+    pub fn flush(&mut self, counts: &mut PacketCounts) {
+        self.texture.cache.flush();
+        for client in [&mut self.colour, &mut self.depth] {
+            for line in client.cache.flush() {
+                shared(&mut self.l2, client.unit, self.compressed.moved_line(line), true, counts);
+            }
+        }
+    }
+
+    /// End the frame: lines in `kept` (images and depths) are written back, all others are dropped.
+    pub fn finish(&mut self, kept: &[Surface], counts: &mut PacketCounts) {
+        let is_kept = |line: u64| kept.iter().any(|surface| surface.contains(line * LINE_BYTES));
         let mut unit = Unit::Colour;
         for client in [&mut self.colour, &mut self.depth] {
             for line in client.cache.flush() {
-                if kept.contains(&(line * LINE_BYTES)) {
+                if is_kept(line) {
                     unit = client.unit;
                     shared(&mut self.l2, unit, self.compressed.moved_line(line), true, counts);
                 }
             }
         }
-        let written = self.l2.cache.flush().into_iter().filter(|line| kept.contains(&(line * LINE_BYTES)));
+        let written = self.l2.cache.flush().into_iter().filter(|line| is_kept(*line));
         for line in written {
             counts[Event::DramWriteBytes] += LINE_BYTES as u32;
             self.l2.log.push(access_to(unit, line, LineKind::Drain, None));
@@ -284,36 +294,9 @@ impl CompressedLines {
 /// Bytes per line in all caches of memory.
 pub const LINE_BYTES: u64 = 64;
 
-/// Addresses of consecutive buffers, each aligned to a line.
-#[derive(Clone, Debug)]
-pub struct AddressMap {
-    /// First byte of the sample depths.
-    pub depth: u64,
-    /// First byte of the sample colours.
-    pub colour: u64,
-    /// First byte of the resolved image.
-    pub image: u64,
-    /// First byte of the vertices of each draw.
-    pub vertices: Vec<u64>,
-    /// First byte of the texture of each draw; draws with the same texture have the same address.
-    pub textures: Vec<u64>,
-}
-
-/// Allocator of addresses.
-#[derive(Debug, Default)]
-pub(crate) struct Allocator(u64);
-
-impl Allocator {
-    /// First byte of a new buffer of `bytes`.
-    pub fn take(&mut self, bytes: u64) -> u64 {
-        let first = self.0;
-        self.0 += bytes.next_multiple_of(LINE_BYTES);
-        first
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::AddressSpace;
     use super::*;
 
     fn system() -> MemorySystem {
@@ -350,11 +333,13 @@ mod tests {
 
     #[test]
     fn only_the_image_is_written_at_the_end() {
-        let (mut memory, mut counts) = (system(), PacketCounts::default());
-        memory.depth(0, true, true, &mut counts);
-        memory.colour(1024, true, true, &mut counts);
-        memory.colour(2048, true, true, &mut counts);
-        memory.finish(2048..4096, &mut counts);
+        let (mut memory, mut counts, mut space) =
+            (system(), PacketCounts::default(), AddressSpace::default());
+        let [depth, colour, image] = [1024, 1024, 2048].map(|bytes| space.take(bytes));
+        memory.depth(depth.address(), true, true, &mut counts);
+        memory.colour(colour.address(), true, true, &mut counts);
+        memory.colour(image.address(), true, true, &mut counts);
+        memory.finish(&[image], &mut counts);
         assert_eq!(counts[Event::DramWriteBytes], 64);
     }
 
@@ -363,15 +348,15 @@ mod tests {
         let (mut memory, mut counts) = (system(), PacketCounts::default());
         (0..3).for_each(|line| memory.depth(64 * line, true, true, &mut counts));
         memory.colour(1024, true, true, &mut counts);
-        memory.finish(0..1024, &mut counts);
+        memory.finish(&[AddressSpace::default().take(1024)], &mut counts);
         assert_eq!(counts[Event::DramWriteBytes], 3 * 64);
     }
 
     #[test]
     fn two_halved_lines_are_moved_as_one() {
         let moved = |fits: bool| {
-            let (mut memory, mut counts) =
-                (system().with_compression([0, 4096, 8192]), PacketCounts::default());
+            let (mut memory, mut counts) = (system(), PacketCounts::default());
+            memory.compress([0, 4096, 8192]);
             (0..2).for_each(|line| memory.set_compressed(64 * line, fits));
             (0..2).for_each(|line| memory.depth(64 * line, false, false, &mut counts));
             (counts[Event::DepthMisses], counts[Event::L2Reads], counts[Event::DramReadBytes])

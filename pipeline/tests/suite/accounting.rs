@@ -4,7 +4,6 @@ use crate::common::*;
 use activity::{Counts, Event, Packet, PacketKind, Unit};
 use glam::{Vec2, Vec3, Vec4};
 use pipeline::depth::{DepthBound, DepthSpec};
-use pipeline::frame::visibility;
 use pipeline::memory::{CacheSpec, Compression, MemorySpec};
 use pipeline::*;
 use proptest::prelude::*;
@@ -50,8 +49,9 @@ fn frame_with(draws: &[Draw<'_>], lens: bool, spec: &PipelineSpec) -> Frame {
     let viewport = Viewport::new(70, 50).unwrap();
     let settings = Settings { spec, viewport, samples: &table, background: Vec3::ZERO };
     let mut packets = Vec::new();
-    let rendered = render(&camera(lens), draws, &settings, |packet| packets.push(*packet)).unwrap();
-    let seen = visibility(&camera(lens), draws, &settings).unwrap();
+    let rendered =
+        RasterPass::new(&camera(lens), draws, &settings).render(|packet, _| packets.push(*packet)).unwrap();
+    let seen = RasterPass::new(&camera(lens), draws, &settings).visibility().unwrap();
     Frame {
         packets,
         counts: rendered.counts,
@@ -312,8 +312,7 @@ fn vertices_are_reused_first_in_first_out() {
     let back_to_the_start = [strip.clone(), vec![[0, 39, 1]]].concat();
     for (triangles, fetched) in [(strip, 40), (back_to_the_start, 42)] {
         let geometry = Geometry::new(&corners, &corners, &triangles).unwrap();
-        let counts =
-            frame(&[Draw { geometry, shader: &Plain, cull: Cull::None }], false, Features::ALL).counts;
+        let counts = frame(&[Draw::new(geometry, &Plain, Cull::None)], false, Features::ALL).counts;
         assert_eq!(counts[Event::VerticesFetched], fetched);
     }
 }
@@ -327,8 +326,10 @@ fn compressed(soup: &Soup, lens: bool, compression: Compression) -> (Counts, Vec
     let table = SampleTable::low_discrepancy(8, 3, LensShape::Disk).unwrap();
     let viewport = Viewport::new(70, 50).unwrap();
     let settings = Settings { spec: &spec, viewport, samples: &table, background: Vec3::ZERO };
-    let rendered = render(&camera(lens), &[soup.draw(&Plain, Cull::None)], &settings, |_| {}).unwrap();
-    (rendered.counts, rendered.image)
+    let rendered = RasterPass::new(&camera(lens), &[soup.draw(&Plain, Cull::None)], &settings)
+        .render(|_, _| {})
+        .unwrap();
+    (rendered.counts, rendered.into_image())
 }
 
 const NOTHING: Compression = Compression { depth: false, colour: false };

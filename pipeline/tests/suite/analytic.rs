@@ -166,7 +166,7 @@ fn an_off_centre_frustum_moves_the_image_by_whole_pixels() {
         let (corners, triangles, mut stage) = dyadic(4);
         stage.camera = stage.camera.with_lens(Some(Lens::new(8.0, 2.0).unwrap()));
         let geometry = Geometry::new(&corners, &corners, &triangles).unwrap();
-        let draws = [Draw { geometry, shader: &Plain, cull: Cull::None }];
+        let draws = [Draw::new(geometry, &Plain, Cull::None)];
         let centred = stage.see(&draws);
         let shift = Vec2::new(right as f32, down as f32) / 40.0;
         stage.camera = stage.camera.with_shift(shift).unwrap();
@@ -197,11 +197,11 @@ fn a_moving_camera_is_a_scene_that_moves_the_other_way() {
         let mut fixed = Stage { camera: stage.camera.with_lens(lens), ..dyadic(6).2 };
         let close: Vec<_> = corners.iter().map(|&p| p + way).collect();
         let scene = Geometry::new(&corners, &close, &triangles).unwrap();
-        let moving_scene = fixed.see(&[Draw { geometry: scene, shader: &Plain, cull: Cull::None }]);
+        let moving_scene = fixed.see(&[Draw::new(scene, &Plain, Cull::None)]);
         let travel = Affine3A::from_translation(way);
         fixed.camera = fixed.camera.moving(Affine3A::IDENTITY, travel).unwrap();
         let still = Geometry::new(&corners, &corners, &triangles).unwrap();
-        let moving_camera = fixed.see(&[Draw { geometry: still, shader: &Plain, cull: Cull::None }]);
+        let moving_camera = fixed.see(&[Draw::new(still, &Plain, Cull::None)]);
         assert!(moving_scene == moving_camera);
         assert!(moving_scene.iter().filter(|seen| seen.2 != u32::MAX).count() > 1000);
     }

@@ -21,13 +21,15 @@ fn rectangle_of(x: [f32; 2], y: [f32; 2], features: Features) -> Counted {
     let viewport = Viewport::new(32, 32).unwrap();
     let corners = rectangle(x, y, 2.0);
     let geometry = Geometry::new(&corners, &corners, &QUAD).unwrap();
-    let draws = [Draw { geometry, shader: &Flat(Vec3::ONE), cull: Cull::None }];
+    let draws = [Draw::new(geometry, &Flat(Vec3::ONE), Cull::None)];
     let table = SampleTable::low_discrepancy(8, 3, LensShape::Disk).unwrap();
     let spec = spec(features);
     let settings = Settings { spec: &spec, viewport, samples: &table, background: Vec3::ZERO };
     let mut packets = Vec::new();
-    let counts =
-        render(&pixel_camera(viewport, 0.25), &draws, &settings, |p| packets.push(*p)).unwrap().counts;
+    let counts = RasterPass::new(&pixel_camera(viewport, 0.25), &draws, &settings)
+        .render(|p, _| packets.push(*p))
+        .unwrap()
+        .counts;
     Counted { packets, counts }
 }
 

@@ -2,7 +2,6 @@
 
 use crate::common::*;
 use glam::Vec3;
-use pipeline::frame::visibility;
 use pipeline::sampling::Sample;
 use pipeline::visibility::{SampleLayout, Visibility, resolve};
 use pipeline::*;
@@ -34,7 +33,7 @@ impl Scene {
             Settings { spec: &spec, viewport: viewport(), samples: &self.table, background: Vec3::ZERO };
         let mut drawn = self.soup.draw(&Plain, Cull::None);
         drawn.geometry = drawn.geometry.with_clip(draw);
-        visibility(&camera(self.lens).with_clip(frame), &[drawn], &settings).unwrap()
+        RasterPass::new(&camera(self.lens).with_clip(frame), &[drawn], &settings).visibility().unwrap()
     }
 }
 
@@ -128,12 +127,11 @@ fn dropped_motion_moves_an_outline_by_at_most_the_threshold() {
     let table = SampleTable::low_discrepancy(64, 3, LensShape::Disk).unwrap();
     let (open, close) =
         (rectangle([-6.0, 6.0], [-40.0, 40.0], 2.0), rectangle([-5.2, 6.8], [-40.0, 40.0], 2.0));
-    let draw =
-        Draw { geometry: Geometry::new(&open, &close, &QUAD).unwrap(), shader: &Plain, cull: Cull::None };
+    let draw = Draw::new(Geometry::new(&open, &close, &QUAD).unwrap(), &Plain, Cull::None);
     let see = |still_px: f32| {
         let spec = spec(Features { still_px, ..Features::ALL });
         let settings = Settings { spec: &spec, viewport, samples: &table, background: Vec3::ZERO };
-        visibility(&camera, &[draw], &settings).unwrap()
+        RasterPass::new(&camera, &[draw], &settings).visibility().unwrap()
     };
     let (exact, below, above) = (see(0.0), see(0.39), see(0.41));
     assert_eq!(exact, below, "it moves 0.4 pixels each way");

@@ -10,7 +10,7 @@ fn counts(soup: &Soup, cull: Cull, lens: bool, per_pixel: u32, features: Feature
     let spec = PipelineSpec { batch_triangles: 65536, ..spec(features) };
     let viewport = Viewport::new(96, 64).unwrap();
     let settings = Settings { spec: &spec, viewport, samples: &table, background: Vec3::ZERO };
-    render(&camera(lens), &[soup.draw(&Plain, cull)], &settings, |_| ()).unwrap().counts
+    RasterPass::new(&camera(lens), &[soup.draw(&Plain, cull)], &settings).render(|_, _| ()).unwrap().counts
 }
 
 /// Multiply-adds of tile tests and sample tests together.

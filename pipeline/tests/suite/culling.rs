@@ -4,7 +4,6 @@
 use crate::common::*;
 use glam::Vec3;
 use pipeline::depth::{DepthBound, DepthSpec};
-use pipeline::frame::visibility;
 use pipeline::*;
 use proptest::prelude::*;
 
@@ -41,7 +40,9 @@ impl Scene {
 
     fn check(&self, spec: &PipelineSpec) {
         let settings = Settings { spec, viewport: viewport(), samples: &self.table, background: Vec3::ZERO };
-        let ours = visibility(&camera(self.optics), &[self.soup.draw(&Plain, self.cull)], &settings).unwrap();
+        let ours = RasterPass::new(&camera(self.optics), &[self.soup.draw(&Plain, self.cull)], &settings)
+            .visibility()
+            .unwrap();
         assert_eq!(ours.len(), self.truth.len());
         let differ = ours.iter().zip(&self.truth).filter(|(a, b)| a != b).count();
         let of = ours.len();

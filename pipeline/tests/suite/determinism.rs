@@ -3,7 +3,6 @@
 use crate::common::*;
 use activity::{Packet, PacketKind};
 use glam::{Vec2, Vec3, Vec4};
-use pipeline::frame::visibility;
 use pipeline::random::mix;
 use pipeline::*;
 
@@ -71,9 +70,15 @@ fn frame(threads: usize, lens: bool, features: Features, batch_triangles: u32) -
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
     pool.install(|| {
         let mut stream = Stream::default();
-        let rendered = render(&camera(lens), &draws, &settings, |packet| stream.add(packet)).unwrap();
-        let image = rendered.image.iter().map(|pixel| pixel.to_array().map(f32::to_bits)).collect();
-        (image, rendered.counts, stream, visibility(&camera(lens), &draws, &settings).unwrap())
+        let rendered =
+            RasterPass::new(&camera(lens), &draws, &settings).render(|packet, _| stream.add(packet)).unwrap();
+        let image = rendered.images[0].iter().map(|pixel| pixel.to_array().map(f32::to_bits)).collect();
+        (
+            image,
+            rendered.counts,
+            stream,
+            RasterPass::new(&camera(lens), &draws, &settings).visibility().unwrap(),
+        )
     })
 }
 
@@ -118,7 +123,7 @@ fn the_size_of_tiles_changes_no_pixel() {
         let spec = PipelineSpec { tile_px, coarse_tile_px, ..spec(Features::ALL) };
         let settings = Settings { spec: &spec, viewport, samples: &table, background: Vec3::ZERO };
         let draws = [soup.draw(&Plain, Cull::None)];
-        visibility(&camera(true), &draws, &settings).unwrap()
+        RasterPass::new(&camera(true), &draws, &settings).visibility().unwrap()
     };
     let eight = seen(8, 32);
     for (tile_px, coarse_tile_px) in [(8, 8), (4, 16), (2, 2), (1, 64), (1, 1), (8, 256)] {

@@ -2,7 +2,6 @@
 
 use crate::common::*;
 use glam::Vec3;
-use pipeline::frame::visibility;
 use pipeline::sampling::Sample;
 use pipeline::setup::{Outcome, Triangle};
 use pipeline::traversal::Box5;
@@ -122,7 +121,7 @@ proptest! {
         let settings = Settings { spec: &spec, viewport, samples: &table, background: Vec3::ZERO };
         let see = |close| {
             let geometry = Geometry::new(&soup.open, close, &soup.triangles).unwrap();
-            visibility(&camera(lens), &[Draw { geometry, shader: &Plain, cull: Cull::None }], &settings).unwrap()
+            RasterPass::new(&camera(lens), &[Draw::new(geometry, &Plain, Cull::None)], &settings).visibility().unwrap()
         };
         prop_assert_eq!(see(&soup.open), see(&twice));
     }

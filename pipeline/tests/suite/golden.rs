@@ -9,7 +9,6 @@ use std::path::PathBuf;
 
 use crate::common::*;
 use glam::{Vec2, Vec3, Vec4};
-use pipeline::frame::visibility;
 use pipeline::random::mix;
 use pipeline::*;
 
@@ -75,16 +74,16 @@ fn image(moving: bool, lens: bool, textured: bool) -> String {
         solid = solid.with_uvs(&uvs).unwrap();
         ground = ground.with_uvs(&floor_uvs).unwrap();
     }
-    let draws = [solid, ground].map(|geometry| Draw { geometry, shader, cull: Cull::None });
+    let draws = [solid, ground].map(|geometry| Draw::new(geometry, shader, Cull::None));
     let table = SampleTable::low_discrepancy(8, 42, LensShape::Disk).unwrap();
     let spec = spec(Features::ALL);
     let viewport = Viewport::new(SIDE_PX, SIDE_PX).unwrap();
     let background = Vec3::new(0.3, 0.5, 0.8);
     let settings = Settings { spec: &spec, viewport, samples: &table, background };
     let camera = camera(false).with_lens(lens.then(|| Lens::new(0.3, 5.0).unwrap()));
-    let rendered = render(&camera, &draws, &settings, |_| ()).unwrap();
-    let seen = visibility(&camera, &draws, &settings).unwrap();
-    text(&rendered.image, &seen)
+    let rendered = RasterPass::new(&camera, &draws, &settings).render(|_, _| ()).unwrap();
+    let seen = RasterPass::new(&camera, &draws, &settings).visibility().unwrap();
+    text(&rendered.images[0], &seen)
 }
 
 fn text(image: &[Vec3], seen: &[(u32, u32)]) -> String {

@@ -4,17 +4,18 @@ use crate::common::stage::{RED, still};
 use crate::common::{Kind, Plain, Soup, camera, pixel_camera, rectangle, spec};
 use activity::{Counts, Event};
 use glam::Vec3;
-use pipeline::frame::{HeatMap, render_with_heat};
+use pipeline::frame::HeatMap;
 use pipeline::*;
 
 fn maps(size: [u32; 2], spec: &PipelineSpec, draws: &[Draw<'_>], camera: &Camera) -> (Vec<HeatMap>, Counts) {
     let viewport = Viewport::new(size[0], size[1]).unwrap();
     let table = SampleTable::low_discrepancy(4, 3, LensShape::Disk).unwrap();
     let settings = Settings { spec, viewport, samples: &table, background: Vec3::ZERO };
-    let (rendered, heat) = render_with_heat(camera, draws, &settings, &Event::ALL, |_, _| ()).unwrap();
-    let plain = render(camera, draws, &settings, |_| ()).unwrap();
-    assert_eq!((plain.image, plain.counts), (rendered.image, rendered.counts), "looking changes nothing");
-    (heat, rendered.counts)
+    let rendered =
+        RasterPass::new(camera, draws, &settings).with_heat(&Event::ALL).render(|_, _| ()).unwrap();
+    let plain = RasterPass::new(camera, draws, &settings).render(|_, _| ()).unwrap();
+    assert_eq!((plain.images, plain.counts), (rendered.images, rendered.counts), "looking changes nothing");
+    (rendered.heat, rendered.counts)
 }
 
 #[test]
@@ -79,7 +80,7 @@ fn tests_without_a_packet_are_counted_in_their_tile() {
     let viewport = Viewport::new(32, 32).unwrap();
     let corners = [[-15.0, -15.0], [15.0, 15.0], [15.0, 14.0]].map(|[x, y]| Vec3::new(x, y, 1.0));
     let geometry = Geometry::new(&corners, &corners, &[[0, 1, 2]]).unwrap();
-    let draws = [Draw { geometry, shader: &RED, cull: Cull::None }];
+    let draws = [Draw::new(geometry, &RED, Cull::None)];
     let (heat, _) = maps([32, 32], &spec(Features::ALL), &draws, &pixel_camera(viewport, 0.25));
     let counts = |event| -> Vec<u64> {
         heat.iter().find(|map| map.event == event).unwrap().tiles.iter().map(|tile| tile.count).collect()

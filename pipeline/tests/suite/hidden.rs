@@ -175,7 +175,7 @@ fn boxes_of_time_cull_during_a_part_of_the_shutter() {
         let spec = PipelineSpec { depth, ..spec(Features { z_max: true, ..Features::NONE }) };
         let settings =
             Settings { spec: &spec, viewport: stage.viewport, samples: &stage.table, background: Vec3::ZERO };
-        render(&stage.camera, &draws, &settings, |_| ()).unwrap().counts
+        RasterPass::new(&stage.camera, &draws, &settings).render(|_, _| ()).unwrap().counts
     };
     let (one, four) = (counts([1; 3]), counts([1, 1, 4]));
     let samples = 32 * 32 * 16;

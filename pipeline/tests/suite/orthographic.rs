@@ -100,7 +100,7 @@ fn an_orthographic_view_is_the_limit_of_distant_perspective() {
             let close = if moving { close } else { open.clone() };
             let triangles: Vec<[u32; 3]> = (0..20).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
             let geometry = Geometry::new(&open, &close, &triangles).unwrap();
-            let draws = [Draw { geometry, shader: &RED, cull: Cull::None }];
+            let draws = [Draw::new(geometry, &RED, Cull::None)];
             let mut near = stage(64, height, table(8));
             near.camera = near.camera.with_lens(lens.then(|| Lens::new(radius, focus).unwrap()));
             let back = Affine3A::from_translation(Vec3::new(0.0, 0.0, FAR));
@@ -149,8 +149,9 @@ fn surfaces_are_shaded_at_their_visible_points() {
                 background: Vec3::ZERO,
             };
             let geometry = Geometry::new(&open, end, &QUAD).unwrap();
-            let draws = [Draw { geometry, shader: &Placed, cull: Cull::None }];
-            let image = render(&stage.camera, &draws, &settings, |_| ()).unwrap().image;
+            let draws = [Draw::new(geometry, &Placed, Cull::None)];
+            let image =
+                RasterPass::new(&stage.camera, &draws, &settings).render(|_, _| ()).unwrap().into_image();
             let moved = 0.5 * (end[0] - open[0]);
             for (i, found) in (0_u32..).zip(&image) {
                 let [x, y] = [(i % 32) as f32 - 15.5, 15.5 - (i / 32) as f32];

@@ -29,11 +29,11 @@ fn render_with(shading: Shading, per_pixel: u32, draws: &[Draw<'_>]) -> Rendered
     let table = SampleTable::low_discrepancy(per_pixel, 3, LensShape::Disk).unwrap();
     let spec = PipelineSpec { shading, ..spec(Features::ALL) };
     let settings = Settings { spec: &spec, viewport, samples: &table, background: Vec3::ZERO };
-    render(&pixel_camera(viewport, 0.25), draws, &settings, |_| ()).unwrap()
+    RasterPass::new(&pixel_camera(viewport, 0.25), draws, &settings).render(|_, _| ()).unwrap()
 }
 
 fn quad<'a>(open: &'a [Vec3], close: &'a [Vec3], shader: &'a dyn Shader) -> Draw<'a> {
-    Draw { geometry: Geometry::new(open, close, &QUAD).unwrap(), shader, cull: Cull::None }
+    Draw::new(Geometry::new(open, close, &QUAD).unwrap(), shader, Cull::None)
 }
 
 /// Larger than the image.
@@ -55,7 +55,10 @@ fn a_constant_colour_gives_a_constant_image() {
             let spec = PipelineSpec { shading, ..spec(Features::ALL) };
             let settings = Settings { spec: &spec, viewport, samples: &table, background: Vec3::ZERO };
             let shader = Flat(Vec3::new(0.25, 0.5, 1.0));
-            render(&camera(true), &[soup.draw(&shader, Cull::None)], &settings, |_| ()).unwrap().image
+            RasterPass::new(&camera(true), &[soup.draw(&shader, Cull::None)], &settings)
+                .render(|_, _| ())
+                .unwrap()
+                .into_image()
         });
         assert_eq!(images[0], images[1], "{kind:?}");
     }
@@ -66,7 +69,8 @@ fn smooth_shading_converges_to_the_same_image() {
     let corners = all(2.0);
     let shader = ByPlace(|at, _| 0.5 + 0.02 * at.position.x + 0.01 * at.position.y, None);
     let worst = |per_pixel| {
-        let image = |shading| render_with(shading, per_pixel, &[quad(&corners, &corners, &shader)]).image;
+        let image =
+            |shading| render_with(shading, per_pixel, &[quad(&corners, &corners, &shader)]).into_image();
         let [cached, own] = [image(Shading::Cached), image(Shading::PerSample)];
         cached.iter().zip(&own).map(|(a, b)| (a.x - b.x).abs()).fold(0.0, f32::max)
     };
@@ -81,8 +85,9 @@ fn a_sample_is_shaded_at_its_own_time() {
     // blur.
     let (open, close) = (all(1.0), all(1.0).map(|p| p + Vec3::new(8.0, 0.0, 0.0)));
     let shader = ByPlace(|at, _| f32::from(at.position.x > 0.0), None);
-    let row =
-        |shading| render_with(shading, 64, &[quad(&open, &close, &shader)]).image[..SIDE as usize].to_vec();
+    let row = |shading| {
+        render_with(shading, 64, &[quad(&open, &close, &shader)]).images[0][..SIDE as usize].to_vec()
+    };
     for (x, colour) in row(Shading::PerSample).iter().enumerate() {
         assert_eq!(colour.x, if x < 8 { 0.0 } else { 1.0 }, "column {x}");
     }
@@ -110,8 +115,7 @@ fn a_whole_quad_needs_no_helper_and_a_column_needs_half() {
             [Vec3::new(x[0], -400.0, 1.0), Vec3::new(x[1], -400.0, 1.0), Vec3::new(x[0], 400.0, 1.0)];
         let shader = Flat(Vec3::ONE);
         let geometry = Geometry::new(&corners, &corners, &[[0, 1, 2]]).unwrap();
-        let counts =
-            render_with(Shading::PerSample, 4, &[Draw { geometry, shader: &shader, cull: Cull::None }]);
+        let counts = render_with(Shading::PerSample, 4, &[Draw::new(geometry, &shader, Cull::None)]);
         (counts.counts[Event::HelperInvocations], counts.counts[Event::QuadsShaded])
     };
     let quads = u64::from(SIDE * SIDE / 4 * 4);
@@ -129,12 +133,13 @@ fn textures_are_fetched_by_every_lane() {
     // A texel is two pixels wide: one bilinear fetch per lane.
     let uvs = [[0.0, 0.0], [0.125, 0.0], [0.125, 0.125], [0.0, 0.125]].map(Vec2::from_array);
     let geometry = Geometry::new(&corners, &corners, &QUAD).unwrap().with_uvs(&uvs).unwrap();
-    let draws = [Draw { geometry, shader: &shader, cull: Cull::None }];
+    let draws = [Draw::new(geometry, &shader, Cull::None)];
     let [own, cached] = [Shading::PerSample, Shading::Cached].map(|shading| render_with(shading, 16, &draws));
     assert_eq!(own.counts[Event::TextureFetches], own.counts[Event::PixelInvocations]);
     assert!(own.counts[Event::TextureLines] >= own.counts[Event::QuadsShaded]);
     assert!(own.counts[Event::TextureFetches] > 8 * cached.counts[Event::TextureFetches]);
-    let worst = own.image.iter().zip(&cached.image).map(|(a, b)| (a.x - b.x).abs()).fold(0.0, f32::max);
+    let worst =
+        own.images[0].iter().zip(&cached.images[0]).map(|(a, b)| (a.x - b.x).abs()).fold(0.0, f32::max);
     assert!(worst < 0.01, "{worst}");
 }
 
@@ -146,5 +151,5 @@ fn threads_change_nothing() {
         pool.install(|| render_with(Shading::PerSample, 8, &[soup.draw(&Plain, Cull::None)]))
     };
     let (one, three) = (with(1), with(3));
-    assert_eq!((one.image, one.counts), (three.image, three.counts));
+    assert_eq!((one.images, one.counts), (three.images, three.counts));
 }

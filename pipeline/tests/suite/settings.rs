@@ -2,7 +2,7 @@
 
 use crate::common::*;
 use glam::{Affine3A, Vec2, Vec3};
-use pipeline::frame::{SpecError, visibility};
+use pipeline::frame::SpecError;
 use pipeline::sampling::{Sample, TableError};
 use pipeline::*;
 
@@ -70,8 +70,8 @@ fn a_cache_that_cannot_be_is_an_error_to_the_renderer_not_a_panic() {
     let table = SampleTable::low_discrepancy(1, 1, LensShape::Disk).unwrap();
     let viewport = Viewport::new(4, 4).unwrap();
     let settings = Settings { spec: &bad, viewport, samples: &table, background: Vec3::ZERO };
-    assert!(render(&camera(false), &[], &settings, |_| ()).is_err());
-    assert!(visibility(&camera(false), &[], &settings).is_err());
+    assert!(RasterPass::new(&camera(false), &[], &settings).render(|_, _| ()).is_err());
+    assert!(RasterPass::new(&camera(false), &[], &settings).visibility().is_err());
 }
 
 #[test]
@@ -210,7 +210,7 @@ fn absurd_numbers_do_not_panic() {
             let close: Vec<_> = (0..60).map(|_| Vec3::from(point())).collect();
             let triangles: Vec<_> = (0..20).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
             let geometry = Geometry::new(&open, &close, &triangles).unwrap();
-            let draws = [Draw { geometry, shader: &Plain, cull: Cull::Back }];
+            let draws = [Draw::new(geometry, &Plain, Cull::Back)];
             let flat = |half| Camera::orthographic(Affine3A::IDENTITY, half, 0.25).unwrap();
             for (features, camera) in [Features::ALL, Features::NONE]
                 .into_iter()
@@ -218,8 +218,9 @@ fn absurd_numbers_do_not_panic() {
             {
                 let spec = spec(features);
                 let settings = Settings { spec: &spec, viewport, samples: &table, background: Vec3::ZERO };
-                let rendered = render(&camera.with_lens(lens), &draws, &settings, |_| ()).unwrap();
-                assert_eq!(rendered.image.len(), 17 * 9);
+                let rendered =
+                    RasterPass::new(&camera.with_lens(lens), &draws, &settings).render(|_, _| ()).unwrap();
+                assert_eq!(rendered.images[0].len(), 17 * 9);
             }
         }
     }

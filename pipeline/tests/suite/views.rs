@@ -5,7 +5,6 @@ use std::ops::Range;
 use crate::common::{Kind, Plain, Soup, camera, spec};
 use activity::{Counts, Event, Unit};
 use glam::Vec3;
-use pipeline::frame::{render_depth, render_views, visibility};
 use pipeline::sampling::{Sample, SampleSource};
 use pipeline::*;
 
@@ -29,7 +28,7 @@ fn with<R>(kind: Kind, run: impl FnOnce(&Camera, &[Draw<'_>], &SampleTable, View
     let soup = Soup::new(kind, 80, 11);
     let table = SampleTable::low_discrepancy(PER_PIXEL, 3, LensShape::Disk).unwrap();
     let geometry = Geometry::new(&soup.open, &soup.close, &soup.triangles).unwrap();
-    let draws = [Draw { geometry, shader: &Plain, cull: Cull::None }];
+    let draws = [Draw::new(geometry, &Plain, Cull::None)];
     run(&camera(true), &draws, &table, Viewport::new(43, 37).unwrap())
 }
 
@@ -47,12 +46,15 @@ fn each_view_is_the_image_of_its_samples_alone() {
         with(kind, |camera, draws, table, viewport| {
             let spec = spec(Features::ALL);
             let views = [0..8, 0..4, 4..8, 2..5, 6..7];
-            let (images, counts) =
-                render_views(camera, draws, &settings(&spec, viewport, table), &views, |_, _| ()).unwrap();
+            let settings_of_all = settings(&spec, viewport, table);
+            let pass = RasterPass::new(camera, draws, &settings_of_all).onto(Target::Views(&views));
+            let Rendered { images, counts, .. } = pass.render(|_, _| ()).unwrap();
             for (view, image) in views.iter().zip(&images) {
                 let run = Run(table, view.clone());
-                let alone = render(camera, draws, &settings(&spec, viewport, &run), |_| ()).unwrap();
-                assert_eq!(bits(image), bits(&alone.image), "{kind:?} {view:?}");
+                let alone = RasterPass::new(camera, draws, &settings(&spec, viewport, &run))
+                    .render(|_, _| ())
+                    .unwrap();
+                assert_eq!(bits(image), bits(&alone.images[0]), "{kind:?} {view:?}");
             }
             assert_eq!(counts[Event::PixelsResolved], (viewport.pixels() * views.len()) as u64);
         });
@@ -66,8 +68,13 @@ fn a_single_view_equals_render_packet_by_packet() {
         let (mut ours, mut theirs) = (Vec::new(), Vec::new());
         let settings = settings(&spec, viewport, table);
         let all: Vec<_> = std::iter::once(0..PER_PIXEL).collect();
-        let (images, _) = render_views(camera, draws, &settings, &all, |p, _| ours.push(*p)).unwrap();
-        let image = render(camera, draws, &settings, |p| theirs.push(*p)).unwrap().image;
+        let images = RasterPass::new(camera, draws, &settings)
+            .onto(Target::Views(&all))
+            .render(|p, _| ours.push(*p))
+            .unwrap()
+            .images;
+        let image =
+            RasterPass::new(camera, draws, &settings).render(|p, _| theirs.push(*p)).unwrap().into_image();
         assert_eq!(bits(&images[0]), bits(&image));
         assert_eq!(ours, theirs);
     });
@@ -78,7 +85,11 @@ fn runs_beyond_the_samples_are_cut_and_empty_ones_black() {
     with(Kind::Still, |camera, draws, table, viewport| {
         let spec = spec(Features::ALL);
         let settings = settings(&spec, viewport, table);
-        let (images, _) = render_views(camera, draws, &settings, &[4..99, 4..8, 9..12], |_, _| ()).unwrap();
+        let images = RasterPass::new(camera, draws, &settings)
+            .onto(Target::Views(&[4..99, 4..8, 9..12]))
+            .render(|_, _| ())
+            .unwrap()
+            .images;
         assert_eq!(bits(&images[0]), bits(&images[1]));
         let touched = images[2].iter().filter(|pixel| **pixel == Vec3::ZERO).count();
         assert!(touched > 0, "pixels that were drawn into have no samples in that view");
@@ -92,11 +103,13 @@ fn a_pass_without_an_image_sees_the_same_shades_nothing_and_keeps_its_depths() {
             let spec = spec(Features::ALL);
             let settings = settings(&spec, viewport, table);
             let mut sum = Counts::default();
-            let (seen, counts) =
-                render_depth(camera, draws, &settings, |packet, _| sum += &packet.counts).unwrap();
-            assert_eq!(sum, counts);
-            assert_eq!(seen, visibility(camera, draws, &settings).unwrap());
-            let drawn = render(camera, draws, &settings, |_| ()).unwrap().counts;
+            let pass = RasterPass::new(camera, draws, &settings).with_visible();
+            let depths = pass.onto(Target::Depth).render(|packet, _| sum += &packet.counts).unwrap();
+            let Rendered { visible: seen, counts, images, .. } = depths;
+            assert_eq!((sum, images.len()), (counts, 0));
+            let drawn = pass.render(|_, _| ()).unwrap();
+            assert_eq!(seen, drawn.visible);
+            let drawn = drawn.counts;
             for unit in [Unit::ShadingCache, Unit::Texture, Unit::Colour] {
                 assert!(!counts.uses(unit), "{unit:?}");
             }

@@ -2,7 +2,7 @@
 
 use cpu_time::ProcessTime;
 use output::table::{grouped, si};
-use pipeline::Viewport;
+use pipeline::{Gpu, Viewport};
 use serde::Serialize;
 use timing::{FrameClock, Level, Recorder};
 use warnings::Warning;
@@ -299,7 +299,10 @@ fn draw_job(
     let request = Request { overrides: &options.overrides, seed: options.seed };
     let size = [viewport.width(), viewport.height()];
     if let Some(job) = catalog::at_size(name, &options.options, &request, size) {
-        job?.frame(number, &plan.gpu.pipeline, &mut |packet, lines| clock.push(packet, lines))?;
+        let emit = |packet: &_, lines: &_| clock.push(packet, lines);
+        let mut gpu = Gpu::new(&plan.gpu.pipeline, emit).map_err(RunError::setting)?;
+        job?.frame(number, &mut gpu)?;
+        gpu.finish();
     }
     Ok(())
 }

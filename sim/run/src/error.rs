@@ -78,7 +78,7 @@ impl RunError {
             | Self::Samples(_)
             | Self::Device(_)
             | Self::Model(_)
-            | Self::Job(workloads::job::JobError::Setting(_) | workloads::job::JobError::Cache(_))
+            | Self::Job(workloads::job::JobError::Setting(_) | workloads::job::JobError::Pass(_))
             | Self::Setting(_) => true,
             _ => false,
         }

@@ -8,8 +8,8 @@ use glam::Vec3;
 use output::OutDir;
 use output::image::LinearImage;
 use output::progress::Progress;
-use pipeline::frame::{HeatMap, render_with_heat};
-use pipeline::{Settings, Viewport};
+use pipeline::frame::HeatMap;
+use pipeline::{FrameReport, Gpu, RasterPass, Settings, Viewport};
 use rayon::prelude::*;
 use timing::{AccuracyWarning, FrameClock, Recorder};
 use workloads::job::Drawn;
@@ -109,7 +109,7 @@ fn simulate_frame(
 ) -> Result<(RunFrame, Vec<Vec3>, Vec<HeatMap>), RunError> {
     let mut clock =
         FrameClock::new(plan.options.timing, plan.gpu.machine()?, Recorder::new(BIN_PS, max_bins));
-    let Rendered { drawn, regime, heat } =
+    let DrawnFrame { drawn, regime, heat, report } =
         draw(plan, number, &plan.options.heat, |packet, lines| clock.push(packet, lines))?;
     let timed = clock.finish()?;
     let accuracy = AccuracyWarning::all(plan.options.timing, &timed);
@@ -117,7 +117,7 @@ fn simulate_frame(
     let power = plan.model.frame(&timeline).map_err(|source| RunError::Timeline { frame: number, source })?;
     let simulated = RunFrame {
         index: number,
-        triangles: drawn.triangles,
+        triangles: report.triangles(),
         moving: drawn.moving,
         lens: drawn.lens,
         power,
@@ -125,7 +125,7 @@ fn simulate_frame(
         busy: busy_shares(&timeline),
         cycles: timed.cycles,
         origin: Origin::Simulated(Box::new(Observed {
-            counts: drawn.counts,
+            counts: report.counts(),
             facts: drawn.facts,
             warnings: drawn.warnings,
             regime,
@@ -156,31 +156,34 @@ fn write_image(plan: &Plan, dir: &OutDir, number: u32, image: &[Vec3]) -> Result
     Ok(())
 }
 
-/// Result of rendering a frame.
-pub(super) struct Rendered {
+/// Result of drawing a frame.
+pub(super) struct DrawnFrame {
     drawn: Drawn,
     regime: Regime,
     heat: Vec<HeatMap>,
+    report: FrameReport,
 }
 
-/// Renders frame `number`, with heat maps of `events`; `emit` receives the packets.
+/// Draws frame `number`, with heat maps of `events`; `emit` receives the packets.
 fn draw(
     plan: &Plan,
     number: u32,
     events: &[Event],
-    mut emit: impl FnMut(&Packet, &[LineAccess]),
-) -> Result<Rendered, RunError> {
+    emit: impl FnMut(&Packet, &[LineAccess]),
+) -> Result<DrawnFrame, RunError> {
     match &plan.work {
         Work::Scene(scene) => draw_scene(plan, scene, &scene.frame(number)?, plan.viewport, events, emit),
         Work::Job { job, .. } => {
-            let drawn = job.frame(number, &plan.gpu.pipeline, &mut emit)?;
-            Ok(Rendered { drawn, regime: Regime::default(), heat: Vec::new() })
+            let mut gpu = Gpu::new(&plan.gpu.pipeline, emit).map_err(RunError::setting)?;
+            let drawn = job.frame(number, &mut gpu)?;
+            let (regime, heat) = Default::default();
+            Ok(DrawnFrame { drawn, regime, heat, report: gpu.finish() })
         }
     }
 }
 
-/// Renders `frame` at the size of `viewport`. The frame number must have no influence: frames with equal fingerprints are
-/// rendered once.
+/// Draws `frame` at the size of `viewport`. The frame number must have no influence: frames with equal fingerprints are
+/// drawn once.
 pub(super) fn draw_scene(
     plan: &Plan,
     scene: &Scene,
@@ -188,20 +191,22 @@ pub(super) fn draw_scene(
     viewport: Viewport,
     events: &[Event],
     emit: impl FnMut(&Packet, &[LineAccess]),
-) -> Result<Rendered, RunError> {
+) -> Result<DrawnFrame, RunError> {
     let draws = frame.draws(scene)?;
     let background = scene.background();
     let settings = Settings { spec: &plan.gpu.pipeline, viewport, samples: &*plan.samples, background };
-    let (rendered, heat) =
-        render_with_heat(&frame.camera, &draws, &settings, events, emit).map_err(RunError::setting)?;
+    let mut gpu = Gpu::new(&plan.gpu.pipeline, emit).map_err(RunError::setting)?;
+    let pass = RasterPass::new(&frame.camera, &draws, &settings).named("scene").with_heat(events);
+    let mut rendered = gpu.draw(&pass).map_err(RunError::setting)?;
+    let report = gpu.finish();
+    rendered.heat.iter_mut().for_each(|map| map.elsewhere += report.write_back[map.event]);
+    let heat = std::mem::take(&mut rendered.heat);
     let drawn = Drawn {
-        image: rendered.image,
-        counts: rendered.counts,
-        triangles: frame.triangle_count(),
+        image: rendered.into_image(),
         moving: frame.is_moving(),
         lens: frame.camera.lens().is_some(),
         ..Drawn::default()
     };
     let regime = Regime::of(&frame.camera, &draws, viewport, plan.samples.per_pixel());
-    Ok(Rendered { drawn, regime, heat })
+    Ok(DrawnFrame { drawn, regime, heat, report })
 }

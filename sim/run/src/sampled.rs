@@ -11,10 +11,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use activity::{Counts, Event, Unit};
 use output::progress::Progress;
-use pipeline::frame::render_with_heat;
 use pipeline::random::mix;
 use pipeline::sampling::SampleSource;
-use pipeline::{Settings, Viewport};
+use pipeline::{RasterPass, Settings, Viewport};
 use power_model::PowerModel;
 use rayon::prelude::*;
 use timing::sampled::{Design, Estimate};
@@ -317,13 +316,13 @@ impl Previewer {
         let mut clock = FrameClock::new(self.level, plan.gpu.machine()?, recorder);
         let emit = |packet: &_, lines: &_| clock.push(packet, lines);
         let rendered =
-            render_with_heat(&frame.camera, &draws, &settings, &[], emit).map_err(RunError::setting)?;
+            RasterPass::new(&frame.camera, &draws, &settings).render(emit).map_err(RunError::setting)?;
         let timed = clock.finish()?;
         Ok(FramePreview {
             triangles: frame.triangle_count(),
             moving: frame.is_moving(),
             lens: frame.camera.lens().is_some(),
-            counts: rendered.0.counts,
+            counts: rendered.counts,
             busy_ps: timed.timeline.busy_ps(),
             cycles: timed.cycles,
         })

@@ -5,7 +5,7 @@ use std::time::Instant;
 use cpu_time::ProcessTime;
 use pipeline::sampling::SampleSource;
 use pipeline::visibility::{SampleLayout, Visibility, VisibleTriangle, resolve};
-use pipeline::{Cull, Draw, Features, Geometry, PipelineSpec, Settings, frame};
+use pipeline::{Cull, Draw, Features, Geometry, PipelineSpec, RasterPass, Settings};
 use serde::Serialize;
 use warnings::{Code, Warning};
 use workloads::visibility::{Unshaded, VisibilityScene};
@@ -67,7 +67,7 @@ pub fn find(
 /// Warnings about an empty image or coordinates out of range.
 pub fn warnings(scene: &VisibilityScene) -> Vec<Warning> {
     let Ok(geometry) = Geometry::new(&scene.open, &scene.close, &scene.triangles) else { return Vec::new() };
-    let draws = [Draw { geometry, shader: &Unshaded, cull: Cull::None }];
+    let draws = [Draw::new(geometry, &Unshaded, Cull::None)];
     let regime = Regime::of(&scene.camera, &draws, scene.viewport, scene.per_pixel);
     let extreme = format!(
         "{} of {} triangles in view have coordinates whose products leave the range of 32-bit numbers: they may not be seen, or at \
@@ -124,10 +124,10 @@ fn modelled(
     let spec = PipelineSpec { features, ..gpu.pipeline };
     let background = glam::Vec3::ZERO;
     let settings = Settings { spec: &spec, viewport: scene.viewport, samples: source, background };
-    let draws = [Draw { geometry, shader: &Unshaded, cull: Cull::None }];
+    let draws = [Draw::new(geometry, &Unshaded, Cull::None)];
     let (mut seen, mut all) = (Vec::new(), Vec::new());
     for _ in 0..runs {
-        let (found, run) = timed(|| frame::visibility(&scene.camera, &draws, &settings));
+        let (found, run) = timed(|| RasterPass::new(&scene.camera, &draws, &settings).visibility());
         seen = found.map_err(|error| error.to_string())?;
         all.push(run);
     }

@@ -10,10 +10,10 @@ mod sweep;
 use cpu_time::ProcessTime;
 use glam::{DVec3, Vec3};
 use pipeline::sampling::SampleSpec;
-use pipeline::{Cull, Draw, LensShape, PipelineSpec, SampleTable, Viewport};
+use pipeline::{Cull, Draw, Gpu, LensShape, PipelineSpec, SampleTable, Viewport};
 use workloads::accumulation::SharedSamples;
 use workloads::multiview::{Layout, Rig, Target};
-use workloads::soft_shadows::{AreaLight, LightSpec, Method, Renderer, ShadowMap};
+use workloads::soft_shadows::{AreaLight, LightSpec, Method, ShadowMap};
 use workloads::{Overrides, glossy, soft_shadows};
 
 const RUNS: usize = 3;
@@ -52,9 +52,9 @@ fn views(spec: &PipelineSpec) {
     for layout in [Layout::stereo(0.28, 0.11), Layout::line(7, 0.5, 0.11)] {
         let rig = Rig::new(&frame.camera, focus, &layout, 8, 1).unwrap();
         let passes = [layout.views as usize, rig.samples() as usize];
-        let one = time(|| _ = rig.one_pass(&draws, &to, &mut |_, _| ()).unwrap());
-        let each = time(|| _ = rig.view_by_view(&draws, &to, &mut |_, _| ()).unwrap());
-        let many = time(|| _ = rig.accumulated(&draws, &to, &mut |_, _| ()).unwrap());
+        let one = time(|| _ = rig.one_pass(&draws, &to, &mut Gpu::quiet(to.spec).unwrap()).unwrap());
+        let each = time(|| _ = rig.view_by_view(&draws, &to, &mut Gpu::quiet(to.spec).unwrap()).unwrap());
+        let many = time(|| _ = rig.accumulated(&draws, &to, &mut Gpu::quiet(to.spec).unwrap()).unwrap());
         let what = format!("{} views, 160x90, 8 samples", layout.views);
         print_row(&what, one, &[("view by view", passes[0], each), ("accumulation", passes[1], many)]);
     }
@@ -67,12 +67,13 @@ fn gloss(spec: &PipelineSpec) {
         frame.draws(&scene).unwrap().into_iter().map(|draw| Draw { cull: Cull::None, ..draw }).collect();
     let eye = (DVec3::new(0.3, 2.0, 3.0), DVec3::new(-0.1, -1.0, -0.8));
     let map = glossy::Map::new(&glossy::receiver(), eye, glossy::Effect::Reflection, 0.25, 128).unwrap();
-    let to = (spec, Vec3::ZERO);
     for count in [16, 64] {
         let table = SampleTable::new(&SampleSpec::default(), count, 1).unwrap();
         let set = SharedSamples::interleaved(&SampleSpec::default(), count, 1).unwrap();
-        let one = time(|| _ = map.one_pass(&draws, &table, to, &mut |_, _| ()).unwrap());
-        let many = time(|| _ = map.accumulated(&draws, &set, to, &mut |_, _| ()).unwrap());
+        let one =
+            time(|| _ = map.one_pass(&draws, &table, Vec3::ZERO, &mut Gpu::quiet(spec).unwrap()).unwrap());
+        let many =
+            time(|| _ = map.accumulated(&draws, &set, Vec3::ZERO, &mut Gpu::quiet(spec).unwrap()).unwrap());
         let what = format!("glossy map, {}x128, {count} samples", map.viewport.width());
         print_row(&what, one, &[("accumulation", count as usize, many)]);
     }
@@ -89,8 +90,8 @@ fn shadows(spec: &PipelineSpec) {
         let set = SharedSamples::interleaved(&disk, count, 1).unwrap();
         let [one, many] = [Method::OnePass, Method::Accumulation].map(|method| {
             time(|| {
-                _ = ShadowMap::new(&light, &draws, 256, &set, Renderer { method, spec }, &mut |_, _| ())
-                    .unwrap();
+                let gpu = &mut Gpu::quiet(spec).unwrap();
+                _ = ShadowMap::new(&light, &draws, 256, &set, method, gpu).unwrap();
             })
         });
         let what = format!("shadow map, 256x256, {count} places");

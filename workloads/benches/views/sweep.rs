@@ -2,7 +2,7 @@
 
 use activity::Event;
 use pipeline::depth::DepthSpec;
-use pipeline::{CacheSpec, Features, MemorySpec, PipelineSpec, Replacement, Shading, Viewport};
+use pipeline::{CacheSpec, Features, Gpu, MemorySpec, PipelineSpec, Replacement, Shading, Viewport};
 use workloads::multiview::{Layout, Rig, Target};
 use workloads::{Overrides, Scene};
 
@@ -78,8 +78,10 @@ impl Point {
         let viewport = Viewport::new(self.size.0, self.size.1).unwrap();
         let to = Target { viewport, spec: &spec, background: scene.background() };
         let middle = (layout.views as usize - 1) / 2;
-        let all = rig.one_pass(&draws, &to, &mut |_, _| ()).unwrap().counts[Event::PixelInvocations];
-        let one = rig.view(middle, &draws, &to, &mut |_, _| ()).unwrap().1[Event::PixelInvocations];
+        let all = rig.one_pass(&draws, &to, &mut Gpu::quiet(to.spec).unwrap()).unwrap().counts
+            [Event::PixelInvocations];
+        let one = rig.view(middle, &draws, &to, &mut Gpu::quiet(to.spec).unwrap()).unwrap().counts
+            [Event::PixelInvocations];
         all as f64 / one as f64 - 1.0
     }
 }

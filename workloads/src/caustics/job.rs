@@ -2,7 +2,7 @@
 
 use activity::{Event, PacketCounts};
 use glam::{DVec3, Vec3};
-use pipeline::PipelineSpec;
+use pipeline::Gpu;
 use serde::{Deserialize, Serialize};
 
 use super::check::{accuracy_warnings, crossing};
@@ -11,8 +11,8 @@ use super::generator::Ocean;
 use super::{Beam, Eye, Floor, Light, Method, Picture};
 use crate::error::LoadError;
 use crate::job::{
-    Drawn, Draws, Emit, Fact, Flag, Flags, FrontEnd, Job, JobError, OptionSource, Passes, Request, TileWork,
-    Touch,
+    Drawn, Draws, Fact, Flag, Flags, FrontEnd, Job, JobError, OptionSource, PIXEL_BYTES, Passes, Request,
+    TileWork, Touch,
 };
 use crate::scene::Settings;
 
@@ -142,18 +142,14 @@ impl Draws for Caustics {
         Ok(f64::from(number) / self.settings.frame_rate_hz)
     }
 
-    fn draw(&self, time_s: &f64, spec: &PipelineSpec, emit: Emit<'_>) -> Result<Drawn, JobError> {
+    fn draw(&self, time_s: &f64, gpu: &mut Gpu<'_>) -> Result<Drawn, JobError> {
         let beams = self.ocean.beams(*time_s);
         let eye = self.eye().ok_or_else(|| JobError::Setting("the view has no extent".to_owned()))?;
         let method = self.options.method;
         let (picture, work) = draw_with_work(&beams, &eye, method, Some(self.light()), true);
-        let mut passes = Passes::new(spec, emit)?;
-        self.emit_packets(&beams, &eye, &work, &mut passes);
-        let (counts, triangles) = passes.finish();
+        self.emit_packets(&beams, &eye, &work, &mut Passes::new(gpu));
         Ok(Drawn {
             image: toned(&picture.light),
-            counts,
-            triangles,
             moving: method == Method::Moving,
             lens: false,
             facts: facts(&picture, &beams),
@@ -188,13 +184,15 @@ impl Caustics {
     }
 
     /// Emits the work as packets: one draw of all beams, and each tile of each beam.
-    fn emit_packets(&self, beams: &[Beam], eye: &Eye, work: &[Covered], passes: &mut Passes<'_>) {
+    fn emit_packets(&self, beams: &[Beam], eye: &Eye, work: &[Covered], passes: &mut Passes<'_, '_>) {
         let triangles = beams.len() * self.options.method.triangles();
         let pixels = eye.viewport().pixels() as u64;
         let tiles =
             u64::from(eye.viewport().width().div_ceil(8)) * u64::from(eye.viewport().height().div_ceil(8));
-        let image = tiles * TILE_PIXELS * LIGHT_BYTES;
-        passes.draw(triangles, 2 * image, &FRONT_END);
+        passes.begin("light");
+        let light = passes.surface(tiles * TILE_PIXELS * LIGHT_BYTES);
+        let vertices = passes.surface(3 * triangles as u64 * u64::from(FRONT_END.vertex_bytes));
+        passes.draw(triangles, vertices.address(), &FRONT_END);
         let mut used = vec![false; tiles as usize];
         for covered in work {
             let runs = covered.pixels.count_ones();
@@ -210,12 +208,18 @@ impl Caustics {
             counts[Event::ColourWrites] = runs;
             let fresh = !std::mem::replace(&mut used[covered.tile as usize], true);
             let bytes = TILE_PIXELS * LIGHT_BYTES;
-            let touch = Touch { address: u64::from(covered.tile) * bytes, bytes, write: true, fresh };
+            let touch = Touch {
+                address: light.address() + u64::from(covered.tile) * bytes,
+                bytes,
+                write: true,
+                fresh,
+            };
             let tile = TileWork { tile: covered.tile, triangle: covered.beam, counts };
             passes.tile(&tile, &[], &[touch]);
         }
-        passes.next();
-        passes.resolve(image, pixels, TILE_PIXELS as u32);
+        passes.begin("tone");
+        let image = passes.surface(pixels * PIXEL_BYTES);
+        passes.resolve(image, TILE_PIXELS as u32);
     }
 }
 
@@ -246,35 +250,40 @@ const TINT: Vec3 = Vec3::new(0.55, 0.9, 1.0);
 
 #[cfg(test)]
 mod tests {
+    use activity::Counts;
+
     use super::*;
     use crate::job::testing::hardware;
     use crate::scene::Overrides;
 
-    fn drawn(set: &[(&str, &str)]) -> Drawn {
+    fn drawn(set: &[(&str, &str)]) -> (Drawn, Counts) {
         let set = set.iter().map(|(name, value)| ((*name).to_owned(), (*value).to_owned())).collect();
         let overrides = Overrides { size: Some((96, 54)), ..Overrides::default() };
         let request = Request { overrides: &overrides, seed: 1 };
         let job = job(&OptionSource { file: None, set }, &request).unwrap();
-        job.frame(0, &hardware(), &mut |_, _| ()).unwrap()
+        let hardware = hardware();
+        let mut gpu = Gpu::quiet(&hardware).unwrap();
+        (job.frame(0, &mut gpu).unwrap(), gpu.finish().counts())
     }
 
     #[test]
     fn every_view_and_method_emits_all_packets() {
         for look in ["volume", "floor"] {
-            let ours = drawn(&[("cells", "12"), ("wave_m", "18"), ("look", look)]);
+            let (ours, counts) = drawn(&[("cells", "12"), ("wave_m", "18"), ("look", look)]);
             assert!(ours.warnings.is_empty() && ours.moving, "{:?}", ours.warnings);
             assert!(ours.image.iter().filter(|pixel| pixel.y > 0.0).count() > 500, "{look}");
             let executions = ours.facts.iter().find(|fact| fact.name == "shader_executions").unwrap().value;
-            assert_eq!(ours.counts[Event::PixelInvocations] as f64, executions);
-            let prism = drawn(&[("cells", "12"), ("wave_m", "18"), ("look", look), ("method", "prism")]);
+            assert_eq!(counts[Event::PixelInvocations] as f64, executions);
+            let (prism, prism_counts) =
+                drawn(&[("cells", "12"), ("wave_m", "18"), ("look", look), ("method", "prism")]);
             assert_eq!(prism.image, ours.image);
-            assert!(prism.counts[Event::PixelInvocations] > ours.counts[Event::PixelInvocations]);
+            assert!(prism_counts[Event::PixelInvocations] > counts[Event::PixelInvocations]);
         }
     }
 
     #[test]
     fn warped_beams_and_coarse_surfaces_are_warned_of() {
-        let codes = |set| drawn(set).warnings.iter().map(|warning| warning.code).collect::<Vec<_>>();
+        let codes = |set| drawn(set).0.warnings.iter().map(|warning| warning.code).collect::<Vec<_>>();
         let crossed =
             [("cells", "26"), ("wave_m", "8"), ("slope", "0.5"), ("depth_m", "16"), ("pleat", "0.5")];
         assert_eq!(codes(&crossed), ["caustics-crossed"]);

@@ -1,14 +1,15 @@
 //! Emitter of the passes of collision detection, as packets of work and as an image.
 
-use activity::{Counts, Event, PacketCounts};
+use activity::{Event, PacketCounts};
 use glam::Vec3;
-use pipeline::PipelineSpec;
+use pipeline::Gpu;
+use pipeline::memory::Surface;
 
 use super::bounds::Bounds;
 use super::object::Object;
 use super::pass::{Fragment, Observer, Part, Pass};
 use super::{Method, Search};
-use crate::job::{FrontEnd, Passes, TileWork, Touch};
+use crate::job::{FrontEnd, PIXEL_BYTES, Passes, TileWork, Touch};
 
 /// Bytes of a vertex at both times, operations of its transformation, and multiply-adds of the set-up of a
 /// triangle with moving conservative edges.
@@ -18,10 +19,6 @@ const FRONT_END: FrontEnd = FrontEnd { vertex_bytes: 24, vertex_ops: 24, setup_m
 const TEST_MADDS: u32 = 3 * 4 * 2 * 2 + 18;
 /// Bytes of a box of time and depth: four numbers of 16 bits.
 const BOX_BYTES: u64 = 8;
-/// Addresses of vertices, of the boxes of both objects, and of the image.
-const VERTICES: u64 = 0;
-const BOXES: [u64; 2] = [1 << 32, 1 << 33];
-const IMAGE: u64 = 1 << 34;
 
 /// Boxes that the fragments of an object are compared with.
 #[derive(Clone, Copy)]
@@ -33,16 +30,16 @@ struct Target {
 
 /// Boxes of the first and of the second object. Each has its own when boxes are compared with boxes;
 /// otherwise the second only reads those of the first.
-fn targets(method: Method) -> [Target; 2] {
-    let first = Target { address: BOXES[0], write: true };
-    let second = Target { address: BOXES[1], write: true };
+fn targets(method: Method, boxes: [Surface; 2]) -> [Target; 2] {
+    let [first, second] = boxes.map(|boxes| Target { address: boxes.address(), write: true });
     [first, if method == Method::BoxBox { second } else { Target { write: false, ..first } }]
 }
 
 /// Observer that emits packets and draws the image.
-pub(super) struct PacketEmitter<'a> {
-    passes: Passes<'a>,
-    spec: &'a PipelineSpec,
+pub(super) struct PacketEmitter<'a, 'e> {
+    passes: Passes<'a, 'e>,
+    tile_px: u32,
+    vertices: Surface,
     picture: Picture,
     side: usize,
     bins: u32,
@@ -63,34 +60,39 @@ struct Pending {
     first_place: u64,
 }
 
-/// Image, counts and sizes of the emitted work.
+/// Image and number of fragments of the emitted work.
 pub(super) struct Emitted {
     pub image: Vec<Vec3>,
-    pub counts: Counts,
-    pub triangles: usize,
     pub fragments: u64,
 }
 
-impl<'a> PacketEmitter<'a> {
-    /// Makes an emitter for the passes of `search` over `objects`, on the hardware `spec`.
-    pub fn new(search: &Search, objects: &[Object], spec: &'a PipelineSpec, passes: Passes<'a>) -> Self {
+impl<'a, 'e> PacketEmitter<'a, 'e> {
+    /// Makes an emitter for the passes of `search` over `objects` on `gpu`.
+    pub fn new(search: &Search, objects: &[Object], gpu: &'a mut Gpu<'e>) -> Self {
         let side = search.resolution as usize;
-        let (picture, targets) = (Picture::new(objects, side), targets(search.method));
-        Self { passes, spec, picture, side, bins: search.bins, targets, fragments: 0, pending: None }
+        let tile_px = gpu.spec().tile_px;
+        let most = objects.iter().map(Object::len).max().unwrap_or(0) as u64;
+        let mut passes = Passes::new(gpu);
+        let vertices = passes.surface(3 * most * u64::from(FRONT_END.vertex_bytes));
+        let pixels = u64::from(search.resolution.next_multiple_of(tile_px)).pow(2);
+        let boxes = [(); 2].map(|()| passes.surface(pixels * u64::from(search.bins) * BOX_BYTES));
+        let (picture, targets) = (Picture::new(objects, side), targets(search.method, boxes));
+        let (bins, fragments, pending) = (search.bins, 0, None);
+        Self { passes, tile_px, vertices, picture, side, bins, targets, fragments, pending }
     }
 
     /// Emits the writes of the image and returns the totals.
     pub fn finish(mut self) -> Emitted {
         self.flush();
         let image = self.picture.image();
-        self.passes.resolve(IMAGE, image.len() as u64, self.spec.tile_px.pow(2));
-        let (counts, triangles) = self.passes.finish();
-        Emitted { image, counts, triangles, fragments: self.fragments }
+        let surface = self.passes.surface(image.len() as u64 * PIXEL_BYTES);
+        self.passes.resolve(surface, self.tile_px.pow(2));
+        Emitted { image, fragments: self.fragments }
     }
 
     /// Hardware tile of a pixel, and the pixel's position in it.
     fn tile(&self, [x, y]: [u32; 2]) -> (u32, u32) {
-        let side = self.spec.tile_px;
+        let side = self.tile_px;
         (y / side * (self.side as u32).div_ceil(side) + x / side, y % side * side + x % side)
     }
 
@@ -114,13 +116,13 @@ impl<'a> PacketEmitter<'a> {
     }
 }
 
-impl Observer for PacketEmitter<'_> {
+impl Observer for PacketEmitter<'_, '_> {
     fn part(&mut self, _: &Pass, which: usize, part: Part<'_>) {
         self.flush();
         if which == 0 {
-            self.passes.next();
+            self.passes.begin("pair");
         }
-        self.passes.draw(part.list.len(), VERTICES, &FRONT_END);
+        self.passes.draw(part.list.len(), self.vertices.address(), &FRONT_END);
     }
 
     fn fragment(&mut self, pass: &Pass, which: usize, fragment: &Fragment) {
@@ -130,7 +132,7 @@ impl Observer for PacketEmitter<'_> {
         if known != Some((tile, fragment.item, which)) {
             self.flush();
         }
-        let first_place = u64::from(tile) * u64::from(self.spec.tile_px.pow(2)) + u64::from(place);
+        let first_place = u64::from(tile) * u64::from(self.tile_px.pow(2)) + u64::from(place);
         let pending = self.pending.get_or_insert(Pending {
             tile,
             item: fragment.item,

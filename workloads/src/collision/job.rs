@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use pipeline::PipelineSpec;
+use pipeline::Gpu;
 use serde::{Deserialize, Serialize};
 use warnings::{Code, Warning};
 
@@ -12,9 +12,7 @@ use super::object::load_objects;
 use super::pass::Scratch;
 use super::{Method, Object, Search, Verdict, candidates};
 use crate::error::LoadError;
-use crate::job::{
-    Drawn, Draws, Emit, Fact, Flag, Flags, Job, JobError, OptionSource, Passes, Request, must_hold,
-};
+use crate::job::{Drawn, Draws, Fact, Flag, Flags, Job, JobError, OptionSource, Request, must_hold};
 use crate::scene::Settings;
 
 /// Options of the job.
@@ -118,8 +116,8 @@ impl Draws for Collision {
         Ok(())
     }
 
-    fn draw(&self, (): &(), spec: &PipelineSpec, emit: Emit<'_>) -> Result<Drawn, JobError> {
-        let mut emitter = PacketEmitter::new(&self.search, &self.objects, spec, Passes::new(spec, emit)?);
+    fn draw(&self, (): &(), gpu: &mut Gpu<'_>) -> Result<Drawn, JobError> {
+        let mut emitter = PacketEmitter::new(&self.search, &self.objects, gpu);
         let pairs = candidates(&self.objects);
         let mut scratch = Scratch::default();
         let mut kept = 0_u32;
@@ -129,7 +127,7 @@ impl Draws for Collision {
             emitter.flush();
             kept += u32::from(matches!(verdict, Verdict::Maybe { .. }));
         }
-        let Emitted { image, counts, triangles, fragments } = emitter.finish();
+        let Emitted { image, fragments } = emitter.finish();
         let fact = |name, value| Fact { name, value };
         let facts = vec![
             fact("pairs_whose_boxes_touch", pairs.len() as f64),
@@ -137,7 +135,7 @@ impl Draws for Collision {
             fact("fragments", fragments as f64),
         ];
         let warnings = near_everywhere(pairs.len(), kept).into_iter().collect();
-        Ok(Drawn { image, counts, triangles, moving: true, lens: false, facts, warnings })
+        Ok(Drawn { image, moving: true, lens: false, facts, warnings })
     }
 }
 
@@ -153,7 +151,7 @@ fn near_everywhere(pairs: usize, kept: u32) -> Option<Warning> {
 
 #[cfg(test)]
 mod tests {
-    use activity::{Counts, Event, LineAccess, Packet};
+    use activity::{Counts, Event, Packet};
 
     use super::*;
     use crate::collision::detect;
@@ -170,14 +168,16 @@ mod tests {
         for method in ["fragment_box", "box_box", "depth_only"] {
             let job = made(&[("resolution", "16"), ("balls", "6"), ("method", method)]).unwrap();
             let mut sum = Counts::default();
-            let mut emit = |packet: &Packet, _: &[LineAccess]| sum += &packet.counts;
-            let drawn = job.frame(0, &hardware(), &mut emit).unwrap();
-            assert_eq!(sum, drawn.counts, "{method}");
+            let hardware = hardware();
+            let mut gpu = Gpu::new(&hardware, |packet: &Packet, _| sum += &packet.counts).unwrap();
+            let drawn = job.frame(0, &mut gpu).unwrap();
+            let counts = gpu.finish().counts();
+            assert_eq!(sum, counts, "{method}");
             assert_eq!(drawn.image.len(), 48 * 16);
             let fact = |name| drawn.facts.iter().find(|fact| fact.name == name).unwrap().value;
-            assert_eq!(drawn.counts[Event::SamplesHit] as f64, fact("fragments"), "{method}");
+            assert_eq!(counts[Event::SamplesHit] as f64, fact("fragments"), "{method}");
             // Each object has its own boxes when boxes are compared; otherwise the second only reads.
-            let writes = drawn.counts[Event::DepthWrites] == drawn.counts[Event::SamplesHit];
+            let writes = counts[Event::DepthWrites] == counts[Event::SamplesHit];
             assert_eq!(writes, method == "box_box", "{method}");
             let objects = swarm_of(6, 1);
             let method: Method = serde_json::from_str(&format!("\"{method}\"")).unwrap();

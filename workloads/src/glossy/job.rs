@@ -3,15 +3,15 @@
 
 use activity::Event;
 use glam::{DVec3, Vec3};
-use pipeline::frame::render_with_heat;
-use pipeline::{Camera, Cull, Draw, Geometry, PipelineSpec, Rendered, SampleSpec, SampleTable, Viewport};
+use pipeline::memory::Surface;
+use pipeline::{Camera, Cull, Draw, Geometry, Gpu, RasterPass, Rendered, SampleSpec, SampleTable, Viewport};
 use serde::{Deserialize, Serialize};
 use warnings::{Code, Warning};
 
 use super::map::Map;
 use super::receiver::{Effect, Receiver, ReceiverShader};
 use crate::error::LoadError;
-use crate::job::{Drawn, DrawsScene, Emit, Fact, Flag, Flags, Job, JobError, OptionSource, Request, shifted};
+use crate::job::{Drawn, DrawsScene, Fact, Flag, Flags, Job, JobError, OptionSource, Request};
 use crate::material::Material;
 use crate::scene::{
     Frame, Graph, Local, Node, Overrides, Parts, Rig, Scene, SceneCamera, Settings, Trs, View, tan_half,
@@ -155,8 +155,8 @@ impl Glossy {
         texels: &[Vec3],
         camera: &Camera,
         mut draws: Vec<Draw<'_>>,
-        spec: &PipelineSpec,
-        emit: Emit<'_>,
+        memory: Surface,
+        gpu: &mut Gpu<'_>,
     ) -> Result<Rendered, JobError> {
         let shader =
             ReceiverShader::new(texels, map.viewport, BASE, self.options.fresnel).map_err(refused)?;
@@ -168,10 +168,10 @@ impl Glossy {
             .ok_or_else(|| JobError::Setting("an image of no size".to_owned()))?;
         let samples = self.table(settings.samples)?;
         let background = self.scene.background();
-        let settings = pipeline::Settings { spec, viewport, samples: &samples, background };
-        let receiver = Draw { geometry, shader: &shader, cull: Cull::None };
+        let settings = pipeline::Settings { spec: gpu.spec(), viewport, samples: &samples, background };
+        let receiver = Draw::new(geometry, &shader, Cull::None).reading(memory);
         let draws: Vec<Draw<'_>> = draws.drain(..).chain([receiver]).collect();
-        Ok(render_with_heat(camera, &draws, &settings, &[], emit)?.0)
+        Ok(gpu.draw(&RasterPass::new(camera, &draws, &settings).named("image"))?)
     }
 
     fn regime_warnings(&self) -> Vec<Warning> {
@@ -189,22 +189,22 @@ impl DrawsScene for Glossy {
         &self.scene
     }
 
-    fn draw_frame(&self, frame: &Frame, spec: &PipelineSpec, emit: Emit<'_>) -> Result<Drawn, JobError> {
+    fn draw_frame(&self, frame: &Frame, gpu: &mut Gpu<'_>) -> Result<Drawn, JobError> {
         let map = self.map(frame).map_err(refused)?;
         let draws: Vec<_> =
             frame.draws(&self.scene)?.into_iter().map(|draw| Draw { cull: Cull::None, ..draw }).collect();
+        let draws = gpu.resident(&draws);
         let samples = self.table(self.options.map_samples)?;
-        let (texels, mut counts) = map.one_pass(&draws, &samples, (spec, self.scene.background()), emit)?;
+        let drawn = map.one_pass(&draws, &samples, self.scene.background(), gpu)?;
         let facts = vec![
             Fact { name: "map_texels", value: map.viewport.pixels() as f64 },
-            Fact { name: "map_samples_tested", value: counts[Event::SamplesTested] as f64 },
+            Fact { name: "map_samples_tested", value: drawn.counts[Event::SamplesTested] as f64 },
             Fact { name: "blur_at_height_1", value: map.blur(1.0) },
         ];
-        let image = self.show(&map, &texels, &frame.camera, draws, spec, &mut shifted(1, emit))?;
-        counts += &image.counts;
-        let (triangles, moving) = (2 * frame.triangle_count() + 2, frame.is_moving());
-        let warnings = self.regime_warnings();
-        Ok(Drawn { image: image.image, counts, triangles, moving, lens: true, facts, warnings })
+        let (memory, texels) = (drawn.surface, drawn.into_image());
+        let image = self.show(&map, &texels, &frame.camera, draws, memory, gpu)?.into_image();
+        let (moving, warnings) = (frame.is_moving(), self.regime_warnings());
+        Ok(Drawn { image, moving, lens: true, facts, warnings })
     }
 }
 

@@ -2,15 +2,14 @@
 
 use activity::Counts;
 use glam::{DVec3, Vec2, Vec3};
-use pipeline::frame::render_with_heat;
 use pipeline::sampling::{Sample, SampleSource};
-use pipeline::{Camera, Draw, Lens, PipelineSpec, Settings, Viewport};
+use pipeline::{Camera, Draw, Gpu, Lens, RasterPass, Rendered, Settings, Target, Viewport};
 use rayon::prelude::*;
 
 use super::receiver::{Effect, Receiver};
 use crate::accumulation::{Rays, SharedSamples, pinhole};
 use crate::error::LoadError;
-use crate::job::{Emit, JobError, shifted};
+use crate::job::JobError;
 use crate::scene::camera::Stand;
 
 /// A map: its camera, and the texels of the receiver.
@@ -114,12 +113,11 @@ impl Map {
         &self,
         draws: &[Draw<'_>],
         samples: &dyn SampleSource,
-        (spec, background): (&PipelineSpec, Vec3),
-        emit: Emit<'_>,
-    ) -> Result<(Vec<Vec3>, Counts), JobError> {
-        let settings = Settings { spec, viewport: self.viewport, samples, background };
-        let (rendered, _) = render_with_heat(&self.camera, draws, &settings, &[], emit)?;
-        Ok((rendered.image, rendered.counts))
+        background: Vec3,
+        gpu: &mut Gpu<'_>,
+    ) -> Result<Rendered, JobError> {
+        let settings = Settings { spec: gpu.spec(), viewport: self.viewport, samples, background };
+        Ok(gpu.draw(&RasterPass::new(&self.camera, draws, &settings).named("map").onto(Target::Texture))?)
     }
 
     /// Renders the map by accumulation: one pinhole pass per sample of a set that all texels share
@@ -131,20 +129,21 @@ impl Map {
         &self,
         draws: &[Draw<'_>],
         set: &SharedSamples,
-        (spec, background): (&PipelineSpec, Vec3),
-        emit: Emit<'_>,
+        background: Vec3,
+        gpu: &mut Gpu<'_>,
     ) -> Result<(Vec<Vec3>, Counts), JobError> {
+        let draws = gpu.resident(draws);
         let mut sum = vec![Vec3::ZERO; self.viewport.pixels()];
         let mut counts = Counts::default();
         for (index, at) in set.samples().iter().enumerate() {
             let camera = pinhole(&self.camera, [at.u, at.v]);
             let camera = camera.map_err(|error| JobError::Setting(error.to_string()))?;
             let samples = set.still(index);
-            let settings = Settings { spec, viewport: self.viewport, samples: &samples, background };
-            let (one, _) =
-                render_with_heat(&camera, draws, &settings, &[], &mut shifted(index as u16, emit))?;
+            let settings =
+                Settings { spec: gpu.spec(), viewport: self.viewport, samples: &samples, background };
+            let one = gpu.draw(&RasterPass::new(&camera, &draws, &settings).named("map sample"))?;
             counts += &one.counts;
-            sum.iter_mut().zip(one.image).for_each(|(sum, pixel)| *sum += pixel);
+            sum.iter_mut().zip(one.into_image()).for_each(|(sum, pixel)| *sum += pixel);
         }
         sum.iter_mut().for_each(|pixel| *pixel /= set.samples().len() as f32);
         Ok((sum, counts))

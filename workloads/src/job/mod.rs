@@ -1,35 +1,22 @@
 //! Jobs: work for the rasterizer beyond one rendering of a scene.
 //!
-//! A [`Job`] draws frames like a scene, but in its own passes. It emits every packet of work, for timing and
-//! power models. [`crate::catalog`] makes jobs by name from their options ([`OptionSource`]).
+//! A [`Job`] draws frames like a scene, but in its own passes on a [`Gpu`], which counts and times them. [`crate::catalog`] makes jobs by name from their options ([`OptionSource`]).
 
 mod options;
 mod passes;
 
 pub use options::OptionSource;
 pub(crate) use options::{Flag, Flags, must_hold};
+pub(crate) use passes::PIXEL_BYTES;
 pub use passes::{FrontEnd, Passes, TileWork, Touch};
 
-use activity::{Counts, LineAccess, Packet};
 use glam::Vec3;
-use pipeline::PipelineSpec;
-use pipeline::memory::CacheError;
+use pipeline::{Gpu, PassError};
 use serde::Serialize;
 use warnings::Warning;
 
 use crate::fingerprint::{Fingerprint, FingerprintError};
 use crate::scene::{Frame, FrameError, Overrides, Scene, Settings};
-
-/// Receiver of a frame's packets, each with its L2 accesses, in the order of the modelled hardware.
-pub type Emit<'a> = &'a mut dyn FnMut(&Packet, &[LineAccess]);
-
-/// Shifts pass numbers of packets by `first`.
-pub(crate) fn shifted<'e>(
-    first: u16,
-    emit: &'e mut (dyn FnMut(&Packet, &[LineAccess]) + 'e),
-) -> impl FnMut(&Packet, &[LineAccess]) + 'e {
-    move |packet, lines| emit(&Packet { pass: packet.pass.saturating_add(first), ..*packet }, lines)
-}
 
 /// A result of a job.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,10 +32,6 @@ pub struct Fact {
 pub struct Drawn {
     /// Linear RGB radiance of each pixel, row by row from the top left.
     pub image: Vec<Vec3>,
-    /// Event counts, of all passes.
-    pub counts: Counts,
-    /// Triangles drawn, in all passes.
-    pub triangles: usize,
     /// Whether time is a dimension of the rendering.
     pub moving: bool,
     /// Whether the lens is a dimension of the rendering.
@@ -87,11 +70,11 @@ pub trait Draws: Sync + Send {
     /// [`JobError`] if the frame cannot be made.
     fn input(&self, number: u32) -> Result<Self::Input, JobError>;
 
-    /// Draws a frame on the hardware `spec`. Every frame may repeat warnings.
+    /// Draws a frame on `gpu`. Every frame may repeat warnings.
     ///
     /// # Errors
-    /// [`JobError`] if the hardware cannot be built or the frame cannot be drawn.
-    fn draw(&self, input: &Self::Input, spec: &PipelineSpec, emit: Emit<'_>) -> Result<Drawn, JobError>;
+    /// [`JobError`] if the frame cannot be drawn.
+    fn draw(&self, input: &Self::Input, gpu: &mut Gpu<'_>) -> Result<Drawn, JobError>;
 }
 
 /// A job whose frames are those of a scene.
@@ -108,7 +91,7 @@ pub trait DrawsScene: Sync + Send {
     ///
     /// # Errors
     /// As [`Draws::draw`].
-    fn draw_frame(&self, frame: &Frame, spec: &PipelineSpec, emit: Emit<'_>) -> Result<Drawn, JobError>;
+    fn draw_frame(&self, frame: &Frame, gpu: &mut Gpu<'_>) -> Result<Drawn, JobError>;
 }
 
 impl<D: DrawsScene> Draws for D {
@@ -126,8 +109,8 @@ impl<D: DrawsScene> Draws for D {
         Ok(self.scene().frame(number)?)
     }
 
-    fn draw(&self, frame: &Frame, spec: &PipelineSpec, emit: Emit<'_>) -> Result<Drawn, JobError> {
-        self.draw_frame(frame, spec, emit)
+    fn draw(&self, frame: &Frame, gpu: &mut Gpu<'_>) -> Result<Drawn, JobError> {
+        self.draw_frame(frame, gpu)
     }
 }
 
@@ -149,11 +132,11 @@ pub trait Job: Sync + Send {
     /// Content of the images, for captions; empty if it is obvious.
     fn shows(&self) -> &'static str;
 
-    /// Draws frame `number` on the hardware `spec`.
+    /// Draws frame `number` on `gpu`.
     ///
     /// # Errors
-    /// [`JobError`] if the hardware cannot be built or the frame cannot be made.
-    fn frame(&self, number: u32, spec: &PipelineSpec, emit: Emit<'_>) -> Result<Drawn, JobError>;
+    /// [`JobError`] if the frame cannot be made or drawn.
+    fn frame(&self, number: u32, gpu: &mut Gpu<'_>) -> Result<Drawn, JobError>;
 }
 
 impl<D: Draws> Job for D {
@@ -173,8 +156,8 @@ impl<D: Draws> Job for D {
         Ok(Fingerprint::of(&self.input(number)?)?)
     }
 
-    fn frame(&self, number: u32, spec: &PipelineSpec, emit: Emit<'_>) -> Result<Drawn, JobError> {
-        self.draw(&self.input(number)?, spec, emit)
+    fn frame(&self, number: u32, gpu: &mut Gpu<'_>) -> Result<Drawn, JobError> {
+        self.draw(&self.input(number)?, gpu)
     }
 }
 
@@ -183,7 +166,7 @@ impl<D: Draws> Job for D {
 #[allow(missing_docs, reason = "the variants are the sources, documented there")]
 pub enum JobError {
     #[error(transparent)]
-    Cache(#[from] CacheError),
+    Pass(#[from] PassError),
     #[error(transparent)]
     Frame(#[from] FrameError),
     #[error(transparent)]
@@ -191,6 +174,13 @@ pub enum JobError {
     /// Invalid or incompatible settings.
     #[error("{0}")]
     Setting(String),
+}
+
+impl JobError {
+    /// Wraps an error of a setting.
+    pub(crate) fn setting(error: impl std::fmt::Display) -> Self {
+        Self::Setting(error.to_string())
+    }
 }
 
 /// Parameters of a job besides its own options.

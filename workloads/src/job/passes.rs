@@ -1,15 +1,13 @@
-//! Passes of a job: each piece of work as a packet, with its memory accesses.
+//! Passes whose packets are made one by one, with their memory accesses.
 
-use activity::{Counts, Event, Packet, PacketCounts, PacketKind};
-use pipeline::PipelineSpec;
-use pipeline::memory::{CacheError, LINE_BYTES, MemorySystem};
-
-use super::Emit;
+use activity::{Event, Packet, PacketCounts, PacketKind};
+use pipeline::Gpu;
+use pipeline::memory::{LINE_BYTES, Surface};
 
 /// Triangles per vertex packet.
 const BATCH: usize = 16;
-/// Bytes per pixel of the image.
-const PIXEL_BYTES: u64 = 4;
+/// Bytes per pixel of an image.
+pub(crate) const PIXEL_BYTES: u64 = 4;
 
 /// Front-end work per vertex and triangle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,45 +51,35 @@ impl Touch {
     }
 }
 
-/// Passes of a frame: emits packets and sums their counts.
-pub struct Passes<'a> {
-    memory: MemorySystem,
-    batch_triangles: u32,
-    emit: Emit<'a>,
-    counts: Counts,
+/// Passes whose packets are made one by one.
+pub struct Passes<'a, 'e> {
+    gpu: &'a mut Gpu<'e>,
     pass: u16,
     /// Triangles of the current pass so far.
     triangles: u32,
-    triangles_in_all: usize,
 }
 
-impl<'a> Passes<'a> {
-    /// Starts the first pass, with empty caches.
-    ///
-    /// # Errors
-    /// [`CacheError`] if a cache of `spec` cannot be built.
-    pub fn new(spec: &PipelineSpec, emit: Emit<'a>) -> Result<Self, CacheError> {
-        Ok(Self {
-            memory: MemorySystem::new(&spec.memory)?,
-            batch_triangles: spec.batch_triangles,
-            emit,
-            counts: Counts::default(),
-            pass: 0,
-            triangles: 0,
-            triangles_in_all: 0,
-        })
+impl<'a, 'e> Passes<'a, 'e> {
+    /// No pass so far.
+    pub fn new(gpu: &'a mut Gpu<'e>) -> Self {
+        Self { gpu, pass: 0, triangles: 0 }
     }
 
-    /// Ends the pass; later packets belong to the next.
-    pub fn next(&mut self) {
-        (self.pass, self.triangles) = (self.pass.saturating_add(1), 0);
+    /// Begins a pass; later packets belong to it.
+    pub fn begin(&mut self, name: &str) {
+        (self.pass, self.triangles) = (self.gpu.begin(name), 0);
+    }
+
+    /// A new surface of `bytes`.
+    pub fn surface(&mut self, bytes: u64) -> Surface {
+        self.gpu.surface(bytes)
     }
 
     /// Emits a draw of `triangles` triangles with three vertices each, which are in memory from `address` on.
     pub fn draw(&mut self, triangles: usize, address: u64, front_end: &FrontEnd) {
         let mut start = self.packet(PacketKind::Draw, Packet::NONE, self.triangles);
         start.counts[Event::Draws] = 1;
-        self.emit_packet(&start);
+        self.gpu.push(&start, 0);
         let bytes = u64::from(front_end.vertex_bytes);
         for first in (0..triangles).step_by(BATCH) {
             let vertices = 3 * BATCH.min(triangles - first) as u32;
@@ -106,11 +94,10 @@ impl<'a> Passes<'a> {
             counts[Event::TrianglesSetUp] = vertices / 3;
             counts[Event::SetupMadds] = vertices / 3 * front_end.setup_madds;
             let from = address + 3 * first as u64 * bytes;
-            self.memory.vertices(from, u64::from(vertices) * bytes, counts);
-            self.emit_packet(&packet);
+            self.gpu.memory().vertices(from, u64::from(vertices) * bytes, counts);
+            self.gpu.push(&packet, vertices as usize / 3);
             self.triangles += vertices / 3;
         }
-        self.triangles_in_all += triangles;
     }
 
     /// Emits work in a tile, with accesses to depth buffers and colour buffers.
@@ -119,48 +106,40 @@ impl<'a> Passes<'a> {
         packet.counts = work.counts;
         for touch in depth {
             let counts = &mut packet.counts;
-            touch.lines().for_each(|line| self.memory.depth(line, touch.write, touch.fresh, counts));
+            touch.lines().for_each(|line| self.gpu.memory().depth(line, touch.write, touch.fresh, counts));
         }
         for touch in colour {
             let counts = &mut packet.counts;
-            touch.lines().for_each(|line| self.memory.colour(line, touch.write, touch.fresh, counts));
+            touch.lines().for_each(|line| self.gpu.memory().colour(line, touch.write, touch.fresh, counts));
         }
-        self.emit_packet(&packet);
+        self.gpu.push(&packet, 0);
     }
 
-    /// Emits the writes of `pixels` pixels at `address`, one packet per tile of `tile_pixels`, and flushes
-    /// the caches.
-    pub fn resolve(&mut self, address: u64, pixels: u64, tile_pixels: u32) {
-        let tile_pixels = u64::from(tile_pixels.max(1));
+    /// Emits the writes of the pixels of `image`, one packet per tile of `tile_pixels`.
+    pub fn resolve(&mut self, image: Surface, tile_pixels: u32) {
+        let (pixels, tile_pixels) = (image.bytes() / PIXEL_BYTES, u64::from(tile_pixels.max(1)));
         for (tile, first) in (0..).zip((0..pixels).step_by(tile_pixels as usize)) {
             let count = tile_pixels.min(pixels - first);
             let mut packet = self.packet(PacketKind::Resolve, tile, Packet::NONE);
             packet.counts[Event::PixelsResolved] = count as u32;
-            let (address, bytes) = (address + first * PIXEL_BYTES, count * PIXEL_BYTES);
+            let (address, bytes) = (image.address() + first * PIXEL_BYTES, count * PIXEL_BYTES);
             let counts = &mut packet.counts;
             let written = Touch { address, bytes, write: true, fresh: true };
-            written.lines().for_each(|line| self.memory.colour(line, true, true, counts));
-            self.emit_packet(&packet);
+            written.lines().for_each(|line| self.gpu.memory().colour(line, true, true, counts));
+            self.gpu.push(&packet, 0);
         }
-        let mut last = self.packet(PacketKind::Resolve, Packet::NONE, Packet::NONE);
-        self.memory.finish(address..address + pixels * PIXEL_BYTES, &mut last.counts);
-        self.emit_packet(&last);
-    }
-
-    /// Event counts and triangles of all passes.
-    pub fn finish(self) -> (Counts, usize) {
-        (self.counts, self.triangles_in_all)
+        self.gpu.keep(image);
     }
 
     fn packet(&self, kind: PacketKind, tile: u32, triangle: u32) -> Packet {
         let of = if triangle == Packet::NONE { self.triangles.saturating_sub(1) } else { triangle };
-        Packet { batch: of / self.batch_triangles, draw: 0, tile, triangle, ..Packet::new(kind, self.pass) }
-    }
-
-    fn emit_packet(&mut self, packet: &Packet) {
-        self.counts += &packet.counts;
-        (self.emit)(packet, self.memory.log());
-        self.memory.clear_log();
+        Packet {
+            batch: of / self.gpu.spec().batch_triangles,
+            draw: 0,
+            tile,
+            triangle,
+            ..Packet::new(kind, self.pass)
+        }
     }
 }
 
@@ -168,26 +147,33 @@ impl<'a> Passes<'a> {
 mod tests {
     use super::*;
     use crate::job::testing::hardware;
+    use activity::Counts;
     use activity::LineAccess;
 
     #[test]
     fn counts_are_the_sum_of_packets_and_lines_are_emitted_once() {
         let (mut sum, mut lines, mut kinds) = (Counts::default(), 0, Vec::new());
-        let mut emit = |packet: &Packet, accesses: &[LineAccess]| {
+        let hardware = hardware();
+        let mut gpu = Gpu::new(&hardware, |packet: &Packet, accesses: &[LineAccess]| {
             sum += &packet.counts;
             lines += accesses.len();
             kinds.push((packet.kind, packet.pass));
-        };
-        let mut passes = Passes::new(&hardware(), &mut emit).unwrap();
-        passes.draw(20, 0, &FrontEnd { vertex_bytes: 24, vertex_ops: 8, setup_madds: 60 });
-        passes.next();
+        })
+        .unwrap();
+        let mut passes = Passes::new(&mut gpu);
+        passes.begin("first");
+        let vertices = passes.surface(20 * 3 * 24);
+        passes.draw(20, vertices.address(), &FrontEnd { vertex_bytes: 24, vertex_ops: 8, setup_madds: 60 });
+        passes.begin("second");
         let mut counts = PacketCounts::default();
         counts[Event::TilesVisited] = 1;
-        let touch = Touch { address: 1 << 20, bytes: 130, write: true, fresh: true };
+        let [depths, image] = [130, 400].map(|bytes| passes.surface(bytes));
+        let touch = Touch { address: depths.address(), bytes: 130, write: true, fresh: true };
         passes.tile(&TileWork { tile: 3, triangle: 0, counts }, &[touch], &[]);
-        passes.resolve(1 << 21, 100, 64);
-        let (total, triangles) = passes.finish();
-        assert_eq!((total, triangles), (sum, 20));
+        passes.resolve(image, 64);
+        let report = gpu.finish();
+        let total = report.counts();
+        assert_eq!((total, report.triangles()), (sum, 20));
         assert_eq!(total[Event::VertexBytes], 20 * 3 * 24);
         assert_eq!((total[Event::DepthLines], total[Event::PixelsResolved]), (3, 100));
         assert_eq!(total[Event::DramWriteBytes], 7 * 64, "100 pixels are 6.25 lines");

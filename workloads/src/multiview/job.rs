@@ -1,14 +1,14 @@
 //! The job `multiview`.
 
 use activity::Event;
-use pipeline::{CacheSpec, Draw, PipelineSpec, Viewport};
+use pipeline::{CacheSpec, Draw, Gpu, PipelineSpec, Viewport};
 use serde::{Deserialize, Serialize};
 use warnings::{Code, Warning};
 
 use super::layout::{Layout, Panel};
 use super::rig::{Rig, Target, Views};
 use crate::error::LoadError;
-use crate::job::{Drawn, DrawsScene, Emit, Fact, Flag, Flags, Job, JobError, OptionSource, Request};
+use crate::job::{Drawn, DrawsScene, Fact, Flag, Flags, Job, JobError, OptionSource, Request};
 use crate::scene::{Frame, Overrides, Scene, Settings};
 
 /// Arrangement of the views in the image.
@@ -168,14 +168,14 @@ impl DrawsScene for MultiView {
         &self.settings
     }
 
-    fn draw_frame(&self, frame: &Frame, spec: &PipelineSpec, emit: Emit<'_>) -> Result<Drawn, JobError> {
+    fn draw_frame(&self, frame: &Frame, gpu: &mut Gpu<'_>) -> Result<Drawn, JobError> {
         let draws = frame.draws(&self.scene)?;
         let rig = self.rig(frame).map_err(|error| JobError::Setting(error.to_string()))?;
-        let to = Target { viewport: self.view, spec, background: self.scene.background() };
+        let to = Target { viewport: self.view, spec: gpu.spec(), background: self.scene.background() };
         let views = if self.options.view_by_view {
-            rig.view_by_view(&draws, &to, emit)?
+            rig.view_by_view(&draws, &to, gpu)?
         } else {
-            rig.one_pass(&draws, &to, emit)?
+            rig.one_pass(&draws, &to, gpu)?
         };
         let mut facts = vec![
             Fact { name: "pixel_invocations", value: views.counts[Event::PixelInvocations] as f64 },
@@ -185,11 +185,10 @@ impl DrawsScene for MultiView {
         if self.options.check_cache {
             let value = runs_over_infinite_cache(&rig, &draws, &to, &views)?;
             facts.push(Fact { name: "invocations_over_those_with_all_in_cache", value });
-            warnings.extend(cache_warning(value, spec));
+            warnings.extend(cache_warning(value, gpu.spec()));
         }
-        let triangles = frame.triangle_count() * views.passes as usize;
         let (image, moving) = (self.shown(&views), frame.is_moving());
-        Ok(Drawn { image, counts: views.counts, triangles, moving, lens: true, facts, warnings })
+        Ok(Drawn { image, moving, lens: true, facts, warnings })
     }
 }
 
@@ -202,7 +201,7 @@ fn runs_over_infinite_cache(
 ) -> Result<f64, JobError> {
     let infinite = PipelineSpec { shading_cache: INFINITE_CACHE, ..*to.spec };
     let to = Target { spec: &infinite, ..*to };
-    let least = rig.one_pass(draws, &to, &mut |_, _| ())?.counts[Event::PixelInvocations];
+    let least = rig.one_pass(draws, &to, &mut Gpu::quiet(&infinite)?)?.counts[Event::PixelInvocations];
     Ok(views.counts[Event::PixelInvocations] as f64 / least.max(1) as f64)
 }
 

@@ -4,16 +4,16 @@ use std::ops::Range;
 
 use activity::Counts;
 use glam::{Affine3A, Vec3};
-use pipeline::frame::{render_views, render_with_heat};
 use pipeline::sampling::{Sample, SampleSource, SampleSpec};
 use pipeline::{
-    Camera, Draw, Geometry, Lens, LensShape, PipelineSpec, SampleTable, Settings, Shading, Viewport,
+    Camera, Draw, Geometry, Gpu, Lens, LensShape, PipelineSpec, RasterPass, Rendered, SampleTable, Settings,
+    Shading, Viewport,
 };
 
 use super::layout::Layout;
 use crate::accumulation::{SharedSamples, pinhole};
 use crate::error::LoadError;
-use crate::job::{Emit, JobError, shifted};
+use crate::job::JobError;
 
 /// Render target of the views.
 #[derive(Clone, Copy)]
@@ -114,9 +114,16 @@ impl Rig {
     ///
     /// # Errors
     /// [`JobError`] if the hardware cannot be built.
-    pub fn one_pass(&self, draws: &[Draw<'_>], to: &Target<'_>, emit: Emit<'_>) -> Result<Views, JobError> {
+    pub fn one_pass(
+        &self,
+        draws: &[Draw<'_>],
+        to: &Target<'_>,
+        gpu: &mut Gpu<'_>,
+    ) -> Result<Views, JobError> {
         let settings = settings(to, &self.table);
-        let (images, counts) = render_views(&self.camera, draws, &settings, &self.runs, emit)?;
+        let views = pipeline::Target::Views(&self.runs);
+        let pass = RasterPass::new(&self.camera, draws, &settings).named("all views").onto(views);
+        let Rendered { images, counts, .. } = gpu.draw(&pass)?;
         Ok(Views { images, counts, passes: 1 })
     }
 
@@ -129,12 +136,12 @@ impl Rig {
         view: usize,
         draws: &[Draw<'_>],
         to: &Target<'_>,
-        emit: Emit<'_>,
-    ) -> Result<(Vec<Vec3>, Counts), JobError> {
+        gpu: &mut Gpu<'_>,
+    ) -> Result<Rendered, JobError> {
         let run = self.runs.get(view).cloned().unwrap_or(0..1);
         let samples = Run { table: &self.table, run };
-        let (rendered, _) = render_with_heat(&self.camera, draws, &settings(to, &samples), &[], emit)?;
-        Ok((rendered.image, rendered.counts))
+        let (settings, name) = (settings(to, &samples), format!("view {view}"));
+        Ok(gpu.draw(&RasterPass::new(&self.camera, draws, &settings).named(&name))?)
     }
 
     /// Renders each view in its own pass; the images are the same bit for bit.
@@ -145,23 +152,23 @@ impl Rig {
         &self,
         draws: &[Draw<'_>],
         to: &Target<'_>,
-        emit: Emit<'_>,
+        gpu: &mut Gpu<'_>,
     ) -> Result<Views, JobError> {
+        let draws = gpu.resident(draws);
         let mut views = Views { images: Vec::new(), counts: Counts::default(), passes: 0 };
         for view in 0..self.runs.len() {
-            let (image, counts) = self.view(view, draws, to, &mut shifted(view as u16, emit))?;
-            views.add(image, &counts, 1);
+            views.add(self.view(view, &draws, to, gpu)?);
         }
         Ok(views)
     }
 }
 
 impl Views {
-    /// Adds a view and its counts.
-    pub(super) fn add(&mut self, image: Vec<Vec3>, counts: &Counts, passes: u32) {
-        self.images.push(image);
-        self.counts += counts;
-        self.passes += passes;
+    /// Adds the image of a pass.
+    fn add(&mut self, drawn: Rendered) {
+        self.counts += &drawn.counts;
+        self.passes += 1;
+        self.images.push(drawn.into_image());
     }
 }
 
@@ -220,34 +227,27 @@ impl Rig {
         &self,
         draws: &[Draw<'_>],
         to: &Target<'_>,
-        emit: Emit<'_>,
+        gpu: &mut Gpu<'_>,
     ) -> Result<Views, JobError> {
         let refused = |error: &dyn std::fmt::Display| JobError::Setting(error.to_string());
         // The samples of one pixel of the table serve all pixels.
         let set = SharedSamples::new(self.table.pixel(0, 0).to_vec())
             .ok_or_else(|| JobError::Setting("too many samples".to_owned()))?;
         let mut views = Views { images: Vec::new(), counts: Counts::default(), passes: 0 };
-        let mut images = Vec::new();
+        let resident = gpu.resident(draws);
         for (number, at) in set.samples().iter().enumerate() {
             let camera = pinhole(&self.camera, [at.u, at.v]).map_err(|e| refused(&e))?;
             let camera = frozen(&camera, at.t).map_err(|e| refused(&e))?;
-            let stills: Vec<Vec<Vec3>> = draws.iter().map(|draw| still(draw, at)).collect();
-            let draws = draws.iter().zip(&stills).map(|(draw, at)| with_positions(draw, at));
+            let stills: Vec<Vec<Vec3>> = resident.iter().map(|draw| still(draw, at)).collect();
+            let draws = resident.iter().zip(&stills).map(|(draw, at)| with_positions(draw, at));
             let draws = draws.collect::<Result<Vec<_>, _>>().map_err(|e| refused(&e))?;
             let one = set.still(number);
-            let (drawn, _) = render_with_heat(
-                &camera,
-                &draws,
-                &settings(to, &one),
-                &[],
-                &mut shifted(number as u16, emit),
-            )?;
-            views.counts += &drawn.counts;
-            views.passes += 1;
-            images.push(drawn.image);
+            let settings = settings(to, &one);
+            views.add(gpu.draw(&RasterPass::new(&camera, &draws, &settings).named("sample"))?);
         }
+        let samples = std::mem::take(&mut views.images);
         views.images =
-            self.runs.iter().map(|run| mean(&images[run.start as usize..run.end as usize])).collect();
+            self.runs.iter().map(|run| mean(&samples[run.start as usize..run.end as usize])).collect();
         Ok(views)
     }
 
@@ -275,7 +275,9 @@ impl Rig {
             let run = Run { table: &self.table, run: run.clone() };
             let samples = OwnLens { run, middle, half: half as f32 };
             let settings = settings(&to, &samples);
-            Ok(pipeline::render(&camera.with_lens(Some(lens)), draws, &settings, |_| ())?.image)
+            Ok(RasterPass::new(&camera.with_lens(Some(lens)), draws, &settings)
+                .render(|_, _| ())?
+                .into_image())
         };
         (0..).zip(&self.runs).map(image).collect()
     }

@@ -2,24 +2,24 @@
 
 use std::sync::Arc;
 
-use activity::{Counts, Event, PacketCounts};
+use activity::{Event, PacketCounts};
 use glam::{Affine3A, Vec3, Vec4};
 use pipeline::depth::BoxGrid;
-use pipeline::frame::render_with_heat;
 use pipeline::geometry::Projection;
 use pipeline::random::mix;
 use pipeline::sampling::SampleSource;
 use pipeline::{
-    Camera, Cull, Draw, DrawError, Geometry, Lens, PipelineSpec, Shader, ShaderCost, ShadingPoint, Viewport,
+    Camera, Cull, Draw, DrawError, Geometry, Gpu, Lens, RasterPass, Shader, ShaderCost, ShadingPoint,
+    Viewport,
 };
 use serde::{Deserialize, Serialize};
 use warnings::{Code, Warning};
 
-use super::{Answer, MovingBox, Pyramid, Queries, depths};
+use super::{Answer, MovingBox, Pyramid, Queries};
 use crate::error::LoadError;
 use crate::job::{
-    Drawn, Draws, Emit, Fact, Flag, Flags, FrontEnd, Job, JobError, OptionSource, Passes, Request, TileWork,
-    must_hold, shifted,
+    Drawn, Draws, Fact, Flag, Flags, FrontEnd, Job, JobError, OptionSource, Passes, Request, TileWork,
+    must_hold,
 };
 use crate::samples::SampleChoice;
 use crate::scene::Settings;
@@ -126,56 +126,57 @@ impl Draws for Occlusion {
         Ok(())
     }
 
-    fn draw(&self, (): &(), spec: &PipelineSpec, emit: Emit<'_>) -> Result<Drawn, JobError> {
-        let refused = |what: &str| JobError::Setting(what.to_owned());
+    fn draw(&self, (): &(), gpu: &mut Gpu<'_>) -> Result<Drawn, JobError> {
         let viewport = Viewport::new(self.settings.width, self.settings.height)
-            .ok_or_else(|| refused("the image has no area"))?;
+            .ok_or_else(|| JobError::Setting("the image has no area".to_owned()))?;
         let background = Vec3::new(0.02, 0.03, 0.05);
-        let settings = pipeline::Settings { spec, viewport, samples: &*self.samples, background };
-        let wall = self.wall_scene.walls(&WALL).map_err(|error| JobError::Setting(error.to_string()))?;
-        let mut counts = Counts::default();
+        let settings = pipeline::Settings { spec: gpu.spec(), viewport, samples: &*self.samples, background };
+        let walls = gpu.resident(&[self.wall_scene.walls(&WALL).map_err(JobError::setting)?]);
         let camera = &self.wall_scene.camera;
-        counts += &render_with_heat(camera, &[wall], &settings, &[], &mut *emit)?.0.counts;
-        let depths = depths(camera, &[wall], &settings)?;
-        let grid = BoxGrid::new(self.options.boxes, camera.lens().is_some())
-            .ok_or_else(|| refused("boxes: 1 to 16 along each axis"))?;
-        let pyramid = Pyramid::new(viewport, &*self.samples, &depths, self.options.tile_px, grid);
-        let projection = Projection::new(camera, viewport);
-        let queries = Queries::new(&pyramid, &projection);
-        let answers: Vec<Answer> = self.wall_scene.boxes.iter().map(|object| queries.ask(object)).collect();
-        counts += &emit_packets(&answers, spec, &mut *emit)?;
-        let seen: Vec<&MovingBox> = self
-            .wall_scene
-            .boxes
-            .iter()
-            .zip(&answers)
-            .filter(|(_, answer)| !answer.hidden)
-            .map(|(b, _)| b)
-            .collect();
-        let Mesh { open, close, triangles } = mesh(&seen);
-        let boxes = Geometry::new(&open, &close, &triangles);
-        let boxes = boxes.map_err(|error| JobError::Setting(error.to_string()))?;
-        let draws = [wall, Draw { geometry: boxes, shader: &BOX, cull: Cull::None }];
-        let (rendered, _) = render_with_heat(camera, &draws, &settings, &[], shifted(2, emit))?;
-        counts += &rendered.counts;
+        let occluders = RasterPass::new(camera, &walls, &settings).named("occluders").with_visible();
+        let (answers, half_covered) = self.ask(&gpu.draw(&occluders)?.visible, viewport)?;
+        gpu.wait();
+        emit_packets(&answers, gpu);
+        // The host draws what is not hidden.
+        gpu.wait();
+        let seen = self.wall_scene.boxes.iter().zip(&answers).filter(|(_, answer)| !answer.hidden);
+        let Mesh { open, close, triangles } = mesh(&seen.map(|(object, _)| object).collect::<Vec<_>>());
+        let boxes = Geometry::new(&open, &close, &triangles).map_err(JobError::setting)?;
+        let draws = [walls[0], Draw::new(boxes, &BOX, Cull::None)];
+        let image = gpu.draw(&RasterPass::new(camera, &draws, &settings).named("image"))?.into_image();
         Ok(Drawn {
-            image: rendered.image,
-            counts,
-            triangles: 2 * self.wall_scene.triangles.len() + triangles.len() + 12 * answers.len(),
+            image,
             moving: self.options.motion > 0.0,
             lens: camera.lens().is_some(),
             facts: facts(&answers),
-            warnings: warnings(&answers, pyramid.half_covered()),
+            warnings: warnings(&answers, half_covered),
         })
+    }
+}
+
+impl Occlusion {
+    /// Answers about all boxes from the depths of the walls, and the share of half-covered tiles.
+    fn ask(&self, visible: &[(u32, u32)], viewport: Viewport) -> Result<(Vec<Answer>, f64), JobError> {
+        let camera = &self.wall_scene.camera;
+        let grid = BoxGrid::new(self.options.boxes, camera.lens().is_some())
+            .ok_or_else(|| JobError::Setting("boxes: 1 to 16 along each axis".to_owned()))?;
+        let depths: Vec<f32> = visible.iter().map(|(_, bits)| f32::from_bits(*bits)).collect();
+        let pyramid = Pyramid::new(viewport, &*self.samples, &depths, self.options.tile_px, grid);
+        let projection = Projection::new(camera, viewport);
+        let queries = Queries::new(&pyramid, &projection);
+        let answers = self.wall_scene.boxes.iter().map(|object| queries.ask(object)).collect();
+        Ok((answers, pyramid.half_covered()))
     }
 }
 
 /// Emits the queries as packets of their own pass. The farthest depths are in fast memory beside the tile
 /// tests, so no cache is accessed.
-fn emit_packets(answers: &[Answer], spec: &PipelineSpec, emit: Emit<'_>) -> Result<Counts, JobError> {
-    let mut passes = Passes::new(spec, emit)?;
-    passes.next();
-    passes.draw(12 * answers.len(), 0, &FRONT_END);
+fn emit_packets(answers: &[Answer], gpu: &mut Gpu<'_>) {
+    let mut passes = Passes::new(gpu);
+    passes.begin("queries");
+    let triangles = 12 * answers.len();
+    let vertices = passes.surface(3 * triangles as u64 * u64::from(FRONT_END.vertex_bytes));
+    passes.draw(triangles, vertices.address(), &FRONT_END);
     for (number, answer) in (0..).zip(answers) {
         let mut counts = PacketCounts::default();
         counts[Event::TilesVisited] = answer.tiles as u32;
@@ -183,7 +184,6 @@ fn emit_packets(answers: &[Answer], spec: &PipelineSpec, emit: Emit<'_>) -> Resu
         counts[Event::ZCullTests] = answer.compared as u32;
         passes.tile(&TileWork { tile: 0, triangle: 12 * number, counts }, &[], &[]);
     }
-    Ok(passes.finish().0)
 }
 
 struct Mesh {
@@ -293,11 +293,7 @@ impl WallScene {
     /// # Errors
     /// [`DrawError`] if a coordinate is not finite.
     pub fn walls<'a>(&'a self, shader: &'a dyn Shader) -> Result<Draw<'a>, DrawError> {
-        Ok(Draw {
-            geometry: Geometry::new(&self.open, &self.close, &self.triangles)?,
-            shader,
-            cull: Cull::None,
-        })
+        Ok(Draw::new(Geometry::new(&self.open, &self.close, &self.triangles)?, shader, Cull::None))
     }
 }
 

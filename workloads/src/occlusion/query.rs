@@ -3,12 +3,12 @@
 use activity::Event;
 use glam::Vec3;
 use pipeline::depth::{Bounder, DepthBound, interval_madds, set_up_madds};
-use pipeline::frame::{render_depth, visibility};
 use pipeline::geometry::Projection;
-use pipeline::memory::CacheError;
 use pipeline::setup::{Outcome, Triangle, bounds, madds, set_up};
 use pipeline::traversal::{Box5, TileRect, narrow_counted};
-use pipeline::{Camera, Cull, Draw, Features, Geometry, PipelineSpec, Settings};
+use pipeline::{
+    Camera, Cull, Draw, Features, Geometry, PassError, PipelineSpec, RasterPass, Rendered, Settings, Target,
+};
 
 use super::Pyramid;
 use crate::visibility::Unshaded;
@@ -233,9 +233,9 @@ impl SampledAnswer {
 /// Depth of every sample of `draws`, as [`Samples`] needs it.
 ///
 /// # Errors
-/// [`CacheError`] if a cache of the hardware cannot be built.
-pub fn depths(camera: &Camera, draws: &[Draw<'_>], settings: &Settings<'_>) -> Result<Vec<f32>, CacheError> {
-    Ok(visibility(camera, draws, settings)?.into_iter().map(depth).collect())
+/// [`PassError`] if the hardware cannot draw it.
+pub fn depths(camera: &Camera, draws: &[Draw<'_>], settings: &Settings<'_>) -> Result<Vec<f32>, PassError> {
+    Ok(RasterPass::new(camera, draws, settings).visibility()?.into_iter().map(depth).collect())
 }
 
 /// Depth of a visible sample.
@@ -247,19 +247,20 @@ impl Samples<'_> {
     /// Counts the samples that see the box, by drawing it alone.
     ///
     /// # Errors
-    /// [`CacheError`] if a cache of the hardware cannot be built.
-    pub fn ask(&self, object: &MovingBox) -> Result<SampledAnswer, CacheError> {
+    /// [`PassError`] if the hardware cannot draw it.
+    pub fn ask(&self, object: &MovingBox) -> Result<SampledAnswer, PassError> {
         let [open, close] = object.corners();
         // A geometry is refused only for values that are not finite, which are invisible.
         let Ok(geometry) = Geometry::new(&open, &close, &MovingBox::TRIANGLES) else {
             return Ok(SampledAnswer::default());
         };
-        let draws = [Draw { geometry, shader: &Unshaded, cull: Cull::None }];
+        let draws = [Draw::new(geometry, &Unshaded, Cull::None)];
         // A sampled query has no stored depths of tiles.
         let features = Features { z_max: false, ..self.settings.spec.features };
         let spec = PipelineSpec { features, ..*self.settings.spec };
         let settings = Settings { spec: &spec, ..*self.settings };
-        let (own, counts) = render_depth(self.camera, &draws, &settings, |_, _| ())?;
+        let pass = RasterPass::new(self.camera, &draws, &settings).onto(Target::Depth).with_visible();
+        let Rendered { visible: own, counts, .. } = pass.render(|_, _| ())?;
         let passes = |(own, stored): &(f32, &f32)| own.is_finite() && own <= stored;
         let passed = own.into_iter().map(depth).zip(self.depths).filter(passes).count() as u64;
         let all = |events: &[Event]| events.iter().map(|event| counts[*event]).sum();

@@ -5,18 +5,19 @@
 //! the depth test rejects nothing. Every round uses new samples, so the points have no bias. Regions smaller
 //! than a pixel are filled by [`super::poisson`] on the host; the facts give the share.
 
-use activity::{Counts, LineAccess, Packet};
 use glam::{Vec3, Vec4};
-use pipeline::frame::{render_with_heat, visibility};
 use pipeline::random::mix;
 use pipeline::sampling::{HashedSamples, LensShape, SampleSource};
-use pipeline::{Cull, Draw, Geometry, PipelineSpec, Shader, ShaderCost, ShadingPoint, Viewport};
+use pipeline::{
+    Cull, Draw, FrameReport, Geometry, Gpu, PipelineSpec, RasterPass, Shader, ShaderCost, ShadingPoint,
+    Viewport,
+};
 use serde::{Deserialize, Serialize};
 
 use super::poisson::{Cube, Domain, PoissonDisk, PoissonSpec, Spacing, poisson_disk_drawn};
 use super::volume::{camera, place};
 use crate::error::LoadError;
-use crate::job::{Drawn, Draws, Emit, Fact, Flag, Flags, Job, JobError, OptionSource, Request};
+use crate::job::{Drawn, Draws, Fact, Flag, Flags, Job, JobError, OptionSource, Request};
 use crate::scene::Settings;
 
 /// Options of the job.
@@ -90,15 +91,11 @@ pub struct Rasterized {
     pub drawn: usize,
     /// Samples that hit an uncovered cell.
     pub candidates: u64,
-    /// Triangles drawn.
-    pub triangles: usize,
     /// Rounds, one pass each.
     pub passes: u16,
-    /// Event counts.
-    pub counts: Counts,
 }
 
-/// Points of the unit square, from `side` by `side` pixels with `samples` each.
+/// Points of the unit square, from `side` by `side` pixels with `samples` each, and the work of the GPU.
 ///
 /// # Errors
 /// [`JobError`] for an invalid option or hardware.
@@ -108,32 +105,31 @@ pub fn rasterized(
     samples: u32,
     seed: u64,
     spec: &PipelineSpec,
-) -> Result<Rasterized, JobError> {
+) -> Result<(Rasterized, FrameReport), JobError> {
     let settings = Settings { width: side, height: side, samples, ..Settings::default() };
-    Sampling { options, settings, seed }.points(0, spec, &mut |_, _| ())
+    let mut gpu = Gpu::quiet(spec)?;
+    let points = Sampling { options, settings, seed }.points(0, &mut gpu)?;
+    Ok((points, gpu.finish()))
 }
 
 /// Totals of the rounds so far.
 #[derive(Default)]
 struct Totals {
-    counts: Counts,
-    triangles: usize,
     candidates: u64,
     round: u16,
 }
 
 impl Sampling {
     /// Runs all rounds, then completes the points on the host.
-    fn points(&self, number: u32, spec: &PipelineSpec, emit: Emit<'_>) -> Result<Rasterized, JobError> {
+    fn points(&self, number: u32, gpu: &mut Gpu<'_>) -> Result<Rasterized, JobError> {
         let domain = if self.options.periodic { Domain::Torus } else { Domain::Box };
         let seed = mix(self.seed.wrapping_add(u64::from(number)));
         let requested = PoissonSpec { radius: self.options.radius, domain, seed, spacing: Spacing::Double };
         let mut totals = Totals::default();
-        let draw = |cubes: &[Cube<2>]| self.round(cubes, number, spec, &mut totals, emit);
+        let draw = |cubes: &[Cube<2>]| self.round(cubes, number, &mut totals, gpu);
         let (found, drawn) = poisson_disk_drawn(&requested, self.options.rounds, draw)?
             .map_err(|error| JobError::Setting(error.to_string()))?;
-        let Totals { counts, triangles, candidates, round } = totals;
-        Ok(Rasterized { found, drawn, candidates, triangles, passes: round, counts })
+        Ok(Rasterized { found, drawn, candidates: totals.candidates, passes: totals.round })
     }
 
     /// Draws the uncovered cells of a round and returns the samples that hit, in random order.
@@ -141,9 +137,8 @@ impl Sampling {
         &self,
         cubes: &[Cube<2>],
         frame: u32,
-        spec: &PipelineSpec,
         totals: &mut Totals,
-        emit: Emit<'_>,
+        gpu: &mut Gpu<'_>,
     ) -> Result<Vec<[f64; 2]>, JobError> {
         let side = self.settings.height;
         let seed = mix(self.seed ^ u64::from(frame) << 32 ^ u64::from(totals.round));
@@ -155,16 +150,16 @@ impl Sampling {
         let (corners, triangles) = squares(cubes);
         let geometry =
             Geometry::new(&corners, &corners, &triangles).map_err(|e| JobError::Setting(e.to_string()))?;
-        let draws = [Draw { geometry, shader: &Append, cull: Cull::None }];
-        let settings = pipeline::Settings { spec, viewport, samples: &samples, background: Vec3::ZERO };
-        let pass = totals.round;
-        let mut emit_in_pass =
-            |packet: &Packet, lines: &[LineAccess]| emit(&Packet { pass, ..*packet }, lines);
-        let (rendered, _) = render_with_heat(&camera, &draws, &settings, &[], &mut emit_in_pass)?;
-        let seen = visibility(&camera, &draws, &settings)?;
-        let candidates = hits(&seen, side, &samples, seed);
-        totals.counts += &rendered.counts;
-        totals.triangles += triangles.len();
+        let draws = [Draw::new(geometry, &Append, Cull::None)];
+        let settings =
+            pipeline::Settings { spec: gpu.spec(), viewport, samples: &samples, background: Vec3::ZERO };
+        if totals.round > 0 {
+            // The host has read the candidates of the round before.
+            gpu.wait();
+        }
+        let name = format!("round {}", totals.round);
+        let pass = RasterPass::new(&camera, &draws, &settings).named(&name).with_visible();
+        let candidates = hits(&gpu.draw(&pass)?.visible, side, &samples, seed);
         totals.candidates += candidates.len() as u64;
         totals.round += 1;
         Ok(candidates)
@@ -228,9 +223,8 @@ impl Draws for Sampling {
         Ok(number)
     }
 
-    fn draw(&self, &number: &u32, spec: &PipelineSpec, emit: Emit<'_>) -> Result<Drawn, JobError> {
-        let Rasterized { found, drawn, candidates, triangles, counts, .. } =
-            self.points(number, spec, emit)?;
+    fn draw(&self, &number: &u32, gpu: &mut Gpu<'_>) -> Result<Drawn, JobError> {
+        let Rasterized { found, drawn, candidates, .. } = self.points(number, gpu)?;
         let fact = |name, value| Fact { name, value };
         let facts = vec![
             fact("points", found.points.len() as f64),
@@ -240,12 +234,14 @@ impl Draws for Sampling {
             fact("thin_voids", found.thin_regions as f64),
         ];
         let image = picture(&found.points, self.settings.height, self.options.radius);
-        Ok(Drawn { image, counts, triangles, facts, ..Drawn::default() })
+        Ok(Drawn { image, facts, ..Drawn::default() })
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use activity::{Counts, Packet};
+
     use super::super::poisson::closer;
     use super::*;
     use crate::job::testing::hardware;
@@ -262,15 +258,18 @@ mod tests {
     fn most_points_come_from_samples_and_packets_add_up() {
         let job = made(&[("radius", "0.05")], (128, 128)).unwrap();
         let (mut sum, mut passes) = (Counts::default(), 0);
-        let mut emit = |packet: &Packet, _: &[LineAccess]| {
+        let hardware = hardware();
+        let mut gpu = Gpu::new(&hardware, |packet: &Packet, _| {
             sum += &packet.counts;
             passes = passes.max(packet.pass + 1);
-        };
-        let drawn = job.frame(0, &hardware(), &mut emit).unwrap();
-        assert_eq!((drawn.counts, passes), (sum, 5));
+        })
+        .unwrap();
+        let drawn = job.frame(0, &mut gpu).unwrap();
+        let report = gpu.finish();
+        assert_eq!((report.counts(), passes), (sum, 5));
         let fact = |name: &str| drawn.facts.iter().find(|fact| fact.name == name).unwrap().value;
         assert!(fact("points_from_samples") > 0.9 * fact("points"), "{:?}", drawn.facts);
-        assert!(drawn.image.contains(&Vec3::ONE) && drawn.triangles > 1600);
+        assert!(drawn.image.contains(&Vec3::ONE) && report.triangles() > 1600);
     }
 
     #[test]

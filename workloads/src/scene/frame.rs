@@ -131,7 +131,7 @@ impl FrameMesh {
             geometry = geometry.with_colors(&self.colors).map_err(|e| refused(e.to_string()))?;
         }
         let cull = if scene.materials()[self.material].double_sided { Cull::None } else { Cull::Back };
-        Ok(Draw { geometry, shader, cull })
+        Ok(Draw::new(geometry, shader, cull))
     }
 }
 

@@ -6,16 +6,16 @@ use std::collections::HashSet;
 use activity::{Counts, Event};
 use glam::{DVec3, Vec3};
 use pipeline::sampling::{Pattern, Sample, SampleSource, SampleSpec};
-use pipeline::{Cull, Draw, PipelineSpec, Viewport};
+use pipeline::{Cull, Draw, Gpu, Viewport};
 use serde::{Deserialize, Serialize};
 use warnings::{Code, Warning};
 
 use super::light::{AreaLight, LightSpec};
-use super::map::{Method, Renderer, ShadowMap, View, depth_pass};
+use super::map::{Method, ShadowMap, View, depth_pass};
 use super::shade::{Shadows, World, look_up_packets};
 use crate::accumulation::SharedSamples;
 use crate::error::LoadError;
-use crate::job::{Drawn, DrawsScene, Emit, Fact, Flag, Flags, Job, JobError, OptionSource, Request, shifted};
+use crate::job::{Drawn, DrawsScene, Fact, Flag, Flags, Job, JobError, OptionSource, Request};
 use crate::material::Material;
 use crate::scene::{
     self, Frame, Graph, Local, Motion, Node, Overrides, Parts, Rig, Scene, SceneCamera, Settings, Spin, Trs,
@@ -157,28 +157,23 @@ impl DrawsScene for SoftShadows {
         &self.scene
     }
 
-    fn draw_frame(&self, frame: &Frame, spec: &PipelineSpec, emit: Emit<'_>) -> Result<Drawn, JobError> {
+    fn draw_frame(&self, frame: &Frame, gpu: &mut Gpu<'_>) -> Result<Drawn, JobError> {
         let settings = self.scene.settings();
         let (draws, albedos) = parts(&self.scene, frame)?;
         let viewport = Viewport::new(settings.width, settings.height)
             .ok_or_else(|| JobError::Setting("an image of no size".to_owned()))?;
-        let (camera, each) = (frame.camera.with_lens(None), self.passes());
-        let (view, renderer) =
-            (View { camera: &camera, draws: &draws }, Renderer { method: self.method(), spec });
-        let map = ShadowMap::new(&self.light, &draws, self.options.map_px, &self.set, renderer, emit)?;
-        let visible = depth_pass(&view, viewport, &self.set, renderer, &mut shifted(each, emit))?;
+        let (camera, draws) = (frame.camera.with_lens(None), gpu.resident(&draws));
+        let view = View { camera: &camera, draws: &draws };
+        let map = ShadowMap::new(&self.light, &draws, self.options.map_px, &self.set, self.method(), gpu)?;
+        let visible = depth_pass(&view, viewport, &self.set, self.method(), gpu)?;
         let world = World::new(&view, viewport, &self.light, &albedos, self.scene.background());
         let lookups = (&self.set as &dyn SampleSource, &visible.samples[..]);
-        let shaded = look_up_packets(&world, lookups, &map, spec, &mut shifted(2 * each, emit))?;
+        let shaded = look_up_packets(&world, lookups, &map, gpu);
         let shadows = Shadows::Map { map: &map, bias: self.options.bias };
         let image = world.image(&self.set, &visible.samples, shadows);
-        let mut counts = map.counts;
-        counts += &visible.counts;
-        counts += &shaded;
-        let triangles = map.triangles + visible.triangles;
         let facts = self.facts(&map, &shaded);
         let (moving, warnings) = (frame.is_moving(), self.regime_warnings());
-        Ok(Drawn { image, counts, triangles, moving, lens: true, facts, warnings })
+        Ok(Drawn { image, moving, lens: true, facts, warnings })
     }
 }
 

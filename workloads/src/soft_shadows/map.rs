@@ -2,13 +2,16 @@
 
 use activity::Counts;
 use glam::Vec3;
-use pipeline::frame::render_depth;
+use pipeline::memory::Surface;
 use pipeline::sampling::Sample;
-use pipeline::{Camera, Draw, PipelineSpec, Settings, Viewport};
+use pipeline::{Camera, Draw, Gpu, RasterPass, Rendered, Settings, Target, Viewport};
 
 use super::light::AreaLight;
 use crate::accumulation::{SharedSamples, Snapshot, SnapshotError};
-use crate::job::{Emit, JobError, shifted};
+use crate::job::JobError;
+
+/// Bytes of a stored depth.
+const DEPTH_BYTES: u64 = 4;
 
 /// An array of shadow maps, one per sample of light and time.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,8 +22,7 @@ pub struct ShadowMap {
     depths: Vec<f32>,
     /// Event counts.
     pub counts: Counts,
-    /// Triangles drawn, in all passes.
-    pub triangles: usize,
+    surfaces: Vec<Surface>,
 }
 
 impl ShadowMap {
@@ -35,17 +37,17 @@ impl ShadowMap {
         draws: &[Draw<'_>],
         side: u32,
         set: &SharedSamples,
-        renderer: Renderer<'_>,
-        emit: Emit<'_>,
+        method: Method,
+        gpu: &mut Gpu<'_>,
     ) -> Result<Self, JobError> {
         let viewport = Viewport::new(side, side).filter(|_| side.is_multiple_of(2));
         let refused =
             || JobError::Setting(format!("map_px {side}: a shadow map has an even number of texels"));
         let viewport = viewport.ok_or_else(refused)?;
         let set = set.centred();
-        let seen = depth_pass(&View { camera: light.camera(), draws }, viewport, &set, renderer, emit)?;
+        let seen = depth_pass(&View { camera: light.camera(), draws }, viewport, &set, method, gpu)?;
         let depths = seen.samples.into_iter().map(|(_, depth)| f32::from_bits(depth)).collect();
-        Ok(Self { side, set, depths, counts: seen.counts, triangles: seen.triangles })
+        Ok(Self { side, set, depths, counts: seen.counts, surfaces: seen.surfaces })
     }
 
     /// Texels across and down.
@@ -65,7 +67,7 @@ impl ShadowMap {
 
     /// Bytes of the map.
     pub fn bytes(&self) -> u64 {
-        4 * self.depths.len() as u64
+        DEPTH_BYTES * self.depths.len() as u64
     }
 
     /// Index in [`Self::depths`] that decides about a point for sample `index` of the set, and the point's
@@ -75,6 +77,16 @@ impl ShadowMap {
         let ([x, y], depth) = light.texel(point, [u, v], self.side)?;
         let texel = y as usize * self.side as usize + x as usize;
         Some((texel * self.set.samples().len() + index, depth))
+    }
+
+    /// Address of the depth at a [place](Self::place).
+    pub fn address(&self, place: usize) -> u64 {
+        let count = self.set.samples().len();
+        let (surface, at) = match &self.surfaces[..] {
+            [all] => (all, place),
+            each => (&each[place % count], place / count),
+        };
+        surface.address() + at as u64 * DEPTH_BYTES
     }
 
     /// Whether a point is lit for sample `index` of the set: no stored depth is nearer by more than `bias`
@@ -102,15 +114,6 @@ pub struct View<'a> {
     pub draws: &'a [Draw<'a>],
 }
 
-/// How depths are rendered, and on which hardware.
-#[derive(Clone, Copy)]
-pub struct Renderer<'a> {
-    /// One pass, or accumulation.
-    pub method: Method,
-    /// The hardware.
-    pub spec: &'a PipelineSpec,
-}
-
 /// Result of a depth pass: the visible triangle of each sample (`u32::MAX` for none) and the bits of its
 /// depth, in the order `(y width + x) n + index`.
 pub struct DepthPass {
@@ -118,8 +121,8 @@ pub struct DepthPass {
     pub samples: Vec<(u32, u32)>,
     /// Event counts.
     pub counts: Counts,
-    /// Triangles drawn, in all passes.
-    pub triangles: usize,
+    /// The depths in memory, of all samples or sample by sample.
+    pub surfaces: Vec<Surface>,
 }
 
 /// Renders the depths of `draws` in `camera`, at the samples of `set`.
@@ -130,33 +133,39 @@ pub fn depth_pass(
     view: &View<'_>,
     viewport: Viewport,
     set: &SharedSamples,
-    renderer: Renderer<'_>,
-    emit: Emit<'_>,
+    method: Method,
+    gpu: &mut Gpu<'_>,
 ) -> Result<DepthPass, JobError> {
     let View { camera, draws } = *view;
-    let Renderer { method, spec } = renderer;
-    let triangles_per_pass: usize = draws.iter().map(|draw| draw.geometry.triangles().len()).sum();
+    let spec = gpu.spec();
     if method == Method::OnePass {
         let settings = Settings { spec, viewport, samples: set, background: Vec3::ZERO };
-        let (samples, counts) = render_depth(camera, draws, &settings, emit)?;
-        return Ok(DepthPass { samples, counts, triangles: triangles_per_pass });
+        let Rendered { visible, counts, surface, .. } = gpu.draw(&depths(camera, draws, &settings))?;
+        return Ok(DepthPass { samples: visible, counts, surfaces: vec![surface] });
     }
     let per_pixel = set.samples().len();
     let mut seen = DepthPass {
         samples: vec![(0, 0); viewport.pixels() * per_pixel],
         counts: Counts::default(),
-        triangles: 0,
+        surfaces: Vec::new(),
     };
+    let draws = gpu.resident(draws);
     for (index, at) in set.samples().iter().enumerate() {
         let failed = |error: SnapshotError| JobError::Setting(error.to_string());
-        let snapshot = Snapshot::new(camera, draws, viewport, at).map_err(failed)?;
+        let snapshot = Snapshot::new(camera, &draws, viewport, at).map_err(failed)?;
         let still = snapshot.draws().map_err(failed)?;
         let samples = set.still(index);
         let settings = Settings { spec, viewport, samples: &samples, background: Vec3::ZERO };
-        let (one, counts) = render_depth(&snapshot.camera, &still, &settings, shifted(index as u16, emit))?;
-        seen.counts += &counts;
-        seen.triangles += triangles_per_pass;
-        seen.samples.iter_mut().skip(index).step_by(per_pixel).zip(one).for_each(|(into, from)| *into = from);
+        let one = gpu.draw(&depths(&snapshot.camera, &still, &settings))?;
+        seen.counts += &one.counts;
+        seen.surfaces.push(one.surface);
+        let of_sample = seen.samples.iter_mut().skip(index).step_by(per_pixel);
+        of_sample.zip(one.visible).for_each(|(into, from)| *into = from);
     }
     Ok(seen)
+}
+
+/// A pass that draws depths.
+fn depths<'a>(camera: &'a Camera, draws: &'a [Draw<'a>], settings: &'a Settings<'a>) -> RasterPass<'a> {
+    RasterPass::new(camera, draws, settings).named("depths").onto(Target::Depth).with_visible()
 }

@@ -4,17 +4,15 @@
 use activity::{Counts, Event, Packet, PacketKind};
 use glam::{DVec3, Vec3};
 use pipeline::geometry::Projection;
-use pipeline::memory::{LINE_BYTES, MemorySystem};
 use pipeline::sample_test::exact::weights;
 use pipeline::sampling::{Sample, SampleSource};
 use pipeline::setup::Corner;
-use pipeline::{Camera, PipelineSpec, Viewport};
+use pipeline::{Camera, Gpu, Viewport};
 use rayon::prelude::*;
 
 use super::light::AreaLight;
 use super::map::{ShadowMap, View};
 use crate::accumulation::Rays;
-use crate::job::{Emit, JobError};
 
 /// Ambient light, relative to the light on a surface that faces the light.
 const AMBIENT: f32 = 0.18;
@@ -163,27 +161,24 @@ const OPS: u32 = 76;
 const BYTES: u64 = 4;
 
 /// Emits the packets of the pass that shades the visible samples, one per tile, and returns their sum.
-///
-/// # Errors
-/// [`JobError`] if a cache of `spec` cannot be built.
 pub fn look_up_packets(
     world: &World<'_>,
     (samples, seen): (&dyn SampleSource, &[(u32, u32)]),
     map: &ShadowMap,
-    spec: &PipelineSpec,
-    emit: Emit<'_>,
-) -> Result<Counts, JobError> {
-    let mut memory = MemorySystem::new(&spec.memory)?;
-    let image = map.bytes().next_multiple_of(LINE_BYTES);
+    gpu: &mut Gpu<'_>,
+) -> Counts {
+    gpu.wait();
+    let pass = gpu.begin("look-ups");
+    let image = gpu.surface(world.viewport.pixels() as u64 * BYTES);
     let (width, height) = (world.viewport.width(), world.viewport.height());
-    let (side, per_pixel) = (spec.tile_px, samples.per_pixel() as usize);
+    let (side, per_pixel) = (gpu.spec().tile_px, samples.per_pixel() as usize);
     let mut counts = Counts::default();
     let mut at = vec![Sample::default(); per_pixel];
     let tiles = (0..height)
         .step_by(side as usize)
         .flat_map(|y| (0..width).step_by(side as usize).map(move |x| [x, y]));
-    for (number, [x0, y0]) in (0..).zip(tiles) {
-        let mut packet = Packet { tile: number, ..Packet::new(PacketKind::Tile, 0) };
+    for (tile, [x0, y0]) in (0..).zip(tiles) {
+        let mut packet = Packet { tile, ..Packet::new(PacketKind::Tile, pass) };
         for [px, py] in
             (y0..height.min(y0 + side)).flat_map(|y| (x0..width.min(x0 + side)).map(move |x| [x, y]))
         {
@@ -195,19 +190,15 @@ pub fn look_up_packets(
                 packet.counts[Event::ShaderOps] += OPS;
                 if let Some((place, _)) = map.place(world.light, point, index) {
                     packet.counts[Event::TextureFetches] += 1;
-                    memory.texture(place as u64 * BYTES, &mut packet.counts);
+                    gpu.memory().texture(map.address(place), &mut packet.counts);
                 }
             }
             packet.counts[Event::PixelsResolved] += 1;
-            memory.colour(image + pixel as u64 * BYTES, true, true, &mut packet.counts);
+            gpu.memory().colour(image.address() + pixel as u64 * BYTES, true, true, &mut packet.counts);
         }
         counts += &packet.counts;
-        emit(&packet, memory.log());
-        memory.clear_log();
+        gpu.push(&packet, 0);
     }
-    let mut last = Packet::new(PacketKind::Resolve, 0);
-    memory.finish(image..image + world.viewport.pixels() as u64 * BYTES, &mut last.counts);
-    counts += &last.counts;
-    emit(&last, memory.log());
-    Ok(counts)
+    gpu.keep(image);
+    counts
 }

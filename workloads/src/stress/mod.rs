@@ -124,7 +124,7 @@ impl StressScene {
     /// None for an unchanged scene of a family; otherwise [`DrawError`] for invalid vertices.
     pub fn draw<'a>(&'a self, shader: &'a dyn Shader) -> Result<Draw<'a>, DrawError> {
         let close = if self.open == self.close { &self.open } else { &self.close };
-        Ok(Draw { geometry: Geometry::new(&self.open, close, &self.triangles)?, shader, cull: Cull::None })
+        Ok(Draw::new(Geometry::new(&self.open, close, &self.triangles)?, shader, Cull::None))
     }
 }
 
@@ -157,7 +157,7 @@ pub fn set_up_all<'a>(
 }
 
 /// Visible triangle of each sample and the bits of its depth, in the form of
-/// [`visibility`](pipeline::frame::visibility). All triangles are tested against all samples in all
+/// [`visibility`](pipeline::RasterPass::visibility). All triangles are tested against all samples in all
 /// dimensions.
 pub fn brute_force(
     camera: &Camera,

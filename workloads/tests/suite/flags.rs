@@ -1,8 +1,10 @@
 //! Scene flags of workloads: used flags change the result, and others are refused.
 
-use crate::common::{expect, spec};
+use crate::common::{drawn_on, expect, spec};
+use activity::Counts;
+use glam::Vec3;
 use workloads::catalog::find;
-use workloads::job::{Drawn, OptionSource, Request};
+use workloads::job::{OptionSource, Request};
 use workloads::{LoadError, Overrides};
 
 type Change = fn(&mut Overrides);
@@ -35,9 +37,10 @@ fn options(job: &str) -> OptionSource {
 }
 
 /// Frame 1, in which moving objects have moved.
-fn drawn(job: &str, overrides: &Overrides) -> Result<Drawn, LoadError> {
+fn drawn(job: &str, overrides: &Overrides) -> Result<(Vec<Vec3>, Counts), LoadError> {
     let job = find(job, &options(job), &Request { overrides, seed: 1 }).unwrap()?;
-    Ok(job.frame(1, &spec(), &mut |_, _| ()).unwrap())
+    let (drawn, report) = drawn_on(&spec(), &*job, 1);
+    Ok((drawn.image, report.counts()))
 }
 
 /// A small image, with a lens if the focus needs one.
@@ -65,8 +68,7 @@ fn used_flags_change_the_result() {
                 Ok(drawn_so) => {
                     assert!(taken.contains(&flag), "{job} takes {flag}");
                     let usual = drawn(job, &usual(job, flag)).unwrap();
-                    let same = (&drawn_so.image, &drawn_so.counts) == (&usual.image, &usual.counts);
-                    assert!(!same, "{job} ignores {flag}");
+                    assert!(drawn_so != usual, "{job} ignores {flag}");
                 }
                 Err(error) => {
                     assert!(!taken.contains(&flag) && error.is_usage(), "{job} {flag}: {error}");

@@ -2,13 +2,13 @@
 
 use glam::{DVec3, Vec3};
 use pipeline::sampling::SampleSource;
-use pipeline::{Cull, Draw, Geometry, LensShape, SampleSpec, SampleTable};
+use pipeline::{Cull, Draw, Geometry, Gpu, LensShape, SampleSpec, SampleTable};
 use workloads::Overrides;
 use workloads::accumulation::{Rays, SharedSamples};
 use workloads::glossy::{Effect, Glossy, Lobe, Map, Options, Receiver, receiver, stage};
 use workloads::job::Job;
 
-use crate::common::{White, spec};
+use crate::common::{White, drawn_on, spec};
 
 const EYE: (DVec3, DVec3) = (DVec3::new(0.3, 2.0, 0.4), DVec3::new(-0.1, -1.0, -0.2));
 
@@ -30,9 +30,10 @@ fn edge(height: f64, radius: f64, effect: Effect) -> (Map, Vec<f64>) {
     let corners = [[0.0, -99.0], [99.0, -99.0], [99.0, 99.0], [0.0, 99.0]].map(|[x, z]| Vec3::new(x, y, z));
     let triangles = [[0, 1, 2], [0, 2, 3]];
     let geometry = Geometry::new(&corners, &corners, &triangles).unwrap();
-    let draws = [Draw { geometry, shader: &White, cull: Cull::None }];
+    let draws = [Draw::new(geometry, &White, Cull::None)];
     let samples = table(64, LensShape::Square);
-    let image = map.one_pass(&draws, &samples, (&spec(), Vec3::ZERO), &mut |_, _| ()).unwrap().0;
+    let image =
+        map.one_pass(&draws, &samples, Vec3::ZERO, &mut Gpu::quiet(&spec()).unwrap()).unwrap().into_image();
     let width = map.viewport.width() as usize;
     let column = |x: usize| {
         image.iter().skip(x).step_by(width).map(|p| f64::from(p.x)).sum::<f64>()
@@ -91,14 +92,15 @@ fn one_pass_accumulation_and_rays_agree() {
         let samples = table(64, LensShape::Disk);
         let sky = scene.background();
         let traced = map.by_rays((&rays, &colours), &[&samples as &dyn SampleSource], sky, Lobe::Lens);
-        let drawn = map.one_pass(&draws, &samples, (&spec(), sky), &mut |_, _| ()).unwrap().0;
+        let drawn =
+            map.one_pass(&draws, &samples, sky, &mut Gpu::quiet(&spec()).unwrap()).unwrap().into_image();
         // The samples are the same, so only samples on edges may differ, by rounding.
         assert!(rmse(&drawn, &traced) < 2e-3, "{effect:?}: {}", rmse(&drawn, &traced));
         assert!(rmse(&drawn, &vec![sky; drawn.len()]) > 0.05, "there is something to see");
         let set = SharedSamples::interleaved(&SampleSpec::default(), 64, 3).unwrap();
-        let added = map.accumulated(&draws, &set, (&spec(), sky), &mut |_, _| ()).unwrap().0;
+        let added = map.accumulated(&draws, &set, sky, &mut Gpu::quiet(&spec()).unwrap()).unwrap().0;
         assert!(rmse(&added, &traced) < 0.04, "{}", rmse(&added, &traced));
-        let one = map.one_pass(&draws, &set, (&spec(), sky), &mut |_, _| ()).unwrap().0;
+        let one = map.one_pass(&draws, &set, sky, &mut Gpu::quiet(&spec()).unwrap()).unwrap().into_image();
         assert!(rmse(&added, &one) < 2e-3, "the same set: {}", rmse(&added, &one));
     }
 }
@@ -113,7 +115,9 @@ fn more_samples_reduce_the_error() {
     let map = Map::new(&receiver(), eye, Effect::Reflection, 0.3, 16).unwrap();
     let image = |seed, samples| {
         let table = SampleTable::new(&SampleSpec::default(), samples, seed).unwrap();
-        map.one_pass(&draws, &table, (&spec(), scene.background()), &mut |_, _| ()).unwrap().0
+        map.one_pass(&draws, &table, scene.background(), &mut Gpu::quiet(&spec()).unwrap())
+            .unwrap()
+            .into_image()
     };
     let truth = image(99, 256);
     let [few, more, most] = [4, 16, 64].map(|samples| rmse(&image(1, samples), &truth));
@@ -123,9 +127,7 @@ fn more_samples_reduce_the_error() {
 fn drawn(options: Options) -> (Vec<Vec3>, Vec<&'static str>) {
     let overrides = Overrides { size: Some((48, 27)), samples: Some(4), ..Overrides::default() };
     let job = Glossy::new(Options { texels: 16, ..options }, &overrides, 1).unwrap();
-    let mut sum = activity::Counts::default();
-    let drawn = job.frame(0, &spec(), &mut |packet, _| sum += &packet.counts).unwrap();
-    assert_eq!(sum, drawn.counts);
+    let (drawn, _) = drawn_on(&spec(), &job, 0);
     (drawn.image, drawn.warnings.iter().map(|warning| warning.code.name()).collect())
 }
 
@@ -147,7 +149,7 @@ fn a_mirror_shows_what_is_mirrored() {
     let options = Options { roughness: 0.0, fresnel: 1.0, texels: 256, map_samples: 4, ..Options::default() };
     let overrides = Overrides { size: Some((WIDE as u32, 216)), samples: Some(4), ..Overrides::default() };
     let job = Glossy::new(options, &overrides, 1).unwrap();
-    let image = job.frame(0, &spec(), &mut |_, _| ()).unwrap().image;
+    let image = job.frame(0, &mut Gpu::quiet(&spec()).unwrap()).unwrap().image;
     let scene = stage(false).unwrap().with_overrides(&overrides).unwrap();
     let frame = scene.frame(0).unwrap();
     let draws = frame.draws(&scene).unwrap();

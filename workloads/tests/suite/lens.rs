@@ -3,7 +3,7 @@
 use crate::common::Files;
 use glam::Vec3;
 use pipeline::{
-    CacheSpec, Features, LensShape, MemorySpec, PipelineSpec, SampleTable, Shading, Viewport, render,
+    CacheSpec, Features, LensShape, MemorySpec, PipelineSpec, RasterPass, SampleTable, Shading, Viewport,
 };
 use workloads::{Overrides, Scene, load};
 
@@ -107,7 +107,7 @@ fn pixels_hit(scene: &Scene) -> usize {
     let settings = pipeline::Settings { spec: &spec, viewport, samples: &samples, background };
     let frame = scene.frame(0).unwrap();
     let draws = frame.draws(scene).unwrap();
-    let image = render(&frame.camera, &draws, &settings, |_| ()).unwrap().image;
+    let image = RasterPass::new(&frame.camera, &draws, &settings).render(|_, _| ()).unwrap().into_image();
     image.iter().filter(|pixel| **pixel != background).count()
 }
 

@@ -2,12 +2,12 @@
 
 use activity::Event;
 use glam::{Affine3A, Vec3};
-use pipeline::{CacheSpec, Camera, Cull, Draw, Geometry, PipelineSpec, Shading, Viewport};
+use pipeline::{CacheSpec, Camera, Cull, Draw, Geometry, Gpu, PipelineSpec, Shading, Viewport};
 use workloads::job::Job;
 use workloads::multiview::{Layout, MultiView, Options, Rig, Show, Target, Views};
 use workloads::{Overrides, Scene};
 
-use crate::common::{White, bits, spec};
+use crate::common::{White, bits, drawn_on, spec};
 
 const LAYOUTS: [(Layout, u32); 4] = [
     (Layout::stereo(0.28, 0.11), 8),
@@ -35,7 +35,9 @@ fn with<R>(
 }
 
 fn one_pass(scene: &Scene, layout: (Layout, u32), spec: &PipelineSpec) -> Views {
-    with(scene, layout, spec, |rig, draws, to| rig.one_pass(draws, to, &mut |_, _| ()).unwrap())
+    with(scene, layout, spec, |rig, draws, to| {
+        rig.one_pass(draws, to, &mut Gpu::quiet(to.spec).unwrap()).unwrap()
+    })
 }
 
 fn rmse(a: &[Vec3], b: &[Vec3]) -> f64 {
@@ -48,8 +50,8 @@ fn one_pass_equals_view_by_view_bit_for_bit() {
     let scene = scene();
     for layout in LAYOUTS {
         with(&scene, layout, &spec(), |rig, draws, to| {
-            let one = rig.one_pass(draws, to, &mut |_, _| ()).unwrap();
-            let each = rig.view_by_view(draws, to, &mut |_, _| ()).unwrap();
+            let one = rig.one_pass(draws, to, &mut Gpu::quiet(to.spec).unwrap()).unwrap();
+            let each = rig.view_by_view(draws, to, &mut Gpu::quiet(to.spec).unwrap()).unwrap();
             assert_eq!((one.passes, each.passes), (1, layout.0.views));
             assert_eq!(one.images.len(), layout.0.views as usize);
             for (view, (a, b)) in one.images.iter().zip(&each.images).enumerate() {
@@ -73,7 +75,7 @@ fn a_region_of_the_lens_equals_a_separate_lens() {
     let scene = scene();
     let spec = PipelineSpec { shading: Shading::PerSample, ..spec() };
     with(&scene, LAYOUTS[0], &spec, |rig, draws, to| {
-        let one = rig.one_pass(draws, to, &mut |_, _| ()).unwrap();
+        let one = rig.one_pass(draws, to, &mut Gpu::quiet(to.spec).unwrap()).unwrap();
         let own = rig.own_cameras(draws, to).unwrap();
         for (a, b) in one.images.iter().zip(&own) {
             assert!(rmse(a, b) < 0.01, "{}", rmse(a, b));
@@ -88,8 +90,8 @@ fn accumulation_converges_to_the_same_views() {
     let layout = (Layout::stereo(0.28, 0.11), 64);
     let spec = PipelineSpec { shading: Shading::PerSample, ..spec() };
     with(&scene, layout, &spec, |rig, draws, to| {
-        let one = rig.one_pass(draws, to, &mut |_, _| ()).unwrap();
-        let many = rig.accumulated(draws, to, &mut |_, _| ()).unwrap();
+        let one = rig.one_pass(draws, to, &mut Gpu::quiet(to.spec).unwrap()).unwrap();
+        let many = rig.accumulated(draws, to, &mut Gpu::quiet(to.spec).unwrap()).unwrap();
         assert_eq!(many.passes, 128);
         for (a, b) in one.images.iter().zip(&many.images) {
             assert!(rmse(a, b) < 0.03, "{}", rmse(a, b));
@@ -111,11 +113,11 @@ fn accumulation_blurs_moving_objects_and_moving_cameras() {
         let views = |by: f32, camera: &Camera, many: bool| {
             let (open, close, spec) = (strip(-0.9), strip(-0.9 + by), spec());
             let geometry = Geometry::new(&open, &close, &[[0, 1, 2], [0, 2, 3]]).unwrap();
-            let draws = [Draw { geometry, shader: &White, cull: Cull::None }];
+            let draws = [Draw::new(geometry, &White, Cull::None)];
             let rig = Rig::new(camera, 4.0, &Layout::stereo(0.28, 0.11), 64, 3).unwrap();
             let to = Target { viewport, spec: &spec, background: Vec3::ZERO };
             let views = if many { Rig::accumulated } else { Rig::one_pass };
-            views(&rig, &draws, &to, &mut |_, _| ()).unwrap().images
+            views(&rig, &draws, &to, &mut Gpu::quiet(to.spec).unwrap()).unwrap().images
         };
         let (one, many, frozen) =
             (views(by, &camera, false), views(by, &camera, true), views(0.0, &still, false));
@@ -149,9 +151,7 @@ fn drawn(options: Options, spec: &PipelineSpec) -> (Vec<Vec3>, Vec<&'static str>
     let overrides = Overrides { size: Some((64, 48)), ..Overrides::default() };
     let options = Options { scene: "tiny".to_owned(), ..options };
     let job = MultiView::new(options, &overrides, 1).unwrap();
-    let mut sum = activity::Counts::default();
-    let drawn = job.frame(0, spec, &mut |packet, _| sum += &packet.counts).unwrap();
-    assert_eq!(sum, drawn.counts);
+    let (drawn, _) = drawn_on(spec, &job, 0);
     let codes = drawn.warnings.iter().map(|warning| warning.code.name()).collect();
     (drawn.image, codes, job.settings().width)
 }

@@ -3,18 +3,18 @@
 use activity::{Event, Unit};
 use glam::{DVec3, Vec3};
 use pipeline::sampling::{Pattern, Sample, SampleSpec};
-use pipeline::{Cull, Draw, Geometry, Viewport};
+use pipeline::{Cull, Draw, Geometry, Gpu, Viewport};
 use proptest::prelude::*;
 use workloads::Overrides;
 use workloads::accumulation::SharedSamples;
 use workloads::job::Job;
 use workloads::soft_shadows::{
-    AreaLight, DepthPass, LightSpec, Method, Options, Renderer, ShadowMap, Shadows, SoftShadows, View, World,
+    AreaLight, DepthPass, LightSpec, Method, Options, ShadowMap, Shadows, SoftShadows, View, World,
     depth_pass,
 };
 use workloads::visibility::Unshaded;
 
-use crate::common::{bits, spec};
+use crate::common::{bits, drawn_on, spec};
 
 /// Equal samples give only one step of a penumbra.
 #[test]
@@ -25,7 +25,7 @@ fn only_different_samples_count_against_banding() {
         let options = Options { points, map_px: 16, ..Options::default() };
         let job = SoftShadows::new(options, &overrides, 1).unwrap();
         let first = job.settings().frames.start;
-        let warnings = job.frame(first, &spec(), &mut |_, _| ()).unwrap().warnings;
+        let warnings = job.frame(first, &mut Gpu::quiet(&spec()).unwrap()).unwrap().warnings;
         warnings.into_iter().find(|warning| warning.code == "shadow-banding").map(|warning| warning.message)
     };
     let one = warned(Some(vec![(0.0, 0.0, 0.0)]), 64).unwrap();
@@ -51,7 +51,7 @@ fn quad(height: f32, x: [f32; 2], z: [f32; 2]) -> [Vec3; 4] {
 const TRIANGLES: [[u32; 3]; 2] = [[0, 1, 2], [0, 2, 3]];
 
 fn draw<'a>(open: &'a [Vec3], close: &'a [Vec3], triangles: &'a [[u32; 3]]) -> Draw<'a> {
-    Draw { geometry: Geometry::new(open, close, triangles).unwrap(), shader: &Unshaded, cull: Cull::None }
+    Draw::new(Geometry::new(open, close, triangles).unwrap(), &Unshaded, Cull::None)
 }
 
 /// A light straight above, at height 4.
@@ -61,7 +61,7 @@ fn above(radius: f64) -> AreaLight {
 }
 
 fn map(light: &AreaLight, draws: &[Draw<'_>], side: u32, set: &SharedSamples, method: Method) -> ShadowMap {
-    ShadowMap::new(light, draws, side, set, Renderer { method, spec: &spec() }, &mut |_, _| ()).unwrap()
+    ShadowMap::new(light, draws, side, set, method, &mut Gpu::quiet(&spec()).unwrap()).unwrap()
 }
 
 #[test]
@@ -71,18 +71,13 @@ fn one_pass_equals_accumulation_bit_for_bit() {
         let options = Options { accumulate, map_px: 64, ..Options::default() };
         let job = SoftShadows::new(options, &overrides, 1).unwrap();
         assert_eq!(job.settings().samples, 64);
-        let mut packets = activity::Counts::default();
-        let drawn = job.frame(1, &spec(), &mut |packet, _| packets += &packet.counts).unwrap();
-        assert_eq!(packets, drawn.counts);
-        drawn
+        let (drawn, report) = drawn_on(&spec(), &job, 1);
+        (drawn, report.triangles(), report.counts()[Event::Draws])
     };
-    let (one, many) = (image(false), image(true));
+    let ((one, triangles, draws), (many, many_triangles, many_draws)) = (image(false), image(true));
     assert_eq!(bits(&one.image), bits(&many.image));
     assert!(one.image.iter().any(|pixel| *pixel != one.image[0]));
-    assert_eq!(
-        (many.triangles, many.counts[Event::Draws]),
-        (64 * one.triangles, 64 * one.counts[Event::Draws])
-    );
+    assert_eq!((many_triangles, many_draws), (64 * triangles, 64 * draws));
 }
 
 proptest! {
@@ -153,8 +148,7 @@ fn motion_blurs_the_shadow_by_the_share_of_time() {
 
 /// The visible samples of a view, in one pass.
 fn visible(view: &View<'_>, viewport: Viewport, set: &SharedSamples) -> DepthPass {
-    let renderer = Renderer { method: Method::OnePass, spec: &spec() };
-    depth_pass(view, viewport, set, renderer, &mut |_, _| ()).unwrap()
+    depth_pass(view, viewport, set, Method::OnePass, &mut Gpu::quiet(&spec()).unwrap()).unwrap()
 }
 
 /// Lambert's law: a floor has the cosine of its angle to the light at the time of the sample, plus ambient
@@ -220,15 +214,18 @@ fn depth_passes_write_depths_only() {
     let floor = quad(0.0, [-9.0, 9.0], [-9.0, 9.0]);
     let (light, set) = (above(0.5), set(4, 1));
     let draws = [draw(&floor, &floor, &TRIANGLES)];
-    let map = map(&light, &draws, 64, &set, Method::OnePass);
-    assert!(!map.counts.uses(Unit::Colour) && !map.counts.uses(Unit::ShadingCache));
-    assert_eq!(map.counts[Event::DramWriteBytes], map.bytes(), "each depth goes to memory once");
+    let spec = spec();
+    let mut gpu = Gpu::quiet(&spec).unwrap();
+    let map = ShadowMap::new(&light, &draws, 64, &set, Method::OnePass, &mut gpu).unwrap();
+    let counts = gpu.finish().counts();
+    assert!(!counts.uses(Unit::Colour) && !counts.uses(Unit::ShadingCache));
+    assert_eq!(counts[Event::DramWriteBytes], map.bytes(), "each depth goes to memory once");
 }
 
 fn warned(options: Options, samples: u32) -> Vec<&'static str> {
     let overrides = Overrides { size: Some((8, 8)), samples: Some(samples), ..Overrides::default() };
     let job = SoftShadows::new(options, &overrides, 1).unwrap();
-    job.frame(0, &spec(), &mut |_, _| ()).unwrap().warnings.iter().map(|w| w.code.name()).collect()
+    job.frame(0, &mut Gpu::quiet(&spec()).unwrap()).unwrap().warnings.iter().map(|w| w.code.name()).collect()
 }
 
 #[test]

@@ -2,11 +2,10 @@
 //! sample sees the same as by brute force.
 
 use glam::Vec3;
-use pipeline::frame::visibility;
 use pipeline::geometry::Projection;
 use pipeline::setup::Triangle;
 use pipeline::traversal::{Box5, TileRect, narrow};
-use pipeline::{Features, PipelineSpec, Settings};
+use pipeline::{Features, PipelineSpec, RasterPass, Settings};
 use workloads::stress::{Family, Size, StressScene, brute_force, families, family, within_bounds};
 use workloads::visibility::Unshaded;
 
@@ -40,7 +39,7 @@ fn seen(scene: &StressScene, features: Features) -> Vec<(u32, u32)> {
     let spec = PipelineSpec { features, ..crate::common::spec() };
     let (viewport, samples) = (scene.viewport, &scene.samples);
     let settings = Settings { spec: &spec, viewport, samples, background: Vec3::ZERO };
-    visibility(&scene.camera, &[scene.draw(&Unshaded).unwrap()], &settings).unwrap()
+    RasterPass::new(&scene.camera, &[scene.draw(&Unshaded).unwrap()], &settings).visibility().unwrap()
 }
 
 fn truth(scene: &StressScene) -> Vec<(u32, u32)> {

@@ -124,7 +124,7 @@ impl Soup {
     pub fn draw<'a>(&'a self, shader: &'a dyn Shader, cull: Cull) -> Draw<'a> {
         let still = self.open == self.close;
         let close = if still { &self.open } else { &self.close };
-        Draw { geometry: Geometry::new(&self.open, close, &self.triangles).unwrap(), shader, cull }
+        Draw::new(Geometry::new(&self.open, close, &self.triangles).unwrap(), shader, cull)
     }
 }
 

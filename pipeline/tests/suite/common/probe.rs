@@ -124,7 +124,7 @@ pub fn repeated(per_pixel: u32, block: &[Sample]) -> SampleTable {
     SampleTable::programmed(per_pixel, 0, samples).unwrap()
 }
 
-/// Samples of an image in the order of [`visibility`](pipeline::frame::visibility): pixel by pixel in rows.
+/// Samples of an image in the order of [`visibility`](pipeline::RasterPass::visibility): pixel by pixel in rows.
 pub fn sample_positions(table: &SampleTable, viewport: Viewport) -> Vec<([u32; 2], Sample)> {
     let pixels = (0..viewport.height()).flat_map(|y| (0..viewport.width()).map(move |x| [x, y]));
     pixels.flat_map(|[x, y]| table.pixel(x, y).iter().map(move |&sample| ([x, y], sample))).collect()

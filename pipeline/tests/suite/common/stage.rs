@@ -1,7 +1,6 @@
 //! A camera, a sample table and an image.
 
 use glam::Vec3;
-use pipeline::frame::visibility;
 use pipeline::sampling::Sample;
 use pipeline::*;
 
@@ -32,7 +31,7 @@ impl Stage {
         let spec = spec(Features::ALL);
         let settings =
             Settings { spec: &spec, viewport: self.viewport, samples: &self.table, background: Vec3::ZERO };
-        render(&self.camera, draws, &settings, |_| ()).unwrap().image
+        RasterPass::new(&self.camera, draws, &settings).render(|_, _| ()).unwrap().into_image()
     }
 
     /// For each sample its pixel, the sample, its visible triangle and its depth.
@@ -40,7 +39,7 @@ impl Stage {
         let spec = spec(Features::ALL);
         let settings =
             Settings { spec: &spec, viewport: self.viewport, samples: &self.table, background: Vec3::ZERO };
-        let seen = visibility(&self.camera, draws, &settings).unwrap();
+        let seen = RasterPass::new(&self.camera, draws, &settings).visibility().unwrap();
         let sample_positions = sample_positions(&self.table, self.viewport);
         assert_eq!(seen.len(), sample_positions.len());
         sample_positions
@@ -62,7 +61,7 @@ impl Stage {
 }
 
 pub fn quad<'a>(open: &'a [Vec3], close: &'a [Vec3], shader: &'a Flat) -> Draw<'a> {
-    Draw { geometry: Geometry::new(open, close, &QUAD).unwrap(), shader, cull: Cull::None }
+    Draw::new(Geometry::new(open, close, &QUAD).unwrap(), shader, Cull::None)
 }
 
 pub fn still<'a>(corners: &'a [Vec3], shader: &'a Flat) -> Draw<'a> {

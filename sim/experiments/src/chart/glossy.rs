@@ -11,7 +11,7 @@ use output::OutputError;
 use output::plot::{ChartPanel, Scale, Series};
 use output::progress::Progress;
 use pipeline::sampling::SampleSource;
-use pipeline::{Cull, Draw, Geometry, LensShape, SampleSpec, SampleTable};
+use pipeline::{Cull, Draw, Geometry, Gpu, LensShape, SampleSpec, SampleTable};
 use run::GpuSpec;
 use serde::Serialize;
 use workloads::accumulation::{Rays, SharedSamples};
@@ -315,19 +315,20 @@ impl Bench {
     /// When the hardware cannot be built.
     pub fn row(&self, samples: u32, reference: &[Vec3]) -> Result<GlossyRow, StudyError> {
         let (map, draws) = (self.map(self.radius, self.effort.texels)?, self.draws()?);
-        let look = (&self.gpu.pipeline, self.scene.background());
+        let (spec, background) = (&self.gpu.pipeline, self.scene.background());
         let table = SampleTable::new(&SampleSpec::default(), samples, 1)?;
         let started = Instant::now();
-        let (one, counts) = map.one_pass(&draws, &table, look, &mut |_, _| ())?;
+        let one = map.one_pass(&draws, &table, background, &mut Gpu::quiet(spec)?)?;
+        let counts = one.counts;
         let host_s = started.elapsed().as_secs_f64();
         let set = SharedSamples::interleaved(&SampleSpec::default(), samples, 1)?;
         let started = Instant::now();
-        let (many, many_counts) = map.accumulated(&draws, &set, look, &mut |_, _| ())?;
+        let (many, many_counts) = map.accumulated(&draws, &set, background, &mut Gpu::quiet(spec)?)?;
         let rmse = |image: &[Vec3]| mean_square(&errors(image, reference)).sqrt();
         Ok(GlossyRow {
             effect: self.effect.0,
             samples,
-            rmse: rmse(&one),
+            rmse: rmse(&one.into_image()),
             accumulated_rmse: rmse(&many),
             vertices: counts[Event::VertexInvocations],
             accumulated_vertices: many_counts[Event::VertexInvocations],
@@ -352,9 +353,9 @@ impl Bench {
                 [[0.0, -99.0], [99.0, -99.0], [99.0, 99.0], [0.0, 99.0]].map(|[x, z]| Vec3::new(x, y, z));
             let refused = |error: pipeline::DrawError| StudyError::Pipeline(error.to_string());
             let geometry = Geometry::new(&corners, &corners, &[[0, 1, 2], [0, 2, 3]]).map_err(refused)?;
-            let draws = [Draw { geometry, shader: &White, cull: Cull::None }];
-            let look = (&self.gpu.pipeline, Vec3::ZERO);
-            let (image, _) = map.one_pass(&draws, &table, look, &mut |_, _| ())?;
+            let draws = [Draw::new(geometry, &White, Cull::None)];
+            let gpu = &mut Gpu::quiet(&self.gpu.pipeline)?;
+            let image = map.one_pass(&draws, &table, Vec3::ZERO, gpu)?.into_image();
             let width = ramp(&image, map.viewport.width() as usize) * map.texel();
             Ok(Blur { height, width, expected: map.blur(height) })
         };
@@ -370,8 +371,8 @@ impl Bench {
             let truth = self.by_rays(&map, Lobe::Lens)?;
             let cone = self.by_rays(&map, Lobe::Cone)?;
             let table = SampleTable::new(&SampleSpec::default(), FEW, 1)?;
-            let look = (&self.gpu.pipeline, self.scene.background());
-            let (few, _) = map.one_pass(&self.draws()?, &table, look, &mut |_, _| ())?;
+            let gpu = &mut Gpu::quiet(&self.gpu.pipeline)?;
+            let few = map.one_pass(&self.draws()?, &table, self.scene.background(), gpu)?.into_image();
             let rmse = |image: &[Vec3]| mean_square(&errors(image, &truth)).sqrt();
             Ok(Wide { over_half, rmse_of_samples: rmse(&few), rmse_of_lobe: rmse(&cone) })
         };

@@ -7,7 +7,6 @@ use output::plot::{ChartPanel, Scale, Series};
 use output::progress::{Bar, Progress};
 use pipeline::depth::BoxGrid;
 use pipeline::geometry::Projection;
-use pipeline::memory::CacheError;
 use pipeline::{LensShape, SampleTable, Settings, Viewport};
 use rayon::prelude::*;
 use run::GpuSpec;
@@ -319,10 +318,6 @@ pub(crate) struct Drawn {
     pub seen: Vec<SampledAnswer>,
 }
 
-fn refused(error: CacheError) -> StudyError {
-    StudyError::Pipeline(error.to_string())
-}
-
 impl Drawn {
     /// Draws the walls of a scene into an image of `size` with `samples` in a pixel, and tests every box by samples.
     ///
@@ -336,10 +331,10 @@ impl Drawn {
         let table = SampleTable::low_discrepancy(samples, SEED, LensShape::Disk)?;
         let settings = Settings { spec: &gpu.pipeline, viewport, samples: &table, background: Vec3::ZERO };
         let walls = scene.walls(&Unshaded).map_err(|error| StudyError::Pipeline(error.to_string()))?;
-        let depths = depths(&scene.camera, &[walls], &settings).map_err(refused)?;
+        let depths = depths(&scene.camera, &[walls], &settings)?;
         let queries = Samples { camera: &scene.camera, settings: &settings, depths: &depths };
         let seen = scene.boxes.par_iter().map(|object| queries.ask(object));
-        let seen = seen.collect::<Result<_, _>>().map_err(refused)?;
+        let seen = seen.collect::<Result<_, _>>()?;
         Ok(Self { scene, viewport, table, depths, seen })
     }
 

@@ -11,12 +11,12 @@ use output::OutputError;
 use output::plot::{ChartPanel, Scale, Series};
 use output::progress::Progress;
 use pipeline::sampling::SampleSource;
-use pipeline::{Cull, Draw, PipelineSpec, SampleSpec, SampleTable, Settings, Viewport};
+use pipeline::{Cull, Draw, Gpu, PipelineSpec, RasterPass, SampleSpec, SampleTable, Settings, Viewport};
 use run::GpuSpec;
 use serde::Serialize;
 use workloads::accumulation::SharedSamples;
 use workloads::soft_shadows::{
-    AreaLight, LightSpec, Method, Renderer, ShadowMap, Shadows, View, World, depth_pass, stage,
+    AreaLight, LightSpec, Method, ShadowMap, Shadows, View, World, depth_pass, stage,
 };
 use workloads::{Frame, Overrides, Scene};
 
@@ -338,19 +338,18 @@ impl Bench<'_> {
     fn by_rays(&self, samples: &dyn SampleSource) -> Result<Vec<Vec3>, StudyError> {
         let settings =
             Settings { spec: self.spec(), viewport: self.viewport, samples, background: Vec3::ZERO };
-        let seen = pipeline::frame::visibility(&self.stage.frame.camera, self.draws, &settings)
-            .map_err(|error| StudyError::Pipeline(error.to_string()))?;
+        let seen = RasterPass::new(&self.stage.frame.camera, self.draws, &settings).visibility()?;
         Ok(self.world.image(samples, &seen, Shadows::Rays))
     }
 
     fn map(&self, set: &SharedSamples, method: Method) -> Result<(ShadowMap, Cost), StudyError> {
         let started = Instant::now();
-        let renderer = Renderer { method, spec: self.spec() };
+        let mut gpu = Gpu::quiet(self.spec())?;
         let Stage { light, effort, .. } = self.stage;
-        let map = ShadowMap::new(light, self.draws, effort.map_px, set, renderer, &mut |_, _| ())?;
+        let map = ShadowMap::new(light, self.draws, effort.map_px, set, method, &mut gpu)?;
         let host_s = started.elapsed().as_secs_f64();
         let passes = if method == Method::OnePass { 1 } else { set.samples().len() as u32 };
-        let cost = cost(&map.counts, passes, host_s);
+        let cost = cost(&gpu.finish().counts(), passes, host_s);
         Ok((map, cost))
     }
 
@@ -376,8 +375,7 @@ impl Bench<'_> {
 
     fn seen(&self, set: &SharedSamples) -> Result<Vec<(u32, u32)>, StudyError> {
         let view = View { camera: &self.stage.frame.camera, draws: self.draws };
-        let renderer = Renderer { method: Method::OnePass, spec: self.spec() };
-        Ok(depth_pass(&view, self.viewport, set, renderer, &mut |_, _| ())?.samples)
+        Ok(depth_pass(&view, self.viewport, set, Method::OnePass, &mut Gpu::quiet(self.spec())?)?.samples)
     }
 
     /// Wrong shadows over the bias.

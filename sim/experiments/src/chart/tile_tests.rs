@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use pipeline::memory::CacheError;
+use pipeline::PassError;
 use pipeline::{LensShape, SampleTable, Viewport};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -195,7 +195,7 @@ fn of_scene(name: &str, effort: &TileTestsEffort, gpu: &GpuSpec) -> Result<Vec<T
     rows.map_err(|error| RunError::Setting(format!("{label}: {error}")))
 }
 
-fn rows(scene: &str, subject: &Subject<'_>, pairs: u64) -> Result<Vec<TileTestsRow>, CacheError> {
+fn rows(scene: &str, subject: &Subject<'_>, pairs: u64) -> Result<Vec<TileTestsRow>, PassError> {
     let pairs = Pairs::of(subject, pairs);
     let (reference, _) = subject.reference()?;
     let row = |(tests, features)| {

@@ -2,8 +2,7 @@
 
 use glam::{Vec3, Vec4};
 use output::progress::Progress;
-use pipeline::frame::render_with_heat;
-use pipeline::{Draw, Settings, Shader, ShaderCost, ShadingPoint, Texture, Viewport};
+use pipeline::{Draw, RasterPass, Settings, Shader, ShaderCost, ShadingPoint, Texture, Viewport};
 use power_model::{
     Cause, Circumstances, EnergyTable, Finish, FramePower, Launch, Pacing, Platform, PowerModel, Seconds,
     Source, Sourced, Surrounded, Watts, pace,
@@ -144,7 +143,8 @@ impl Stage {
             draws.iter().zip(&shaders).map(|(draw, shader)| Draw { shader, ..*draw }).collect();
         let mut clock =
             FrameClock::new(Level::default(), self.gpu.machine()?, Recorder::new(BIN_PS, MOST_BINS));
-        render_with_heat(&frame.camera, &draws, &settings, &[], |packet, lines| clock.push(packet, lines))
+        RasterPass::new(&frame.camera, &draws, &settings)
+            .render(|packet, lines| clock.push(packet, lines))
             .map_err(RunError::setting)?;
         let timeline = clock.finish()?.timeline;
         self.model.frame(&timeline).map_err(|source| RunError::Timeline { frame: number, source })

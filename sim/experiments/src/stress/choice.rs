@@ -57,7 +57,7 @@ pub fn trial(
     gpu: &GpuSpec,
 ) -> Result<Trial, RunError> {
     on_subject(family, value, (size, seed), gpu, |subject| {
-        let madds = |features| Ok(Work::new(&subject.counts(features)?).madds());
+        let madds = |features| subject.counts(features).map(|counts| Work::new(&counts).madds());
         let auto = madds(Features { auto: true, ..Features::ALL })?;
         let fixed = fixed(subject.camera.lens().is_some(), madds)?;
         Ok(Trial { family: family.name, value, auto, fixed })

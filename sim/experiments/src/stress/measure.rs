@@ -5,7 +5,7 @@ use pipeline::geometry::Projection;
 use pipeline::random::mix;
 use pipeline::setup::{Triangle, bounds};
 use pipeline::traversal::Box5;
-use pipeline::{Features, Shear};
+use pipeline::{Features, PassError, Shear};
 use run::{GpuSpec, RunError};
 use serde::Serialize;
 use workloads::stress::{Family, Size, set_up_all};
@@ -90,7 +90,7 @@ pub fn measure(
     on_subject(family, value, (size, super::SEED), gpu, |subject| {
         let pairs = Pairs::of(subject, PAIRS[usize::from(size != Size::FULL)]);
         let (reference, brute) = subject.reference()?;
-        let row = |method: &Method| {
+        let row = |method: &Method| -> Result<_, PassError> {
             let seen = subject.seen(method.features)?;
             Ok(StressRow {
                 family: family.name,

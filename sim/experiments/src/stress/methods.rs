@@ -2,14 +2,12 @@
 
 use activity::Counts;
 use glam::Vec3;
-use pipeline::frame::{render, visibility};
-use pipeline::memory::CacheError;
 use pipeline::sampling::SampleSource;
 use pipeline::setup::Triangle;
 use pipeline::traversal::{
     Box5, EdgeBounds, Edges, Facing, LensLines, Piece, TileRect, Timeline, View, narrow,
 };
-use pipeline::{Camera, Draw, Features, PipelineSpec, Settings, Shear, Viewport};
+use pipeline::{Camera, Draw, Features, PassError, PipelineSpec, RasterPass, Settings, Shear, Viewport};
 use run::{GpuSpec, RunError};
 use workloads::stress::{Family, Size, brute_force};
 use workloads::visibility::Unshaded;
@@ -160,7 +158,7 @@ pub fn on_subject<T>(
     value: f64,
     (size, seed): (Size, u64),
     gpu: &GpuSpec,
-    run: impl FnOnce(&Subject<'_>) -> Result<T, CacheError>,
+    run: impl FnOnce(&Subject<'_>) -> Result<T, PassError>,
 ) -> Result<T, RunError> {
     let failed = |message: String| RunError::Setting(format!("{} at {value}: {message}", family.name));
     let scene = family.scene(value, size, seed).map_err(|error| failed(error.to_string()))?;
@@ -183,18 +181,20 @@ impl Subject<'_> {
     }
 
     /// What every sample sees with the tests of `features`.
-    pub fn seen(&self, features: Features) -> Result<Seen, CacheError> {
-        self.with(features, |settings| visibility(self.camera, self.draws, settings))
+    pub fn seen(&self, features: Features) -> Result<Seen, PassError> {
+        self.with(features, |settings| RasterPass::new(self.camera, self.draws, settings).visibility())
     }
 
     /// How often each event happens with the tests of `features`.
-    pub fn counts(&self, features: Features) -> Result<Counts, CacheError> {
-        self.with(features, |settings| Ok(render(self.camera, self.draws, settings, |_| ())?.counts))
+    pub fn counts(&self, features: Features) -> Result<Counts, PassError> {
+        self.with(features, |settings| {
+            Ok(RasterPass::new(self.camera, self.draws, settings).render(|_, _| ())?.counts)
+        })
     }
 
     /// What every sample has to see: from all triangles against all samples where that is not too much, else from the pipeline
     /// with every test off. Also says whether it was brute force.
-    pub fn reference(&self) -> Result<(Seen, bool), CacheError> {
+    pub fn reference(&self) -> Result<(Seen, bool), PassError> {
         let samples = self.viewport.pixels() as u64 * u64::from(self.samples.per_pixel());
         if samples * self.triangles() <= MOST_TESTS {
             Ok((brute_force(self.camera, self.draws, self.viewport, self.samples), true))

@@ -230,6 +230,8 @@ pub enum StudyError {
     #[error(transparent)]
     Frame(#[from] workloads::FrameError),
     #[error(transparent)]
+    Pass(#[from] pipeline::PassError),
+    #[error(transparent)]
     Samples(#[from] pipeline::sampling::TableError),
     #[error(transparent)]
     Gpu(#[from] GpuError),

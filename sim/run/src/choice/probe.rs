@@ -5,8 +5,7 @@ use std::time::Instant;
 use activity::{Counts, Event};
 use cpu_time::ThreadTime;
 use output::progress::Progress;
-use pipeline::frame::render_with_heat;
-use pipeline::{PipelineSpec, Settings, Viewport};
+use pipeline::{PipelineSpec, RasterPass, Settings, Viewport};
 use timing::{FrameClock, Level, Recorder};
 
 use super::Findings;
@@ -125,8 +124,8 @@ fn simulate_frame(
         lines.extend_from_slice(new_lines);
         packets.push((*packet, lines.len()));
     };
-    let rendered = render_with_heat(&frame.camera, &draws, &settings, &[], emit);
-    let (rendered, _) = rendered.map_err(RunError::setting)?;
+    let rendered = RasterPass::new(&frame.camera, &draws, &settings).render(emit);
+    let rendered = rendered.map_err(RunError::setting)?;
     let pipeline_s = started.elapsed().as_secs_f64();
     let started = ThreadTime::now();
     let mut first = 0;

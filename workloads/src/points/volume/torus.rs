@@ -4,10 +4,8 @@ use std::f64::consts::{PI, TAU};
 
 use glam::{Affine3A, Vec3};
 use pipeline::conservative::{Grid, MovingTriangle};
-use pipeline::frame::visibility;
-use pipeline::memory::CacheError;
 use pipeline::sampling::{Sample, SampleSource};
-use pipeline::{Camera, Clip, Cull, Draw, Geometry, PipelineSpec, Settings, Viewport};
+use pipeline::{Camera, Clip, Cull, Draw, Geometry, PassError, PipelineSpec, RasterPass, Settings, Viewport};
 
 use super::{Bounds, Hull, Inside};
 use crate::visibility::Unshaded;
@@ -155,7 +153,7 @@ impl Prisms {
     pub fn draws<'a>(all: &'a [Self], shader: &'a dyn pipeline::Shader) -> Vec<Draw<'a>> {
         let draw = |prisms: &'a Self| {
             let geometry = Geometry::new(&prisms.ends[0], &prisms.ends[1], &prisms.triangles).ok()?;
-            Some(Draw { geometry: geometry.with_clip(prisms.clip), shader, cull: Cull::None })
+            Some(Draw::new(geometry.with_clip(prisms.clip), shader, Cull::None))
         };
         all.iter().filter_map(draw).collect()
     }
@@ -178,17 +176,17 @@ pub(in crate::points) fn place(sample: &Sample, pixel: [u32; 2], side: u32) -> [
 /// it.
 ///
 /// # Errors
-/// [`CacheError`] if a cache of `spec` cannot be built.
+/// [`PassError`] if a cache of `spec` cannot be built.
 pub fn standard_mode(
     torus: &Torus,
     side: u32,
     samples: &dyn SampleSource,
     spec: &PipelineSpec,
-) -> Result<Covered, CacheError> {
+) -> Result<Covered, PassError> {
     let (prisms, viewport) = (Prisms::of(torus), Viewport::new(side, side));
     let (Some(camera), Some(viewport)) = (camera(), viewport) else { return Ok(Covered::default()) };
     let settings = Settings { spec, viewport, samples, background: Vec3::ZERO };
-    let seen = visibility(&camera, &Prisms::draws(&prisms, &Unshaded), &settings)?;
+    let seen = RasterPass::new(&camera, &Prisms::draws(&prisms, &Unshaded), &settings).visibility()?;
     Ok(inside(torus, side, samples, &seen))
 }
 

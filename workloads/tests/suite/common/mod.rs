@@ -4,8 +4,11 @@ pub mod meshes;
 
 use std::path::PathBuf;
 
+use activity::Packet;
+use pipeline::{FrameReport, Gpu, PipelineSpec};
 use serde_json::{Value, json};
 use workloads::LoadError;
+use workloads::job::{Drawn, Job};
 
 /// A `.glb` of JSON and a binary chunk.
 pub fn glb(json: &Value, binary: &[u8]) -> Vec<u8> {
@@ -145,9 +148,9 @@ pub fn expect(text: &str, parts: &[&str]) {
 }
 
 /// Hardware for tests: all features on, caches of the reference GPU.
-pub fn spec() -> pipeline::PipelineSpec {
+pub fn spec() -> PipelineSpec {
     let lines = pipeline::CacheSpec::lru(256, 4);
-    pipeline::PipelineSpec {
+    PipelineSpec {
         tile_px: 8,
         coarse_tile_px: 64,
         batch_triangles: 65_536,
@@ -182,4 +185,14 @@ impl pipeline::Shader for White {
     fn shade(&self, _at: &pipeline::ShadingPoint, _texel: glam::Vec4) -> glam::Vec3 {
         glam::Vec3::ONE
     }
+}
+
+/// Frame `number` of a job with the work of the GPU, which is the sum of its packets.
+pub fn drawn_on(spec: &PipelineSpec, job: &dyn Job, number: u32) -> (Drawn, FrameReport) {
+    let mut sum = activity::Counts::default();
+    let mut gpu = Gpu::new(spec, |packet: &Packet, _| sum += &packet.counts).unwrap();
+    let drawn = job.frame(number, &mut gpu).unwrap();
+    let report = gpu.finish();
+    assert_eq!(sum, report.counts());
+    (drawn, report)
 }

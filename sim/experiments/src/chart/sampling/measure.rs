@@ -5,7 +5,7 @@ use std::time::Instant;
 use glam::{Affine3A, DVec3, Vec3};
 use output::progress::Bar;
 use pipeline::sampling::SampleSource;
-use pipeline::{Camera, Cull, Draw, Geometry, Lens, SampleSpec, SampleTable, Settings, Viewport};
+use pipeline::{Camera, Cull, Draw, Geometry, Lens, RasterPass, SampleSpec, SampleTable, Settings, Viewport};
 use rayon::prelude::*;
 use run::GpuSpec;
 use serde::Serialize;
@@ -38,12 +38,11 @@ pub(super) fn table(name: &str, samples: u32, seed: u64) -> Result<Box<dyn Sampl
 /// An image of the stage.
 pub(super) fn image(stage: &Stage, samples: &dyn SampleSource) -> Result<Vec<Vec3>, StudyError> {
     let gpu = GpuSpec::load("reference")?;
-    stage
-        .draw(|camera, draws, viewport, background| {
-            let settings = Settings { spec: &gpu.pipeline, viewport, samples, background };
-            pipeline::render(camera, draws, &settings, |_| ()).map(|rendered| rendered.image)
-        })?
-        .map_err(|error| StudyError::Pipeline(error.to_string()))
+    let rendered = stage.draw(|camera, draws, viewport, background| {
+        let settings = Settings { spec: &gpu.pipeline, viewport, samples, background };
+        RasterPass::new(camera, draws, &settings).render(|_, _| ())
+    })??;
+    Ok(rendered.into_image())
 }
 
 /// The mean of several images of the default table with seeds of their own.
@@ -197,7 +196,7 @@ impl Fence {
         // Focused at depth 1: at depth 2 the circle of confusion is 3 pixels across.
         let camera = camera.with_lens(Some(Lens::new(3.0, 1.0).map_err(|e| refused(&e))?));
         let geometry = Geometry::new(&self.open, &self.close, &self.triangles).map_err(|e| refused(&e))?;
-        let draws = [Draw { geometry, shader: &White, cull: Cull::None }];
+        let draws = [Draw::new(geometry, &White, Cull::None)];
         Ok(render(&camera, &draws, self.viewport, Vec3::ZERO))
     }
 }

@@ -5,9 +5,8 @@ use std::path::Path;
 use activity::{LineAccess, Packet};
 use cpu_time::ProcessTime;
 use output::progress::Progress;
-use pipeline::frame::render_with_heat;
 use pipeline::sampling::SampleSource;
-use pipeline::{Camera, Draw, LensShape, SampleTable, Settings, Viewport};
+use pipeline::{Camera, Draw, LensShape, RasterPass, SampleTable, Settings, Viewport};
 use run::{
     Distinct, Forecast, GpuSpec, Plan, Previews, RunError, RunFrame, RunOptions, Sampling, Signatures,
     frames_of,
@@ -272,7 +271,8 @@ impl Subject {
         emit: impl FnMut(&Packet, &[LineAccess]),
     ) -> Result<(), RunError> {
         let settings = Settings { spec: &gpu.pipeline, viewport, samples, background: glam::Vec3::ZERO };
-        render_with_heat(camera, draws, &settings, &[], emit)
+        RasterPass::new(camera, draws, &settings)
+            .render(emit)
             .map_err(|error| RunError::Setting(format!("{}: {error}", self.name)))?;
         Ok(())
     }

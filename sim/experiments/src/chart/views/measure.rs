@@ -5,7 +5,7 @@ use std::time::Instant;
 use activity::Event;
 use glam::{Vec3, Vec4};
 use pipeline::{
-    CacheSpec, Draw, PipelineSpec, Replacement, Shader, ShaderCost, ShadingPoint, Texture, Viewport,
+    CacheSpec, Draw, Gpu, PipelineSpec, Replacement, Shader, ShaderCost, ShadingPoint, Texture, Viewport,
 };
 use serde::Serialize;
 use workloads::multiview::{Layout, Rig, Target, Views};
@@ -170,9 +170,9 @@ impl Bench {
         Ok(ViewsRow {
             views,
             samples_per_view: rig.samples() / layout.strips() * layout.overlap.max(1),
-            one_pass: run(&|| rig.one_pass(&draws, &to, &mut |_, _| ()))?,
-            view_by_view: run(&|| rig.view_by_view(&draws, &to, &mut |_, _| ()))?,
-            accumulation: run(&|| rig.accumulated(&draws, &to, &mut |_, _| ()))?,
+            one_pass: run(&|| rig.one_pass(&draws, &to, &mut Gpu::quiet(to.spec)?))?,
+            view_by_view: run(&|| rig.view_by_view(&draws, &to, &mut Gpu::quiet(to.spec)?))?,
+            accumulation: run(&|| rig.accumulated(&draws, &to, &mut Gpu::quiet(to.spec)?))?,
         })
     }
 
@@ -184,7 +184,8 @@ impl Bench {
         draws: &[Draw<'_>],
         to: &Target<'_>,
     ) -> Result<u64, StudyError> {
-        let (_, counts) = rig.view((layout.views as usize - 1) / 2, draws, to, &mut |_, _| ())?;
+        let middle = (layout.views as usize - 1) / 2;
+        let counts = rig.view(middle, draws, to, &mut Gpu::quiet(to.spec)?)?.counts;
         Ok(counts[Event::PixelInvocations].max(1))
     }
 
@@ -219,7 +220,7 @@ impl Bench {
         let spec = PipelineSpec { shading_cache, ..self.gpu.pipeline };
         let (rig, to) = (self.rig(&layout, samples)?, self.target(&spec));
         let draws = self.frame.draws(&self.scene)?;
-        let counts = rig.one_pass(&draws, &to, &mut |_, _| ())?.counts;
+        let counts = rig.one_pass(&draws, &to, &mut Gpu::quiet(to.spec)?)?.counts;
         let one = self.one_view(&rig, &layout, &draws, &to)?;
         let [draws, samples_hit] = [Event::Draws, Event::SamplesHit].map(|event| counts[event]);
         Ok(Lanes { all: counts[Event::PixelInvocations], one, draws, samples_hit })
@@ -235,7 +236,7 @@ impl Bench {
             let glosses: Vec<_> = draws.iter().map(|draw| Gloss { looks: draw.shader, exponent }).collect();
             let draws: Vec<_> =
                 draws.iter().zip(&glosses).map(|(draw, shader)| Draw { shader, ..*draw }).collect();
-            let found = rig.one_pass(&draws, &to, &mut |_, _| ())?.images;
+            let found = rig.one_pass(&draws, &to, &mut Gpu::quiet(to.spec)?)?.images;
             let truth = rig.own_cameras(&draws, &to)?;
             let pixels = |images: &[Vec<Vec3>]| images.concat();
             Ok::<_, StudyError>(mean_square(&errors(&pixels(&found), &pixels(&truth))).sqrt())

@@ -3,8 +3,7 @@
 use activity::{Counts, Event};
 use glam::Vec3;
 use pipeline::depth::{DepthBound, DepthSpec};
-use pipeline::frame::render_depth;
-use pipeline::{Cull, Draw, Features, PipelineSpec, Settings};
+use pipeline::{Cull, Draw, Features, PipelineSpec, RasterPass, Rendered, Settings, Target};
 use rayon::prelude::*;
 use workloads::stress::{Size, StressScene, brute_force};
 use workloads::visibility::Unshaded;
@@ -48,8 +47,8 @@ impl Compared {
             let truth = brute_force(&scene.camera, &draws, scene.viewport, &scene.samples);
             let settings =
                 Settings { spec, viewport: scene.viewport, samples: &scene.samples, background: Vec3::ZERO };
-            let (seen, counts) =
-                render_depth(&scene.camera, &draws, &settings, |_, _| ()).map_err(RunError::setting)?;
+            let pass = RasterPass::new(&scene.camera, &draws, &settings).onto(Target::Depth).with_visible();
+            let Rendered { visible: seen, counts, .. } = pass.render(|_, _| ()).map_err(RunError::setting)?;
             all.samples += seen.len() as u64;
             // A sample that one of them does not have differs as well.
             let missing = seen.len().abs_diff(truth.len());

@@ -1,5 +1,6 @@
 //! Rows VI-9 and VI-10: points by darts, and points that follow a density.
 
+use pipeline::FrameReport;
 use std::ops::RangeInclusive;
 
 use activity::Event;
@@ -62,23 +63,23 @@ impl Checked {
 }
 
 /// Darts in two dimensions, the first rounds of them rasterized, and in three.
-fn thrown(row: &Darts, form: Form) -> Result<(job::Rasterized, PoissonDisk<3>), RunError> {
+fn thrown(row: &Darts, form: Form) -> Result<(job::Rasterized, FrameReport, PoissonDisk<3>), RunError> {
     let options =
         job::Options { radius: *row.radius_2d.get(form), rounds: *row.rounds.get(form), periodic: true };
     let size = [*row.side_px.get(form), *row.samples.get(form)];
-    let flat =
+    let (flat, work) =
         rasterized(options, size[0], size[1], *row.seed.get(form), &GpuSpec::load("reference")?.pipeline)?;
     let radius = *row.radius_3d.get(form);
     let spec =
         PoissonSpec { radius, domain: Domain::Torus, seed: *row.seed.get(form), spacing: Spacing::Double };
-    Ok((flat, poisson_disk::<3>(&spec).map_err(failed)?))
+    Ok((flat, work, poisson_disk::<3>(&spec).map_err(failed)?))
 }
 
 /// VI-9: dart throwing in two and three dimensions.
 pub(super) fn darts(task: &Task<'_>) -> Result<Done, RunError> {
     let with = task.with(|settings| &settings.vi_9);
     let (row, form) = (with.settings, with.form);
-    let (flat, deep) = thrown(row, form)?;
+    let (flat, work, deep) = thrown(row, form)?;
     let places = *row.places.get(form);
     let in_plane = Checked::of(&flat.found, *row.radius_2d.get(form), places);
     let in_space = Checked::of(&deep, *row.radius_3d.get(form), places);
@@ -112,8 +113,8 @@ pub(super) fn darts(task: &Task<'_>) -> Result<Done, RunError> {
     ]);
     let ran = numbers([
         ("passes", f64::from(flat.passes)),
-        ("triangles", flat.triangles as f64),
-        ("samples_tested", flat.counts[Event::SamplesTested] as f64),
+        ("triangles", work.triangles() as f64),
+        ("samples_tested", work.counts()[Event::SamplesTested] as f64),
         ("samples_hit", flat.candidates as f64),
     ]);
     let radius = *row.radius_2d.get(form);

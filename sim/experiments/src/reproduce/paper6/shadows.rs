@@ -1,7 +1,8 @@
 //! VI-12: motion-blurred soft shadows.
 
-use activity::Event;
+use activity::{Counts, Event};
 use glam::Vec3;
+use pipeline::Gpu;
 use workloads::Overrides;
 use workloads::job::{Drawn, Job};
 use workloads::soft_shadows::{Options, SoftShadows};
@@ -16,16 +17,18 @@ use run::RunError;
 pub(super) fn row(task: &Task<'_>) -> Result<Done, RunError> {
     let with = task.with(|settings| &settings.vi_12);
     let (row, form) = (with.settings, with.form);
-    let draw = |accumulate| -> Result<Drawn, RunError> {
+    let draw = |accumulate| -> Result<(Drawn, Counts), RunError> {
         let (size, samples) = (Some(*row.size_px.get(form)), Some(*row.places.get(form)));
         let overrides = Overrides { size, samples, ..Overrides::default() };
         let job = SoftShadows::new(Options { accumulate, ..Options::default() }, &overrides, 1)?;
-        Ok(job.frame(*row.frame.get(form), &GpuSpec::load("reference")?.pipeline, &mut |_, _| ())?)
+        let hardware = GpuSpec::load("reference")?.pipeline;
+        let mut gpu = Gpu::quiet(&hardware).map_err(RunError::setting)?;
+        Ok((job.frame(*row.frame.get(form), &mut gpu)?, gpu.finish().counts()))
     };
-    let (one, many) = (draw(false)?, draw(true)?);
+    let [(one, one_counts), (many, many_counts)] = [draw(false)?, draw(true)?];
     let bits = |pixel: &Vec3| pixel.to_array().map(f32::to_bits);
     let differ = one.image.iter().zip(&many.image).filter(|(a, b)| bits(a) != bits(b)).count();
-    let count = |event: Event| [&one, &many].map(|drawn| drawn.counts[event] as f64);
+    let count = |event: Event| [&one_counts, &many_counts].map(|counts| counts[event] as f64);
     let (vertices, tested) = (count(Event::VertexInvocations), count(Event::SamplesTested));
     let same = differ == 0 && one.image.len() == many.image.len();
     let ours = format!(

@@ -1,0 +1,319 @@
+//! GPU during a frame: passes follow each other through one address space and one set of caches.
+
+use activity::{Counts, LineAccess, Packet, PacketCounts, PacketKind, Waits};
+use glam::Vec3;
+
+use super::heat::HeatMap;
+use super::pass::{AddressMap, Draw, Pass, RasterPass, Resident, Target, resident};
+use super::replay::Replay;
+use super::{Finished, PipelineSpec, rasterize, resolve};
+use crate::memory::{AddressSpace, CacheError, MemorySystem, Surface};
+
+/// Receiver of packets, each with the lines it requests from the L2.
+type Emit<'e> = Box<dyn FnMut(&Packet, &[LineAccess]) + 'e>;
+
+/// The modelled GPU during a frame. It draws passes in order and emits every work packet, in the order of the hardware, with the
+/// lines that the packet requests from the L2. Results and packets are the same for any number of threads.
+pub struct Gpu<'e> {
+    spec: &'e PipelineSpec,
+    memory: MemorySystem,
+    space: AddressSpace,
+    emit: Emit<'e>,
+    passes: Vec<PassReport>,
+    /// Last batch of the last pass.
+    last_batch: u32,
+    /// Results of passes, which are in memory when the frame ends.
+    results: Vec<Surface>,
+    /// Results since the last barrier: other units cannot read them yet.
+    pending: Vec<Surface>,
+}
+
+/// Result of a pass.
+#[derive(Clone, Debug)]
+pub struct Rendered {
+    /// Linear RGB radiance of every pixel of each image, row by row from the top left.
+    pub images: Vec<Vec<Vec3>>,
+    /// Visible triangle (`u32::MAX` for none) and bits of its depth (infinite for none) of every sample, in the order
+    /// `(y width + x) per_pixel + index`; empty unless asked for or drawn.
+    pub visible: Vec<(u32, u32)>,
+    /// Count of every event of the pass.
+    pub counts: Counts,
+    /// Heat map of each event asked for.
+    pub heat: Vec<HeatMap>,
+    /// Images or depths in memory.
+    pub surface: Surface,
+}
+
+impl Rendered {
+    /// The first image; empty without images.
+    pub fn into_image(self) -> Vec<Vec3> {
+        self.images.into_iter().next().unwrap_or_default()
+    }
+}
+
+/// Work of a pass.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PassReport {
+    /// Name of the pass.
+    pub name: String,
+    /// Triangles of its draws.
+    pub triangles: usize,
+    /// Events of each draw.
+    pub draws: Vec<Counts>,
+    /// Events of no single draw: resolving, and the barrier before the pass.
+    pub others: Counts,
+}
+
+impl PassReport {
+    fn new(pass: &RasterPass<'_>) -> Self {
+        let draws = vec![Counts::default(); pass.draws.len()];
+        Self { name: pass.name.to_owned(), triangles: pass.triangles(), draws, others: Counts::default() }
+    }
+
+    fn add(&mut self, packet: &Packet) {
+        *self.draws.get_mut(packet.draw as usize).unwrap_or(&mut self.others) += &packet.counts;
+    }
+
+    /// Events of the pass.
+    pub fn counts(&self) -> Counts {
+        let mut all = self.others;
+        self.draws.iter().for_each(|draw| all += draw);
+        all
+    }
+}
+
+/// Work of a frame.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FrameReport {
+    /// The passes, in order.
+    pub passes: Vec<PassReport>,
+    /// Events of writing results back to memory when the frame ends.
+    pub write_back: Counts,
+}
+
+impl FrameReport {
+    /// Events of the frame.
+    pub fn counts(&self) -> Counts {
+        let mut all = self.write_back;
+        self.passes.iter().for_each(|pass| all += &pass.counts());
+        all
+    }
+
+    /// Triangles drawn in all passes.
+    pub fn triangles(&self) -> usize {
+        self.passes.iter().map(|pass| pass.triangles).sum()
+    }
+}
+
+/// Reason why a pass cannot be drawn.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum PassError {
+    /// A cache is invalid.
+    #[error(transparent)]
+    Cache(#[from] CacheError),
+    /// The surfaces of a frame are too large.
+    #[error(
+        "pass `{pass}`: the surfaces of the frame take {bytes} bytes, more than the {} that can be addressed; draw fewer pixels, \
+         samples or passes",
+        AddressSpace::END
+    )]
+    Memory {
+        /// The pass that does not fit.
+        pass: String,
+        /// Bytes of all surfaces with those of the pass.
+        bytes: u64,
+    },
+}
+
+impl<'e> Gpu<'e> {
+    /// A GPU with empty caches.
+    ///
+    /// # Errors
+    /// [`PassError::Cache`] if a cache of `spec` is invalid.
+    pub fn new(
+        spec: &'e PipelineSpec,
+        emit: impl FnMut(&Packet, &[LineAccess]) + 'e,
+    ) -> Result<Self, PassError> {
+        let emit = Box::new(emit);
+        let memory = MemorySystem::new(&spec.memory)?;
+        let (passes, results, pending) = Default::default();
+        Ok(Self {
+            spec,
+            memory,
+            space: AddressSpace::default(),
+            emit,
+            passes,
+            last_batch: 0,
+            results,
+            pending,
+        })
+    }
+
+    /// A GPU whose packets are only counted.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn quiet(spec: &'e PipelineSpec) -> Result<Self, PassError> {
+        Self::new(spec, |_, _| ())
+    }
+
+    /// Functional parameters.
+    pub fn spec(&self) -> &'e PipelineSpec {
+        self.spec
+    }
+
+    /// The draws with addresses for their vertices and textures, so that several passes read the same data.
+    pub fn resident<'a>(&mut self, draws: &[Draw<'a>]) -> Vec<Draw<'a>> {
+        let at: Vec<Resident> = resident(draws, &mut self.space).collect();
+        draws.iter().zip(at).map(|(draw, resident)| Draw { resident, ..*draw }).collect()
+    }
+
+    /// A new surface of `bytes`.
+    pub fn surface(&mut self, bytes: u64) -> Surface {
+        self.space.take(bytes)
+    }
+
+    /// Starts a pass whose packets come from the caller, and returns its number.
+    pub fn begin(&mut self, name: &str) -> u16 {
+        let (name, draws, others) = (name.to_owned(), Vec::new(), Counts::default());
+        self.passes.push(PassReport { name, triangles: 0, draws, others });
+        self.last_batch = 0;
+        self.passes.len() as u16 - 1
+    }
+
+    /// Caches, for the packets of a pass that was begun.
+    pub fn memory(&mut self) -> &mut MemorySystem {
+        &mut self.memory
+    }
+
+    /// Emits a packet of a pass that was begun, which sets up `triangles`, with the lines requested since the one before.
+    pub fn push(&mut self, packet: &Packet, triangles: usize) {
+        if let Some(report) = self.passes.last_mut() {
+            report.triangles += triangles;
+            report.add(packet);
+        }
+        self.last_batch = self.last_batch.max(packet.batch);
+        (self.emit)(packet, self.memory.log());
+        self.memory.clear_log();
+    }
+
+    /// Marks a surface as a result of the pass that was begun.
+    pub fn keep(&mut self, surface: Surface) {
+        self.results.push(surface);
+        self.pending.push(surface);
+    }
+
+    /// Lets all later work wait for the work so far, and makes its results readable.
+    pub fn wait(&mut self) {
+        self.barrier(Waits::All);
+    }
+
+    /// Work so far.
+    pub fn passes(&self) -> &[PassReport] {
+        &self.passes
+    }
+
+    /// Draws a pass.
+    ///
+    /// # Errors
+    /// [`PassError`] if a cache of the settings is invalid, or if the surfaces of the frame are too large.
+    pub fn draw(&mut self, pass: &RasterPass<'_>) -> Result<Rendered, PassError> {
+        let number = self.passes.len() as u16;
+        let prepared = Pass::new(pass, number, &mut self.space);
+        if !self.space.fits() {
+            return Err(PassError::Memory { pass: pass.name.to_owned(), bytes: self.space.bytes() });
+        }
+        self.passes.push(PassReport::new(pass));
+        if let Some(waits) = self.waits(&prepared.addresses, pass.draws) {
+            self.barrier(waits);
+        }
+        let drawn = self.pass(&prepared, pass)?;
+        self.last_batch = prepared.batches().len().max(1) as u32 - 1;
+        self.results.push(drawn.surface);
+        self.pending.push(drawn.surface);
+        Ok(drawn)
+    }
+
+    fn pass(&mut self, prepared: &Pass<'_>, pass: &RasterPass<'_>) -> Result<Rendered, PassError> {
+        let mut heat: Vec<_> = pass.heat.iter().map(|&event| HeatMap::new(event, prepared)).collect();
+        let (emit, report) = (&mut self.emit, &mut self.passes[usize::from(prepared.number)]);
+        let mut done = |work: Finished<'_>| match work {
+            Finished::Packet(packet, lines) => {
+                report.add(packet);
+                heat.iter_mut().for_each(|map| map.packet(packet));
+                emit(packet, lines);
+            }
+            Finished::Tests(number, bin, log) => {
+                heat.iter_mut().for_each(|map| map.tests(prepared, number, bin, log));
+            }
+        };
+        let mut replay = Replay::new(prepared, &mut self.memory)?;
+        let is_empty = prepared.is_depth_only() && pass.target != Target::Depth;
+        let bins = if is_empty { Vec::new() } else { rasterize(prepared, &mut replay, &mut done) };
+        let visible = if pass.visible { resolve::visible(prepared, &bins) } else { Vec::new() };
+        Ok(Rendered {
+            images: resolve::resolve(prepared, &bins),
+            visible,
+            counts: report.counts(),
+            heat,
+            surface: prepared.addresses.result(),
+        })
+    }
+
+    /// Packets that have to wait for earlier passes, if any: those that read their results.
+    fn waits(&self, at: &AddressMap, draws: &[Draw<'_>]) -> Option<Waits> {
+        let is_pending = |address: &u64| self.pending.iter().any(|surface| surface.contains(*address));
+        let textured = draws.iter().zip(&at.textures).filter(|(draw, _)| draw.shader.texture().is_some());
+        if at.vertices.iter().any(is_pending) {
+            return Some(Waits::All);
+        }
+        textured.map(|(_, texture)| texture).any(is_pending).then_some(Waits::Tiles)
+    }
+
+    /// Lets packets wait for all earlier ones, and makes results readable.
+    fn barrier(&mut self, waits: Waits) {
+        let mut packet = Packet::new(PacketKind::Barrier(waits), self.passes.len().max(1) as u16 - 1);
+        self.memory.flush(&mut packet.counts);
+        self.pending.clear();
+        if let Some(report) = self.passes.last_mut() {
+            report.add(&packet);
+        }
+        (self.emit)(&packet, self.memory.log());
+        self.memory.clear_log();
+    }
+
+    /// Ends the frame: the results of all passes are written back to memory.
+    pub fn finish(mut self) -> FrameReport {
+        let mut counts = PacketCounts::default();
+        self.memory.finish(&self.results, &mut counts);
+        let (batch, pass) = (self.last_batch, self.passes.len().max(1) as u16 - 1);
+        let packet = Packet { batch, counts, ..Packet::new(PacketKind::Resolve, pass) };
+        (self.emit)(&packet, self.memory.log());
+        let mut write_back = Counts::default();
+        write_back += &counts;
+        FrameReport { passes: self.passes, write_back }
+    }
+}
+
+impl RasterPass<'_> {
+    /// Visible triangle and bits of its depth of every sample, as in [`Rendered::visible`].
+    ///
+    /// # Errors
+    /// As [`Gpu::draw`].
+    pub fn visibility(&self) -> Result<Vec<(u32, u32)>, PassError> {
+        Ok(self.onto(Target::Depth).with_visible().render(|_, _| ())?.visible)
+    }
+
+    /// Draws the pass as the only one of a frame. The counts include writing the result back to memory.
+    ///
+    /// # Errors
+    /// As [`Gpu::draw`].
+    pub fn render(&self, emit: impl FnMut(&Packet, &[LineAccess])) -> Result<Rendered, PassError> {
+        let mut gpu = Gpu::new(self.settings.spec, emit)?;
+        let mut drawn = gpu.draw(self)?;
+        let FrameReport { write_back, .. } = gpu.finish();
+        drawn.counts += &write_back;
+        drawn.heat.iter_mut().for_each(|map| map.elsewhere += write_back[map.event]);
+        Ok(drawn)
+    }
+}
