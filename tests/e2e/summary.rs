@@ -235,3 +235,26 @@ fn a_crash_reports_its_place_and_a_command_to_repeat_it() {
         assert!(before == results.files());
     }
 }
+
+#[test]
+fn the_work_of_passes_adds_up_to_that_of_the_run() {
+    let small = ["--size", "64x36", "--frames", "0..1"];
+    for (work, passes) in [
+        ("tiny", &["scene", "write back"][..]),
+        ("occlusion", &["occluders", "queries", "image", "write back"]),
+        ("glossy", &["map", "image", "write back"]),
+        ("soft-shadows", &["depths", "look-ups", "write back"]),
+    ] {
+        let summary = run(work, &small).summary();
+        let rows = summary["passes"].as_array().expect("passes");
+        let names: Vec<_> = rows.iter().map(|row| row["name"].as_str().expect("a name")).collect();
+        assert_eq!(names, passes, "{work}");
+        for (event, count) in summary["counts"].as_object().expect("counts") {
+            let sum: u64 = rows.iter().filter_map(|row| row["counts"][event].as_u64()).sum();
+            assert_eq!(count.as_u64(), Some(sum), "{work}: {event}");
+        }
+        let events_j: f64 = rows.iter().filter_map(|row| row["events_j"].as_f64()).sum();
+        let run_j = summary["truth"]["total_j"].as_f64().expect("joules");
+        assert!(events_j > 0.0 && events_j < run_j, "{work}: {events_j} of {run_j} J");
+    }
+}

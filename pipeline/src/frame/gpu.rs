@@ -74,6 +74,12 @@ impl PassReport {
         *self.draws.get_mut(packet.draw as usize).unwrap_or(&mut self.others) += &packet.counts;
     }
 
+    /// Keeps the events, but not of which draw they are.
+    pub fn forget_draws(&mut self) {
+        self.others = self.counts();
+        self.draws.clear();
+    }
+
     /// Events of the pass.
     pub fn counts(&self) -> Counts {
         let mut all = self.others;

@@ -16,6 +16,7 @@ use workloads::job::Drawn;
 use workloads::{Frame, Scene};
 
 use crate::heat::{self, HeatPicture};
+use crate::passes;
 use crate::regime::Regime;
 use crate::{Distinct, Observed, Origin, Plan, RunError, RunFrame, Work};
 
@@ -109,8 +110,9 @@ fn simulate_frame(
 ) -> Result<(RunFrame, Vec<Vec3>, Vec<HeatMap>), RunError> {
     let mut clock =
         FrameClock::new(plan.options.timing, plan.gpu.machine()?, Recorder::new(BIN_PS, max_bins));
-    let DrawnFrame { drawn, regime, heat, report } =
+    let DrawnFrame { drawn, regime, heat, mut report } =
         draw(plan, number, &plan.options.heat, |packet, lines| clock.push(packet, lines))?;
+    passes::limit_draws(&mut report);
     let timed = clock.finish()?;
     let accuracy = AccuracyWarning::all(plan.options.timing, &timed);
     let timeline = timed.timeline;
@@ -126,6 +128,7 @@ fn simulate_frame(
         cycles: timed.cycles,
         origin: Origin::Simulated(Box::new(Observed {
             counts: report.counts(),
+            report,
             facts: drawn.facts,
             warnings: drawn.warnings,
             regime,

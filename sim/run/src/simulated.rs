@@ -2,6 +2,7 @@
 
 use activity::{Counts, Unit};
 use glam::Vec3;
+use pipeline::FrameReport;
 use power_model::FramePower;
 use serde::Serialize;
 use timing::sampled::Interval;
@@ -47,6 +48,8 @@ pub enum Origin {
 pub struct Observed {
     /// Event counts.
     pub counts: Counts,
+    /// Work by pass and by draw.
+    pub report: FrameReport,
     /// Results of a workload, by name.
     pub facts: Vec<Fact>,
     /// Warnings of a workload.

@@ -13,6 +13,7 @@ use workloads::scene::CameraUsed;
 
 use crate::frame::image_name;
 use crate::measure::{Checks, mean_parts_w};
+use crate::passes::{self, PassSummary};
 use crate::provenance::SCHEMA;
 use crate::stalls::{self, StallShares};
 use crate::{
@@ -71,6 +72,8 @@ pub struct Summary {
     pub facts: BTreeMap<&'static str, f64>,
     /// Event counts of the simulated frames.
     pub counts: Counts,
+    /// Work and energy of the passes of the simulated frames, by name.
+    pub passes: Vec<PassSummary>,
     /// Hash of the event counts of all simulated frames. Equal runs have equal hashes.
     pub counts_hash: String,
     /// Choice for the requested accuracy or time budget.
@@ -229,6 +232,7 @@ impl Summary {
             facts: facts(simulated),
             sample_test_efficiency: counts.sample_test_efficiency(),
             counts,
+            passes: passes::summaries(plan, simulated),
             counts_hash: format!(
                 "{:016x}",
                 simulated.known().fold(0, |seed, frame| hash(seed, &frame.counts))

@@ -1,0 +1,143 @@
+//! Work and energy by pass and by draw, over the simulated frames of a run.
+
+use activity::{Counts, Event};
+use pipeline::FrameReport;
+use power_model::PowerModel;
+use serde::Serialize;
+
+use crate::{Plan, Simulated};
+
+/// Passes of one name.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PassSummary {
+    /// Name of the pass; [`WRITE_BACK`] for what is written to memory when frames end.
+    pub name: String,
+    /// Number of passes of this name.
+    pub passes: u64,
+    /// Work of all of them.
+    #[serde(flatten)]
+    pub work: WorkSummary,
+    /// Draws of a pass, by their place in it. Empty if there is one draw only, or too many.
+    pub draws: Vec<WorkSummary>,
+}
+
+/// Work of passes or draws.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct WorkSummary {
+    /// Energy of the events in joules; parts that depend on time are not in it.
+    pub events_j: f64,
+    /// Bytes to and from memory.
+    pub dram_bytes: u64,
+    /// Event counts.
+    pub counts: Counts,
+}
+
+/// Name of the last row: results that are written to memory when a frame ends.
+pub const WRITE_BACK: &str = "write back";
+/// Largest number of draws of a pass that are listed.
+const MAX_DRAWS: usize = 256;
+
+/// Drops the numbers of single draws where there are too many to list.
+pub(crate) fn limit_draws(report: &mut FrameReport) {
+    report.passes.iter_mut().filter(|pass| pass.draws.len() > MAX_DRAWS).for_each(|pass| pass.forget_draws());
+}
+
+impl WorkSummary {
+    fn new(counts: Counts, model: &PowerModel) -> Self {
+        Self {
+            events_j: model.counts_energy(&counts).total_j(),
+            dram_bytes: counts[Event::DramReadBytes] + counts[Event::DramWriteBytes],
+            counts,
+        }
+    }
+}
+
+/// Passes of all simulated frames of a run, in the order of their first use.
+pub(crate) fn summaries(plan: &Plan, simulated: &Simulated) -> Vec<PassSummary> {
+    let mut groups: Vec<Group> = Vec::new();
+    let mut write_back = Counts::default();
+    for report in simulated.known().map(|frame| &frame.report) {
+        write_back += &report.write_back;
+        add(&mut groups, report);
+    }
+    let mut rows: Vec<_> = groups.into_iter().map(|group| group.summary(&plan.model)).collect();
+    let (name, work) = (WRITE_BACK.to_owned(), WorkSummary::new(write_back, &plan.model));
+    rows.push(PassSummary { name, passes: 0, work, draws: Vec::new() });
+    rows
+}
+
+/// Passes of one name, so far.
+struct Group {
+    name: String,
+    passes: u64,
+    counts: Counts,
+    draws: Vec<Counts>,
+}
+
+fn add(groups: &mut Vec<Group>, report: &FrameReport) {
+    for pass in &report.passes {
+        let place = groups.iter().position(|group| group.name == pass.name).unwrap_or_else(|| {
+            let (counts, draws) = Default::default();
+            groups.push(Group { name: pass.name.clone(), passes: 0, counts, draws });
+            groups.len() - 1
+        });
+        let group = &mut groups[place];
+        group.passes += 1;
+        group.counts += &pass.counts();
+        if pass.draws.len() > group.draws.len() {
+            group.draws.resize(pass.draws.len(), Counts::default());
+        }
+        group.draws.iter_mut().zip(&pass.draws).for_each(|(sum, draw)| *sum += draw);
+    }
+}
+
+impl Group {
+    fn summary(self, model: &PowerModel) -> PassSummary {
+        let listed = if (2..=MAX_DRAWS).contains(&self.draws.len()) { self.draws } else { Vec::new() };
+        PassSummary {
+            name: self.name,
+            passes: self.passes,
+            work: WorkSummary::new(self.counts, model),
+            draws: listed.into_iter().map(|draw| WorkSummary::new(draw, model)).collect(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use pipeline::PassReport;
+
+    fn counts(event: Event, count: u64) -> Counts {
+        let mut counts = Counts::default();
+        counts[event] = count;
+        counts
+    }
+
+    fn pass(name: &str, draws: Vec<Counts>) -> PassReport {
+        PassReport { name: name.to_owned(), triangles: 1, draws, others: counts(Event::PixelsResolved, 3) }
+    }
+
+    #[test]
+    fn passes_of_a_name_are_one_row_with_their_draws() {
+        let mut groups = Vec::new();
+        let hits = |count| counts(Event::SamplesHit, count);
+        for _ in 0..2 {
+            let passes = vec![pass("map", vec![hits(5)]), pass("image", vec![hits(1), hits(2)])];
+            add(&mut groups, &FrameReport { passes, write_back: Counts::default() });
+        }
+        let found: Vec<_> = groups.iter().map(|group| (group.name.as_str(), group.passes)).collect();
+        assert_eq!(found, [("map", 2), ("image", 2)]);
+        assert_eq!(groups[1].draws, [hits(2), hits(4)]);
+        assert_eq!((groups[1].counts[Event::SamplesHit], groups[1].counts[Event::PixelsResolved]), (6, 6));
+    }
+
+    #[test]
+    fn too_many_draws_are_one_sum() {
+        let draws = vec![counts(Event::SamplesHit, 1); MAX_DRAWS + 1];
+        let mut report = FrameReport { passes: vec![pass("scene", draws)], write_back: Counts::default() };
+        let before = report.counts();
+        limit_draws(&mut report);
+        assert!(report.passes[0].draws.is_empty() && report.counts() == before);
+    }
+}
