@@ -22,6 +22,7 @@ mod heat;
 mod hidden;
 mod oracle;
 mod orthographic;
+mod passes;
 mod per_sample;
 mod rounding;
 mod settings;
