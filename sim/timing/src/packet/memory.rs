@@ -20,6 +20,8 @@ pub(super) struct Fetched {
     pub last_request: Time,
     /// When the L2 accepts the first line.
     pub first: Time,
+    /// When the L2 accepts the last line.
+    pub last: Time,
     /// When the last line read arrives; 0 if none is read.
     pub arrived: Time,
     /// When all transfers are done.
@@ -106,7 +108,7 @@ impl Memory {
 
     /// Request `lines` one after another from `start` on, for a client with cycles of `period` grains.
     pub fn request(&mut self, port: usize, lines: &[LineAccess], start: Time, period: Time) -> Fetched {
-        let mut fetched = Fetched { last_request: start, first: Time::MAX, arrived: 0, moved: 0 };
+        let mut fetched = Fetched { last_request: start, first: Time::MAX, last: 0, arrived: 0, moved: 0 };
         let mut pacer =
             RequestPacer { at: start, used: 0, lines_per_cycle: self.lines_per_cycle[port], period };
         let mut remaining = lines;
@@ -130,6 +132,7 @@ impl Memory {
             self.order[port] = last;
             self.ports[port].note_all(run.count, first + self.period, last + self.period);
             fetched.first = fetched.first.min(first);
+            fetched.last = last;
             pacer.advance(count, fetched.last_request);
         }
         fetched
@@ -166,6 +169,11 @@ impl Memory {
         fetched.moved = fetched.moved.max(last + self.period);
         self.end = self.end.max(last + self.period);
         (first, last)
+    }
+
+    /// When a client knows that a line accepted at `accepted` is in the L2.
+    pub fn acknowledges(&self, accepted: Time) -> Time {
+        accepted + self.latency
     }
 
     /// When the last line is accepted and the last transfer is done.
