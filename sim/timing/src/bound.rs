@@ -5,11 +5,11 @@
 //! If the cores cannot hold enough packets at once to hide their program latency, it takes as long as
 //! Little's law demands (Little 1961). The front end of a batch overlaps the tiles of the previous batch;
 //! both share the cores, the L2 and memory. Neither is shorter than its longest packet without contention,
-//! or half of that if the batches around it hide the other half. A path that was empty adds the latency of a
-//! packet:
+//! or half of that if the batches around it hide the other half. A path that was empty fills first: its longest
+//! packet passes all units but the busiest, which is among those summed.
 //!
 //! ```text
-//! tiles(b) = max(sum over segments of busiest unit or full cores + fill, longest packet)        front(b) likewise
+//! tiles(b) = max(fill + sum over segments of busiest unit or full cores, longest packet)        front(b) likewise
 //! frame    = front(0) + sum over b of max(tiles(b) + barriers(b), front(b + 1), shared(b) + fill, rows(b) + fill)
 //! ```
 //!
@@ -30,11 +30,11 @@ use crate::{Clock, Recorder, Timed};
 
 /// Time of a frame from its totals.
 pub fn bound(machine: &MachineSpec, clocks: Clocks, totals: &Totals, mut recorder: Recorder) -> Timed {
-    let speeds = UnitSpeeds::new(machine, &clocks);
+    let speeds = &totals.speeds;
     let mut lengths = vec![PhaseLength::default(); totals.phases.len()];
     let mut passes = Passes::default();
     for segment in totals.segments().filter(|segment| segment.packets > 0) {
-        lengths[segment.phase].add(segment, &speeds);
+        lengths[segment.phase].add(segment, speeds);
         let work = passes.work(segment.pass);
         work.iter_mut().zip(segment.work).for_each(|(sum, part)| *sum += part);
     }
@@ -76,27 +76,34 @@ struct PhaseLength {
     work: UnitWork,
     /// Segments of each path, without barriers.
     paths: [Time; 2],
+    /// The same with the busiest unit other than the cores.
+    stages: [Time; 2],
     barriers: Time,
 }
 
 impl PhaseLength {
     fn add(&mut self, segment: &Segment, speeds: &UnitSpeeds) {
-        let busiest = speeds.times(&segment.work).into_iter().max().unwrap_or(0);
+        let [busiest, stage] = speeds.busiest(&segment.work);
         let length = segment.full.into_iter().fold(busiest, |most, full| most.max(full as Time));
         match segment.barrier {
             Some(latency) => self.barriers += length.max(latency),
-            None => self.paths[segment.path] += length,
+            None => {
+                self.paths[segment.path] += length;
+                self.stages[segment.path] += stage;
+            }
         }
         self.work.iter_mut().zip(segment.work).for_each(|(sum, part)| *sum += part);
     }
 
     /// Length of `phase`, with the busy time of its units and its row time.
     fn of(&self, phase: &Phase, busy: &[Time; Unit::COUNT], rows: Time) -> Time {
-        let fill: [Time; 2] =
-            std::array::from_fn(|path| if phase.fills[path] { phase.latency[path] } else { 0 });
-        let alone = phase.longest_alone(self.barriers > 0);
-        let [front, tiles] = std::array::from_fn(|path| (self.paths[path] + fill[path]).max(alone[path]));
-        let shared = busy.iter().copied().fold(rows, Time::max) + fill[0].max(fill[1]);
+        let floors = phase.floors(self.barriers > 0);
+        let [front, tiles] = std::array::from_fn(|path| {
+            let [fill, fill_stage] = phase.fill(path);
+            (self.paths[path] + fill).max(self.stages[path] + fill_stage).max(floors[path])
+        });
+        let fill = phase.fill(0)[0].max(phase.fill(1)[0]);
+        let shared = busy.iter().copied().fold(rows, Time::max) + fill;
         shared.max(front).max(tiles + self.barriers)
     }
 }
@@ -162,15 +169,22 @@ struct Segment {
     pub packets: u32,
 }
 
+/// The longest packet of a path, without contention.
+#[derive(Clone, Copy, Debug, Default)]
+struct Longest {
+    alone: Time,
+    /// The part of it beyond its busiest unit and its program, which other packets overlap.
+    beyond: Time,
+    /// The part of it beyond its busiest unit other than the cores.
+    beyond_stage: Time,
+}
+
 /// Batches that overlap. Phase 0 is the front end of batch 0. The next has the tiles of batch 0 and the front end
 /// of batch 1, and so on; a barrier that vertices wait for makes the two separate phases.
 #[derive(Clone, Debug, Default)]
 struct Phase {
     counts: Counts,
-    /// Longest packet of each path without contention.
-    longest: [Time; 2],
-    /// Latency of each path as far as packets go.
-    latency: [Time; 2],
+    longest: [Longest; 2],
     /// Whether a path was empty before.
     fills: [bool; 2],
 }
@@ -178,10 +192,16 @@ struct Phase {
 impl Phase {
     /// The least time of each path. Between other batches each path works on two batches at once, unless it was
     /// empty or is emptied.
-    fn longest_alone(&self, is_emptied: bool) -> [Time; 2] {
-        let [front, tiles] = self.longest;
+    fn floors(&self, is_emptied: bool) -> [Time; 2] {
+        let [front, tiles] = self.longest.map(|longest| longest.alone);
         let overlaps = front > 0 && tiles > 0 && !is_emptied && self.fills == [false; 2];
-        if overlaps { [(front + tiles) / 2; 2] } else { self.longest }
+        if overlaps { [(front + tiles) / 2; 2] } else { [front, tiles] }
+    }
+
+    /// Time to fill an empty path, if the cores are its busiest unit or if another unit is.
+    fn fill(&self, path: usize) -> [Time; 2] {
+        let Longest { beyond, beyond_stage, .. } = self.longest[path];
+        if self.fills[path] { [beyond, beyond_stage] } else { [0; 2] }
     }
 }
 
@@ -191,6 +211,7 @@ impl Phase {
 pub struct Totals {
     /// Packets per segment, for the front end and for tiles.
     segment_packets: [u32; 2],
+    speeds: UnitSpeeds,
     uncontended: Uncontended,
     open: [Segment; 2],
     closed: Vec<Segment>,
@@ -224,6 +245,7 @@ impl Totals {
         let open = |path| Segment { path, phase: path, ..Segment::default() };
         Self {
             segment_packets: PATHS.map(|path| path.iter().map(queue).sum()),
+            speeds: UnitSpeeds::new(machine, clocks),
             uncontended: Uncontended::new(machine, clocks),
             open: [open(0), open(1)],
             closed: Vec::new(),
@@ -263,8 +285,14 @@ impl Totals {
         self.open[path].full.iter_mut().zip(full).for_each(|(sum, part)| *sum += part);
         let at = &mut self.phases[phase];
         at.fills[path] |= std::mem::take(&mut self.empty[path]);
-        at.longest[path] = at.longest[path].max(alone);
-        at.latency[path] = at.latency[path].max(self.uncontended.latency(demand));
+        if alone > at.longest[path].alone {
+            let mut own = UnitWork::default();
+            builder.add_work(demand, counts, &mut own);
+            let [busiest, stage] = self.speeds.busiest(&own);
+            let hidden = full.into_iter().fold(busiest.max(program), |most, full| most.max(full as Time));
+            let [beyond, beyond_stage] = [hidden, stage].map(|part| alone.saturating_sub(part));
+            at.longest[path] = Longest { alone, beyond, beyond_stage };
+        }
     }
 
     /// The open segment of a path for the packet of `demand`.
@@ -367,11 +395,6 @@ impl Uncontended {
     pub fn full(&self, demand: &ServiceDemand, program: Time) -> [f64; 2] {
         let [packets, warps] = self.capacity;
         [program as f64 / packets, program as f64 * f64::from(demand.warps(self.warp_lanes)) / warps]
-    }
-
-    /// Latency of the stations that a packet passes.
-    pub fn latency(&self, demand: &ServiceDemand) -> Time {
-        self.latency[demand.first() as usize..=demand.last as usize].iter().sum()
     }
 
     /// Time that the clients of a packet take to request its lines beyond their service in the cycles of `work`, and

@@ -33,4 +33,12 @@ impl UnitSpeeds {
         Unit::ALL
             .map(|unit| (work[unit as usize] as f64 * self.grains_per_work[unit as usize]).ceil() as Time)
     }
+
+    /// Busy time of the busiest unit, and of the busiest one other than the cores.
+    pub fn busiest(&self, work: &UnitWork) -> [Time; 2] {
+        let times = self.times(work);
+        let others = Unit::ALL.into_iter().filter(|&unit| unit != Unit::Shader);
+        let stage = others.map(|unit| times[unit as usize]).fold(0, Time::max);
+        [stage.max(times[Unit::Shader as usize]), stage]
+    }
 }

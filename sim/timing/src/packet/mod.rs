@@ -32,7 +32,7 @@ mod station;
 use std::collections::VecDeque;
 
 use activity::{Counts, LineAccess, Packet, PacketCounts, Unit, Waits};
-use calendar::Calendar;
+use calendar::{Calendar, Turn};
 use cores::Cores;
 use memory::Memory;
 use station::StationState;
@@ -54,6 +54,7 @@ struct Visit<'a> {
     /// When it arrives, and when the next station has room for it.
     arrive: Time,
     room: Time,
+    turn: Turn,
 }
 
 /// First and last time of work with several parts.
@@ -119,6 +120,19 @@ impl Gates {
             }
             (false, batch) => at(&self.set_up, batch).max(self.barrier),
         }
+    }
+
+    /// The front end overlaps tiles that are simulated before it, so it takes turns with them.
+    fn turn(&self, demand: &ServiceDemand) -> Turn {
+        if demand.front && !self.traversed.is_empty() { Turn::Late } else { Turn::InOrder }
+    }
+
+    /// The last tiles so far, or the barrier after them, end no earlier than `at`.
+    fn delay(&mut self, at: Time) {
+        if let Some(last) = self.traversed.last_mut() {
+            *last = at.max(*last);
+        }
+        self.barrier = if self.barrier > 0 { at.max(self.barrier) } else { 0 };
     }
 
     fn note(&mut self, demand: &ServiceDemand, at: Time) {
@@ -222,6 +236,7 @@ impl PacketClock {
         if self.is_too_long {
             return;
         }
+        let turn = self.gates.turn(demand);
         let mut memory = Span::NONE;
         let begin = self.stations[first as usize].starts(arrive);
         for &station in &Station::ALL[first as usize..=demand.last as usize] {
@@ -231,7 +246,7 @@ impl PacketClock {
             // A packet leaves when the next queue has room, which it sees one cycle later.
             let room =
                 if station == demand.last { 0 } else { self.stations[station as usize + 1].queue.room_at() };
-            let visit = Visit { station, demand, lines, arrive, room };
+            let visit = Visit { station, demand, lines, arrive, room, turn };
             let leave = match station.unit() {
                 Unit::Shader => self.cores(&visit, counts, &mut memory),
                 _ => self.serve(&visit, counts, &mut memory),
@@ -247,6 +262,11 @@ impl PacketClock {
             self.tally.count(Unit::Dram, counts, memory.from, memory.to);
         }
         self.tally.packet_done(counts);
+        if turn == Turn::Late {
+            let yielded = self.cores.lanes().yielded().max(self.memory.yielded());
+            self.gates.delay(yielded);
+            self.end = self.end.max(yielded);
+        }
     }
 
     fn serve(&mut self, visit: &Visit<'_>, counts: &PacketCounts, memory: &mut Span) -> Time {

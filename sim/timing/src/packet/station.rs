@@ -117,7 +117,7 @@ impl StationState {
         let range = visit.demand.lines_of(port);
         let first = visit.demand.first_line;
         let lines = &visit.lines[range.start - first..range.end - first];
-        let fetched = memory.request(port, lines, start.max(self.next_request), self.period);
+        let fetched = memory.request(port, lines, visit.turn, start.max(self.next_request), self.period);
         self.next_request = fetched.last_request + self.period;
         Some(fetched)
     }
