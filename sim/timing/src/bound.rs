@@ -4,90 +4,108 @@
 //! segments of as many packets as the queues of the path hold. A segment takes as long as its busiest unit.
 //! If the cores cannot hold enough packets at once to hide their program latency, it takes as long as
 //! Little's law demands (Little 1961). The front end of a batch overlaps the tiles of the previous batch;
-//! both share the cores, the L2 and memory. Neither is shorter than its longest packet without contention:
+//! both share the cores, the L2 and memory. Neither is shorter than its longest packet without contention,
+//! or half of that if the batches around it hide the other half. A path that was empty fills first: its longest
+//! packet passes all units but the busiest, which is among those summed.
 //!
 //! ```text
-//! tiles(b) = max(sum over segments of busiest unit or full cores, longest packet)        front(b) likewise
-//! frame    = front(0) + sum over b of max(tiles(b), front(b + 1), shared(b), rows(b)) + latency of one packet per path
+//! tiles(b) = max(fill + sum over segments of busiest unit or full cores, longest packet)        front(b) likewise
+//! frame    = front(0) + sum over b of max(tiles(b) + barriers(b), front(b + 1), shared(b) + fill, rows(b) + fill)
 //! ```
+//!
+//! A barrier after batch `b` empties the tile path, and its own packet comes alone. If vertices wait for it,
+//! the front end of the next batch overlaps no tiles.
 //!
 //! Totals accumulated from a stream of packets.
 
-use activity::{Counts, Event, LineAccess, LineKind, Packet, PacketCounts, Unit};
+use activity::{Counts, Event, LineAccess, LineKind, Packet, PacketCounts, Unit, Waits};
 
 use crate::address::AddressMap;
 use crate::clock::{Clocks, Time};
-use crate::demand::{CLIENTS, DemandBuilder, ServiceDemand, Station, TEXTURE_PORT, port};
+use crate::demand::{CLIENTS, DemandBuilder, ServiceDemand, Station, port};
+use crate::passes::Passes;
 use crate::spec::MachineSpec;
-use crate::{Clock, LINE_BYTES, Recorder, Timed};
-
-/// Speeds of the units.
-struct UnitSpeeds<'a> {
-    machine: &'a MachineSpec,
-    clocks: Clocks,
-    /// Grains per unit of work: a cycle, an operation of a core, or a line.
-    grains_per_work: [f64; Unit::COUNT],
-}
-
-impl<'a> UnitSpeeds<'a> {
-    fn new(machine: &'a MachineSpec, clocks: Clocks) -> Self {
-        let servers = |unit: Unit| match unit {
-            Unit::Shader => f64::from(machine.shader.cores) * f64::from(machine.shader.lanes),
-            Unit::L2 => f64::from(machine.l2.lines_per_cycle),
-            Unit::Dram => f64::from(machine.dram.channels) / f64::from(machine.dram.burst_cycles),
-            _ => 1.0,
-        };
-        let grains_per_work =
-            Unit::ALL.map(|unit| clocks.period(machine.common(unit).clock) as f64 / servers(unit));
-        Self { machine, clocks, grains_per_work }
-    }
-
-    /// Busy time of every unit for the given work.
-    fn times(&self, work: &UnitWork) -> [Time; Unit::COUNT] {
-        Unit::ALL
-            .map(|unit| (work[unit as usize] as f64 * self.grains_per_work[unit as usize]).ceil() as Time)
-    }
-
-    /// Latency of an empty path.
-    fn latency(&self, stations: &[Station]) -> Time {
-        let of = |unit: Unit| {
-            let common = self.machine.common(unit);
-            self.clocks.period(common.clock) * Time::from(common.latency_cycles)
-        };
-        stations.iter().map(|station| of(station.unit())).sum()
-    }
-}
+use crate::work::{UnitSpeeds, UnitWork};
+use crate::{Clock, Recorder, Timed};
 
 /// Time of a frame from its totals.
 pub fn bound(machine: &MachineSpec, clocks: Clocks, totals: &Totals, mut recorder: Recorder) -> Timed {
-    let speeds = UnitSpeeds::new(machine, clocks);
-    let mut work = vec![UnitWork::default(); totals.phases.len()];
-    let mut paths = vec![[0; 2]; totals.phases.len()];
+    let speeds = &totals.speeds;
+    let mut lengths = vec![PhaseLength::default(); totals.phases.len()];
+    let mut passes = Passes::default();
     for segment in totals.segments().filter(|segment| segment.packets > 0) {
-        let busiest = speeds.times(&segment.work).into_iter().max().unwrap_or(0);
-        paths[segment.phase][segment.path] +=
-            segment.full.into_iter().fold(busiest, |most, full| most.max(full as Time));
-        work[segment.phase].iter_mut().zip(segment.work).for_each(|(sum, part)| *sum += part);
+        lengths[segment.phase].add(segment, speeds);
+        let work = passes.work(segment.pass);
+        work.iter_mut().zip(segment.work).for_each(|(sum, part)| *sum += part);
     }
-    let fill = PATHS.map(|path| speeds.latency(path));
     let rows = totals.rows();
+    let mut times = Vec::with_capacity(lengths.len());
     let mut now: Time = 0;
-    for (number, counts) in totals.phases.iter().enumerate() {
-        let busy = speeds.times(&work[number]);
-        let length = busy.into_iter().chain(paths[number]).fold(rows[number], Time::max);
-        let [front, tiles] = totals.longest[number];
-        let used = [front, tiles] != [0; 2];
-        let filled = length + if number < 2 && used { fill[number] } else { 0 };
-        let end = now + filled.max(front).max(tiles);
-        write(&mut recorder, &clocks, counts, &busy, [now, end]);
+    // Barriers come last in their phase.
+    for ((phase, length), rows) in totals.phases.iter().zip(&lengths).zip(&rows) {
+        let busy = speeds.times(&length.work);
+        let end = now + length.of(phase, &busy, *rows);
+        write(&mut recorder, &clocks, &phase.counts, &busy, [now, end]);
+        times.push([now, end - length.barriers, end]);
         now = end;
     }
+    for segment in totals.segments().filter(|segment| segment.packets > 0) {
+        let [begin, barriers, end] = times[segment.phase];
+        match segment.barrier {
+            Some(_) => passes.note(segment.pass, barriers, end),
+            None => passes.note(segment.pass, begin, barriers),
+        }
+    }
     recorder.lasts(clocks.ps(now));
-    let packets = totals.segments().map(|segment| u64::from(segment.packets)).sum();
     let timeline = recorder.finish();
     let share = crate::ratio_to_busiest(clocks.ps(rows.iter().sum()), &timeline);
-    let cycles = clocks.cycles(Clock::Core, now);
-    Timed { timeline, cycles, stalls: None, unit_cycles: 0, packets, rows: Some(share) }
+    Timed {
+        cycles: clocks.cycles(Clock::Core, now),
+        stalls: None,
+        unit_cycles: 0,
+        packets: totals.segments().map(|segment| u64::from(segment.packets)).sum(),
+        rows: Some(share),
+        passes: passes.finish(machine, &clocks, timeline.duration_ps),
+        timeline,
+    }
+}
+
+/// Parts of the length of a phase, in grains.
+#[derive(Clone, Debug, Default)]
+struct PhaseLength {
+    work: UnitWork,
+    /// Segments of each path, without barriers.
+    paths: [Time; 2],
+    /// The same with the busiest unit other than the cores.
+    stages: [Time; 2],
+    barriers: Time,
+}
+
+impl PhaseLength {
+    fn add(&mut self, segment: &Segment, speeds: &UnitSpeeds) {
+        let [busiest, stage] = speeds.busiest(&segment.work);
+        let length = segment.full.into_iter().fold(busiest, |most, full| most.max(full as Time));
+        match segment.barrier {
+            Some(latency) => self.barriers += length.max(latency),
+            None => {
+                self.paths[segment.path] += length;
+                self.stages[segment.path] += stage;
+            }
+        }
+        self.work.iter_mut().zip(segment.work).for_each(|(sum, part)| *sum += part);
+    }
+
+    /// Length of `phase`, with the busy time of its units and its row time.
+    fn of(&self, phase: &Phase, busy: &[Time; Unit::COUNT], rows: Time) -> Time {
+        let floors = phase.floors(self.barriers > 0);
+        let [front, tiles] = std::array::from_fn(|path| {
+            let [fill, fill_stage] = phase.fill(path);
+            (self.paths[path] + fill).max(self.stages[path] + fill_stage).max(floors[path])
+        });
+        let fill = phase.fill(0)[0].max(phase.fill(1)[0]);
+        let shared = busy.iter().copied().fold(rows, Time::max) + fill;
+        shared.max(front).max(tiles + self.barriers)
+    }
 }
 
 fn write(
@@ -98,7 +116,7 @@ fn write(
     [from, to]: [Time; 2],
 ) {
     let (start, end) = (clocks.ps(from), clocks.ps(to));
-    for unit in Unit::ALL.into_iter().filter(|&unit| counts.uses(unit)) {
+    for unit in Unit::ALL.into_iter().filter(|&unit| counts.uses(unit) || busy[unit as usize] > 0) {
         recorder.count_all(unit, counts, start, end);
         if to > from {
             recorder.busy(unit, start, end, busy[unit as usize], to - from);
@@ -137,18 +155,54 @@ impl BoundClock {
     }
 }
 
-/// Work of every unit: operations for the cores, lines for the L2 and memory, cycles for all others.
-type UnitWork = [u64; Unit::COUNT];
-
-/// Consecutive packets of one path that fit in its queues together.
+/// Consecutive packets of one path that fit in its queues together, or a barrier.
 #[derive(Clone, Debug, Default)]
 struct Segment {
     pub path: usize,
     pub phase: usize,
+    pub pass: u16,
+    /// Time of a barrier without contention; `None` for other packets.
+    pub barrier: Option<Time>,
     pub work: UnitWork,
     /// Grains for which the cores are full if no packet waits, by packets and by warps.
     pub full: [f64; 2],
     pub packets: u32,
+}
+
+/// The longest packet of a path, without contention.
+#[derive(Clone, Copy, Debug, Default)]
+struct Longest {
+    alone: Time,
+    /// The part of it beyond its busiest unit and its program, which other packets overlap.
+    beyond: Time,
+    /// The part of it beyond its busiest unit other than the cores.
+    beyond_stage: Time,
+}
+
+/// Batches that overlap. Phase 0 is the front end of batch 0. The next has the tiles of batch 0 and the front end
+/// of batch 1, and so on; a barrier that vertices wait for makes the two separate phases.
+#[derive(Clone, Debug, Default)]
+struct Phase {
+    counts: Counts,
+    longest: [Longest; 2],
+    /// Whether a path was empty before.
+    fills: [bool; 2],
+}
+
+impl Phase {
+    /// The least time of each path. Between other batches each path works on two batches at once, unless it was
+    /// empty or is emptied.
+    fn floors(&self, is_emptied: bool) -> [Time; 2] {
+        let [front, tiles] = self.longest.map(|longest| longest.alone);
+        let overlaps = front > 0 && tiles > 0 && !is_emptied && self.fills == [false; 2];
+        if overlaps { [(front + tiles) / 2; 2] } else { [front, tiles] }
+    }
+
+    /// Time to fill an empty path, if the cores are its busiest unit or if another unit is.
+    fn fill(&self, path: usize) -> [Time; 2] {
+        let Longest { beyond, beyond_stage, .. } = self.longest[path];
+        if self.fills[path] { [beyond, beyond_stage] } else { [0; 2] }
+    }
 }
 
 /// Totals of a frame: work of every segment and events of every phase. The size grows with segments, not with
@@ -157,19 +211,18 @@ struct Segment {
 pub struct Totals {
     /// Packets per segment, for the front end and for tiles.
     segment_packets: [u32; 2],
-    /// Lines per cycle that each client of the L2 can request.
-    lines_per_cycle: [u32; CLIENTS.len()],
+    speeds: UnitSpeeds,
     uncontended: Uncontended,
     open: [Segment; 2],
     closed: Vec<Segment>,
-    /// Longest packet of each phase and path without contention.
-    longest: Vec<[Time; 2]>,
     banks: Banks,
     /// Row time of the busiest bank, for each phase before the last.
     rows: Vec<Time>,
-    /// Events of each phase. Phase 0 is the front end of batch 0. Phase `b + 1` is the tiles of batch `b` and
-    /// the front end of batch `b + 1`.
-    phases: Vec<Counts>,
+    phases: Vec<Phase>,
+    /// Whether each path is empty.
+    empty: [bool; 2],
+    /// Barriers so far that vertices wait for.
+    full_barriers: usize,
 }
 
 const PATHS: [&[Station]; 2] = [
@@ -192,14 +245,15 @@ impl Totals {
         let open = |path| Segment { path, phase: path, ..Segment::default() };
         Self {
             segment_packets: PATHS.map(|path| path.iter().map(queue).sum()),
-            lines_per_cycle: CLIENTS.map(|unit| machine.common(unit).lines_per_cycle),
+            speeds: UnitSpeeds::new(machine, clocks),
             uncontended: Uncontended::new(machine, clocks),
             open: [open(0), open(1)],
             closed: Vec::new(),
-            longest: Vec::new(),
             banks: Banks::new(machine, clocks),
             rows: Vec::new(),
             phases: Vec::new(),
+            empty: [true; 2],
+            full_barriers: 0,
         }
     }
 
@@ -212,42 +266,70 @@ impl Totals {
         lines: &[LineAccess],
     ) {
         let path = usize::from(!demand.front);
-        let phase = demand.batch as usize + path;
-        let open = &mut self.open[path];
-        if phase != open.phase || open.packets == self.segment_packets[path] {
-            let full = std::mem::replace(open, Segment { path, phase, ..Segment::default() });
-            self.closed.push(full);
-        }
-        let work = &mut open.work;
-        // A client is busy until it has requested its last line.
-        let request_cycles = |port: usize| demand.lines[port].div_ceil(self.lines_per_cycle[port]);
-        for &station in PATHS[path] {
-            let request_cycles = port(station.unit()).map_or(0, request_cycles);
-            work[station.unit() as usize] += u64::from(demand.service[station as usize].max(request_cycles));
-        }
-        work[Unit::Shader as usize] += u64::from(counts[Event::ShaderOps]);
-        if demand.is_textured() {
-            let cycles = builder.texture_cycles(demand.texels);
-            work[Unit::Texture as usize] += u64::from(cycles.max(request_cycles(TEXTURE_PORT)));
-        }
-        work[Unit::L2 as usize] += demand.lines.iter().map(|&lines| u64::from(lines)).sum::<u64>();
-        let bytes = counts[Event::DramReadBytes] + counts[Event::DramWriteBytes];
-        work[Unit::Dram as usize] += u64::from(bytes / LINE_BYTES);
+        let phase = match demand.barrier {
+            Some(_) => self.phases.len().saturating_sub(1),
+            None => demand.batch as usize + path + self.full_barriers,
+        };
+        self.reach(phase);
         let program = self.uncontended.program(demand);
-        open.full.iter_mut().zip(self.uncontended.full(demand, program)).for_each(|(sum, part)| *sum += part);
-        open.packets += 1;
+        let alone = self.uncontended.packet(demand, program, counts);
+        let segment = self.segment(path, phase, demand);
+        builder.add_work(demand, counts, &mut segment.work);
+        segment.packets += 1;
+        self.phases[phase].counts += counts;
+        self.banks.add(lines);
+        if let Some(waits) = demand.barrier {
+            return self.barrier(waits, demand, alone);
+        }
+        let full = self.uncontended.full(demand, program);
+        self.open[path].full.iter_mut().zip(full).for_each(|(sum, part)| *sum += part);
+        let at = &mut self.phases[phase];
+        at.fills[path] |= std::mem::take(&mut self.empty[path]);
+        if alone > at.longest[path].alone {
+            let mut own = UnitWork::default();
+            builder.add_work(demand, counts, &mut own);
+            let [busiest, stage] = self.speeds.busiest(&own);
+            let hidden = full.into_iter().fold(busiest.max(program), |most, full| most.max(full as Time));
+            let [beyond, beyond_stage] = [hidden, stage].map(|part| alone.saturating_sub(part));
+            at.longest[path] = Longest { alone, beyond, beyond_stage };
+        }
+    }
+
+    /// The open segment of a path for the packet of `demand`.
+    fn segment(&mut self, path: usize, phase: usize, demand: &ServiceDemand) -> &mut Segment {
+        let open = &mut self.open[path];
+        let is_full = open.packets == self.segment_packets[path] || demand.barrier.is_some();
+        if phase != open.phase || is_full {
+            let next = Segment { path, phase, pass: demand.pass, ..Segment::default() };
+            self.closed.push(std::mem::replace(open, next));
+        }
+        open.pass = demand.pass;
+        open
+    }
+
+    /// End the segment of a barrier. Its packet is alone, so it takes the sum of its units.
+    fn barrier(&mut self, waits: Waits, demand: &ServiceDemand, alone: Time) {
+        let open = &mut self.open[1];
+        let requests = self.uncontended.requests(demand, &open.work);
+        open.barrier = Some(alone + requests);
+        let next = Segment { path: 1, phase: open.phase, ..Segment::default() };
+        self.closed.push(std::mem::replace(open, next));
+        self.empty[1] = true;
+        if waits == Waits::All {
+            self.empty[0] = true;
+            self.full_barriers += 1;
+        }
+    }
+
+    /// Add phases up to `phase`.
+    fn reach(&mut self, phase: usize) {
         if self.phases.len() <= phase {
             self.rows.resize(phase, 0);
             if let Some(last) = self.rows.last_mut() {
                 *last += self.banks.take_longest();
             }
-            self.phases.resize(phase + 1, Counts::default());
-            self.longest.resize(phase + 1, [0; 2]);
+            self.phases.resize(phase + 1, Phase::default());
         }
-        self.phases[phase] += counts;
-        self.banks.add(lines);
-        let longest = &mut self.longest[phase][path];
-        *longest = (*longest).max(self.uncontended.packet(demand, program, counts));
     }
 
     /// Row time of the busiest bank in each phase.
@@ -313,6 +395,20 @@ impl Uncontended {
     pub fn full(&self, demand: &ServiceDemand, program: Time) -> [f64; 2] {
         let [packets, warps] = self.capacity;
         [program as f64 / packets, program as f64 * f64::from(demand.warps(self.warp_lanes)) / warps]
+    }
+
+    /// Time that the clients of a packet take to request its lines beyond their service in the cycles of `work`, and
+    /// the answers to all of them but one.
+    pub fn requests(&self, demand: &ServiceDemand, work: &UnitWork) -> Time {
+        let clients = [Station::Depth, Station::Colour]
+            .into_iter()
+            .filter(|station| port(station.unit()).is_some_and(|port| demand.lines[port] > 0));
+        let beyond = |station: &Station| {
+            let cycles = work[station.unit() as usize] - u64::from(demand.service[*station as usize]);
+            self.period[*station as usize] * cycles
+        };
+        let answers = self.line[0] * (clients.clone().count() as Time).saturating_sub(1);
+        clients.map(|station| beyond(&station)).sum::<Time>() + answers
     }
 
     /// Time of a packet from its first station to its last.

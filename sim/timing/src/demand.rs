@@ -3,9 +3,10 @@
 
 use std::ops::Range;
 
-use activity::{Event, LineAccess, Packet, PacketCounts, PacketKind, Unit};
+use activity::{Event, LineAccess, Packet, PacketCounts, PacketKind, Unit, Waits};
 
-use crate::MachineSpec;
+use crate::work::UnitWork;
+use crate::{LINE_BYTES, MachineSpec};
 
 /// A station on the path of a packet. The shader cores are two stations, one for vertices and one for pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -79,8 +80,12 @@ pub const TEXELS: usize = {
 pub struct ServiceDemand {
     /// Whether the packet takes the front end (command to set-up) or the tile path (traversal to colour).
     pub front: bool,
-    /// Batch number in the frame, all passes counted.
+    /// Pass number in the frame.
+    pub pass: u16,
+    /// Batch number in the frame, all passes counted. Barriers are in no batch.
     pub batch: u32,
+    /// For a barrier: which later packets wait for it.
+    pub barrier: Option<Waits>,
     /// Last station with work.
     pub last: Station,
     /// Cycles of service at each station; 0 at the shader cores.
@@ -110,6 +115,11 @@ impl ServiceDemand {
         self.texels != [0; TEXELS] || self.lines[TEXTURE_PORT] > 0
     }
 
+    /// First station of its path.
+    pub fn first(&self) -> Station {
+        if self.front { Station::Command } else { Station::Traversal }
+    }
+
     /// Number of warps of at most `lanes` threads.
     pub fn warps(&self, lanes: u32) -> u32 {
         self.threads.div_ceil(lanes)
@@ -129,6 +139,8 @@ pub struct DemandBuilder {
     costs: [Vec<(Event, f64)>; Station::COUNT],
     /// Cycles per event of the texture units.
     texel_cycles: [f64; TEXELS],
+    /// Lines per cycle that each client of the L2 can request.
+    lines_per_cycle: [u32; CLIENTS.len()],
     /// Pass of the last packet, number of its first batch in the frame, and number of the last batch.
     pass: u16,
     first_batch: u32,
@@ -145,10 +157,17 @@ impl DemandBuilder {
         let cycles = |event| {
             machine.texture.rates.iter().find(|(e, _)| *e == event).map_or(0.0, |(_, rate)| rate.recip())
         };
-        Self { costs, texel_cycles: texture_events().map(cycles), pass: 0, first_batch: 0, last_batch: 0 }
+        Self {
+            costs,
+            texel_cycles: texture_events().map(cycles),
+            lines_per_cycle: CLIENTS.map(|unit| machine.common(unit).lines_per_cycle),
+            pass: 0,
+            first_batch: 0,
+            last_batch: 0,
+        }
     }
 
-    /// Demand of the next packet of the stream. `lines` are appended to `store`, sorted by client.
+    /// Demand of the next packet of the stream; passes come one after another. `lines` are appended to `store`, sorted by client.
     pub fn build(
         &mut self,
         packet: &Packet,
@@ -157,11 +176,17 @@ impl DemandBuilder {
     ) -> ServiceDemand {
         let counts = &packet.counts;
         let front = matches!(packet.kind, PacketKind::Draw | PacketKind::Vertices);
-        let batch = self.batch_of(packet);
+        let barrier = match packet.kind {
+            PacketKind::Barrier(waits) => Some(waits),
+            _ => None,
+        };
+        let batch = if barrier.is_some() { self.last_batch } else { self.batch_of(packet) };
         let stations = if front { Station::Command as usize..3 } else { 3..Station::COUNT };
         let mut demand = ServiceDemand {
             front,
+            pass: packet.pass,
             batch,
+            barrier,
             last: if front { Station::Command } else { Station::Traversal },
             service: [0; Station::COUNT],
             threads: counts[if front { Event::VertexInvocations } else { Event::PixelInvocations }],
@@ -190,6 +215,26 @@ impl DemandBuilder {
         let parts =
             texels.into_iter().zip(self.texel_cycles).map(|(count, cycles)| f64::from(count) * cycles);
         whole(parts.fold(0.0, f64::max))
+    }
+
+    /// Add the work of a packet to `work`. A client of the L2 works until it has requested its last line.
+    pub(crate) fn add_work(&self, demand: &ServiceDemand, counts: &PacketCounts, work: &mut UnitWork) {
+        let mut add = |unit: Unit, amount: u32| work[unit as usize] += u64::from(amount);
+        let service = |station: Station| demand.service[station as usize];
+        let texture = if demand.is_textured() { self.texture_cycles(demand.texels) } else { 0 };
+        Station::ALL.into_iter().for_each(|station| add(station.unit(), service(station)));
+        add(Unit::Texture, texture);
+        add(Unit::Shader, counts[Event::ShaderOps]);
+        add(Unit::Dram, (counts[Event::DramReadBytes] + counts[Event::DramWriteBytes]) / LINE_BYTES);
+        if demand.lines == [0; CLIENTS.len()] {
+            return;
+        }
+        let served = [service(Station::Command), service(Station::Depth), texture, service(Station::Colour)];
+        for (port, served) in served.into_iter().enumerate() {
+            let requests = demand.lines[port].div_ceil(self.lines_per_cycle[port]);
+            add(CLIENTS[port], requests.saturating_sub(served));
+            add(Unit::L2, demand.lines[port]);
+        }
     }
 
     /// Cycles of service at `station` for `counts`, without line requests. The parts of a unit work in

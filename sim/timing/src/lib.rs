@@ -11,6 +11,7 @@
 //! - [`BoundClock`]: a roofline over segments of the stream, from [`Totals`] gathered while packets arrive.
 //! - [`sampled`]: which frames of an animation to simulate, and estimates of the others.
 //! - [`streams`]: streams that challenge the levels, and microbenchmarks of single rates.
+//! - [`PassTime`]: when a pass began and ended, and the time of its work in every unit.
 //! - [`Recorder`]: events and busy time over time; [`Stalls`]: why units did not work.
 //!
 //! The crate contains no geometry and no energy. The activity is fixed before its timing: cache hits and
@@ -34,12 +35,14 @@ mod clock;
 mod demand;
 mod frame_clock;
 mod packet;
+mod passes;
 mod recorder;
 pub mod sampled;
 mod spec;
 mod stalls;
 pub mod stepped;
 pub mod streams;
+mod work;
 
 pub use bound::{BoundClock, Totals, bound};
 pub use clock::{Clocks, Time};
@@ -47,6 +50,7 @@ pub use demand::{CLIENTS, DemandBuilder, ServiceDemand, Station};
 pub use frame_clock::AccuracyWarning;
 pub use frame_clock::{FrameClock, Level, Machine, TimingError};
 pub use packet::{MAX_CYCLES, PacketClock};
+pub use passes::PassTime;
 pub use recorder::Recorder;
 pub use spec::{
     Chips, ClientSpec, Clock, Common, Cycles, DramSpec, Entries, L2Spec, MachineSpec, Rates, RowBytes,
@@ -73,6 +77,8 @@ pub struct Timed {
     /// Row time of the busiest memory bank over the busy time of the busiest unit; `None` at the level
     /// `stepped`. Levels differ most where it is large, as they order lines differently.
     pub rows: Option<f64>,
+    /// The passes of the frame, by number.
+    pub passes: Vec<PassTime>,
 }
 
 /// `length_ps` over the busy time of the busiest unit.

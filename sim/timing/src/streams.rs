@@ -1,7 +1,7 @@
 //! Synthetic streams of packets: some challenge the levels of timing, others measure a single rate. They
 //! bypass the pipeline, so each has a single cause.
 
-use activity::{Bounded, Event, LineAccess, LineKind, Packet, PacketKind, Unit};
+use activity::{Bounded, Event, LineAccess, LineKind, Packet, PacketKind, Unit, Waits};
 
 use crate::spec::{Entries, MachineSpec};
 
@@ -98,6 +98,9 @@ pub fn failures(units: &MachineSpec, batch: u32) -> Vec<Failure> {
         on("thrashing caches", thrashing(1)),
         on("row after row", thrashing(4096)),
         on("a short frame", vec![vertices(0, 1, 8), tile(0, 4, 8, Vec::new())]),
+        on("64 passes of one triangle", single_triangles()),
+        on("passes in a chain", chain()),
+        on("passes side by side", side_by_side()),
     ]
 }
 
@@ -159,6 +162,59 @@ fn thrashing(stride: u32) -> Packets {
         tile(0, 16, 20, all.concat())
     });
     std::iter::once(vertices(0, 1, 20)).chain(tiles).collect()
+}
+
+/// A frame of passes, with what comes before each.
+fn in_passes(passes: impl IntoIterator<Item = (Option<Packets>, Packets)>) -> Packets {
+    let mut all = Packets::new();
+    for ((before, packets), pass) in passes.into_iter().zip(0..) {
+        let of_pass = before.into_iter().flatten().chain(packets);
+        all.extend(of_pass.map(|(packet, lines)| (Packet { pass, ..packet }, lines)));
+    }
+    all
+}
+
+/// A barrier at which depth and colour write `count` lines each to the L2, from `first` on.
+fn barrier(waits: Waits, first: u32, count: u32) -> Packets {
+    let written = |client, first| lines(client, first, count, 1, LineKind::Write, None);
+    let all = [written(Unit::Depth, first), written(Unit::Colour, first + count)];
+    vec![packet(PacketKind::Barrier(waits), 0, &[], all.concat())]
+}
+
+/// Passes of a triangle in four tiles, each of which reads what the one before wrote.
+fn single_triangles() -> Packets {
+    let pass = |n: u32| {
+        let before = (n > 0).then(|| barrier(Waits::Tiles, 64 * n, 16));
+        let texels = |at: u32| lines(Unit::Texture, 64 * n + 16 + 4 * at, 4, 1, LineKind::Hit, None);
+        let tiles = (0..4).map(|at| tile(0, 64, 20, if n > 0 { texels(at) } else { Vec::new() }));
+        (before, std::iter::once(vertices(0, 1, 20)).chain(tiles).collect())
+    };
+    in_passes((0..64).map(pass))
+}
+
+/// Passes of many packets, each of which reads what the one before wrote; every other one has its vertices wait,
+/// too.
+fn chain() -> Packets {
+    let pass = |n: u32| {
+        let waits = if n.is_multiple_of(2) { Waits::All } else { Waits::Tiles };
+        let before = (n > 0).then(|| barrier(waits, n << 16, 256));
+        let texels = |at: u32| lines(Unit::Texture, (n << 16) + 4 * at, 4, 1, LineKind::Fetch, None);
+        let fronts = (0..32).map(|at| vertices(32 * at, 32, 40));
+        let tiles = (0..200).map(|at| tile(at, 16 + at % 48, 40, texels(at)));
+        (before, fronts.chain(tiles).collect())
+    };
+    in_passes((0..16).map(pass))
+}
+
+/// Passes that depend on no other, in turn of many vertices and of many pixels.
+fn side_by_side() -> Packets {
+    let pass = |n: u32| {
+        let (fronts, tiles) = if n.is_multiple_of(2) { (160, 20) } else { (8, 250) };
+        let fronts = (0..fronts).map(|at| vertices(32 * at, 32, 60));
+        let tiles = (0..tiles).map(|at| tile(at, 48, 60, Vec::new()));
+        (None, fronts.chain(tiles).collect())
+    };
+    in_passes((0..16).map(pass))
 }
 
 fn shallow(units: &mut MachineSpec) {

@@ -2,6 +2,15 @@
 
 use crate::clock::Time;
 
+/// How a packet comes to shared resources.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Turn {
+    /// After the packets before it in the stream.
+    InOrder,
+    /// Packets before it in the stream are under way at the same time, and make room for it.
+    Late,
+}
+
 /// Time slots of equal length, each with capacity for the same amount of work. Requests come in stream order,
 /// not in time order. A request may use capacity before that of earlier requests.
 ///
@@ -14,6 +23,9 @@ pub(super) struct Calendar {
     /// Capacity of a slot.
     capacity: u64,
     used: Vec<u64>,
+    /// The part of it that came late.
+    shared: Vec<u64>,
+    yielded: Time,
     /// For each slot, a lower bound of the first slot from it on with free capacity (union-find with path
     /// compression).
     next_free: Vec<u32>,
@@ -30,6 +42,8 @@ impl Calendar {
             servers,
             capacity: length * servers,
             used: Vec::new(),
+            shared: Vec::new(),
+            yielded: 0,
             next_free: Vec::new(),
         }
     }
@@ -54,9 +68,62 @@ impl Calendar {
         }
     }
 
+    /// Reserve `work` from `at` on, in order or in turn.
+    pub fn reserve_as(&mut self, turn: Turn, at: Time, work: u64) -> (Time, Time) {
+        match turn {
+            Turn::InOrder => self.reserve(at, work),
+            Turn::Late => self.share(at, work),
+        }
+    }
+
+    /// Reserve `work` from `at` on in turn with what is reserved already: up to half of a full slot makes room and
+    /// moves on to later slots.
+    fn share(&mut self, at: Time, work: u64) -> (Time, Time) {
+        let mut slot = (at >> self.shift) as usize;
+        let (mut remaining, mut moved, mut begin) = (work, 0, None);
+        loop {
+            self.reach(slot);
+            self.shared.resize(self.used.len(), 0);
+            let free = self.capacity - self.used[slot];
+            let half = (self.capacity / 2).saturating_sub(self.shared[slot]);
+            let here = remaining.min(free.max(half));
+            // In turn with as much other work, if there is any.
+            let before = self.used[slot].min(2 * self.shared[slot]);
+            let from = (self.start_of(slot) + self.on_all_servers(before)).max(at);
+            let end = from + self.on_all_servers(if here > free { 2 * here } else { here });
+            if here > 0 {
+                begin.get_or_insert(from);
+            }
+            self.shared[slot] += here;
+            self.used[slot] += here.min(free);
+            moved += here - here.min(free);
+            remaining -= here;
+            if self.used[slot] == self.capacity {
+                self.next_free[slot] = slot as u32 + 1;
+            }
+            if remaining == 0 {
+                let begin = begin.unwrap_or(at);
+                if moved > 0 {
+                    self.yielded = self.yielded.max(self.reserve(self.start_of(slot + 1), moved).1);
+                }
+                return (begin, end.max(begin + self.on_all_servers(work + self.servers - 1)));
+            }
+            slot += 1;
+        }
+    }
+
+    /// When the last work that made room for other work ends; 0 if none did.
+    pub fn yielded(&self) -> Time {
+        self.yielded
+    }
+
+    fn start_of(&self, slot: usize) -> Time {
+        (slot as Time) << self.shift
+    }
+
     /// End of the work reserved in a slot so far, if none of it ends before `at`.
     fn end_of_slot_work(&self, slot: usize, at: Time) -> Time {
-        (((slot as Time) << self.shift) + self.on_all_servers(self.used[slot])).max(at)
+        (self.start_of(slot) + self.on_all_servers(self.used[slot])).max(at)
     }
 
     /// Time of `work` on all servers.
@@ -157,6 +224,19 @@ mod tests {
         // Slot 0 has capacity for 12 more, slot 1 is free, slot 2 is full.
         assert_eq!(calendar.reserve(0, 30), (4, 52));
         assert_eq!(calendar.slots().map(|(_, _, used, _)| used).sum::<u64>(), 52);
+    }
+
+    #[test]
+    fn late_work_takes_turns_with_what_is_there() {
+        let mut calendar = Calendar::new(16, 1);
+        assert_eq!(calendar.reserve(0, 64), (0, 64));
+        // Half of two slots, and the other work ends later.
+        assert_eq!(calendar.reserve_as(Turn::Late, 0, 16), (0, 32));
+        assert_eq!(calendar.yielded(), 80);
+        // Half of the next two; what is free is taken first.
+        assert_eq!(calendar.reserve_as(Turn::Late, 32, 4), (32, 40));
+        assert_eq!(calendar.reserve_as(Turn::Late, 90, 30), (90, 120));
+        assert_eq!(calendar.slots().map(|(_, _, used, _)| used).sum::<u64>(), 64 + 16 + 4 + 30);
     }
 
     #[test]

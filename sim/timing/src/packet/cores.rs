@@ -6,7 +6,7 @@ use super::memory::Memory;
 use super::station::aligned;
 use super::{Span, Visit};
 use crate::clock::{Clocks, Time};
-use crate::demand::{DemandBuilder, ServiceDemand, Station, TEXTURE_PORT, share};
+use crate::demand::{DemandBuilder, Station, TEXTURE_PORT, share};
 use crate::spec::MachineSpec;
 
 /// Cycles per slot of the calendars.
@@ -116,7 +116,7 @@ impl Cores {
             if textured {
                 ready = self.texels(visit, &chunk, ready, builder, memory, &mut run);
             }
-            let done = self.operate(demand, &chunk, ready);
+            let done = self.operate(visit, &chunk, ready);
             self.fifos[kind].slots.note_all(chunk.count, done.from, done.to);
             run.done = run.done.max(done.to);
         }
@@ -168,6 +168,7 @@ impl Cores {
             let fetched = memory.request(
                 TEXTURE_PORT,
                 &visit.lines[range],
+                visit.turn,
                 start.max(self.next_texture_request),
                 self.texture_period,
             );
@@ -194,7 +195,8 @@ impl Cores {
 
     /// Run the operations of some warps, ready between `ready.from` and `ready.to`. Returns when the first and
     /// the last warp are done.
-    fn operate(&mut self, demand: &ServiceDemand, chunk: &Chunk, ready: Span) -> Span {
+    fn operate(&mut self, visit: &Visit<'_>, chunk: &Chunk, ready: Span) -> Span {
+        let demand = visit.demand;
         let part = |part: u32| share(demand.threads, part, chunk.of).start;
         let threads = part(chunk.first + chunk.count) - part(chunk.first);
         let operations = u64::from(threads) * u64::from(demand.ops);
@@ -202,8 +204,10 @@ impl Cores {
         let wide = Time::from(threads.div_ceil(chunk.count).div_ceil(self.lanes_of_core).saturating_sub(1))
             * self.period;
         let alone = Time::from(demand.ops.max(1)) * (self.alu + wide);
-        let issued =
-            if operations > 0 { self.lanes.reserve(ready.from, operations * self.period).1 } else { 0 };
+        let issued = match operations * self.period {
+            0 => 0,
+            work => self.lanes.reserve_as(visit.turn, ready.from, work).1,
+        };
         let last = (ready.to + alone).max(issued + self.alu.saturating_sub(self.period));
         Span { from: last - (ready.to - ready.from).min(last - ready.from), to: last }
     }

@@ -4,7 +4,7 @@
 use activity::{LineAccess, LineKind};
 
 use super::Span;
-use super::calendar::{Calendar, QueueTimes};
+use super::calendar::{Calendar, QueueTimes, Turn};
 use crate::address::AddressMap;
 use crate::clock::{Clocks, Time};
 use crate::demand::CLIENTS;
@@ -20,6 +20,8 @@ pub(super) struct Fetched {
     pub last_request: Time,
     /// When the L2 accepts the first line.
     pub first: Time,
+    /// When the L2 accepts the last line.
+    pub last: Time,
     /// When the last line read arrives; 0 if none is read.
     pub arrived: Time,
     /// When all transfers are done.
@@ -31,6 +33,7 @@ pub(super) struct Fetched {
 struct Run {
     head: LineAccess,
     count: u32,
+    turn: Turn,
     /// Delay from the request of the first line to that of the last.
     last: Time,
 }
@@ -105,8 +108,15 @@ impl Memory {
     }
 
     /// Request `lines` one after another from `start` on, for a client with cycles of `period` grains.
-    pub fn request(&mut self, port: usize, lines: &[LineAccess], start: Time, period: Time) -> Fetched {
-        let mut fetched = Fetched { last_request: start, first: Time::MAX, arrived: 0, moved: 0 };
+    pub fn request(
+        &mut self,
+        port: usize,
+        lines: &[LineAccess],
+        turn: Turn,
+        start: Time,
+        period: Time,
+    ) -> Fetched {
+        let mut fetched = Fetched { last_request: start, first: Time::MAX, last: 0, arrived: 0, moved: 0 };
         let mut pacer =
             RequestPacer { at: start, used: 0, lines_per_cycle: self.lines_per_cycle[port], period };
         let mut remaining = lines;
@@ -123,13 +133,14 @@ impl Memory {
             pacer.delay_until(
                 queue.room_at().max(queue.room_for(count).saturating_sub(pacer.delay_of_last(count))),
             );
-            let run = Run { head, count, last: pacer.delay_of_last(count) };
+            let run = Run { head, count, turn, last: pacer.delay_of_last(count) };
             fetched.last_request = pacer.at + run.last;
             let seen = (pacer.at + period).max(self.order[port]);
             let (first, last) = self.take(&run, seen, &mut fetched);
             self.order[port] = last;
             self.ports[port].note_all(run.count, first + self.period, last + self.period);
             fetched.first = fetched.first.min(first);
+            fetched.last = last;
             pacer.advance(count, fetched.last_request);
         }
         fetched
@@ -146,8 +157,8 @@ impl Memory {
     /// Pass a run through the L2; its first line arrives at `seen`. Returns when the first and the last line
     /// are accepted.
     fn take(&mut self, run: &Run, seen: Time, fetched: &mut Fetched) -> (Time, Time) {
-        let Run { head, count, last: later } = *run;
-        let (first, end) = self.l2.reserve(seen, u64::from(count) * self.period);
+        let Run { head, count, turn, last: later } = *run;
+        let (first, end) = self.l2.reserve_as(turn, seen, u64::from(count) * self.period);
         let mut last = end.saturating_sub(self.period).max(first + later);
         if head.kind == LineKind::Hit {
             fetched.arrived = fetched.arrived.max(last + self.latency);
@@ -155,7 +166,7 @@ impl Memory {
         let (fetch, victim) = moved(&head);
         for line in [fetch, victim].into_iter().flatten() {
             let seen = Span { from: first + self.period, to: last + self.period };
-            let moved = self.dram.transfer(line, count, seen);
+            let moved = self.dram.transfer(line, count, turn, seen);
             // The channel's queue holds `backlog`; the rest of the run waits in front of the L2.
             last = last.max(moved.issued.saturating_sub(self.dram.backlog()));
             fetched.moved = fetched.moved.max(moved.data);
@@ -168,9 +179,20 @@ impl Memory {
         (first, last)
     }
 
+    /// When a client knows that a line accepted at `accepted` is in the L2.
+    pub fn acknowledges(&self, accepted: Time) -> Time {
+        accepted + self.latency
+    }
+
     /// When the last line is accepted and the last transfer is done.
     pub fn ends_at(&self) -> Time {
         self.end.max(self.dram.ends_at())
+    }
+
+    /// When the last line that made room for others ends.
+    pub fn yielded(&self) -> Time {
+        let buses = self.buses().map(Calendar::yielded);
+        buses.fold(self.l2.yielded(), Time::max)
     }
 
     /// Calendar of the L2.
@@ -306,7 +328,7 @@ impl Dram {
 
     /// Transfer `count` lines of one group over the bus of their channel. The first arrives at `seen.from`, the
     /// last at `seen.to`.
-    pub fn transfer(&mut self, line: u32, count: u32, seen: Span) -> Moved {
+    pub fn transfer(&mut self, line: u32, count: u32, turn: Turn, seen: Span) -> Moved {
         let address = self.map.locate(line);
         let channel = &mut self.channels[address.channel];
         let bank = &mut channel.banks[address.bank];
@@ -316,8 +338,9 @@ impl Dram {
         // The next row can open once the last line is issued.
         let held = work - self.burst;
         let closes = bank.closes_at(seen.from).min(seen.from + self.backlog);
-        let ready = opens.map_or(seen.from, |opens| bank.time.reserve(closes, opens + held).0 + opens);
-        let end = channel.bus.reserve(ready, work).1.max(seen.to + self.burst);
+        let ready =
+            opens.map_or(seen.from, |opens| bank.time.reserve_as(turn, closes, opens + held).0 + opens);
+        let end = channel.bus.reserve_as(turn, ready, work).1.max(seen.to + self.burst);
         let used = RowUse {
             row: address.row,
             seen: seen.from,

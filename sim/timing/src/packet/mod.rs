@@ -11,7 +11,17 @@
 //!
 //! This is the recurrence of tandem queues with finite buffers and blocking after service (Dallery and
 //! Gershwin 1992). For units that share nothing it equals the level `stepped`, to the cycle. Shared resources
-//! (lanes of the cores, the L2, buses and banks of memory) are calendars.
+//! (lanes of the cores, the L2, buses and banks of memory) are calendars. The front end overlaps tiles that are
+//! simulated before it, and gets up to half of a slot that they fill.
+//!
+//! Packets arrive at their first unit when their gates open. With `tiles(b)` the time when all tiles of batch `b`
+//! have left, `front(b)` likewise, and barrier `i` done at `barrier(i)`:
+//!
+//! ```text
+//! vertices of batch b    max(tiles(b - 2), barrier(last that stops them))
+//! tiles of batch b       max(front(b), barrier(last))
+//! barrier                when all packets before it in the stream have left
+//! ```
 //!
 //! Events of packets in bins of time. Consecutive packets of a bin are written together.
 
@@ -22,14 +32,15 @@ mod station;
 
 use std::collections::VecDeque;
 
-use activity::{Counts, LineAccess, Packet, PacketCounts, Unit};
-use calendar::Calendar;
+use activity::{Counts, LineAccess, Packet, PacketCounts, Unit, Waits};
+use calendar::{Calendar, Turn};
 use cores::Cores;
 use memory::Memory;
 use station::StationState;
 
 use crate::clock::{Clocks, Time};
 use crate::demand::{DemandBuilder, ServiceDemand, Station};
+use crate::passes::Passes;
 use crate::spec::MachineSpec;
 use crate::stepped::Stream;
 use crate::{Clock, Recorder, Timed};
@@ -44,6 +55,7 @@ struct Visit<'a> {
     /// When it arrives, and when the next station has room for it.
     arrive: Time,
     room: Time,
+    turn: Turn,
 }
 
 /// First and last time of work with several parts.
@@ -64,6 +76,7 @@ impl Span {
 /// Clock that advances by packets.
 #[derive(Debug)]
 pub struct PacketClock {
+    machine: MachineSpec,
     clocks: Clocks,
     builder: DemandBuilder,
     stations: Vec<StationState>,
@@ -73,6 +86,7 @@ pub struct PacketClock {
     memory: Memory,
     tally: Tally,
     gates: Gates,
+    passes: Passes,
     /// Front-end packets not yet simulated; the tiles have not reached them.
     ahead: VecDeque<(ServiceDemand, PacketCounts, Vec<LineAccess>)>,
     lines: Vec<LineAccess>,
@@ -93,18 +107,41 @@ pub const MAX_CYCLES: u64 = 1 << 30;
 struct Gates {
     set_up: Vec<Time>,
     traversed: Vec<Time>,
+    /// When the last barrier was done, and the last one that the front end waits for.
+    barrier: Time,
+    front_barrier: Time,
 }
 
 impl Gates {
     fn opens(&self, demand: &ServiceDemand) -> Time {
         let at = |times: &[Time], batch: usize| times.get(batch).copied().unwrap_or(0);
         match (demand.front, demand.batch as usize) {
-            (true, batch) => batch.checked_sub(2).map_or(0, |before| at(&self.traversed, before)),
-            (false, batch) => at(&self.set_up, batch),
+            (true, batch) => {
+                batch.checked_sub(2).map_or(0, |before| at(&self.traversed, before)).max(self.front_barrier)
+            }
+            (false, batch) => at(&self.set_up, batch).max(self.barrier),
         }
     }
 
+    /// The front end overlaps tiles that are simulated before it, so it takes turns with them.
+    fn turn(&self, demand: &ServiceDemand) -> Turn {
+        if demand.front && !self.traversed.is_empty() { Turn::Late } else { Turn::InOrder }
+    }
+
+    /// The last tiles so far, or the barrier after them, end no earlier than `at`.
+    fn delay(&mut self, at: Time) {
+        if let Some(last) = self.traversed.last_mut() {
+            *last = at.max(*last);
+        }
+        self.barrier = if self.barrier > 0 { at.max(self.barrier) } else { 0 };
+    }
+
     fn note(&mut self, demand: &ServiceDemand, at: Time) {
+        if let Some(waits) = demand.barrier {
+            self.barrier = at;
+            self.front_barrier = if waits == Waits::All { at } else { self.front_barrier };
+            return;
+        }
         let times = if demand.front { &mut self.set_up } else { &mut self.traversed };
         let batch = demand.batch as usize;
         if times.len() <= batch {
@@ -120,6 +157,7 @@ impl PacketClock {
         let stations: Vec<_> =
             Station::ALL.into_iter().map(|station| StationState::new(station, machine, &clocks)).collect();
         Self {
+            machine: machine.clone(),
             clocks,
             builder: DemandBuilder::new(machine),
             clocks_differ: stations.iter().any(|station| station.period() != stations[0].period()),
@@ -128,6 +166,7 @@ impl PacketClock {
             memory: Memory::new(machine, &clocks),
             tally: Tally::new(recorder, clocks),
             gates: Gates::default(),
+            passes: Passes::default(),
             ahead: VecDeque::new(),
             lines: Vec::new(),
             packets: 0,
@@ -168,13 +207,13 @@ impl PacketClock {
             return;
         }
         if !self.ahead.is_empty() {
-            self.catch_up(Some(demand.batch));
+            self.catch_up(demand.barrier.is_none().then_some(demand.batch));
         }
         self.walk(demand, counts, lines);
     }
 
-    /// Simulate the front end up to the batch that the tiles need, and as far as it is behind the tiles in
-    /// time.
+    /// Simulate the front end up to the batch that the tiles need (all of it before a barrier), and as far as it
+    /// is behind the tiles in time.
     fn catch_up(&mut self, batch: Option<u32>) {
         while let Some((demand, ..)) = self.ahead.front() {
             let needed = batch.is_none_or(|batch| demand.batch <= batch);
@@ -191,13 +230,16 @@ impl PacketClock {
 
     /// Move a packet from its first station to its last.
     fn walk(&mut self, demand: &ServiceDemand, counts: &PacketCounts, lines: &[LineAccess]) {
-        let first = if demand.front { Station::Command } else { Station::Traversal };
-        let mut arrive = self.gates.opens(demand);
+        let first = demand.first();
+        // A barrier comes when all packets before it have left.
+        let mut arrive = if demand.barrier.is_some() { self.end } else { self.gates.opens(demand) };
         self.is_too_long |= self.end > self.max_end || arrive > self.max_end;
         if self.is_too_long {
             return;
         }
+        let turn = self.gates.turn(demand);
         let mut memory = Span::NONE;
+        let begin = self.stations[first as usize].starts(arrive);
         for &station in &Station::ALL[first as usize..=demand.last as usize] {
             if self.clocks_differ {
                 arrive = self.stations[station as usize].edge(arrive);
@@ -205,7 +247,7 @@ impl PacketClock {
             // A packet leaves when the next queue has room, which it sees one cycle later.
             let room =
                 if station == demand.last { 0 } else { self.stations[station as usize + 1].queue.room_at() };
-            let visit = Visit { station, demand, lines, arrive, room };
+            let visit = Visit { station, demand, lines, arrive, room, turn };
             let leave = match station.unit() {
                 Unit::Shader => self.cores(&visit, counts, &mut memory),
                 _ => self.serve(&visit, counts, &mut memory),
@@ -214,11 +256,18 @@ impl PacketClock {
         }
         self.end = self.end.max(arrive);
         self.gates.note(demand, arrive);
+        self.passes.note(demand.pass, begin, arrive);
+        self.builder.add_work(demand, counts, self.passes.work(demand.pass));
         if memory.from <= memory.to {
             self.tally.count(Unit::L2, counts, memory.from, memory.to);
             self.tally.count(Unit::Dram, counts, memory.from, memory.to);
         }
         self.tally.packet_done(counts);
+        if turn == Turn::Late {
+            let yielded = self.cores.lanes().yielded().max(self.memory.yielded());
+            self.gates.delay(yielded);
+            self.end = self.end.max(yielded);
+        }
     }
 
     fn serve(&mut self, visit: &Visit<'_>, counts: &PacketCounts, memory: &mut Span) -> Time {
@@ -247,7 +296,7 @@ impl PacketClock {
         let end = self.end.max(self.memory.ends_at());
         let end_ps = self.clocks.ps(end);
         let channels = self.memory.buses().count() as u64;
-        let Self { tally, clocks, cores, memory, packets, .. } = self;
+        let Self { machine, tally, clocks, cores, memory, passes, packets, .. } = self;
         let mut recorder = tally.finish();
         recorder.lasts(end_ps);
         write(&mut recorder, &clocks, Unit::Shader, cores.lanes(), 1, end_ps);
@@ -258,6 +307,7 @@ impl PacketClock {
         let timeline = recorder.finish();
         let rows = crate::ratio_to_busiest(clocks.ps(memory.rows()), &timeline);
         Timed {
+            passes: passes.finish(&machine, &clocks, timeline.duration_ps),
             timeline,
             cycles: clocks.cycles(Clock::Core, end),
             stalls: None,

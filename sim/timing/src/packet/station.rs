@@ -59,6 +59,11 @@ impl StationState {
         self.free
     }
 
+    /// When it starts with the next packet, if that arrives at `arrive`.
+    pub fn starts(&self, arrive: Time) -> Time {
+        self.edge(arrive).max(self.free)
+    }
+
     /// First edge of its clock at or after `at`.
     pub fn edge(&self, at: Time) -> Time {
         aligned(at, self.period)
@@ -81,7 +86,11 @@ impl StationState {
         let fetched = self.fetch(visit, start, memory);
         let last_request =
             fetched.as_ref().map_or(busy_to, |fetched| self.later(busy_to, fetched.last_request));
-        let waits = fetched.as_ref().map_or(0, |fetched| fetched.arrived).max(visit.room);
+        let answered = |fetched: &Fetched| match visit.demand.barrier {
+            None => fetched.arrived,
+            Some(_) => fetched.arrived.max(memory.acknowledges(fetched.last)),
+        };
+        let waits = fetched.as_ref().map_or(0, answered).max(visit.room);
         let leave = match &self.behind {
             None => {
                 self.free = self.later(last_request, waits);
@@ -108,7 +117,7 @@ impl StationState {
         let range = visit.demand.lines_of(port);
         let first = visit.demand.first_line;
         let lines = &visit.lines[range.start - first..range.end - first];
-        let fetched = memory.request(port, lines, start.max(self.next_request), self.period);
+        let fetched = memory.request(port, lines, visit.turn, start.max(self.next_request), self.period);
         self.next_request = fetched.last_request + self.period;
         Some(fetched)
     }

@@ -1,4 +1,4 @@
-//! All units of a machine, cycle by cycle, and the sources of packets: the command stream and the double-buffered bins.
+//! All units of a machine, cycle by cycle.
 
 use activity::{LineAccess, Unit};
 
@@ -6,16 +6,19 @@ use super::memory::{Dram, L2};
 use super::meter::Meter;
 use super::queue::{Queue, Waits};
 use super::shader::{CoreEnv, Shader};
+use super::sources::Sources;
 use super::stage::{Stage, StageEnv};
 use super::{Stalled, StepOptions, Stream};
 use crate::clock::{Clocks, Time};
-use crate::demand::{DemandBuilder, ServiceDemand, Station, TEXTURE_PORT, port};
+use crate::demand::{DemandBuilder, Station, TEXTURE_PORT, port};
+use crate::passes::Passes;
 use crate::spec::{Common, MachineSpec};
 use crate::stalls::Reason;
 use crate::{Recorder, Timed};
 
 /// All units of a machine.
 pub(super) struct Machine<'a> {
+    spec: &'a MachineSpec,
     shared: SharedState<'a>,
     /// Input queue of each station.
     queues: [Queue<u32>; Station::COUNT],
@@ -35,7 +38,7 @@ pub(super) struct Machine<'a> {
 
 impl<'a> Machine<'a> {
     pub fn new(
-        machine: &MachineSpec,
+        machine: &'a MachineSpec,
         clocks: Clocks,
         builder: &'a DemandBuilder,
         stream: &'a Stream,
@@ -60,10 +63,12 @@ impl<'a> Machine<'a> {
             latency: Station::ALL
                 .map(|station| period(station) * Time::from(common[station as usize].latency_cycles)),
             sources: Sources::new(&stream.demands),
+            passes: Passes::default(),
             recorder,
             end: 0,
         };
         Self {
+            spec: machine,
             shared,
             queues: Station::ALL.map(|station| Queue::new(common[station as usize].queue)),
             stages: Station::ALL.map(stage),
@@ -124,16 +129,20 @@ impl<'a> Machine<'a> {
         }
         let end = self.shared.end.max(self.l2.ends_at()).max(self.dram.ends_at());
         self.meter.finish(end, &mut self.shared.recorder);
-        let mut recorder = self.shared.recorder;
+        let SharedState { mut recorder, mut passes, stream, builder, .. } = self.shared;
         recorder.lasts(clocks.ps(end));
         let timeline = recorder.finish();
         let cycles = clocks.cycles(crate::Clock::Core, end);
+        for (demand, counts) in stream.demands.iter().zip(&stream.counts) {
+            builder.add_work(demand, counts, passes.work(demand.pass));
+        }
         Ok(Timed {
+            passes: passes.finish(self.spec, &clocks, timeline.duration_ps),
             timeline,
             cycles,
             stalls: Some(self.meter.stalls),
             unit_cycles: self.visited,
-            packets: self.shared.stream.demands.len() as u64,
+            packets: stream.demands.len() as u64,
             rows: None,
         })
     }
@@ -230,6 +239,7 @@ pub(super) struct SharedState<'a> {
     pub stream: &'a Stream,
     pub latency: [Time; Station::COUNT],
     pub sources: Sources,
+    pub passes: Passes,
     pub recorder: Recorder,
     pub end: Time,
 }
@@ -252,6 +262,10 @@ impl StageEnv for StationEnv<'_, '_> {
         self.shared.stream.lines[at]
     }
 
+    fn is_barrier(&self, id: u32) -> bool {
+        self.shared.stream.demands[id as usize].barrier.is_some()
+    }
+
     fn served(&mut self, id: u32, from: Time, to: Time) {
         self.shared.count(self.station.unit(), id, from, to);
     }
@@ -264,6 +278,7 @@ impl StageEnv for StationEnv<'_, '_> {
 impl SharedState<'_> {
     fn count(&mut self, unit: Unit, id: u32, from: Time, to: Time) {
         let counts = &self.stream.counts[id as usize];
+        self.passes.note(self.stream.demands[id as usize].pass, from, to);
         self.recorder.count(unit, counts, self.clocks.ps(from), self.clocks.ps(to));
     }
 
@@ -278,7 +293,8 @@ impl SharedState<'_> {
         let demand = &self.stream.demands[id as usize];
         let at = now + self.latency[station as usize];
         if demand.last == station {
-            self.sources.done(demand, at);
+            self.sources.done(id, demand, at);
+            self.passes.note(demand.pass, at, at);
             self.end = self.end.max(at);
             return Ok(());
         }
@@ -335,150 +351,14 @@ impl StageEnv for TextureEnv<'_, '_> {
         self.shared.stream.lines[at]
     }
 
+    fn is_barrier(&self, _: u32) -> bool {
+        false
+    }
+
     fn served(&mut self, _: u32, _: Time, _: Time) {}
 
     fn leave(&mut self, id: u32, now: Time) -> Result<(), Unit> {
         self.shader.textured(id, now + self.latency);
         Ok(())
-    }
-}
-
-/// Unfinished packets of a batch, and when the last one finished.
-#[derive(Clone, Copy, Debug, Default)]
-struct Gate {
-    remaining: usize,
-    at: Time,
-}
-
-impl Gate {
-    fn is_open(&self, now: Time) -> bool {
-        self.remaining == 0 && self.at <= now
-    }
-}
-
-/// Packets of a frame not yet in any queue. Tiles wait for the set-up of their whole batch. The front end
-/// waits for the tiles of the batch before the last.
-#[derive(Clone, Debug)]
-pub(super) struct Sources {
-    /// Index and batch of the packets of each path, in order, and the next of each path.
-    paths: [Vec<(u32, u32)>; 2],
-    next: [usize; 2],
-    set_up: Vec<Gate>,
-    traversed: Vec<Gate>,
-    /// Packets that have yet to pass each station.
-    to_come: [usize; Station::COUNT],
-    /// Packets done in this cycle, as first and last station; visible in the next cycle.
-    done_this_cycle: Vec<(usize, usize)>,
-    remaining: usize,
-}
-
-impl Sources {
-    pub fn new(demands: &[ServiceDemand]) -> Self {
-        let batches = demands.iter().map(|demand| demand.batch as usize + 1).max().unwrap_or(0);
-        let mut sources = Self {
-            paths: [Vec::new(), Vec::new()],
-            next: [0; 2],
-            set_up: vec![Gate::default(); batches],
-            traversed: vec![Gate::default(); batches],
-            to_come: [0; Station::COUNT],
-            done_this_cycle: Vec::new(),
-            remaining: demands.len(),
-        };
-        for (demand, id) in demands.iter().zip(0..) {
-            sources.paths[usize::from(!demand.front)].push((id, demand.batch));
-            sources.gate(demand).remaining += 1;
-            let first = if demand.front { 0 } else { Station::Traversal as usize };
-            sources.to_come[first..=demand.last as usize].iter_mut().for_each(|count| *count += 1);
-        }
-        sources
-    }
-
-    fn gate(&mut self, demand: &ServiceDemand) -> &mut Gate {
-        let gates = if demand.front { &mut self.set_up } else { &mut self.traversed };
-        &mut gates[demand.batch as usize]
-    }
-
-    /// Packets not done.
-    pub fn remaining(&self) -> usize {
-        self.remaining
-    }
-
-    /// Packets that have yet to pass `station`.
-    pub fn remaining_at(&self, station: Station) -> usize {
-        self.to_come[station as usize]
-    }
-
-    /// Record that a packet is done at `at`.
-    pub fn done(&mut self, demand: &ServiceDemand, at: Time) {
-        let gate = self.gate(demand);
-        gate.remaining -= 1;
-        gate.at = gate.at.max(at);
-        self.remaining -= 1;
-        self.done_this_cycle
-            .push((if demand.front { 0 } else { Station::Traversal as usize }, demand.last as usize));
-    }
-
-    /// Begin a cycle.
-    pub fn begin_cycle(&mut self) {
-        for (first, last) in self.done_this_cycle.drain(..) {
-            self.to_come[first..=last].iter_mut().for_each(|count| *count -= 1);
-        }
-    }
-
-    /// Fill the input queue of the first station of a path.
-    pub fn feed(&mut self, station: Station, now: Time, queue: &mut Queue<u32>) -> bool {
-        let path = match station {
-            Station::Command => 0,
-            Station::Traversal => 1,
-            _ => return false,
-        };
-        let mut fed = false;
-        while queue.room(now) > 0
-            && let Some(&(id, batch)) = self.paths[path].get(self.next[path])
-            && self.may_start(path, batch, now)
-        {
-            queue.push(id, now);
-            self.next[path] += 1;
-            fed = true;
-        }
-        fed
-    }
-
-    fn waits_for(&self, path: usize, batch: u32) -> Option<&Gate> {
-        match path {
-            0 => self.traversed.get((batch as usize).checked_sub(2)?),
-            _ => self.set_up.get(batch as usize),
-        }
-    }
-
-    fn may_start(&self, path: usize, batch: u32, now: Time) -> bool {
-        self.waits_for(path, batch).is_none_or(|gate| gate.is_open(now))
-    }
-
-    /// Why `station` has no work.
-    pub fn idle_reason(&self, station: Station, now: Time) -> Reason {
-        let gated = |path: usize| {
-            let next = self.paths[path].get(self.next[path]);
-            next.is_some_and(|&(_, batch)| !self.may_start(path, batch, now))
-        };
-        match station {
-            Station::Pixel if self.remaining_at(Station::Pixel) > 0 => Reason::Starved(Unit::ShadingCache),
-            Station::Pixel if self.remaining_at(Station::Vertex) > 0 => Reason::Starved(Unit::Command),
-            _ if self.remaining_at(station) == 0 => Reason::Idle,
-            Station::Command if gated(0) => Reason::Blocked(Unit::Traversal),
-            Station::Command => Reason::Idle,
-            Station::Traversal if gated(1) => Reason::Starved(Unit::Setup),
-            Station::Traversal => Reason::Idle,
-            _ => Reason::Starved(Station::ALL[station as usize - 1].unit()),
-        }
-    }
-
-    /// Earliest time after `now` at which a batch may continue.
-    pub fn wakes_at(&self, now: Time) -> Option<Time> {
-        let gates = (0..2).filter_map(|path| {
-            let &(_, batch) = self.paths[path].get(self.next[path])?;
-            self.waits_for(path, batch)
-        });
-        gates.filter(|gate| gate.remaining == 0).map(|gate| gate.at).filter(|&at| at > now).min()
     }
 }

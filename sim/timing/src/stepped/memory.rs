@@ -15,7 +15,7 @@ use crate::{LINE_BYTES, Recorder};
 /// Stands for no wait.
 pub(super) const NO_WAIT: u32 = u32::MAX;
 
-/// A line request, with the wait it belongs to.
+/// A line request, and the wait that its answer belongs to; writes have none, except at a barrier.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Request {
     pub access: LineAccess,
@@ -94,13 +94,15 @@ impl L2 {
             dram.push(access.victim, None, seen_at);
         }
         match access.kind {
-            LineKind::Hit => waits.arrives(wait, now + self.latency),
             LineKind::Fetch => {
                 waits.fetches(wait, now);
-                dram.push(access.line, Some(Reader { wait, latency: self.latency }), seen_at);
+                return dram.push(access.line, Some(Reader { wait, latency: self.latency }), seen_at);
             }
             LineKind::Drain => dram.push(access.line, None, seen_at),
-            LineKind::Write | LineKind::Allocate => {}
+            LineKind::Hit | LineKind::Write | LineKind::Allocate => {}
+        }
+        if wait != NO_WAIT {
+            waits.arrives(wait, now + self.latency);
         }
     }
 

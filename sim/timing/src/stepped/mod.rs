@@ -9,6 +9,7 @@ mod memory;
 mod meter;
 mod queue;
 mod shader;
+mod sources;
 mod stage;
 
 use activity::{LineAccess, PacketCounts, Unit};

@@ -17,6 +17,8 @@ pub(super) trait StageEnv {
     fn work(&self, id: u32) -> (u32, Range<usize>);
     /// Line number `at`.
     fn line(&self, at: usize) -> LineAccess;
+    /// Whether `id` is a barrier, which waits until the L2 has acknowledged each of its lines.
+    fn is_barrier(&self, id: u32) -> bool;
     /// Record that `id` was served from `from` to `to`.
     fn served(&mut self, id: u32, from: Time, to: Time);
     /// Pass `id` on at `now`. The error is the unit that has no room.
@@ -40,6 +42,11 @@ struct Serving {
     /// Lines not yet requested.
     lines: Range<usize>,
     wait: u32,
+    barrier: bool,
+}
+
+fn is_read(kind: LineKind) -> bool {
+    matches!(kind, LineKind::Hit | LineKind::Fetch)
 }
 
 /// State of a stage.
@@ -122,7 +129,9 @@ impl Stage {
             return false;
         }
         let Some(at) = serving.lines.next() else { return false };
-        port.push(Request { access: env.line(at), wait: serving.wait }, now + self.period);
+        let access = env.line(at);
+        let wait = if serving.barrier || is_read(access.kind) { serving.wait } else { NO_WAIT };
+        port.push(Request { access, wait }, now + self.period);
         self.last_requests = (now, requested + 1);
         true
     }
@@ -192,11 +201,11 @@ impl Stage {
         let Some(id) = input.head(now) else { return false };
         input.pop(now);
         let (cycles, lines) = env.work(id);
-        let read = |kind| matches!(kind, LineKind::Hit | LineKind::Fetch);
-        let reads = lines.clone().filter(|&at| read(env.line(at).kind)).count() as u32;
-        let wait = if reads > 0 { waits.open(reads) } else { NO_WAIT };
+        let barrier = env.is_barrier(id);
+        let answered = lines.clone().filter(|&at| barrier || is_read(env.line(at).kind)).count() as u32;
+        let wait = if answered > 0 { waits.open(answered) } else { NO_WAIT };
         let done_at = now + self.period * Time::from(cycles);
-        self.serving = Some(Serving { id, from: now, done_at, lines, wait });
+        self.serving = Some(Serving { id, from: now, done_at, lines, wait, barrier });
         true
     }
 

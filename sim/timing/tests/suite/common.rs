@@ -97,11 +97,22 @@ pub fn recorder() -> Recorder {
 }
 
 pub fn stepped_as(machine: &MachineSpec, clocks: Clocks, packets: &Packets, options: &StepOptions) -> Timed {
+    stepped_into(recorder(), machine, clocks, packets, options)
+}
+
+/// The same, with a recorder.
+pub fn stepped_into(
+    recorder: Recorder,
+    machine: &MachineSpec,
+    clocks: Clocks,
+    packets: &Packets,
+    options: &StepOptions,
+) -> Timed {
     machine.validate().unwrap();
     let mut builder = DemandBuilder::new(machine);
     let mut stream = Stream::default();
     packets.iter().for_each(|(packet, lines)| stream.push(&mut builder, packet, lines));
-    stepped::run(machine, clocks, &builder, &stream, recorder(), options).unwrap()
+    stepped::run(machine, clocks, &builder, &stream, recorder, options).unwrap()
 }
 
 pub fn stepped(machine: &MachineSpec, packets: &Packets) -> Timed {
@@ -115,7 +126,17 @@ pub fn tiles(counts: impl IntoIterator<Item = Vec<(Event, u32)>>) -> Packets {
 
 /// Timing of the packets at the level `packet`.
 pub fn packet_level(machine: &MachineSpec, clocks: Clocks, packets: &Packets) -> Timed {
-    let mut clock = timing::PacketClock::new(machine, clocks, recorder());
+    packet_level_into(recorder(), machine, clocks, packets)
+}
+
+/// The same, with a recorder.
+pub fn packet_level_into(
+    recorder: Recorder,
+    machine: &MachineSpec,
+    clocks: Clocks,
+    packets: &Packets,
+) -> Timed {
+    let mut clock = timing::PacketClock::new(machine, clocks, recorder);
     packets.iter().for_each(|(packet, lines)| clock.push(packet, lines));
     clock.finish()
 }

@@ -1,13 +1,15 @@
 //! Conservation: all packets that enter leave, times add up, and the order of simulation does not matter.
 
-use activity::{Counts, Event, LineAccess, LineKind, Packet, PacketKind, Unit};
+use activity::{Counts, Event, LineAccess, LineKind, Packet, PacketKind, Unit, Waits};
 use proptest::prelude::*;
 use timing::stepped::StepOptions;
 use timing::{Clocks, MachineSpec};
 
 use crate::common::{Packets, plain, size, stepped_as};
 
-fn line() -> impl Strategy<Value = (u32, LineKind, Option<u32>)> {
+type Line = (u32, LineKind, Option<u32>);
+
+fn line() -> impl Strategy<Value = Line> {
     let kind = prop_oneof![
         Just(LineKind::Hit),
         Just(LineKind::Fetch),
@@ -18,16 +20,16 @@ fn line() -> impl Strategy<Value = (u32, LineKind, Option<u32>)> {
 }
 
 /// Lines of `client`, counted in `packet` as in the pipeline.
-fn add_lines(packet: &mut Packet, client: Unit, lines: &[(u32, LineKind, Option<u32>)]) -> Vec<LineAccess> {
+fn add_lines(packet: &mut Packet, client: Unit, lines: &[Line]) -> Vec<LineAccess> {
     let counts = &mut packet.counts;
-    let access = |&(line, kind, victim): &(u32, LineKind, Option<u32>)| {
+    let access = |&(line, kind, victim): &Line| {
         let miss = matches!(kind, LineKind::Fetch | LineKind::Allocate);
-        let read = matches!(kind, LineKind::Hit | LineKind::Fetch);
         let victim = victim.filter(|_| miss);
-        counts[if read { Event::L2Reads } else { Event::L2Writes }] += 1;
+        counts[Event::L2Reads] += u32::from(matches!(kind, LineKind::Hit | LineKind::Fetch));
+        counts[Event::L2Writes] += u32::from(matches!(kind, LineKind::Write | LineKind::Allocate));
         counts[Event::L2Misses] += u32::from(miss);
         counts[Event::DramReadBytes] += 64 * u32::from(kind == LineKind::Fetch);
-        counts[Event::DramWriteBytes] += 64 * u32::from(victim.is_some());
+        counts[Event::DramWriteBytes] += 64 * u32::from(victim.is_some() || kind == LineKind::Drain);
         LineAccess { line, victim: victim.unwrap_or(LineAccess::NONE), client, kind }
     };
     lines.iter().map(access).collect()
@@ -37,7 +39,7 @@ type Some5 = (u32, u32, u32, u32, u32);
 
 fn tile_packet(
     (tiles, samples, reads, threads, fetches): Some5,
-    depth: &[(u32, LineKind, Option<u32>)],
+    depth: &[Line],
     batch: u32,
 ) -> (Packet, Vec<LineAccess>) {
     let mut packet = Packet { batch, ..Packet::new(PacketKind::Tile, 0) };
@@ -58,11 +60,7 @@ fn tile_packet(
     (packet, lines)
 }
 
-fn vertices_packet(
-    triangles: u32,
-    lines: &[(u32, LineKind, Option<u32>)],
-    batch: u32,
-) -> (Packet, Vec<LineAccess>) {
+fn vertices_packet(triangles: u32, lines: &[Line], batch: u32) -> (Packet, Vec<LineAccess>) {
     let mut packet = Packet { batch, ..Packet::new(PacketKind::Vertices, 0) };
     packet.counts[Event::Indices] = 3 * triangles;
     packet.counts[Event::VertexInvocations] = triangles;
@@ -72,22 +70,65 @@ fn vertices_packet(
     (packet, lines)
 }
 
-/// Four batches with the front end one ahead, as in the pipeline.
-pub fn packets() -> impl Strategy<Value = Packets> {
+/// Front-end packets and tiles of a batch.
+type Batch = (Vec<(u32, Vec<Line>)>, Vec<(Some5, Vec<Line>)>);
+
+fn batch() -> impl Strategy<Value = Batch> {
     let tile = ((0u32..9, 0u32..30, 0u32..9, 0u32..5, 0u32..20), prop::collection::vec(line(), 0..12));
     let front = (1u32..20, prop::collection::vec(line(), 0..6));
-    let batch = (prop::collection::vec(front, 1..6), prop::collection::vec(tile, 0..25));
-    prop::collection::vec(batch, 4).prop_map(|batches| {
+    (prop::collection::vec(front, 1..6), prop::collection::vec(tile, 0..25))
+}
+
+/// A pass with the front end one batch ahead, as in the pipeline.
+fn pass(number: u16, batches: &[Batch]) -> Packets {
+    let mut stream = Packets::new();
+    let front = |stream: &mut Packets, b: usize| {
+        if let Some((fronts, _)) = batches.get(b) {
+            stream.extend(fronts.iter().map(|(n, lines)| vertices_packet(*n, lines, b as u32)));
+        }
+    };
+    front(&mut stream, 0);
+    for (b, (_, tiles)) in batches.iter().enumerate() {
+        front(&mut stream, b + 1);
+        stream.extend(tiles.iter().map(|(some, lines)| tile_packet(*some, lines, b as u32)));
+    }
+    stream.iter_mut().for_each(|(packet, _)| packet.pass = number);
+    stream
+}
+
+/// A pass of four batches.
+pub fn packets() -> impl Strategy<Value = Packets> {
+    prop::collection::vec(batch(), 4).prop_map(|batches| pass(0, &batches))
+}
+
+/// The event that only barriers have, once each.
+pub const OF_BARRIERS: Event = Event::DepthWrites;
+
+fn barrier(pass: u16, waits: Waits, lines: &[Line]) -> (Packet, Vec<LineAccess>) {
+    let mut packet = Packet::new(PacketKind::Barrier(waits), pass);
+    packet.counts[OF_BARRIERS] = 1;
+    let written = |&(line, kind, victim): &Line| match kind {
+        LineKind::Hit => (line, LineKind::Write, None),
+        LineKind::Fetch => (line, LineKind::Drain, None),
+        kind => (line, kind, victim),
+    };
+    let lines: Vec<Line> = lines.iter().map(written).collect();
+    let (depth, colour) = lines.split_at(lines.len() / 2);
+    let mut all = add_lines(&mut packet, Unit::Depth, depth);
+    all.extend(add_lines(&mut packet, Unit::Colour, colour));
+    (packet, all)
+}
+
+/// Some passes of some batches. A barrier may come before each, and belongs to it.
+pub fn passes() -> impl Strategy<Value = Packets> {
+    let waits = prop_oneof![Just(Waits::Tiles), Just(Waits::All)];
+    let barriers = prop::option::weighted(0.7, (waits, prop::collection::vec(line(), 0..16)));
+    let passes = prop::collection::vec((barriers, prop::collection::vec(batch(), 0..4)), 1..5);
+    passes.prop_map(|passes| {
         let mut stream = Packets::new();
-        let front = |stream: &mut Packets, b: usize| {
-            if let Some((fronts, _)) = batches.get(b) {
-                stream.extend(fronts.iter().map(|(n, lines)| vertices_packet(*n, lines, b as u32)));
-            }
-        };
-        front(&mut stream, 0);
-        for (b, (_, tiles)) in batches.iter().enumerate() {
-            front(&mut stream, b + 1);
-            stream.extend(tiles.iter().map(|(some, lines)| tile_packet(*some, lines, b as u32)));
+        for ((before, batches), number) in passes.iter().zip(0..) {
+            stream.extend(before.iter().map(|(waits, lines)| barrier(number, *waits, lines)));
+            stream.extend(pass(number, batches));
         }
         stream
     })
@@ -116,14 +157,14 @@ pub fn machine() -> impl Strategy<Value = MachineSpec> {
     })
 }
 
-fn total(packets: &Packets) -> Counts {
+pub fn total(packets: &Packets) -> Counts {
     packets.iter().fold(Counts::default(), |mut sum, (packet, _)| {
         sum += &packet.counts;
         sum
     })
 }
 
-fn two_clocks() -> impl Strategy<Value = Clocks> {
+pub fn two_clocks() -> impl Strategy<Value = Clocks> {
     prop_oneof![Just((1e9, 1e9)), Just((925e6, 1375e6)), Just((3e8, 1e8))]
         .prop_map(|(a, b)| Clocks::new(a, b).unwrap())
 }
@@ -132,7 +173,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 96, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn every_packet_leaves_and_times_add_up(packets in packets(), machine in machine(), clocks in two_clocks()) {
+    fn every_packet_leaves_and_times_add_up(packets in prop_oneof![packets(), passes()], machine in machine(), clocks in two_clocks()) {
         let timed = stepped_as(&machine, clocks, &packets, &StepOptions::default());
         prop_assert_eq!(timed.timeline.total(), total(&packets));
         let stalls = timed.stalls.unwrap();
@@ -146,7 +187,7 @@ proptest! {
 
     #[test]
     fn neither_the_order_of_visits_nor_skipping_matters(
-        packets in packets(),
+        packets in prop_oneof![packets(), passes()],
         machine in machine(),
         clocks in two_clocks(),
         order in Just(Unit::ALL.to_vec()).prop_shuffle(),
@@ -158,6 +199,7 @@ proptest! {
             prop_assert_eq!(other.cycles, plainly.cycles);
             prop_assert_eq!(&other.timeline, &plainly.timeline);
             prop_assert_eq!(&other.stalls, &plainly.stalls);
+            prop_assert_eq!(&other.passes, &plainly.passes);
         }
     }
 }

@@ -6,6 +6,7 @@ mod closed_forms;
 mod common;
 mod conservation;
 mod ladder;
+mod passes;
 mod rates;
 mod sampled;
 mod waiting;

@@ -1,6 +1,6 @@
 //! Rates of the large GPU, compared with those of a real card of its class.
 
-use activity::Unit;
+use activity::{Event, LineAccess, LineKind, Packet, PacketKind, Unit};
 use timing::stepped::{self, StepOptions, Stream};
 use timing::streams::{Packets, failures, rates};
 use timing::{Clocks, DemandBuilder, MachineSpec, PacketClock, Recorder, Timed, Totals, bound};
@@ -100,6 +100,53 @@ fn challenging_streams_end() {
                     _ => assert!(rows < 0.1, "{name}, {}: {rows}", case.name),
                 }
             }
+        }
+    }
+}
+
+/// Frames of passes are within 8 % at `packet`, and within 15 % at `bound`, which has no queues.
+#[test]
+fn passes_are_close_to_the_reference() {
+    for name in ["mobile", "reference", "discrete"] {
+        let gpu = Gpu::builtin(name);
+        for case in failures(&gpu.units, BATCH).into_iter().filter(|case| case.name.contains("passes")) {
+            let [truth, packet, bound] = gpu.run(&case.units, &case.packets);
+            for (found, within) in [(&packet, 0.08), (&bound, 0.15)] {
+                let ratio = found.cycles as f64 / truth.cycles as f64;
+                assert!((ratio - 1.0).abs() < within, "{} on {name}: {ratio}", case.name);
+                assert_eq!(found.passes.len(), truth.passes.len());
+            }
+        }
+    }
+}
+
+/// Front ends that overlap the tiles of the pass before, with lines of both.
+fn contended(per_front: u32, per_tile: u32, gpu: &Gpu) -> Packets {
+    let side_by_side =
+        failures(&gpu.units, BATCH).into_iter().find(|case| case.name == "passes side by side");
+    let mut next = 1 << 20;
+    let mut with_lines = |(mut packet, _): (Packet, Vec<LineAccess>)| {
+        let is_front = packet.kind == PacketKind::Vertices;
+        let (client, count) = if is_front { (Unit::Command, per_front) } else { (Unit::Colour, per_tile) };
+        next += count;
+        let read = |line| LineAccess { line, victim: LineAccess::NONE, client, kind: LineKind::Fetch };
+        let counts = [(Event::L2Reads, count), (Event::L2Misses, count), (Event::DramReadBytes, 64 * count)];
+        counts.into_iter().for_each(|(event, count)| packet.counts[event] = count);
+        (packet, (next - count..next).map(read).collect())
+    };
+    side_by_side.unwrap().packets.into_iter().map(&mut with_lines).collect()
+}
+
+/// A front end that comes after tiles in the stream takes turns with them where both need the cores and memory. In
+/// order, `packet` is up to half as long again.
+#[test]
+fn front_ends_take_turns_with_tiles() {
+    for name in ["mobile", "reference", "discrete"] {
+        let gpu = Gpu::builtin(name);
+        for (per_front, per_tile) in [(16, 16), (16, 48), (64, 48)] {
+            let [truth, packet, _] = gpu.run(&gpu.units, &contended(per_front, per_tile, &gpu));
+            let percent = 100.0 * (packet.cycles as f64 / truth.cycles as f64 - 1.0);
+            assert!(percent.abs() < 8.0, "{name}, {per_front} and {per_tile} lines: {percent:.1} %");
         }
     }
 }
