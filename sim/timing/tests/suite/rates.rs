@@ -137,8 +137,7 @@ fn contended(per_front: u32, per_tile: u32, gpu: &Gpu) -> Packets {
     side_by_side.unwrap().packets.into_iter().map(&mut with_lines).collect()
 }
 
-/// A front end that comes after tiles in the stream takes turns with them where both need the cores and memory. In
-/// order, `packet` is up to half as long again.
+/// A front end that comes after tiles in the stream takes turns with them where both need the cores and memory.
 #[test]
 fn front_ends_take_turns_with_tiles() {
     for name in ["mobile", "reference", "discrete"] {
