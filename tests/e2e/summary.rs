@@ -253,8 +253,15 @@ fn the_work_of_passes_adds_up_to_that_of_the_run() {
             let sum: u64 = rows.iter().filter_map(|row| row["counts"][event].as_u64()).sum();
             assert_eq!(count.as_u64(), Some(sum), "{work}: {event}");
         }
-        let events_j: f64 = rows.iter().filter_map(|row| row["events_j"].as_f64()).sum();
-        let run_j = summary["truth"]["total_j"].as_f64().expect("joules");
-        assert!(events_j > 0.0 && events_j < run_j, "{work}: {events_j} of {run_j} J");
+        let sum = |rows: &[Value], key: &str| rows.iter().filter_map(|row| row[key].as_f64()).sum::<f64>();
+        let frames = summary["frames"].as_array().expect("frames");
+        let (events_j, energy_j) = (sum(rows, "events_j"), sum(rows, "energy_j"));
+        assert!(events_j > 0.0 && events_j < energy_j, "{work}: {events_j} of {energy_j} J");
+        let parts = summary["energy_by_part_j"].as_object().expect("parts");
+        let busy_j: f64 =
+            parts.iter().filter(|(part, _)| *part != "idle").filter_map(|(_, joules)| joules.as_f64()).sum();
+        for (of_passes, of_run) in [(sum(rows, "time_s"), sum(frames, "busy_s")), (energy_j, busy_j)] {
+            assert!((of_passes / of_run - 1.0).abs() < 1e-6, "{work}: {of_passes} against {of_run}");
+        }
     }
 }

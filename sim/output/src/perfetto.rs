@@ -1,6 +1,6 @@
 //! A timeline for the Perfetto viewer (<https://ui.perfetto.dev>).
 //!
-//! One process; below it a track of frames, a track per unit with slices of busy time, and counter tracks of
+//! One process; below it a track of frames and their passes, a track per unit with slices of busy time, and counter tracks of
 //! power. Field numbers are those of Perfetto v59's `trace_packet.proto`, `track_descriptor.proto`,
 //! `track_event.proto`, `counter_descriptor.proto`, `process_descriptor.proto` and `debug_annotation.proto`
 //! (Apache-2.0, google/perfetto).
@@ -36,8 +36,21 @@ pub struct FrameSpan {
     pub busy_end_ns: u64,
     /// Start of the next frame, not before `busy_end_ns`.
     pub end_ns: u64,
+    /// Its passes in order, without overlap.
+    pub passes: Vec<PassSpan>,
     /// Numbers shown with the frame, each with a name that carries its unit, for example `energy_mJ`.
     pub numbers: Vec<(&'static str, f64)>,
+}
+
+/// A pass of a frame.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PassSpan {
+    /// Its name.
+    pub name: String,
+    /// Start, not before that of the frame.
+    pub start_ns: u64,
+    /// End of its work, not after that of the frame.
+    pub end_ns: u64,
 }
 
 /// Track of a unit's busy time.
@@ -152,7 +165,11 @@ impl Trace<'_> {
         self.track(&child_track(FRAMES_UUID, "frames", 0))?;
         for frame in frames {
             self.begin(FRAMES_UUID, &format!("frame {}", frame.frame), frame.start_ns, &frame.numbers)?;
-            self.slice(FRAMES_UUID, "busy", (frame.start_ns, frame.busy_end_ns), &[])?;
+            self.begin(FRAMES_UUID, "busy", frame.start_ns, &[])?;
+            for pass in &frame.passes {
+                self.slice(FRAMES_UUID, &pass.name, (pass.start_ns, pass.end_ns), &[])?;
+            }
+            self.end(FRAMES_UUID, frame.busy_end_ns)?;
             if frame.end_ns > frame.busy_end_ns {
                 self.slice(FRAMES_UUID, "idle", (frame.busy_end_ns, frame.end_ns), &[])?;
             }

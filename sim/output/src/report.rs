@@ -42,6 +42,8 @@ pub struct Report<'a> {
     pub frames: Vec<FrameRow>,
     /// Pixels of a frame, for joules per pixel; 0 leaves that column empty.
     pub pixels: u64,
+    /// One row per name of a pass.
+    pub passes: Vec<PassRow>,
     /// One row per unit: what was modelled and what was not.
     pub units: Vec<UnitRow>,
     /// One row per counter.
@@ -233,6 +235,25 @@ pub struct FrameRow {
     pub truth: Option<FrameNumbers>,
     /// Flags, for example `warm-up`; may be empty.
     pub flags: String,
+}
+
+/// Row of the passes of one name.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct PassRow {
+    /// Its name.
+    pub name: String,
+    /// Number of passes.
+    pub passes: u64,
+    /// Seconds, and the share of the time of all rows.
+    pub time_s: f64,
+    /// Share of the time of all rows, 0 to 1.
+    pub time_share: f64,
+    /// Joules.
+    pub energy_j: f64,
+    /// Share of the energy of all rows, 0 to 1.
+    pub energy_share: f64,
+    /// Bytes to and from memory.
+    pub dram_bytes: u64,
 }
 
 /// Row of a unit.

@@ -129,6 +129,7 @@ fn simulate_frame(
         origin: Origin::Simulated(Box::new(Observed {
             counts: report.counts(),
             report,
+            times: timed.passes,
             facts: drawn.facts,
             warnings: drawn.warnings,
             regime,

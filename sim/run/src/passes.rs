@@ -4,8 +4,9 @@ use activity::{Counts, Event};
 use pipeline::FrameReport;
 use power_model::PowerModel;
 use serde::Serialize;
+use timing::PassTime;
 
-use crate::{Plan, Simulated};
+use crate::{Observed, Plan, Simulated};
 
 /// Passes of one name.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -14,6 +15,10 @@ pub struct PassSummary {
     pub name: String,
     /// Number of passes of this name.
     pub passes: u64,
+    /// Seconds from the end of the pass before to its own end. Those of all passes add up to the busy time of the frames.
+    pub time_s: f64,
+    /// Energy in joules: that of the events, and the other energy of frames by time.
+    pub energy_j: f64,
     /// Work of all of them.
     #[serde(flatten)]
     pub work: WorkSummary,
@@ -56,13 +61,17 @@ impl WorkSummary {
 pub(crate) fn summaries(plan: &Plan, simulated: &Simulated) -> Vec<PassSummary> {
     let mut groups: Vec<Group> = Vec::new();
     let mut write_back = Counts::default();
-    for report in simulated.known().map(|frame| &frame.report) {
+    for frame in simulated.in_order() {
+        let Some(Observed { report, times, counts, .. }) = frame.observed() else { continue };
         write_back += &report.write_back;
-        add(&mut groups, report);
+        let events_j = plan.model.counts_energy(counts).total_j();
+        let others_j = frame.power.energy().total_j() - events_j;
+        let others_w = others_j / frame.power.duration_s();
+        add(&mut groups, report, times, others_w);
     }
     let mut rows: Vec<_> = groups.into_iter().map(|group| group.summary(&plan.model)).collect();
     let (name, work) = (WRITE_BACK.to_owned(), WorkSummary::new(write_back, &plan.model));
-    rows.push(PassSummary { name, passes: 0, work, draws: Vec::new() });
+    rows.push(PassSummary { name, passes: 0, time_s: 0.0, energy_j: work.events_j, work, draws: Vec::new() });
     rows
 }
 
@@ -70,19 +79,30 @@ pub(crate) fn summaries(plan: &Plan, simulated: &Simulated) -> Vec<PassSummary> 
 struct Group {
     name: String,
     passes: u64,
+    time_s: f64,
+    /// Energy that depends on time, in joules.
+    others_j: f64,
     counts: Counts,
     draws: Vec<Counts>,
 }
 
-fn add(groups: &mut Vec<Group>, report: &FrameReport) {
-    for pass in &report.passes {
+/// Adds the passes of a frame. `others_w` is its power besides the events.
+fn add(groups: &mut Vec<Group>, report: &FrameReport, times: &[PassTime], others_w: f64) {
+    let mut before_ps = 0;
+    for (number, pass) in report.passes.iter().enumerate() {
         let place = groups.iter().position(|group| group.name == pass.name).unwrap_or_else(|| {
             let (counts, draws) = Default::default();
-            groups.push(Group { name: pass.name.clone(), passes: 0, counts, draws });
+            let name = pass.name.clone();
+            groups.push(Group { name, passes: 0, time_s: 0.0, others_j: 0.0, counts, draws });
             groups.len() - 1
         });
+        let end_ps = times.get(number).map_or(before_ps, |time| time.end_ps);
+        let time_s = (end_ps - before_ps) as f64 * 1e-12;
+        before_ps = end_ps;
         let group = &mut groups[place];
         group.passes += 1;
+        group.time_s += time_s;
+        group.others_j += time_s * others_w;
         group.counts += &pass.counts();
         if pass.draws.len() > group.draws.len() {
             group.draws.resize(pass.draws.len(), Counts::default());
@@ -94,10 +114,13 @@ fn add(groups: &mut Vec<Group>, report: &FrameReport) {
 impl Group {
     fn summary(self, model: &PowerModel) -> PassSummary {
         let listed = if (2..=MAX_DRAWS).contains(&self.draws.len()) { self.draws } else { Vec::new() };
+        let work = WorkSummary::new(self.counts, model);
         PassSummary {
             name: self.name,
             passes: self.passes,
-            work: WorkSummary::new(self.counts, model),
+            time_s: self.time_s,
+            energy_j: work.events_j + self.others_j,
+            work,
             draws: listed.into_iter().map(|draw| WorkSummary::new(draw, model)).collect(),
         }
     }
@@ -124,11 +147,15 @@ mod tests {
         let hits = |count| counts(Event::SamplesHit, count);
         for _ in 0..2 {
             let passes = vec![pass("map", vec![hits(5)]), pass("image", vec![hits(1), hits(2)])];
-            add(&mut groups, &FrameReport { passes, write_back: Counts::default() });
+            let time = |begin_ps, end_ps| PassTime { begin_ps, end_ps, busy_ps: [0; activity::Unit::COUNT] };
+            let times = [time(0, 3_000_000), time(2_000_000, 5_000_000)];
+            add(&mut groups, &FrameReport { passes, write_back: Counts::default() }, &times, 2.0);
         }
         let found: Vec<_> = groups.iter().map(|group| (group.name.as_str(), group.passes)).collect();
         assert_eq!(found, [("map", 2), ("image", 2)]);
         assert_eq!(groups[1].draws, [hits(2), hits(4)]);
+        let spent: Vec<_> = groups.iter().map(|group| (group.time_s, group.others_j)).collect();
+        assert_eq!(spent, [(6e-6, 12e-6), (4e-6, 8e-6)], "from end to end");
         assert_eq!((groups[1].counts[Event::SamplesHit], groups[1].counts[Event::PixelsResolved]), (6, 6));
     }
 

@@ -5,8 +5,8 @@ use glam::Vec3;
 use output::image::LinearImage;
 use output::plot::part_colour;
 use output::report::{
-    CounterRow, FactRow, FileLink, FrameNumbers, FrameRow, PartRow, Report, ReportImage, ReportPlot, UnitRow,
-    WarningRow,
+    CounterRow, FactRow, FileLink, FrameNumbers, FrameRow, PartRow, PassRow, Report, ReportImage, ReportPlot,
+    UnitRow, WarningRow,
 };
 use output::table::{count_or_digits, grouped, shell_line, si};
 use power_model::{Bound, Part};
@@ -14,7 +14,7 @@ use power_model::{Bound, Part};
 use crate::frame::image_name;
 use crate::heat::heat_name;
 use crate::pictures::{Plot, parts_in_use};
-use crate::{Host, Input, Outcome, RunError};
+use crate::{Host, Input, Outcome, PassSummary, RunError};
 
 /// Collects the contents of the report.
 pub(super) fn report<'a>(outcome: &'a Outcome, plots: &[Plot]) -> Result<Report<'a>, RunError> {
@@ -29,6 +29,7 @@ pub(super) fn report<'a>(outcome: &'a Outcome, plots: &[Plot]) -> Result<Report<
         parts: parts(outcome),
         frames: frames(outcome),
         pixels: plan.pixels(),
+        passes: passes(outcome),
         units: units(outcome),
         counters: counters(outcome),
         settings: settings(outcome),
@@ -121,6 +122,22 @@ fn frame_flags(predicted: bool, flags: String) -> String {
         (true, true) => "predicted".to_owned(),
         (true, false) => format!("predicted, {flags}"),
     }
+}
+
+fn passes(outcome: &Outcome) -> Vec<PassRow> {
+    let rows = &outcome.summary.passes;
+    let time_s: f64 = rows.iter().map(|pass| pass.time_s).sum();
+    let energy_j: f64 = rows.iter().map(|pass| pass.energy_j).sum();
+    let row = |pass: &PassSummary| PassRow {
+        name: pass.name.clone(),
+        passes: pass.passes,
+        time_s: pass.time_s,
+        time_share: pass.time_s / time_s,
+        energy_j: pass.energy_j,
+        energy_share: pass.energy_j / energy_j,
+        dram_bytes: pass.work.dram_bytes,
+    };
+    rows.iter().map(row).collect()
 }
 
 fn units(outcome: &Outcome) -> Vec<UnitRow> {

@@ -6,7 +6,7 @@ use pipeline::FrameReport;
 use power_model::FramePower;
 use serde::Serialize;
 use timing::sampled::Interval;
-use timing::{AccuracyWarning, Stalls};
+use timing::{AccuracyWarning, PassTime, Stalls};
 use warnings::Warning;
 use workloads::job::Fact;
 
@@ -50,6 +50,8 @@ pub struct Observed {
     pub counts: Counts,
     /// Work by pass and by draw.
     pub report: FrameReport,
+    /// Time of each pass.
+    pub times: Vec<PassTime>,
     /// Results of a workload, by name.
     pub facts: Vec<Fact>,
     /// Warnings of a workload.

@@ -2,15 +2,19 @@
 
 use activity::Unit;
 use output::dir::{Claim, OutDir, SUMMARY};
-use output::perfetto::{self, CounterTrack, FrameSpan, MAX_SLICES, Timeline, UnitTrack, slices_of_bins};
+use output::perfetto::{
+    self, CounterTrack, FrameSpan, MAX_SLICES, PassSpan, Timeline, UnitTrack, slices_of_bins,
+};
 use output::progress::Progress;
+use pipeline::PassReport;
 use power_model::Part;
+use timing::PassTime;
 use traces::energy::{ExtraColumn, FrameEnergy, FrameTable};
 use traces::score::{TOLERANCE_S, truth_beside};
 
 use crate::frame::image_name;
 use crate::heat::heat_name;
-use crate::{FIGURES, FrameRow, Outcome, Plan, RunError, pictures, report, stalls};
+use crate::{FIGURES, FrameRow, Observed, Outcome, Plan, RunError, pictures, report, stalls};
 
 /// Files that a run may write.
 pub(super) fn claim(plan: &Plan) -> Claim {
@@ -110,19 +114,42 @@ fn ns(time_s: f64) -> u64 {
 }
 
 fn frames(outcome: &Outcome) -> Vec<FrameSpan> {
-    let rows = outcome.measurement.run.frames.iter().zip(&outcome.summary.frames);
-    rows.map(|(paced, row)| FrameSpan {
-        frame: u64::from(row.frame),
-        start_ns: ns(paced.start_s),
-        busy_end_ns: ns(paced.busy_end_s),
-        end_ns: ns(paced.end_s),
-        numbers: vec![
-            ("energy_mJ", row.energy_j * 1e3),
-            ("energy_nJ_per_pixel", row.energy_per_pixel_j * 1e9),
-            ("power_W", row.power_w),
-        ],
-    })
-    .collect()
+    let frames = outcome.simulated.in_order().zip(&outcome.summary.frames);
+    let most = MAX_SLICES / outcome.summary.frames.len().max(1);
+    outcome
+        .measurement
+        .run
+        .frames
+        .iter()
+        .zip(frames)
+        .map(|(paced, (frame, row))| FrameSpan {
+            passes: frame.observed().map_or(Vec::new(), |observed| passes(observed, paced.start_s, most)),
+            frame: u64::from(row.frame),
+            start_ns: ns(paced.start_s),
+            busy_end_ns: ns(paced.busy_end_s),
+            end_ns: ns(paced.end_s),
+            numbers: vec![
+                ("energy_mJ", row.energy_j * 1e3),
+                ("energy_nJ_per_pixel", row.energy_per_pixel_j * 1e9),
+                ("power_W", row.power_w),
+            ],
+        })
+        .collect()
+}
+
+/// Passes of a frame that starts at `start_s`, each from the end of the one before; none if there are more than `most`.
+fn passes(observed: &Observed, start_s: f64, most: usize) -> Vec<PassSpan> {
+    if observed.times.len() > most {
+        return Vec::new();
+    }
+    let at = |ps: u64| ns(start_s + ps as f64 * 1e-12);
+    let mut before_ps = 0;
+    let span = |(pass, time): (&PassReport, &PassTime)| {
+        let start_ps = std::mem::replace(&mut before_ps, time.end_ps).max(time.begin_ps);
+        PassSpan { name: pass.name.clone(), start_ns: at(start_ps), end_ns: at(time.end_ps) }
+    };
+    let spans = observed.report.passes.iter().zip(&observed.times).map(span);
+    spans.filter(|span| span.start_ns < span.end_ns).collect()
 }
 
 fn unit_track(outcome: &Outcome, unit: Unit) -> UnitTrack<'static> {

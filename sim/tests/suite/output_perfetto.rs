@@ -2,7 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use output::perfetto::{BusySlice, CounterTrack, FrameSpan, MAX_POINTS, Timeline, UnitTrack, write};
+use output::perfetto::{
+    BusySlice, CounterTrack, FrameSpan, MAX_POINTS, PassSpan, Timeline, UnitTrack, write,
+};
 
 /// A decoded field: a varint, eight bytes, or bytes that may be a message.
 #[derive(Clone, Debug, PartialEq)]
@@ -146,6 +148,10 @@ fn timeline(points: Vec<(u64, f64)>) -> Timeline<'static> {
         start_ns,
         busy_end_ns: start_ns + 60,
         end_ns: start_ns + 100,
+        passes: vec![
+            PassSpan { name: "map".to_owned(), start_ns, end_ns: start_ns + 20 },
+            PassSpan { name: "image".to_owned(), start_ns: start_ns + 20, end_ns: start_ns + 60 },
+        ],
         numbers: vec![("energy_mJ", 1.5)],
     };
     let slices = vec![
@@ -196,7 +202,13 @@ fn slices_nest_and_close_on_every_track() {
     }
     assert!(open.values().all(Vec::is_empty));
     let named: Vec<_> = decoded.events.iter().filter_map(|event| event.name.as_deref()).collect();
-    assert_eq!(named, ["frame 0", "busy", "idle", "frame 1", "busy", "idle", "60 %", "100 %"]);
+    assert_eq!(
+        named,
+        [
+            "frame 0", "busy", "map", "image", "idle", "frame 1", "busy", "map", "image", "idle", "60 %",
+            "100 %"
+        ]
+    );
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! The report: whole without a network, harmless for any text in it, complete without what is missing.
 
 use output::report::{
-    CounterRow, FactRow, FileLink, FrameNumbers, FrameRow, Headline, PartRow, Report, ReportImage,
+    CounterRow, FactRow, FileLink, FrameNumbers, FrameRow, Headline, PartRow, PassRow, Report, ReportImage,
     ReportPlot, UnitRow, WarningRow,
 };
 use output::{Claim, Destination, MeanSd, plot};
@@ -52,6 +52,15 @@ fn report(text: &str, number: f64) -> Report<'static> {
         parts: vec![part(text, 99.0 * number, true), part(text, number, false)],
         frames: frames(text, number),
         pixels: 1000,
+        passes: vec![PassRow {
+            name: owned(),
+            passes: 1,
+            time_s: number,
+            time_share: 1.0,
+            energy_j: number,
+            energy_share: 1.0,
+            dram_bytes: 64,
+        }],
         units: vec![UnitRow {
             name: owned(),
             doc: owned(),
