@@ -161,7 +161,14 @@ fn missing_files() {
     fs::create_dir(&folder).expect("a folder can be made");
     refusals.call(&[&folder], 1, &[&folder, "directory"], "give the path of a .ron, .gltf");
     let scene = inputs.put("s.ron", "(objects: [(file: \"gone.obj\")])");
-    refusals.call(&[&scene], 1, &["gone.obj", "No such file"], "check the path");
+    refusals.call(
+        &[&scene],
+        1,
+        &["s.ron:1:18: ", "gone.obj: cannot read it: No such file"],
+        "check the path",
+    );
+    let cut = inputs.put("cut.ron", "(\n  objects: [\n    (shape: ");
+    refusals.call(&[&cut], 2, &["cut.ron:3:12: the file ends early"], "add what is missing");
 }
 
 #[cfg(unix)]

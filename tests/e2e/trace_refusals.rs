@@ -16,7 +16,7 @@ fn bad_values_are_refused_with_the_option_they_are_of() {
     let inputs = Inputs::new();
     let trace = recording(&inputs);
     let (stamps, out) = (inputs.put("stamps.txt", "1\n2\n3\n4\n"), inputs.path("o.csv"));
-    let (svg, bad) = (inputs.path("o.svg"), inputs.put("bad.txt", "0.02s\n0.04s\n"));
+    let svg = inputs.path("o.svg");
     let sample = ["sample", &trace, "--device-rate", "1000", "--out", &out];
     let marked = ["energy", &trace, "--mark", "0.02"];
     for (args, says) in [
@@ -37,12 +37,56 @@ fn bad_values_are_refused_with_the_option_they_are_of() {
         ([&sample[..], &["--specified-voltage", "0"]].concat(), vec!["--specified-voltage", "above 0"]),
         ([&sample[..], &["--current-gain=-1"]].concat(), vec!["--current-gain", "above zero"]),
         (vec!["plot", &trace, "--from", "0.05", "--to", "1", "--out", &svg], vec!["not within the trace"]),
-        (vec!["frames", &trace, "--mark-file", &bad], vec!["line 1: `0.02s` holds no time"]),
     ] {
         let ended = quintile().call(["trace"].iter().chain(&args));
         assert_eq!(ended.code, Some(2), "{args:?}: {}", ended.stderr);
         assert!(says.iter().all(|part| ended.stderr.contains(part)), "{args:?}: {}", ended.stderr);
     }
+}
+
+#[test]
+fn a_file_that_cannot_be_read_ends_every_command_with_1() {
+    let inputs = Inputs::new();
+    let trace = recording(&inputs);
+    let (gone, bad) = (inputs.path("gone.csv"), inputs.put("bad.txt", "0.02s\n0.04s\n"));
+    let cut = inputs.put("summary.json", "{\"schema\": 3, \"scene\": \"ti");
+    let (out, svg) = (inputs.path("o.csv"), inputs.path("o.svg"));
+    let missing = ["gone.csv: cannot read it: No such file", "check the path"];
+    for (args, says) in [
+        (vec!["run", "--again", &gone], missing),
+        (vec!["trace", "frames", &gone, "--mark", "0.02"], missing),
+        (vec!["trace", "frames", &trace, "--mark-file", &gone], missing),
+        (vec!["trace", "align", &trace, &gone], missing),
+        (vec!["trace", "convert", &gone, &out], missing),
+        (vec!["trace", "plot", &gone, "--out", &svg], missing),
+        (vec!["trace", "sample", &trace, "--device", &gone, "--out", &out], missing),
+        (vec!["trace", "pareto", &gone], missing),
+        (vec!["compare", &gone, &gone], missing),
+        (vec!["trace", "frames", &trace, "--mark-file", &bad], ["line 1: `0.02s` is not a time", "seconds"]),
+        (vec!["run", "--again", &cut], ["summary.json: it is cut off or damaged", "get the file again"]),
+    ] {
+        let ended = quintile().call(&args);
+        assert_eq!(ended.code, Some(1), "{args:?}: {}", ended.stderr);
+        assert!(says.iter().all(|part| ended.stderr.contains(part)), "{args:?}: {}", ended.stderr);
+    }
+}
+
+#[test]
+fn a_proposed_start_that_does_not_come_back_is_refused() {
+    let inputs = Inputs::new();
+    // One rise in a trace that is otherwise noise.
+    let row = |i: u32| {
+        format!(
+            "{},12,{}\n",
+            f64::from(i) / 5000.0,
+            0.2 + f64::from(i * 7919 % 13) * 0.01 + if i >= 300 { 2.0 } else { 0.0 }
+        )
+    };
+    let trace = inputs
+        .put("t.csv", "time_s,voltage_V,current_A\n".to_owned() + &(0..500).map(row).collect::<String>());
+    let ended = quintile().call(["trace", "frames", &trace, "--auto"]);
+    assert_eq!(ended.code, Some(2), "{}", ended.stdout);
+    assert!(ended.stderr.contains("--auto found no start that comes back"), "{}", ended.stderr);
 }
 
 #[test]

@@ -5,7 +5,7 @@ use parquet::file::reader::FileReader;
 use parquet::record::Field;
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{ErrorKind, Read};
+use std::io::Read;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -16,16 +16,8 @@ const MAX_BYTES: u64 = 1 << 28;
 /// Why a table cannot be used.
 #[derive(Debug, Error)]
 pub enum TableReadError {
-    /// There is no such file.
-    #[error("{path}: cannot be read: {reason}", path = path.display())]
-    Absent {
-        /// The file.
-        path: PathBuf,
-        /// The error of the system.
-        reason: String,
-    },
-    /// The file.
-    #[error("{path}: cannot be read: {reason}", path = path.display())]
+    /// The file is missing, unreadable, or not a table.
+    #[error("{path}: cannot read it: {reason}", path = path.display())]
     File {
         /// The file.
         path: PathBuf,
@@ -70,15 +62,10 @@ impl Table {
     /// Reads a table with a header: Parquet by its first bytes, else a text with commas, semicolons or tabs.
     ///
     /// # Errors
-    /// [`TableReadError::Absent`] if it is not there, [`TableReadError::File`] if it cannot be read.
+    /// [`TableReadError::File`] if it cannot be read.
     pub fn read(path: &Path) -> Result<Self, TableReadError> {
         let refuse = |reason: String| TableReadError::File { path: path.to_owned(), reason };
-        let file = File::open(path).map_err(|error| match error.kind() {
-            ErrorKind::NotFound => {
-                TableReadError::Absent { path: path.to_owned(), reason: error.to_string() }
-            }
-            _ => refuse(error.to_string()),
-        })?;
+        let file = File::open(path).map_err(|error| refuse(format!("{error}; check the path")))?;
         let there = file.metadata().map_err(|error| refuse(error.to_string()))?;
         if there.is_dir() {
             return Err(refuse("it is a folder; name a file in it".to_owned()));

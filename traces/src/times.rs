@@ -9,14 +9,6 @@ use thiserror::Error;
 /// Why a file of times cannot be used.
 #[derive(Debug, Error)]
 pub enum TimesError {
-    /// There is no such file.
-    #[error("{path}: cannot be read: {source}", path = path.display())]
-    NotFound {
-        /// The file.
-        path: PathBuf,
-        /// The error of the system.
-        source: std::io::Error,
-    },
     /// A folder where a file has to be.
     #[error("{path}: is a folder: name a file in it", path = path.display())]
     Folder {
@@ -24,7 +16,7 @@ pub enum TimesError {
         path: PathBuf,
     },
     /// The file could not be read.
-    #[error("{path}: cannot be read: {source}", path = path.display())]
+    #[error("{path}: cannot read it: {source}; check the path", path = path.display())]
     Io {
         /// The file.
         path: PathBuf,
@@ -32,7 +24,7 @@ pub enum TimesError {
         source: std::io::Error,
     },
     /// The file has no times.
-    #[error("{path}: holds no time: give one in each line", path = path.display())]
+    #[error("{path}: no times: write one in each line", path = path.display())]
     Empty {
         /// The file.
         path: PathBuf,
@@ -112,7 +104,6 @@ fn is_header(fields: &[&str]) -> bool {
 fn unreadable(path: &Path, source: std::io::Error) -> TimesError {
     let path = path.to_owned();
     match source.kind() {
-        ErrorKind::NotFound => TimesError::NotFound { path, source },
         ErrorKind::IsADirectory => TimesError::Folder { path },
         _ => TimesError::Io { path, source },
     }
@@ -146,7 +137,9 @@ impl Column {
             });
         }
         let number = fields[self.index].parse::<f64>().ok().filter(|time| time.is_finite());
-        number.map(|time| time * self.scale).ok_or_else(|| "holds no time; fix it".to_owned())
+        number
+            .map(|time| time * self.scale)
+            .ok_or_else(|| "is not a time: write seconds, such as 2.513".to_owned())
     }
 }
 
@@ -190,11 +183,11 @@ mod tests {
             ("start_s;label\n1,5;a\n", "line 2: `1,5;a` has 3 fields, the first line 2"),
             ("frame,energy\n1,2\n", "(frame, energy) is called start, time"),
             ("start_mJ\n1\n", "holds no times"),
-            ("1.5s\n2.5\n", "line 1: `1.5s` holds no time"),
-            ("1.5.0\n2.5\n", "line 1: `1.5.0` holds no time"),
-            ("-.5s\n2.5\n", "line 1: `-.5s` holds no time"),
+            ("1.5s\n2.5\n", "line 1: `1.5s` is not a time"),
+            ("1.5.0\n2.5\n", "line 1: `1.5.0` is not a time"),
+            ("-.5s\n2.5\n", "line 1: `-.5s` is not a time"),
             ("1.5s,a\n2.5,b\n", "line 1: `1.5s,a` has 2 fields"),
-            ("time_s\nx\n", "line 2: `x` holds no time"),
+            ("time_s\nx\n", "line 2: `x` is not a time"),
         ] {
             let message = read(text).unwrap_err();
             assert!(message.contains(says), "{text}: {message}");

@@ -102,6 +102,10 @@ pub fn parse<T: DeserializeOwned>(text: &str, name: &str) -> Result<T, SpecError
 
 fn describe(error: &SpannedError, text: &str, name: &str) -> SpecError {
     let at = error.span.start;
+    if let Some((line, column)) = early_end(text, at.line, at.col) {
+        let message = "the file ends early: add what is missing, closing brackets included, or get it again";
+        return SpecError::Parse { path: name.to_owned(), line, column, message: message.to_owned() };
+    }
     let field = field_of_value(text, at.line, at.col);
     SpecError::Parse {
         path: name.to_owned(),
@@ -109,6 +113,22 @@ fn describe(error: &SpannedError, text: &str, name: &str) -> SpecError {
         column: at.col,
         message: message(&error.code, field.as_deref(), word_at(text, at.line, at.col)),
     }
+}
+
+/// The place just after the last character of the text, if an error at a position is that nothing follows.
+fn early_end(text: &str, line: usize, column: usize) -> Option<(usize, usize)> {
+    let plain = without_comments(text);
+    let end = plain.trim_end();
+    let rest = plain.lines().skip(line.saturating_sub(1));
+    let mut after = rest.enumerate().map(|(nth, text)| match nth {
+        0 => text.chars().skip(column.saturating_sub(1)).collect(),
+        _ => text.to_owned(),
+    });
+    let is_end = after.all(|text: String| text.trim().is_empty());
+    let balance = |open: char, close: char| end.matches(open).count() > end.matches(close).count();
+    let is_open = end.is_empty() || balance('(', ')') || balance('[', ']') || balance('{', '}');
+    let last = end.rfind('\n').map_or(0, |newline| newline + 1);
+    (is_end && is_open).then(|| (1 + end.matches('\n').count(), 1 + end[last..].chars().count()))
 }
 
 /// Name of the field whose value is at or just before a position: the word before the last colon of the line
@@ -215,6 +235,17 @@ mod tests {
         let error = parse::<Gpu>("(wibble: 1)", "gpu.ron").unwrap_err();
         assert!(error.to_string().contains("known here: tile_size, clock_hz"), "{error}");
         assert_eq!(suggestion("foo", &["look", "seconds"]), "known here: look, seconds");
+    }
+
+    #[test]
+    fn a_text_that_is_cut_anywhere_ends_early() {
+        let whole = "(\n  tile_size: 8, // a comment\n  clock_hz: 1e9,\n)";
+        for length in [0, 1, 5, 15, 17, 25, 45] {
+            let error = parse::<Gpu>(&whole[..length], "gpu.ron").unwrap_err().to_string();
+            assert!(error.contains("the file ends early: add what is missing"), "{length}: {error}");
+        }
+        let error = parse::<Gpu>("(tile_size: 8, clock_hz: x)", "gpu.ron").unwrap_err().to_string();
+        assert!(!error.contains("ends early"), "{error}");
     }
 
     #[test]

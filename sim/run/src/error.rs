@@ -46,10 +46,13 @@ pub enum RunError {
     Image(#[from] ImageError),
     #[error("frames.csv: {0}")]
     Frames(#[from] traces::energy::TableError),
-    #[error("{path}: cannot read it: {source}; check the path and its permissions")]
+    #[error("{path}: cannot read it: {source}; check the path")]
     Input { path: String, source: std::io::Error },
     #[error(transparent)]
     Spec(#[from] activity::spec::SpecError),
+    /// A file is cut off or damaged.
+    #[error("{path}: {message}")]
+    Damaged { path: String, message: String },
     /// A setting is invalid, or two settings conflict.
     #[error("{0}")]
     Setting(String),

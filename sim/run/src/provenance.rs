@@ -8,6 +8,7 @@ use std::path::Path;
 use output::dir::sha256_of;
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
+use serde_json::error::Category;
 use workloads::scene::CameraUsed;
 
 use crate::{Choice, Plan, RunError, RunOptions, Work};
@@ -155,8 +156,15 @@ pub fn again(
     let name = path.display();
     let text = fs::read(path).map_err(|source| RunError::Input { path: name.to_string(), source })?;
     let refuse = |message: String| RunError::Setting(format!("{name}: {message}"));
-    let summary: Schema = serde_json::from_slice(&text).map_err(|_| {
-        refuse("it is not the summary of a run; give the summary.json that `quintile run` wrote".to_owned())
+    let damaged = |error: serde_json::Error| RunError::Damaged {
+        path: name.to_string(),
+        message: format!("it is cut off or damaged: {error}; get the file again"),
+    };
+    let summary: Schema = serde_json::from_slice(&text).map_err(|error| match error.classify() {
+        Category::Data => refuse(
+            "it is not the summary of a run; give the summary.json that `quintile run` wrote".to_owned(),
+        ),
+        _ => damaged(error),
     })?;
     if summary.schema != SCHEMA {
         let message = format!(
@@ -165,8 +173,7 @@ pub fn again(
         );
         return Err(refuse(message));
     }
-    let recorded: Recorded = serde_json::from_slice(&text)
-        .map_err(|error| refuse(format!("it is damaged: {error}; get the file again")))?;
+    let recorded: Recorded = serde_json::from_slice(&text).map_err(damaged)?;
     if !force {
         recorded.check(revision).map_err(refuse)?;
     }

@@ -48,7 +48,7 @@ pub struct Summary {
     pub modelled: Modelled,
     /// Warnings.
     pub warnings: Vec<Warning>,
-    /// Frames as measured in the trace; `None` if only the marked frame was found.
+    /// Frames as measured in the trace; `None` if of several frames only the marked one was found.
     pub measured: Option<Figures>,
     /// Frames as simulated: the ground truth.
     pub truth: Option<Figures>,

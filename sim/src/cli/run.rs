@@ -42,8 +42,8 @@ pub struct RunArgs {
     /// A built-in scene or a workload (see `quintile list`), or a .ron, .gltf, .glb, .obj, .ply, .off or .stl file
     #[arg(default_value = "default", value_name = "SCENE|WORKLOAD|FILE")]
     pub scene: PathBuf,
-    /// Repeat the run that wrote this summary.json, to the same bytes; only --out, --force, --threads and
-    /// --json can be added. Refused if the program version or an input differs, unless with --force
+    /// Repeat the run that wrote this summary.json, to the same bytes; only --out, --force, --threads,
+    /// --dry-run, --json and the options of messages can be added. Refused if the program version or an input differs, unless with --force
     #[arg(long, value_name = "SUMMARY", conflicts_with_all = SETTINGS)]
     pub again: Option<PathBuf>,
     /// Options of a workload in a .ron file

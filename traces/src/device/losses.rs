@@ -100,7 +100,7 @@ mod tests {
     use crate::curve::Curve;
     use crate::device::{Device, DeviceSpec};
     use crate::io;
-    use crate::io::{ReadError, ReadOptions, csv, parquet};
+    use crate::io::{ReadError, ReadOptions, RepairKind, csv, parquet};
 
     fn device(packet_loss: f64, seed: u64) -> Device {
         Device::new(DeviceSpec { packet_samples: 100, packet_loss, seed, ..DeviceSpec::default() }).unwrap()
@@ -135,7 +135,7 @@ mod tests {
             let at_gap = |row: u64| row == first.start as u64 + 1;
             assert!(matches!(refused, ReadError::Uneven { row, .. } if at_gap(row)), "{refused}");
             let repaired = io::read(&path, &ReadOptions { repair: true, ..ReadOptions::default() }).unwrap();
-            let gaps = repaired.repairs.iter().filter(|repair| repair.code == "filled-gap");
+            let gaps = repaired.repairs.iter().filter(|repair| repair.code == RepairKind::FilledGap);
             let gaps: Vec<u64> = gaps.map(|repair| repair.count).collect();
             let lost: Vec<u64> = trace
                 .lost()

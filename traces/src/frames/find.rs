@@ -144,7 +144,7 @@ pub struct Proposal {
     /// How evenly the starts like it divide the segment that was looked at, 0 to 1.
     pub regularity: f64,
     /// How many starts like it there are in that segment.
-    pub alike: usize,
+    pub similar_starts: usize,
     /// How many rises were tried.
     pub tried: usize,
 }
@@ -162,13 +162,16 @@ pub fn propose(trace: &Trace) -> Option<Proposal> {
         let window = default_window(0.0, part.rate_hz());
         let marks = Marks::one(mark_s, window, part.end_s());
         let found = find_with(&part, &marks, &Options { method: Method::SumOfSquares }).ok()?;
-        let (regularity, alike) = (found.threshold.regularity, found.starts.len());
-        Some(Proposal { mark_s, regularity, alike, tried })
+        let (regularity, similar_starts) = (found.threshold.regularity, found.starts.len());
+        Some(Proposal { mark_s, regularity, similar_starts, tried })
     });
     // Of equally even ones the rarer: a start occurs once per frame, similar parts of frames more often.
     judged.max_by(|a, b| {
         let even = |p: &Proposal| libm::round(p.regularity * 20.0);
-        even(a).total_cmp(&even(b)).then(b.alike.cmp(&a.alike)).then(b.mark_s.total_cmp(&a.mark_s))
+        even(a)
+            .total_cmp(&even(b))
+            .then(b.similar_starts.cmp(&a.similar_starts))
+            .then(b.mark_s.total_cmp(&a.mark_s))
     })
 }
 

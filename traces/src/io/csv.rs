@@ -5,7 +5,7 @@ use super::columns::{Layout, Picked, RowBatch, layout};
 use super::description::{Description, to_json};
 use super::samples::{TraceChunk, TraceHeader, TraceReader, TraceWriter};
 use super::time_base::Stamps;
-use super::{CURRENT_A, ReadError, ReadOptions, Repair, TIME_S, VOLTAGE_V, WriteError, atomic};
+use super::{CURRENT_A, ReadError, ReadOptions, Repair, RepairKind, TIME_S, VOLTAGE_V, WriteError, atomic};
 use crate::decimal;
 use ::csv::{ByteRecord, Reader, ReaderBuilder};
 use flate2::Compression;
@@ -253,7 +253,7 @@ impl CsvRows {
             "{count} rows have more or fewer fields than there are columns, the first of them row {row} ({time_s} s); \
              surplus fields were dropped"
         );
-        Some(Repair { code: "uneven-rows", row, time_s, count, message })
+        Some(Repair { code: RepairKind::UnevenRows, row, time_s, count, message })
     }
 
     /// Moves to the next row; whether there was one.

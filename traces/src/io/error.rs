@@ -9,7 +9,7 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 pub enum ReadError {
     /// The file could not be opened or read.
-    #[error("{path}: cannot be read: {source}", path = path.display())]
+    #[error("{path}: cannot read it: {source}; check the path", path = path.display())]
     Io {
         /// The file.
         path: PathBuf,
@@ -175,7 +175,7 @@ pub enum ReadError {
         path: PathBuf,
     },
     /// A value is missing, not a number, or not finite.
-    #[error("{path}: row {row}: {column} is {value}, not a finite number: fix it or cut it out", path = path.display())]
+    #[error("{path}: row {row}: {column} is {value}, not a finite number: fix it, cut it out, or have it filled with --repair", path = path.display())]
     Value {
         /// The file.
         path: PathBuf,
@@ -229,7 +229,7 @@ pub enum ReadError {
         other: String,
     },
     /// There is no row.
-    #[error("{path}: no samples: record at least one", path = path.display())]
+    #[error("{path}: no samples: give a trace with at least one row under the names", path = path.display())]
     Empty {
         /// The file.
         path: PathBuf,

@@ -9,7 +9,7 @@ use super::columns::{Layout, RowBatch, layout};
 use super::description::{self, Description};
 use super::samples::{TraceChunk, TraceReader, TraceWriter};
 use super::time_base::Stamps;
-use super::{ReadError, ReadOptions, Repair, WriteError};
+use super::{ReadError, ReadOptions, Repair, RepairKind, WriteError};
 use crate::metadata::Metadata;
 use crate::units;
 use ::jls::{MAX_PAYLOAD_BYTES, Reader, SAMPLE_TYPES, SampleReader, Signal, SignalName, Timestamp};
@@ -307,7 +307,7 @@ fn trim(path: &Path, tracks: &mut [Track]) -> Result<Option<Repair>, ReadError> 
         "signals do not begin and end together: the {kept} samples from number {from} on are read, which all have; the \
          longest signal has {count} more"
     );
-    Ok(Some(Repair { code: "cut-signals", row, time_s: 0.0, count, message }))
+    Ok(Some(Repair { code: RepairKind::CutSignals, row, time_s: 0.0, count, message }))
 }
 
 /// Refuses signals that do not make up rows: of different rates, or from other samples to others.

@@ -24,7 +24,7 @@ pub mod unfinished;
 pub use error::{ReadError, WriteError};
 pub use read::{Loaded, open, read, read_csv, read_parquet};
 pub use recording::Recording;
-pub use repair::Repair;
+pub use repair::{Repair, RepairKind};
 pub use rows::Rows;
 #[cfg(test)]
 pub(crate) use samples::SplitTrace;

@@ -82,7 +82,7 @@ fn load(mut rows: Rows) -> Result<Loaded, ReadError> {
     let mut repairs: Vec<Repair> = rows.repair().into_iter().collect();
     let mut description = std::mem::take(&mut rows.description);
     if rows.repairs_input() {
-        repairs.extend(repair_rows(&path, &mut columns, &mut description)?);
+        repairs.extend(repair_rows(&path, &rows.channel_names(), &mut columns, &mut description)?);
     }
     let Columns { stamps, voltage_v, current_a } = columns;
     let grid = time_base::grid(&path, &stamps, &description)?;

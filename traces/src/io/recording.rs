@@ -280,7 +280,7 @@ mod tests {
         let message = parquet::save(&recording, &out).unwrap_err().to_string();
         assert!(message.contains("t.csv: changed"), "{message}");
         fs::remove_file(&path).unwrap();
-        assert!(csv::save(&recording, &out).unwrap_err().to_string().contains("t.csv: cannot be read"));
+        assert!(csv::save(&recording, &out).unwrap_err().to_string().contains("t.csv: cannot read it"));
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
     }
 }

@@ -4,6 +4,7 @@ use super::ReadError;
 use super::description::Description;
 use super::time_base::{Stamps, usual_rate_hz};
 use serde::Serialize;
+use std::ops::Range;
 use std::path::Path;
 
 /// Largest distance of a stamp from its place in the time base, in sample periods.
@@ -18,12 +19,31 @@ pub(super) struct Columns {
     pub current_a: Vec<f32>,
 }
 
+/// What a repair did.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum RepairKind {
+    /// Signals that do not begin and end together were cut to what all have.
+    CutSignals,
+    /// Surplus fields of rows were dropped.
+    UnevenRows,
+    /// Rows without a time of their own were dropped.
+    DroppedRows,
+    /// Rows were sorted by time.
+    SortedRows,
+    /// Values that are not finite were filled from their neighbours.
+    FilledValues,
+    /// Missing samples were filled in.
+    FilledGap,
+    /// Rows off an even rate were resampled.
+    Resampled,
+}
+
 /// A repair.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Repair {
-    /// `cut-signals`, `uneven-rows`, `dropped-rows`, `sorted-rows`, `filled-values`, `filled-gap` or
-    /// `resampled`.
-    pub code: &'static str,
+    /// What was done.
+    pub code: RepairKind,
     /// The first row (from 1, as in the file; after sorting, in the sorted order).
     pub row: u64,
     /// When, s; by rate and start where the file has no times.
@@ -38,6 +58,7 @@ pub struct Repair {
 /// neighbours, and adds missing samples.
 pub(super) fn repair_rows(
     path: &Path,
+    names: &[String; 2],
     columns: &mut Columns,
     description: &mut Description,
 ) -> Result<Vec<Repair>, ReadError> {
@@ -45,12 +66,18 @@ pub(super) fn repair_rows(
     let times = seconds(&columns.stamps);
     let mut times = times.map(|times| order(times, columns, &mut repairs));
     let time_s = |row: usize| times.as_ref().map_or_else(|| description.time_s(row), |times| times[row]);
-    fill(path, "voltage_V", &mut columns.voltage_v, &time_s, &mut repairs)?;
-    fill(path, "current_A", &mut columns.current_a, &time_s, &mut repairs)?;
+    let gaps = [(&names[0], &mut columns.voltage_v), (&names[1], &mut columns.current_a)]
+        .map(|(name, values)| fill(path, name, values));
+    let [voltage, current] = gaps;
+    repairs.extend(filled(names, [voltage?, current?], time_s));
     if let Some(times) = &mut times
         && times.len() > 1
     {
-        space(path, times, columns, description, &mut repairs)?;
+        let grid = Grid::new(times, description);
+        if !grid.holds(times) {
+            resample(path, &grid, times, columns, &mut repairs)?;
+            description.rate_hz = Some(grid.rate_hz);
+        }
     }
     lengthen(path, columns, times.as_mut(), description, &mut repairs)?;
     if !repairs.is_empty() {
@@ -81,7 +108,13 @@ fn order(times: Vec<f64>, columns: &mut Columns, repairs: &mut Vec<Repair>) -> V
     if let Some(row) = unsorted {
         let message = format!("rows were sorted by time; row {} was the first out of order", row + 1);
         let count = rows.len() as u64;
-        repairs.push(Repair { code: "sorted-rows", row: row as u64 + 1, time_s: times[row], count, message });
+        repairs.push(Repair {
+            code: RepairKind::SortedRows,
+            row: row as u64 + 1,
+            time_s: times[row],
+            count,
+            message,
+        });
     }
     if dropped.is_some() || unsorted.is_some() {
         columns.voltage_v = rows.iter().map(|&row| columns.voltage_v[row]).collect();
@@ -104,17 +137,12 @@ fn dropped(times: &[f64], repeats: &[usize]) -> Option<Repair> {
         "{count} rows without a time of their own were dropped ({} repeats), the first of them row {row} (about {time_s} s)",
         repeats.len()
     );
-    Some(Repair { code: "dropped-rows", row, time_s, count: count as u64, message })
+    Some(Repair { code: RepairKind::DroppedRows, row, time_s, count: count as u64, message })
 }
 
-/// Replaces non-finite values by the straight line between their neighbours.
-fn fill(
-    path: &Path,
-    name: &str,
-    values: &mut [f32],
-    time_s: &dyn Fn(usize) -> f64,
-    repairs: &mut Vec<Repair>,
-) -> Result<(), ReadError> {
+/// Replaces non-finite values by the straight line between their neighbours. Returns the ranges of rows.
+fn fill(path: &Path, name: &str, values: &mut [f32]) -> Result<Vec<Range<usize>>, ReadError> {
+    let mut gaps: Vec<Range<usize>> = Vec::new();
     let mut from = 0;
     while let Some(first) = values[from..].iter().position(|value| !value.is_finite()).map(|at| from + at) {
         let end =
@@ -130,38 +158,69 @@ fn fill(
             let share = (at + 1) as f32 / (end + 1 - first) as f32;
             *value = before + share * (after - before);
         }
-        let time_s = time_s(first);
-        let message =
-            format!("{name}: {} values from row {} ({time_s} s) on were not finite", end - first, first + 1);
-        repairs.push(Repair {
-            code: "filled-values",
-            row: first as u64 + 1,
-            time_s,
-            count: (end - first) as u64,
-            message,
-        });
+        gaps.push(first..end);
         from = end;
     }
-    Ok(())
+    Ok(gaps)
+}
+
+/// Reports filled ranges, in order of rows; one that both columns have in common once.
+fn filled(names: &[String; 2], gaps: [Vec<Range<usize>>; 2], time_s: impl Fn(usize) -> f64) -> Vec<Repair> {
+    let [voltage, current] = gaps;
+    let alone = current.iter().filter(|gap| !voltage.contains(gap)).map(|gap| (names[1].clone(), gap));
+    let first = voltage.iter().map(|gap| match current.contains(gap) && names[0] != names[1] {
+        true => (names.join(" and "), gap),
+        false => (names[0].clone(), gap),
+    });
+    let mut all: Vec<(String, &Range<usize>)> = first.chain(alone).collect();
+    all.sort_by_key(|(_, gap)| gap.start);
+    let report = |(name, gap): (String, &Range<usize>)| {
+        let (time_s, row, count) = (time_s(gap.start), gap.start as u64 + 1, gap.len() as u64);
+        let values = if count == 1 { "value" } else { "values" };
+        let message = format!("{name}: {count} {values} from row {row} ({time_s} s) on not finite");
+        Repair { code: RepairKind::FilledValues, row, time_s, count, message }
+    };
+    all.into_iter().map(report).collect()
+}
+
+/// An even time base.
+struct Grid {
+    start_s: f64,
+    rate_hz: f64,
+}
+
+impl Grid {
+    fn new(times: &[f64], description: &Description) -> Self {
+        Self { start_s: times[0], rate_hz: description.rate_hz.unwrap_or_else(|| usual_rate_hz(times)) }
+    }
+
+    /// The place of a time, in samples from the start.
+    fn place(&self, time_s: f64) -> f64 {
+        (time_s - self.start_s) * self.rate_hz
+    }
+
+    /// Whether a time is too far from its nearest place.
+    fn is_off(&self, time_s: f64) -> bool {
+        (self.place(time_s) - libm::round(self.place(time_s))).abs() > MAX_OFFSET_PERIODS
+    }
+
+    /// Whether the rows are on it, one after the other.
+    fn holds(&self, times: &[f64]) -> bool {
+        let on = |(row, &time): (usize, &f64)| (self.place(time) - row as f64).abs() <= MAX_OFFSET_PERIODS;
+        times.iter().enumerate().all(on)
+    }
 }
 
 /// Resamples the rows to an even time base, by straight lines between rows.
-fn space(
+fn resample(
     path: &Path,
+    grid: &Grid,
     times: &mut Vec<f64>,
     columns: &mut Columns,
-    description: &mut Description,
     repairs: &mut Vec<Repair>,
 ) -> Result<(), ReadError> {
-    let rate_hz = description.rate_hz.unwrap_or_else(|| usual_rate_hz(times));
-    let start_s = times[0];
-    let place = |time: f64| (time - start_s) * rate_hz;
-    let even =
-        times.iter().enumerate().all(|(row, &time)| (place(time) - row as f64).abs() <= MAX_OFFSET_PERIODS);
-    if even {
-        return Ok(());
-    }
-    let slots = libm::round(place(times[times.len() - 1])) + 1.0;
+    let rate_hz = grid.rate_hz;
+    let slots = libm::round(grid.place(times[times.len() - 1])) + 1.0;
     if !(slots >= 1.0 && slots <= (MAX_GROWTH * times.len()) as f64) {
         let reason = format!(
             "filling it evenly at {rate_hz} Hz would take {slots:.0} samples for {} rows",
@@ -169,44 +228,39 @@ fn space(
         );
         return Err(ReadError::Repair { path: path.to_owned(), reason });
     }
-    let off = times
-        .iter()
-        .filter(|&&time| (place(time) - libm::round(place(time))).abs() > MAX_OFFSET_PERIODS)
-        .count();
-    if off > 0 {
-        let row = times
-            .iter()
-            .position(|&time| (place(time) - libm::round(place(time))).abs() > MAX_OFFSET_PERIODS)
-            .unwrap_or(0);
-        let message =
-            format!("{off} rows, the first of them {}, were off an even rate of {rate_hz} Hz", row + 1);
-        repairs.push(Repair {
-            code: "resampled",
-            row: row as u64 + 1,
-            time_s: times[row],
-            count: off as u64,
-            message,
-        });
-    }
-    for (row, pair) in times.windows(2).enumerate() {
-        let missing = libm::round(place(pair[1])) - libm::round(place(pair[0])) - 1.0;
-        if missing >= 1.0 {
-            let message = format!("after row {} ({} s) {missing:.0} samples were missing", row + 1, pair[0]);
-            repairs.push(Repair {
-                code: "filled-gap",
-                row: row as u64 + 1,
-                time_s: pair[0],
-                count: missing as u64,
-                message,
-            });
-        }
-    }
-    let grid: Vec<f64> = (0..slots as usize).map(|slot| start_s + slot as f64 / rate_hz).collect();
-    columns.voltage_v = interpolated(times, &columns.voltage_v, &grid, MAX_OFFSET_PERIODS / rate_hz);
-    columns.current_a = interpolated(times, &columns.current_a, &grid, MAX_OFFSET_PERIODS / rate_hz);
-    *times = grid;
-    description.rate_hz = Some(rate_hz);
+    repairs.extend(resampled(grid, times));
+    repairs.extend(filled_gaps(grid, times));
+    let places: Vec<f64> = (0..slots as usize).map(|slot| grid.start_s + slot as f64 / rate_hz).collect();
+    columns.voltage_v = interpolated(times, &columns.voltage_v, &places, MAX_OFFSET_PERIODS / rate_hz);
+    columns.current_a = interpolated(times, &columns.current_a, &places, MAX_OFFSET_PERIODS / rate_hz);
+    *times = places;
     Ok(())
+}
+
+/// Reports rows off the time base.
+fn resampled(grid: &Grid, times: &[f64]) -> Option<Repair> {
+    let first = times.iter().position(|&time| grid.is_off(time))?;
+    let count = times.iter().filter(|&&time| grid.is_off(time)).count();
+    let rows = if count == 1 { "row" } else { "rows" };
+    let row = first as u64 + 1;
+    let message = format!("{count} {rows} off an even rate of {} Hz, from row {row} on", grid.rate_hz);
+    Some(Repair { code: RepairKind::Resampled, row, time_s: times[first], count: count as u64, message })
+}
+
+/// Reports missing samples.
+fn filled_gaps(grid: &Grid, times: &[f64]) -> Vec<Repair> {
+    let gap = |(row, pair): (usize, &[f64])| {
+        let missing = libm::round(grid.place(pair[1])) - libm::round(grid.place(pair[0])) - 1.0;
+        let (row, time_s, count) = (row as u64 + 1, pair[0], missing.max(0.0) as u64);
+        let message = missing_after(&format!("row {row}"), time_s, count);
+        (count > 0).then_some(Repair { code: RepairKind::FilledGap, row, time_s, count, message })
+    };
+    times.windows(2).enumerate().filter_map(gap).collect()
+}
+
+fn missing_after(row: &str, time_s: f64, count: u64) -> String {
+    let samples = if count == 1 { "sample" } else { "samples" };
+    format!("{count} {samples} missing after {row} ({time_s} s)")
 }
 
 /// Repeats the last sample where the recorder lost the end.
@@ -236,8 +290,8 @@ fn lengthen(
     for values in [&mut columns.voltage_v, &mut columns.current_a] {
         values.resize(longer, values[rows - 1]);
     }
-    let message = format!("after the last row ({time_s} s) {lost} samples were missing");
-    repairs.push(Repair { code: "filled-gap", row: rows as u64, time_s, count: lost, message });
+    let message = missing_after("the last row", time_s, lost);
+    repairs.push(Repair { code: RepairKind::FilledGap, row: rows as u64, time_s, count: lost, message });
     Ok(())
 }
 
@@ -262,11 +316,15 @@ mod tests {
     use super::*;
 
     /// Stamps in whole microseconds at 44.1 kHz, without some of them.
-    fn rounded(lost: core::ops::Range<u32>) -> Vec<f64> {
+    fn rounded(lost: Range<u32>) -> Vec<f64> {
         (0..20_000)
             .filter(|row| !lost.contains(row))
             .map(|row| libm::round(f64::from(row) * 1e6 / 44_100.0) / 1e6)
             .collect()
+    }
+
+    fn names() -> [String; 2] {
+        ["voltage_V", "current_A"].map(str::to_owned)
     }
 
     fn repaired(times: Vec<f64>, spoilt: usize) -> (Vec<Repair>, Columns, Description) {
@@ -275,14 +333,14 @@ mod tests {
         let mut columns =
             Columns { voltage_v: vec![1.0; times.len()], current_a, stamps: Stamps::Seconds(times) };
         let mut description = Description::default();
-        let repairs = repair_rows(Path::new("t.csv"), &mut columns, &mut description).unwrap();
+        let repairs = repair_rows(Path::new("t.csv"), &names(), &mut columns, &mut description).unwrap();
         (repairs, columns, description)
     }
 
     #[test]
     fn rounded_stamps_of_an_even_rate_stay_as_they_are() {
         let (repairs, columns, _) = repaired(rounded(0..0), 777);
-        assert_eq!(repairs.iter().map(|repair| repair.code).collect::<Vec<_>>(), ["filled-values"]);
+        assert_eq!(repairs.iter().map(|repair| repair.code).collect::<Vec<_>>(), [RepairKind::FilledValues]);
         assert!(columns.current_a.iter().enumerate().all(|(row, amps)| *amps == row as f32));
     }
 
@@ -291,7 +349,27 @@ mod tests {
         let (repairs, columns, description) = repaired(rounded(5000..5100), 3);
         assert_eq!(description.rate_hz, Some(44_100.0));
         let gaps: Vec<_> = repairs.iter().map(|repair| (repair.code, repair.row, repair.count)).collect();
-        assert_eq!(gaps, [("filled-values", 4, 1), ("filled-gap", 5000, 100)]);
+        assert_eq!(gaps, [(RepairKind::FilledValues, 4, 1), (RepairKind::FilledGap, 5000, 100)]);
         assert_eq!((columns.current_a.len(), columns.current_a[19_999]), (20_000, 19_899.0));
+    }
+
+    #[test]
+    fn values_that_both_columns_lack_are_reported_once() {
+        let lost = |row: usize| if (2..5).contains(&row) { f32::NAN } else { 1.0 };
+        let mut columns = Columns {
+            voltage_v: (0..9).map(lost).collect(),
+            current_a: (0..9).map(|row| if row == 7 { f32::NAN } else { lost(row) }).collect(),
+            stamps: Stamps::Absent,
+        };
+        let mut description = Description { rate_hz: Some(10.0), ..Description::default() };
+        let repairs = repair_rows(Path::new("t.jls"), &names(), &mut columns, &mut description).unwrap();
+        let messages: Vec<&str> = repairs.iter().map(|repair| repair.message.as_str()).collect();
+        assert_eq!(
+            messages,
+            [
+                "voltage_V and current_A: 3 values from row 3 (0.2 s) on not finite",
+                "current_A: 1 value from row 8 (0.7 s) on not finite"
+            ]
+        );
     }
 }

@@ -6,7 +6,7 @@ use super::description::Description;
 use super::jls::JlsRows;
 use super::parquet::ParquetRows;
 use super::time_base::mean_rate_hz;
-use super::{CURRENT_A, ReadError, ReadOptions, Repair, TIME_NS, TIME_S, VOLTAGE_V};
+use super::{ReadError, ReadOptions, Repair, TIME_NS, TIME_S, VOLTAGE_V};
 use crate::metadata::Metadata;
 use std::fs::File;
 use std::io::Read;
@@ -138,7 +138,7 @@ impl Rows {
         current_a: &[f32],
         first: u64,
     ) -> Result<(), ReadError> {
-        for (values, column) in [(voltage_v, VOLTAGE_V), (current_a, CURRENT_A)] {
+        for (values, column) in [voltage_v, current_a].into_iter().zip(self.channel_names()) {
             // Without an early exit, so that the loop vectorizes; the place is searched only afterwards.
             if values.iter().fold(true, |all, value| all & value.is_finite()) {
                 continue;
@@ -147,7 +147,7 @@ impl Rows {
                 return Err(ReadError::Value {
                     path: self.path.clone(),
                     row: first + at as u64 + 1,
-                    column: column.to_owned(),
+                    column,
                     value: values[at].to_string(),
                 });
             }
@@ -167,6 +167,17 @@ impl Rows {
     /// Names of the rails that are read, in order.
     pub fn rails(&self) -> &[String] {
         &self.layout.names
+    }
+
+    /// The columns that voltages and currents are read from, for messages; one of powers twice.
+    pub(crate) fn channel_names(&self) -> [String; 2] {
+        let name = |column: usize| self.layout.values[column].name.clone();
+        match self.layout.rails[..] {
+            [Rail::Measured { voltage, current }] => [name(voltage), name(current)],
+            [Rail::Specified { current, .. }] => [VOLTAGE_V.to_owned(), name(current)],
+            [Rail::Power { power }] => [name(power), name(power)],
+            _ => ["the power of all rails", "the power of all rails"].map(str::to_owned),
+        }
     }
 
     /// Whether wrong input is to be repaired.

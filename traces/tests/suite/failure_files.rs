@@ -8,7 +8,7 @@ use ::parquet::schema::types::Type;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tempfile::TempDir;
-use traces::io::{self, ReadError, ReadOptions, csv, parquet, read_csv, read_parquet};
+use traces::io::{self, ReadError, ReadOptions, RepairKind, csv, parquet, read_csv, read_parquet};
 use traces::{Mark, MarkKind, Metadata, Trace};
 
 fn in_folder(name: &str, content: &[u8]) -> (TempDir, PathBuf) {
@@ -126,7 +126,7 @@ fn a_row_of_units_is_refused_and_not_dropped_by_repair() {
 #[test]
 fn a_file_that_is_not_there_or_not_text() {
     let error = read_csv(Path::new("/no/such/trace.csv")).unwrap_err();
-    says(&error, &["/no/such/trace.csv: cannot be read"]);
+    says(&error, &["/no/such/trace.csv: cannot read it"]);
     assert!(matches!(read_parquet(Path::new("/no/such/trace.parquet")), Err(ReadError::Io { .. })));
     let (_folder, path) = in_folder("bad.csv", b"time_s,voltage_V,current_A\n0,\xff\xfe,1\n");
     says(&read_csv(&path).unwrap_err(), &["row 1: voltage_V"]);
@@ -308,10 +308,10 @@ fn missing_values_are_filled_by_repair_and_reported_with_their_place() {
     assert_eq!(
         reported,
         [
-            ("dropped-rows", 4, 1.0, 1),
-            ("filled-values", 2, 0.5, 1),
-            ("filled-values", 5, 2.5, 1),
-            ("filled-gap", 3, 1.0, 1)
+            (RepairKind::DroppedRows, 4, 1.0, 1),
+            (RepairKind::FilledValues, 2, 0.5, 1),
+            (RepairKind::FilledValues, 5, 2.5, 1),
+            (RepairKind::FilledGap, 3, 1.0, 1)
         ]
     );
 }
@@ -324,7 +324,10 @@ fn surplus_fields_that_repair_drops_are_reported_with_their_place() {
     let reported = io::read(&path, &options).unwrap().repairs;
     assert_eq!(io::Recording::open(&path, &options).unwrap().repairs(), reported);
     let [reported] = &reported[..] else { panic!("{reported:?}") };
-    assert_eq!((reported.code, reported.row, reported.time_s, reported.count), ("uneven-rows", 2, 0.5, 2));
+    assert_eq!(
+        (reported.code, reported.row, reported.time_s, reported.count),
+        (RepairKind::UnevenRows, 2, 0.5, 2)
+    );
 }
 
 #[test]

@@ -4,7 +4,7 @@ use crate::common::jls::sealed;
 use proptest::prelude::*;
 use std::path::{Path, PathBuf};
 use traces::Trace;
-use traces::io::{ReadError, ReadOptions, Rows, read};
+use traces::io::{ReadError, ReadOptions, RepairKind, Rows, read};
 
 fn foreign(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/foreign").join(name)
@@ -184,7 +184,7 @@ fn a_recording_that_was_cut_and_repaired_gives_what_all_its_signals_have() {
         );
         let loaded = read(&path, &ReadOptions { repair: true, ..ReadOptions::default() }).unwrap();
         let reported: Vec<_> = loaded.repairs.iter().map(|repair| (repair.code, repair.count)).collect();
-        assert_eq!(reported, [("cut-signals", current as u64 - voltage as u64)]);
+        assert_eq!(reported, [(RepairKind::CutSignals, current as u64 - voltage as u64)]);
         let last_s = loaded.trace.time_s(voltage - 1);
         assert!((loaded.repairs[0].time_s - last_s).abs() < 1e-9, "{:?}", loaded.repairs);
         assert_eq!(bits(loaded.trace.voltage_v()), bits(&whole.voltage_v()[..voltage]));

@@ -295,7 +295,7 @@ impl ImageDensity {
     /// [`ImageError`] if it cannot be read or decoded.
     pub fn load(path: &Path) -> Result<Self, ImageError> {
         let refused = |message: String| ImageError { file: path.display().to_string(), message };
-        let unread = |error: std::io::Error| refused(format!("cannot be read: {error}"));
+        let unread = |error: std::io::Error| refused(format!("cannot read it: {error}; check the path"));
         let unknown = |error| refused(format!("is no picture that is known ({error}); give a PNG or JPEG"));
         let picture =
             image::ImageReader::open(path).map_err(unread)?.with_guessed_format().map_err(unread)?;

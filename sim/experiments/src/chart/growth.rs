@@ -159,7 +159,7 @@ impl Study for GrowthChart {
     const ABOUT: &'static str =
         "Time of the visibility engine over triangles, samples a pixel and blur, with exponents";
     const PICTURES: &'static [&'static str] = &["growth"];
-    const FILES: &'static [&'static str] = &["growth.csv", "growth.md", "growth.json"];
+    const FILES: &'static [&'static str] = &["growth.csv", "growth.json"];
 
     type Effort = GrowthEffort;
     const FULL: GrowthEffort = GrowthEffort {
@@ -212,7 +212,6 @@ impl Study for GrowthChart {
             .shown("fitted", |row| row.fitted(), optional(|(low, high)| format!("{low:.0} to {high:.0}")))
             .shown("ms, first", |row| row.points.first().map(|point| point.cpu_s), optional(millis(2)))
             .shown("ms, last", |row| row.points.last().map(|point| point.cpu_s), optional(millis(2)))
-            .in_book()
             .after(format!("\n{}\n", self.subject()));
         let each = self.rows.iter().flat_map(|row| row.points.iter().map(move |point| (row, point)));
         let points = Table::of(each)

@@ -29,3 +29,11 @@ pub mod statistics;
 pub mod tile_tests;
 pub mod timing;
 pub mod views;
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn costs_of_other_work_over_another_reference_are_not_in_one_panel() {
+        assert_ne!(super::timing::HOST_TIME, super::sampled::HOST_TIME);
+    }
+}

@@ -52,7 +52,7 @@ impl Study for PointsChart {
     const ABOUT: &'static str =
         "Points of all kinds: quality over points a second, spectra, and where it fails";
     const PICTURES: &'static [&'static str] = &["points_quality", "points_spectra", "points_failures"];
-    const FILES: &'static [&'static str] = &["points.csv", "points.md", "points.json"];
+    const FILES: &'static [&'static str] = &["points.csv", "points.json"];
 
     type Effort = PointsEffort;
     const FULL: PointsEffort =
@@ -113,7 +113,7 @@ impl Study for PointsChart {
             .detail("candidates a point", |c| c.candidates_each, fixed(3))
             .detail("p", |c| c.p, fixed(3))
             .detail("p, low discrepancy", |c| c.p_low_discrepancy, fixed(4));
-        vec![rows.in_book().sheet(), coarse.in_book().sheet(), columns.in_book().sheet()]
+        vec![rows.sheet(), coarse.sheet(), columns.sheet()]
     }
 
     fn tradeoff(&self) -> Vec<TradeoffPoint> {

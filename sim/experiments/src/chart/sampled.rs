@@ -33,6 +33,9 @@ pub struct SampledEffort {
     pub seeds: u64,
 }
 
+/// What the cost is called: previews and timing of a run, over those of a run that simulates every frame.
+pub(super) const HOST_TIME: &str = "host time of a run, relative to all frames simulated";
+
 /// The quantities that are predicted.
 pub const QUANTITIES: [&str; 3] = ["cycles", "energy", "power"];
 
@@ -119,7 +122,7 @@ impl Study for SampledChart {
     const ABOUT: &'static str =
         "Frames predicted from few: errors, how often intervals hold the truth, host time";
     const PICTURES: &'static [&'static str] = &["sampled"];
-    const FILES: &'static [&'static str] = &["sampled.csv", "sampled.md", "sampled.json"];
+    const FILES: &'static [&'static str] = &["sampled.csv", "sampled.json"];
     /// They have to be animated.
     const TAKES_SCENES: bool = true;
 
@@ -176,7 +179,7 @@ impl Study for SampledChart {
             .data("half_width_percent", |trial| trial.half_width_percent)
             .data("inside", |trial| trial.inside)
             .csv("sampled.csv");
-        vec![figures.in_book().sheet(), costs.in_book().sheet(), trials.sheet()]
+        vec![figures.sheet(), costs.sheet(), trials.sheet()]
     }
 
     /// The median error of each quantity, beside the host time of simulating all frames.
@@ -184,7 +187,7 @@ impl Study for SampledChart {
         let point = |cost: &Cost, quantity: &'static str| {
             let trials = self.trials.iter().filter(|t| t.scene == cost.scene && t.quantity == quantity);
             let error = quantiles(trials.map(|trial| trial.error_percent.abs()))(0.5);
-            let relative = Metric::new("host time relative to the reference", "", 1.0 / cost.times_faster);
+            let relative = Metric::new(HOST_TIME, "", 1.0 / cost.times_faster);
             let level = format!("{} of {} frames simulated", cost.simulated, cost.frames);
             let metrics =
                 [Metric::new(median_error_of(quantity), "%", error).beside(0.0), relative.beside(1.0)];

@@ -40,11 +40,11 @@ pub use verdict::{Kind, Verdict};
 /// Papers with reproduced claims.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, clap::ValueEnum)]
 pub enum Paper {
-    /// Performance per What? Energy-Efficiency Units for Graphics
+    /// Performance per What?
     #[value(name = "II")]
     #[serde(rename = "II")]
     Two,
-    /// Per-frame Energy Measurement Methodology for Computer Graphics
+    /// Measuring Per-Frame Energy Consumption of Real-Time Graphics Applications
     #[value(name = "III")]
     #[serde(rename = "III")]
     Three,
@@ -67,9 +67,9 @@ impl Paper {
     /// Its title.
     pub const fn title(self) -> &'static str {
         match self {
-            Self::Two => "Performance per What? Energy-Efficiency Units for Graphics",
+            Self::Two => "Performance per What?",
             Self::Six => "Design and Novel Uses of Higher-Dimensional Rasterization",
-            Self::Three => "Per-frame Energy Measurement Methodology for Computer Graphics",
+            Self::Three => "Measuring Per-Frame Energy Consumption of Real-Time Graphics Applications",
         }
     }
 }

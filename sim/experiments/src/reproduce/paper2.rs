@@ -1,4 +1,4 @@
-//! Paper II, "Performance per What? Energy-Efficiency Units for Graphics".
+//! Paper II, "Performance per What?".
 
 use output::progress::Progress;
 use power_model::{Circumstances, FramePower};

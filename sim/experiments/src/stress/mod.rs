@@ -17,7 +17,7 @@ use serde::{Serialize, Serializer};
 use workloads::stress::{Family, Size, families, family};
 
 use crate::study::table::{Sheet, Table, fixed, optional, plain, share};
-use crate::study::{Gallery, Study, StudyError};
+use crate::study::{Gallery, Study, StudyError, files};
 use choice::{Choice, Choices, Trial};
 use measure::StressRow;
 use methods::METHODS;
@@ -156,7 +156,7 @@ impl Study for Report {
         let families = families()
             .flat_map(|family| endings().map(move |ending| format!("{}{ending}", stem(family.name))));
         let plots = families.chain(["matrix", "auto"].map(stem));
-        Claim::new(Self::NAME).plots(plots).files(Self::FILES.iter().copied())
+        Claim::new(Self::NAME).plots(plots).files(files::<Self>())
     }
 }
 

@@ -27,7 +27,7 @@ pub trait Study: Serialize + Sized {
     const ABOUT: &'static str;
     /// Paths of its pictures, without endings.
     const PICTURES: &'static [&'static str];
-    /// Its other files: CSV, Markdown for the book where there is one, and JSON, which is written last.
+    /// Its CSV files, and its JSON file, which is written last. Tables in Markdown are in `NAME.md`.
     const FILES: &'static [&'static str];
     /// Whether other scenes than its own can be given.
     const TAKES_SCENES: bool = false;
@@ -67,8 +67,17 @@ pub trait Study: Serialize + Sized {
 
     /// The files it may write.
     fn claim() -> Claim {
-        Claim::new(format!("chart {}", Self::NAME)).plots(Self::PICTURES).files(Self::FILES.iter().copied())
+        Claim::new(format!("chart {}", Self::NAME)).plots(Self::PICTURES).files(files::<Self>())
     }
+}
+
+/// All files of a study besides its pictures.
+pub(crate) fn files<S: Study>() -> impl Iterator<Item = String> {
+    S::FILES.iter().map(|file| (*file).to_owned()).chain([markdown_file::<S>()])
+}
+
+fn markdown_file<S: Study>() -> String {
+    format!("{}.md", S::NAME.replace('-', "_"))
 }
 
 /// The pictures of a study on their way into its folder.
@@ -151,12 +160,9 @@ fn write<S: Study>(found: &S, sheets: &[Sheet], dir: &OutDir, look: &Look) -> Re
     for sheet in sheets {
         sheet.csv_file().map_or(Ok(()), |file| dir.write_file(file, |out| sheet.write_csv(out)))?;
     }
-    let named = |ending: &str| S::FILES.iter().find(|file| file.ends_with(ending));
-    if let Some(file) = named(".md") {
-        let book: Vec<String> = sheets.iter().filter_map(Sheet::markdown).collect();
-        dir.write_file(file, |out| Ok(out.write_all(book.join("\n").as_bytes())?))?;
-    }
-    named(".json").map_or(Ok(()), |file| dir.write_json(file, found))
+    let tables: Vec<String> = sheets.iter().filter_map(Sheet::markdown).collect();
+    dir.write_file(&markdown_file::<S>(), |out| Ok(out.write_all(tables.join("\n").as_bytes())?))?;
+    S::FILES.iter().find(|file| file.ends_with(".json")).map_or(Ok(()), |file| dir.write_json(file, found))
 }
 
 /// A study in a list of studies.
@@ -214,9 +220,11 @@ pub(crate) fn written<S: Study>(effort: S::Effort) -> (tempfile::TempDir, S, Don
     let make = |dir: &OutDir| Done::new(&found, dir, &Look::default()).unwrap();
     let done = OutDir::with(folder.path(), S::claim(), make).unwrap();
     let pictures = S::PICTURES.iter().flat_map(|stem| ["svg", "png"].map(|end| format!("{stem}.{end}")));
-    for file in pictures.chain(S::FILES.iter().map(|file| (*file).to_owned())) {
+    for file in pictures.chain(files::<S>()) {
         assert!(folder.path().join(&file).exists(), "{file}");
     }
+    let tables = std::fs::read_to_string(folder.path().join(markdown_file::<S>())).unwrap();
+    assert!(tables.starts_with("| "), "{tables}");
     assert!(foreign.exists(), "a file that no study wrote is gone");
     (folder, found, done)
 }

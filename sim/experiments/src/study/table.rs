@@ -89,7 +89,6 @@ pub struct Sheet {
     height: usize,
     columns: Vec<Column>,
     csv: Option<&'static str>,
-    in_book: bool,
     before: String,
     after: String,
 }
@@ -163,13 +162,6 @@ impl<R> Table<R> {
         self
     }
 
-    /// The same table, also a table of the book.
-    #[must_use]
-    pub fn in_book(mut self) -> Self {
-        self.sheet.in_book = true;
-        self
-    }
-
     /// The same table with lines printed before it.
     #[must_use]
     pub fn before(mut self, lines: impl Into<String>) -> Self {
@@ -209,16 +201,17 @@ impl Sheet {
         Ok(table.flush()?)
     }
 
-    /// The table of the book as Markdown; `None` where it is not in the book.
+    /// The table as Markdown; `None` where nothing is shown.
     pub fn markdown(&self) -> Option<String> {
         let columns: Vec<&Column> = self.columns.iter().filter(|column| column.is_shown()).collect();
+        columns.first()?;
         let line = |cell: &dyn Fn(&Column) -> String| {
             let cells: Vec<String> = columns.iter().map(|column| cell(column)).collect();
             format!("| {} |\n", cells.join(" | "))
         };
         let heading = line(&|column| column.heading.clone()) + &"|---".repeat(columns.len()) + "|\n";
         let rows = (0..self.height).map(|row| line(&|column| column.cells[row].clone()));
-        self.in_book.then(|| heading + &rows.collect::<String>())
+        Some(heading + &rows.collect::<String>())
     }
 
     /// What is printed; `None` where nothing is.
@@ -273,7 +266,6 @@ mod tests {
             .column("error", "RMSE", |row| row.1, fixed(2))
             .data("count", |row| row.2)
             .detail("share", |row| row.1, share(0))
-            .in_book()
             .after("done\n")
             .sheet();
         let mut csv = Vec::new();
@@ -287,6 +279,7 @@ mod tests {
         let json = serde_json::to_string(&sheet).unwrap();
         let second = r#"{"name":"b","error":1.0,"count":null}"#;
         assert_eq!(json, format!(r#"[{{"name":"a","error":0.5,"count":2}},{second}]"#));
-        assert!(Table::of([1_u32]).data("n", |n| *n).sheet().text().is_none());
+        let hidden = Table::of([1_u32]).data("n", |n| *n).sheet();
+        assert!(hidden.text().is_none() && hidden.markdown().is_none());
     }
 }

@@ -151,7 +151,6 @@ impl Tradeoff {
                 |point| self.is_optimal(point),
                 |yes| if yes { "yes" } else { "" }.to_owned(),
             )
-            .in_book()
             .sheet()
     }
 

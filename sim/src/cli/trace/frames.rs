@@ -145,10 +145,10 @@ fn text(frames: &Frames, table: &FrameTable, summary: Option<Summary>, pixels: O
     let mut lines = String::new();
     if let Some(p) = &frames.proposal {
         lines += &format!(
-            "proposed mark: {} s, the most even of {} rises: {} similar ones divide {:.0} % of the trace evenly\n",
+            "proposed mark: {} s, of {}; {} like it, evenly apart over {:.0} % of the trace\n",
             p.mark_s,
-            p.tried,
-            p.alike,
+            counted(p.tried, "rise"),
+            counted(p.similar_starts, "start"),
             100.0 * p.regularity
         );
     }
@@ -199,10 +199,12 @@ fn text(frames: &Frames, table: &FrameTable, summary: Option<Summary>, pixels: O
 fn reason(threshold: &Threshold) -> String {
     match threshold.rule {
         Rule::Sequence => "no threshold: the sequence with the most evidence as a whole".to_owned(),
-        rule => format!(
-            "threshold {:.4e} W^2 ({rule:?}, separation {:.2})",
-            threshold.value_w2, threshold.separation
-        ),
+        Rule::NoneAlike => "no threshold: nothing else resembles the marked frame".to_owned(),
+        Rule::NoCandidates => "no threshold: nothing to compare with the marked frame".to_owned(),
+        Rule::AllAlike => format!("threshold {:.4e} W^2, above all minima", threshold.value_w2),
+        Rule::Otsu | Rule::OtsuRegular | Rule::OtsuDistinct => {
+            format!("threshold {:.4e} W^2, separation {:.2}", threshold.value_w2, threshold.separation)
+        }
     }
 }
 

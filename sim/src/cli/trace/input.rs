@@ -365,7 +365,15 @@ impl FindArgs {
         };
         let end_s = self.end.or_else(|| trace.metadata.end_mark_s()).unwrap_or(trace.end_s());
         let marks = Marks { starts_s, window: self.window_s(), end_s };
-        Ok((find_with(trace, &marks, &Options { method: self.method })?, proposal))
+        let found = find_with(trace, &marks, &Options { method: self.method })?;
+        if let Some(proposal) = proposal.filter(|_| found.starts.len() < 2) {
+            return Err(wrong(format!(
+                "--auto found no start that comes back: nothing else resembles the steepest rises, such as that at {} s; \
+                 mark a frame with --mark",
+                proposal.mark_s
+            )));
+        }
+        Ok((found, proposal))
     }
 
     fn window_s(&self) -> Window {

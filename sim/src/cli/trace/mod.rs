@@ -90,7 +90,7 @@ impl From<ReadError> for Failure {
         let wrong = matches!(
             error,
             ReadError::MissingColumn { .. } | ReadError::Format { .. } | ReadError::Conflict { .. }
-        ) || matches!(&error, ReadError::Io { source, .. } if source.kind() == std::io::ErrorKind::NotFound);
+        );
         Self { message: error.to_string(), code: if wrong { 2 } else { 1 } }
     }
 }
@@ -103,9 +103,8 @@ impl From<MarkError> for Failure {
 
 impl From<TimesError> for Failure {
     fn from(error: TimesError) -> Self {
-        let failed =
-            matches!(error, TimesError::Io { .. } | TimesError::Folder { .. } | TimesError::Empty { .. });
-        Self { message: error.to_string(), code: if failed { 1 } else { 2 } }
+        let wrong = matches!(error, TimesError::Column { .. } | TimesError::Unit { .. });
+        Self { message: error.to_string(), code: if wrong { 2 } else { 1 } }
     }
 }
 

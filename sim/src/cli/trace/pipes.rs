@@ -87,7 +87,7 @@ impl Pipes {
         }
         let file = self.file(INPUT)?;
         let copied = File::create(&file).and_then(|mut file| io::copy(&mut io::stdin().lock(), &mut file));
-        copied.map_err(|error| Failure { message: format!("{INPUT}: cannot be read: {error}"), code: 1 })?;
+        copied.map_err(|error| Failure { message: format!("{INPUT}: cannot read it: {error}"), code: 1 })?;
         *path = file;
         Ok(())
     }

@@ -197,9 +197,11 @@ impl SampleArgs {
         };
         let hint =
             "--device takes a JSON file with the fields of a device, such as those that `--json` prints";
-        let unread = |error: String| wrong(format!("{}: {error}; {hint}", path.display()));
-        let text = std::fs::read_to_string(path).map_err(|error| unread(error.to_string()))?;
-        serde_json::from_str(&text).map_err(|error| unread(error.to_string()))
+        let text = std::fs::read_to_string(path).map_err(|error| Failure {
+            message: format!("{}: cannot read it: {error}; check the path", path.display()),
+            code: 1,
+        })?;
+        serde_json::from_str(&text).map_err(|error| wrong(format!("{}: {error}; {hint}", path.display())))
     }
 
     /// Puts the options that are given into `spec`; ranges are there already.

@@ -48,6 +48,16 @@ impl Context<'_> {
     fn beside(self, name: &str) -> std::path::PathBuf {
         self.path.parent().map_or_else(|| Path::new(name).to_path_buf(), |folder| folder.join(name))
     }
+
+    /// An error of a file that the scene names as `name`: one that cannot be read is reported where it is named.
+    fn named(self, name: &str, error: LoadError) -> LoadError {
+        let LoadError::Read { file, source } = error else { return error };
+        let text = std::fs::read_to_string(self.path).unwrap_or_default();
+        let quoted = format!("\"{name}\"");
+        let at = text.lines().enumerate().find_map(|(line, text)| Some((line, text.find(&quoted)?)));
+        let place = at.map_or(String::new(), |(line, column)| format!(":{}:{}", line + 1, column + 1));
+        LoadError::Read { file: format!("{}{place}: {file}", self.path.display()), source }
+    }
 }
 
 fn build(spec: SceneSpec, path: &Path) -> Result<Parts, LoadError> {

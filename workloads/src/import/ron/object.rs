@@ -28,7 +28,9 @@ pub(super) fn add(
     let node = node(context, &place, object)?;
     let node = parts.graph.push_node(node);
     match (&object.file, &object.shape) {
-        (Some(file), None) => add_file(context, parts, &place, object, (file, node)),
+        (Some(file), None) => {
+            add_file(context, parts, &place, object, (file, node)).map_err(|error| context.named(file, error))
+        }
         (None, Some(shape)) => {
             if object.end.is_some() || object.clip.is_some() {
                 return Err(context.wrong(place, "`end` and `clip` go with a `file`, not with a `shape`"));
@@ -93,7 +95,8 @@ fn add_surface(
     };
     if let Some(end) = &object.end {
         let arrival_s = object.end_s.unwrap_or(1.0 / parts.settings.frame_rate_hz);
-        whole.targets = vec![to_end(&whole, &context.beside(end), origin)?];
+        whole.targets =
+            vec![to_end(&whole, &context.beside(end), origin).map_err(|error| context.named(end, error))?];
         let track = Track::new(vec![0.0, arrival_s], vec![0.0, 1.0], 1, Interpolation::Linear);
         parts.graph.nodes[hook].channels.weights = Some(track.map_err(|what| context.wrong(place, what))?);
     }

@@ -150,7 +150,7 @@ impl Study for FramesChart {
     const ABOUT: &'static str =
         "Frame starts found and energy error, by method, over sampling rate, noise, bits and host time";
     const PICTURES: &'static [&'static str] = &["frames_rate", "frames_noise", "frames_bits", "frames_time"];
-    const FILES: &'static [&'static str] = &["frames.csv", "frames.md", "frames.json"];
+    const FILES: &'static [&'static str] = &["frames.csv", "frames.json"];
     const SHOWS_TIME: bool = true;
 
     type Effort = FramesEffort;
@@ -347,7 +347,6 @@ impl FramesChart {
             .detail("energy error, auto", |(axis, value)| energy(*axis, *value), optional(share(3)))
             .detail("wrong frames flagged", wrong, plain)
             .detail("right ones flagged", right, plain)
-            .in_book()
             .after(format!("*: mean F1 below {FAILS_BELOW}; in brackets how many scenes are below\n"))
             .sheet()
     }
@@ -374,7 +373,7 @@ impl FramesChart {
         }
         let table =
             table.detail("energy error, auto", |(_, row)| row.outcome.energy_error, optional(share(3)));
-        table.in_book().sheet()
+        table.sheet()
     }
 }
 

@@ -81,7 +81,7 @@ impl Study for SamplingChart {
     const ABOUT: &'static str =
         "Image error over samples per pixel and over host time, for every sample table";
     const PICTURES: &'static [&'static str] = &["sampling_error", "sampling_time", "sampling_failures"];
-    const FILES: &'static [&'static str] = &["sampling.csv", "sampling.md", "sampling.json"];
+    const FILES: &'static [&'static str] = &["sampling.csv", "sampling.json"];
     const SHOWS_TIME: bool = true;
 
     type Effort = SamplingEffort;
@@ -163,7 +163,7 @@ impl Study for SamplingChart {
             .data("rmse", |(.., point)| point.rmse)
             .data("host_s", |(.., point)| point.host_s)
             .csv("sampling.csv");
-        vec![exponents.in_book().sheet(), shared.in_book().sheet(), points.sheet()]
+        vec![exponents.sheet(), shared.sheet(), points.sheet()]
     }
 
     fn tradeoff(&self) -> Vec<TradeoffPoint> {

@@ -25,6 +25,9 @@ pub use failures::{Chosen, FailedLevel, FailureRow, RateRow};
 pub use measure::AddedRow;
 pub use measure::TimingRow;
 
+/// What the cost is called: timing alone, without drawing, over that at `stepped`.
+pub(super) const HOST_TIME: &str = "host time of timing alone, relative to stepped";
+
 /// GPUs in the chart: small, integrated, large.
 const GPUS: [&str; 3] = ["mobile", "reference", "discrete"];
 
@@ -98,7 +101,7 @@ impl Study for TimingChart {
     const ABOUT: &'static str = "Every level of timing: error against the reference over host time";
     const PICTURES: &'static [&'static str] = &["timing", "timing_failures"];
     const FILES: &'static [&'static str] =
-        &["timing.csv", "timing_points.csv", "timing_failures.csv", "timing.md", "timing.json"];
+        &["timing.csv", "timing_points.csv", "timing_failures.csv", "timing.json"];
     const TAKES_SCENES: bool = true;
     const SHOWS_TIME: bool = true;
 
@@ -152,7 +155,7 @@ impl Study for TimingChart {
 
     fn tradeoff(&self) -> Vec<TradeoffPoint> {
         let both = |(level, f): (&&'static str, &Figures)| {
-            let cost = Metric::new("host time relative to the reference", "", 1.0 / f.speedup_over_stepped);
+            let cost = Metric::new(HOST_TIME, "", 1.0 / f.speedup_over_stepped);
             let errors = [
                 Metric::new("median error of cycles", "%", f.cycle_error_median_percent),
                 Metric::new("median error of energy", "%", f.energy_error_median_percent),
@@ -244,11 +247,10 @@ impl TimingChart {
             .shown("energy: median", |(_, f)| f.energy_error_median_percent, percent(2))
             .shown("worst", |(_, f)| f.energy_error_worst_percent, percent(2))
             .shown("power shape", |(_, f)| f.power_shape_error_percent, percent(2))
-            .shown("times as fast", |(_, f)| f.speedup_over_stepped, fixed(1))
+            .shown("speed over stepped", |(_, f)| f.speedup_over_stepped, fixed(1))
             .detail("least", |(_, f)| f.speedup_over_stepped_least, fixed(1))
-            .shown("adds to a run", added, plain)
+            .shown("added to drawing", added, plain)
             .detail("worst", |(_, f)| f.added_worst_percent, percent(0))
-            .in_book()
             .after(below)
             .sheet()
     }
@@ -278,9 +280,8 @@ impl TimingChart {
             .detail("error", |row| row.cycle_error_percent, signed(2))
             .detail("energy", |row| row.energy_error_percent, signed(2))
             .detail("busiest", |row| format!("{} {:.0} %", row.busiest.0, row.busiest.1 * 100.0), plain)
-            .detail("times as fast", |row| row.speedup_over_stepped, fixed(1))
+            .detail("speed over stepped", |row| row.speedup_over_stepped, fixed(1))
             .csv("timing.csv")
-            .in_book()
             .sheet()
     }
 
@@ -348,7 +349,7 @@ impl TimingChart {
         for (place, asked) in asked.into_iter().enumerate() {
             table = table.detail(&format!("{asked} %"), |row| row.chosen[place].level.name(), plain);
         }
-        table.in_book().sheet()
+        table.sheet()
     }
 
     /// Rates of the large GPU beside those of a card.
@@ -362,7 +363,6 @@ impl TimingChart {
             .detail("packet", of(packet), fixed(1))
             .detail("bound", of(bound), fixed(1))
             .detail("card", |row| row.card, plain)
-            .in_book()
             .sheet()
     }
 

@@ -1,4 +1,4 @@
-//! Paper III, "Per-frame Energy Measurement Methodology for Computer Graphics".
+//! Paper III, "Measuring Per-Frame Energy Consumption of Real-Time Graphics Applications".
 
 mod blocking;
 mod disturbance;
