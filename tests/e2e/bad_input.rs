@@ -100,8 +100,8 @@ fn files_without_triangles_are_refused_by_ccd() {
         refusals.call(
             &["ccd", "--set", &format!("file={file}")],
             2,
-            &[&file, "is no .mts file"],
-            "one of those is taken here",
+            &[&file, "is not an .mts file"],
+            "use `quintile ccd`",
         );
     }
 }
@@ -385,7 +385,7 @@ fn invalid_gpu_and_platform_files() {
     ];
     for (flag, text, edits) in cases {
         for (right, wrong, says, remedy) in edits {
-            assert!(text.contains(right), "{flag}: there is no `{right}` to break");
+            assert!(text.contains(right), "{flag}: `{right}` is not there to break");
             let inputs = Inputs::new();
             let file = inputs.put("bad.ron", text.replace(right, wrong));
             refusals.call(&["tiny", flag, &file], 2, &[file.as_str(), ":", says], remedy);

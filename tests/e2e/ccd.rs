@@ -109,11 +109,11 @@ fn meshes_of_different_topology_are_refused() {
     let empty = format!(
         "ply\nformat ascii 1.0\n{header}\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n"
     );
-    let [hollow, void] = ["hollow.ply", "void.ply"].map(|name| inputs.put(name, &empty));
+    let [hollow, bare] = ["hollow.ply", "bare.ply"].map(|name| inputs.put(name, &empty));
     for (open, close, says) in [
         (&whole, &more, [more.as_str(), "4 vertices"]),
         (&none, &other, [none.as_str(), "it has none"]),
-        (&hollow, &void, [hollow.as_str(), "it has none"]),
+        (&hollow, &bare, [hollow.as_str(), "it has none"]),
         (&whole, &none, [none.as_str(), "it has none"]),
     ] {
         let ended = quintile().call(["ccd", open, close]);

@@ -144,7 +144,7 @@ fn changed_results_are_the_users() {
     names.sort();
     let found: Vec<String> = results.files().keys().map(|name| name.display().to_string()).collect();
     assert_eq!(names, found);
-    fs::write(results.path("frames.csv"), "frame,remark\n0,mine\n").expect("a file can be written");
+    fs::write(results.path("frames.csv"), "frame,note\n0,mine\n").expect("a file can be written");
     let ended = quintile().call(["run", "tiny", "--out", &inputs.path("out")]);
     assert_eq!(ended.code, Some(2), "{}", ended.stderr);
     for says in ["frames.csv: this file was changed after Quintile wrote it", "--force"] {

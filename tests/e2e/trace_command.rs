@@ -116,7 +116,7 @@ fn samples_that_a_device_loses_are_missing_in_jls_and_filled_as_in_parquet() {
     let (rows, nan) = (numbers(&rows), numbers(&nan));
     // The last packets may be lost: Parquet then ends before.
     assert!(rows.len() <= nan.len() && rows.len() > nan.len() - 450);
-    assert!(rows.iter().zip(&nan).all(|(a, b)| (a - b).abs() < 1e-6), "filled alike");
+    assert!(rows.iter().zip(&nan).all(|(a, b)| (a - b).abs() < 1e-6), "filled with the same values");
 }
 
 #[test]

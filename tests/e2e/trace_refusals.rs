@@ -90,7 +90,7 @@ fn a_proposed_start_that_does_not_come_back_is_refused() {
 }
 
 #[test]
-fn files_without_a_trace_fail_alike_in_every_format_and_command() {
+fn files_without_a_trace_fail_with_1_in_every_format_and_command() {
     let inputs = Inputs::new();
     let trace = recording(&inputs);
     let folder = inputs.path("folder.parquet");

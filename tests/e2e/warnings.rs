@@ -104,7 +104,7 @@ const PROVOKED: [&str; 53] = [
     "orthographic-view",
     "packets-lost",
     "platform-mismatch",
-    "points-thin-voids",
+    "points-thin-regions",
     "primitive-dropped",
     "reflection-ignored",
     "short-frame",
@@ -592,7 +592,7 @@ fn points_limited_by_precision() {
         let printed: serde_json::Value = serde_json::from_str(&ended.stdout).expect(&ended.stderr);
         printed["warnings"].clone()
     };
-    assert_eq!(warnings(&["--single"])[0]["code"], "points-thin-voids");
+    assert_eq!(warnings(&["--single"])[0]["code"], "points-thin-regions");
     assert_eq!(warnings(&[]), json!([]));
 }
 

@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use traces::frames::Method;
 
-/// What was asked for.
+/// The request.
 struct Options {
     method: Method,
     several: bool,

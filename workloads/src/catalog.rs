@@ -37,19 +37,19 @@ const JOBS: &[Entry] = &[
     },
     Entry {
         name: "multiview",
-        what: "stereo and multi-view images with motion and defocus in one pass, interlaced for a panel if asked to",
+        what: "stereo and multi-view images with motion and defocus in one pass, optionally interlaced for a panel",
         flags: crate::multiview::FLAGS,
         make: crate::multiview::job,
     },
     Entry {
         name: "occlusion",
-        what: "occlusion queries: moving boxes behind moving walls, asked for by intervals of lens, time and depth",
+        what: "occlusion queries: moving boxes behind moving walls, queried by intervals of lens, time and depth",
         flags: crate::occlusion::FLAGS,
         make: crate::occlusion::job,
     },
     Entry {
         name: "sampling",
-        what: "dart throwing over voids that are drawn, until no point fits",
+        what: "maximal Poisson-disk points: darts thrown at rasterized uncovered regions",
         flags: crate::points::job::FLAGS,
         make: crate::points::job::job,
     },

@@ -182,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn vertex_colours_multiply_and_cost_where_they_are_asked_for() {
+    fn vertex_colours_multiply_and_cost_where_they_are_requested() {
         let red = ShadingPoint { color: Vec3::new(1.0, 0.5, 0.0), ..point(Vec3::Z) };
         let (plain, colored) = (shader(true), shader(true).with_vertex_colors());
         assert_eq!(plain.shade(&red, Vec4::ONE), Vec3::new(0.5, 0.25, 1.0));

@@ -34,11 +34,11 @@ pub struct Rendered {
     /// Linear RGB radiance of every pixel of each image, row by row from the top left.
     pub images: Vec<Vec<Vec3>>,
     /// Visible triangle (`u32::MAX` for none) and bits of its depth (infinite for none) of every sample, in the order
-    /// `(y width + x) per_pixel + index`; empty unless asked for or drawn.
+    /// `(y width + x) per_pixel + index`; empty unless requested or drawn.
     pub visible: Vec<(u32, u32)>,
     /// Count of every event of the pass.
     pub counts: Counts,
-    /// Heat map of each event asked for.
+    /// Heat map of each requested event.
     pub heat: Vec<HeatMap>,
     /// Images or depths in memory.
     pub surface: Surface,

@@ -246,7 +246,7 @@ fn agree(frame: &Frame) {
         ("a box is renewed for tests", n(E::ZMaxUpdates), boxes * n(E::ZCullTests)),
         ("a box comes nearer by a write", n(E::ZMinUpdates), n(E::DepthWrites)),
         ("what is in front is written", n(E::DepthReadsSkipped), n(E::DepthWrites)),
-        ("a quad has a lane that was asked for", n(E::HelperInvocations), 3 * n(E::QuadsShaded)),
+        ("a quad has a lane that is covered", n(E::HelperInvocations), 3 * n(E::QuadsShaded)),
         ("vertices are fetched for indices", n(E::VerticesFetched), n(E::Indices)),
         ("a miss is an access", n(E::DepthMisses), n(E::DepthLines)),
         ("a miss is an access", n(E::ColourMisses), n(E::ColourLines)),

@@ -6,7 +6,7 @@
 //! Counted one by one, its points may be off on each axis by the **band**
 //!
 //! ```text
-//! off p  = g (2 |t (r - q)| + |p|)        where the vertex moves on that axis, else 0; p.x and p.w alike
+//! off p  = g (2 |t (r - q)| + |p|)        where the vertex moves on that axis, else 0; the same for p.x and p.w
 //! slope  = X - u a                        off by g (|u a| + |slope|) where there is a lens, else 0
 //! band_x = off p.x + g (|u s| + |p.x - u s|)  where there is a lens
 //!        + |slope| off p.w + |p.w| off slope + g |slope p.w| + g |x'|

@@ -75,7 +75,7 @@ fn a_cache_that_cannot_be_is_an_error_to_the_renderer_not_a_panic() {
 }
 
 #[test]
-fn an_unknown_field_of_a_cache_is_told_with_its_neighbour() {
+fn an_unknown_field_of_a_cache_is_reported_with_its_neighbour() {
     let error = activity::spec::parse::<CacheSpec>("(entries: 8, weys: 2)", "gpu.ron").unwrap_err();
     assert!(error.to_string().contains("did you mean `ways`?"), "{error}");
 }
@@ -87,7 +87,7 @@ fn programmed(change: impl FnOnce(&mut Vec<Sample>)) -> Result<SampleTable, Tabl
 }
 
 #[test]
-fn a_sample_outside_pixel_lens_or_shutter_is_told_by_its_place() {
+fn a_sample_outside_pixel_lens_or_shutter_is_reported_by_its_place() {
     assert!(programmed(|_| ()).is_ok());
     let bad: [fn(&mut Sample); 10] = [
         |s| s.x = 1.0,
@@ -141,7 +141,7 @@ fn arrays_over_the_same_vertices_have_the_same_length() {
 }
 
 #[test]
-fn values_that_are_not_finite_are_told_by_their_vertex() {
+fn values_that_are_not_finite_are_reported_by_their_vertex() {
     let spoilt = |bad: f32| [Vec3::ZERO, Vec3::X, Vec3::new(0.0, bad, 0.0)];
     let geometry = Geometry::new(&CORNERS, &CORNERS, &FACE).unwrap();
     for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {

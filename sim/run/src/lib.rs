@@ -4,7 +4,7 @@
 //! RunOptions -> Plan -> open -> prepare -> Prepared -> run: simulate -> measure -> Outcome -> write
 //! ```
 //!
-//! - [`RunOptions`]: everything that may be asked for; [`Plan`]: with all inputs loaded and checked.
+//! - [`RunOptions`]: everything that may be requested; [`Plan`]: with all inputs loaded and checked.
 //! - [`GpuSpec`]: a GPU: its pipeline, its machine, and the platform and energy table it belongs to.
 //! - [`Work`] and [`Distinct`]: what is drawn, and which frames differ.
 //! - [`frames_of`]: frames in cycles and joules, without a trace. [`run()`]: all of it, into a folder.

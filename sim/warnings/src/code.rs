@@ -121,7 +121,7 @@ codes! {
     OcclusionSmallOccluders = "occlusion-small-occluders" in Workload,
     /// `quintile sample poisson`: more than one uncovered region per 100 points is thinner than the float
     /// spacing.
-    PointsThinVoids = "points-thin-voids" in Workload,
+    PointsThinRegions = "points-thin-regions" in Workload,
     /// `soft-shadows` has fewer than 16 distinct light samples.
     ShadowBanding = "shadow-banding" in Workload,
     /// The bias is below half a texel of the map or above eight.

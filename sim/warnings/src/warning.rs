@@ -45,7 +45,7 @@ impl Warning {
         Self { code, message: kind.message(1), count: 1, details: vec![detail.into()], kind: Some(kind) }
     }
 
-    /// The same about as many things as there are `details`, of which only the first are asked for.
+    /// The same about as many things as there are `details`, of which only the first are computed.
     pub fn about_all(
         code: Code,
         thing: &'static str,

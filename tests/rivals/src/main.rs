@@ -53,7 +53,7 @@ fn ours<const D: usize>(radius: f64, domain: Domain) -> f64 {
     };
     let found = measured(make);
     let rate = found.0;
-    print("voids", radius, found, domain, rate);
+    print("uncovered", radius, found, domain, rate);
     rate
 }
 

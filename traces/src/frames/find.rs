@@ -273,7 +273,7 @@ mod tests {
     }
 
     #[test]
-    fn four_frames_of_passes_that_look_alike_are_four() {
+    fn four_frames_of_similar_passes_are_four() {
         // After one of idle, each frame is of four passes, unevenly apart, whose levels differ as much as
         // frames do.
         let power = |sample: usize| {

@@ -68,7 +68,7 @@ pub(super) fn marked_starts(placement: &Placement, profile: &[f64]) -> Vec<Frame
     placement.marks.iter().map(start).collect()
 }
 
-/// One remark.
+/// A note on a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Flag {
     /// The frame whose start was marked.

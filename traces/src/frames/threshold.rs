@@ -319,7 +319,7 @@ mod tests {
     }
 
     #[test]
-    fn a_few_matches_are_told_from_look_alikes_by_distance() {
+    fn a_few_matches_are_distinguished_from_similar_windows_by_distance() {
         // A run of four equal frames: three matches, segments within frames that resemble the marked window a
         // little, and the rest. A threshold among the look-alikes happens to space the starts a little more
         // evenly.

@@ -166,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn a_start_far_from_every_tick_stays_and_is_told() {
+    fn a_start_far_from_every_tick_stays_and_is_reported() {
         let late = |i: usize| {
             if i == 90 {
                 150.0

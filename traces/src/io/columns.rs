@@ -103,7 +103,7 @@ fn pick(path: &Path, names: &[String], column: &str, of: Quantity) -> Result<Pic
     let parsed = parse_name(&names[index]);
     if let Some(other) = parsed.as_ref().filter(|named| named.quantity != of && named.sure) {
         let reason = format!(
-            "column {} holds {} by its name, but was asked for as that of {}: choose another, or rename it",
+            "column {} holds {} by its name, but is requested as that of {}: choose another, or rename it",
             names[index],
             other.quantity.name(),
             of.name()

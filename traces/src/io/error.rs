@@ -217,7 +217,7 @@ pub enum ReadError {
     },
     /// Signals that do not make up rows.
     #[error(
-        "{path}: {one}, but {other}: record them alike, or read one alone (its power, or its current with a voltage by \
+        "{path}: {one}, but {other}: record them at one rate and from one sample to one other, or read one alone (its power, or its current with a voltage by \
          specification)", path = path.display()
     )]
     Signals {

@@ -53,7 +53,7 @@ impl Rows {
     /// bytes.
     ///
     /// # Errors
-    /// [`ReadError`] if there is no such file, it is of no known format, or columns are missing.
+    /// [`ReadError`] if the file does not exist, is of no known format, or columns are missing.
     pub fn open(path: &Path, options: &ReadOptions) -> Result<Self, ReadError> {
         let rows = Self::of_kind(path, options)?;
         check_rate(&rows, options)?;
@@ -321,7 +321,7 @@ fn check_overrides(
 ) -> Result<(), ReadError> {
     if let Some((start_s, column)) = options.start_s.zip(layout.time.as_ref()) {
         let reason = format!(
-            "a start at {start_s} s was asked for, but column {} has the times: leave --start out",
+            "a start at {start_s} s is requested, but column {} has the times: leave --start out",
             column.name
         );
         return Err(conflict(path, reason));
@@ -330,7 +330,7 @@ fn check_overrides(
         && (requested_hz / stated_hz - 1.0).abs() > MAX_RATE_DEVIATION
     {
         let reason = format!(
-            "a rate of {requested_hz} Hz was asked for, but it or its description says {stated_hz} Hz: leave --rate out, or fix \
+            "a rate of {requested_hz} Hz is requested, but it or its description says {stated_hz} Hz: leave --rate out, or fix \
              rate_hz there"
         );
         return Err(conflict(path, reason));
@@ -340,7 +340,7 @@ fn check_overrides(
         && (requested_s - stated_s).abs() * rate_hz > MAX_OFFSET_PERIODS
     {
         let reason = format!(
-            "a start at {requested_s} s was asked for, but it or its description says {stated_s} s: leave --start out, or fix \
+            "a start at {requested_s} s is requested, but it or its description says {stated_s} s: leave --start out, or fix \
              start_s there"
         );
         return Err(conflict(path, reason));
@@ -367,7 +367,7 @@ fn check_rate(rows: &Rows, options: &ReadOptions) -> Result<(), ReadError> {
     let off = (requested_hz / rate_hz - 1.0).abs();
     if off > MAX_RATE_DEVIATION && off * times.len() as f64 > MAX_OFFSET_PERIODS {
         let reason = format!(
-            "a rate of {requested_hz} Hz was asked for, but by column {} it is {rate_hz} Hz: leave --rate out",
+            "a rate of {requested_hz} Hz is requested, but by column {} it is {rate_hz} Hz: leave --rate out",
             column.name
         );
         return Err(conflict(&rows.path, reason));

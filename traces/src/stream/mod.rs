@@ -133,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mark_in_the_rest_between_frames_is_told_as_in_memory() {
+    fn a_mark_in_the_rest_between_frames_is_reported_as_in_memory() {
         let trace = trace(300);
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("t.parquet");

@@ -74,10 +74,10 @@ fn what_contradicts_a_file_or_may_mean_another_number_is_refused() {
     says(&io::read(&path, &swapped).unwrap_err(), &["column voltage_V holds voltages", "currents"]);
     std::fs::write(csv::sidecar_path(&path), r#"{"rate_hz": 20}"#).unwrap();
     let other = ReadOptions { rate_hz: Some(10.0), ..ReadOptions::default() };
-    says(&io::read(&path, &other).unwrap_err(), &["10 Hz was asked for", "says 20 Hz", "--rate"]);
+    says(&io::read(&path, &other).unwrap_err(), &["10 Hz is requested", "says 20 Hz", "--rate"]);
     std::fs::write(csv::sidecar_path(&path), r#"{"rate_hz": 20, "start_s": 3}"#).unwrap();
     let late = |start_s| ReadOptions { start_s: Some(start_s), ..ReadOptions::default() };
-    says(&io::read(&path, &late(4.0)).unwrap_err(), &["start at 4 s was asked for", "says 3 s", "--start"]);
+    says(&io::read(&path, &late(4.0)).unwrap_err(), &["start at 4 s is requested", "says 3 s", "--start"]);
     assert!(io::read(&path, &late(3.0)).is_ok());
 }
 
@@ -89,7 +89,7 @@ fn a_rate_that_contradicts_the_times_is_refused_also_where_they_are_to_be_repair
         let of = |rate_hz| ReadOptions { repair, rate_hz: Some(rate_hz), ..ReadOptions::default() };
         for rate_hz in [2000.0, 500.0, 1002.0] {
             let error = io::read(&path, &of(rate_hz)).unwrap_err();
-            says(&error, &[&format!("a rate of {rate_hz} Hz was asked for"), "column time_s it is 1000 Hz"]);
+            says(&error, &[&format!("a rate of {rate_hz} Hz is requested"), "column time_s it is 1000 Hz"]);
             assert!(matches!(error, ReadError::Conflict { .. }));
         }
         assert_eq!(io::read(&path, &of(1000.0)).unwrap().trace.samples(), 500);
@@ -136,7 +136,7 @@ fn a_file_that_is_not_there_or_not_text() {
 }
 
 #[test]
-fn descriptions_are_held_against_the_rows() {
+fn descriptions_are_compared_with_the_rows() {
     let (_folder, path) = in_folder("a.csv", b"time_s,voltage_V,current_A\n0,1,2\n1,1,2\n");
     let describe = |json: &str| {
         std::fs::write(csv::sidecar_path(&path), json).unwrap();

@@ -269,7 +269,7 @@ pub(crate) fn load_objects(file: &Path) -> Result<Vec<MovingMesh>, LoadError> {
         Ok(Kind::Mts) => load_mts(file),
         Ok(_) | Err(LoadError::Kind { .. }) => {
             let message = format!(
-                "{} is no .mts file, and one of those is taken here; `quintile ccd` takes .ply, .obj and .off files, too, two by two",
+                "{} is not an .mts file; for two .ply, .obj or .off files use `quintile ccd`",
                 file.display()
             );
             Err(LoadError::Setting { setting: "file", message })

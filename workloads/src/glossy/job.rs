@@ -165,7 +165,7 @@ impl Glossy {
         let geometry = geometry.and_then(|geometry| geometry.with_uvs(&uvs)).map_err(refused)?;
         let settings = self.scene.settings();
         let viewport = Viewport::new(settings.width, settings.height)
-            .ok_or_else(|| JobError::Setting("an image of no size".to_owned()))?;
+            .ok_or_else(|| JobError::Setting(crate::job::IMAGE_SIZE.to_owned()))?;
         let samples = self.table(settings.samples)?;
         let background = self.scene.background();
         let settings = pipeline::Settings { spec: gpu.spec(), viewport, samples: &samples, background };
@@ -177,8 +177,8 @@ impl Glossy {
     fn regime_warnings(&self) -> Vec<Warning> {
         let (radius, least) = (self.options.roughness, self.receiver.half[0].min(self.receiver.half[1]));
         let message = format!(
-            "the lens is {radius} in radius and the receiver {least} in half its shorter side: texels at its rim gather from quite other \
-             directions than a surface of one roughness would, and samples are too few for the blur"
+            "the radius of the lens, {radius}, exceeds half the shorter side of the receiver, {least}: texels at its rim gather from other \
+             directions than those of a uniformly rough surface would, and the blur has too few samples"
         );
         (radius > least).then(|| Warning::new(Code::LensWiderThanReceiver, message)).into_iter().collect()
     }

@@ -50,7 +50,7 @@ impl<R: Read> Read for Limited<R> {
     fn read(&mut self, into: &mut [u8]) -> std::io::Result<usize> {
         let count = self.inner.read(into)?;
         self.left = self.left.checked_sub(count as u64).ok_or_else(|| {
-            std::io::Error::other("it unpacks to more than 2 GiB: unpack it yourself if it is what it says")
+            std::io::Error::other("it unpacks to more than 2 GiB; unpack it first if that is its real size")
         })?;
         Ok(count)
     }
@@ -62,10 +62,10 @@ pub(super) fn named(path: &Path) -> std::io::Result<Vec<u8>> {
     inputs::read(path)
 }
 
-/// Fails for what is there and no file.
+/// Fails for a folder or a device.
 pub(super) fn check_named(path: &Path) -> std::io::Result<()> {
     inputs::note(path);
-    if std::fs::metadata(path)?.is_file() { Ok(()) } else { Err(std::io::Error::other("it is no file")) }
+    if std::fs::metadata(path)?.is_file() { Ok(()) } else { Err(std::io::Error::other("not a regular file")) }
 }
 
 /// All bytes of `path`, unpacked where they are gzipped.

@@ -161,6 +161,9 @@ impl<D: Draws> Job for D {
     }
 }
 
+/// Message about an image without pixels, or with too many.
+pub const IMAGE_SIZE: &str = "image width or height is zero or too large";
+
 /// Reason why a frame could not be drawn.
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs, reason = "the variants are the sources, documented there")]

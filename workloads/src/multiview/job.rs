@@ -106,7 +106,7 @@ impl MultiView {
         let settings = Settings { focus: options.focus.or(settings.focus), ..settings };
         let view = Viewport::new(settings.width / across, settings.height);
         let refused = |message: &str| LoadError::Setting { setting: "size", message: message.to_owned() };
-        let view = view.ok_or_else(|| refused("views of no size"))?;
+        let view = view.ok_or_else(|| refused(crate::job::IMAGE_SIZE))?;
         let job = Self { scene, options, settings, view, seed };
         let first =
             job.scene.frame(job.settings.frames.start).map_err(|error| refused(&error.to_string()))?;

@@ -103,7 +103,7 @@ pub fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<dyn Job>
     let Options { walls, slats, gaps, objects, motion, lens, .. } = options;
     let spec = WallSceneSpec { walls, slats, gaps, boxes: objects, motion, lens, seed: request.seed };
     let refused =
-        || LoadError::Setting { setting: "lens", message: format!("{lens}: there is no such lens") };
+        || LoadError::Setting { setting: "lens", message: format!("{lens}: it has to be 0 to 1 metre") };
     let wall_scene = spec.wall_scene().ok_or_else(refused)?;
     Ok(Box::new(Occlusion { options, settings, samples, wall_scene }))
 }

@@ -64,7 +64,7 @@ pub(crate) fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<d
     let usual = Settings { width: 512, height: 512, samples: 4, ..Settings::default() };
     let settings = usual.with(request.overrides)?;
     if settings.width != settings.height {
-        return refused("size", "the unit square is drawn: let width and height be equal".to_owned());
+        return refused("size", "width and height have to be equal, as the unit square is drawn".to_owned());
     }
     Ok(Box::new(Sampling { options, settings, seed: request.seed }))
 }
@@ -230,8 +230,8 @@ impl Draws for Sampling {
             fact("points", found.points.len() as f64),
             fact("points_from_samples", drawn as f64),
             fact("candidates_from_samples", candidates as f64),
-            fact("voids", found.uncovered as f64),
-            fact("thin_voids", found.thin_regions as f64),
+            fact("uncovered_regions", found.uncovered as f64),
+            fact("thin_regions", found.thin_regions as f64),
         ];
         let image = picture(&found.points, self.settings.height, self.options.radius);
         Ok(Drawn { image, facts, ..Drawn::default() })

@@ -63,10 +63,11 @@ pub fn thin_regions_warning(points: usize, thin_regions: u64) -> Option<Warning>
     let per_point = thin_regions as f64 / points.max(1) as f64;
     (per_point > MAX_THIN_PER_POINT).then(|| {
         Warning::new(
-            Code::PointsThinVoids,
+            Code::PointsThinRegions,
             format!(
-                "{thin_regions} voids beside {points} points have no number in them (a warning from one for {:.0} points on): no other point can be \
-                 written, but places are farther than r from all points; coordinates in double precision or a larger r help",
+                "{thin_regions} uncovered regions among {points} points contain no number of the coordinates' format (more than one per {:.0} \
+                 points): no point can be written there, so places farther than r from all points remain; use double \
+                 precision or a larger r",
                 1.0 / MAX_THIN_PER_POINT
             ),
         )

@@ -296,7 +296,7 @@ impl ImageDensity {
     pub fn load(path: &Path) -> Result<Self, ImageError> {
         let refused = |message: String| ImageError { file: path.display().to_string(), message };
         let unread = |error: std::io::Error| refused(format!("cannot read it: {error}; check the path"));
-        let unknown = |error| refused(format!("is no picture that is known ({error}); give a PNG or JPEG"));
+        let unknown = |error| refused(format!("unrecognized image format ({error}); give a PNG or JPEG"));
         let picture =
             image::ImageReader::open(path).map_err(unread)?.with_guessed_format().map_err(unread)?;
         let picture = picture.decode().map_err(unknown)?.into_rgb8();
@@ -306,7 +306,7 @@ impl ImageDensity {
         Self::new(width, height, picture.pixels().map(|pixel| luminance(pixel.0)).collect()).ok_or_else(
             || {
                 refused(
-                    "is black all over, and bright is dense; give a picture with something bright in it"
+                    "the image is black throughout, so the density is zero; give an image with bright parts"
                         .to_owned(),
                 )
             },

@@ -208,12 +208,12 @@ impl Scene {
 /// Keys of the tracks of position and target; `None` if files cannot describe them.
 fn keys([position, target]: [Option<&Track>; 2]) -> Option<(Vec<CameraKey>, Option<InterpolationSpec>)> {
     let first = position.or(target)?;
-    let alike = |track: &Track| {
+    let is_same = |track: &Track| {
         track.times_s() == first.times_s()
             && track.interpolation() == first.interpolation()
             && track.period_s().is_none()
     };
-    if ![position, target].into_iter().flatten().all(alike) {
+    if ![position, target].into_iter().flatten().all(is_same) {
         return None;
     }
     let interpolation = match first.interpolation() {

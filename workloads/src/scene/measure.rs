@@ -45,7 +45,7 @@ pub(crate) fn lens_leaves_view() -> Warning {
 
 fn leaves_fitted_view(fitted: &Range<u32>) -> Warning {
     let message = format!(
-        "parts of the scene leave the view in the frames asked for: the fitted camera holds them in the scene's own frames, {} to \
+        "parts of the scene leave the view in the requested frames: the fitted camera holds them in the scene's own frames, {} to \
          {}; give the scene a `camera`, or set its `frames`",
         fitted.start,
         fitted.end - 1
@@ -79,7 +79,7 @@ impl Scene {
         Ok([low, high])
     }
 
-    /// The place inside, where it is asked for or the scene is a room.
+    /// The place inside, where it is requested or the scene is a room.
     fn inside(&mut self, side: Side) -> Result<Option<Placed>, FrameError> {
         let found = match side {
             Side::Outside => None,

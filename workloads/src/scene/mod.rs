@@ -60,7 +60,7 @@ pub struct Scene {
     light: Light,
     background: Vec3,
     settings: Settings,
-    /// Frames that the scene renders where nothing else is asked for. What is placed once for all frames (a fitted camera, the
+    /// Frames that the scene renders where nothing else is requested. What is placed once for all frames (a fitted camera, the
     /// lamp over its shoulder, the centre that a lens is focused on) is placed for these, so that a frame looks the same whichever
     /// frames are rendered with it.
     own_frames: Range<u32>,
@@ -185,7 +185,7 @@ impl Scene {
     /// The scene with other settings, or playing another clip.
     ///
     /// # Errors
-    /// [`LoadError::Setting`] when a value makes no sense or there is no such clip or camera; as [`CameraSpec::flag`] when
+    /// [`LoadError::Setting`] when a value makes no sense or the clip or camera does not exist; as [`CameraSpec::flag`] when
     /// another camera cannot be read.
     pub fn with_overrides(mut self, overrides: &Overrides) -> Result<Self, LoadError> {
         let lens = self.choose_camera(overrides)?;

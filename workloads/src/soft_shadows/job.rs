@@ -123,7 +123,7 @@ impl SoftShadows {
         if bias < Self::BIAS_RANGE_TEXELS[0] * texel || bias > Self::BIAS_RANGE_TEXELS[1] * texel {
             let message = format!(
                 "the bias is {bias} and a texel of the map {texel:.3} scene units wide at the target: with less than half a texel \
-                 surfaces shade themselves (acne), with more than eight shadows come off what throws them"
+                 surfaces shade themselves (acne), with more than eight shadows detach from their casters"
             );
             warnings.push(Warning::new(Code::ShadowBias, message));
         }
@@ -161,7 +161,7 @@ impl DrawsScene for SoftShadows {
         let settings = self.scene.settings();
         let (draws, albedos) = parts(&self.scene, frame)?;
         let viewport = Viewport::new(settings.width, settings.height)
-            .ok_or_else(|| JobError::Setting("an image of no size".to_owned()))?;
+            .ok_or_else(|| JobError::Setting(crate::job::IMAGE_SIZE.to_owned()))?;
         let (camera, draws) = (frame.camera.with_lens(None), gpu.resident(&draws));
         let view = View { camera: &camera, draws: &draws };
         let map = ShadowMap::new(&self.light, &draws, self.options.map_px, &self.set, self.method(), gpu)?;

@@ -128,7 +128,7 @@ fn bad_animations_and_skins_are_named() {
         file.animate("translation", &[0.0], (&[0.0; 3], "VEC3"), "LINEAR");
         file.json["animations"][0]["channels"][0]["target"]["node"] = json!(4);
     });
-    expect(&text, &["animations[0].channels[0]: there is no such node"]);
+    expect(&text, &["animations[0].channels[0]: node 4 does not exist (there are "]);
     let text = broken(|file| {
         let joints = file.accessor(&[5; 12], 3, "VEC4", 5121);
         let weights = file.floats(&[1.0; 12], "VEC4");

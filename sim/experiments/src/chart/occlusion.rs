@@ -28,8 +28,8 @@ pub struct OcclusionEffort {
     pub size: [u32; 2],
     /// Boxes queried in each scene.
     pub boxes: u32,
-    /// Yards of each kind.
-    pub yards: u64,
+    /// Scenes of each kind.
+    pub scenes: u64,
     /// Samples in a pixel that sampled queries look at.
     pub samples: &'static [u32],
     /// Sides of tiles in pixels.
@@ -129,7 +129,7 @@ impl Study for OcclusionChart {
     const FULL: OcclusionEffort = OcclusionEffort {
         size: [192, 108],
         boxes: 96,
-        yards: 3,
+        scenes: 3,
         samples: &[16, 32, 64],
         tiles: &[4, 8, 16, 32],
         slats: &[1, 2, 4, 8, 16, 32, 64],
@@ -137,7 +137,7 @@ impl Study for OcclusionChart {
     const QUICK: OcclusionEffort = OcclusionEffort {
         size: [128, 72],
         boxes: 48,
-        yards: 1,
+        scenes: 1,
         samples: &[16, 64],
         tiles: &[4, 8, 16],
         slats: &[1, 4, 16],
@@ -151,7 +151,7 @@ impl Study for OcclusionChart {
         let samples = self.effort.samples[0];
         let title = "Occlusion queries: by intervals and by samples";
         let subject = format!(
-            "share of hidden boxes that are found, over bytes of stored depth read for each box that is asked for; {samples} samples a pixel, sampled queries 16 to 64; \
+            "share of hidden boxes that are found, over bytes of stored depth read for each queried box; {samples} samples a pixel, sampled queries 16 to 64; \
              dots of a tile from few boxes of lens and time to many"
         );
         to.chart("occlusion", [title, &subject], Kind::ALL.map(|kind| self.rates(kind)).into())?;
@@ -395,11 +395,11 @@ fn blank(kind: Kind, slats: u32, samples: u32) -> OcclusionRow {
     }
 }
 
-fn by_intervals(yards: &[Drawn], like: OcclusionRow, boxes: [u32; 3], tile_px: u32) -> OcclusionRow {
+fn by_intervals(scenes: &[Drawn], like: OcclusionRow, boxes: [u32; 3], tile_px: u32) -> OcclusionRow {
     let (mut answered, mut half_covered) = (Vec::new(), 0.0);
-    for drawn in yards {
+    for drawn in scenes {
         let (answers, half) = drawn.ask(boxes, tile_px);
-        half_covered += half / yards.len() as f64;
+        half_covered += half / scenes.len() as f64;
         let all = answers.iter().zip(&drawn.seen).map(|(answer, seen)| {
             ((answer.hidden, [answer.tests(), answer.bytes(), answer.madds]), seen.passed == 0)
         });
@@ -408,8 +408,8 @@ fn by_intervals(yards: &[Drawn], like: OcclusionRow, boxes: [u32; 3], tile_px: u
     row(OcclusionRow { tile_px: Some(tile_px), boxes: Some(boxes), half_covered, ..like }, &answered)
 }
 
-fn by_samples(yards: &[Drawn], like: OcclusionRow) -> OcclusionRow {
-    let all = yards.iter().flat_map(|drawn| &drawn.seen).map(|seen| {
+fn by_samples(scenes: &[Drawn], like: OcclusionRow) -> OcclusionRow {
+    let all = scenes.iter().flat_map(|drawn| &drawn.seen).map(|seen| {
         let hidden = seen.passed == 0;
         ((hidden, [seen.tests(), seen.bytes(), seen.madds]), hidden)
     });
@@ -422,24 +422,24 @@ fn measure(effort: OcclusionEffort, progress: &Progress) -> Result<OcclusionChar
         OcclusionChart { effort, intervals: Vec::new(), samples: Vec::new(), failing: Vec::new() };
     for kind in Kind::ALL {
         for &samples in effort.samples {
-            let yards = drawn(&effort, kind, 1, samples, &bar)?;
+            let scenes = drawn(&effort, kind, 1, samples, &bar)?;
             let like = blank(kind, 1, samples);
-            chart.samples.push(by_samples(&yards, like));
-            chart.samples.push(by_intervals(&yards, like, kind.typical(), TILE_PX));
+            chart.samples.push(by_samples(&scenes, like));
+            chart.samples.push(by_intervals(&scenes, like, kind.typical(), TILE_PX));
             if samples == effort.samples[0] {
                 let each = kind
                     .boxes()
                     .iter()
                     .flat_map(|boxes| effort.tiles.iter().map(move |tile| (*boxes, *tile)));
-                chart.intervals.extend(each.map(|(boxes, tile)| by_intervals(&yards, like, boxes, tile)));
+                chart.intervals.extend(each.map(|(boxes, tile)| by_intervals(&scenes, like, boxes, tile)));
             }
         }
     }
     for &slats in effort.slats {
-        let yards = drawn(&effort, Kind::Motion, slats, SAMPLES, &bar)?;
+        let scenes = drawn(&effort, Kind::Motion, slats, SAMPLES, &bar)?;
         let like = blank(Kind::Motion, slats, SAMPLES);
-        chart.failing.push(by_samples(&yards, like));
-        chart.failing.extend(FAILING_TILES.map(|tile_px| by_intervals(&yards, like, [1, 1, 8], tile_px)));
+        chart.failing.push(by_samples(&scenes, like));
+        chart.failing.extend(FAILING_TILES.map(|tile_px| by_intervals(&scenes, like, [1, 1, 8], tile_px)));
     }
     Ok(chart)
 }
@@ -456,9 +456,9 @@ fn drawn(
         let scene = WallSceneSpec { slats, gaps, ..kind.spec(effort.boxes, seed) };
         Drawn::new(effort.size, &scene, samples)
     };
-    let yards = (0..effort.yards).map(drawn).collect();
+    let scenes = (0..effort.scenes).map(drawn).collect();
     bar.inc();
-    yards
+    scenes
 }
 
 #[cfg(test)]
@@ -471,7 +471,7 @@ mod tests {
         let least = OcclusionEffort {
             size: [64, 36],
             boxes: 24,
-            yards: 1,
+            scenes: 1,
             samples: &[4, 8],
             tiles: &[8],
             slats: &[1, 8],

@@ -41,7 +41,7 @@ pub struct PointsChart {
     pub effort: PointsEffort,
     /// Dimension by dimension, method by method.
     pub rows: Vec<PointsRow>,
-    /// Voids thinner than an ulp.
+    /// Uncovered regions thinner than an ulp.
     pub coarse: Vec<Coarse>,
     /// Candidates for a point that follows a density.
     pub columns: Vec<Columns>,
@@ -77,7 +77,7 @@ impl Study for PointsChart {
         let subject = format!("torus, r {plane} in the plane and {space} in space; CPU time of one thread");
         to.chart("points_quality", ["Largest hole and free share over speed", &subject], self.quality())?;
         to.chart("points_spectra", ["Power over frequency, all directions", &subject], self.spectra())?;
-        let subject = "points of the plane that keep their distance, on coarser and coarser numbers (marked: points-thin-voids), and candidates for points that follow a density";
+        let subject = "points of the plane that keep their distance, on ever coarser grids of numbers (marked: points-thin-regions), and candidates for points that follow a density";
         to.chart("points_failures", ["Where points fail", subject], self.failures())
     }
 
@@ -103,9 +103,9 @@ impl Study for PointsChart {
             .detail("at", |row| row.peak.0, fixed(2))
             .csv("points.csv");
         let coarse = Table::of(&self.coarse)
-            .shown("r in spacings of numbers", |c| c.radius_in_numbers, fixed(0))
+            .shown("r in spacings of numbers", |c| c.radius_ulp, fixed(0))
             .shown("points", |c| c.points, plain)
-            .shown("thin voids", |c| c.thin_voids, plain)
+            .shown("thin regions", |c| c.thin_regions, plain)
             .shown("hole beyond r", |c| c.beyond, |beyond| format!("{beyond:.1e} r"));
         let columns = Table::of(&self.columns)
             .detail("D", |c| c.dimensions, plain)
@@ -144,7 +144,7 @@ fn long_name(method: &str) -> &str {
     match method {
         "bridson" => "Bridson, more and more candidates",
         "plain" => "plain darts, more and more misses",
-        _ => "voids",
+        _ => "uncovered",
     }
 }
 
@@ -187,12 +187,12 @@ impl PointsChart {
     /// Numbers too coarse for the disks, and columns too few for the density.
     fn failures(&self) -> Vec<ChartPanel> {
         let coarse = |title: &str, up: &str, of: fn(&Coarse) -> f64| {
-            let curve = Series::curve("voids, 2D", self.coarse.iter().map(|c| (c.radius_in_numbers, of(c))));
-            let warned = |c: &&Coarse| c.thin_voids as f64 > MAX_THIN_PER_POINT * c.points as f64;
+            let curve = Series::curve("uncovered regions, 2D", self.coarse.iter().map(|c| (c.radius_ulp, of(c))));
+            let warned = |c: &&Coarse| c.thin_regions as f64 > MAX_THIN_PER_POINT * c.points as f64;
             let last = self.coarse.iter().rfind(warned);
             ChartPanel::new(title, ["r in spacings of numbers", up], vec![curve])
                 .on(Scale::Doublings, Scale::Decades)
-                .failing(last.map(|c| 0.0..c.radius_in_numbers), "a run warns")
+                .failing(last.map(|c| 0.0..c.radius_ulp), "a run warns")
         };
         let of = |dimensions: usize| {
             let rows = self.columns.iter().filter(move |c| c.dimensions == dimensions);
@@ -200,8 +200,8 @@ impl PointsChart {
         };
         let columns = (1..=4).map(of).collect();
         vec![
-            coarse("voids thinner than an ulp", "voids without a number, a point", |c| {
-                c.thin_voids as f64 / c.points as f64
+            coarse("uncovered regions thinner than an ulp", "regions without a number, a point", |c| {
+                c.thin_regions as f64 / c.points as f64
             }),
             coarse("what that costs: holes", "largest hole beyond r, share of r", |c| c.beyond),
             ChartPanel::new(
@@ -223,7 +223,7 @@ pub struct PointsRow {
     pub method: &'static str,
     /// How long it may go on: misses in a row, or candidates around a point; 0 where it ends by itself.
     pub effort: u64,
-    /// Least distance asked for.
+    /// Least distance requested.
     pub radius: f64,
     /// How many points there are.
     pub points: usize,
@@ -249,13 +249,13 @@ pub struct PointsRow {
 }
 
 /// The name of the method of [`workloads::points::poisson`].
-const VOIDS: &str = "voids";
+const UNCOVERED: &str = "uncovered";
 const BRIDSON: &str = "bridson";
 const PLAIN: &str = "plain";
 
 /// Methods with their efforts.
 const METHODS: [(&str, u64); 6] =
-    [(VOIDS, 0), (BRIDSON, 10), (BRIDSON, 30), (PLAIN, 100), (PLAIN, 1000), (PLAIN, 10_000)];
+    [(UNCOVERED, 0), (BRIDSON, 10), (BRIDSON, 30), (PLAIN, 100), (PLAIN, 1000), (PLAIN, 10_000)];
 
 fn points<const D: usize>(
     (method, effort): (&str, u64),
@@ -337,18 +337,18 @@ pub struct Coarse {
     /// Coordinates are multiples of 2 to the power of minus this.
     pub bits: u32,
     /// The least distance in spacings of numbers.
-    pub radius_in_numbers: f64,
+    pub radius_ulp: f64,
     /// How many points there are.
     pub points: usize,
-    /// Voids left, without a number in them.
-    pub thin_voids: u64,
+    /// Uncovered regions left, without a number in them.
+    pub thin_regions: u64,
     /// How far the largest hole is beyond r, as a share of r.
     pub beyond: f64,
 }
 
 /// The least distance of the points on coarse numbers: what fails depends on how many numbers wide it is alone.
 const COARSE_RADIUS: f64 = 1.0 / 64.0;
-/// The coarsest numbers with which that can be asked for.
+/// The coarsest numbers with which that can be requested.
 const COARSEST_BITS: u32 = 12;
 
 /// Finer and finer numbers, from disks on that are as few numbers wide as may be.
@@ -360,9 +360,9 @@ fn coarse(effort: &PointsEffort) -> Result<Vec<Coarse>, PoissonError> {
         let hole = largest_hole(&found.points, Domain::Torus);
         Ok(Coarse {
             bits,
-            radius_in_numbers: COARSE_RADIUS * spacing.per_unit(),
+            radius_ulp: COARSE_RADIUS * spacing.per_unit(),
             points: found.points.len(),
-            thin_voids: found.thin_regions,
+            thin_regions: found.thin_regions,
             beyond: (hole.radius / COARSE_RADIUS - 1.0).max(0.0),
         })
     });
@@ -424,7 +424,7 @@ mod tests {
         let (_folder, chart, _) = written::<PointsChart>(effort);
         for row in &chart.rows {
             let maximal = row.hole_over_r <= 1.0 + 1e-9;
-            assert_eq!(maximal, row.method == VOIDS, "{row:?}");
+            assert_eq!(maximal, row.method == UNCOVERED, "{row:?}");
             assert!(row.closer_pairs == 0 && row.points_per_s > 0.0, "{row:?}");
         }
     }

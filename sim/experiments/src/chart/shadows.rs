@@ -92,7 +92,7 @@ impl Study for ShadowsChart {
             "{width}x{height} pixels, a map of {0}x{0} texels, RMSE in linear light against {1} rays a pixel",
             self.effort.map_px, self.reference_samples_per_pixel
         );
-        let title = "Soft shadows: error and how alike neighbours err";
+        let title = "Soft shadows: error, and correlation of neighbouring errors";
         to.chart("shadows_error", [title, &subject], self.errors())?;
         let title = "Soft shadows: one pass against accumulation";
         to.chart("shadows_cost", [title, &subject], self.costs())?;
@@ -302,7 +302,7 @@ impl Stage {
             self.frame.meshes.iter().map(|mesh| self.scene.materials()[mesh.material].base_color).collect();
         let [width, height] = self.effort.size;
         let viewport = Viewport::new(width, height)
-            .ok_or_else(|| StudyError::Pipeline("an image of no size".to_owned()))?;
+            .ok_or_else(|| StudyError::Pipeline(workloads::job::IMAGE_SIZE.to_owned()))?;
         let view = View { camera: &self.frame.camera, draws: &draws };
         let world = World::new(&view, viewport, &self.light, &albedos, self.scene.background());
         run(&Bench { stage: self, draws: &draws, world, viewport })

@@ -175,7 +175,7 @@ fn of_family(
 ) -> Result<Vec<TileTestsRow>, RunError> {
     let label = format!("{name} at {value}");
     let family =
-        family(name).ok_or_else(|| RunError::Setting(format!("{label}: there is no such family")))?;
+        family(name).ok_or_else(|| RunError::Setting(format!("{label}: unknown family")))?;
     on_subject(family, value, (effort.families, 1), gpu, |subject| rows(&label, subject, effort.pairs))
 }
 
@@ -325,7 +325,7 @@ mod tests {
     use output::plot::Look;
 
     #[test]
-    fn every_combination_is_held_against_none_and_the_best_is_marked() {
+    fn every_combination_is_compared_with_none_and_the_best_is_marked() {
         let gpu = GpuSpec::load("reference").unwrap();
         let rows = of_family("speed", 0.1, &TileTests::QUICK, &gpu).unwrap();
         assert_eq!(rows.len(), 1 << SWITCHES.len());

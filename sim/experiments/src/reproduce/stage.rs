@@ -132,7 +132,7 @@ impl Stage {
     pub fn frame(&self, scene: &Scene, number: u32, cost: ShaderCost) -> Result<FramePower, RunError> {
         let options = scene.settings();
         let viewport = Viewport::new(options.width, options.height);
-        let viewport = viewport.ok_or_else(|| RunError::Setting("an image of no size".to_owned()))?;
+        let viewport = viewport.ok_or_else(|| RunError::setting(workloads::job::IMAGE_SIZE))?;
         let samples = SampleChoice::load(&options.table)?.source(options.samples, 1)?;
         let background = scene.background();
         let settings = Settings { spec: &self.gpu.pipeline, viewport, samples: &*samples, background };

@@ -27,7 +27,7 @@ pub struct StressRow {
     /// Samples that do not see what they have to: must be none.
     pub samples_lost: u64,
     /// What that was found by: `brute force` or `no tests`.
-    pub held_against: &'static str,
+    pub compared_with: &'static str,
     /// What it cost.
     pub work: Work,
     /// Its multiply-adds over those of the best method at this value.
@@ -98,7 +98,7 @@ pub fn measure(
                 method: method.name,
                 triangles: subject.triangles(),
                 samples_lost: differing(&seen, &reference),
-                held_against: if brute { "brute force" } else { "no tests" },
+                compared_with: if brute { "brute force" } else { "no tests" },
                 work: Work::new(&subject.counts(method.features)?),
                 over_best: 1.0,
                 truth: pairs.source(),

@@ -33,7 +33,7 @@ const SEED: u64 = 1;
 /// The family called `name`.
 ///
 /// # Errors
-/// When there is no such family; names those there are.
+/// When the family does not exist; names the known ones.
 pub fn family_named(name: &str) -> Result<&'static Family, RunError> {
     let unknown = || {
         let names: Vec<_> = families().map(|family| family.name).collect();
@@ -250,7 +250,7 @@ impl Report {
             .data("method", |row| row.method)
             .data("triangles", |row| row.triangles)
             .data("samples_lost", |row| row.samples_lost)
-            .data("held_against", |row| row.held_against)
+            .data("compared_with", |row| row.compared_with)
             .data("samples_tested", |row| row.work.samples_tested)
             .data("samples_hit", |row| row.work.samples_hit)
             .data("tile_madds", |row| row.work.tile_madds)
@@ -364,7 +364,7 @@ mod tests {
         let rows = measure::measure(family, 0.1, SIZE, &gpu, &METHODS).unwrap();
         let mut report = Report { families: vec![family], size: SIZE, rows, auto: Choices::default() };
         assert!(report.is_clean(), "{}", text(&report));
-        assert_eq!(report.rows[0].held_against, "brute force");
+        assert_eq!(report.rows[0].compared_with, "brute force");
         let scene = family.scene(0.1, SIZE, 1).unwrap();
         let mut other = scene.clone();
         other.triangles.truncate(scene.triangles.len() / 2);
@@ -403,7 +403,7 @@ mod tests {
     }
 
     #[test]
-    fn an_unknown_family_is_told_with_the_known_ones() {
+    fn an_unknown_family_is_reported_with_the_known_ones() {
         let error = family_named("splinters").err().unwrap();
         assert!(error.is_usage());
         assert!(error.to_string().contains("splinters") && error.to_string().contains("slivers"), "{error}");

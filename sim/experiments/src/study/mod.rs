@@ -111,7 +111,7 @@ impl Gallery<'_> {
     }
 }
 
-/// What a study is asked for.
+/// A request for a study.
 #[derive(Clone, Copy, Debug)]
 pub struct Request<'a> {
     /// Whether a preview will do.

@@ -218,14 +218,14 @@ impl Tradeoff {
     }
 }
 
-/// Points that are alike together, in the order of the first of each group.
+/// Points in groups, in the order of the first of each group.
 fn groups<'a>(
     points: impl Iterator<Item = &'a TradeoffPoint>,
-    alike: impl Fn(&TradeoffPoint, &TradeoffPoint) -> bool,
+    same: impl Fn(&TradeoffPoint, &TradeoffPoint) -> bool,
 ) -> Vec<Vec<&'a TradeoffPoint>> {
     let mut groups: Vec<Vec<&TradeoffPoint>> = Vec::new();
     for point in points {
-        match groups.iter_mut().find(|group| alike(group[0], point)) {
+        match groups.iter_mut().find(|group| same(group[0], point)) {
             Some(group) => group.push(point),
             None => groups.push(vec![point]),
         }

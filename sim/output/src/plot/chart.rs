@@ -246,10 +246,10 @@ impl<'a> Chart<'a> {
     /// same order. Small panels have no legend; their titles name the series.
     fn shared_legend(&self) -> Option<Vec<(Key, String)>> {
         let longest = self.panels.iter().max_by_key(|panel| panel.series.len())?;
-        let is_alike = |panel: &ChartPanel| {
+        let is_same = |panel: &ChartPanel| {
             panel.series.iter().zip(&longest.series).all(|(a, b)| a.name == b.name && a.paint == b.paint)
         };
-        if self.small.is_some() || !self.panels.iter().all(is_alike) {
+        if self.small.is_some() || !self.panels.iter().all(is_same) {
             return None;
         }
         Some(longest.named().map(|(key, series)| (key, series.name.clone())).collect())
@@ -544,7 +544,7 @@ mod tests {
     }
 
     #[test]
-    fn a_row_for_zero_is_called_as_asked_for() {
+    fn a_row_for_zero_is_called_as_requested() {
         let axes = [AxisSpec::default(), AxisSpec { zero: "exact".to_owned(), ..AxisSpec::default() }];
         let panel = ChartPanel::over("", axes, vec![dots(&[(1.0, 0.0), (2.0, 5.0), (3.0, 200.0)])]);
         let picture = Chart::new("t", "s", vec![panel]).picture(&Look::default());

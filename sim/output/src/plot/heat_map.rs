@@ -156,13 +156,13 @@ impl HeatMapPlot<'_> {
         for y in 0..self.size[1] as usize {
             let shades: Vec<u32> = (0..width).map(|x| shade(x, y)).collect();
             let mut x = 0;
-            for alike in shades.chunk_by(|a, b| a == b) {
+            for equal in shades.chunk_by(|a, b| a == b) {
                 let at = |x: usize, y: usize| (left + x as f64 * scale, top + y as f64 * scale);
-                if alike[0] > 0 {
-                    let alpha = OUTLINE_ALPHA * alike[0] as f32 / 5.0;
-                    picture.rect(at(x, y), at(x + alike.len(), y + 1), INK.alpha(f64::from(alpha)));
+                if equal[0] > 0 {
+                    let alpha = OUTLINE_ALPHA * equal[0] as f32 / 5.0;
+                    picture.rect(at(x, y), at(x + equal.len(), y + 1), INK.alpha(f64::from(alpha)));
                 }
-                x += alike.len();
+                x += equal.len();
             }
         }
     }

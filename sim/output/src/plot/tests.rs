@@ -329,7 +329,7 @@ fn a_unit_has_one_colour_in_every_plot() {
 
 /// What a paper asks for: so many millimetres, letters of so many points, its own caption.
 #[test]
-fn pictures_are_as_wide_as_asked_for() {
+fn pictures_are_as_wide_as_requested() {
     let chart = Chart::new(
         "Own title",
         "own subject",

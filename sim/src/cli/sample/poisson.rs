@@ -43,10 +43,10 @@ struct Facts {
     /// Packing density: share of the domain covered by balls of diameter r.
     packing_density: f64,
     darts: u64,
-    voids: u64,
+    uncovered_regions: u64,
     levels: u32,
     /// Uncovered regions left, narrower than the gap between representable numbers.
-    thin_voids: u64,
+    thin_regions: u64,
     /// Warnings about the points.
     warnings: Vec<Warning>,
 }
@@ -121,9 +121,9 @@ fn sample<const D: usize>(args: &PoissonArgs, terminal: &Terminal) -> Result<(),
         seed: spec.seed,
         packing_density: found.points.len() as f64 * ball(D) * spec.radius.powi(D as i32),
         darts: found.darts,
-        voids: found.uncovered,
+        uncovered_regions: found.uncovered,
         levels: found.levels,
-        thin_voids: found.thin_regions,
+        thin_regions: found.thin_regions,
         warnings: thin_regions_warning(found.points.len(), found.thin_regions).into_iter().collect(),
     };
     let thin = match found.thin_regions {

@@ -1,4 +1,4 @@
-//! Packets wait for what they depend on, at the levels `stepped` and `packet` alike.
+//! Packets wait for what they depend on, at the levels `stepped` and `packet`.
 
 use activity::{Event, LineAccess, LineKind, Packet, PacketKind, Unit};
 use timing::MachineSpec;

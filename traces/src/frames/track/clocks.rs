@@ -236,7 +236,7 @@ mod tests {
     }
 
     #[test]
-    fn frames_whose_beginnings_noise_hides_are_told_by_the_whole_of_them() {
+    fn frames_whose_beginnings_noise_hides_are_recognized_by_the_whole_of_them() {
         let (mut power, right) = trace(12, 1);
         let noise = Random::new(7, 0);
         for start in right[12..].iter().map(|start| start + ANCHOR) {

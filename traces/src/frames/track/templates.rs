@@ -107,9 +107,9 @@ impl Templates {
             let novelty = |three: &[usize]| {
                 let uneven = libm::log((three[2] - three[1]) as f64 / (three[1] - three[0]) as f64).abs()
                     > MAX_GAP_DEVIATION;
-                let alike =
+                let similarity =
                     f64::min(self.similarity(three[0], three[1]), self.similarity(three[1], three[2]));
-                if uneven { f64::NEG_INFINITY } else { alike - (1.0 - self.shape[three[1]]) }
+                if uneven { f64::NEG_INFINITY } else { similarity - (1.0 - self.shape[three[1]]) }
             };
             let newest = starts.windows(3).map(|three| (novelty(three), three));
             match newest.max_by(|a, b| a.0.total_cmp(&b.0)) {

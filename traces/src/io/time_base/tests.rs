@@ -121,7 +121,7 @@ fn a_rate_that_puts_one_late_row_a_hair_off_is_looked_at_again() {
 }
 
 #[test]
-fn a_step_between_two_pieces_is_held_against_the_others_too() {
+fn a_step_between_two_pieces_is_compared_with_the_others_too() {
     for (at, periods) in [(1100, 5), (1100, -5), (1101, 5), (2199, 1), (2200, 1), (2201, 1)] {
         let time = |row: i64| 1_000_000 * (row + if row < at { 0 } else { periods });
         let stamps = Stamps::Nanoseconds((0..3000).map(time).collect());

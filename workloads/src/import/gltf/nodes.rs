@@ -145,9 +145,13 @@ fn channel(
     let place = format!("animations[{clip}].channels[{number}]");
     let fail = |message: &str| document.source.broken(place.clone(), format!("{message}: export it again"));
     let channel: &Channel = &animation.channels[number];
-    let node = *tree.place.get(channel.target.node.value()).ok_or_else(|| fail("there is no such node"))?;
-    let sampler =
-        animation.samplers.get(channel.sampler.value()).ok_or_else(|| fail("there is no such sampler"))?;
+    let (node, sampler) = (channel.target.node.value(), channel.sampler.value());
+    let unknown = |what: &str, index: usize, count: usize| {
+        fail(&format!("{what} {index} does not exist (there are {count})"))
+    };
+    let node = *tree.place.get(node).ok_or_else(|| unknown("node", node, tree.place.len()))?;
+    let samplers = &animation.samplers;
+    let sampler = samplers.get(sampler).ok_or_else(|| unknown("sampler", sampler, samplers.len()))?;
     let Checked::Valid(path) = channel.target.path else { return Err(fail("it drives an unknown property")) };
     let (property, kind) = match path {
         JsonProperty::Translation => (Property::Translation, Type::Vec3),

@@ -284,7 +284,7 @@ impl Document<'_> {
     }
 
     fn numbers(&self, index: usize, kinds: &[Type]) -> Result<Values, String> {
-        let accessor = self.root.accessors.get(index).ok_or("there is no such accessor")?;
+        let accessor = self.root.accessors.get(index).ok_or_else(|| missing("it", &self.root.accessors))?;
         let (Checked::Valid(kind), Checked::Valid(component)) = (&accessor.type_, &accessor.component_type)
         else {
             return Err("its type is not known".to_owned());
@@ -358,9 +358,11 @@ impl Document<'_> {
 
     /// The bytes of a buffer view.
     pub fn view(&self, index: usize) -> Result<&[u8], String> {
-        let view =
-            self.root.buffer_views.get(index).ok_or_else(|| format!("there is no buffer view {index}"))?;
-        let buffer = self.buffers.get(view.buffer.value()).ok_or("there is no such buffer")?;
+        let views = &self.root.buffer_views;
+        let view = views.get(index).ok_or_else(|| missing(&format!("buffer view {index}"), views))?;
+        let buffer = view.buffer.value();
+        let buffer =
+            self.buffers.get(buffer).ok_or_else(|| missing(&format!("buffer {buffer}"), &self.buffers))?;
         let start = view.byte_offset.map_or(0, |offset| offset.0);
         let end = start.saturating_add(view.byte_length.0);
         let range = usize::try_from(start).ok().zip(usize::try_from(end).ok());
@@ -411,6 +413,11 @@ impl Layout {
         };
         if self.normalized { (value / most).max(-1.0) } else { value }
     }
+}
+
+/// Message about an index beyond a list.
+fn missing<T>(what: &str, list: &[T]) -> String {
+    format!("{what} does not exist (there are {})", list.len())
 }
 
 #[cfg(test)]

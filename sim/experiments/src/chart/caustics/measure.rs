@@ -38,7 +38,7 @@ pub struct Ocean {
 /// Counts the executions of every method on an ocean of `2 cells^2` volumes, its waves of this slope and so many metres deep.
 ///
 /// # Errors
-/// When `size` is no size of an image.
+/// When the width or the height in `size` is zero or too large.
 pub fn ocean(
     cells: u32,
     [slope, depth_m]: [f64; 2],

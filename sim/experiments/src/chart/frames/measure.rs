@@ -12,7 +12,7 @@ use traces::synth::{Recording, Scenario, Scene};
 use super::{FramesEffort, Way};
 use crate::study::StudyError;
 
-/// Places of the marks, as shares of the frames; where one is asked for, it is the first.
+/// Places of the marks, as shares of the frames; where one is requested, it is the first.
 const MARKED: [f64; 5] = [0.4, 0.1, 0.25, 0.6, 0.85];
 /// How far off the marks are, s.
 const HAND_S: [f64; 5] = [0.05e-3, -0.1e-3, 0.1e-3, 0.0, -0.05e-3];

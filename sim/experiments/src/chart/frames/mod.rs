@@ -48,7 +48,7 @@ pub enum Way {
     Templates,
     /// Tracking from one mark, templates learnt.
     Tracking,
-    /// One mark and no method asked for: that of the others which fits what is found.
+    /// One mark and no method requested: that of the others which fits what is found.
     Auto,
 }
 

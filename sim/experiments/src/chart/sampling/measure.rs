@@ -208,11 +208,11 @@ pub struct Failures {
     pub every_number: Vec<SamplingRow>,
     /// More edges in a pixel than samples: stratification finds nothing to hold on to.
     pub many_edges: Vec<SamplingRow>,
-    /// Tables that all pixels share: what one pixel gets wrong its neighbours get wrong alike.
+    /// Tables that all pixels share: neighbouring pixels have the same error.
     pub shared: Vec<Shared>,
 }
 
-/// How alike the errors of neighbours are.
+/// Correlation of the errors of neighbours.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Shared {
     /// The sample table.

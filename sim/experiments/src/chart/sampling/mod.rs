@@ -294,7 +294,7 @@ mod tests {
     }
 
     #[test]
-    fn equal_errors_are_alike_and_alternating_ones_opposite() {
+    fn equal_errors_are_correlated_and_alternating_ones_opposite() {
         let row = |signs: [f64; 4]| signs.iter().flat_map(|s| [*s; 3]).collect::<Vec<_>>();
         assert_eq!(neighbours(&row([1.0; 4]), 4), 1.0);
         assert_eq!(neighbours(&row([1.0, -1.0, 1.0, -1.0]), 4), -1.0);

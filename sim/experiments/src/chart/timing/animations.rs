@@ -226,7 +226,7 @@ fn of_scene(name: &str, quick: bool) -> Result<Subject, RunError> {
 
 fn of_family(name: &'static str, value: f64) -> Result<Subject, RunError> {
     let failed = |message: String| RunError::Setting(format!("{name} at {value}: {message}"));
-    let family = family(name).ok_or_else(|| failed("there is no such family".to_owned()))?;
+    let family = family(name).ok_or_else(|| failed("unknown family".to_owned()))?;
     let scene = family.scene(value, Size::QUICK, 1).map_err(|error| failed(error.to_string()))?;
     Ok(Subject { name: format!("{name} at {value}"), what: What::Family(Box::new(scene)) })
 }

@@ -33,7 +33,7 @@ pub struct FailureRow {
     pub chosen: Vec<Chosen>,
 }
 
-/// The level that is chosen where so many percent are asked for.
+/// The level that is chosen where so many percent are requested.
 #[derive(Clone, Debug, Serialize)]
 pub struct Chosen {
     /// Requested error, percent.

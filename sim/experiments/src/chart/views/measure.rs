@@ -127,7 +127,7 @@ impl Bench {
             workloads::load(name)?.with_overrides(&Overrides { size, shutter, ..Overrides::default() })?;
         let frame = scene.frame(number)?;
         let focus = frame.camera.lens().ok_or_else(|| refused("it has no lens"))?.focus();
-        let viewport = Viewport::new(width, height).ok_or_else(|| refused("views of no size"))?;
+        let viewport = Viewport::new(width, height).ok_or_else(|| refused(workloads::job::IMAGE_SIZE))?;
         Ok(Self { scene, frame, gpu: GpuSpec::load("reference")?, viewport, focus })
     }
 

@@ -50,9 +50,9 @@ fn areas_of(panel: u32, picture: &Picture) -> Vec<HeatTile> {
     let mut tiles = Vec::new();
     for (y, row) in (0..).zip(kinds.chunks(width as usize)) {
         let mut x = panel * width;
-        for alike in row.chunk_by(|a, b| a == b) {
-            let size = [alike.len() as u32, 1];
-            tiles.push(HeatTile { origin: [x, y], size, value: f64::from(alike[0]) });
+        for equal in row.chunk_by(|a, b| a == b) {
+            let size = [equal.len() as u32, 1];
+            tiles.push(HeatTile { origin: [x, y], size, value: f64::from(equal[0]) });
             x += size[0];
         }
     }

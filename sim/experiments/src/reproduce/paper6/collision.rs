@@ -260,7 +260,7 @@ impl Looked<'_> {
     }
 
     /// Whether boxes of time and depth and boxes of depth alone say what they have to.
-    fn is_told_apart(&self, ours: &PlainResult, depth: &PlainResult) -> bool {
+    fn is_distinguished(&self, ours: &PlainResult, depth: &PlainResult) -> bool {
         depth.may_collide() && ours.may_collide() == self.case.collide
     }
 }
@@ -287,7 +287,7 @@ pub(super) fn dodged(task: &Task<'_>) -> Result<Done, RunError> {
                     (looked.drawn(method, resolution), looked.drawn(Method::DepthOnly, resolution));
                 drawn = drawn.and(&ours).and(&depth);
                 let fewest = ours.overlaps.into_iter().min().unwrap_or(0);
-                at.push((resolution, fewest as f64, looked.is_told_apart(&ours, &depth)));
+                at.push((resolution, fewest as f64, looked.is_distinguished(&ours, &depth)));
                 if resolution == *row.resolution_px.get(form) && method == row.methods.get(form)[0] {
                     said.push(told(case, &ours, &depth, resolution));
                 }
@@ -330,7 +330,7 @@ pub(super) fn tighter(task: &Task<'_>) -> Result<Done, RunError> {
     let mut drawn = PlainResult::default();
     let mut kept = |method| -> Vec<Vec<usize>> {
         let at = |&resolution: &u32| {
-            let each: Vec<_> = all.par_iter().map(|case| kept_in_vain(case, method, resolution)).collect();
+            let each: Vec<_> = all.par_iter().map(|case| false_positives(case, method, resolution)).collect();
             drawn = each.iter().fold(drawn, |all, (_, one)| all.and(one));
             each.into_iter().map(|(count, _)| count).collect()
         };
@@ -370,7 +370,7 @@ pub(super) fn tighter(task: &Task<'_>) -> Result<Done, RunError> {
 }
 
 /// Pairs of a case that do not collide and are kept, and what was drawn for that.
-fn kept_in_vain(case: &Case, method: Method, resolution: u32) -> (usize, PlainResult) {
+fn false_positives(case: &Case, method: Method, resolution: u32) -> (usize, PlainResult) {
     let mut passes = PlainPasses::new(method, resolution);
     let (mut kept, mut all) = (0, PlainResult::default());
     for (a, b) in candidates(&case.objects) {

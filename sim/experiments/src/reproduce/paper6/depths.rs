@@ -271,7 +271,7 @@ impl<'a> Scenes<'a> {
 fn random(count: u32, side_px: u32, seed: u64) -> Result<StressScene, RunError> {
     let camera = Camera::new(Affine3A::IDENTITY, 1.0, NEAR).map_err(RunError::setting)?;
     let viewport =
-        Viewport::new(side_px, side_px).ok_or_else(|| RunError::setting("VI-15: an image of no size"))?;
+        Viewport::new(side_px, side_px).ok_or_else(|| RunError::setting(workloads::job::IMAGE_SIZE))?;
     let samples = SampleTable::low_discrepancy(4, seed, LensShape::Disk)?;
     let (mut open, mut close) = (Vec::new(), Vec::new());
     for number in 0..count {

@@ -12,10 +12,10 @@ use crate::chart::occlusion::{Drawn, Kind};
 use output::plot::Series;
 use run::RunError;
 
-/// Yards drawn, with so many boxes asked for in each.
+/// Draws the scenes of a kind, with `asked` queried boxes in each.
 fn drawn(
     kind: Kind,
-    yards: u64,
+    scenes: u64,
     change: impl Fn(WallSceneSpec) -> WallSceneSpec,
     size: (u32, u32),
     samples: u32,
@@ -35,10 +35,10 @@ struct Share {
 }
 
 impl Share {
-    fn of(yards: &[Drawn], boxes: [u32; 3], tile_px: u32) -> Self {
+    fn of(scenes: &[Drawn], boxes: [u32; 3], tile_px: u32) -> Self {
         let mut share = Self::default();
-        for yard in yards {
-            for (answer, seen) in yard.ask(boxes, tile_px).0.iter().zip(&yard.seen) {
+        for scene in scenes {
+            for (answer, seen) in scene.ask(boxes, tile_px).0.iter().zip(&scene.seen) {
                 let hidden = seen.passed == 0;
                 share.hidden += u64::from(hidden);
                 share.found += u64::from(hidden && answer.hidden);
@@ -62,9 +62,9 @@ pub(super) fn rate(task: &Task<'_>) -> Result<Done, RunError> {
     let mut total = Share::default();
     let mut measure = |motion: f32, tile_px: u32| -> Result<Vec<(f64, f64)>, RunError> {
         let change = |spec| WallSceneSpec { motion, ..spec };
-        let yards = drawn(Kind::Motion, *row.yards.get(form), change, size, *row.samples.get(form), asked)?;
+        let scenes = drawn(Kind::Motion, *row.yards.get(form), change, size, *row.samples.get(form), asked)?;
         let at = |&boxes: &u32| {
-            let share = Share::of(&yards, [1, 1, boxes], tile_px);
+            let share = Share::of(&scenes, [1, 1, boxes], tile_px);
             total.hidden += share.hidden;
             total.tiles += share.tiles;
             total.wrong += share.wrong;
@@ -111,7 +111,7 @@ pub(super) fn rate(task: &Task<'_>) -> Result<Done, RunError> {
         ("share_most_boxes", ends.map_or(f64::NAN, |(_, last)| last.1)),
         ("wrong", wrong as f64),
     ]);
-    let ran = numbers([("hidden_objects_asked_for", total.hidden as f64), ("tiles", total.tiles as f64)]);
+    let ran = numbers([("hidden_objects_queried", total.hidden as f64), ("tiles", total.tiles as f64)]);
     let figure = over_doublings(
         "VI_occlusion",
         [
@@ -143,13 +143,13 @@ struct Costs {
 }
 
 impl Costs {
-    /// Over the objects that are asked for; `charged` is the share of making the boxes of depth that queries pay for.
-    fn of(yards: &[(Drawn, Vec<Answer>)], asked: Asked, charged: f64) -> Self {
+    /// Over the queried objects; `charged` is the share of making the boxes of depth that queries pay for.
+    fn of(scenes: &[(Drawn, Vec<Answer>)], asked: Asked, charged: f64) -> Self {
         let mut costs = Self::default();
-        for (yard, answers) in yards {
+        for (scene, answers) in scenes {
             // Each stored depth is read and compared once, for all queries of the frame.
-            let made = charged * yard.stored() as f64 / answers.len().max(1) as f64;
-            for (answer, seen) in answers.iter().zip(&yard.seen) {
+            let made = charged * scene.stored() as f64 / answers.len().max(1) as f64;
+            for (answer, seen) in answers.iter().zip(&scene.seen) {
                 if asked == Asked::All || seen.passed == 0 {
                     costs.add(seen, answer, made);
                 }
@@ -187,16 +187,16 @@ pub(super) fn cost(task: &Task<'_>) -> Result<Done, RunError> {
     let mut queried = Vec::new();
     for kind in Kind::ALL {
         for &samples in row.samples.get(form) {
-            let yards = drawn(kind, *row.yards.get(form), |spec| spec, size, samples, asked)?;
-            let answered = |yard: Drawn| {
-                let answers = yard.ask(kind.typical(), tile_px).0;
-                (yard, answers)
+            let scenes = drawn(kind, *row.yards.get(form), |spec| spec, size, samples, asked)?;
+            let answered = |scene: Drawn| {
+                let answers = scene.ask(kind.typical(), tile_px).0;
+                (scene, answers)
             };
-            queried.push(yards.into_iter().map(answered).collect::<Vec<_>>());
+            queried.push(scenes.into_iter().map(answered).collect::<Vec<_>>());
         }
     }
     let costs =
-        |objects, charged| queried.iter().map(|yards| Costs::of(yards, objects, charged)).collect::<Vec<_>>();
+        |objects, charged| queried.iter().map(|scenes| Costs::of(scenes, objects, charged)).collect::<Vec<_>>();
     let far = *row.far_fewer.get(form);
     let mut tried =
         Cases::new("times fewer tests or bytes, whichever are nearer", "objects and boxes_charged jointly");
@@ -230,7 +230,7 @@ pub(super) fn cost(task: &Task<'_>) -> Result<Done, RunError> {
         ("least_bytes_ratio_boxes_charged", charged[1]),
     ]);
     let ran = numbers([
-        ("objects_asked_for", base.iter().map(|costs| costs.objects).sum()),
+        ("objects_queried", base.iter().map(|costs| costs.objects).sum()),
         ("sampled_tests", base.iter().map(|costs| costs.sampled[0]).sum()),
         ("interval_tests", base.iter().map(|costs| costs.interval[0]).sum()),
     ]);

@@ -34,7 +34,7 @@ struct Checked {
     hole: f64,
     free: f64,
     density: f64,
-    thin_voids: u64,
+    thin_regions: u64,
 }
 
 impl Checked {
@@ -46,7 +46,7 @@ impl Checked {
             hole: largest_hole(points, torus).radius / radius,
             free: free_share(points, radius, torus, places),
             density: points.len() as f64 * ball(D) * radius.powi(D as i32),
-            thin_voids: found.thin_regions,
+            thin_regions: found.thin_regions,
         }
     }
 
@@ -85,7 +85,7 @@ pub(super) fn darts(task: &Task<'_>) -> Result<Done, RunError> {
     let in_space = Checked::of(&deep, *row.radius_3d.get(form), places);
     let holds = in_plane.is_maximal() && in_space.is_maximal() && flat.drawn > 0;
     let ours = format!(
-        "2D, {} of the points from {} samples that hit rasterized voids in {} passes: {}; 3D, thrown on the CPU: {}",
+        "2D, {} of the points from {} samples that hit rasterized uncovered regions in {} passes: {}; 3D, thrown on the CPU: {}",
         flat.drawn,
         flat.candidates,
         flat.passes,
@@ -109,7 +109,7 @@ pub(super) fn darts(task: &Task<'_>) -> Result<Done, RunError> {
         ("free_share", in_plane.free + in_space.free),
         ("packing_density_2d", in_plane.density),
         ("packing_density_3d", in_space.density),
-        ("thin_voids", (in_plane.thin_voids + in_space.thin_voids) as f64),
+        ("thin_regions", (in_plane.thin_regions + in_space.thin_regions) as f64),
     ]);
     let ran = numbers([
         ("passes", f64::from(flat.passes)),
