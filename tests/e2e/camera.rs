@@ -217,7 +217,7 @@ fn errors_in_a_camera_name_their_place() {
             "shift: only `quintile visibility`",
             "leave it out",
         ),
-        ("upside", "camera: there is no camera `upside`: known here: scene", "give `inside` or `outside`"),
+        ("upside", "camera: there is no camera `upside`: known: scene", "give `inside` or `outside`"),
         ("scen", "camera: there is no camera `scen`", "did you mean `scene`?"),
         ("7", "camera: there is no camera `7`", "give `inside` or `outside`"),
     ] {

@@ -36,7 +36,7 @@ fn invalid_arguments_are_refused() {
     let (good, cut) = (inputs.put("good.mts", falling()), inputs.put("cut.mts", &falling()[..100]));
     let alone = inputs.put("alone.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     let cases: [(&[&str], i32, &str); 6] = [
-        (&["/dev/null"], 2, "known here: .mts, and .ply, .obj or .off two by two"),
+        (&["/dev/null"], 2, "known: .mts, and .ply, .obj or .off two by two"),
         (&[&good, "--resolution", "0"], 2, "1..=1024"),
         (&[&good, "--method", "guess"], 2, "fragment-box"),
         (&[&good, "--csv", &good], 2, "name another file"),

@@ -220,7 +220,7 @@ fn usage_errors_and_failures_have_their_exit_codes() {
         (&[&start, &end], &["--camera", &gone], 2, &["gone.mts` is not a camera: give `inside`"]),
         (&[&start, &end], &["--camera", &typo], 2, &["typo.ron:2:", "`widht`, did you mean `width`?"]),
         (&[&start, &whole], &[], 2, &["a.mts holds both ends", "give it alone"]),
-        (&[&strange], &[], 2, &["a.glb: ", "known here: .m5d, .mts"]),
+        (&[&strange], &[], 2, &["a.glb: ", "known: .m5d, .mts"]),
         (&[&carried], &["--print-camera"], 2, &["a.m5d has a camera of its own", "leave it out"]),
         (&[&start, &end, &end], &[], 2, &["no more were expected"]),
         (&[], &[], 2, &["<FILE>"]),

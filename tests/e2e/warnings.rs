@@ -42,7 +42,7 @@ const NOT_PROVOKED: [(&str, &str); 21] = [
         "the recorder of a run is chosen so that its range holds the peak; only a recorder set by hand could clip",
     ),
     (
-        "prediction-unsure",
+        "wide-prediction-interval",
         "it takes an animation whose previews mislead by more than a few percent; a unit test in `sim` makes it up",
     ),
     (
@@ -53,7 +53,7 @@ const NOT_PROVOKED: [(&str, &str); 21] = [
         "start-error",
         "it takes a start that counts as found and is off by more than half of its frame; a unit test in `run` makes one up",
     ),
-    ("unsure-frames", "it takes a trace in which frames go astray; tests in `traces` have some"),
+    ("low-confidence", "it takes a trace in which frames go astray; tests in `traces` have some"),
     (
         "uncovered",
         "it takes a trace whose frames change until they are not followed; a unit test in `traces` has one",

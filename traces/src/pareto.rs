@@ -25,7 +25,7 @@ pub struct Point {
 
 /// A setting, compared with all others.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct TradeoffPoint {
+pub struct RatedPoint {
     /// The point; its energy is as given.
     #[serde(flatten)]
     pub point: Point,
@@ -42,7 +42,7 @@ pub const DRAWS: u32 = 4096;
 
 /// Which points are on the frontier. With `idle_w`, the faster of two is charged idling for the time it saves
 /// (Paper IV, section 5): all are charged up to the slowest, so that any two are compared in the same way.
-pub fn frontier(points: &[Point], idle_w: f64, seed: u64) -> Vec<TradeoffPoint> {
+pub fn frontier(points: &[Point], idle_w: f64, seed: u64) -> Vec<RatedPoint> {
     let slowest_s = points.iter().map(|point| point.time_s).fold(0.0, f64::max);
     let compensated = |time_s: f64, energy_j: f64| energy_j + idle_w * (slowest_s - time_s);
     let pairs: Vec<(f64, f64)> =
@@ -59,7 +59,7 @@ pub fn frontier(points: &[Point], idle_w: f64, seed: u64) -> Vec<TradeoffPoint> 
         let moved: Vec<(f64, f64)> = moved.collect();
         nondominated(&moved).iter().zip(&mut counts).for_each(|(on, count)| *count += u32::from(*on));
     }
-    let tradeoff = |(index, point): (usize, &Point)| TradeoffPoint {
+    let tradeoff = |(index, point): (usize, &Point)| RatedPoint {
         point: point.clone(),
         compensated_j: pairs[index].1,
         on_frontier: on[index],
@@ -162,7 +162,7 @@ pub fn frontiers(
     columns: &SettingColumns,
     idle_w: f64,
     seed: u64,
-) -> Result<BTreeMap<String, Vec<TradeoffPoint>>, ParetoError> {
+) -> Result<BTreeMap<String, Vec<RatedPoint>>, ParetoError> {
     let numbers = |column: &str, scale: f64| -> Result<Vec<f64>, ParetoError> {
         let values = table.numbers(column)?;
         Ok(values.into_iter().map(|value| value * scale).collect())
@@ -230,7 +230,7 @@ fn check_settings(
 ///
 /// # Errors
 /// The errors of `out`.
-pub fn write_csv(groups: &BTreeMap<String, Vec<TradeoffPoint>>, out: &mut impl Write) -> std::io::Result<()> {
+pub fn write_csv(groups: &BTreeMap<String, Vec<RatedPoint>>, out: &mut impl Write) -> std::io::Result<()> {
     let mut rows = csv::Writer::from_writer(out);
     rows.write_record([
         "group",

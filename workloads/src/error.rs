@@ -20,7 +20,7 @@ pub enum LoadError {
         known: String,
     },
     /// A file of a format that is not accepted here.
-    #[error("{file}: it cannot be told what kind of file this is; known here: {known}")]
+    #[error("{file}: unrecognized kind of file; known: {known}")]
     Kind {
         /// The file.
         file: String,

@@ -203,8 +203,8 @@ pub fn suggestion(found: &str, known: &[&str]) -> String {
     };
     match nearest {
         Some((distance, name)) if is_typing_error(distance, name) => format!("did you mean `{name}`?"),
-        Some(_) => format!("known here: {}", known.join(", ")),
-        None => "none is known here".to_owned(),
+        Some(_) => format!("known: {}", known.join(", ")),
+        None => "none is known".to_owned(),
     }
 }
 
@@ -233,8 +233,8 @@ mod tests {
     #[test]
     fn an_unrelated_name_lists_the_known_ones() {
         let error = parse::<Gpu>("(wibble: 1)", "gpu.ron").unwrap_err();
-        assert!(error.to_string().contains("known here: tile_size, clock_hz"), "{error}");
-        assert_eq!(suggestion("foo", &["look", "seconds"]), "known here: look, seconds");
+        assert!(error.to_string().contains("known: tile_size, clock_hz"), "{error}");
+        assert_eq!(suggestion("foo", &["look", "seconds"]), "known: look, seconds");
     }
 
     #[test]

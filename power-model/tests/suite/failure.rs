@@ -163,7 +163,7 @@ fn invalid_surroundings_are_refused_with_their_position() {
         ("launch: (", "lunch: (", ["unknown field `lunch`", "did you mean `launch`?"]),
         ("waiting_w: ", "wating_w: ", ["unknown field `wating_w`", "did you mean `waiting_w`?"]),
         ("irregularity: ", "iregularity: ", ["unknown field `iregularity`", "did you mean `irregularity`?"]),
-        ("core_scale: ", "scale: ", ["unknown field `scale`", "known here: node_nm, core_scale"]),
+        ("core_scale: ", "scale: ", ["unknown field `scale`", "known: node_nm, core_scale"]),
         (
             "frame_cap_hz: Published(30",
             "frame_cap_hz: Published(0",

@@ -172,10 +172,11 @@ fn report_camera(plan: &Plan, progress: &Progress) {
     }
 }
 
-/// Figures that every run writes into `plots/`: name and description.
-pub const FIGURES: [(&str, &str); 4] = [
+/// Figures that a run writes into `plots/`: name and description.
+pub const FIGURES: [(&str, &str); 5] = [
     ("power_run", "power over the run with found and true frame starts"),
     ("frame_power", "power over one frame, stacked by part"),
     ("unit_busy", "how busy each unit is over one frame"),
     ("frame_energy", "energy of each frame, measured and true"),
+    ("stalls", "what each unit waited for in one frame (only with --timing stepped)"),
 ];

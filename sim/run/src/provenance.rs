@@ -15,7 +15,7 @@ use crate::{Choice, Plan, RunError, RunOptions, Work};
 
 /// Schema version of `summary.json`, described by `docs/summary.schema.json`. A version may gain keys.
 /// Removing a key or changing its meaning or unit needs a new version.
-pub const SCHEMA: u32 = 2;
+pub const SCHEMA: u32 = 3;
 
 /// Input file of a run.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]

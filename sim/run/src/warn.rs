@@ -113,8 +113,10 @@ pub(crate) fn missed_requests(choice: &Choice) -> Vec<Warning> {
     let late = choice.budget_s.zip(choice.expected_host_s).filter(|(budget, expected)| expected > budget);
     let late = late.map(|(budget_s, expected_s)| {
         let message = format!(
-            "simulating was expected to take {expected_s:.1} s, more than the {budget_s} s of --budget, at the cheapest \
-             there is; give more time, or fewer frames, samples or pixels"
+            "even the cheapest choice is expected to take {}, more than the {} of --budget; give more time, or fewer frames, \
+             samples or pixels",
+            si(expected_s, "s"),
+            si(budget_s, "s")
         );
         Warning::new(Code::BudgetMissed, message)
     });
@@ -140,7 +142,7 @@ fn wide_intervals(simulated: &Simulated) -> Option<Warning> {
     let worst = sampled.worst() * 100.0;
     (worst > MAX_HALF_WIDTH_PERCENT).then(|| {
         Warning::new(
-            Code::PredictionUnsure,
+            Code::WidePredictionInterval,
             format!(
                 "{} of {} frames were simulated, and totals predicted from them are good to {worst:.1} % only: frames differ in \
                  ways that their previews do not show; give --accuracy, or simulate all",
@@ -168,7 +170,7 @@ fn short_frames(measurement: &Measurement) -> Option<Warning> {
         Warning::new(
             Code::ShortFrame,
             format!(
-                "{short} of {} frames are too short for the recorder: at {} it takes {:.1} samples while the shortest is busy, and \
+                "{short} of {} frames are too short for the recorder: at {} the shortest is busy for {:.1} samples, and \
                  {found}; {faster}a larger image",
                 frames.len(),
                 si(resolution.rate_hz, "Hz"),
@@ -180,12 +182,12 @@ fn short_frames(measurement: &Measurement) -> Option<Warning> {
 
 fn detection(measurement: &Measurement) -> Option<Warning> {
     let score = &measurement.score;
-    let unsure = measurement.frames.iter().filter(|frame| frame.flags.contains(Flag::Unsure)).count();
+    let flagged = measurement.frames.iter().filter(|frame| frame.flags.contains(Flag::LowConfidence)).count();
     (score.matched < score.truth || score.found > score.matched).then(|| {
         Warning::new(
             Code::FramesMissed,
             format!(
-                "{} of {} frame starts were found in the trace, with {} false ones ({unsure} flagged unsure): energies \
+                "{} of {} frame starts were found in the trace, with {} false ones ({flagged} flagged low_confidence): energies \
                  of the frames beside them are wrong",
                 score.matched,
                 score.truth,

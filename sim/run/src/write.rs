@@ -24,7 +24,7 @@ pub(super) fn claim(plan: &Plan) -> Claim {
         frames().flat_map(|frame| ends.iter().map(move |end| format!("{}.{end}", image_name(frame))));
     let maps = plan.options.heat.iter().flat_map(|&event| frames().map(move |frame| heat_name(event, frame)));
     let heat = maps.flat_map(|name| ["png", "exr", "csv"].map(|end| format!("{name}.{end}")));
-    let figures = FIGURES.map(|(figure, _)| figure).into_iter().chain(["stalls"]);
+    let figures = FIGURES.map(|(figure, _)| figure).into_iter();
     Claim::new("run")
         .files(images.chain(heat))
         .plots(figures.map(|figure| format!("plots/{figure}")))

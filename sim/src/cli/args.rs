@@ -29,18 +29,18 @@ impl ThreadArgs {
     }
 }
 
-/// Style of pictures. The default is a width of their own and letters for a screen.
+/// Style of pictures. By default each picture has its own width, and text for a screen.
 #[derive(Clone, Debug, Default, Args)]
 #[command(next_help_heading = "Pictures")]
 pub struct LookArgs {
-    /// Width of pictures in millimetres, 30 to 400, or `column` for 85 mm; letters are then 8 points high
+    /// Width of pictures in millimetres, 30 to 400, or `column` for 85 mm; text is then 8 points high
     #[arg(long, value_name = "MM|column", allow_negative_numbers = true, value_parser = width)]
     pub width: Option<f64>,
     /// Title of pictures in place of their own; an empty one omits title and subtitle, for papers with
     /// captions
     #[arg(long, value_name = "TEXT")]
     pub title: Option<String>,
-    /// Size of ordinary letters of pictures in points, 4 to 32
+    /// Font size of pictures in points, 4 to 32
     #[arg(long, value_name = "PT", allow_negative_numbers = true, value_parser = font_size)]
     pub font_size: Option<f64>,
 }
@@ -63,7 +63,7 @@ fn width(text: &str) -> Result<f64, String> {
 
 fn font_size(text: &str) -> Result<f64, String> {
     within(text.strip_suffix("pt").unwrap_or(text), 4.0..=32.0)
-        .ok_or_else(|| format!("`{text}` is not a size of letters; give 4 to 32 points"))
+        .ok_or_else(|| format!("`{text}` is not a font size; give 4 to 32 points"))
 }
 
 fn within(text: &str, range: std::ops::RangeInclusive<f64>) -> Option<f64> {

@@ -222,7 +222,7 @@ fn unanswered(outcomes: &[Outcome], terminal: &Terminal) -> Result<(), Failure> 
 
 fn text(outcomes: &[Outcome]) -> String {
     let mut table =
-        Table::new(["case", "objects", "triangles", "boxes touch", "may collide", "seen to touch"]);
+        Table::new(["case", "objects", "triangles", "boxes touch", "may collide", "contact found"]);
     for case in outcomes.iter().filter_map(Outcome::found) {
         table.row([
             case.case_id.clone(),

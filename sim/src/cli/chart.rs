@@ -27,7 +27,7 @@ use crate::cli::args::{LookArgs, ThreadArgs};
 pub struct StressArgs {
     /// One family; all without it
     pub family: Option<String>,
-    /// Folder for the results; made where it is missing
+    /// Folder for the results; created if missing
     #[arg(long, value_name = "DIR", default_value = "out/stress")]
     pub out: PathBuf,
     /// Overwrite files in DIR that Quintile did not write
@@ -58,10 +58,10 @@ pub struct ChartArgs {
     /// Another scene for `sampled`, `tile-tests` or `timing`, by name or file; may be given several times
     #[arg(long, value_name = "SCENE")]
     pub scene: Vec<String>,
-    /// Smaller images, fewer samples and a coarser reference: seconds instead of minutes
+    /// Smaller images, fewer samples and a coarser reference: seconds for one chart instead of minutes, minutes for `all`
     #[arg(long)]
     pub quick: bool,
-    /// Folder for the results; made where it is missing
+    /// Folder for the results; created if missing
     #[arg(long, value_name = "DIR", default_value = "out/charts")]
     pub out: PathBuf,
     /// Overwrite files in DIR that Quintile did not write

@@ -99,7 +99,7 @@ pub(super) fn run(args: &VisibilityArgs, terminal: &Terminal) -> Result<(), Fail
     );
     let notes: String = std::iter::once(rates).chain(camera).collect();
     print(&format!(
-        "{} triangles, {}x{} pixels of {} samples: {} of {} samples see a triangle{notes}",
+        "{} triangles, {}x{} pixels of {} samples: {} of {} samples hit a triangle{notes}",
         found.triangles, found.width, found.height, found.samples_per_pixel, found.hits, found.samples
     ))
 }

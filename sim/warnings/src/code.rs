@@ -104,7 +104,7 @@ codes! {
     /// At `bound`: a packet arrives every two cycles or faster.
     ShortPackets = "short-packets" in Simulator,
     /// An interval of `--timing sampled` is wider than 5 % of its value either way.
-    PredictionUnsure = "prediction-unsure" in Simulator,
+    WidePredictionInterval = "wide-prediction-interval" in Simulator,
     /// The expected error of the choice exceeds the requested accuracy.
     AccuracyMissed = "accuracy-missed" in Simulator,
     /// Even the cheapest choice was expected to exceed `--budget`.
@@ -141,7 +141,7 @@ codes! {
     /// Matches and other minima are poorly separated.
     WeakSeparation = "weak-separation" in Trace,
     /// More than a tenth of the frames have a confidence below one half.
-    UnsureFrames = "unsure-frames" in Trace,
+    LowConfidence = "low-confidence" in Trace,
     /// Too many frames are longer than 1.5 or shorter than 0.5 median durations.
     IrregularSpacing = "irregular-spacing" in Trace,
     /// The window is longer than the median frame.

@@ -13,7 +13,7 @@ const MIN_FRAME_SAMPLES: f64 = 50.0;
 /// Largest share of frames of odd length, by number or by covered time, of a regular spacing.
 const MAX_ODD_SHARE: f64 = 0.1;
 /// Largest share of frames of low confidence without a warning about the whole result.
-const MAX_UNSURE_SHARE: f64 = 0.1;
+const MAX_LOW_CONFIDENCE_SHARE: f64 = 0.1;
 
 /// The confidence of a distance (W^2): 1 at or below the mean of the matches, 0 at or above that of the rest,
 /// linear in the logarithm between; scaled down where neither the populations are distinct nor the starts
@@ -68,7 +68,7 @@ pub(crate) fn conclude_at(
         only_marks(&found),
         weak_separation(&found),
         irregular(&found),
-        many_unsure(&found),
+        low_confidence(&found),
         median_s.and_then(|median_s| window_too_long(&found, median_s)),
         median_s.and_then(|median_s| few_samples(median_s, rate_hz)),
     ]
@@ -124,12 +124,12 @@ fn irregular(found: &Found) -> Option<Warning> {
     })
 }
 
-fn many_unsure(found: &Found) -> Option<Warning> {
-    let unsure = found.frames.iter().filter(|frame| frame.flags.contains(Flag::Unsure)).count();
+fn low_confidence(found: &Found) -> Option<Warning> {
+    let flagged = found.frames.iter().filter(|frame| frame.flags.contains(Flag::LowConfidence)).count();
     let all = found.frames.len();
-    (unsure as f64 > MAX_UNSURE_SHARE * all as f64).then(|| {
-        Warning::new(Code::UnsureFrames, format!(
-            "{unsure} of {all} frames have a confidence below one half: their starts may be those of something else that \
+    (flagged as f64 > MAX_LOW_CONFIDENCE_SHARE * all as f64).then(|| {
+        Warning::new(Code::LowConfidence, format!(
+            "{flagged} of {all} frames have a confidence below one half: their starts may be those of something else that \
              repeats; look at them before their energies are used, mark several frames, or sample faster"))
     })
 }
@@ -204,15 +204,15 @@ mod tests {
     }
 
     #[test]
-    fn many_unsure_frames_make_the_whole_result_unsure() {
+    fn many_frames_of_low_confidence_give_a_warning() {
         let marks = Marks::one(0.0, Window { pre_s: 0.1, post_s: 0.4 }, 21.0);
         let placement = Placement { marks: Vec::new(), samples: 50, cut: false };
-        let warned = |unsure: usize| {
+        let warned = |flagged: usize| {
             let mut starts = starts(&[1.0; 20], 1.0);
-            starts[..unsure].iter_mut().for_each(|start| start.confidence = 0.2);
+            starts[..flagged].iter_mut().for_each(|start| start.confidence = 0.2);
             let nothing = super::super::threshold::choose(&[], 0.0, 0.0, 0.0, |_| 0.0);
             let found = conclude_at(100.0, &marks, &placement, starts, nothing);
-            found.warnings.iter().any(|warning| warning.code == "unsure-frames")
+            found.warnings.iter().any(|warning| warning.code == "low-confidence")
         };
         assert!(!warned(0) && !warned(2) && warned(3));
     }

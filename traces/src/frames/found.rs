@@ -80,13 +80,13 @@ pub enum Flag {
     /// Less than half the median duration: perhaps part of a frame.
     Short,
     /// Confidence below one half.
-    Unsure,
+    LowConfidence,
     /// Over 1.6 times as long as the frames around it: starts in between may have been missed.
     Merged,
     /// Less than 1 / 1.6 as long as the frames around it: it may be part of one.
     Split,
     /// Its length deviates from the even period of its neighbours: one of its ends may be misplaced.
-    Odd,
+    IrregularLength,
     /// It has fewer than 16 samples: its ends, known to half a sample at best, may be off by a thirtieth of
     /// it and more.
     Coarse,
@@ -99,16 +99,23 @@ impl Flag {
         Self::Last,
         Self::Long,
         Self::Short,
-        Self::Unsure,
+        Self::LowConfidence,
         Self::Merged,
         Self::Split,
-        Self::Odd,
+        Self::IrregularLength,
         Self::Coarse,
     ];
 
     /// Flags of frames whose ends may be misplaced.
-    pub const LOW_CONFIDENCE: [Self; 7] =
-        [Self::Long, Self::Short, Self::Unsure, Self::Merged, Self::Split, Self::Odd, Self::Coarse];
+    pub const LOW_CONFIDENCE: [Self; 7] = [
+        Self::Long,
+        Self::Short,
+        Self::LowConfidence,
+        Self::Merged,
+        Self::Split,
+        Self::IrregularLength,
+        Self::Coarse,
+    ];
 
     /// The word in the `flags` column.
     pub fn name(self) -> &'static str {
@@ -117,10 +124,10 @@ impl Flag {
             Self::Last => "last",
             Self::Long => "long",
             Self::Short => "short",
-            Self::Unsure => "unsure",
+            Self::LowConfidence => "low_confidence",
             Self::Merged => "merged",
             Self::Split => "split",
-            Self::Odd => "odd",
+            Self::IrregularLength => "irregular_length",
             Self::Coarse => "coarse",
         }
     }
@@ -221,9 +228,9 @@ mod tests {
     fn flags_print_in_a_fixed_order() {
         let mut flags = Flags::default();
         assert_eq!(flags.to_string(), "");
-        flags.insert(Flag::Unsure);
+        flags.insert(Flag::LowConfidence);
         flags.insert(Flag::Last);
-        assert_eq!(flags.to_string(), "last+unsure");
+        assert_eq!(flags.to_string(), "last+low_confidence");
         assert!(flags.contains(Flag::Last) && !flags.contains(Flag::Long));
     }
 

@@ -24,7 +24,7 @@ pub enum MarkError {
     },
     /// A marked start is outside the trace, or too near its ends for a usable window.
     #[error(
-        "the frame start marked at {mark_s} s has no window in the trace ({start_s} s to {end_s} s): \
+        "the window around the mark at {mark_s} s is not within the trace ({start_s} s to {end_s} s): \
          mark a frame further inside"
     )]
     OutsideTrace {
@@ -215,7 +215,7 @@ pub(crate) fn flat_mark<'a>(
     Some(Warning::new(
         Code::FlatMark,
         format!(
-            "around the mark at {mark_s} s power varies by no more than noise, so that any rest resembles it: what is found may be no \
+            "around the mark at {mark_s} s power varies by no more than noise, and any idle time resembles it: what is found may be no \
              frames; mark where one begins"
         ),
     ))

@@ -54,7 +54,7 @@ pub(super) fn spans(starts: &[FrameStart], end_s: f64, sampling: Sampling) -> Ve
     }
     lower_coarse_confidence(&mut frames, sampling);
     for frame in frames.iter_mut().filter(|frame| frame.confidence < 0.5) {
-        frame.flags.insert(Flag::Unsure);
+        frame.flags.insert(Flag::LowConfidence);
     }
     for frame in frames
         .iter_mut()
@@ -122,7 +122,7 @@ fn flag_unusual(frames: &mut [FrameSpan]) {
         } else if length_s * MAX_LENGTH_RATIO < usual_s {
             frame.flags.insert(Flag::Split);
         } else if (length_s - usual_s).abs() > (ODD_LIMITS[0] * usual_s).max(ODD_LIMITS[1] * others_s) {
-            frame.flags.insert(Flag::Odd);
+            frame.flags.insert(Flag::IrregularLength);
         }
     }
 }
@@ -161,22 +161,22 @@ mod tests {
     #[test]
     fn a_start_misplaced_in_an_even_beat_makes_both_its_frames_odd() {
         let gaps_s = [1.0, 1.01, 0.99, 1.0, 1.2, 0.8, 1.0, 1.01, 1.0, 0.99];
-        assert_eq!(flagged(&gaps_s, Flag::Odd), [4, 5]);
+        assert_eq!(flagged(&gaps_s, Flag::IrregularLength), [4, 5]);
     }
 
     #[test]
     fn a_clock_step_and_lengths_that_vary_anyway_are_not_odd() {
         let step_s = [1.0, 1.01, 0.99, 1.0, 1.01, 1.4, 1.41, 1.39, 1.4, 1.4, 1.41];
-        assert!(flagged(&step_s, Flag::Odd).is_empty());
+        assert!(flagged(&step_s, Flag::IrregularLength).is_empty());
         let varied_s = [1.0, 1.2, 0.9, 1.15, 0.85, 1.1, 0.95, 1.2, 0.9, 1.0];
-        assert!(flagged(&varied_s, Flag::Odd).is_empty());
+        assert!(flagged(&varied_s, Flag::IrregularLength).is_empty());
     }
 
     #[test]
     fn merged_and_split_frames_are_called_that_and_not_odd() {
         let gaps_s = [1.0, 1.0, 1.0, 2.0, 1.0, 1.0, 0.5, 0.5, 1.0, 1.0, 1.0];
         assert_eq!((flagged(&gaps_s, Flag::Merged), flagged(&gaps_s, Flag::Split)), (vec![3], vec![6, 7]));
-        assert!(flagged(&gaps_s, Flag::Odd).is_empty());
+        assert!(flagged(&gaps_s, Flag::IrregularLength).is_empty());
     }
 
     #[test]
@@ -187,35 +187,35 @@ mod tests {
         assert_eq!(coarse, [true, false, true, true]);
     }
 
-    fn unsure(gaps_s: &[f64], sampling: Sampling) -> Vec<usize> {
+    fn low_confidence(gaps_s: &[f64], sampling: Sampling) -> Vec<usize> {
         let starts = starts(gaps_s, 1.0);
         let frames = spans(&starts, starts.last().map_or(1.0, |last| last.time_s + 1.0), sampling);
-        (0..frames.len()).filter(|&index| frames[index].flags.contains(Flag::Unsure)).collect()
+        (0..frames.len()).filter(|&index| frames[index].flags.contains(Flag::LowConfidence)).collect()
     }
 
     #[test]
-    fn in_a_coarse_window_what_breaks_the_beat_is_unsure_and_without_a_beat_all_is() {
+    fn in_a_coarse_window_what_breaks_the_beat_has_low_confidence_and_without_a_beat_all_is() {
         let coarse = Sampling { window: 10, rate_hz: 20.0 };
         let mut gaps_s = vec![1.0; 30];
         (gaps_s[10], gaps_s[11]) = (1.15, 0.85);
-        assert_eq!(unsure(&gaps_s, coarse), [10, 11]);
-        assert!(unsure(&gaps_s, FINE).is_empty());
+        assert_eq!(low_confidence(&gaps_s, coarse), [10, 11]);
+        assert!(low_confidence(&gaps_s, FINE).is_empty());
         let halves: Vec<f64> = (0..30).map(|i| if i % 2 == 0 { 1.2 } else { 0.8 }).collect();
-        assert_eq!(unsure(&halves, coarse).len(), 31);
-        assert_eq!(unsure(&halves, Sampling { window: 40, ..coarse }).len(), 31);
-        assert!(unsure(&halves, FINE).is_empty());
+        assert_eq!(low_confidence(&halves, coarse).len(), 31);
+        assert_eq!(low_confidence(&halves, Sampling { window: 40, ..coarse }).len(), 31);
+        assert!(low_confidence(&halves, FINE).is_empty());
     }
 
     #[test]
     fn with_a_handful_of_samples_gaps_must_agree_within_half_of_one() {
         let mut gaps_s = vec![1.0; 30];
         (gaps_s[10], gaps_s[11]) = (1.06, 0.94);
-        assert_eq!(unsure(&gaps_s, Sampling { window: 5, rate_hz: 10.0 }), [10, 11]);
-        assert!(unsure(&gaps_s, Sampling { window: 8, rate_hz: 10.0 }).is_empty());
+        assert_eq!(low_confidence(&gaps_s, Sampling { window: 5, rate_hz: 10.0 }), [10, 11]);
+        assert!(low_confidence(&gaps_s, Sampling { window: 8, rate_hz: 10.0 }).is_empty());
     }
 
     #[test]
-    fn frames_hardly_longer_than_a_coarse_window_are_unsure_all() {
-        assert_eq!(unsure(&[1.0; 30], Sampling { window: 10, rate_hz: 11.0 }).len(), 31);
+    fn frames_hardly_longer_than_a_coarse_window_all_have_low_confidence() {
+        assert_eq!(low_confidence(&[1.0; 30], Sampling { window: 10, rate_hz: 11.0 }).len(), 31);
     }
 }

@@ -46,7 +46,7 @@ impl Options {
                 "the path of a file; leave it out for balls",
             ),
             ("balls", (2..=100).contains(&self.balls), "2 to 100"),
-            ("resolution", (1..=1024).contains(&self.resolution), "1 to 1024 tiles"),
+            ("resolution", (1..=1024).contains(&self.resolution), "1 to 1024 pixels"),
             ("bins", (1..=256).contains(&self.bins), "1 to 256"),
         ])
     }

@@ -89,9 +89,7 @@ fn check_fields(
     let Value::Object(typed) = typed else {
         let (name, example) = known.iter().next().ok_or("nothing can be set in it")?;
         let (value, names) = (shortened(value), names.join(", "));
-        return Err(format!(
-            "`{value}` names no value: write it as ({name}: {example}); known here: {names}"
-        ));
+        return Err(format!("`{value}` names no value: write it as ({name}: {example}); known: {names}"));
     };
     for (name, value_of_it) in typed {
         if !known.contains_key(name) {
@@ -341,10 +339,7 @@ mod tests {
     #[test]
     fn errors_in_struct_values_name_the_field() {
         for (value, says) in [
-            (
-                "(1, 2)",
-                "light: `(1, 2)` names no value: write it as (radius: 0.0); known here: radius, target",
-            ),
+            ("(1, 2)", "light: `(1, 2)` names no value: write it as (radius: 0.0); known: radius, target"),
             ("5", "light: `5` names no value"),
             ("(raduis: 1)", "light: unknown option `raduis`; did you mean `radius`?"),
             (

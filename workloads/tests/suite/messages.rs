@@ -134,7 +134,7 @@ fn options_out_of_range_give_the_valid_range() {
         ("glossy", "roughness", "1e-300", "0, or a radius of 1e-15 to 120.0"),
         ("soft-shadows", "points", "[]", "1 to 65536 points"),
         ("soft-shadows", "light", "(radius: 1e10)", "100 times the way to the target"),
-        ("soft-shadows", "light", "(1, 2)", "known here: fov_deg, near, position, radius, target"),
+        ("soft-shadows", "light", "(1, 2)", "known: fov_deg, near, position, radius, target"),
         ("soft-shadows", "light", "(raduis: 1)", "did you mean `radius`?"),
     ] {
         let set = vec![(name.to_owned(), value.to_owned())];

@@ -217,7 +217,7 @@ fn incompatible_files_are_mistakes_of_usage() {
         (vec![&surface, &whole], ["files: ", "a.mts holds both ends"]),
         (vec![&carried, &surface], ["files: ", "a.m5d holds both ends"]),
         (vec![&surface, &surface, &surface], ["files: 3 were given", "give one, or two"]),
-        (vec![&other], ["a.png: ", "known here: .m5d, .mts, and .ply, .obj, .off or .stl"]),
+        (vec![&other], ["a.png: ", "known: .m5d, .mts, and .ply, .obj, .off or .stl"]),
         (vec![], ["files: 0 were given", "give one"]),
     ] {
         let error = load(&case, None).unwrap_err();

@@ -187,7 +187,8 @@ impl PointsChart {
     /// Numbers too coarse for the disks, and columns too few for the density.
     fn failures(&self) -> Vec<ChartPanel> {
         let coarse = |title: &str, up: &str, of: fn(&Coarse) -> f64| {
-            let curve = Series::curve("uncovered regions, 2D", self.coarse.iter().map(|c| (c.radius_ulp, of(c))));
+            let curve =
+                Series::curve("uncovered regions, 2D", self.coarse.iter().map(|c| (c.radius_ulp, of(c))));
             let warned = |c: &&Coarse| c.thin_regions as f64 > MAX_THIN_PER_POINT * c.points as f64;
             let last = self.coarse.iter().rfind(warned);
             ChartPanel::new(title, ["r in spacings of numbers", up], vec![curve])

@@ -128,7 +128,7 @@ impl Band {
             .map(|turn| format!("{} between {} and {}", turn.setting, turn.between[0], turn.between[1]))
             .collect();
         let turns =
-            if turns.is_empty() { String::new() } else { format!("; turns along {}", turns.join(", ")) };
+            if turns.is_empty() { String::new() } else { format!("; it changes along {}", turns.join(", ")) };
         format!(
             "{} from {} to {} over the settings tried ({}); the condition is met at {} of {}{turns}",
             self.of,
@@ -178,7 +178,7 @@ mod tests {
         assert_eq!((band.min, band.max, band.held), (2.5, 7.5, 2));
         assert_eq!(
             band.text(),
-            "increase in % from 2.500 to 7.500 over the settings tried (eyes alone); the condition is met at 2 of 3; turns along eyes between 2 and 3"
+            "increase in % from 2.500 to 7.500 over the settings tried (eyes alone); the condition is met at 2 of 3; it changes along eyes between 2 and 3"
         );
     }
 

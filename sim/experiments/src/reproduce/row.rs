@@ -138,7 +138,7 @@ impl Row {
         let less = if self.less_work.is_empty() { "quick form" } else { "quick form, less work" };
         match &self.band {
             _ if self.form == Form::Full || self.verdict == Verdict::NotYet => verdict.to_owned(),
-            Some(band) => format!("{verdict} at the {} of {} settings tried ({less})", band.tried, band.full),
+            Some(band) => format!("{verdict} at {} of {} settings ({less})", band.tried, band.full),
             None => format!("{verdict} ({less})"),
         }
     }
@@ -210,7 +210,7 @@ pub(super) mod tests {
         cases.along("tiles", [(4, 0.5, true), (8, 0.2, true)]);
         let less_work = vec!["yards".to_owned()];
         let banded = Row { band: cases.band(6), less_work, ..quick };
-        let text = "holds at the 2 of 6 settings tried (quick form, less work)";
+        let text = "holds at 2 of 6 settings (quick form, less work)";
         assert_eq!(banded.clone().judged().verdict_text, text);
         assert_eq!(Row { form: Form::Full, ..banded.clone() }.judged().verdict_text, "holds");
         assert_eq!(Row { verdict: Verdict::NotYet, ..banded }.judged().verdict_text, "not yet");

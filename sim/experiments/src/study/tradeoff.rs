@@ -103,8 +103,8 @@ impl TradeoffPoint {
 
 /// For each (cost, gain) whether it is Pareto-optimal: no other costs no more and gains no less, one of the two strictly.
 pub fn front(points: &[(f64, f64)]) -> Vec<bool> {
-    let dominates = |a: &(f64, f64), b: &(f64, f64)| a.0 <= b.0 && a.1 >= b.1 && a != b;
-    points.iter().map(|point| !points.iter().any(|other| dominates(other, point))).collect()
+    let costs: Vec<(f64, f64)> = points.iter().map(|(cost, gain)| (*cost, -gain)).collect();
+    traces::pareto::nondominated(&costs)
 }
 
 /// The points of many studies.

@@ -59,6 +59,9 @@ impl CompareError {
     }
 }
 
+/// Largest relative difference of sums of the same numbers in another order.
+const ROUNDING: f64 = 1e-13;
+
 /// Result of a comparison.
 #[derive(Clone, Debug, Serialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
@@ -173,9 +176,10 @@ impl Change {
         }
     }
 
-    /// Whether both values are equal or both are missing.
+    /// Whether both values are equal but for the rounding of sums, or both are missing.
     pub fn is_equal(&self) -> bool {
-        self.a == self.b
+        let close = |(a, b): (f64, f64)| (a - b).abs() <= ROUNDING * a.abs().max(b.abs());
+        self.a == self.b || self.a.zip(self.b).is_some_and(close)
     }
 }
 
@@ -269,6 +273,8 @@ mod tests {
         let change = Change::new("g", "n", "J", [Some(2.0), Some(1.5)]);
         assert_eq!((change.difference, change.ratio), (Some(-0.5), Some(0.75)));
         assert_eq!(Change::new("g", "n", "J", [Some(0.0), Some(1.0)]).ratio, None);
+        assert!(Change::new("g", "n", "J", [Some(0.1 + 0.2), Some(0.3)]).is_equal());
+        assert!(!Change::new("g", "n", "J", [Some(1.0), Some(1.0 + 1e-9)]).is_equal());
         let missing = Change::new("g", "n", "J", [None, Some(1.0)]);
         assert!(!missing.is_equal() && missing.difference.is_none());
     }

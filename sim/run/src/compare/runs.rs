@@ -131,9 +131,16 @@ fn warnings(runs: &[Value; 2]) -> Vec<String> {
     warnings
 }
 
-/// A JSON value as text: strings without quotes, `-` for null.
+/// A JSON value as text: strings without quotes, `-` for null, input files by path and the first digits of their SHA-256.
 pub fn shown(value: &Value) -> String {
     match value {
+        Value::Array(items) if items.iter().any(|item| item["path"].is_string()) => {
+            items.iter().map(shown).collect::<Vec<_>>().join(", ")
+        }
+        Value::Object(input) if input.contains_key("path") => {
+            let text = |key: &str| input.get(key).and_then(Value::as_str).unwrap_or("missing");
+            format!("{} ({:.8})", text("path"), text("sha256"))
+        }
         Value::Null => "-".to_owned(),
         Value::String(text) => text.clone(),
         other => other.to_string(),
@@ -232,6 +239,13 @@ mod tests {
         let cycles = values.iter().find(|change| change.name == "cycles").unwrap();
         assert_eq!((cycles.a, cycles.is_equal()), (Some(20.0), true));
         assert!(warnings(&runs).is_empty());
+    }
+
+    #[test]
+    fn input_files_are_shown_by_path_and_hash() {
+        let inputs =
+            json!([{"path": "a.ron", "bytes": 3, "sha256": "0123456789ab"}, {"path": "b", "sha256": null}]);
+        assert_eq!(shown(&inputs), "a.ron (01234567), b (missing)");
     }
 
     #[test]

@@ -95,16 +95,17 @@ pub struct FindArgs {
     /// A file of starts: a number in each line, in seconds, or a table with a column start or time, its unit in its name (start_s, time_ms)
     #[arg(long, value_name = "FILE")]
     pub mark_file: Option<PathBuf>,
-    /// Propose a start
+    /// Propose the start of a frame near the middle of the trace, where no mark is known; look at the result
     #[arg(long, conflicts_with_all = ["mark", "mark_file"])]
     pub auto: bool,
     /// Where the last frame ends, in seconds or with its unit; the end of the trace without it
     #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = time)]
     pub end: Option<f64>,
-    /// What is compared: times before and after the mark, in milliseconds or with their units
+    /// The window around a mark that is compared with the trace: times before and after it, in milliseconds or with their units
     #[arg(long, value_name = "PRE,POST", value_parser = window, default_value = "1,4", allow_hyphen_values = true)]
     pub window: (f64, f64),
-    /// How: `squares`, `normalized`, `tracking`, or `auto`
+    /// How starts are found: `squares` (sum of squared differences to the marked window), `normalized` (the same, regardless of level
+    /// and scale), `tracking` (the most likely sequence of starts), or `auto` (chosen by the length and the clarity of the trace)
     #[arg(long, value_name = "METHOD", default_value_t)]
     pub method: Method,
     /// Read in pieces even if the trace would fit into memory (sum of squares)

@@ -9,7 +9,7 @@ use output::table::{Table, si_digits};
 use output::terminal::Terminal;
 use serde_json::json;
 use traces::io::atomic::write_file;
-use traces::pareto::{ParetoError, Point, SettingColumns, TradeoffPoint, frontiers, write_csv};
+use traces::pareto::{ParetoError, Point, RatedPoint, SettingColumns, frontiers, write_csv};
 use traces::table::{Table as Columns, TableReadError};
 
 use super::pipes::shown;
@@ -98,7 +98,7 @@ impl From<ParetoError> for Failure {
     }
 }
 
-type Groups = BTreeMap<String, Vec<TradeoffPoint>>;
+type Groups = BTreeMap<String, Vec<RatedPoint>>;
 
 pub(super) fn run(args: &ParetoArgs, terminal: &Terminal) -> Result<(), Failure> {
     may_hold_results(("--out", args.out.as_deref()), [args.table.as_path()])?;
@@ -161,7 +161,7 @@ fn place(show: ParetoShow, p: &Point) -> (f64, f64, f64, f64) {
 /// All groups in one picture: points with their names and deviations, and each group's frontier as steps, as between two settings
 /// there is none.
 fn picture(args: &ParetoArgs, groups: &Groups) -> Picture {
-    let place = |s: &TradeoffPoint| place(args.show, &s.point);
+    let place = |s: &RatedPoint| place(args.show, &s.point);
     let all = || groups.values().flatten();
     let of = |on: bool| {
         let chosen = all().filter(move |s| s.on_frontier == on);

@@ -39,10 +39,10 @@ pub struct PlotArgs {
     /// What to draw
     #[arg(long, value_enum, default_value_t)]
     pub kind: PlotKind,
-    /// Begin of what is shown of the curve, in seconds or with its unit
+    /// Where the shown part of the curve begins, in seconds or with its unit
     #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = time)]
     pub from: Option<f64>,
-    /// End of what is shown of the curve, in seconds or with its unit
+    /// Where the shown part of the curve ends, in seconds or with its unit
     #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = time)]
     pub to: Option<f64>,
     /// Time over which the curve's mean is drawn, in milliseconds or with its unit; a fiftieth of the range without it
@@ -106,7 +106,7 @@ pub enum PlotKind {
     Overlay,
     /// Energy of each frame
     Energy,
-    /// How often which energy occurs
+    /// Distribution of the energies of frames
     Histogram,
     /// Mean energy over the number of frames left out at the beginning
     Discard,
@@ -374,7 +374,7 @@ fn histogram(energies: &[f64]) -> Drawn {
     let at = |index: usize| low + index as f64 * width;
     let bars = counts.iter().enumerate().map(|(i, &count)| (at(i), at(i + 1), f64::from(count))).collect();
     (
-        "How often which energy occurs",
+        "Distribution of frame energies",
         ("energy", "J"),
         ("frames", ""),
         vec![series("frames", Mark::Bars(bars))],

@@ -77,7 +77,7 @@ impl Library {
         found.faces.iter().filter_map(|face| face.material).for_each(|name| used[name as usize] = true);
         let names = found.materials.iter().zip(used).filter(|(_, used)| *used && self.whole);
         let names = names.map(|(name, _)| name).filter(|name| !self.described.contains_key(*name));
-        let what = "described in no material file: drawn grey";
+        let what = "missing from the material files: drawn grey";
         names.map(|name| ignored::about_material(Code::MissingMaterial, "material", what, name)).collect()
     }
 }

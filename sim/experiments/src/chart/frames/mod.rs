@@ -150,7 +150,7 @@ impl Study for FramesChart {
     const ABOUT: &'static str =
         "Frame starts found and energy error, by method, over sampling rate, noise, bits and host time";
     const PICTURES: &'static [&'static str] = &["frames_rate", "frames_noise", "frames_bits", "frames_time"];
-    const FILES: &'static [&'static str] = &["frames.csv", "frames.json"];
+    const FILES: &'static [&'static str] = &["frame_finding.csv", "frame_finding.json"];
     const SHOWS_TIME: bool = true;
 
     type Effort = FramesEffort;
@@ -228,7 +228,7 @@ impl Study for FramesChart {
             .data("right", |row| row.outcome.right)
             .data("right_flagged", |row| row.outcome.right_flagged)
             .data("host_s_per_1e6", |row| row.outcome.host_s_per_1e6)
-            .csv("frames.csv");
+            .csv("frame_finding.csv");
         vec![self.by_scene(), self.by_value(), rows.sheet()]
     }
 
@@ -400,7 +400,7 @@ mod tests {
             assert_eq!(row.fails, row.outcome.f1 < FAILS_BELOW);
             assert!(row.outcome.wrong_flagged <= row.outcome.wrong && row.outcome.f1 <= 1.0);
         }
-        let text = std::fs::read_to_string(dir.path().join("frames.csv")).unwrap();
+        let text = std::fs::read_to_string(dir.path().join("frame_finding.csv")).unwrap();
         assert_eq!(text.lines().count(), 1 + chart.rows.len());
     }
 

@@ -57,7 +57,7 @@ pub struct AnimationRow {
     /// Relative error of the cycles of all frames together.
     pub cycle_error_percent: f64,
     /// Seconds of the host's processor, drawing included, all threads together.
-    pub host_s: f64,
+    pub cpu_s: f64,
     /// The same over that of the reference.
     pub relative_host: f64,
 }
@@ -66,7 +66,7 @@ pub struct AnimationRow {
 struct Simulated {
     plan: Plan,
     frames: Vec<RunFrame>,
-    host_s: f64,
+    cpu_s: f64,
 }
 
 impl Simulated {
@@ -87,14 +87,14 @@ pub(super) fn rows(
         let plan = plan(scene, gpu, extent, level)?;
         let started = ProcessTime::now();
         let frames = frames_of(&plan, &numbers, progress)?;
-        Ok(Simulated { plan, frames, host_s: started.elapsed().as_secs_f64() })
+        Ok(Simulated { plan, frames, cpu_s: started.elapsed().as_secs_f64() })
     };
     if Distinct::new(&plan(scene, gpu, extent, Level::Packet)?.work)?.numbers().len() < numbers.len() {
         return Ok(Vec::new());
     }
     let truth = all(Level::Stepped)?;
     let name = Path::new(scene).file_name().map_or(scene.into(), |file| file.to_string_lossy());
-    let row = |level: &'static str, simulated: usize, cycles: f64, host_s: f64| AnimationRow {
+    let row = |level: &'static str, simulated: usize, cycles: f64, cpu_s: f64| AnimationRow {
         scene: name.clone().into_owned(),
         gpu: gpu.name.clone(),
         level,
@@ -106,16 +106,16 @@ pub(super) fn rows(
         } else {
             (cycles / truth.cycles() - 1.0) * 100.0
         },
-        host_s,
-        relative_host: host_s / truth.host_s,
+        cpu_s,
+        relative_host: cpu_s / truth.cpu_s,
     };
     let whole =
-        |level: Level, found: &Simulated| row(level.name(), numbers.len(), found.cycles(), found.host_s);
+        |level: Level, found: &Simulated| row(level.name(), numbers.len(), found.cycles(), found.cpu_s);
     let (packet, bound) = (all(Level::Packet)?, all(Level::Bound)?);
     let mut rows =
         vec![whole(Level::Stepped, &truth), whole(Level::Packet, &packet), whole(Level::Bound, &bound)];
-    for (seed, simulated, cycles, host_s) in sampled(&packet, &numbers, extent.seeds, progress)? {
-        rows.push(AnimationRow { seed: Some(seed), ..row(SAMPLED, simulated, cycles, host_s) });
+    for (seed, simulated, cycles, cpu_s) in sampled(&packet, &numbers, extent.seeds, progress)? {
+        rows.push(AnimationRow { seed: Some(seed), ..row(SAMPLED, simulated, cycles, cpu_s) });
     }
     Ok(rows)
 }
@@ -149,8 +149,8 @@ fn sampled(
         let design = previews.design(&signatures, Sampling::Some.first(count), seed);
         let simulated = design.chosen().len();
         let forecast = Forecast::new(design, &signatures, |place| all.frames[place].cost());
-        let host_s = previews_s + all.host_s * simulated as f64 / count as f64;
-        (seed, simulated, forecast.cycles_per_frame().value * count as f64, host_s)
+        let cpu_s = previews_s + all.cpu_s * simulated as f64 / count as f64;
+        (seed, simulated, forecast.cycles_per_frame().value * count as f64, cpu_s)
     };
     Ok((1..=seeds).map(choice).collect())
 }

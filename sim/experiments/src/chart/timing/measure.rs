@@ -52,7 +52,7 @@ pub struct TimingRow {
     /// Codes of the warnings that a run at this level would give of its time.
     pub warns: Vec<&'static str>,
     /// Seconds of the host's processor, timing alone: the stream is written.
-    pub host_s: f64,
+    pub cpu_s: f64,
     /// Seconds of the host's processor to turn packets into service demands, once for all levels.
     pub written_s: f64,
     /// Seconds of the host for the reference over these.
@@ -64,16 +64,16 @@ pub struct TimingRow {
 pub(super) struct Speed {
     unit_cycles: u64,
     cycles: u64,
-    host_s: f64,
+    cpu_s: f64,
 }
 
 impl Speed {
     pub fn figures(&self) -> Reference {
-        let per_s = |count: u64| count as f64 / self.host_s.max(1e-12);
+        let per_s = |count: u64| count as f64 / self.cpu_s.max(1e-12);
         Reference {
             unit_cycles_per_s: per_s(self.unit_cycles),
             cycles_per_s: per_s(self.cycles),
-            host_s: self.host_s,
+            cpu_s: self.cpu_s,
         }
     }
 }
@@ -93,13 +93,13 @@ pub(super) fn rows(
     let (truth, stepped_s) = timed(Level::Stepped, gpu, &written)?;
     speed.unit_cycles += truth.unit_cycles;
     speed.cycles += truth.cycles;
-    speed.host_s += stepped_s;
+    speed.cpu_s += stepped_s;
     let true_power = power(&truth)?;
     let mut rows = Vec::new();
     for level in Level::ALL.into_iter().filter(|&level| level != Level::Stepped) {
-        let (found, mut host_s) = timed(level, gpu, &written)?;
+        let (found, mut cpu_s) = timed(level, gpu, &written)?;
         for _ in 1..TIMES {
-            host_s = host_s.min(timed(level, gpu, &written)?.1);
+            cpu_s = cpu_s.min(timed(level, gpu, &written)?.1);
         }
         let found_power = power(&found)?;
         rows.push(TimingRow {
@@ -120,9 +120,9 @@ pub(super) fn rows(
                 .into_iter()
                 .map(|warning| warning.code().name())
                 .collect(),
-            host_s,
-            written_s: written.host_s,
-            speedup_over_stepped: stepped_s / host_s,
+            cpu_s,
+            written_s: written.cpu_s,
+            speedup_over_stepped: stepped_s / cpu_s,
         });
     }
     Ok(rows)
@@ -134,7 +134,7 @@ pub(super) struct Written {
     builder: DemandBuilder,
     stream: Stream,
     totals: Totals,
-    host_s: f64,
+    cpu_s: f64,
 }
 
 impl Written {
@@ -147,7 +147,7 @@ impl Written {
             stream.push(&mut builder, packet, lines);
             stream.add_last(&builder, &mut totals);
         });
-        Ok(Self { clocks, builder, stream, totals, host_s: started.elapsed().as_secs_f64() })
+        Ok(Self { clocks, builder, stream, totals, cpu_s: started.elapsed().as_secs_f64() })
     }
 }
 

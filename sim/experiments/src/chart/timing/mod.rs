@@ -72,7 +72,7 @@ pub struct Reference {
     /// Cycles of the core clock, those that were skipped included, in a second of host time.
     pub cycles_per_s: f64,
     /// Host seconds of all rows.
-    pub host_s: f64,
+    pub cpu_s: f64,
 }
 
 /// The whole chart.
@@ -270,7 +270,7 @@ impl TimingChart {
             .data("power_shape_error_percent", |row| row.power_shape_error_percent)
             .data("busiest", |row| row.busiest.0)
             .data("busiest_share", |row| row.busiest.1)
-            .data("host_s", |row| row.host_s)
+            .data("cpu_s", |row| row.cpu_s)
             .data("written_s", |row| row.written_s)
             .data("speedup_over_stepped", |row| row.speedup_over_stepped)
             .detail("scene", |row| row.scene.as_str(), plain)

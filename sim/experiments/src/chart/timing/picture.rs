@@ -116,14 +116,14 @@ mod tests {
                 frames: 100,
                 simulated: 100,
                 cycle_error_percent: *cycle_error_percent,
-                host_s: 1.0,
+                cpu_s: 1.0,
                 relative_host: *relative_host,
             })
         });
         TimingChart {
             quick: true,
             levels: std::collections::BTreeMap::new(),
-            reference: Reference { unit_cycles_per_s: 1.0, cycles_per_s: 1.0, host_s: 1.0 },
+            reference: Reference { unit_cycles_per_s: 1.0, cycles_per_s: 1.0, cpu_s: 1.0 },
             animations: rows.collect(),
             rows: Vec::new(),
             added: Vec::new(),

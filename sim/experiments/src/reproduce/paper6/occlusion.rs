@@ -22,7 +22,7 @@ fn drawn(
     asked: u32,
 ) -> Result<Vec<Drawn>, RunError> {
     let one = |seed| Drawn::new([size.0, size.1], &change(kind.spec(asked, seed)), samples);
-    (0..yards).map(one).collect::<Result<_, _>>().map_err(RunError::setting)
+    (0..scenes).map(one).collect::<Result<_, _>>().map_err(RunError::setting)
 }
 
 /// What queries by intervals found: objects hidden, those of them found, and those called hidden that a sample sees.
@@ -195,8 +195,9 @@ pub(super) fn cost(task: &Task<'_>) -> Result<Done, RunError> {
             queried.push(scenes.into_iter().map(answered).collect::<Vec<_>>());
         }
     }
-    let costs =
-        |objects, charged| queried.iter().map(|scenes| Costs::of(scenes, objects, charged)).collect::<Vec<_>>();
+    let costs = |objects, charged| {
+        queried.iter().map(|scenes| Costs::of(scenes, objects, charged)).collect::<Vec<_>>()
+    };
     let far = *row.far_fewer.get(form);
     let mut tried =
         Cases::new("times fewer tests or bytes, whichever are nearer", "objects and boxes_charged jointly");
