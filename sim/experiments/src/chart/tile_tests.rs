@@ -81,7 +81,7 @@ impl Study for TileTests {
     const NAME: &'static str = "tile-tests";
     const ABOUT: &'static str =
         "Every combination of tile tests: efficiency and tightness over multiply-adds";
-    const PICTURES: &'static [&'static str] = &["plots/tile_tests_efficiency", "plots/tile_tests_tightness"];
+    const PICTURES: &'static [&'static str] = &["tile_tests_efficiency", "tile_tests_tightness"];
     const FILES: &'static [&'static str] = &["tile_tests.csv", "tile_tests.json"];
     const TAKES_SCENES: bool = true;
 
@@ -115,10 +115,10 @@ impl Study for TileTests {
         );
         let panel = self.panel("efficiency over the best (%)", |row| row.efficiency);
         let title = "Which tile tests pay: efficiency";
-        to.chart("plots/tile_tests_efficiency", [title, &subject], vec![panel])?;
+        to.chart("tile_tests_efficiency", [title, &subject], vec![panel])?;
         let panel = self.panel("tightness over the best (%)", |row| row.tightness);
         let title = "Which tile tests pay: tightness";
-        to.chart("plots/tile_tests_tightness", [title, &subject], vec![panel])
+        to.chart("tile_tests_tightness", [title, &subject], vec![panel])
     }
 
     fn tables(&self) -> Vec<Sheet> {
