@@ -30,12 +30,15 @@ const SOURCES: [&str; 19] = [
 fn main() {
     // Tests on real scenes count as ignored where there are none.
     println!("cargo:rerun-if-env-changed=QUINTILE_SCENES");
-    println!("cargo:rustc-check-cfg=cfg(real_scenes, collision_data)");
+    println!("cargo:rustc-check-cfg=cfg(real_scenes, collision_data, superuser)");
     if let Some(scenes) = std::env::var_os("QUINTILE_SCENES") {
         println!("cargo:rustc-cfg=real_scenes");
         if Path::new(&scenes).join("../ccd").is_dir() {
             println!("cargo:rustc-cfg=collision_data");
         }
+    }
+    if may_write_anywhere() {
+        println!("cargo:rustc-cfg=superuser");
     }
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     if std::env::var("PROFILE").is_ok_and(|profile| profile == "release") {
@@ -44,6 +47,14 @@ fn main() {
     } else {
         println!("cargo:rerun-if-changed=build.rs");
     }
+}
+
+/// Whether permissions of folders do not hold for this user; tests of them then count as ignored.
+fn may_write_anywhere() -> bool {
+    #[cfg(unix)]
+    return std::fs::metadata("/proc/self").is_ok_and(|this| std::os::unix::fs::MetadataExt::uid(&this) == 0);
+    #[cfg(not(unix))]
+    return false;
 }
 
 /// The revision, with `+changes` where the sources are not quite its.

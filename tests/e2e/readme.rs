@@ -77,6 +77,73 @@ fn links_resolve() {
     }
 }
 
+/// Files and folders in back quotes of `ARCHITECTURE.md` and `CONTRIBUTING.md` that begin with a folder of the repository.
+#[test]
+fn quoted_paths_exist() {
+    for page in ["ARCHITECTURE.md", "CONTRIBUTING.md"] {
+        let plain: String = text(&root().join(page)).split("```").step_by(2).collect();
+        let quoted = plain.split('`').skip(1).step_by(2).filter(|quoted| !quoted.contains([' ', '*', '\n']));
+        let paths: Vec<&str> = quoted
+            .filter(|quoted| quoted.split_once('/').is_some_and(|(first, _)| root().join(first).is_dir()))
+            .collect();
+        assert!(paths.len() > 10, "{page}: {paths:?}");
+        for path in paths {
+            assert!(root().join(path).exists() || is_module(path), "{page}: `{path}` does not exist");
+        }
+    }
+}
+
+/// Whether a path without an ending is that of a module of Rust.
+fn is_module(path: &str) -> bool {
+    root().join(format!("{path}.rs")).exists()
+}
+
+/// Names of modules and of functions below `folder`.
+fn names(folder: &Path, into: &mut Vec<String>) {
+    for entry in fs::read_dir(folder).expect("a folder of tests").map(|entry| entry.expect("an entry").path())
+    {
+        into.extend(entry.file_stem().map(|stem| stem.to_string_lossy().into_owned()));
+        if entry.is_dir() {
+            names(&entry, into);
+        } else if entry.extension().is_some_and(|ending| ending == "rs") {
+            let functions = text(&entry);
+            let named = functions.split("fn ").skip(1).filter_map(|rest| rest.split('(').next());
+            into.extend(named.map(str::to_owned));
+        }
+    }
+}
+
+/// Pages of the book, with `CONTRIBUTING.md`.
+fn pages(folder: &Path) -> Vec<std::path::PathBuf> {
+    let entries =
+        fs::read_dir(folder).expect("a folder of pages").map(|entry| entry.expect("an entry").path());
+    let (folders, files): (Vec<_>, Vec<_>) = entries.partition(|entry| entry.is_dir());
+    let markdown = files.into_iter().filter(|file| file.extension().is_some_and(|ending| ending == "md"));
+    markdown.chain(folders.iter().flat_map(|folder| pages(folder))).collect()
+}
+
+#[test]
+fn filters_of_tests_in_the_book_match_a_test() {
+    let mut known = Vec::new();
+    for folder in ["pipeline", "workloads", "traces", "power-model", "sim", "sim/timing"] {
+        names(&root().join(folder).join("tests/suite"), &mut known);
+    }
+    names(&root().join("tests/e2e"), &mut known);
+    let mut checked = 0;
+    for page in pages(&root().join("docs")).into_iter().chain([root().join("CONTRIBUTING.md")]) {
+        let text = text(&page);
+        for rest in ["--test suite ", "--test e2e "].iter().flat_map(|key| text.split(key).skip(1)) {
+            let end =
+                rest.find(|c: char| !(c.is_ascii_lowercase() || c.is_ascii_digit() || "_:".contains(c)));
+            for filter in rest[..end.unwrap_or(rest.len())].split("::").filter(|filter| !filter.is_empty()) {
+                assert!(known.iter().any(|name| name.contains(filter)), "{}: {filter}", page.display());
+                checked += 1;
+            }
+        }
+    }
+    assert!(checked > 5, "only {checked} filters were found");
+}
+
 #[test]
 fn there_is_a_licence() {
     let names = ["LICENSE", "LICENSE-MIT", "LICENSE-APACHE", "LICENCE"];

@@ -141,12 +141,6 @@ pub struct LineAccess {
 impl LineAccess {
     /// Stands for no line.
     pub const NONE: u32 = u32::MAX;
-
-    /// Number of lines transferred to or from memory.
-    pub fn transfers(&self) -> u32 {
-        u32::from(matches!(self.kind, LineKind::Fetch | LineKind::Drain))
-            + u32::from(self.victim != Self::NONE)
-    }
 }
 
 impl AddAssign<&PacketCounts> for Counts {

@@ -29,8 +29,8 @@ impl Progress {
         Self { bars: MultiProgress::with_draw_target(target), terminal: terminal.clone() }
     }
 
-    /// Whether bars are hidden.
-    pub fn is_silent(&self) -> bool {
+    #[cfg(test)]
+    fn is_silent(&self) -> bool {
         self.bars.is_hidden()
     }
 

@@ -152,23 +152,6 @@ impl Device {
         let slack = 1.0 + 2.0 * trace.samples() as f64 * f64::EPSILON;
         Some(watts * slack * trace.period_s())
     }
-
-    /// Standard deviation that the device's noise alone gives the trace's whole energy, J:
-    /// `dt sqrt(sum (V s_I)^2 + (I s_V)^2)`, the noise being independent from sample to sample.
-    pub fn noise_energy_sigma_j(&self, sampled: &Sampled) -> f64 {
-        let trace = &sampled.trace;
-        let variance: f64 = trace
-            .voltage_v()
-            .iter()
-            .zip(trace.current_a())
-            .map(|(&voltage, &current)| {
-                let by_current = f64::from(voltage) * self.spec.current_noise_a;
-                let by_voltage = f64::from(current) * self.spec.voltage_noise_v;
-                by_current * by_current + by_voltage * by_voltage
-            })
-            .sum();
-        libm::sqrt(variance) * trace.period_s()
-    }
 }
 
 #[cfg(test)]

@@ -61,7 +61,7 @@ fn views(spec: &PipelineSpec) {
 }
 
 fn gloss(spec: &PipelineSpec) {
-    let scene = glossy::stage(false).unwrap();
+    let scene = glossy::default_scene(false).unwrap();
     let frame = scene.frame(0).unwrap();
     let draws: Vec<_> =
         frame.draws(&scene).unwrap().into_iter().map(|draw| Draw { cull: Cull::None, ..draw }).collect();
@@ -80,7 +80,7 @@ fn gloss(spec: &PipelineSpec) {
 }
 
 fn shadows(spec: &PipelineSpec) {
-    let scene = soft_shadows::stage().unwrap();
+    let scene = soft_shadows::default_scene().unwrap();
     let frame = scene.frame(1).unwrap();
     let draws: Vec<_> =
         frame.draws(&scene).unwrap().into_iter().map(|draw| Draw { cull: Cull::None, ..draw }).collect();

@@ -80,13 +80,13 @@ fn fill(graph: &mut Graph) {
     let at = |x: f64, y: f64, z: f64| Local::Trs(Trs { translation: DVec3::new(x, y, z), ..Trs::default() });
 
     let ground = graph.push_node(Node::new("floor", None, at(0.0, 0.0, 0.0)));
-    graph.hang(shapes::plane(8.0, 2, 4.0, floor), ground);
+    graph.attach(shapes::plane(8.0, 2, 4.0, floor), ground);
     let mut thrown = Node::new("thrown box", None, at(-1.0, 0.9, 0.2));
     thrown.motion.velocity = DVec3::new(18.0, 0.0, 0.0);
     let thrown = graph.push_node(thrown);
-    graph.hang(shapes::cuboid(Vec3::splat(0.7), red), thrown);
+    graph.attach(shapes::cuboid(Vec3::splat(0.7), red), thrown);
     let mut turning = Node::new("turning box", None, at(0.7, 0.6, -1.5));
     turning.motion.spin = Spin::new(DVec3::new(0.3, 1.0, 0.1), 4.0);
     let turning = graph.push_node(turning);
-    graph.hang(shapes::cuboid(Vec3::new(1.2, 0.8, 0.5), teal), turning);
+    graph.attach(shapes::cuboid(Vec3::new(1.2, 0.8, 0.5), teal), turning);
 }

@@ -62,7 +62,7 @@ fn palette(graph: &mut Graph) -> Palette {
 fn place(graph: &mut Graph, name: &str, mesh: Mesh, at: [f64; 3], turn: DQuat, motion: Motion) {
     let trs = Trs { translation: DVec3::from_array(at), rotation: turn, ..Trs::default() };
     let node = graph.push_node(Node { motion, ..Node::new(name, None, Local::Trs(trs)) });
-    graph.hang(Mesh { name: name.to_owned(), ..mesh }, node);
+    graph.attach(Mesh { name: name.to_owned(), ..mesh }, node);
 }
 
 fn spin(axis: DVec3, rate_hz: f64) -> Motion {

@@ -119,7 +119,7 @@ impl Glossy {
     pub fn new(options: Options, overrides: &Overrides, seed: u64) -> Result<Self, LoadError> {
         let scene = match &options.scene {
             Some(name) => crate::load(name)?,
-            None => stage(options.index.is_some())?,
+            None => default_scene(options.index.is_some())?,
         };
         let scene = scene.with_overrides(overrides)?;
         options.check()?;
@@ -227,7 +227,7 @@ pub fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<dyn Job>
 ///
 /// # Errors
 /// None are expected: the scene is tested.
-pub fn stage(below: bool) -> Result<Scene, LoadError> {
+pub fn default_scene(below: bool) -> Result<Scene, LoadError> {
     let mut parts = Parts::new("glossy");
     fill(&mut parts.graph, if below { -1.0 } else { 1.0 });
     parts.camera = SceneCamera {
@@ -254,7 +254,7 @@ fn fill(graph: &mut Graph, side: f64) {
         let at = DVec3::new(at[0], side * at[1], at[2]);
         let trs = Trs { translation: at, ..Trs::default() };
         let node = graph.push_node(Node::new("block", None, Local::Trs(trs)));
-        graph.hang(shapes::cuboid(size, colours[colour % 4]), node);
+        graph.attach(shapes::cuboid(size, colours[colour % 4]), node);
     };
     for (post, x) in [-1.1, 0.0, 1.1].into_iter().enumerate() {
         for step in 0..4 {

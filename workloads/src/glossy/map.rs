@@ -10,13 +10,13 @@ use super::receiver::{Effect, Receiver};
 use crate::accumulation::{Rays, SharedSamples, pinhole};
 use crate::error::LoadError;
 use crate::job::JobError;
-use crate::scene::camera::Stand;
+use crate::scene::camera::CameraFrame;
 
 /// A map: its camera, and the texels of the receiver.
 #[derive(Clone, Copy, Debug)]
 pub struct Map {
     camera: Camera,
-    stand: Stand,
+    stand: CameraFrame,
     receiver: Receiver,
     radius: f64,
     /// Texels across and down.
@@ -52,7 +52,7 @@ impl Map {
         })?;
         let forward = if effect == Effect::Reflection { receiver.normal } else { -receiver.normal };
         let up = receiver.right.cross(forward);
-        let stand = Stand { eye: from, right: receiver.right, up, forward };
+        let stand = CameraFrame { eye: from, right: receiver.right, up, forward };
         let to = receiver.centre - from;
         let (distance, [x, y]) = (to.dot(forward), [to.dot(stand.right), to.dot(up)]);
         let [wide, high] = receiver.half;

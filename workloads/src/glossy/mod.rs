@@ -9,13 +9,13 @@
 //!   shading.
 //! - [`Map`]: the map in [one pass](Map::one_pass), by [accumulation](Map::accumulated), and by
 //!   [rays](Map::by_rays), the brute-force reference.
-//! - [`job()`]: the workload; [`stage()`]: its scene.
+//! - [`job()`]: the workload; [`default_scene()`]: its scene.
 
 mod job;
 mod map;
 mod receiver;
 
 pub(crate) use job::FLAGS;
-pub use job::{Glossy, Options, job, receiver, stage};
+pub use job::{Glossy, Options, default_scene, job, receiver};
 pub use map::{Lobe, Map};
 pub use receiver::{Effect, Receiver, ReceiverShader};

@@ -120,7 +120,7 @@ fn solid(path: &Path, mut soup: Soup) -> Result<Parts, LoadError> {
     let looks = std::mem::take(&mut soup.looks);
     let (meshes, materials) = looks.split(soup.into_mesh(path, origin)?, 0);
     parts.graph.materials = materials;
-    meshes.into_iter().for_each(|mesh| parts.graph.hang(mesh, node));
+    meshes.into_iter().for_each(|mesh| parts.graph.attach(mesh, node));
     Ok(parts)
 }
 

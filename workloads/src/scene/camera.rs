@@ -155,14 +155,14 @@ impl Default for SceneCamera {
 
 /// Position and axes of a camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Stand {
+pub(crate) struct CameraFrame {
     pub eye: DVec3,
     pub right: DVec3,
     pub up: DVec3,
     pub forward: DVec3,
 }
 
-impl Stand {
+impl CameraFrame {
     /// A camera at `eye` that looks along `forward`; `None` if `forward` has no length or is not finite. If `up`
     /// is parallel to `forward`, another axis is used as up.
     pub fn new(eye: DVec3, forward: DVec3, up: DVec3) -> Option<Self> {
@@ -205,7 +205,7 @@ fn unit(v: DVec3) -> Option<DVec3> {
 
 impl SceneCamera {
     /// Position and axes in `pose`, relative to its origin; `None` for a camera that is not fitted yet or has no direction.
-    pub(super) fn stand(&self, pose: &Pose, at: Instant) -> Option<Stand> {
+    pub(super) fn stand(&self, pose: &Pose, at: Instant) -> Option<CameraFrame> {
         match &self.rig {
             Rig::LookAt(sight) => {
                 let eye = sight.position.at(at);
@@ -213,15 +213,15 @@ impl SceneCamera {
                     Aim::At(target) => target.at(at) - eye,
                     Aim::Along(direction) => *direction,
                 };
-                Stand::new(eye - pose.origin, along, sight.up)
+                CameraFrame::new(eye - pose.origin, along, sight.up)
             }
-            Rig::Node(node) => Stand::on_node(pose.world(*node)),
+            Rig::Node(node) => CameraFrame::on_node(pose.world(*node)),
             Rig::Fitted(_) => None,
         }
     }
 
     /// Depth of the target, if the camera has one.
-    pub(super) fn target_depth(&self, stand: &Stand, (pose, at): (&Pose, Instant)) -> Option<f64> {
+    pub(super) fn target_depth(&self, stand: &CameraFrame, (pose, at): (&Pose, Instant)) -> Option<f64> {
         let Rig::LookAt(sight) = &self.rig else { return None };
         let Aim::At(target) = &sight.aim else { return None };
         Some(stand.depth(target.at(at) - pose.origin))
@@ -238,8 +238,8 @@ impl SceneCamera {
 /// A camera during one shutter interval.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Standing {
-    pub open: Stand,
-    pub close: Stand,
+    pub open: CameraFrame,
+    pub close: CameraFrame,
     /// Near depth in scene units.
     pub near: f64,
     /// Default focus depth in scene units.
@@ -269,7 +269,7 @@ mod tests {
 
     #[test]
     fn camera_space_is_right_up_forward() {
-        let stand = Stand::new(DVec3::new(0.0, 0.0, 5.0), DVec3::NEG_Z, DVec3::Y).unwrap();
+        let stand = CameraFrame::new(DVec3::new(0.0, 0.0, 5.0), DVec3::NEG_Z, DVec3::Y).unwrap();
         let pose = stand.pose();
         assert_eq!(pose.transform_point3a(Vec3A::ZERO), Vec3A::new(0.0, 0.0, 5.0));
         assert_eq!(pose.transform_vector3a(Vec3A::X), Vec3A::X);
@@ -279,8 +279,8 @@ mod tests {
 
     #[test]
     fn a_camera_that_looks_straight_up_still_has_axes() {
-        let stand = Stand::new(DVec3::ZERO, DVec3::Y, DVec3::Y).unwrap();
+        let stand = CameraFrame::new(DVec3::ZERO, DVec3::Y, DVec3::Y).unwrap();
         assert!(stand.right.is_finite() && stand.right.dot(DVec3::Y).abs() < 1e-12);
-        assert!(Stand::new(DVec3::ZERO, DVec3::ZERO, DVec3::Y).is_none());
+        assert!(CameraFrame::new(DVec3::ZERO, DVec3::ZERO, DVec3::Y).is_none());
     }
 }

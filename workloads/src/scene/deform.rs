@@ -17,7 +17,7 @@ pub(super) struct Pose {
 
 /// Transforms of the vertices of one instance at one time.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Carriage {
+pub(super) struct InstanceTransforms {
     /// One matrix for a rigid instance, one for each joint of a skinned one.
     matrices: Vec<DAffine3>,
     weights: Vec<f64>,
@@ -36,7 +36,7 @@ impl Pose {
         self.worlds.get(node).copied().unwrap_or(DAffine3::IDENTITY)
     }
 
-    pub fn carriage(&self, graph: &Graph, instance: Instance) -> Carriage {
+    pub fn transforms(&self, graph: &Graph, instance: Instance) -> InstanceTransforms {
         let skin = instance.skin.and_then(|skin| graph.skins.get(skin));
         let matrices = match skin {
             Some(skin) => {
@@ -45,7 +45,7 @@ impl Pose {
             }
             None => vec![self.world(instance.node)],
         };
-        Carriage { matrices, weights: self.weights(graph, instance) }
+        InstanceTransforms { matrices, weights: self.weights(graph, instance) }
     }
 
     fn weights(&self, graph: &Graph, instance: Instance) -> Vec<f64> {
@@ -58,7 +58,7 @@ impl Pose {
     }
 }
 
-impl Carriage {
+impl InstanceTransforms {
     /// Whether a rigid transform mirrors the mesh, so that the winding of its triangles has to be reversed.
     pub fn mirrors(&self) -> bool {
         matches!(&self.matrices[..], [matrix] if matrix.matrix3.determinant() < 0.0)

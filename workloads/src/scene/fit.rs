@@ -8,7 +8,7 @@
 
 use glam::DVec3;
 
-use super::camera::Stand;
+use super::camera::CameraFrame;
 
 /// Share of the image's width and height that a fitted scene fills.
 const FILL: f64 = 0.92;
@@ -28,7 +28,7 @@ const TOWARD_EYE: DVec3 = DVec3::new(0.55, 0.42, 1.0);
 /// Extremes of all points, from which a camera is fitted.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Extent {
-    axes: Stand,
+    axes: CameraFrame,
     slopes: [f64; 2],
     /// Largest `a - tan_x c`, `-a - tan_x c`, and the same for `b`.
     sides: [f64; 4],
@@ -39,7 +39,7 @@ pub(crate) struct Extent {
 /// Position of a fitted camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Fit {
-    pub stand: Stand,
+    pub stand: CameraFrame,
     /// Direction of the view before normalization; up is +y.
     pub direction: DVec3,
     /// A depth nearer than the nearest point.
@@ -54,7 +54,7 @@ impl Extent {
     /// No points yet, for a view with these tangents of half its width and height.
     pub fn new(tan_half_width: f64, tan_half_height: f64) -> Option<Self> {
         Some(Self {
-            axes: Stand::new(DVec3::ZERO, -TOWARD_EYE, DVec3::Y)?,
+            axes: CameraFrame::new(DVec3::ZERO, -TOWARD_EYE, DVec3::Y)?,
             slopes: [tan_half_width * FILL, tan_half_height * FILL],
             sides: [f64::NEG_INFINITY; 4],
             low: DVec3::INFINITY,
@@ -126,7 +126,7 @@ impl Extent {
         let (x, y) = ((right - left) / 2.0, (top - bottom) / 2.0);
         let eye = x * self.axes.right + y * self.axes.up + z * self.axes.forward;
         Fit {
-            stand: Stand { eye, ..self.axes },
+            stand: CameraFrame { eye, ..self.axes },
             direction: -TOWARD_EYE,
             near: 0.25 * (self.low.z - z),
             focus: (self.low.z + self.high.z) / 2.0 - z,

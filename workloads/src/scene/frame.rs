@@ -7,7 +7,7 @@ use pipeline::{Camera, Cull, Draw, Geometry};
 use serde::Serialize;
 
 use super::Scene;
-use super::deform::{Carriage, Pose};
+use super::deform::{InstanceTransforms, Pose};
 use super::mesh::{Instance, Mesh, Normals, smooth_normals};
 
 /// A scene during one shutter interval: everything that changes from frame to frame.
@@ -149,8 +149,8 @@ pub(super) type Path = (Arc<[Vec3]>, Arc<[Vec3]>);
 impl Interval {
     pub fn path(&self, scene: &Scene, instance: Instance) -> Result<Path, FrameError> {
         let mesh = &scene.graph.meshes[instance.mesh];
-        let open = self.open.carriage(&scene.graph, instance);
-        let close = self.close.carriage(&scene.graph, instance);
+        let open = self.open.transforms(&scene.graph, instance);
+        let close = self.close.transforms(&scene.graph, instance);
         let (from, to) = if open == close { still(mesh, &open) } else { moving(mesh, &open, &close) };
         for end in [&from, &to] {
             if let Some(vertex) = end.iter().position(|p| !p.is_finite()) {
@@ -163,8 +163,8 @@ impl Interval {
     pub fn mesh(&self, scene: &Scene, instance: Instance) -> Result<FrameMesh, FrameError> {
         let mesh = &scene.graph.meshes[instance.mesh];
         let (open, close) = self.path(scene, instance)?;
-        let middle = self.middle.carriage(&scene.graph, instance);
-        let triangles = if self.open.carriage(&scene.graph, instance).mirrors() {
+        let middle = self.middle.transforms(&scene.graph, instance);
+        let triangles = if self.open.transforms(&scene.graph, instance).mirrors() {
             mesh.triangles.iter().map(|[a, b, c]| [*a, *c, *b]).collect()
         } else {
             Arc::clone(&mesh.triangles)
@@ -182,13 +182,13 @@ impl Interval {
     }
 }
 
-fn still(mesh: &Mesh, carriage: &Carriage) -> Path {
+fn still(mesh: &Mesh, transforms: &InstanceTransforms) -> Path {
     let open: Arc<[Vec3]> =
-        (0..mesh.positions.len()).map(|index| carriage.position(mesh, index).as_vec3()).collect();
+        (0..mesh.positions.len()).map(|index| transforms.position(mesh, index).as_vec3()).collect();
     (Arc::clone(&open), open)
 }
 
-fn moving(mesh: &Mesh, open: &Carriage, close: &Carriage) -> Path {
+fn moving(mesh: &Mesh, open: &InstanceTransforms, close: &InstanceTransforms) -> Path {
     let ends = |index| {
         let (from, to) = (open.position(mesh, index), close.position(mesh, index));
         (from.as_vec3(), if is_noise(from, to) { from } else { to }.as_vec3())
@@ -208,7 +208,7 @@ fn is_noise(from: DVec3, to: DVec3) -> bool {
 
 fn normals(
     mesh: &Mesh,
-    middle: &Carriage,
+    middle: &InstanceTransforms,
     (open, close): (&[Vec3], &[Vec3]),
     triangles: &[[u32; 3]],
 ) -> Arc<[Vec3]> {

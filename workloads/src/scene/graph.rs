@@ -36,7 +36,7 @@ impl Graph {
     }
 
     /// Adds a mesh as an instance on a node.
-    pub fn hang(&mut self, mesh: Mesh, node: usize) {
+    pub fn attach(&mut self, mesh: Mesh, node: usize) {
         self.meshes.push(mesh);
         self.instances.push(Instance { node, mesh: self.meshes.len() - 1, skin: None });
     }
@@ -362,11 +362,11 @@ mod tests {
         let mesh = || Mesh::new("m", vec![glam::Vec3::ZERO; 3], vec![[0, 1, 2]], 0).unwrap();
         let mut graph = Graph::default();
         let node = graph.push_node(Node::new("n", None, Local::Trs(Trs::default())));
-        graph.hang(mesh(), node);
+        graph.attach(mesh(), node);
         assert!(graph.check().unwrap_err().contains("material 0"));
         graph.push_material(Material::colored("grey", glam::Vec3::ONE));
         assert!(graph.check().is_ok());
-        graph.hang(mesh(), 7);
+        graph.attach(mesh(), 7);
         assert!(graph.check().is_err());
         graph.instances.pop();
         graph.nodes[0].parent = Some(0);

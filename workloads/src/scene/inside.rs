@@ -12,7 +12,7 @@ use std::f64::consts::TAU;
 
 use glam::DVec3;
 
-use super::camera::{Stand, View, tan_half};
+use super::camera::{CameraFrame, View, tan_half};
 use super::fit::Fit;
 use super::rays::{Hit, Rays, normal};
 
@@ -158,7 +158,7 @@ impl Best {
 }
 
 fn fit(eye: DVec3, direction: DVec3, focus: f64) -> Option<Fit> {
-    let stand = Stand::new(eye, direction, DVec3::Y)?;
+    let stand = CameraFrame::new(eye, direction, DVec3::Y)?;
     Some(Fit { stand, direction, near: 1e-3 * focus, focus, holds_lens: true })
 }
 

@@ -109,7 +109,7 @@ impl Scene {
         for instance in &self.graph.instances {
             let (open, _) = interval.path(self, *instance)?;
             let corner = |vertex: u32| open[vertex as usize].as_dvec3();
-            let mirrors = interval.open.carriage(&self.graph, *instance).mirrors();
+            let mirrors = interval.open.transforms(&self.graph, *instance).mirrors();
             let turned = |[a, b, c]: [DVec3; 3]| if mirrors { [a, c, b] } else { [a, b, c] };
             let triangles = self.graph.meshes[instance.mesh].triangles.iter();
             surface.extend(triangles.map(|corners| turned(corners.map(corner))));

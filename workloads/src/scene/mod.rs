@@ -169,7 +169,7 @@ impl Scene {
         let mut bounds = far::Bounds::default();
         for instance in &self.graph.instances {
             let at_rest = self.graph.meshes[instance.mesh].positions.iter().map(|point| point.as_dvec3());
-            first.carriage(&self.graph, *instance).place(&far::Bounds::of(at_rest), &mut bounds);
+            first.transforms(&self.graph, *instance).place(&far::Bounds::of(at_rest), &mut bounds);
         }
         self.origin = bounds.origin();
         if self.origin != DVec3::ZERO {

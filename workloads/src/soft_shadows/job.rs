@@ -78,7 +78,8 @@ impl SoftShadows {
     /// # Errors
     /// [`LoadError`] for a scene that cannot be loaded, or an invalid option.
     pub fn new(mut options: Options, overrides: &Overrides, seed: u64) -> Result<Self, LoadError> {
-        let scene = options.scene.as_deref().map_or_else(stage, crate::load)?.with_overrides(overrides)?;
+        let scene =
+            options.scene.as_deref().map_or_else(default_scene, crate::load)?.with_overrides(overrides)?;
         options.light.move_by(-scene.origin());
         options.check()?;
         let light = AreaLight::new(&options.light)?;
@@ -203,7 +204,7 @@ pub fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<dyn Job>
 ///
 /// # Errors
 /// None are expected: the scene is tested.
-pub fn stage() -> Result<Scene, LoadError> {
+pub fn default_scene() -> Result<Scene, LoadError> {
     let mut parts = Parts::new("soft shadows");
     fill(&mut parts.graph);
     parts.camera = SceneCamera {
@@ -225,7 +226,7 @@ fn fill(graph: &mut Graph) {
     let mut put = |mesh, at: [f64; 3], motion: Motion| {
         let trs = Trs { translation: DVec3::from_array(at), ..Trs::default() };
         let node = graph.push_node(Node { motion, ..Node::new("body", None, Local::Trs(trs)) });
-        graph.hang(mesh, node);
+        graph.attach(mesh, node);
     };
     let still = Motion::default;
     let moves = |x: f64, y: f64, z: f64| Motion { velocity: DVec3::new(x, y, z), spin: None };

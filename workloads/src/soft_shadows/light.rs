@@ -5,7 +5,7 @@ use pipeline::{Camera, Lens};
 use serde::{Deserialize, Serialize};
 
 use crate::error::LoadError;
-use crate::scene::camera::Stand;
+use crate::scene::camera::CameraFrame;
 use crate::scene::{View, tan_half};
 
 /// Position, target and size of an area light.
@@ -62,7 +62,7 @@ impl LightSpec {
 /// An area light: a camera whose lens is the light.
 #[derive(Clone, Copy, Debug)]
 pub struct AreaLight {
-    stand: Stand,
+    stand: CameraFrame,
     radius: f64,
     tan_half: f64,
     camera: Camera,
@@ -84,7 +84,7 @@ impl AreaLight {
     pub fn new(spec: &LightSpec) -> Result<Self, LoadError> {
         let refused = |message: String| LoadError::Setting { setting: "light", message };
         let position = DVec3::from_array(spec.position);
-        let stand = Stand::new(position, DVec3::from_array(spec.target) - position, DVec3::Y);
+        let stand = CameraFrame::new(position, DVec3::from_array(spec.target) - position, DVec3::Y);
         let stand = stand.ok_or_else(|| {
             refused("position and target coincide or are not finite: move one of them".to_owned())
         })?;

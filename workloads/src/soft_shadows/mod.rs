@@ -9,7 +9,7 @@
 //! - [`AreaLight`]: the light as a camera.
 //! - [`ShadowMap`]: both ways of making a map, and look-ups.
 //! - [`World`]: shading, with a map or with rays as the ground truth.
-//! - [`job()`]: the workload; [`stage()`]: its default scene.
+//! - [`job()`]: the workload; [`default_scene()`]: its default scene.
 
 mod job;
 mod light;
@@ -17,7 +17,7 @@ mod map;
 mod shade;
 
 pub(crate) use job::FLAGS;
-pub use job::{Options, SoftShadows, job, stage};
+pub use job::{Options, SoftShadows, default_scene, job};
 pub use light::{AreaLight, LightSpec};
 pub use map::{DepthPass, Method, ShadowMap, View, depth_pass};
 pub use shade::{Shadows, World, look_up_packets};

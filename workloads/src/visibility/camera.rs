@@ -4,7 +4,7 @@ use glam::{Affine3A, DVec2, DVec3};
 use pipeline::{Camera, CameraError, Lens, LensShape, Viewport};
 
 use super::mesh::MovingMesh;
-use crate::scene::camera::Stand;
+use crate::scene::camera::CameraFrame;
 use crate::scene::fit::{Extent, Fit};
 use crate::scene::inside::Inside;
 use crate::scene::{CameraSpec, Side, Wrong, tan_half};
@@ -15,7 +15,7 @@ const NEAR: f64 = 1e-3;
 /// A camera with its poses and image.
 pub(super) struct View {
     /// Pose at shutter open and at shutter close.
-    pub stands: [Stand; 2],
+    pub stands: [CameraFrame; 2],
     /// The camera in its own space.
     pub camera: Camera,
     /// Image size.
@@ -104,14 +104,15 @@ impl CameraSpec {
         position: Option<[f64; 3]>,
         target: Option<[f64; 3]>,
         up: Option<[f64; 3]>,
-    ) -> Result<Stand, Wrong> {
+    ) -> Result<CameraFrame, Wrong> {
         let eye = DVec3::from(position.unwrap_or([f64::NAN; 3]));
         let along = match (target, self.direction) {
             (Some(target), _) => DVec3::from(target) - eye,
             (None, direction) => DVec3::from(direction.unwrap_or([f64::NAN; 3])),
         };
         let message = "the camera has no direction, because it coincides with its target or is too far from it: move one of them";
-        Stand::new(eye, along, up.map_or(DVec3::Y, DVec3::from)).ok_or_else(|| (place, message.to_owned()))
+        CameraFrame::new(eye, along, up.map_or(DVec3::Y, DVec3::from))
+            .ok_or_else(|| (place, message.to_owned()))
     }
 
     /// Builds the camera in its own space.

@@ -109,7 +109,7 @@ fn joined(objects: Vec<MovingMesh>) -> Result<(MovingMesh, Vec<Range<u32>>), Str
 /// Vertices in camera space at both ends, rounded once. A still vertex and a still camera stay exactly still.
 fn in_camera_space(view: &View, mesh: &MovingMesh) -> Result<[Vec<Vec3>; 2], String> {
     let [open, close] = &view.stands;
-    let see = |(stand, points): (&crate::scene::camera::Stand, &[glam::DVec3])| {
+    let see = |(stand, points): (&crate::scene::camera::CameraFrame, &[glam::DVec3])| {
         let seen = points.iter().enumerate().map(|(vertex, point)| {
             let seen = stand.view(*point).as_vec3();
             let far =

@@ -5,7 +5,7 @@ use pipeline::sampling::SampleSource;
 use pipeline::{Cull, Draw, Geometry, Gpu, LensShape, SampleSpec, SampleTable};
 use workloads::Overrides;
 use workloads::accumulation::{Rays, SharedSamples};
-use workloads::glossy::{Effect, Glossy, Lobe, Map, Options, Receiver, receiver, stage};
+use workloads::glossy::{Effect, Glossy, Lobe, Map, Options, Receiver, default_scene, receiver};
 use workloads::job::Job;
 
 use crate::common::{White, drawn_on, spec};
@@ -79,7 +79,7 @@ fn the_blur_widens_with_height_as_in_the_closed_form() {
 #[test]
 fn one_pass_accumulation_and_rays_agree() {
     for (effect, below) in [(Effect::Reflection, false), (Effect::Refraction(1.33), true)] {
-        let scene = stage(below).unwrap();
+        let scene = default_scene(below).unwrap();
         let frame = scene.frame(0).unwrap();
         let draws: Vec<_> =
             frame.draws(&scene).unwrap().into_iter().map(|d| Draw { cull: Cull::None, ..d }).collect();
@@ -107,7 +107,7 @@ fn one_pass_accumulation_and_rays_agree() {
 
 #[test]
 fn more_samples_reduce_the_error() {
-    let scene = stage(false).unwrap();
+    let scene = default_scene(false).unwrap();
     let frame = scene.frame(0).unwrap();
     let draws = frame.draws(&scene).unwrap();
     let world = frame.camera.open().inverse();
@@ -150,7 +150,7 @@ fn a_mirror_shows_what_is_mirrored() {
     let overrides = Overrides { size: Some((WIDE as u32, 216)), samples: Some(4), ..Overrides::default() };
     let job = Glossy::new(options, &overrides, 1).unwrap();
     let image = job.frame(0, &mut Gpu::quiet(&spec()).unwrap()).unwrap().image;
-    let scene = stage(false).unwrap().with_overrides(&overrides).unwrap();
+    let scene = default_scene(false).unwrap().with_overrides(&overrides).unwrap();
     let frame = scene.frame(0).unwrap();
     let draws = frame.draws(&scene).unwrap();
     let (rays, camera) = (Rays::new(&draws), frame.camera);

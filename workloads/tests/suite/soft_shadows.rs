@@ -182,7 +182,7 @@ fn a_floor_in_the_light_follows_the_cosine_while_it_tilts() {
 
 #[test]
 fn rays_and_a_fine_map_agree() {
-    let scene = workloads::soft_shadows::stage().unwrap();
+    let scene = workloads::soft_shadows::default_scene().unwrap();
     let frame = scene.frame(1).unwrap();
     let draws: Vec<_> =
         frame.draws(&scene).unwrap().into_iter().map(|d| Draw { cull: Cull::None, ..d }).collect();

@@ -15,7 +15,7 @@ use pipeline::{Cull, Draw, Geometry, Gpu, LensShape, SampleSpec, SampleTable};
 use run::GpuSpec;
 use serde::Serialize;
 use workloads::accumulation::{Rays, SharedSamples};
-use workloads::glossy::{Effect, Lobe, Map, receiver, stage};
+use workloads::glossy::{Effect, Lobe, Map, default_scene, receiver};
 use workloads::{Frame, Scene};
 
 use crate::chart::statistics::{White, errors, mean_square};
@@ -268,7 +268,7 @@ impl Bench {
     /// # Errors
     /// None that is expected.
     pub fn new(effect: (&'static str, Effect), effort: GlossyEffort) -> Result<Self, StudyError> {
-        let scene = stage(effect.1 != Effect::Reflection)?;
+        let scene = default_scene(effect.1 != Effect::Reflection)?;
         let frame = scene.frame(0)?;
         Ok(Self { scene, frame, gpu: GpuSpec::load("reference")?, effect, effort, radius: ROUGHNESS })
     }

@@ -16,7 +16,7 @@ use run::GpuSpec;
 use serde::Serialize;
 use workloads::accumulation::SharedSamples;
 use workloads::soft_shadows::{
-    AreaLight, LightSpec, Method, ShadowMap, Shadows, View, World, depth_pass, stage,
+    AreaLight, LightSpec, Method, ShadowMap, Shadows, View, World, default_scene, depth_pass,
 };
 use workloads::{Frame, Overrides, Scene};
 
@@ -285,7 +285,7 @@ struct Bench<'a> {
 impl Stage {
     pub fn new(effort: &ShadowsEffort) -> Result<Self, StudyError> {
         let size = Some((effort.size[0], effort.size[1]));
-        let scene = stage()?.with_overrides(&Overrides { size, ..Overrides::default() })?;
+        let scene = default_scene()?.with_overrides(&Overrides { size, ..Overrides::default() })?;
         let frame = scene.frame(1)?;
         let light = AreaLight::new(&LightSpec::default())?;
         Ok(Self { effort: *effort, scene, frame, light, gpu: GpuSpec::load("reference")? })

@@ -78,7 +78,7 @@ fn grid(graph: &mut Graph, object: u32, edge: f64, material: usize) {
     let rotation = DQuat::from_xyzw(FRAC_1_SQRT_2, 0.0, 0.0, FRAC_1_SQRT_2);
     let trs = Trs { translation: at, rotation, ..Trs::default() };
     let node = graph.push_node(Node::new("grid", None, Local::Trs(trs)));
-    graph.hang(shapes::plane(edge, CELLS, 1.0, material), node);
+    graph.attach(shapes::plane(edge, CELLS, 1.0, material), node);
 }
 
 /// 32 spotlights in one forward pass (Paper III, section 4). The paper has the number of lights, the operations of each are

@@ -13,7 +13,7 @@ use traces::pareto::{ParetoError, Point, RatedPoint, SettingColumns, frontiers, 
 use traces::table::{Table as Columns, TableReadError};
 
 use super::pipes::shown;
-use super::plot::{Ending, write};
+use super::plot::{PlotFormat, write};
 use super::report;
 use crate::cli::Failure;
 use crate::cli::args::LookArgs;
@@ -108,7 +108,7 @@ pub(super) fn run(args: &ParetoArgs, terminal: &Terminal) -> Result<(), Failure>
         if out.extension().is_some_and(|end| end.eq_ignore_ascii_case("csv")) {
             write_file(out, |file| write_csv(&groups, file))?;
         } else {
-            write(&picture(args, &groups), out, Ending::of(out)?)?;
+            write(&picture(args, &groups), out, PlotFormat::of(out)?)?;
         }
     }
     if args.json {

@@ -122,7 +122,7 @@ const BARS: usize = 60;
 const OVERLAID: usize = 400;
 
 pub(super) fn run(args: &PlotArgs, terminal: &Terminal) -> Result<(), Failure> {
-    let kind = Ending::of(&args.out)?;
+    let kind = PlotFormat::of(&args.out)?;
     may_hold_results(("--out", Some(&args.out)), [args.input.trace.as_path()])?;
     let (picture, shown) = match args.kind {
         PlotKind::Curve => curve(args, terminal)?,
@@ -135,15 +135,8 @@ pub(super) fn run(args: &PlotArgs, terminal: &Terminal) -> Result<(), Failure> {
     report(&format!("{}: {shown}", args.out.display()), args.piped, terminal)
 }
 
-/// What kind of file a name asks for.
-#[derive(Clone, Copy)]
-pub(super) enum Ending {
-    Svg,
-    Png,
-    Pdf,
-}
-
-impl Ending {
+impl PlotFormat {
+    /// The format of a file, by its name.
     pub(super) fn of(path: &Path) -> Result<Self, Failure> {
         match path.extension().and_then(|end| end.to_str()).map(str::to_ascii_lowercase).as_deref() {
             Some("svg") => Ok(Self::Svg),
@@ -154,11 +147,11 @@ impl Ending {
     }
 }
 
-pub(super) fn write(picture: &Picture, path: &Path, ending: Ending) -> Result<(), Failure> {
-    let bytes = match ending {
-        Ending::Svg => picture.svg().map(String::into_bytes),
-        Ending::Png => picture.png(),
-        Ending::Pdf => Ok(picture.pdf()),
+pub(super) fn write(picture: &Picture, path: &Path, format: PlotFormat) -> Result<(), Failure> {
+    let bytes = match format {
+        PlotFormat::Svg => picture.svg().map(String::into_bytes),
+        PlotFormat::Png => picture.png(),
+        PlotFormat::Pdf => Ok(picture.pdf()),
     }
     .map_err(|error| Failure { message: format!("{}: {error}", path.display()), code: 1 })?;
     Ok(traces::io::atomic::write_file(path, |out| std::io::Write::write_all(out, &bytes))?)

@@ -37,9 +37,10 @@ pub(super) fn add(
             }
             let material = material(context, parts, &place, object.material.as_ref())?;
             let mesh = solid(shape, material);
-            parts
-                .graph
-                .hang(Mesh { name: object.name.clone().unwrap_or_else(|| mesh.name.clone()), ..mesh }, node);
+            parts.graph.attach(
+                Mesh { name: object.name.clone().unwrap_or_else(|| mesh.name.clone()), ..mesh },
+                node,
+            );
             Ok(())
         }
         _ => Err(context.wrong(place, "give it either a `file` or a `shape`")),
@@ -109,7 +110,7 @@ fn add_surface(
         }
     };
     parts.graph.materials.extend(materials);
-    meshes.into_iter().for_each(|mesh| parts.graph.hang(mesh, hook));
+    meshes.into_iter().for_each(|mesh| parts.graph.attach(mesh, hook));
     Ok(())
 }
 
