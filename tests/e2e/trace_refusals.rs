@@ -72,6 +72,15 @@ fn a_file_that_cannot_be_read_ends_every_command_with_1() {
 }
 
 #[test]
+fn the_summary_of_a_run_is_no_trace() {
+    let inputs = Inputs::new();
+    let summary = inputs.put("summary.json", "{\"schema\": 3}");
+    let ended = quintile().call(["trace", "frames", &summary, "--mark", "0.1"]);
+    assert_eq!(ended.code, Some(2), "{}", ended.stderr);
+    assert!(ended.stderr.contains("that of a run is trace.parquet beside"), "{}", ended.stderr);
+}
+
+#[test]
 fn a_proposed_start_that_does_not_come_back_is_refused() {
     let inputs = Inputs::new();
     // One rise in a trace that is otherwise noise.

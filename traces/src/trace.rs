@@ -190,7 +190,7 @@ pub(crate) fn lost_samples(lost: &[Range<usize>]) -> usize {
 pub(crate) fn losses(lost: &[Range<usize>], time_s: impl Fn(usize) -> f64) -> Option<String> {
     let first = lost.first()?;
     Some(format!(
-        "{} samples in {} stretches are missing, the first after {} s",
+        "{} samples in {} ranges are missing, the first after {} s",
         lost_samples(lost),
         lost.len(),
         time_s(first.start - 1)

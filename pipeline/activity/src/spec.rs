@@ -196,6 +196,15 @@ fn message(code: &Error, field: Option<&str>, word: &str) -> String {
 
 /// "did you mean `x`?" for the nearest of `known`, or the whole list where none is near.
 pub fn suggestion(found: &str, known: &[&str]) -> String {
+    // `shaded_quads` is `quads_shaded`.
+    let words = |name: &str| {
+        let mut words: Vec<String> = name.split('_').map(str::to_owned).collect();
+        words.sort();
+        words
+    };
+    if let Some(name) = known.iter().find(|name| words(name) == words(found)) {
+        return format!("did you mean `{name}`?");
+    }
     let nearest = known.iter().map(|name| (strsim::damerau_levenshtein(found, name), *name)).min();
     // An edit of half of a short word is no typing error: `foo` does not suggest `look`.
     let is_typing_error = |distance: usize, name: &str| {
@@ -234,6 +243,10 @@ mod tests {
     fn an_unrelated_name_lists_the_known_ones() {
         let error = parse::<Gpu>("(wibble: 1)", "gpu.ron").unwrap_err();
         assert!(error.to_string().contains("known: tile_size, clock_hz"), "{error}");
+        assert_eq!(
+            suggestion("shaded_quads", &["shader_ops", "quads_shaded"]),
+            "did you mean `quads_shaded`?"
+        );
         assert_eq!(suggestion("foo", &["look", "seconds"]), "known: look, seconds");
     }
 

@@ -20,8 +20,8 @@ use crate::cli::outputs;
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  quintile ccd armadillo-rollers.mts.gz --json\n  \
     quintile ccd cases/*.mts --resolution 128 --csv pairs.csv\n  quintile ccd start.ply end.ply\n\n\
-    Every vertex moves on a straight line from time 0 to time 1. A pair that is not reported does not collide; one that is may.\n\
-    A file that is broken or has coordinates beyond 1e60 does not stop the others. It is reported, its case has no row in\n\
+    Every vertex moves on a straight line from time 0 to time 1. A pair that is not reported does not collide; one that is may. \
+    A file that is broken or has coordinates beyond 1e60 does not stop the others. It is reported, its case has no row in \
     the CSV and an `error` in the JSON, and the exit code is 1.")]
 pub struct CcdArgs {
     /// .mts files (gzipped or not), a case each, or .ply, .obj or .off files two by two: a mesh at time 0 and at time 1
@@ -55,10 +55,13 @@ pub struct CcdArgs {
 pub enum MethodArg {
     /// Each fragment of one object with the box of the other
     #[default]
+    #[value(alias = "fragment_box")]
     FragmentBox,
     /// The boxes of time and depth of both
+    #[value(alias = "box_box")]
     BoxBox,
     /// Depths alone, in six passes (Govindaraju et al. 2003)
+    #[value(alias = "depth_only")]
     DepthOnly,
 }
 

@@ -17,7 +17,7 @@ use super::outputs::{print, print_json};
 #[command(
     after_help = "Examples:\n  quintile compare out/before out/after\n  quintile compare before.png after.png --out difference.png\n  \
     quintile compare before/images after/images --json\n\n\
-    Differences are B minus A, ratios B over A. The exit code is 0 with or without differences; 1 if a file is broken, 2 if\n\
+    Differences are B minus A, ratios B over A. The exit code is 0 with or without differences; 1 if a file is broken, 2 if \
     the two cannot be compared: images of different sizes, or a run with an image."
 )]
 pub struct CompareArgs {

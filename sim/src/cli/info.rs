@@ -19,7 +19,7 @@ use crate::cli::args::SceneArgs;
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  quintile info Fox.glb\n  quintile info building.obj --camera inside --json\n\n\
-    The flags change the view, as for `quintile run`. The camera is printed as RON: pass it to\n\
+    The flags change the view, as for `quintile run`. The camera is printed as RON: pass it to \
     --camera, changed or not. Unchanged, it gives the same bytes."
 )]
 pub struct InfoArgs {

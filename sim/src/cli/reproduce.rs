@@ -18,12 +18,12 @@ use output::terminal::Terminal;
 #[command(after_help = "Examples:\n  quintile reproduce III --quick --out claims\n  \
     quintile reproduce VI --row VI-13 --row VI-14\n  \
     quintile reproduce VI --row VI-1 --collision-data ccd\n\n\
-    Each row of the paper is computed from scratch, by simulating, recording and analysing, and compared with what the paper\n\
-    says, at every value of the settings that the paper leaves open. It holds at all of them, differs at all of them, depends\n\
-    on them, or is not yet there because a part is missing. Rows of kind E have to hold exactly, N are numbers to be near, O\n\
-    orders or signs that have to come out, F have figures. The settings are in sim/experiments/papers; every row names the SHA-256\n\
+    Each row of the paper is computed from scratch, by simulating, recording and analysing, and compared with what the paper \
+    says, at every value of the settings that the paper leaves open. It holds at all of them, differs at all of them, depends \
+    on them, or is not yet there because a part is missing. Rows of kind E have to hold exactly, N are numbers to be near, O \
+    orders or signs that have to come out, F have figures. The settings are in sim/experiments/papers; every row names the SHA-256 \
     of its file, what was run, and what it does not exercise.\n\n\
-    Results are in DIR: plots/ as SVG and PNG, reproduce_III.md and, last, reproduce_III.json with a list `rows`. Ends with 0\n\
+    Results are in DIR: plots/ as SVG and PNG, reproduce_III.md and, last, reproduce_III.json with a list `rows`. Ends with 0 \
     if every row of kind E holds and every row ran something, otherwise with 1; one that is not yet there does not hold.")]
 pub struct ReproduceArgs {
     /// Which paper

@@ -32,10 +32,10 @@ use crate::cli::quantity::rate;
     after_help = "Example:\n  quintile run Fox.glb --clip Run --frames 0..60 --lens 2 --samples 16 --out fox\n  \
     quintile run Fox.glb --frames 0..300 --accuracy 2% --verify --out fox\n  \
     quintile run ccd --set resolution=64 --set bins=8 --out ccd\n\n\
-    The chapter of a workload lists its options and defaults; `--set` lists them when one is misspelled. It takes no\n\
-    --accuracy, --budget, --timing sampled or --heat, which need a scene, and refuses flags of scenes that would change nothing.\n\n\
-    Results are in DIR: images/, report.html, summary.json, frames.csv, trace.parquet, trace.csv, plots/ and\n\
-    timeline.perfetto-trace (open it at ui.perfetto.dev). They appear together when all are whole; results of an earlier run\n\
+    The chapter of a workload in the book lists its options and defaults; an unknown name after `--set` lists the known ones. Workloads take no \
+    --accuracy, --budget, --timing sampled or --heat, which need a scene, and refuse flags without effect.\n\n\
+    Results are in DIR: images/, report.html, summary.json, frames.csv, trace.parquet, trace.csv, plots/ and \
+    timeline.perfetto-trace (open it at ui.perfetto.dev). They appear together when all are whole; results of an earlier run \
     are replaced then, and other files in DIR are left alone."
 )]
 pub struct RunArgs {

@@ -18,7 +18,7 @@ use crate::cli::parse::{per_pixel, size};
 #[derive(Debug, Args)]
 #[command(
     after_help = "Example:\n  quintile samples jittered --samples 16 --size 640x360 --out mine.smp\n\n\
-    `quintile run --table mine.smp` and `quintile visibility --samples mine.smp` read the file. Its layout is\n\
+    `quintile run --table mine.smp` and `quintile visibility --samples mine.smp` read the file. Its layout is \
     described in docs/formats.md."
 )]
 pub struct SamplesArgs {

@@ -14,7 +14,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
 /// The first bytes of formats that are not read, and what to do about them.
-const FOREIGN: [(&[u8], &str, &str); 6] = [
+const FOREIGN: [(&[u8], &str, &str); 7] = [
     (b"\xd3tagfmt", "a JLS recording of version 1", "export it to CSV from the program that made it"),
     (b"\x89HDF\r\n", "an HDF5 file", "export its channels to CSV or Parquet"),
     (
@@ -22,6 +22,7 @@ const FOREIGN: [(&[u8], &str, &str); 6] = [
         "an archive (sigrok .sr, .ppk2 or a spreadsheet)",
         "export it to CSV from its own program",
     ),
+    (b"{", "a JSON file", "give a trace; that of a run is trace.parquet beside its summary.json"),
     (b"\x89PNG", "a PNG image", TRACE_FORMATS),
     (b"\xff\xd8\xff", "a JPEG image", TRACE_FORMATS),
     (b"%PDF", "a PDF document", TRACE_FORMATS),

@@ -5,7 +5,7 @@
 //! be distinguished from a room.
 //!
 //! Candidates for the camera stand over the floors that vertical lines cross, at eye height below the ceiling. From each, rays
-//! go out in all directions; the camera takes the place and the level direction in which its view is deepest on the average.
+//! go out in all directions; the camera takes the place and the level direction in which its view is deepest on average.
 //! Where the front sides of a scene enclose no place, as those of a room modelled from outside, both sides count.
 
 use std::f64::consts::TAU;
@@ -26,23 +26,23 @@ const DIRECTIONS: usize = 256;
 const SURFACE_STRIDE: usize = 8;
 
 /// The share of a scene's surface that is enclosed from which on the scene is a room.
-const ENCLOSED: f64 = 0.6;
+const MIN_ENCLOSED_SHARE: f64 = 0.6;
 
 /// The least share of the directions from a camera that end on front sides, and the largest that end on back sides, where a
-/// camera is placed unasked.
-const SEEN: [f64; 2] = [0.6, 0.1];
+/// camera is placed by default.
+const SEEN_SHARES: [f64; 2] = [0.6, 0.1];
 
-/// The least mean depth of the view of a camera that is placed unasked, in lengths of the diagonal of the scene.
-const DEPTH: f64 = 0.05;
+/// The least mean depth of the view of a camera that is placed by default, in lengths of the diagonal of the scene.
+const MIN_DEPTH_SHARE: f64 = 0.05;
 
 /// Vertical lines on each side of the grid that crosses the floors.
-const GRID: usize = 16;
+const LINES_PER_AXIS: usize = 16;
 
 /// Floors that a line crosses at most.
 const FLOORS: usize = 16;
 
 /// Eye height, in heights of the room.
-const EYE: f64 = 0.45;
+const EYE_HEIGHT_SHARE: f64 = 0.45;
 
 /// What is demanded of a camera's place.
 #[derive(Clone, Copy, Debug)]
@@ -64,10 +64,10 @@ const DEMANDS: [Demands; 4] = [
 ];
 
 /// Surfaces stand upright whose normal rises less.
-const UPRIGHT: f64 = 0.7;
+const MAX_WALL_NORMAL_Y: f64 = 0.7;
 
-/// How many of these are tried where a camera is placed unasked.
-const UNASKED: usize = 2;
+/// How many of these are tried where a camera is placed by default.
+const DEMANDS_BY_DEFAULT: usize = 2;
 
 /// Level rays that decide whether a place is in a closed part, and surfaces that each crosses at most.
 const CROSSING_RAYS: usize = 15;
@@ -77,14 +77,14 @@ const MAX_CROSSINGS: usize = 64;
 const TURNS: usize = 32;
 
 /// Cosine of the largest angle between the middle of the view and the rays that count for its depth.
-const CONE: f64 = 0.85;
+const VIEW_CONE_COS: f64 = 0.85;
 
 /// How much a camera inside sees.
 pub(super) fn view() -> View {
     View::Perspective { tan_half_height: tan_half(Inside::FOV_DEG) }
 }
 
-/// A place inside, and whether the scene is a room, so that a camera stands there unasked.
+/// A place inside, and whether the scene is a room, so that a camera is placed there by default.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Inside {
     pub fit: Fit,
@@ -113,20 +113,23 @@ impl Inside {
         }
         let directions = directions();
         let enclosed = enclosed(&rays, &directions, 1e-6 * diagonal);
-        if enclosed < ENCLOSED && !anyway {
+        if enclosed < MIN_ENCLOSED_SHARE && !anyway {
             return None;
         }
-        let demands = &DEMANDS[..if anyway { DEMANDS.len() } else { UNASKED }];
+        let demands = &DEMANDS[..if anyway { DEMANDS.len() } else { DEMANDS_BY_DEFAULT }];
         let best = Best::find(&rays, &directions, demands, diagonal);
         let (eye, direction) = match &best {
             Some(best) => (best.eye, level(best.turn)),
             None if !anyway => return None,
-            None => (low + DVec3::new(0.5, EYE, 0.5) * (high - low), along_the_longer_side(high - low)),
+            None => (
+                low + DVec3::new(0.5, EYE_HEIGHT_SHARE, 0.5) * (high - low),
+                along_the_longer_side(high - low),
+            ),
         };
         let ahead = rays.first(eye, direction, 0.0).map_or(0.5 * diagonal, |hit| hit.distance);
         let fit = fit(eye, direction, ahead.max(1e-3 * diagonal))?;
-        let is_room = enclosed >= ENCLOSED
-            && best.is_some_and(|best| best.is_enclosed && best.depth >= DEPTH * diagonal);
+        let is_room = enclosed >= MIN_ENCLOSED_SHARE
+            && best.is_some_and(|best| best.is_enclosed && best.depth >= MIN_DEPTH_SHARE * diagonal);
         (is_room || anyway).then_some(Self { fit, enclosed, is_room })
     }
 }
@@ -219,9 +222,11 @@ fn within([a, b, c]: [DVec3; 3], point: usize) -> DVec3 {
 /// Eyes over the floors, and whether a floor shows its front.
 fn candidates(rays: &Rays) -> Vec<(DVec3, bool)> {
     let [low, high] = rays.bounds();
-    let place =
-        |line: usize, axis: usize| low[axis] + (line as f64 + 0.5) / GRID as f64 * (high[axis] - low[axis]);
-    let lines = (0..GRID * GRID).map(|line| [place(line % GRID, 0), place(line / GRID, 2)]);
+    let place = |line: usize, axis: usize| {
+        low[axis] + (line as f64 + 0.5) / LINES_PER_AXIS as f64 * (high[axis] - low[axis])
+    };
+    let lines = (0..LINES_PER_AXIS * LINES_PER_AXIS)
+        .map(|line| [place(line % LINES_PER_AXIS, 0), place(line / LINES_PER_AXIS, 2)]);
     lines.flat_map(|[x, z]| over_the_floors(rays, x, z)).collect()
 }
 
@@ -235,7 +240,7 @@ fn over_the_floors(rays: &Rays, x: f64, z: f64) -> Vec<(DVec3, bool)> {
         let Some(hit) = rays.first(DVec3::new(x, from, z), DVec3::NEG_Y, 1e-9 * height) else { break };
         let at = from - hit.distance;
         if hit.normal.y.abs() > 0.5 && ceiling - at > 0.02 * height {
-            eyes.push((DVec3::new(x, at + EYE * (ceiling - at), z), hit.front));
+            eyes.push((DVec3::new(x, at + EYE_HEIGHT_SHARE * (ceiling - at), z), hit.front));
         }
         (from, ceiling) = (at, at);
     }
@@ -285,16 +290,17 @@ impl Around {
             let ends = self.hits.iter().flatten().filter(|hit| hit.front == front).count();
             ends as f64 / self.hits.len() as f64
         };
-        share(true) >= SEEN[0] && share(false) <= SEEN[1]
+        share(true) >= SEEN_SHARES[0] && share(false) <= SEEN_SHARES[1]
     }
 
     /// Mean depth of the view along `direction`; what is open, or a back side that does not count, has none. Zero where
     /// something upright is nearer than `ahead`.
     fn depth(&self, direction: DVec3, directions: &[DVec3], two_sided: bool, ahead: f64) -> f64 {
-        let seen = directions.iter().zip(&self.hits).filter(|(along, _)| along.dot(direction) >= CONE);
+        let seen =
+            directions.iter().zip(&self.hits).filter(|(along, _)| along.dot(direction) >= VIEW_CONE_COS);
         let (mut sum, mut count) = (0.0, 0.0);
         for (_, hit) in seen {
-            if hit.is_some_and(|hit| hit.distance < ahead && hit.normal.y.abs() < UPRIGHT) {
+            if hit.is_some_and(|hit| hit.distance < ahead && hit.normal.y.abs() < MAX_WALL_NORMAL_Y) {
                 return 0.0;
             }
             sum += hit.filter(|hit| hit.front || two_sided).map_or(0.0, |hit| hit.distance);
@@ -408,7 +414,7 @@ mod tests {
         let columns: Vec<_> = columns.collect();
         for parts in [pillar, columns] {
             let all = [room.clone(), parts.clone()].concat();
-            assert_eq!(Inside::find(all.clone(), false), None, "not unasked");
+            assert_eq!(Inside::find(all.clone(), false), None, "not by default");
             let stand = Inside::find(all, true).unwrap().fit.stand;
             assert!((stand.eye.y - 0.45 * 3.0).abs() < 1e-9, "{}", stand.eye);
             let [x, z] = [stand.eye.x, stand.eye.z];

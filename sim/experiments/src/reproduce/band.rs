@@ -90,7 +90,7 @@ impl Cases {
     }
 
     /// Sets the given value of the setting added last, which it has while others vary.
-    pub fn standing_at(&mut self, value: impl std::fmt::Display) {
+    pub fn with_base(&mut self, value: impl std::fmt::Display) {
         let Some(setting) = self.cases.last().map(|case| case.setting.clone()) else { return };
         let value = value.to_string();
         let own = self.cases.iter_mut().rev().take_while(|case| case.setting == setting);
@@ -185,8 +185,8 @@ mod tests {
     #[test]
     fn the_case_at_which_all_stand_counts_once() {
         let mut cases = Cases::new("increase in %", "eyes and lens one at a time");
-        cases.along("eyes", [(1, 5.0, true), (2, 9.0, false)]).standing_at(1);
-        cases.along("lens", [(7, 5.0, true), (8, 6.0, true)]).standing_at(7);
+        cases.along("eyes", [(1, 5.0, true), (2, 9.0, false)]).with_base(1);
+        cases.along("lens", [(7, 5.0, true), (8, 6.0, true)]).with_base(7);
         let band = cases.band(3).unwrap();
         assert_eq!((band.tried, band.held, band.cases.len()), (3, 2, 4));
         assert_eq!(band.verdict(), Verdict::Depends);

@@ -1,11 +1,9 @@
 //! The true interval of lens and time in which a triangle touches a tile.
 //!
-//! Before a pinhole it is exact ([`Sweep`]). Under a lens it is found from below: places where a point of the triangle is seen at a
+//! Before a pinhole it is exact ([`Sweep`]). Under a lens it is found from below, from places where a point of the triangle is seen at a
 //! point of the tile (solved for `u, v`), then, from the outermost of these, exact roots along `t`, `u` and `v` in turn.
 //!
-//! When a triangle that moves on straight lines touches a tile: exact roots.
-//!
-//! On the homogeneous image plane a vertex is `p(s) = p_0 + s (p_1 - p_0)`. The triangle begins or ceases to touch a rectangle
+//! Roots in time: on the homogeneous image plane a vertex is `p(s) = p_0 + s (p_1 - p_0)`. The triangle begins or ceases to touch a rectangle
 //! only where a vertex crosses a side (`x(s) - X w(s)`, linear), a corner of the rectangle crosses an edge (`p_i x p_j`
 //! seen from the corner, quadratic) or, where it reaches to the near plane, where the cut does (linear, quadratic). Between two
 //! such instants nothing changes, so one test in the middle decides (the idea of Gribel et al. 2010 for a point, here for a tile).

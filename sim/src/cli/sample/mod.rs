@@ -25,7 +25,7 @@ use crate::cli::args::ThreadArgs;
     quintile sample poisson --dim 3 --count 100000 --box -o points.npy --json\n  \
     quintile sample white --dim 2 --image portrait.png --count 20000 -o stipples.csv\n  \
     quintile sample volume --mesh bunny.ply --count 50000 -o inside.bin\n\n\
-    Files by their ending: .csv (with a line x,y,... first), .npy, or .bin (coordinates point by point, little-endian, f64 or, with\n\
+    Files by their ending: .csv (with a line x,y,... first), .npy, or .bin (coordinates point by point, little-endian, f64 or, with \
     --single, f32). Without -o the points are printed as CSV.")]
 pub struct SampleArgs {
     /// Distribution of the points

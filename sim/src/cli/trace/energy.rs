@@ -77,7 +77,7 @@ pub struct EnergyArgs {
     /// Another run of the same thing, with the same marks; may be given several times
     #[arg(long, value_name = "TRACE")]
     pub run: Vec<PathBuf>,
-    /// Power above which the old method takes a frame's work to go on, in W; a tenth above idle without it
+    /// Threshold of the begin-to-finish method: power above which a frame is still at work, in W; a tenth above idle without it
     #[arg(long, value_name = "W", allow_hyphen_values = true, value_parser = power)]
     pub busy_above: Option<f64>,
     /// Print everything as JSON and nothing else

@@ -8,7 +8,7 @@ use output::table::{counted, si};
 use output::terminal::Terminal;
 use serde_json::json;
 use traces::Trace;
-use traces::energy::{FrameEnergy, PowerIntegral, Spread, mean_over_discarded};
+use traces::energy::{FrameEnergy, PowerIntegral, Spread, mean_over_discarded, whole};
 use traces::io::{ReadError, ReadOptions};
 use traces::pyramid::{Column, Pyramid, pyramid_path};
 use traces::trace::check_span;
@@ -261,7 +261,9 @@ fn samples(args: &PlotArgs, terminal: &Terminal) -> Result<(usize, Drawn), Failu
 /// The energy of each frame of one recording, J, in pieces where it is long.
 fn energies_of(args: &PlotArgs, path: &Path, terminal: &Terminal) -> Result<Vec<f64>, Failure> {
     let frames = args.find.frames(&args.input, path, terminal)?;
-    Ok(frames.energies.iter().map(|frame| frame.energy_j).collect())
+    // A last frame that is cut has no energy that belongs into a distribution.
+    let shown = if args.kind == PlotKind::Histogram { whole(&frames.energies) } else { &frames.energies };
+    Ok(shown.iter().map(|frame| frame.energy_j).collect())
 }
 
 /// The kinds that show energies of frames.

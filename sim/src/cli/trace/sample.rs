@@ -27,7 +27,7 @@ use crate::cli::trace::input::{InputArgs, TraceFormat};
 #[derive(Clone, Debug, Args)]
 #[command(
     after_help = "Example:\n  quintile trace sample meter.parquet --device-rate 1kHz --bits 10 --specified-voltage 12V --out coarse.parquet\n\n\
-    Without --device the recorder has the defaults above and a range that fits the trace. Options with a unit take a number in that\n\
+    Without --device the recorder has the defaults above and a range that fits the trace. Options with a unit take a number in that \
     unit, or with any unit of its kind: 1kHz, 20us, 5mV, 250mA, 4mOhm."
 )]
 pub struct SampleArgs {

@@ -87,9 +87,9 @@ pub(super) fn phone(bench: &Bench<'_>) -> Result<Done, RunError> {
         "waiting_w, idle_w and edge one at a time about the values given",
     );
     let over_waiting = at.iter().map(|(waiting_w, share, _)| (*waiting_w, *share)).collect();
-    tried.along("waiting_w", at).standing_at(waiting_w);
-    tried.along("idle_w", over_idle(bench, row, waiting_w)?).standing_at(idle_w);
-    tried.along("edge", over_edge(bench, row, &base_stage)?).standing_at(edge);
+    tried.along("waiting_w", at).with_base(waiting_w);
+    tried.along("idle_w", over_idle(bench, row, waiting_w)?).with_base(idle_w);
+    tried.along("edge", over_edge(bench, row, &base_stage)?).with_base(edge);
     let full = one_at_a_time([row.waiting_w.values(), row.idle_w.values(), row.edge.values()]);
     let band = tried.band(full).ok_or_else(|| RunError::setting("III-4 has nothing to try"))?;
     let base = Methods::of(bench, &base_stage, &bench.phone_frames)?;
@@ -260,7 +260,7 @@ pub(super) fn pc(bench: &Bench<'_>) -> Result<Done, RunError> {
     );
     let at: Vec<_> = at.collect::<Result<_, RunError>>()?;
     let over_waiting = at.iter().map(|(watts, over, _)| (*watts, *over)).collect();
-    tried.along("waiting_w", at).standing_at(waiting_w);
+    tried.along("waiting_w", at).with_base(waiting_w);
     if row.background_w.all(form).len() > 1 {
         let at = row.background_w.all(form).iter().map(|&other_w| {
             let other = (other_w != background_w)
@@ -269,7 +269,7 @@ pub(super) fn pc(bench: &Bench<'_>) -> Result<Done, RunError> {
             let (over, below) = other.as_ref().unwrap_or(&base).judged();
             Ok((other_w, over, below))
         });
-        tried.along("background_w", at.collect::<Result<Vec<_>, RunError>>()?).standing_at(background_w);
+        tried.along("background_w", at.collect::<Result<Vec<_>, RunError>>()?).with_base(background_w);
     }
     let full = one_at_a_time([row.waiting_w.values(), row.background_w.values()]);
     let band = tried.band(full).ok_or_else(|| RunError::setting("III-5 has nothing to try"))?;

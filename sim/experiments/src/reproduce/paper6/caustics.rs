@@ -49,8 +49,8 @@ pub(super) fn executions(task: &Task<'_>) -> Result<Done, RunError> {
         "slope and depth_m one at a time about the values given",
     );
     let judged = |(at, counted): &(f64, Counted)| (*at, over_fewer(counted), over_fewer(counted) < 1.0);
-    tried.along("slope", slopes.iter().map(judged)).standing_at(slope);
-    tried.along("depth_m", depths.iter().map(judged)).standing_at(depth_m);
+    tried.along("slope", slopes.iter().map(judged)).with_base(slope);
+    tried.along("depth_m", depths.iter().map(judged)).with_base(depth_m);
     let full = one_at_a_time([row.slope.values(), row.depth_m.values()]);
     let band = tried.band(full).ok_or_else(|| RunError::setting("VI-6 has nothing to try"))?;
     let [moving, refined, hull, prism] = base.executions;

@@ -110,7 +110,7 @@ struct AgainstNull {
     /// How many cases there are.
     cases: usize,
     /// In how many the planes are narrower where the facing changes, and elsewhere.
-    beaten: [usize; 2],
+    narrower: [usize; 2],
     /// In how many they gain more on the null where the facing changes than elsewhere.
     turning_more: usize,
     /// Least and greatest width over the null's, where the facing changes and elsewhere.
@@ -123,19 +123,19 @@ impl AgainstNull {
         for (class, over) in [turning, steady].into_iter().enumerate() {
             let [low, high] = if self.cases == 0 { [over; 2] } else { self.ranges[class] };
             self.ranges[class] = [low.min(over), high.max(over)];
-            self.beaten[class] += usize::from(over < 1.0);
+            self.narrower[class] += usize::from(over < 1.0);
         }
         self.turning_more += usize::from(turning < steady);
         self.cases += 1;
     }
 
     fn text(&self) -> String {
-        let Self { cases, beaten, turning_more, ranges: [turning, steady] } = self;
+        let Self { cases, narrower, turning_more, ranges: [turning, steady] } = self;
         format!(
             "against the null, vertices within the tile's own time and no plane, planes are narrower in {} of {cases} cases where the facing \
              changes ({:.3} to {:.3} of it) and in {} of {cases} elsewhere ({:.3} to {:.3}), and gain more where the facing changes in \
              {turning_more}",
-            beaten[0], turning[0], turning[1], beaten[1], steady[0], steady[1]
+            narrower[0], turning[0], turning[1], narrower[1], steady[0], steady[1]
         )
     }
 }
@@ -190,8 +190,8 @@ pub(super) fn tighter(task: &Task<'_>) -> Result<Done, RunError> {
         ("most_turning_over_steady", band.max),
         ("violations", total.violations as f64),
         ("cases", against_null.cases as f64),
-        ("cases_narrower_than_null_turning", against_null.beaten[0] as f64),
-        ("cases_narrower_than_null_steady", against_null.beaten[1] as f64),
+        ("cases_narrower_than_null_turning", against_null.narrower[0] as f64),
+        ("cases_narrower_than_null_steady", against_null.narrower[1] as f64),
         ("least_over_null_turning", against_null.ranges[0][0]),
         ("most_over_null_turning", against_null.ranges[0][1]),
         ("least_over_null_steady", against_null.ranges[1][0]),
@@ -566,7 +566,7 @@ mod tests {
     }
 
     /// Narrower than the vertices over the whole shutter, with no gain by planes at all: the condition holds, and the row says that
-    /// the null is not beaten.
+    /// no interval is narrower than that of the null.
     #[test]
     fn planes_that_gain_nothing_are_not_narrower_than_the_null() {
         let idle = widths([1.0, 1.0, 1.0], [1.8, 1.8, 1.8]);
@@ -575,9 +575,9 @@ mod tests {
         let useful = widths([0.5, 0.5, 1.0], [1.8, 1.8, 1.8]);
         let mut against = AgainstNull::default();
         against.add(&idle);
-        assert_eq!((against.cases, against.beaten, against.turning_more), (1, [0, 0], 0));
+        assert_eq!((against.cases, against.narrower, against.turning_more), (1, [0, 0], 0));
         against.add(&useful);
-        assert_eq!((against.cases, against.beaten, against.turning_more), (2, [1, 0], 1));
+        assert_eq!((against.cases, against.narrower, against.turning_more), (2, [1, 0], 1));
         assert_eq!(against.ranges, [[0.5, 1.0], [1.0, 1.0]]);
         assert!(against.text().contains("in 1 of 2 cases where the facing changes (0.500 to 1.000 of it)"));
     }

@@ -78,7 +78,7 @@ pub(super) fn row(task: &Task<'_>) -> Result<Done, RunError> {
     // The lens sets the roughness: a wider one blurs more.
     let rougher = widest.is_sorted_by(|a, b| a < b);
     let at = at.into_iter().map(|(one, ratio, holds)| (one, ratio, holds && rougher));
-    tried.along("lens_radius", at).standing_at(radius);
+    tried.along("lens_radius", at).with_base(radius);
     let mut at = Vec::new();
     for &one in row.index.all(form) {
         let other = (one != index).then(|| found([radius, one])).transpose()?;
@@ -86,7 +86,7 @@ pub(super) fn row(task: &Task<'_>) -> Result<Done, RunError> {
         let found = other.as_ref().unwrap_or(&base);
         at.push((one, found.ratio(), found.falls() && found.hardens(off)));
     }
-    tried.along("index", at).standing_at(index);
+    tried.along("index", at).with_base(index);
     let full = one_at_a_time([row.lens_radius.values(), row.index.values()]);
     let band = tried.band(full).ok_or_else(|| RunError::setting("VI-11 has nothing to try"))?;
     let [reflected, refracted] = base.errors.map(|both| both.map(|row| row.rmse));

@@ -93,9 +93,9 @@ pub(super) fn rate(task: &Task<'_>) -> Result<Done, RunError> {
         "tile_px and motion_m one at a time about the values given",
     );
     let at = tiles.into_iter().map(|(side, gain, grows)| (side, gain, grows && wrong == 0));
-    tried.along("tile_px", at).standing_at(tile_px);
+    tried.along("tile_px", at).with_base(tile_px);
     let at = motions.into_iter().map(|(motion, gain, grows)| (motion, gain, grows && wrong == 0));
-    tried.along("motion_m", at).standing_at(motion);
+    tried.along("motion_m", at).with_base(motion);
     let full = one_at_a_time([row.tile_px.values(), row.motion_m.values()]);
     let band = tried.band(full).ok_or_else(|| RunError::setting("VI-4 has nothing to try"))?;
     let base = curves.iter().find(|(name, _)| *name == format!("{tile_px}-pixel tiles"));

@@ -153,7 +153,7 @@ fn rarity(errors: f64) -> f64 {
     upper_tail(errors * errors, 1)
 }
 
-/// What the file says of the tolerance. It is not so, but files of settings are not changed once a number was computed with them.
+/// The tolerance that the file states. It is wrong, but files of settings are not changed once a number was computed with them.
 const SAID_OF_TOLERANCE: &str =
     "The samples of a pixel are stratified, so that 3 standard errors of independent ones are generous.";
 

@@ -132,7 +132,7 @@ impl Tried<'_> {
         }
         let found = at.iter().map(|(_, increase, _)| *increase).collect();
         let cases = self.cases.along(setting, at);
-        standing.into_iter().for_each(|value| cases.standing_at(value));
+        standing.into_iter().for_each(|value| cases.with_base(value));
         Ok(found)
     }
 }
