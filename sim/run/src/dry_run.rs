@@ -1,7 +1,7 @@
 //! `--dry-run`: what a run would do, and the time and memory that it is expected to take.
 
 use cpu_time::ProcessTime;
-use output::table::{grouped, si};
+use output::table::{counted, grouped, si};
 use pipeline::{Gpu, Viewport};
 use serde::Serialize;
 use timing::{FrameClock, Level, Recorder};
@@ -110,8 +110,11 @@ impl DryRun {
             (
                 "image",
                 format!(
-                    "{}x{}, {} samples per pixel ({})",
-                    self.size[0], self.size[1], self.samples, self.table
+                    "{}x{}, {} per pixel ({})",
+                    self.size[0],
+                    self.size[1],
+                    counted(self.samples as usize, "sample"),
+                    self.table
                 ),
             ),
             ("camera", format!("{lens}, shutter {} of {}", self.shutter, si(1.0 / self.frame_rate_hz, "s"))),

@@ -128,8 +128,13 @@ fn print_mesh(name: &str, json: bool, scene: &VisibilityScene) -> Result<(), Fai
             if info.moves { "moves" } else { "still" }
         ),
         format!(
-            "  {}x{} pixels, {} samples, seed {}, lens radius {}, near depth {}",
-            info.width, info.height, info.samples_per_pixel, info.seed, info.lens_radius, info.near
+            "  {}x{} pixels, {}, seed {}, lens radius {}, near depth {}",
+            info.width,
+            info.height,
+            counted(info.samples_per_pixel as usize, "sample"),
+            info.seed,
+            info.lens_radius,
+            info.near
         ),
     ];
     lines.push(match &info.camera {
@@ -156,8 +161,9 @@ fn print_samples(name: &str, json: bool, samples: &FixedSamples) -> Result<(), F
         return print_json(&info, true);
     }
     print(&format!(
-        "{}: a sample table of {width}x{height} pixels, {} samples in each",
-        info.name, info.samples_per_pixel
+        "{}: a sample table of {width}x{height} pixels, {} in each",
+        info.name,
+        counted(info.samples_per_pixel as usize, "sample")
     ))
 }
 
@@ -173,10 +179,10 @@ fn point(values: [f64; 3]) -> String {
 fn settings_text(settings: &SettingsInfo) -> String {
     let [first, end] = settings.frames;
     format!(
-        "  image     {}x{} pixels, {} samples in a pixel of table `{}`\n  time      frames {first}..{end} at {} Hz, shutter open for {} of a frame",
+        "  image     {}x{} pixels, {} in a pixel of table `{}`\n  time      frames {first}..{end} at {} Hz, shutter open for {} of a frame",
         settings.width,
         settings.height,
-        settings.samples,
+        counted(settings.samples as usize, "sample"),
         settings.table,
         settings.frame_rate_hz,
         settings.shutter

@@ -5,6 +5,7 @@ use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use output::table::counted;
 use output::terminal::Terminal;
 use pipeline::sampling::SampleSource;
 use pipeline::visibility::VisibleTriangle;
@@ -91,16 +92,21 @@ pub(super) fn run(args: &VisibilityArgs, terminal: &Terminal) -> Result<(), Fail
     let camera = found.camera.as_ref().map(|camera| format!("\nthe camera was fitted: {}", camera.to_ron()));
     found.warnings.iter().for_each(|warning| terminal.warn(warning));
     let rates = format!(
-        "\n{:.1} million samples/s by the CPU time of a thread ({} runs on {} threads), {:.1} end to end",
+        "\n{:.1} million samples/s by the CPU time of a thread ({} on {}), {:.1} end to end",
         found.rates.samples_per_s / 1e6,
-        found.rates.runs,
-        found.rates.threads,
+        counted(usize::from(found.rates.runs), "run"),
+        counted(found.rates.threads, "thread"),
         found.rates.end_to_end_samples_per_s / 1e6
     );
     let notes: String = std::iter::once(rates).chain(camera).collect();
     print(&format!(
-        "{} triangles, {}x{} pixels of {} samples: {} of {} samples hit a triangle{notes}",
-        found.triangles, found.width, found.height, found.samples_per_pixel, found.hits, found.samples
+        "{}, {}x{} pixels of {}: {} of {} samples hit a triangle{notes}",
+        counted(found.triangles, "triangle"),
+        found.width,
+        found.height,
+        counted(found.samples_per_pixel as usize, "sample"),
+        found.hits,
+        found.samples
     ))
 }
 
