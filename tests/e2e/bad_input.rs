@@ -159,7 +159,7 @@ fn missing_files() {
     refusals.call(
         &[&scene],
         1,
-        &["s.ron:1:18: ", "gone.obj: cannot read it: No such file"],
+        &["s.ron:1:19: ", "gone.obj: cannot read it: No such file"],
         "check the path",
     );
     let cut = inputs.put("cut.ron", "(\n  objects: [\n    (shape: ");
@@ -326,8 +326,8 @@ fn invalid_scene_files() {
             "camera.target",
             "move one of them",
         ),
-        ("(".to_owned(), ":1:", "end of RON"),
-        (String::new(), ":1:", "Expected opening `(`"),
+        ("(".to_owned(), ":1:", "the file ends early: add what is missing"),
+        (String::new(), ":1:", "the file ends early: add what is missing"),
     ];
     for (text, place, remedy) in cases {
         refusals.file("scene.ron", text, 2, &[place], remedy);
