@@ -83,16 +83,19 @@ fn the_summary_of_a_run_is_no_trace() {
 #[test]
 fn a_proposed_start_that_does_not_come_back_is_refused() {
     let inputs = Inputs::new();
-    // One rise in a trace that is otherwise noise.
-    let row = |i: u32| {
-        format!(
-            "{},12,{}\n",
-            f64::from(i) / 5000.0,
-            0.2 + f64::from(i * 7919 % 13) * 0.01 + if i >= 300 { 2.0 } else { 0.0 }
-        )
+    // One frame between noise.
+    let noise = |i: u32| {
+        let mixed = i.wrapping_mul(2_654_435_761);
+        let mixed = (mixed ^ (mixed >> 15)).wrapping_mul(2_246_822_519);
+        f64::from((mixed ^ (mixed >> 13)) % 1000) / 1000.0 - 0.5
     };
-    let trace = inputs
-        .put("t.csv", "time_s,voltage_V,current_A\n".to_owned() + &(0..500).map(row).collect::<String>());
+    let row = |i: u32| {
+        let busy = (10_000..10_400).contains(&i);
+        let level = if busy { 3.0 + (f64::from(i) / 17.0).sin() } else { 0.5 };
+        format!("{},12,{}\n", f64::from(i) / 50e3, 0.1 * noise(i) + level)
+    };
+    let rows: String = (0..20_000).map(row).collect();
+    let trace = inputs.put("t.csv", format!("time_s,voltage_V,current_A\n{rows}"));
     let ended = quintile().call(["trace", "frames", &trace, "--auto"]);
     assert_eq!(ended.code, Some(2), "{}", ended.stdout);
     assert!(ended.stderr.contains("--auto found no start that comes back"), "{}", ended.stderr);

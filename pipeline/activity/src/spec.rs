@@ -102,7 +102,8 @@ pub fn parse<T: DeserializeOwned>(text: &str, name: &str) -> Result<T, SpecError
 
 fn describe(error: &SpannedError, text: &str, name: &str) -> SpecError {
     let at = error.span.start;
-    if let Some((line, column)) = early_end(text, at.line, at.col) {
+    if matches!(error.code, Error::Eof) || ends_early(text, at.line, at.col) {
+        let (line, column) = end_of(text);
         let message = "the file ends early: add what is missing, closing brackets included, or get it again";
         return SpecError::Parse { path: name.to_owned(), line, column, message: message.to_owned() };
     }
@@ -115,8 +116,16 @@ fn describe(error: &SpannedError, text: &str, name: &str) -> SpecError {
     }
 }
 
-/// The place just after the last character of the text, if an error at a position is that nothing follows.
-fn early_end(text: &str, line: usize, column: usize) -> Option<(usize, usize)> {
+/// The place just after the last character of the text, comments left out.
+fn end_of(text: &str) -> (usize, usize) {
+    let plain = without_comments(text);
+    let end = plain.trim_end();
+    let last = end.rfind('\n').map_or(0, |newline| newline + 1);
+    (1 + end.matches('\n').count(), 1 + end[last..].chars().count())
+}
+
+/// Whether an error at a position is that nothing follows.
+fn ends_early(text: &str, line: usize, column: usize) -> bool {
     let plain = without_comments(text);
     let end = plain.trim_end();
     let rest = plain.lines().skip(line.saturating_sub(1));
@@ -127,8 +136,7 @@ fn early_end(text: &str, line: usize, column: usize) -> Option<(usize, usize)> {
     let is_end = after.all(|text: String| text.trim().is_empty());
     let balance = |open: char, close: char| end.matches(open).count() > end.matches(close).count();
     let is_open = end.is_empty() || balance('(', ')') || balance('[', ']') || balance('{', '}');
-    let last = end.rfind('\n').map_or(0, |newline| newline + 1);
-    (is_end && is_open).then(|| (1 + end.matches('\n').count(), 1 + end[last..].chars().count()))
+    is_end && is_open
 }
 
 /// Name of the field whose value is at or just before a position: the word before the last colon of the line

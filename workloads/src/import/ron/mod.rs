@@ -52,7 +52,7 @@ impl Context<'_> {
     /// An error of a file that the scene names as `name`: one that cannot be read is reported where it is named.
     fn named(self, name: &str, error: LoadError) -> LoadError {
         let LoadError::Read { file, source } = error else { return error };
-        let text = std::fs::read_to_string(self.path).unwrap_or_default();
+        let text = activity::spec::read(self.path).unwrap_or_default();
         let quoted = format!("\"{name}\"");
         let at = text.lines().enumerate().find_map(|(line, text)| Some((line, text.find(&quoted)?)));
         let place = at.map_or(String::new(), |(line, column)| format!(":{}:{}", line + 1, column + 1));
