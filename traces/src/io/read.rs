@@ -89,6 +89,7 @@ fn load(mut rows: Rows) -> Result<Loaded, ReadError> {
     if !rows.repairs_input() {
         description.check_end(&path)?;
     }
+    rows.check_finite(&voltage_v, &current_a, 0)?;
     let trace = Trace::new(voltage_v, current_a, grid.rate_hz, grid.start_s, description.metadata)
         .map_err(|error| ReadError::trace(&path, error))?;
     Ok(Loaded { trace, repairs })
