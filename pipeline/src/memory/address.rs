@@ -1,6 +1,7 @@
 //! Address space of a frame: surfaces, vertices and textures, each aligned to a line.
 
-use super::LINE_BYTES;
+/// Bytes per line in all caches of memory.
+pub const LINE_BYTES: u64 = 64;
 
 /// A region of memory that passes write to and later ones may read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

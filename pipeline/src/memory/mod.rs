@@ -4,7 +4,7 @@ mod address;
 mod cache;
 mod system;
 
-pub use address::{AddressSpace, Surface};
+pub use address::{AddressSpace, LINE_BYTES, Surface};
 pub use cache::{Access, Cache, CacheError, CacheSpec, Replacement};
 pub(crate) use system::depths_fit;
-pub use system::{Compression, LINE_BYTES, MemorySpec, MemorySystem};
+pub use system::{Compression, MemorySpec, MemorySystem};

@@ -4,7 +4,8 @@
 use activity::{Event, LineAccess, LineKind, PacketCounts, Unit};
 use serde::Deserialize;
 
-use super::{Access, Cache, CacheError, CacheSpec, Surface};
+use super::address::{LINE_BYTES, Surface};
+use super::{Access, Cache, CacheError, CacheSpec};
 
 /// Caches of memory, with lines of 64 bytes as entries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
@@ -290,9 +291,6 @@ impl CompressedLines {
         !shared || self.moved_line(line) != line
     }
 }
-
-/// Bytes per line in all caches of memory.
-pub const LINE_BYTES: u64 = 64;
 
 #[cfg(test)]
 mod tests {
