@@ -268,12 +268,12 @@ impl<'e> Gpu<'e> {
 
     /// Packets that have to wait for earlier passes, if any: those that read their results.
     fn waits(&self, at: &AddressMap, draws: &[Draw<'_>]) -> Option<Waits> {
-        let is_pending = |address: &u64| self.pending.iter().any(|surface| surface.contains(*address));
+        let is_pending = |address: u64| self.pending.iter().any(|surface| surface.contains(address));
         let textured = draws.iter().zip(&at.textures).filter(|(draw, _)| draw.shader.texture().is_some());
-        if at.vertices.iter().any(is_pending) {
+        if at.vertices.iter().any(|buffer| is_pending(buffer.address)) {
             return Some(Waits::All);
         }
-        textured.map(|(_, texture)| texture).any(is_pending).then_some(Waits::Tiles)
+        textured.map(|(_, texture)| *texture).any(is_pending).then_some(Waits::Tiles)
     }
 
     /// Lets packets wait for all earlier ones, and makes results readable.

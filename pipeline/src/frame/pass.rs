@@ -163,8 +163,8 @@ pub(super) struct AddressMap {
     pub colour: Surface,
     /// Images, one after the other.
     pub image: Surface,
-    /// First byte of the vertices of each draw.
-    pub vertices: Vec<u64>,
+    /// Vertices of each draw.
+    pub vertices: Vec<VertexBuffer>,
     /// First byte of the texture of each draw; draws with the same texture have the same address.
     pub textures: Vec<u64>,
 }
@@ -185,7 +185,7 @@ impl AddressMap {
         };
         let image = space.take((pixels * SAMPLE_BYTES * images as u64).max(mip_levels));
         let resident: Vec<Resident> = resident(pass.draws, space).collect();
-        let vertices = resident.iter().map(|at| at.vertices.unwrap_or(0)).collect();
+        let vertices = resident.iter().map(|at| at.vertices.unwrap_or_default()).collect();
         let textures = resident.iter().map(|at| at.texture.unwrap_or(0)).collect();
         Self { depth, colour, image, vertices, textures }
     }
@@ -201,11 +201,12 @@ pub(super) fn resident<'s>(
     draws: &'s [Draw<'_>],
     space: &'s mut AddressSpace,
 ) -> impl Iterator<Item = Resident> + use<'s> {
-    let vertices: Vec<u64> = draws
+    let vertices: Vec<VertexBuffer> = draws
         .iter()
         .map(|draw| {
-            let bytes = draw.geometry.open().len() as u64 * u64::from(draw.geometry.vertex_bytes());
-            draw.resident.vertices.unwrap_or_else(|| space.take(bytes).address())
+            let (count, stride) = (draw.geometry.open().len() as u64, draw.geometry.vertex_bytes());
+            let new = || VertexBuffer { address: space.take(count * u64::from(stride)).address(), stride };
+            draw.resident.vertices.unwrap_or_else(new)
         })
         .collect();
     let mut known: Vec<(*const Texture, u64)> = Vec::new();
@@ -247,10 +248,19 @@ impl<'a> Draw<'a> {
     }
 }
 
+/// Vertices in memory. A pass that draws them at one time of the shutter still reads both ends.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct VertexBuffer {
+    /// First byte.
+    pub address: u64,
+    /// Bytes of a vertex.
+    pub stride: u32,
+}
+
 /// Addresses of a draw's data.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Resident {
-    pub(super) vertices: Option<u64>,
+    pub(super) vertices: Option<VertexBuffer>,
     pub(super) texture: Option<u64>,
 }
 

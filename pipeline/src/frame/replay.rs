@@ -5,7 +5,7 @@ use activity::{Event, LineAccess, Packet, PacketCounts, PacketKind};
 use super::Shading;
 use super::bin::Bin;
 use super::bin::{BinLog, Work};
-use super::pass::{Pass, SAMPLE_BYTES};
+use super::pass::{Pass, SAMPLE_BYTES, VertexBuffer};
 use super::surface::Surface;
 use crate::memory::{Access, Cache, CacheError, LINE_BYTES, MemorySystem};
 use crate::random::mix;
@@ -67,7 +67,7 @@ impl<'a> Replay<'a> {
     /// Fetch and shade the vertices of a triangle that were not shaded recently.
     pub fn vertices(&mut self, draw: usize, triangle: u32, counts: &mut PacketCounts) {
         let geometry = &self.pass.draws[draw].geometry;
-        let bytes = geometry.vertex_bytes();
+        let VertexBuffer { address, stride: bytes } = self.pass.addresses.vertices[draw];
         let ends = if geometry.is_still() && self.pass.still_camera { 1 } else { 2 };
         for vertex in self.pass.corners(triangle).1 {
             if self.reuse.contains_or_insert((draw, vertex as u32)) {
@@ -77,8 +77,8 @@ impl<'a> Replay<'a> {
             counts[Event::VertexBytes] += bytes;
             counts[Event::VertexInvocations] += 1;
             counts[Event::ShaderOps] += ends * self.pass.draws[draw].shader.cost().vertex_ops;
-            let address = self.pass.addresses.vertices[draw] + vertex as u64 * u64::from(bytes);
-            self.memory.vertices(address, u64::from(bytes), counts);
+            let at = address + vertex as u64 * u64::from(bytes);
+            self.memory.vertices(at, u64::from(bytes), counts);
         }
     }
 

@@ -428,7 +428,9 @@ mod tests {
         let (first, last) = (&chart.rows[0], chart.rows.last().unwrap());
         assert!(last.rmse < 0.6 * first.rmse, "{} {}", first.rmse, last.rmse);
         assert!(last.one_pass.vertices * 16 == last.accumulation.vertices);
-        assert!(last.one_pass.dram_bytes <= last.accumulation.dram_bytes);
+        // The L2 holds the vertices from pass to pass, so both move little but their depths.
+        let [one, many] = [&last.one_pass, &last.accumulation].map(|cost| cost.dram_bytes as f64);
+        assert!((one / many - 1.0).abs() < 0.05, "{one} {many}");
         let (least, most) = (&chart.biases[0], chart.biases.last().unwrap());
         assert!(least.acne > 0.05 && most.acne < 0.01, "{} {}", least.acne, most.acne);
         assert!(most.leak > 0.2 && least.leak < most.leak, "{} {}", least.leak, most.leak);

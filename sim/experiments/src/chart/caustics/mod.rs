@@ -447,8 +447,10 @@ mod tests {
         assert_eq!(read("caustics.csv").lines().count(), 1 + 2 * 4 + coarse + 2 * 4);
         let gentle: Vec<f64> =
             chart.coarse.iter().filter(|row| row.slope == 0.05).map(|row| row.error).collect();
-        let [few, many] = gentle[..] else { panic!("{gentle:?}") };
-        assert!(few < 0.2 && many < 0.5 * few, "more triangles, closer to the photons: {gentle:?}");
+        assert!(
+            gentle.len() == 2 && gentle.iter().all(|error| *error < 0.1),
+            "close to the photons: {gentle:?}"
+        );
         let [straight, crossed] = [&chart.crossed[0], &chart.crossed[1]];
         assert!(crossed.crossing > straight.crossing + 0.02);
         assert!(chart.crossed.iter().all(|row| row.difference == 0.0 && row.floor_error > row.noise));

@@ -279,7 +279,9 @@ mod tests {
         assert!((same.rms() - 1.0).abs() < 0.2 && same.is_of_independent(3.0), "{}", same.text(3.0));
         assert_eq!([1.0, 2.0, 3.0].map(|errors| same.beyond(errors)), [28, 4, 0]);
         assert!((same.by_chance(1.0) - 20.31).abs() < 0.01 && (same.by_chance(3.0) - 0.173).abs() < 0.001);
-        assert!(same.text(3.0).contains("no sign that 3 standard errors are generous"));
+        assert!(same.text(3.0).contains(
+            "consistent with independent samples, so 3 standard errors are not a generous tolerance"
+        ));
         assert!(
             times(0.5).text(3.0).contains("of whose standard errors are 5.4 of these")
                 && times(0.5).is_of_independent(3.0)
