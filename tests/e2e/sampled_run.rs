@@ -47,7 +47,7 @@ fn predicted_frames_are_marked_in_every_file() {
     assert!((1..=6).contains(&rows(",0,,", "")), "{table}");
     assert!((1..=24).contains(&rows("", ",1,0.")), "{table}");
     assert!(results.text("report.html").contains("predicted"));
-    assert!(results.ended.stdout.contains("predicted: from 6 frames"), "{}", results.ended.stdout);
+    assert!(results.ended.stdout.contains("predicted: from 6 simulated frames"), "{}", results.ended.stdout);
 }
 
 /// Other levels predict no frames and add no columns.

@@ -203,7 +203,7 @@ impl SampledSummary {
             )
         });
         format!(
-            "predicted from {} simulated frames, one of every {:.0}, with 95 % intervals: {}",
+            "from {} simulated frames, one of every {:.0}, with 95 % intervals: {}",
             self.simulated_frames.len(),
             self.frames_per_simulated,
             quantities.join(", ")
