@@ -269,8 +269,8 @@ mod tests {
     fn each_bad_mark_says_what_and_where() {
         let message = |marks: Marks| marks.place(&trace()).unwrap_err().to_string();
         assert!(message(Marks { starts_s: vec![], window: WINDOW, end_s: 3.0 }).contains("no frame start"));
-        assert!(message(Marks::one(9.0, WINDOW, 10.0)).contains("marked at 9 s"));
-        assert!(message(Marks::one(f64::NAN, WINDOW, 3.0)).contains("marked at NaN s"));
+        assert!(message(Marks::one(9.0, WINDOW, 10.0)).contains("mark at 9 s"));
+        assert!(message(Marks::one(f64::NAN, WINDOW, 3.0)).contains("mark at NaN s"));
         assert!(message(Marks::one(2.5, WINDOW, 2.4)).contains("end mark 2.4 s"));
         assert!(message(Marks::one(2.5, WINDOW, 3.5)).contains("end mark 3.5 s"));
         assert!(

@@ -106,7 +106,7 @@ fn lost_samples_are_missing_and_filled_on_request() {
         let trace = trace(20_000).without(lost.clone());
         let message = read_bytes(&written(&trace), false).unwrap_err().to_string();
         let row = lost[0].start + 1;
-        assert!(message.contains(&format!("row {row}: voltage_V is NaN")), "{message}");
+        assert!(message.contains(&format!("row {row}: voltage is NaN")), "{message}");
         let repaired = read_bytes(&written(&trace), true).unwrap();
         assert_eq!((repaired.samples(), repaired.start_s()), (20_000, 1.25));
         // Between stretches nothing is changed, and in them it is the line that the trace in memory has.
