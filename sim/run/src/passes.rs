@@ -11,7 +11,7 @@ use crate::{Observed, Plan, Simulated};
 /// Passes of one name.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PassSummary {
-    /// Name of the pass; [`WRITE_BACK`] for what is written to memory when frames end.
+    /// Name of the pass; `write back` for what is written to memory when frames end.
     pub name: String,
     /// Number of passes of this name.
     pub passes: u64,
