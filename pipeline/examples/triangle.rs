@@ -4,20 +4,16 @@ use activity::Event;
 use glam::{Affine3A, Vec3, Vec4};
 use pipeline::depth::DepthSpec;
 use pipeline::{
-    CacheSpec, Camera, Cull, Draw, Features, Geometry, Lens, LensShape, MemorySpec, PipelineSpec, RasterPass,
-    SampleTable, Settings, Shader, ShaderCost, Shading, ShadingPoint, Viewport,
+    CacheSpec, Camera, Cull, Draw, Features, Geometry, Lane, Lens, LensShape, MemorySpec, PipelineSpec,
+    RasterPass, SampleTable, Settings, Shader, Shading, ShadingPoint, Viewport,
 };
 
 /// A surface of one colour.
 struct White;
 
 impl Shader for White {
-    fn cost(&self) -> ShaderCost {
-        ShaderCost { pixel_ops: 1, vertex_ops: 1 }
-    }
-
-    fn shade(&self, _: &ShadingPoint, _: Vec4) -> Vec3 {
-        Vec3::ONE
+    fn shade(&self, _: &Lane, _: &ShadingPoint, _: Vec4) -> Vec4 {
+        Vec4::ONE
     }
 }
 

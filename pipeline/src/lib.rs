@@ -51,6 +51,7 @@ pub mod random;
 pub mod sample_test;
 pub mod sampling;
 pub mod setup;
+pub mod shader;
 pub mod shading;
 pub mod simd;
 pub mod texture;
@@ -66,5 +67,5 @@ pub use geometry::{
 };
 pub use memory::{CacheSpec, MemorySpec, Replacement};
 pub use sampling::{LensShape, SampleSpec, SampleTable};
-pub use shading::{Shader, ShaderCost, ShadingPoint};
+pub use shader::{Lane, Shader, ShadingPoint};
 pub use texture::{Texture, TextureError, Wrap, linear_to_srgb8};

@@ -1,53 +1,9 @@
-//! Shading: shaders, the shading grid, and the quads that a packet requests.
+//! Shading: the shading grid, and the quads that a packet requests.
 //!
 //! A sample is shaded at the cell of the shading grid that contains its surface point at the reference lens
 //! position and time, `(u, v, t) = (0, 0, 1/2)` (decoupled sampling, Ragan-Kelley et al. 2011). The value of
 //! a cell depends on the triangle and the cell alone. The alternative shades every sample at its own
 //! position, in quads of 2x2 pixels at one sample index.
-
-use glam::{Vec2, Vec3, Vec4};
-
-use crate::texture::Texture;
-
-/// Cost of one run of a shader lane.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct ShaderCost {
-    /// Multiply-adds or simpler operations of one pixel shader lane.
-    pub pixel_ops: u32,
-    /// Multiply-adds or simpler operations of one vertex shader run, for one end of the shutter.
-    pub vertex_ops: u32,
-}
-
-/// Shader input, interpolated over the triangle at the reference lens position and time.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ShadingPoint {
-    /// World position.
-    pub position: Vec3,
-    /// Unit normal in world space, facing the camera.
-    pub normal: Vec3,
-    /// Unit vector from the point to the camera.
-    pub to_camera: Vec3,
-    /// Texture coordinate; zero for draws without any.
-    pub uv: Vec2,
-    /// Vertex colour in linear RGB, each channel 0 to 1; white for draws without any.
-    pub color: Vec3,
-}
-
-/// Shader of surface points. The result has to depend on the arguments alone: workers shade in any order, and
-/// the shading cache may return one result to many samples.
-pub trait Shader: Sync {
-    /// Cost of a run.
-    fn cost(&self) -> ShaderCost;
-
-    /// Texture sampled at the point's texture coordinate before the shader runs, if any. Its fetches go
-    /// through the texture unit and its cache.
-    fn texture(&self) -> Option<&Texture> {
-        None
-    }
-
-    /// Linear RGB radiance. `texel` is the filtered texel in linear RGBA, or white without a texture.
-    fn shade(&self, at: &ShadingPoint, texel: Vec4) -> Vec3;
-}
 
 /// Time of the reference at which the shading grid is defined.
 pub const REFERENCE_TIME: f32 = 0.5;

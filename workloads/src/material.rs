@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use glam::{Vec3, Vec4};
-use pipeline::{Shader, ShaderCost, ShadingPoint, Texture};
+use pipeline::{Lane, Shader, ShadingPoint, Texture};
 
 /// Appearance of a surface. Surfaces are opaque and diffuse, with a faint highlight.
 #[derive(Clone, Debug)]
@@ -79,21 +79,6 @@ pub struct SurfaceShader {
 /// Largest share of the lamp's light in the highlight.
 const HIGHLIGHT: f32 = 0.12;
 
-/// Base colour by texel: one multiplication for each of three channels.
-const BASE_OPS: u32 = 3;
-
-/// Base colour by vertex colour.
-const VERTEX_COLOR_OPS: u32 = 3;
-
-/// Counted from [`SurfaceShader::lit`]; a square root, a division, a comparison count as one operation each.
-/// Half vector: 3 additions, 3 multiply-adds, root, clamp, reciprocal, 3 to scale = 12; two cosines with their
-/// clamps, 4 each = 8; power of 32 = 5 squarings; hemisphere: 1 + 3; lamp onto it: 3; times base: 3; highlight:
-/// comparison, strength, 3 to add.
-const LIT_OPS: u32 = 12 + 8 + 5 + 4 + 3 + 3 + 5;
-
-/// World to camera: 9 multiply-adds; projection of x and y: 2.
-const VERTEX_OPS: u32 = 11;
-
 impl SurfaceShader {
     /// The shader of `material` under `light`, whose direction has to be known.
     pub fn new(material: &Material, light: &Light) -> Self {
@@ -115,48 +100,40 @@ impl SurfaceShader {
         Self { vertex_colors: true, ..self }
     }
 
-    fn lit(&self, at: &ShadingPoint, base: Vec3) -> Vec3 {
-        let half = self.toward + at.to_camera;
-        let length = half.dot(half).sqrt();
-        let half = half * (1.0 / length.max(f32::MIN_POSITIVE));
-        let facing = at.normal.dot(self.toward).max(0.0);
-        let glint = pow32(at.normal.dot(half).max(0.0));
-        let up = 0.5 * at.normal.y + 0.5;
-        let ambient = self.ground + up * self.sky_over_ground;
-        let diffuse = base * (facing * self.lamp + ambient);
+    fn lit(&self, lane: &Lane, at: &ShadingPoint, base: Vec3) -> Vec3 {
+        let half = lane.add(self.toward, at.to_camera);
+        let length = lane.max(lane.sqrt(lane.dot(half, half)), f32::MIN_POSITIVE);
+        let half = lane.scale(half, lane.recip(length));
+        let facing = lane.max(lane.dot(at.normal, self.toward), 0.0);
+        let glint = pow32(lane, lane.max(lane.dot(at.normal, half), 0.0));
+        let up = lane.madd(0.5, at.normal.y, 0.5);
+        let ambient = lane.madd(Vec3::splat(up), self.sky_over_ground, self.ground);
+        let diffuse = lane.mul(base, lane.madd(Vec3::splat(facing), self.lamp, ambient));
         // No highlight on the side turned away from the lamp.
-        let glint = if facing > 0.0 { HIGHLIGHT * glint } else { 0.0 };
-        diffuse + glint * self.lamp
+        let glint = lane.select_greater([facing, 0.0], lane.mul(HIGHLIGHT, glint), 0.0);
+        lane.madd(Vec3::splat(glint), self.lamp, diffuse)
     }
 }
 
-fn pow32(x: f32) -> f32 {
-    let (x2, square) = (x * x, |x: f32| x * x);
-    square(square(square(square(x2))))
+fn pow32(lane: &Lane, x: f32) -> f32 {
+    (0..5).fold(x, |power, _| lane.mul(power, power))
 }
 
 impl Shader for SurfaceShader {
-    fn cost(&self) -> ShaderCost {
-        let base_ops = if self.vertex_colors { BASE_OPS + VERTEX_COLOR_OPS } else { BASE_OPS };
-        let pixel_ops = if self.unlit { base_ops } else { base_ops + LIT_OPS };
-        ShaderCost { pixel_ops, vertex_ops: VERTEX_OPS }
-    }
-
     fn texture(&self) -> Option<&Texture> {
         self.texture.as_deref()
     }
 
-    fn shade(&self, at: &ShadingPoint, texel: Vec4) -> Vec3 {
-        let base = self.base_color * texel.truncate();
-        let base = if self.vertex_colors { base * at.color } else { base };
-        if self.unlit { base } else { self.lit(at, base) }
+    fn shade(&self, lane: &Lane, at: &ShadingPoint, texel: Vec4) -> Vec4 {
+        let base = lane.mul(self.base_color, texel.truncate());
+        let base = if self.vertex_colors { lane.mul(base, at.color) } else { base };
+        if self.unlit { base } else { self.lit(lane, at, base) }.extend(1.0)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::Vec2;
 
     fn shader(unlit: bool) -> SurfaceShader {
         let light =
@@ -165,12 +142,18 @@ mod tests {
     }
 
     fn point(normal: Vec3) -> ShadingPoint {
-        ShadingPoint { position: Vec3::ZERO, normal, to_camera: Vec3::X, uv: Vec2::ZERO, color: Vec3::ONE }
+        ShadingPoint { normal, to_camera: Vec3::X, ..ShadingPoint::FACING }
+    }
+
+    /// Radiance of a point, and the operations it takes.
+    fn shade(shader: &SurfaceShader, at: &ShadingPoint, texel: Vec4) -> (Vec3, u32) {
+        let lane = Lane::default();
+        (shader.shade(&lane, at, texel).truncate(), lane.ops())
     }
 
     #[test]
     fn a_surface_facing_the_lamp_shows_lamp_and_sky() {
-        let seen = shader(false).shade(&point(Vec3::Y), Vec4::ONE);
+        let (seen, _) = shade(&shader(false), &point(Vec3::Y), Vec4::ONE);
         // The half vector is 45 degrees off, so the highlight adds 0.12 / 2^16.
         let expected = Vec3::new(0.5, 0.25, 1.0) * 1.25 + Vec3::splat(0.12 / 65536.0);
         assert!((seen - expected).length() < 1e-5, "{seen}");
@@ -178,21 +161,21 @@ mod tests {
 
     #[test]
     fn a_surface_turned_away_shows_the_ground_only() {
-        assert_eq!(shader(false).shade(&point(Vec3::NEG_Y), Vec4::ONE), Vec3::ZERO);
+        assert_eq!(shade(&shader(false), &point(Vec3::NEG_Y), Vec4::ONE).0, Vec3::ZERO);
     }
 
     #[test]
     fn vertex_colours_multiply_and_cost_where_they_are_requested() {
         let red = ShadingPoint { color: Vec3::new(1.0, 0.5, 0.0), ..point(Vec3::Z) };
         let (plain, colored) = (shader(true), shader(true).with_vertex_colors());
-        assert_eq!(plain.shade(&red, Vec4::ONE), Vec3::new(0.5, 0.25, 1.0));
-        assert_eq!(colored.shade(&red, Vec4::ONE), Vec3::new(0.5, 0.125, 0.0));
-        assert_eq!(colored.cost().pixel_ops, plain.cost().pixel_ops + 3);
+        assert_eq!(shade(&plain, &red, Vec4::ONE), (Vec3::new(0.5, 0.25, 1.0), 3));
+        assert_eq!(shade(&colored, &red, Vec4::ONE), (Vec3::new(0.5, 0.125, 0.0), 6));
     }
 
     #[test]
     fn an_unlit_surface_shows_its_colour_and_costs_less() {
-        assert_eq!(shader(true).shade(&point(Vec3::Z), Vec4::splat(0.5)), Vec3::new(0.25, 0.125, 0.5));
-        assert!(shader(true).cost().pixel_ops < shader(false).cost().pixel_ops);
+        let (seen, ops) = shade(&shader(true), &point(Vec3::Z), Vec4::splat(0.5));
+        assert_eq!(seen, Vec3::new(0.25, 0.125, 0.5));
+        assert!(ops < shade(&shader(false), &point(Vec3::Z), Vec4::ONE).1);
     }
 }

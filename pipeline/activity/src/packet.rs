@@ -84,7 +84,7 @@ pub struct Packet {
     /// Kind of work.
     pub kind: PacketKind,
     /// Pass number in the frame, from 0.
-    pub pass: u16,
+    pub pass: u32,
     /// Batch of triangles in the pass, from 0. Tiles wait for the vertices of their batch, vertices for the tiles of the batch
     /// before the last.
     pub batch: u32,
@@ -103,7 +103,7 @@ impl Packet {
     pub const NONE: u32 = u32::MAX;
 
     /// A packet without events, in the first batch, of no draw, tile or triangle.
-    pub fn new(kind: PacketKind, pass: u16) -> Self {
+    pub fn new(kind: PacketKind, pass: u32) -> Self {
         let (draw, tile, triangle) = (Self::NONE, Self::NONE, Self::NONE);
         Self { kind, pass, batch: 0, draw, tile, triangle, counts: PacketCounts::default() }
     }

@@ -31,10 +31,10 @@ pub struct Gpu<'e> {
 /// Result of a pass.
 #[derive(Clone, Debug)]
 pub struct Rendered {
-    /// Linear RGB radiance of every pixel of each image, row by row from the top left.
+    /// Linear RGB radiance of every pixel of each image, row by row from the top left; empty unless requested.
     pub images: Vec<Vec<Vec3>>,
     /// Visible triangle (`u32::MAX` for none) and bits of its depth (infinite for none) of every sample, in the order
-    /// `(y width + x) per_pixel + index`; empty unless requested or drawn.
+    /// `(y width + x) per_pixel + index`; empty unless requested.
     pub visible: Vec<(u32, u32)>,
     /// Count of every event of the pass.
     pub counts: Counts,
@@ -45,6 +45,14 @@ pub struct Rendered {
 }
 
 impl Rendered {
+    /// The result with the work of writing it back to memory, when it is the only pass of a frame.
+    #[must_use]
+    pub fn with_write_back(mut self, report: &FrameReport) -> Self {
+        self.counts += &report.write_back;
+        self.heat.iter_mut().for_each(|map| map.elsewhere += report.write_back[map.event]);
+        self
+    }
+
     /// The first image; empty without images.
     pub fn into_image(self) -> Vec<Vec3> {
         self.images.into_iter().next().unwrap_or_default()
@@ -170,7 +178,9 @@ impl<'e> Gpu<'e> {
 
     /// The draws with addresses for their vertices and textures, so that several passes read the same data.
     pub fn resident<'a>(&mut self, draws: &[Draw<'a>]) -> Vec<Draw<'a>> {
-        let at: Vec<Resident> = resident(draws, &mut self.space).collect();
+        let at: Vec<Resident> = resident(draws, &mut self.space)
+            .map(|(vertices, texture)| Resident { vertices: Some(vertices), texture })
+            .collect();
         draws.iter().zip(at).map(|(draw, resident)| Draw { resident, ..*draw }).collect()
     }
 
@@ -180,11 +190,11 @@ impl<'e> Gpu<'e> {
     }
 
     /// Starts a pass whose packets come from the caller, and returns its number.
-    pub fn begin(&mut self, name: &str) -> u16 {
+    pub fn begin(&mut self, name: &str) -> u32 {
         let (name, draws, others) = (name.to_owned(), Vec::new(), Counts::default());
         self.passes.push(PassReport { name, triangles: 0, draws, others });
         self.last_batch = 0;
-        self.passes.len() as u16 - 1
+        self.last_pass()
     }
 
     /// Caches, for the packets of a pass that was begun.
@@ -214,35 +224,29 @@ impl<'e> Gpu<'e> {
         self.barrier(Waits::All);
     }
 
-    /// Work so far.
-    pub fn passes(&self) -> &[PassReport] {
-        &self.passes
-    }
-
     /// Draws a pass.
     ///
     /// # Errors
     /// [`PassError`] if a cache of the settings is invalid, or if the surfaces of the frame are too large.
     pub fn draw(&mut self, pass: &RasterPass<'_>) -> Result<Rendered, PassError> {
-        let number = self.passes.len() as u16;
+        let number = self.passes.len() as u32;
         let prepared = Pass::new(pass, number, &mut self.space);
         if !self.space.fits() {
             return Err(PassError::Memory { pass: pass.name.to_owned(), bytes: self.space.bytes() });
         }
         self.passes.push(PassReport::new(pass));
-        if let Some(waits) = self.waits(&prepared.addresses, pass.draws) {
+        if let Some(waits) = self.waits(&prepared.addresses) {
             self.barrier(waits);
         }
         let drawn = self.pass(&prepared, pass)?;
         self.last_batch = prepared.batches().len().max(1) as u32 - 1;
-        self.results.push(drawn.surface);
-        self.pending.push(drawn.surface);
+        self.keep(drawn.surface);
         Ok(drawn)
     }
 
     fn pass(&mut self, prepared: &Pass<'_>, pass: &RasterPass<'_>) -> Result<Rendered, PassError> {
         let mut heat: Vec<_> = pass.heat.iter().map(|&event| HeatMap::new(event, prepared)).collect();
-        let (emit, report) = (&mut self.emit, &mut self.passes[usize::from(prepared.number)]);
+        let (emit, report) = (&mut self.emit, &mut self.passes[prepared.number as usize]);
         let mut done = |work: Finished<'_>| match work {
             Finished::Packet(packet, lines) => {
                 report.add(packet);
@@ -258,7 +262,7 @@ impl<'e> Gpu<'e> {
         let bins = if is_empty { Vec::new() } else { rasterize(prepared, &mut replay, &mut done) };
         let visible = if pass.visible { resolve::visible(prepared, &bins) } else { Vec::new() };
         Ok(Rendered {
-            images: resolve::resolve(prepared, &bins),
+            images: if pass.image { resolve::resolve(prepared, &bins) } else { Vec::new() },
             visible,
             counts: report.counts(),
             heat,
@@ -267,32 +271,32 @@ impl<'e> Gpu<'e> {
     }
 
     /// Packets that have to wait for earlier passes, if any: those that read their results.
-    fn waits(&self, at: &AddressMap, draws: &[Draw<'_>]) -> Option<Waits> {
+    fn waits(&self, at: &AddressMap) -> Option<Waits> {
         let is_pending = |address: u64| self.pending.iter().any(|surface| surface.contains(address));
-        let textured = draws.iter().zip(&at.textures).filter(|(draw, _)| draw.shader.texture().is_some());
         if at.vertices.iter().any(|buffer| is_pending(buffer.address)) {
             return Some(Waits::All);
         }
-        textured.map(|(_, texture)| *texture).any(is_pending).then_some(Waits::Tiles)
+        at.textures.iter().flatten().copied().any(is_pending).then_some(Waits::Tiles)
     }
 
     /// Lets packets wait for all earlier ones, and makes results readable.
     fn barrier(&mut self, waits: Waits) {
-        let mut packet = Packet::new(PacketKind::Barrier(waits), self.passes.len().max(1) as u16 - 1);
+        let mut packet = Packet::new(PacketKind::Barrier(waits), self.last_pass());
         self.memory.flush(&mut packet.counts);
         self.pending.clear();
-        if let Some(report) = self.passes.last_mut() {
-            report.add(&packet);
-        }
-        (self.emit)(&packet, self.memory.log());
-        self.memory.clear_log();
+        self.push(&packet, 0);
+    }
+
+    /// Number of the last pass; 0 before the first.
+    fn last_pass(&self) -> u32 {
+        self.passes.len().saturating_sub(1) as u32
     }
 
     /// Ends the frame: the results of all passes are written back to memory.
     pub fn finish(mut self) -> FrameReport {
         let mut counts = PacketCounts::default();
         self.memory.finish(&self.results, &mut counts);
-        let (batch, pass) = (self.last_batch, self.passes.len().max(1) as u16 - 1);
+        let (batch, pass) = (self.last_batch, self.last_pass());
         let packet = Packet { batch, counts, ..Packet::new(PacketKind::Resolve, pass) };
         (self.emit)(&packet, self.memory.log());
         let mut write_back = Counts::default();
@@ -316,10 +320,7 @@ impl RasterPass<'_> {
     /// As [`Gpu::draw`].
     pub fn render(&self, emit: impl FnMut(&Packet, &[LineAccess])) -> Result<Rendered, PassError> {
         let mut gpu = Gpu::new(self.settings.spec, emit)?;
-        let mut drawn = gpu.draw(self)?;
-        let FrameReport { write_back, .. } = gpu.finish();
-        drawn.counts += &write_back;
-        drawn.heat.iter_mut().for_each(|map| map.elsewhere += write_back[map.event]);
-        Ok(drawn)
+        let drawn = gpu.draw(self)?;
+        Ok(drawn.with_write_back(&gpu.finish()))
     }
 }

@@ -10,7 +10,7 @@ use crate::depth::BoxGrid;
 use crate::geometry::{Camera, Clip, Cull, Geometry, MovingVertex, Projection, Viewport};
 use crate::memory::{AddressSpace, Surface};
 use crate::setup::Corner;
-use crate::shading::Shader;
+use crate::shader::{Program, Shader};
 use crate::texture::Texture;
 use crate::traversal::thresholds::{at_rest, blur_px, motion_px};
 
@@ -27,7 +27,7 @@ pub(super) struct Staged {
 /// Data of a pass that all stages read and none changes.
 pub(super) struct Pass<'a> {
     /// Number in the frame.
-    pub number: u16,
+    pub number: u32,
     pub draws: &'a [Draw<'a>],
     pub settings: &'a Settings<'a>,
     pub projection: Projection,
@@ -36,6 +36,8 @@ pub(super) struct Pass<'a> {
     /// First triangle of each draw, and the total number.
     first_triangle: Vec<u32>,
     pub addresses: AddressMap,
+    /// Operations of the shader of each draw.
+    pub programs: Vec<Program>,
     /// Image coordinate of the first column and row.
     pub origin: [f32; 2],
     /// Whether the camera has a lens.
@@ -54,7 +56,7 @@ pub(super) struct Pass<'a> {
 
 impl<'a> Pass<'a> {
     /// Prepares pass `number` of a frame and gives its surfaces addresses in `space`.
-    pub fn new(pass: &RasterPass<'a>, number: u16, space: &mut AddressSpace) -> Self {
+    pub fn new(pass: &RasterPass<'a>, number: u32, space: &mut AddressSpace) -> Self {
         let RasterPass { camera, draws, settings, .. } = *pass;
         let views = pass.target.views(settings.samples.per_pixel());
         let projection = Projection::new(camera, settings.viewport);
@@ -73,6 +75,7 @@ impl<'a> Pass<'a> {
             vertices,
             first_triangle,
             addresses: AddressMap::new(pass, views.len(), space),
+            programs: draws.iter().map(|draw| Program::of(draw.shader)).collect(),
             origin: [Viewport::edge(0, viewport.width()), Viewport::edge(0, viewport.height())],
             lens: !projection.shear.is_none(),
             clip: camera.clip(),
@@ -165,8 +168,8 @@ pub(super) struct AddressMap {
     pub image: Surface,
     /// Vertices of each draw.
     pub vertices: Vec<VertexBuffer>,
-    /// First byte of the texture of each draw; draws with the same texture have the same address.
-    pub textures: Vec<u64>,
+    /// First byte of the texture of each draw, if it has any; draws with the same texture have the same address.
+    pub textures: Vec<Option<u64>>,
 }
 
 impl AddressMap {
@@ -184,9 +187,7 @@ impl AddressMap {
             _ => 0,
         };
         let image = space.take((pixels * SAMPLE_BYTES * images as u64).max(mip_levels));
-        let resident: Vec<Resident> = resident(pass.draws, space).collect();
-        let vertices = resident.iter().map(|at| at.vertices.unwrap_or_default()).collect();
-        let textures = resident.iter().map(|at| at.texture.unwrap_or(0)).collect();
+        let (vertices, textures) = resident(pass.draws, space).unzip();
         Self { depth, colour, image, vertices, textures }
     }
 
@@ -200,7 +201,7 @@ impl AddressMap {
 pub(super) fn resident<'s>(
     draws: &'s [Draw<'_>],
     space: &'s mut AddressSpace,
-) -> impl Iterator<Item = Resident> + use<'s> {
+) -> impl Iterator<Item = (VertexBuffer, Option<u64>)> + use<'s> {
     let vertices: Vec<VertexBuffer> = draws
         .iter()
         .map(|draw| {
@@ -218,7 +219,7 @@ pub(super) fn resident<'s>(
             known.push((texture, address));
             address
         });
-        Resident { vertices: Some(vertices), texture }
+        (vertices, texture)
     })
 }
 
@@ -227,7 +228,7 @@ pub(super) fn resident<'s>(
 pub struct Draw<'a> {
     /// Triangles.
     pub geometry: Geometry<'a>,
-    /// Shader: its cost and its colours.
+    /// Shader.
     pub shader: &'a dyn Shader,
     /// Culled faces.
     pub cull: Cull,
@@ -277,6 +278,8 @@ pub struct RasterPass<'a> {
     pub settings: &'a Settings<'a>,
     /// What is drawn.
     pub target: Target<'a>,
+    /// Whether the result has the pixels of the images.
+    pub image: bool,
     /// Whether the result has the visible triangle and the depth of every sample.
     pub visible: bool,
     /// Events of which the result has heat maps.
@@ -312,7 +315,8 @@ impl Target<'_> {
 impl<'a> RasterPass<'a> {
     /// A pass that draws one image.
     pub fn new(camera: &'a Camera, draws: &'a [Draw<'a>], settings: &'a Settings<'a>) -> Self {
-        Self { name: "draw", camera, draws, settings, target: Target::Image, visible: false, heat: &[] }
+        let (name, target) = ("draw", Target::Image);
+        Self { name, camera, draws, settings, target, image: true, visible: false, heat: &[] }
     }
 
     /// The pass with another name.
@@ -325,6 +329,12 @@ impl<'a> RasterPass<'a> {
     #[must_use]
     pub fn onto(self, target: Target<'a>) -> Self {
         Self { target, ..self }
+    }
+
+    /// The pass without pixels in its result. Its work is the same.
+    #[must_use]
+    pub fn without_image(self) -> Self {
+        Self { image: false, ..self }
     }
 
     /// The pass with visible triangles and depths in its result.

@@ -67,6 +67,7 @@ impl<'a> Replay<'a> {
     /// Fetch and shade the vertices of a triangle that were not shaded recently.
     pub fn vertices(&mut self, draw: usize, triangle: u32, counts: &mut PacketCounts) {
         let geometry = &self.pass.draws[draw].geometry;
+        let ops = self.pass.projection.vertex_ops() + self.pass.programs[draw].vertex_ops;
         let VertexBuffer { address, stride: bytes } = self.pass.addresses.vertices[draw];
         let ends = if geometry.is_still() && self.pass.still_camera { 1 } else { 2 };
         for vertex in self.pass.corners(triangle).1 {
@@ -76,7 +77,7 @@ impl<'a> Replay<'a> {
             counts[Event::VerticesFetched] += 1;
             counts[Event::VertexBytes] += bytes;
             counts[Event::VertexInvocations] += 1;
-            counts[Event::ShaderOps] += ends * self.pass.draws[draw].shader.cost().vertex_ops;
+            counts[Event::ShaderOps] += ends * ops;
             let at = address + vertex as u64 * u64::from(bytes);
             self.memory.vertices(at, u64::from(bytes), counts);
         }
@@ -180,7 +181,7 @@ impl<'a> Replay<'a> {
             if hit {
                 continue;
             }
-            run_quad(&surface, access, counts);
+            count_quad(access, surface.quad_ops(access.quad), counts);
             let memory = &mut self.memory;
             let fetches = surface.fetch(access.quad, |line| memory.texture(line, counts));
             counts[Event::TextureFetches] += fetches;
@@ -194,14 +195,14 @@ impl<'a> Replay<'a> {
         let mut samples: [Vec<Sample>; 4] =
             std::array::from_fn(|_| vec![Sample::default(); source.per_pixel() as usize]);
         for pixels in quads.chunk_by(|a, b| a.quad == b.quad) {
-            if surface.sampler().is_some() {
+            if surface.needs_samples() {
                 for (lane, of_pixel) in (0..).zip(&mut samples) {
                     let [x, y] = pixels[0].quad.map(|part| 2 * part as u32);
                     source.pixel_into(x + lane % 2, y + lane / 2, of_pixel);
                 }
             }
             for access in pixels {
-                run_quad(&surface, access, counts);
+                count_quad(access, surface.quad_ops_at(self.pass, access, &samples), counts);
                 let memory = &mut self.memory;
                 let line = |line| memory.texture(line, counts);
                 let fetches = surface.fetch_at(self.pass, access, &samples, line);
@@ -273,12 +274,12 @@ impl<'a> Replay<'a> {
     }
 }
 
-/// Shade four lanes; lanes that were not requested are helpers.
-fn run_quad(surface: &Surface<'_>, access: &QuadAccess, counts: &mut PacketCounts) {
+/// Count a quad of four lanes, each of which takes `ops` operations; lanes that were not requested are helpers.
+fn count_quad(access: &QuadAccess, ops: u32, counts: &mut PacketCounts) {
     counts[Event::QuadsShaded] += 1;
     counts[Event::PixelInvocations] += 4;
     counts[Event::HelperInvocations] += 4 - access.lanes.count_ones();
-    counts[Event::ShaderOps] += 4 * surface.shader().cost().pixel_ops;
+    counts[Event::ShaderOps] += 4 * ops;
 }
 
 /// Key of a quad in the shading cache, hashed so that sets are used evenly in all directions.

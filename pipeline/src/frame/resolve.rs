@@ -14,6 +14,7 @@ use super::surface::{Grid, Surface};
 use crate::depth::DepthTile;
 use crate::random::mix;
 use crate::sampling::TileSamples;
+use crate::shader::Lane;
 
 /// The images; each pixel is the mean of its samples.
 pub(super) fn resolve(pass: &Pass<'_>, bins: &[Bin]) -> Vec<Vec<Vec3>> {
@@ -112,14 +113,16 @@ fn resolve_tile(
         }
         let (corners, moving) = pass.moving_corners(triangle);
         let grid = Grid::new(pass, &corners, moving);
-        let surface = Surface::new(pass, triangle);
+        let (surface, lane) = (Surface::new(pass, triangle), Lane::default());
         scratch.shaded.clear();
         for slot in group.iter().map(|&slot| slot as usize) {
             let colour = match pass.settings.spec.shading {
-                Shading::PerSample => surface.shade_at(&SampleView::of_slot(&corners, samples, slot)),
+                Shading::PerSample => {
+                    surface.shade_at(&lane, &SampleView::of_slot(&corners, samples, slot)).truncate()
+                }
                 Shading::Cached => {
                     let cell = grid.cell(samples, slot, origin, side);
-                    *scratch.shaded.entry(cell).or_insert_with(|| surface.shade(cell))
+                    *scratch.shaded.entry(cell).or_insert_with(|| surface.shade(&lane, cell).truncate())
                 }
             };
             add(slot, colour);

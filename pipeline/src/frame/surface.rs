@@ -7,9 +7,13 @@ use crate::geometry::Viewport;
 use crate::sample_test::exact;
 use crate::sampling::{Sample, TileSamples};
 use crate::setup::Corner;
+use crate::shader::{Lane, Program, Shader, ShadingPoint};
 use crate::shading;
-use crate::shading::{QuadAccess, REFERENCE_TIME, Shader, ShadingPoint, weights_at};
+use crate::shading::{QuadAccess, REFERENCE_TIME, weights_at};
 use crate::texture::{Footprint, Sampler};
+
+/// Places of the lanes of a quad.
+const LANES: [[i32; 2]; 4] = [[0, 0], [1, 0], [0, 1], [1, 1]];
 
 /// Shading grid over one triangle.
 pub(super) struct Grid<'a> {
@@ -68,12 +72,14 @@ impl<'a> Surface<'a> {
         let reference = reference(pass, &corners);
         let texture = pass.draws[draw].shader.texture();
         let textured = texture.filter(|_| !pass.draws[draw].geometry.uvs().is_empty());
-        let sampler = textured.map(|texture| Sampler::new(texture, pass.addresses.textures[draw]));
+        let sampler = textured
+            .zip(pass.addresses.textures[draw])
+            .map(|(texture, address)| Sampler::new(texture, address));
         Self { pass, draw, vertices, corners, reference, sampler }
     }
 
-    /// Linear RGB radiance of a cell, a function of the triangle and the cell alone.
-    pub fn shade(&self, cell: [i32; 2]) -> Vec3 {
+    /// Linear RGB radiance and opacity of a cell, a function of the triangle and the cell alone.
+    pub fn shade(&self, lane: &Lane, cell: [i32; 2]) -> Vec4 {
         let weights = shading::cell_weights(&self.reference, cell, self.pass.origin);
         let texel = self.sampler.map_or(Vec4::ONE, |sampler| {
             let uv = self.uv(weights);
@@ -81,7 +87,7 @@ impl<'a> Surface<'a> {
         });
         let geometry = &self.pass.draws[self.draw].geometry;
         let middle = self.vertices.map(|v| (geometry.open()[v] + geometry.close()[v]) * 0.5);
-        self.shader().shade(&self.point(weights, middle), texel)
+        self.shader().shade(lane, &self.point(weights, middle), texel)
     }
 
     /// Shader input at the point with the given weights at time `t`.
@@ -95,20 +101,30 @@ impl<'a> Surface<'a> {
         self.pass.draws[self.draw].shader
     }
 
-    pub fn sampler(&self) -> Option<Sampler<'a>> {
-        self.sampler
+    fn program(&self) -> Program {
+        self.pass.programs[self.draw]
     }
 
-    /// Vertices on the image plane.
-    pub fn corners(&self) -> &[Corner; 3] {
-        &self.corners
+    /// Whether shading at samples needs their positions to be counted.
+    pub fn needs_samples(&self) -> bool {
+        self.sampler.is_some() || self.program().pixel_ops.is_none()
+    }
+
+    /// Operations of each lane of a quad of cells: those of the longest, as lanes of a quad run in step.
+    pub fn quad_ops(&self, quad: [i32; 2]) -> u32 {
+        let of_cell = |[x, y]: [i32; 2]| {
+            let lane = Lane::default();
+            self.shade(&lane, [2 * quad[0] + x, 2 * quad[1] + y]);
+            lane.ops()
+        };
+        self.program().pixel_ops.unwrap_or_else(|| LANES.map(of_cell).into_iter().max().unwrap_or(0))
     }
 
     /// Bilinear fetches of shading the four cells of a quad; `line` gets every memory line they read.
     pub fn fetch(&self, quad: [i32; 2], mut line: impl FnMut(u64)) -> u32 {
         let Some(sampler) = self.sampler else { return 0 };
         let footprint = self.footprint(&sampler, quad);
-        for [x, y] in [[0, 0], [1, 0], [0, 1], [1, 1]] {
+        for [x, y] in LANES {
             let weights =
                 shading::cell_weights(&self.reference, [2 * quad[0] + x, 2 * quad[1] + y], self.pass.origin);
             sampler.lines(self.uv(weights), &footprint, &mut line);
@@ -200,13 +216,13 @@ impl SampleView {
 }
 
 impl Surface<'_> {
-    /// Linear RGB radiance at the sample's own point.
-    pub fn shade_at(&self, view: &SampleView) -> Vec3 {
+    /// Linear RGB radiance and opacity at the sample's own point.
+    pub fn shade_at(&self, lane: &Lane, view: &SampleView) -> Vec4 {
         let weights = view.weights(0.0, 0.0);
-        let texel = self.sampler().map_or(Vec4::ONE, |sampler| {
+        let texel = self.sampler.map_or(Vec4::ONE, |sampler| {
             sampler.sample(self.uv(weights), &self.footprint_at(&sampler, view))
         });
-        self.shader().shade(&self.point_at(weights, view.t), texel)
+        self.shader().shade(lane, &self.point_at(weights, view.t), texel)
     }
 
     /// Bilinear fetches of the four lanes of a quad of pixels at one sample index; `line` gets every memory
@@ -219,15 +235,36 @@ impl Surface<'_> {
         samples: &[Vec<Sample>; 4],
         mut line: impl FnMut(u64),
     ) -> u32 {
-        let Some(sampler) = self.sampler() else { return 0 };
-        let corners = self.corners();
-        let lanes = [[0, 0], [1, 0], [0, 1], [1, 1]].into_iter().zip(samples);
-        lanes.fold(0, |fetches, (offset, of_pixel)| {
-            let pixel = [0, 1].map(|axis| (2 * access.quad[axis] + offset[axis]) as u32);
-            let view = SampleView::of_sample(corners, pass, pixel, &of_pixel[access.sample as usize]);
+        let Some(sampler) = self.sampler else { return 0 };
+        self.views_of(pass, access, samples).fold(0, |fetches, view| {
             let footprint = self.footprint_at(&sampler, &view);
             sampler.lines(self.uv(view.weights(0.0, 0.0)), &footprint, &mut line);
             fetches + Sampler::fetches(&footprint)
+        })
+    }
+
+    /// Operations of each lane of a quad of pixels at one sample index: those of the longest. Arguments as for
+    /// [`Self::fetch_at`].
+    pub fn quad_ops_at(&self, pass: &Pass<'_>, access: &QuadAccess, samples: &[Vec<Sample>; 4]) -> u32 {
+        let of_view = |view| {
+            let lane = Lane::default();
+            self.shade_at(&lane, &view);
+            lane.ops()
+        };
+        let longest = || self.views_of(pass, access, samples).map(of_view).max().unwrap_or(0);
+        self.program().pixel_ops.unwrap_or_else(longest)
+    }
+
+    /// Views of the four lanes of a quad.
+    fn views_of(
+        &self,
+        pass: &Pass<'_>,
+        access: &QuadAccess,
+        samples: &[Vec<Sample>; 4],
+    ) -> impl Iterator<Item = SampleView> {
+        LANES.into_iter().zip(samples).map(|(offset, of_pixel)| {
+            let pixel = [0, 1].map(|axis| (2 * access.quad[axis] + offset[axis]) as u32);
+            SampleView::of_sample(&self.corners, pass, pixel, &of_pixel[access.sample as usize])
         })
     }
 

@@ -5,6 +5,7 @@ use glam::{DAffine3, DVec3, Vec2, Vec3, Vec4};
 use rayon::prelude::*;
 
 use super::{Camera, Clip};
+use crate::shader::Lane;
 
 /// Image size in pixels; both sides are 1 to 16384.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -193,11 +194,22 @@ impl Projection {
     }
 
     fn image(&self, pose: &DAffine3, world: Vec3) -> [f32; 3] {
-        let p = pose.transform_point3(DVec3::from(world));
+        self.image_on(&Lane::default(), pose, world)
+    }
+
+    fn image_on(&self, lane: &Lane, pose: &DAffine3, world: Vec3) -> [f32; 3] {
+        let p = lane.transform_f64(pose, DVec3::from(world));
         let weight = if self.shear.parallel { 1.0 } else { p.z };
-        let x = self.scale_px * p.x + self.shift_px[0] * weight;
-        let y = -self.scale_px * p.y + self.shift_px[1] * weight;
+        let x = lane.madd(self.scale_px, p.x, lane.mul(self.shift_px[0], weight));
+        let y = lane.madd(-self.scale_px, p.y, lane.mul(self.shift_px[1], weight));
         [x as f32, y as f32, p.z as f32]
+    }
+
+    /// Operations of moving one vertex to the image plane at one end of the shutter.
+    pub(crate) fn vertex_ops(&self) -> u32 {
+        let lane = Lane::default();
+        self.image_on(&lane, &self.open, Vec3::ZERO);
+        lane.ops()
     }
 
     /// Camera in world space at mid-shutter as a homogeneous point: its position, or in an orthographic view

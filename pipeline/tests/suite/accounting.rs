@@ -2,27 +2,11 @@
 
 use crate::common::*;
 use activity::{Counts, Event, Packet, PacketKind, Unit};
-use glam::{Vec2, Vec3, Vec4};
+use glam::{Vec2, Vec3};
 use pipeline::depth::{DepthBound, DepthSpec};
 use pipeline::memory::{CacheSpec, Compression, MemorySpec};
 use pipeline::*;
 use proptest::prelude::*;
-
-struct Checkered(Texture);
-
-impl Shader for Checkered {
-    fn cost(&self) -> ShaderCost {
-        ShaderCost { pixel_ops: 10, vertex_ops: 20 }
-    }
-
-    fn texture(&self) -> Option<&Texture> {
-        Some(&self.0)
-    }
-
-    fn shade(&self, _at: &ShadingPoint, texel: Vec4) -> Vec3 {
-        texel.truncate()
-    }
-}
 
 /// All combinations of enabled tests.
 fn switches() -> Vec<Features> {
@@ -71,7 +55,7 @@ proptest! {
         let (soup, other) = (Soup::new(kind, count, seed), Soup::new(Kind::Still, 20, seed));
         let uvs: Vec<_> = soup.open.iter().map(|p| Vec2::new(p.x, p.y)).collect();
         let texels = (0..256_u32).map(|i| [i as u8, 255 - i as u8, 7, 255]).collect();
-        let checkered = Checkered(Texture::from_srgb8(16, 16, texels, [Wrap::Repeat; 2]).unwrap());
+        let checkered = Textured(Texture::from_srgb8(16, 16, texels, [Wrap::Repeat; 2]).unwrap());
         let cull = if front { Cull::Back } else { Cull::None };
         let mut first = soup.draw(if textured { &checkered } else { &Plain }, cull);
         first.geometry = first.geometry.with_uvs(&uvs).unwrap();

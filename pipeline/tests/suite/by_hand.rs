@@ -2,7 +2,7 @@
 
 use crate::common::*;
 use activity::{Counts, Event, Packet, PacketKind, Unit};
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 use pipeline::*;
 
 /// Packets and counts of a frame.
@@ -58,7 +58,8 @@ const BY_HAND: [(Event, u64); 25] = [
     (Event::PixelInvocations, 4 * (256 + 16)),
     // On the diagonal each triangle requests three lanes: every pixel of it has samples on both sides.
     (Event::HelperInvocations, 2 * 16),
-    (Event::ShaderOps, 4 * 20 + 4 * (256 + 16) * 10),
+    // A vertex: nine multiply-adds to the camera, scale and shift of two axes. A lane of the shader: four.
+    (Event::ShaderOps, 4 * 13 + 4 * (256 + 16) * 4),
     // Two pixels per line: 32 lines of each of the 12 tiles off the diagonal, 20 for each triangle of each of
     // the 4 on it.
     (Event::DepthLines, 12 * 32 + 4 * 2 * 20),
@@ -137,4 +138,43 @@ fn a_single_pixel_has_three_helpers() {
     let hits = [Event::SamplesHit, Event::DepthReads, Event::ColourWrites, Event::ShadingLookups];
     expect(&frame.counts, &hits.map(|event| (event, 8)));
     expect(&frame.counts, &[(Event::QuadsShaded, 2), (Event::HelperInvocations, 6), (Event::ShadingHits, 6)]);
+}
+
+/// Counts to the column of the pixel, counted from the left of the image.
+struct Columns;
+
+impl Shader for Columns {
+    fn shade(&self, lane: &Lane, at: &ShadingPoint, _: Vec4) -> Vec4 {
+        let mut column = 0.0;
+        while lane.branch(column < at.position.x + 16.0) {
+            column = lane.add(column, 1.0);
+        }
+        Vec4::splat(column)
+    }
+}
+
+/// One triangle covers the image. The loop runs column + 1 times, and both columns of a quad take as long as the second.
+#[test]
+fn lanes_of_a_quad_take_as_long_as_the_longest() {
+    let viewport = Viewport::new(32, 32).unwrap();
+    let corners = [[-100.0, -100.0], [100.0, -100.0], [0.0, 200.0]].map(|[x, y]| Vec3::new(x, y, 1.0));
+    let geometry = Geometry::new(&corners, &corners, &[[0, 1, 2]]).unwrap();
+    let draws = [Draw::new(geometry, &Columns, Cull::None)];
+    let table = SampleTable::low_discrepancy(4, 3, LensShape::Disk).unwrap();
+    let of_quad = |quad: u64| 4 * (2 * (2 * quad + 2) + 1);
+    for (shading, runs) in [(Shading::Cached, 1), (Shading::PerSample, 4)] {
+        let spec = PipelineSpec { shading, ..spec(Features::ALL) };
+        let settings = Settings { spec: &spec, viewport, samples: &table, background: Vec3::ZERO };
+        let pass =
+            RasterPass::new(&pixel_camera(viewport, 0.25), &draws, &settings).render(|_, _| ()).unwrap();
+        let expected = 3 * 13 + 16 * runs * (0..16).map(of_quad).sum::<u64>();
+        if shading == Shading::Cached {
+            assert_eq!(pass.counts[Event::ShaderOps], expected);
+            assert_eq!(pass.images[0][5].x, 6.0);
+        } else {
+            // Samples of a pixel lie on both sides of its middle, so some loops are one step shorter.
+            let steps = 16 * 16 * runs * 4 * 2;
+            assert!((expected - steps..=expected).contains(&pass.counts[Event::ShaderOps]));
+        }
+    }
 }

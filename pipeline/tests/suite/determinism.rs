@@ -35,16 +35,12 @@ impl Stream {
 struct Textured(Texture);
 
 impl Shader for Textured {
-    fn cost(&self) -> ShaderCost {
-        ShaderCost { pixel_ops: 30, vertex_ops: 20 }
-    }
-
     fn texture(&self) -> Option<&Texture> {
         Some(&self.0)
     }
 
-    fn shade(&self, at: &ShadingPoint, texel: Vec4) -> Vec3 {
-        texel.truncate() * at.normal.abs()
+    fn shade(&self, _lane: &Lane, at: &ShadingPoint, texel: Vec4) -> Vec4 {
+        (texel.truncate() * at.normal.abs()).extend(1.0)
     }
 }
 

@@ -18,17 +18,13 @@ const SIDE_PX: u32 = 32;
 struct Lit(Texture);
 
 impl Shader for Lit {
-    fn cost(&self) -> ShaderCost {
-        ShaderCost { pixel_ops: 30, vertex_ops: 20 }
-    }
-
     fn texture(&self) -> Option<&Texture> {
         Some(&self.0)
     }
 
-    fn shade(&self, at: &ShadingPoint, texel: Vec4) -> Vec3 {
+    fn shade(&self, _lane: &Lane, at: &ShadingPoint, texel: Vec4) -> Vec4 {
         let light = Vec3::new(0.25, 0.75, -0.5).normalize();
-        texel.truncate() * (0.2 + 0.8 * at.normal.dot(light).max(0.0))
+        (texel.truncate() * (0.2 + 0.8 * at.normal.dot(light).max(0.0))).extend(1.0)
     }
 }
 

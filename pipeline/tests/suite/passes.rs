@@ -2,25 +2,8 @@
 
 use crate::common::*;
 use activity::{Counts, Event, Packet, PacketKind, Waits};
-use glam::{Vec2, Vec3, Vec4};
+use glam::{Vec2, Vec3};
 use pipeline::*;
-
-/// Shows its texture.
-struct Textured(Texture);
-
-impl Shader for Textured {
-    fn cost(&self) -> ShaderCost {
-        ShaderCost { pixel_ops: 4, vertex_ops: 8 }
-    }
-
-    fn texture(&self) -> Option<&Texture> {
-        Some(&self.0)
-    }
-
-    fn shade(&self, _at: &ShadingPoint, texel: Vec4) -> Vec3 {
-        texel.truncate()
-    }
-}
 
 const SIDE: u32 = 64;
 
@@ -41,7 +24,7 @@ fn frame(passes: &[RasterPass<'_>]) -> (Vec<Rendered>, Vec<Packet>, FrameReport)
     (drawn, packets, report)
 }
 
-fn barriers(packets: &[Packet]) -> Vec<(u16, Waits)> {
+fn barriers(packets: &[Packet]) -> Vec<(u32, Waits)> {
     let barrier = |packet: &Packet| match packet.kind {
         PacketKind::Barrier(waits) => Some((packet.pass, waits)),
         _ => None,
@@ -78,7 +61,7 @@ fn packets_add_up_to_the_work_of_draws_and_passes() {
         let camera = camera(true);
         let pass = RasterPass::new(&camera, &draws, settings);
         let (drawn, packets, report) = frame(&[pass, pass.named("again").onto(Target::Depth)]);
-        let of = |pass: u16, draw: u32| {
+        let of = |pass: u32, draw: u32| {
             let own = packets.iter().filter(|packet| (packet.pass, packet.draw) == (pass, draw));
             own.fold(Counts::default(), |mut sum, packet| {
                 sum += &packet.counts;

@@ -11,16 +11,12 @@ const SIDE: u32 = 16;
 struct ByPlace<F: Fn(&ShadingPoint, Vec4) -> f32 + Sync>(F, Option<Texture>);
 
 impl<F: Fn(&ShadingPoint, Vec4) -> f32 + Sync> Shader for ByPlace<F> {
-    fn cost(&self) -> ShaderCost {
-        ShaderCost { pixel_ops: 10, vertex_ops: 20 }
-    }
-
     fn texture(&self) -> Option<&Texture> {
         self.1.as_ref()
     }
 
-    fn shade(&self, at: &ShadingPoint, texel: Vec4) -> Vec3 {
-        Vec3::splat((self.0)(at, texel))
+    fn shade(&self, _lane: &Lane, at: &ShadingPoint, texel: Vec4) -> Vec4 {
+        Vec3::splat((self.0)(at, texel)).extend(1.0)
     }
 }
 

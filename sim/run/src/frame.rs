@@ -201,9 +201,9 @@ pub(super) fn draw_scene(
     let settings = Settings { spec: &plan.gpu.pipeline, viewport, samples: &*plan.samples, background };
     let mut gpu = Gpu::new(&plan.gpu.pipeline, emit).map_err(RunError::setting)?;
     let pass = RasterPass::new(&frame.camera, &draws, &settings).named("scene").with_heat(events);
-    let mut rendered = gpu.draw(&pass).map_err(RunError::setting)?;
+    let rendered = gpu.draw(&pass).map_err(RunError::setting)?;
     let report = gpu.finish();
-    rendered.heat.iter_mut().for_each(|map| map.elsewhere += report.write_back[map.event]);
+    let mut rendered = rendered.with_write_back(&report);
     let heat = std::mem::take(&mut rendered.heat);
     let drawn = Drawn {
         image: rendered.into_image(),

@@ -160,7 +160,7 @@ impl BoundClock {
 struct Segment {
     pub path: usize,
     pub phase: usize,
-    pub pass: u16,
+    pub pass: u32,
     /// Time of a barrier without contention; `None` for other packets.
     pub barrier: Option<Time>,
     pub work: UnitWork,

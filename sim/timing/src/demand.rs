@@ -81,7 +81,7 @@ pub struct ServiceDemand {
     /// Whether the packet takes the front end (command to set-up) or the tile path (traversal to colour).
     pub front: bool,
     /// Pass number in the frame.
-    pub pass: u16,
+    pub pass: u32,
     /// Batch number in the frame, all passes counted. Barriers are in no batch.
     pub batch: u32,
     /// For a barrier: which later packets wait for it.
@@ -142,7 +142,7 @@ pub struct DemandBuilder {
     /// Lines per cycle that each client of the L2 can request.
     lines_per_cycle: [u32; CLIENTS.len()],
     /// Pass of the last packet, number of its first batch in the frame, and number of the last batch.
-    pass: u16,
+    pass: u32,
     first_batch: u32,
     last_batch: u32,
 }

@@ -37,19 +37,19 @@ pub(crate) struct Passes(Vec<Pass>);
 
 impl Passes {
     /// Record that packets of `pass` are in the machine between two times.
-    pub fn note(&mut self, pass: u16, begin: Time, end: Time) {
+    pub fn note(&mut self, pass: u32, begin: Time, end: Time) {
         let pass = self.reach(pass);
         pass.begin = pass.begin.min(begin);
         pass.end = pass.end.max(end);
     }
 
     /// Work of `pass` so far.
-    pub fn work(&mut self, pass: u16) -> &mut UnitWork {
+    pub fn work(&mut self, pass: u32) -> &mut UnitWork {
         &mut self.reach(pass).work
     }
 
-    fn reach(&mut self, pass: u16) -> &mut Pass {
-        let pass = usize::from(pass);
+    fn reach(&mut self, pass: u32) -> &mut Pass {
+        let pass = pass as usize;
         if self.0.len() <= pass {
             self.0.resize(pass + 1, Pass::NONE);
         }

@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3, Vec4};
 use pipeline::texture::linear_to_srgb8;
-use pipeline::{Shader, ShaderCost, ShadingPoint, Texture, TextureError, Viewport, Wrap};
+use pipeline::{Lane, Shader, ShadingPoint, Texture, TextureError, Viewport, Wrap};
 use serde::{Deserialize, Serialize};
 
 /// A rectangle in world space.
@@ -101,28 +101,23 @@ impl ReceiverShader {
 }
 
 impl Shader for ReceiverShader {
-    /// Operations: cosine 4, fifth power 3, Fresnel term 2, mix 6; world to camera and projection 11.
-    fn cost(&self) -> ShaderCost {
-        ShaderCost { pixel_ops: 15, vertex_ops: 11 }
-    }
-
     fn texture(&self) -> Option<&Texture> {
         Some(&self.map)
     }
 
-    fn shade(&self, at: &ShadingPoint, texel: Vec4) -> Vec3 {
-        let away = 1.0 - at.normal.dot(at.to_camera).clamp(0.0, 1.0);
-        let square = away * away;
+    fn shade(&self, lane: &Lane, at: &ShadingPoint, texel: Vec4) -> Vec4 {
+        let away = lane.sub(1.0, lane.saturate(lane.dot(at.normal, at.to_camera)));
+        let square = lane.mul(away, away);
         // Schlick 1994.
-        let share = self.normal_share + (1.0 - self.normal_share) * square * square * away;
-        self.base + (texel.truncate() - self.base) * share
+        let rest = lane.mul(lane.mul(1.0 - self.normal_share, square), square);
+        let share = lane.madd(rest, away, self.normal_share);
+        let over = lane.sub(texel.truncate(), self.base);
+        lane.madd(over, Vec3::splat(share), self.base).extend(1.0)
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use glam::Vec2;
-
     use super::*;
 
     #[test]
@@ -158,14 +153,8 @@ mod tests {
         let surface = ReceiverShader::new(&[Vec3::ONE], one, Vec3::splat(0.2), 0.04).unwrap();
         let seen = |cosine: f32| {
             let to_camera = Vec3::new((1.0 - cosine * cosine).sqrt(), cosine, 0.0);
-            let at = ShadingPoint {
-                position: Vec3::ZERO,
-                normal: Vec3::Y,
-                to_camera,
-                uv: Vec2::ZERO,
-                color: Vec3::ONE,
-            };
-            surface.shade(&at, Vec4::ONE).x
+            let at = ShadingPoint { normal: Vec3::Y, to_camera, ..ShadingPoint::FACING };
+            surface.shade(&Lane::default(), &at, Vec4::ONE).x
         };
         for (cosine, share) in [(1.0, 0.04), (0.5, 0.04 + 0.96 / 32.0), (0.0, 1.0)] {
             let expected = 0.2 + 0.8 * share;

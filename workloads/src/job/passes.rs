@@ -54,7 +54,7 @@ impl Touch {
 /// Passes whose packets are made one by one.
 pub struct Passes<'a, 'e> {
     gpu: &'a mut Gpu<'e>,
-    pass: u16,
+    pass: u32,
     /// Triangles of the current pass so far.
     triangles: u32,
 }

@@ -9,8 +9,7 @@ use pipeline::geometry::Projection;
 use pipeline::random::mix;
 use pipeline::sampling::SampleSource;
 use pipeline::{
-    Camera, Cull, Draw, DrawError, Geometry, Gpu, Lens, RasterPass, Shader, ShaderCost, ShadingPoint,
-    Viewport,
+    Camera, Cull, Draw, DrawError, Geometry, Gpu, Lane, Lens, RasterPass, Shader, ShadingPoint, Viewport,
 };
 use serde::{Deserialize, Serialize};
 use warnings::{Code, Warning};
@@ -237,12 +236,9 @@ const WALL: Headlight = Headlight(Vec3::new(0.55, 0.5, 0.42));
 const BOX: Headlight = Headlight(Vec3::new(0.75, 0.25, 0.12));
 
 impl Shader for Headlight {
-    fn cost(&self) -> ShaderCost {
-        ShaderCost { pixel_ops: 12, vertex_ops: 24 }
-    }
-
-    fn shade(&self, at: &ShadingPoint, _: Vec4) -> Vec3 {
-        self.0 * (0.25 + 0.75 * at.normal.dot(at.to_camera).abs())
+    fn shade(&self, lane: &Lane, at: &ShadingPoint, _: Vec4) -> Vec4 {
+        let facing = lane.dot(at.normal, at.to_camera).abs();
+        lane.scale(self.0, lane.madd(0.75, facing, 0.25)).extend(1.0)
     }
 }
 

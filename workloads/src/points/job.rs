@@ -5,12 +5,11 @@
 //! the depth test rejects nothing. Every round uses new samples, so the points have no bias. Regions smaller
 //! than a pixel are filled by [`super::poisson`] on the host; the facts give the share.
 
-use glam::{Vec3, Vec4};
+use glam::{Vec2, Vec3, Vec4};
 use pipeline::random::mix;
 use pipeline::sampling::{HashedSamples, LensShape, SampleSource};
 use pipeline::{
-    Cull, Draw, FrameReport, Geometry, Gpu, PipelineSpec, RasterPass, Shader, ShaderCost, ShadingPoint,
-    Viewport,
+    Cull, Draw, FrameReport, Geometry, Gpu, Lane, PipelineSpec, RasterPass, Shader, ShadingPoint, Viewport,
 };
 use serde::{Deserialize, Serialize};
 
@@ -69,16 +68,13 @@ pub(crate) fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<d
     Ok(Box::new(Sampling { options, settings, seed: request.seed }))
 }
 
-/// A shader that appends a candidate to a list: an address, a compare and two coordinates.
+/// A shader that finds the coordinates of a candidate in the unit square from its place.
 struct Append;
 
 impl Shader for Append {
-    fn cost(&self) -> ShaderCost {
-        ShaderCost { pixel_ops: 8, vertex_ops: 4 }
-    }
-
-    fn shade(&self, _at: &ShadingPoint, _texel: Vec4) -> Vec3 {
-        Vec3::ONE
+    fn shade(&self, lane: &Lane, at: &ShadingPoint, _texel: Vec4) -> Vec4 {
+        let place = at.position.truncate();
+        lane.madd(place, Vec2::splat(0.5), Vec2::splat(0.5)).extend(0.0).extend(1.0)
     }
 }
 

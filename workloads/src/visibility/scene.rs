@@ -5,7 +5,7 @@ use std::path::Path;
 
 use glam::{Vec3, Vec4};
 use pipeline::sampling::HashedSamples;
-use pipeline::{Camera, LensShape, Shader, ShaderCost, ShadingPoint, Viewport};
+use pipeline::{Camera, Lane, LensShape, Shader, ShadingPoint, Viewport};
 use warnings::Warning;
 
 use super::camera::{View, fit};
@@ -126,11 +126,7 @@ fn in_camera_space(view: &View, mesh: &MovingMesh) -> Result<[Vec<Vec3>; 2], Str
 pub struct Unshaded;
 
 impl Shader for Unshaded {
-    fn cost(&self) -> ShaderCost {
-        ShaderCost::default()
-    }
-
-    fn shade(&self, _at: &ShadingPoint, _texel: Vec4) -> Vec3 {
-        Vec3::ZERO
+    fn shade(&self, _lane: &Lane, _at: &ShadingPoint, _texel: Vec4) -> Vec4 {
+        Vec4::ZERO
     }
 }

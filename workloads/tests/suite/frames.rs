@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use crate::common::{Builder, Files};
 use glam::{Vec2, Vec3, Vec4};
-use pipeline::{Lens, ShadingPoint};
+use pipeline::{Lane, Lens, ShadingPoint};
 use serde_json::json;
 use workloads::catalog::find;
 use workloads::job::{Job, OptionSource, Request};
@@ -125,14 +125,8 @@ fn every_part_of_a_frame_counts() {
 
 /// Shading of a surface at one point, which shows the lamp.
 fn shade(scene: &Scene, frame: &Frame) -> Vec3 {
-    let at = ShadingPoint {
-        position: Vec3::ZERO,
-        normal: Vec3::new(0.6, 0.64, 0.48),
-        to_camera: Vec3::Z,
-        uv: Vec2::ZERO,
-        color: Vec3::ONE,
-    };
-    frame.draws(scene).unwrap()[0].shader.shade(&at, Vec4::ONE)
+    let at = ShadingPoint { normal: Vec3::new(0.6, 0.64, 0.48), ..ShadingPoint::FACING };
+    frame.draws(scene).unwrap()[0].shader.shade(&Lane::default(), &at, Vec4::ONE).truncate()
 }
 
 /// Frame 3 alone must equal frame 3 of a run: camera, focus and lamp are placed for the scene, not for the

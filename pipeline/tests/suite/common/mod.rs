@@ -38,12 +38,21 @@ impl Uniform {
 pub struct Plain;
 
 impl Shader for Plain {
-    fn cost(&self) -> ShaderCost {
-        ShaderCost { pixel_ops: 10, vertex_ops: 20 }
+    fn shade(&self, _lane: &Lane, at: &ShadingPoint, _texel: Vec4) -> Vec4 {
+        at.normal.abs().extend(1.0)
+    }
+}
+
+/// Shows its texture.
+pub struct Textured(pub Texture);
+
+impl Shader for Textured {
+    fn texture(&self) -> Option<&Texture> {
+        Some(&self.0)
     }
 
-    fn shade(&self, at: &ShadingPoint, _texel: Vec4) -> Vec3 {
-        at.normal.abs()
+    fn shade(&self, _lane: &Lane, _at: &ShadingPoint, texel: Vec4) -> Vec4 {
+        texel
     }
 }
 
@@ -256,16 +265,12 @@ pub fn brute_force(
     seen
 }
 
-/// A shader of one colour.
+/// A shader of one colour, in four operations.
 pub struct Flat(pub Vec3);
 
 impl Shader for Flat {
-    fn cost(&self) -> ShaderCost {
-        ShaderCost { pixel_ops: 10, vertex_ops: 20 }
-    }
-
-    fn shade(&self, _at: &ShadingPoint, _texel: Vec4) -> Vec3 {
-        self.0
+    fn shade(&self, lane: &Lane, _at: &ShadingPoint, texel: Vec4) -> Vec4 {
+        lane.mul(self.0.extend(1.0), texel)
     }
 }
 

@@ -2,7 +2,7 @@
 //! images in which only edges matter.
 
 use glam::{Vec3, Vec4};
-use pipeline::{Shader, ShaderCost, ShadingPoint};
+use pipeline::{Lane, Shader, ShadingPoint};
 
 /// The exponent `p` of `y = c x^p` that fits the points best in the logarithms of both, or `None` where fewer than two
 /// points above zero differ in `x`.
@@ -40,12 +40,8 @@ pub(super) fn quantiles(values: impl Iterator<Item = f64>) -> impl Fn(f64) -> f6
 pub(super) struct White;
 
 impl Shader for White {
-    fn cost(&self) -> ShaderCost {
-        ShaderCost::default()
-    }
-
-    fn shade(&self, _at: &ShadingPoint, _texel: Vec4) -> Vec3 {
-        Vec3::ONE
+    fn shade(&self, _lane: &Lane, _at: &ShadingPoint, _texel: Vec4) -> Vec4 {
+        Vec4::ONE
     }
 }
 

@@ -3,8 +3,8 @@
 use std::f64::consts::{FRAC_1_SQRT_2, TAU};
 use std::sync::Arc;
 
-use glam::{DQuat, DVec3, Vec3};
-use pipeline::{ShaderCost, Texture, Wrap};
+use glam::{DQuat, DVec3, Mat4, Vec3, Vec4};
+use pipeline::{Lane, Shader, ShadingPoint, Texture, Wrap};
 use workloads::Material;
 use workloads::scene::{Graph, Local, Node, Parts, Rig, SceneCamera, Settings, Trs, View};
 use workloads::{LoadError, Overrides, Scene, shapes};
@@ -15,10 +15,28 @@ pub(super) const PHONE_FRAMES: u32 = 24;
 const OBJECTS: [u32; 2] = [23, 62];
 /// Quads along an edge of an object: 2048 triangles (Paper III, section 4).
 const CELLS: u32 = 32;
-/// Three 4x4 matrices times a vector in the vertex shader; a dot product of 3, a normalization of 8 and 4 to mix two texels in
-/// the fragment shader. A draw has one texture here, but its look-up is trilinear: two fetches, as many as their two without
-/// mipmaps.
-pub(super) const PHONE_COST: ShaderCost = ShaderCost { vertex_ops: 48, pixel_ops: 15 };
+
+/// The phone's shaders (Paper III, section 4): three matrices times a vector for a vertex, of which the pipeline does one; a
+/// normalization, a dot product and a mix of two texels for a fragment. A draw has one texture here, but its look-up is trilinear:
+/// two fetches, as many as their two without mipmaps.
+pub(super) struct Grids<'a>(pub &'a dyn Shader);
+
+impl Shader for Grids<'_> {
+    fn texture(&self) -> Option<&Texture> {
+        self.0.texture()
+    }
+
+    fn vertex(&self, lane: &Lane, position: Vec3) {
+        let turned = lane.transform4(&Mat4::from_rotation_y(0.5), position.extend(1.0));
+        lane.transform4(&Mat4::from_rotation_x(0.5), turned);
+    }
+
+    fn shade(&self, lane: &Lane, at: &ShadingPoint, texel: Vec4) -> Vec4 {
+        let facing = lane.dot(lane.normalize(at.normal), Vec3::Y);
+        let other = Vec4::ONE;
+        lane.madd(lane.sub(other, texel), Vec4::splat(facing), texel)
+    }
+}
 
 /// Number of objects in a frame of the phone's sequence: from fewest to most and back.
 pub(super) fn objects(frame: u32) -> u32 {
@@ -81,10 +99,47 @@ fn grid(graph: &mut Graph, object: u32, edge: f64, material: usize) {
     graph.attach(shapes::plane(edge, CELLS, 1.0, material), node);
 }
 
-/// 32 spotlights in one forward pass (Paper III, section 4). The paper has the number of lights, the operations of each are
-/// counted from a usual one: difference, length and normalization 13, diffuse 3, half vector and its normalization 13, specular
-/// 11, cone 9, distance 5, colour 6.
-pub(super) const PC_COST: ShaderCost = ShaderCost { vertex_ops: 16, pixel_ops: 43 + 32 * 60 };
+/// Spotlights of the PC's animation (Paper III, section 4).
+const LIGHTS: u16 = 32;
+
+/// The PC's shader: 32 spotlights in one forward pass on top of the surface's own. The paper has their number; each is a usual one with
+/// a cone, a range and a highlight (Blinn 1977).
+pub(super) struct Spotlights<'a>(pub &'a dyn Shader);
+
+impl Spotlights<'_> {
+    /// Light `number` at `position`, towards which the surface faces by `normal`: diffuse light and highlight.
+    fn light(lane: &Lane, number: u16, at: &ShadingPoint, [normal, to_camera]: [Vec3; 2]) -> f32 {
+        let [cone, hardness, range, exponent] = [0.7, 1.0 / (1.0 - 0.7), 0.01, 24.0];
+        let place = Vec3::new(f32::from(number % 8) - 3.5, 4.0, f32::from(number / 8) - 1.5);
+        let to_light = lane.sub(place, at.position);
+        let square = lane.dot(to_light, to_light);
+        let to_light = lane.scale(to_light, lane.recip(lane.sqrt(square)));
+        let edge = lane.sub(lane.dot(to_light, Vec3::Y), cone);
+        let edge = lane.saturate(lane.mul(edge, hardness));
+        let cone = lane.mul(lane.mul(edge, edge), lane.madd(-2.0, edge, 3.0));
+        let fading = lane.max(lane.madd(square, -range, 1.0), 0.0);
+        let half = lane.normalize(lane.add(to_light, to_camera));
+        let glint = lane.max(lane.dot(normal, half), 0.0);
+        let glint = lane.exp2(lane.mul(exponent, lane.log2(glint)));
+        let reflected = lane.add(lane.max(lane.dot(normal, to_light), 0.0), glint);
+        lane.mul(lane.mul(reflected, cone), fading)
+    }
+}
+
+impl Shader for Spotlights<'_> {
+    fn texture(&self) -> Option<&Texture> {
+        self.0.texture()
+    }
+
+    fn shade(&self, lane: &Lane, at: &ShadingPoint, texel: Vec4) -> Vec4 {
+        let looks = self.0.shade(lane, at, texel);
+        let seen = [lane.normalize(at.normal), lane.normalize(at.to_camera)];
+        (0..LIGHTS).fold(looks, |sum, number| {
+            let light = Self::light(lane, number, at, seen);
+            lane.madd(Vec3::splat(light), looks.truncate(), sum.truncate()).extend(1.0)
+        })
+    }
+}
 
 /// The PC's animation: the built-in scene without motion blur and lens, as their GPUs drew it, at 30 frames a second.
 /// (Theirs is a path through Sponza, which does not come with this program.)

@@ -1,8 +1,7 @@
 //! A machine that draws frames, its recorder, and the analysis of the recorded trace.
 
-use glam::{Vec3, Vec4};
 use output::progress::Progress;
-use pipeline::{Draw, RasterPass, Settings, Shader, ShaderCost, ShadingPoint, Texture, Viewport};
+use pipeline::{Draw, RasterPass, Settings, Shader, Viewport};
 use power_model::{
     Cause, Circumstances, EnergyTable, Finish, FramePower, Launch, Pacing, Platform, PowerModel, Seconds,
     Source, Sourced, Surrounded, Watts, pace,
@@ -128,8 +127,8 @@ impl Stage {
         RunError::Setting(format!("platform `{}` has no `system.{what}`", self.platform.name))
     }
 
-    /// Power over time of frame `number` of a scene, with shaders of the given cost.
-    pub fn frame(&self, scene: &Scene, number: u32, cost: ShaderCost) -> Result<FramePower, RunError> {
+    /// Power over time of frame `number` of a scene, with a shader for each of its own.
+    pub fn frame(&self, scene: &Scene, number: u32, shader: Shaders) -> Result<FramePower, RunError> {
         let options = scene.settings();
         let viewport = Viewport::new(options.width, options.height);
         let viewport = viewport.ok_or_else(|| RunError::setting(workloads::job::IMAGE_SIZE))?;
@@ -138,12 +137,13 @@ impl Stage {
         let settings = Settings { spec: &self.gpu.pipeline, viewport, samples: &*samples, background };
         let frame = scene.frame(number)?;
         let draws = frame.draws(scene)?;
-        let shaders: Vec<Costed<'_>> = draws.iter().map(|draw| Costed { looks: draw.shader, cost }).collect();
+        let shaders: Vec<_> = draws.iter().map(|draw| shader(draw.shader)).collect();
         let draws: Vec<Draw<'_>> =
-            draws.iter().zip(&shaders).map(|(draw, shader)| Draw { shader, ..*draw }).collect();
+            draws.iter().zip(&shaders).map(|(draw, shader)| Draw { shader: &**shader, ..*draw }).collect();
         let mut clock =
             FrameClock::new(Level::default(), self.gpu.machine()?, Recorder::new(BIN_PS, MOST_BINS));
         RasterPass::new(&frame.camera, &draws, &settings)
+            .without_image()
             .render(|packet, lines| clock.push(packet, lines))
             .map_err(RunError::setting)?;
         let timeline = clock.finish()?.timeline;
@@ -160,7 +160,7 @@ impl Stage {
         let numbers: Vec<u32> = (0..scenes::PHONE_FRAMES).step_by(step as usize).collect();
         let bar = progress.bar("phone", numbers.len() as u64);
         let simulate = |&number: &u32| {
-            let frame = self.frame(&scenes::phone(number, edge)?, 0, scenes::PHONE_COST);
+            let frame = self.frame(&scenes::phone(number, edge)?, 0, |looks| Box::new(scenes::Grids(looks)));
             bar.inc();
             frame
         };
@@ -172,7 +172,7 @@ impl Stage {
         let scene = scenes::pc()?;
         let bar = progress.bar("pc", u64::from(frames));
         let simulate = |number| {
-            let frame = self.frame(&scene, number, scenes::PC_COST);
+            let frame = self.frame(&scene, number, |looks| Box::new(scenes::Spotlights(looks)));
             bar.inc();
             frame
         };
@@ -180,31 +180,14 @@ impl Stage {
     }
 }
 
+/// The shader that is drawn in place of another one.
+type Shaders = for<'a> fn(&'a dyn Shader) -> Box<dyn Shader + 'a>;
+
 /// A quantity of the platform that a row varies.
 fn swept<T>(value: Result<T, impl std::fmt::Display>) -> Result<Sourced<T>, RunError> {
     let value = value.map_err(RunError::setting)?;
     let source = Source::try_from("varied by `quintile reproduce`".to_owned()).map_err(RunError::setting)?;
     Ok(Sourced::Assumed(value, source))
-}
-
-/// A shader with the colours of another one and its own cost.
-struct Costed<'a> {
-    looks: &'a dyn Shader,
-    cost: ShaderCost,
-}
-
-impl Shader for Costed<'_> {
-    fn cost(&self) -> ShaderCost {
-        self.cost
-    }
-
-    fn texture(&self) -> Option<&Texture> {
-        self.looks.texture()
-    }
-
-    fn shade(&self, at: &ShadingPoint, texel: Vec4) -> Vec3 {
-        self.looks.shade(at, texel)
-    }
 }
 
 /// Samples per second of the papers' recorder (Paper II, section 3).

@@ -80,7 +80,7 @@ fn batch() -> impl Strategy<Value = Batch> {
 }
 
 /// A pass with the front end one batch ahead, as in the pipeline.
-fn pass(number: u16, batches: &[Batch]) -> Packets {
+fn pass(number: u32, batches: &[Batch]) -> Packets {
     let mut stream = Packets::new();
     let front = |stream: &mut Packets, b: usize| {
         if let Some((fronts, _)) = batches.get(b) {
@@ -104,7 +104,7 @@ pub fn packets() -> impl Strategy<Value = Packets> {
 /// The event that only barriers have, once each.
 pub const OF_BARRIERS: Event = Event::DepthWrites;
 
-fn barrier(pass: u16, waits: Waits, lines: &[Line]) -> (Packet, Vec<LineAccess>) {
+fn barrier(pass: u32, waits: Waits, lines: &[Line]) -> (Packet, Vec<LineAccess>) {
     let mut packet = Packet::new(PacketKind::Barrier(waits), pass);
     packet.counts[OF_BARRIERS] = 1;
     let written = |&(line, kind, victim): &Line| match kind {

@@ -15,21 +15,21 @@ fn front_takes(cycles: u32) -> u64 {
     u64::from(cycles) + 1 + 3
 }
 
-fn of(pass: u16, kind: PacketKind, counts: &[(Event, u32)]) -> (Packet, Vec<LineAccess>) {
+fn of(pass: u32, kind: PacketKind, counts: &[(Event, u32)]) -> (Packet, Vec<LineAccess>) {
     let mut packet = Packet::new(kind, pass);
     counts.iter().for_each(|&(event, count)| packet.counts[event] = count);
     (packet, Vec::new())
 }
 
 /// A pass of one packet on each path, with so many cycles in the command unit and in traversal.
-fn pass(number: u16, front: u32, tiles: u32) -> Packets {
+fn pass(number: u32, front: u32, tiles: u32) -> Packets {
     vec![
         of(number, PacketKind::Vertices, &[(Event::Indices, front), (Event::TrianglesIn, 1)]),
         of(number, PacketKind::Tile, &[(Event::TilesVisited, tiles)]),
     ]
 }
 
-fn barrier(pass: u16, waits: Waits) -> (Packet, Vec<LineAccess>) {
+fn barrier(pass: u32, waits: Waits) -> (Packet, Vec<LineAccess>) {
     of(pass, PacketKind::Barrier(waits), &[])
 }
 
@@ -100,7 +100,7 @@ proptest! {
 }
 
 /// A barrier that writes `depth` and `colour` lines; every other one evicts a line to memory.
-fn writes(pass: u16, waits: Waits, depth: u32, colour: u32) -> (Packet, Vec<LineAccess>) {
+fn writes(pass: u32, waits: Waits, depth: u32, colour: u32) -> (Packet, Vec<LineAccess>) {
     let (mut packet, mut lines) = barrier(pass, waits);
     for (client, count, first) in [(Unit::Depth, depth, 0), (Unit::Colour, colour, 1 << 12)] {
         lines.extend((0..count).map(|n| {
@@ -225,7 +225,7 @@ proptest! {
             }
             for (packet, _) in &packets {
                 if packet.kind == PacketKind::Barrier(Waits::All) && packet.pass > 0 {
-                    let [before, after] = [packet.pass - 1, packet.pass].map(|pass| timed.passes[usize::from(pass)]);
+                    let [before, after] = [packet.pass - 1, packet.pass].map(|pass| timed.passes[pass as usize]);
                     prop_assert!(after.begin_ps >= before.end_ps);
                 }
             }

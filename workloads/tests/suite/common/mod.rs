@@ -178,12 +178,8 @@ pub fn bits(image: &[glam::Vec3]) -> Vec<[u32; 3]> {
 pub struct White;
 
 impl pipeline::Shader for White {
-    fn cost(&self) -> pipeline::ShaderCost {
-        pipeline::ShaderCost::default()
-    }
-
-    fn shade(&self, _at: &pipeline::ShadingPoint, _texel: glam::Vec4) -> glam::Vec3 {
-        glam::Vec3::ONE
+    fn shade(&self, _lane: &pipeline::Lane, _at: &pipeline::ShadingPoint, _texel: glam::Vec4) -> glam::Vec4 {
+        glam::Vec4::ONE
     }
 }
 

@@ -5,7 +5,7 @@ use std::time::Instant;
 use activity::Event;
 use glam::{Vec3, Vec4};
 use pipeline::{
-    CacheSpec, Draw, Gpu, PipelineSpec, Replacement, Shader, ShaderCost, ShadingPoint, Texture, Viewport,
+    CacheSpec, Draw, Gpu, Lane, PipelineSpec, Replacement, Shader, ShadingPoint, Texture, Viewport,
 };
 use serde::Serialize;
 use workloads::multiview::{Layout, Rig, Target, Views};
@@ -257,18 +257,14 @@ struct Gloss<'a> {
 const TOWARD: Vec3 = Vec3::new(0.36, 0.80, 0.48);
 
 impl Shader for Gloss<'_> {
-    fn cost(&self) -> ShaderCost {
-        self.looks.cost()
-    }
-
     fn texture(&self) -> Option<&Texture> {
         self.looks.texture()
     }
 
-    fn shade(&self, at: &ShadingPoint, texel: Vec4) -> Vec3 {
-        let matt = self.looks.shade(&ShadingPoint { to_camera: at.normal, ..*at }, texel);
+    fn shade(&self, lane: &Lane, at: &ShadingPoint, texel: Vec4) -> Vec4 {
+        let matt = self.looks.shade(lane, &ShadingPoint { to_camera: at.normal, ..*at }, texel);
         let half = (TOWARD + at.to_camera).normalize_or_zero();
         let glint = self.exponent.map_or(0.0, |exponent| at.normal.dot(half).max(0.0).powi(exponent));
-        matt + Vec3::splat(glint)
+        matt + Vec3::splat(glint).extend(0.0)
     }
 }

@@ -1,0 +1,309 @@
+//! Shaders: code that a lane of a warp runs, and that counts its operations as it runs.
+
+use std::cell::Cell;
+use std::ops::{Add, Mul, Sub};
+
+use glam::{Affine3A, DAffine3, DVec3, Mat4, Vec2, Vec3, Vec4};
+
+use crate::texture::Texture;
+
+/// Shader input, interpolated over the triangle at the reference lens position and time. Interpolators and the
+/// normalization of both directions are fixed functions, which are not counted as operations.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ShadingPoint {
+    /// World position.
+    pub position: Vec3,
+    /// Unit normal in world space, facing the camera.
+    pub normal: Vec3,
+    /// Unit vector from the point to the camera.
+    pub to_camera: Vec3,
+    /// Texture coordinate; zero for draws without any.
+    pub uv: Vec2,
+    /// Vertex colour in linear RGB, each channel 0 to 1; white for draws without any.
+    pub color: Vec3,
+}
+
+impl ShadingPoint {
+    /// A point at the origin that faces the camera along `z`.
+    pub const FACING: Self =
+        Self { position: Vec3::ZERO, normal: Vec3::Z, to_camera: Vec3::Z, uv: Vec2::ZERO, color: Vec3::ONE };
+}
+
+/// Shader of vertices and surface points. Results have to depend on the arguments alone: workers shade in any order,
+/// and the shading cache may return one result to many samples. Its operations are counted from the code as it runs
+/// on a [`Lane`].
+pub trait Shader: Sync {
+    /// Texture sampled at the point's texture coordinate before the shader runs, if any. Its fetches go
+    /// through the texture unit and its cache.
+    fn texture(&self) -> Option<&Texture> {
+        None
+    }
+
+    /// Work on a vertex in world space besides moving it to the image plane, which the pipeline does with every vertex.
+    fn vertex(&self, _lane: &Lane, _position: Vec3) {}
+
+    /// Linear RGB radiance and opacity. `texel` is the filtered texel in linear RGBA, or white without a texture.
+    fn shade(&self, lane: &Lane, at: &ShadingPoint, texel: Vec4) -> Vec4;
+
+    /// Whether [`Lane::discard`] may be called. Then samples are shaded before they are stored; a shader without it
+    /// discards nothing.
+    fn may_discard(&self) -> bool {
+        false
+    }
+}
+
+/// A value in registers: every component is one operation.
+pub trait Operand: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
+    /// Components.
+    const COMPONENTS: u32;
+    /// Larger of both, by component.
+    fn larger(self, other: Self) -> Self;
+    /// Smaller of both, by component.
+    fn smaller(self, other: Self) -> Self;
+}
+
+macro_rules! operands {
+    ($($value:ty: $components:literal),*) => {
+        $(impl Operand for $value {
+            const COMPONENTS: u32 = $components;
+            fn larger(self, other: Self) -> Self {
+                self.max(other)
+            }
+            fn smaller(self, other: Self) -> Self {
+                self.min(other)
+            }
+        })*
+    };
+}
+operands!(f32: 1, f64: 1, Vec2: 2, Vec3: 3, Vec4: 4, DVec3: 3);
+
+/// A lane of a warp. It computes what a shader asks for and counts the operations: a multiply-add, or anything simpler, of
+/// one component is one operation; so are a comparison, a reciprocal and a square root, as in the shader cores of the GPU
+/// files. Constants and the choice between programs that is the same for a whole draw are free.
+#[derive(Debug, Default)]
+pub struct Lane {
+    ops: Cell<u32>,
+    branches: Cell<u32>,
+    discarded: Cell<bool>,
+}
+
+impl Lane {
+    /// Operations so far.
+    pub fn ops(&self) -> u32 {
+        self.ops.get()
+    }
+
+    /// Whether the lane chose a path by its data. A program that never does has the same cost for all data.
+    pub fn has_branched(&self) -> bool {
+        self.branches.get() > 0
+    }
+
+    /// Whether the samples are discarded.
+    pub fn is_discarded(&self) -> bool {
+        self.discarded.get()
+    }
+
+    #[inline(always)]
+    fn count(&self, ops: u32) {
+        self.ops.set(self.ops.get() + ops);
+    }
+
+    /// `a + b`.
+    #[inline(always)]
+    pub fn add<T: Operand>(&self, a: T, b: T) -> T {
+        self.count(T::COMPONENTS);
+        a + b
+    }
+
+    /// `a - b`.
+    #[inline(always)]
+    pub fn sub<T: Operand>(&self, a: T, b: T) -> T {
+        self.count(T::COMPONENTS);
+        a - b
+    }
+
+    /// `a b`, by component.
+    #[inline(always)]
+    pub fn mul<T: Operand>(&self, a: T, b: T) -> T {
+        self.count(T::COMPONENTS);
+        a * b
+    }
+
+    /// `a b + c`, by component, rounded after each operation.
+    #[inline(always)]
+    pub fn madd<T: Operand>(&self, a: T, b: T, c: T) -> T {
+        self.count(T::COMPONENTS);
+        a * b + c
+    }
+
+    /// `a` with every component multiplied by `factor`.
+    #[inline(always)]
+    pub fn scale<T: Operand + Mul<f32, Output = T>>(&self, a: T, factor: f32) -> T {
+        self.count(T::COMPONENTS);
+        a * factor
+    }
+
+    /// Larger of both, by component.
+    #[inline(always)]
+    pub fn max<T: Operand>(&self, a: T, b: T) -> T {
+        self.count(T::COMPONENTS);
+        a.larger(b)
+    }
+
+    /// Smaller of both, by component.
+    #[inline(always)]
+    pub fn min<T: Operand>(&self, a: T, b: T) -> T {
+        self.count(T::COMPONENTS);
+        a.smaller(b)
+    }
+
+    /// `a` limited to 0 to 1, one operation as the result modifier of GPUs.
+    #[inline(always)]
+    pub fn saturate(&self, a: f32) -> f32 {
+        self.count(1);
+        a.clamp(0.0, 1.0)
+    }
+
+    /// `a . b`: three multiply-adds.
+    #[inline(always)]
+    pub fn dot(&self, a: Vec3, b: Vec3) -> f32 {
+        self.count(3);
+        a.dot(b)
+    }
+
+    /// `1 / a`.
+    #[inline(always)]
+    pub fn recip(&self, a: f32) -> f32 {
+        self.count(1);
+        1.0 / a
+    }
+
+    /// Square root.
+    #[inline(always)]
+    pub fn sqrt(&self, a: f32) -> f32 {
+        self.count(1);
+        a.sqrt()
+    }
+
+    /// Base-2 logarithm.
+    #[inline(always)]
+    pub fn log2(&self, a: f32) -> f32 {
+        self.count(1);
+        libm::log2f(a)
+    }
+
+    /// Two to the power of `a`.
+    #[inline(always)]
+    pub fn exp2(&self, a: f32) -> f32 {
+        self.count(1);
+        libm::exp2f(a)
+    }
+
+    /// `a` divided by its length: a dot product, a reciprocal square root in two operations and the products.
+    #[inline(always)]
+    pub fn normalize(&self, a: Vec3) -> Vec3 {
+        self.scale(a, self.recip(self.sqrt(self.dot(a, a))))
+    }
+
+    /// `point` moved by `pose`: nine multiply-adds.
+    #[inline(always)]
+    pub fn transform(&self, pose: &Affine3A, point: Vec3) -> Vec3 {
+        self.count(9);
+        pose.transform_point3(point)
+    }
+
+    /// The same in double precision, which stands for the fixed-point arithmetic of the hardware.
+    #[inline(always)]
+    pub(crate) fn transform_f64(&self, pose: &DAffine3, point: DVec3) -> DVec3 {
+        self.count(9);
+        pose.transform_point3(point)
+    }
+
+    /// `matrix` times `vector`: sixteen multiply-adds.
+    #[inline(always)]
+    pub fn transform4(&self, matrix: &Mat4, vector: Vec4) -> Vec4 {
+        self.count(16);
+        *matrix * vector
+    }
+
+    /// `a` if `a > b`, a test without a branch: `then` or `otherwise`.
+    #[inline(always)]
+    pub fn select_greater<T>(&self, [a, b]: [f32; 2], then: T, otherwise: T) -> T {
+        self.count(1);
+        if a > b { then } else { otherwise }
+    }
+
+    /// Compares and branches: lanes of a quad that differ take both paths. One operation.
+    #[inline(always)]
+    pub fn branch(&self, condition: bool) -> bool {
+        self.count(1);
+        self.branches.set(self.branches.get() + 1);
+        condition
+    }
+
+    /// Discards the samples that this lane shades, if the shader says that it [may](Shader::may_discard).
+    #[inline(always)]
+    pub fn discard(&self) {
+        self.discarded.set(true);
+    }
+}
+
+/// Operations of a shader on one lane.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Program {
+    /// Operations for a surface point; `None` if they depend on the point.
+    pub pixel_ops: Option<u32>,
+    /// Operations for a vertex at one end of the shutter, without moving it to the image plane.
+    pub vertex_ops: u32,
+}
+
+impl Program {
+    /// Runs `shader` once. Without branches its cost is the same for all points.
+    pub fn of(shader: &dyn Shader) -> Self {
+        let [pixel, vertex] = [Lane::default(), Lane::default()];
+        shader.shade(&pixel, &ShadingPoint::FACING, Vec4::ONE);
+        shader.vertex(&vertex, Vec3::ZERO);
+        let pixel_ops = (!pixel.has_branched()).then(|| pixel.ops());
+        Self { pixel_ops, vertex_ops: vertex.ops() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_component_is_an_operation() {
+        let lane = Lane::default();
+        assert_eq!(lane.madd(Vec3::splat(2.0), Vec3::X, Vec3::ONE), Vec3::new(3.0, 1.0, 1.0));
+        assert_eq!(lane.ops(), 3);
+        assert!((lane.normalize(Vec3::new(3.0, 0.0, 4.0)) - Vec3::new(0.6, 0.0, 0.8)).length() < 1e-6);
+        assert_eq!(lane.ops(), 3 + 8);
+        assert_eq!(lane.scale(Vec4::ONE, 2.0), Vec4::splat(2.0));
+        assert_eq!(lane.ops(), 11 + 4);
+        assert!(!lane.has_branched());
+    }
+
+    struct Loop;
+
+    impl Shader for Loop {
+        fn shade(&self, lane: &Lane, at: &ShadingPoint, _: Vec4) -> Vec4 {
+            let mut sum = 0.0;
+            while lane.branch(sum < at.position.x) {
+                sum = lane.add(sum, 1.0);
+            }
+            Vec4::splat(sum)
+        }
+    }
+
+    #[test]
+    fn a_program_that_branches_has_no_single_cost() {
+        assert_eq!(Program::of(&Loop).pixel_ops, None);
+        let ops = |x: f32| {
+            let lane = Lane::default();
+            Loop.shade(&lane, &ShadingPoint { position: Vec3::X * x, ..ShadingPoint::FACING }, Vec4::ONE);
+            lane.ops()
+        };
+        assert_eq!([ops(0.0), ops(1.0), ops(5.0)], [1, 3, 11]);
+    }
+}
