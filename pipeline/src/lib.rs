@@ -14,6 +14,7 @@
 //! - [`random`]: counter-based random numbers,
 //! - [`sampling`]: sample positions of every pixel,
 //! - [`depth`]: depth intervals and culling,
+//! - [`state`]: depth test, stencil test and blending of a draw,
 //! - [`shading`] and [`texture`]: the shading grid, shaders and textures,
 //! - [`memory`]: caches and addresses,
 //! - [`conservative`]: the tiles that a triangle may touch, without samples,
@@ -54,6 +55,7 @@ pub mod setup;
 pub mod shader;
 pub mod shading;
 pub mod simd;
+pub mod state;
 pub mod texture;
 pub mod traversal;
 pub mod visibility;
@@ -68,4 +70,5 @@ pub use geometry::{
 pub use memory::{CacheSpec, MemorySpec, Replacement};
 pub use sampling::{LensShape, SampleSpec, SampleTable};
 pub use shader::{Lane, Shader, ShadingPoint};
+pub use state::{Blend, Clear, Compare, DepthState, DrawState, Stencil, StencilFace, StencilOp};
 pub use texture::{Texture, TextureError, Wrap, linear_to_srgb8};

@@ -45,7 +45,7 @@ pub trait Shader: Sync {
     /// Linear RGB radiance and opacity. `texel` is the filtered texel in linear RGBA, or white without a texture.
     fn shade(&self, lane: &Lane, at: &ShadingPoint, texel: Vec4) -> Vec4;
 
-    /// Whether [`Lane::discard`] may be called. Then samples are shaded before they are stored; a shader without it
+    /// Whether [`Lane::discard_below`] may be called. Then samples are shaded before they are stored; a shader without it
     /// discards nothing.
     fn may_discard(&self) -> bool {
         false
@@ -241,10 +241,12 @@ impl Lane {
         condition
     }
 
-    /// Discards the samples that this lane shades, if the shader says that it [may](Shader::may_discard).
+    /// Discards the samples that this lane shades if `a < b`, and if the shader says that it [may](Shader::may_discard). A
+    /// test without a branch: the lane runs on.
     #[inline(always)]
-    pub fn discard(&self) {
-        self.discarded.set(true);
+    pub fn discard_below(&self, a: f32, b: f32) {
+        self.count(1);
+        self.discarded.set(self.discarded.get() || a < b);
     }
 }
 

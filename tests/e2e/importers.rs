@@ -150,6 +150,10 @@ fn demanding() -> Glb {
     glb.json["materials"] = json!([material("one"), material("two"), material("three"), material("unused")]);
     let primitive = |index: usize| json!({"attributes": {"POSITION": 0, "TEXCOORD_0": 2}, "indices": 1, "material": index});
     glb.json["meshes"] = json!([{"primitives": [primitive(0), primitive(1), primitive(2)]}]);
+    let faint = glb.floats(&[1.0, 1.0, 1.0, 0.5].repeat(4), 4);
+    for index in 0..3 {
+        glb.json["meshes"][0]["primitives"][index]["attributes"]["COLOR_0"] = json!(faint);
+    }
     let lamp = |light: usize| json!({"extensions": {"KHR_lights_punctual": {"light": light}}});
     glb.json["nodes"] = json!([{"mesh": 0, "children": [1, 2, 3]}, lamp(0), lamp(0), lamp(0)]);
     let lights = json!([{"type": "point", "intensity": 10}, {"type": "spot", "spot": {}, "intensity": 0}]);
@@ -167,7 +171,7 @@ fn ignored_features_give_one_line_per_kind_with_a_count() {
     let inputs = Inputs::new();
     let results = run(&inputs.put("a.glb", demanding().bytes()), &[]);
     let kinds = [
-        ("alpha-ignored", 3, "3 blended materials drawn opaque"),
+        ("alpha-ignored", 3, "3 materials with opacities of vertices"),
         ("emissive-ignored", 3, "3 emissive materials"),
         ("extension-ignored", 1, "1 extension ignored"),
         ("light-ignored", 3, "3 point lights ignored"),
@@ -205,10 +209,44 @@ fn features_without_effect_are_not_reported() {
     glb.json["extensions"]["KHR_lights_punctual"]["lights"][0]["intensity"] = json!(0);
     glb.json["extensionsUsed"] = json!(["KHR_lights_punctual", "KHR_xmp_json_ld"]);
     let white = glb.floats(&[1.0; 16], 4);
-    glb.primitive()["attributes"]["COLOR_0"] = json!(white);
+    for index in 0..3 {
+        glb.json["meshes"][0]["primitives"][index]["attributes"]["COLOR_0"] = json!(white);
+    }
     let inputs = Inputs::new();
     let codes = run(&inputs.put("a.glb", glb.bytes()), &[]).warning_codes();
     assert!(!codes.iter().any(|code| code.contains("ignored")), "{codes:?}");
+}
+
+/// A red pane before a wall: opaque, blended or with holes, in a scene file and in an OBJ file.
+#[test]
+fn opacity_shows_what_is_behind() {
+    let inputs = Inputs::new();
+    let pane = |material: &str| {
+        let plane = "rotation_deg: (90, 0, 0), shape: Plane(size: 2, cells: 1, tiles: 1)";
+        let pane =
+            format!("({plane}, position: (0, 0, 1), material: (color: (1, 0, 0), unlit: true, {material}))");
+        let wall = format!(
+            "({plane}, position: (0, 0, 0), scale: (4, 4, 4), material: (color: (0, 0, 1), unlit: true))"
+        );
+        format!(
+            "(camera: (position: (0, 0, 5), target: (0, 0, 0)), settings: (width: 32, height: 32, samples: 1, frames: (0, 1)), \
+              objects: [{pane}, {wall}])"
+        )
+    };
+    let middle = |material: &str| {
+        let results = run(&inputs.put("a.ron", pane(material)), &[]);
+        let image = results.image(0);
+        (image.get_pixel(16, 16).0, counts(&results))
+    };
+    let of = |counts: &Value, event: &str| number(counts, &format!("/{event}"));
+    let (red, opaque) = middle("");
+    assert_eq!((red, of(&opaque, "samples_blended")), ([255, 0, 0], 0.0));
+    let (violet, blended) = middle("opacity: 0.5");
+    assert_eq!(violet, [188, 0, 188], "half the light of each");
+    assert!(of(&blended, "samples_blended") > 50.0, "{blended}");
+    assert!(of(&blended, "shader_ops") > of(&opaque, "shader_ops"));
+    let (hole, cut) = middle("opacity: 0.25, alpha: CutOut(cutoff: 0.5)");
+    assert_eq!((hole, of(&cut, "samples_blended")), ([0, 0, 255], 0.0));
 }
 
 #[test]

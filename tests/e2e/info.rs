@@ -48,9 +48,9 @@ fn a_scene_file_is_described_in_full() {
     assert_eq!(found["materials"][0]["name"], "leaf");
     assert_eq!(found["settings"]["frames"], json!([0, 36]));
     let codes: Vec<&Value> = found["warnings"].as_array().into_iter().flatten().map(|w| &w["code"]).collect();
-    assert_eq!(codes, ["alpha-ignored"]);
-    for says in
-        ["triangles 2", "Turn", "1.250 s", "1 of 1 meshes move", "leaf", "[alpha-ignored]", "--camera '("]
+    assert_eq!(codes, [""; 0]);
+    assert_eq!(found["materials"][0]["alpha"], "Blended");
+    for says in ["triangles 2", "Turn", "1.250 s", "1 of 1 meshes move", "leaf", "0.5 blended", "--camera '("]
     {
         assert!(text.contains(says), "`{says}` is not in:\n{text}");
     }

@@ -357,6 +357,8 @@ fn missing_images() {
 #[test]
 fn unsupported_material_features() {
     let mut glb = Glb::square();
+    let faint = glb.floats(&[1.0, 1.0, 1.0, 0.5].repeat(4), 4);
+    glb.primitive()["attributes"]["COLOR_0"] = json!(faint);
     let see_through = json!({"baseColorFactor": [1, 1, 1, 0.5], "metallicFactor": 1});
     let map = json!({"index": 0});
     glb.material(json!({"alphaMode": "BLEND", "pbrMetallicRoughness": see_through, "normalTexture": map,

@@ -85,6 +85,10 @@ pub(crate) fn teeth<'de, D: Deserializer<'de>>(from: D) -> Result<u32, D::Error>
     required(from, |value| (3..=1024).contains(value), "a number of teeth from 3 to 1024")
 }
 
+pub(crate) fn share<'de, D: Deserializer<'de>>(from: D) -> Result<Option<f32>, D::Error> {
+    checked(from, |value| (0.0..=1.0).contains(value), "a share from 0 to 1")
+}
+
 pub(crate) fn blades<'de, D: Deserializer<'de>>(from: D) -> Result<u32, D::Error> {
     required(from, |value| (1..=64).contains(value), "a number of blades from 1 to 64")
 }

@@ -58,6 +58,6 @@ pub use error::LoadError;
 pub use fingerprint::{Fingerprint, FingerprintError};
 pub use job::Job;
 pub use load::load;
-pub use material::{Light, Material};
+pub use material::{Alpha, Light, Material};
 pub use samples::SampleChoice;
 pub use scene::{Frame, FrameError, FrameMesh, Overrides, Scene, Settings};

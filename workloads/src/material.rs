@@ -4,15 +4,36 @@
 use std::sync::Arc;
 
 use glam::{Vec3, Vec4};
-use pipeline::{Lane, Shader, ShadingPoint, Texture};
+use pipeline::{Blend, Cull, DepthState, DrawState, Lane, Shader, ShadingPoint, Texture};
+use serde::{Deserialize, Serialize};
 
-/// Appearance of a surface. Surfaces are opaque and diffuse, with a faint highlight.
+/// What the opacity of a surface does (glTF 2.0, 3.9.4).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub enum Alpha {
+    /// Nothing: the surface is opaque.
+    #[default]
+    Opaque,
+    /// The surface is opaque, with holes where the opacity is below the cutoff.
+    CutOut {
+        /// Lowest opacity that is drawn.
+        cutoff: f32,
+    },
+    /// The surface covers this share of what is behind.
+    Blended,
+}
+
+/// Appearance of a surface. Surfaces are diffuse, with a faint highlight.
 #[derive(Clone, Debug)]
 pub struct Material {
     /// Name for messages.
     pub name: String,
     /// Linear RGB reflectance; a factor of the texture, if there is one.
     pub base_color: Vec3,
+    /// Opacity from 0 to 1; a factor of that of the texture.
+    pub opacity: f32,
+    /// What the opacity does.
+    pub alpha: Alpha,
     /// Colour texture.
     pub texture: Option<Arc<Texture>>,
     /// Whether back faces are drawn, too.
@@ -24,7 +45,40 @@ pub struct Material {
 impl Material {
     /// A matt, single-sided surface of one colour (linear RGB reflectance).
     pub fn colored(name: impl Into<String>, base_color: Vec3) -> Self {
-        Self { name: name.into(), base_color, texture: None, double_sided: false, unlit: false }
+        let (opacity, alpha) = (1.0, Alpha::Opaque);
+        Self {
+            name: name.into(),
+            base_color,
+            opacity,
+            alpha,
+            texture: None,
+            double_sided: false,
+            unlit: false,
+        }
+    }
+
+    /// The same surface, opaque if its opacity has no effect anywhere.
+    #[must_use]
+    pub fn simplified(self) -> Self {
+        let texture = self.texture.as_ref().map_or(1.0, |texture| f32::from(texture.min_alpha()) / 255.0);
+        let needed = match self.alpha {
+            Alpha::Opaque => 0.0,
+            Alpha::CutOut { cutoff } => cutoff,
+            Alpha::Blended => 1.0,
+        };
+        if self.opacity * texture >= needed { Self { alpha: Alpha::Opaque, ..self } } else { self }
+    }
+
+    /// State of draws. A blended surface hides nothing, so its depth is not stored.
+    pub fn state(&self) -> DrawState {
+        let opaque = DrawState::new(if self.double_sided { Cull::None } else { Cull::Back });
+        match self.alpha {
+            Alpha::Opaque | Alpha::CutOut { .. } => opaque,
+            Alpha::Blended => {
+                let depth = DepthState { write: false, ..opaque.depth };
+                DrawState { depth, blend: Blend::Over, ..opaque }
+            }
+        }
     }
 
     /// The same surface with a texture.
@@ -63,10 +117,12 @@ impl Default for Light {
 ///
 /// `texel * base * vertex colour * (lamp * max(0, n.l) + mix(ground, sky, n.y)) + highlight * lamp * max(0, n.h)^32`, with the
 /// half vector `h` of Blinn (Models of light reflection, SIGGRAPH 1977). The vertex colour is left out unless
-/// [`SurfaceShader::with_vertex_colors`] asks for it.
+/// [`SurfaceShader::with_vertex_colors`] asks for it. Opacity is computed for materials that are not opaque.
 #[derive(Clone, Debug)]
 pub struct SurfaceShader {
     base_color: Vec3,
+    opacity: f32,
+    alpha: Alpha,
     texture: Option<Arc<Texture>>,
     unlit: bool,
     vertex_colors: bool,
@@ -84,6 +140,8 @@ impl SurfaceShader {
     pub fn new(material: &Material, light: &Light) -> Self {
         Self {
             base_color: material.base_color,
+            opacity: material.opacity,
+            alpha: material.alpha,
             texture: material.texture.clone(),
             unlit: material.unlit,
             vertex_colors: false,
@@ -115,6 +173,19 @@ impl SurfaceShader {
     }
 }
 
+impl SurfaceShader {
+    fn opacity(&self, lane: &Lane, texel: Vec4) -> f32 {
+        match self.alpha {
+            Alpha::Opaque => 1.0,
+            Alpha::CutOut { cutoff } => {
+                lane.discard_below(lane.mul(self.opacity, texel.w), cutoff);
+                1.0
+            }
+            Alpha::Blended => lane.mul(self.opacity, texel.w),
+        }
+    }
+}
+
 fn pow32(lane: &Lane, x: f32) -> f32 {
     (0..5).fold(x, |power, _| lane.mul(power, power))
 }
@@ -127,7 +198,12 @@ impl Shader for SurfaceShader {
     fn shade(&self, lane: &Lane, at: &ShadingPoint, texel: Vec4) -> Vec4 {
         let base = lane.mul(self.base_color, texel.truncate());
         let base = if self.vertex_colors { lane.mul(base, at.color) } else { base };
-        if self.unlit { base } else { self.lit(lane, at, base) }.extend(1.0)
+        let opacity = self.opacity(lane, texel);
+        if self.unlit { base } else { self.lit(lane, at, base) }.extend(opacity)
+    }
+
+    fn may_discard(&self) -> bool {
+        matches!(self.alpha, Alpha::CutOut { .. })
     }
 }
 
@@ -170,6 +246,23 @@ mod tests {
         let (plain, colored) = (shader(true), shader(true).with_vertex_colors());
         assert_eq!(shade(&plain, &red, Vec4::ONE), (Vec3::new(0.5, 0.25, 1.0), 3));
         assert_eq!(shade(&colored, &red, Vec4::ONE), (Vec3::new(0.5, 0.125, 0.0), 6));
+    }
+
+    #[test]
+    fn opacity_costs_where_it_has_an_effect() {
+        let half = Material { opacity: 0.5, unlit: true, ..Material::colored("m", Vec3::ONE) };
+        let ops = |alpha| {
+            let material = Material { alpha, ..half.clone() }.simplified();
+            let lane = Lane::default();
+            let shader = SurfaceShader::new(&material, &Light::default());
+            let color = shader.shade(&lane, &point(Vec3::Z), Vec4::new(1.0, 1.0, 1.0, 0.5));
+            (color.w, lane.is_discarded(), lane.ops())
+        };
+        assert_eq!(ops(Alpha::Opaque), (1.0, false, 3));
+        assert_eq!(ops(Alpha::Blended), (0.25, false, 4));
+        assert_eq!(ops(Alpha::CutOut { cutoff: 0.75 }), (1.0, true, 5));
+        // Without a texture the opacity is one half throughout.
+        assert_eq!(ops(Alpha::CutOut { cutoff: 0.5 }), (1.0, false, 3));
     }
 
     #[test]

@@ -129,6 +129,7 @@ activity! {
     }
     Colour "colour" "Stores sample colours and resolves them into pixels." {
         ColourWrites "colour_writes" "A sample colour written."
+        SamplesBlended "samples_blended" "Of these: a colour that is combined with the stored one, or replaces a part of it."
         ColourLines "colour_lines" "A line of the colour cache accessed."
         ColourMisses "colour_misses" "A line that was not in the colour cache."
         SamplesResolved "samples_resolved" "A sample colour read to resolve its pixel."

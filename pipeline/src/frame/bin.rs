@@ -179,9 +179,9 @@ impl SamplesHere {
     pub fn add(&mut self, found: &PixelHits, [screen_madds, test_madds]: [u32; 2]) {
         for (pixel, counts) in self.0.iter_mut().enumerate() {
             let (screened, tested) = (found.screened[pixel], found.tested[pixel]);
-            let (hit, written) = (found.hit[pixel], found.written[pixel]);
+            let (hit, written, coloured) = (found.hit[pixel], found.written[pixel], found.coloured[pixel]);
             let here =
-                [screened, screened * screen_madds, tested, tested * test_madds, hit, written, written];
+                [screened, screened * screen_madds, tested, tested * test_madds, hit, written, coloured];
             counts.iter_mut().zip(here).for_each(|(sum, count)| *sum += count);
         }
     }
@@ -204,13 +204,18 @@ pub(super) struct Work {
     pub screen_madds: u32,
     pub tested: u32,
     pub hit: u32,
-    /// Hits known to be nearer than all stored depths.
+    /// Hits whose tests need no stored depth.
     pub unread: u32,
+    /// Depth and stencil words written.
     pub written: u32,
+    pub coloured: u32,
+    /// Samples whose new colour depends on the stored one.
+    pub blended: u32,
     pub sample_madds: u32,
     pub read_pixels: u64,
     pub written_pixels: u64,
-    /// Pixels of these whose depths and whose colours now compress to half; only with compression.
+    pub coloured_pixels: u64,
+    /// Pixels written whose depths and whose colours now compress to half; only with compression.
     pub small_pixels: [u64; 2],
     /// One past the last entry of this work in [`BinLog::quads`].
     pub quads_end: u32,

@@ -33,7 +33,7 @@ pub struct Gpu<'e> {
 pub struct Rendered {
     /// Linear RGB radiance of every pixel of each image, row by row from the top left; empty unless requested.
     pub images: Vec<Vec<Vec3>>,
-    /// Visible triangle (`u32::MAX` for none) and bits of its depth (infinite for none) of every sample, in the order
+    /// Triangle stored last (`u32::MAX` for none) and bits of the depth of every sample, in the order
     /// `(y width + x) per_pixel + index`; empty unless requested.
     pub visible: Vec<(u32, u32)>,
     /// Count of every event of the pass.

@@ -6,11 +6,13 @@ use activity::Event;
 use glam::Vec4;
 
 use super::{Features, Settings};
-use crate::depth::BoxGrid;
+use crate::depth::{BoxGrid, DepthTile};
 use crate::geometry::{Camera, Clip, Cull, Geometry, MovingVertex, Projection, Viewport};
 use crate::memory::{AddressSpace, Surface};
+use crate::sampling::TileSamples;
 use crate::setup::Corner;
 use crate::shader::{Program, Shader};
+use crate::state::{Clear, DrawState};
 use crate::texture::Texture;
 use crate::traversal::thresholds::{at_rest, blur_px, motion_px};
 
@@ -52,6 +54,9 @@ pub(super) struct Pass<'a> {
     pub heat: bool,
     /// Range of samples of each image. Without ranges the pass computes depths only.
     pub views: Vec<Range<u32>>,
+    pub clear: Clear,
+    /// Whether the result depends on the order of triangles, so that samples are shaded and stored in it.
+    pub is_ordered: bool,
 }
 
 impl<'a> Pass<'a> {
@@ -84,6 +89,8 @@ impl<'a> Pass<'a> {
             heat: !pass.heat.is_empty(),
             views,
             projection,
+            clear: pass.clear,
+            is_ordered: draws.iter().any(|draw| !draw.state.keeps_nearest() || draw.shader.may_discard()),
         }
     }
 
@@ -138,6 +145,19 @@ impl<'a> Pass<'a> {
     /// Division of lens and time for depth culling.
     pub fn depth_grid(&self) -> BoxGrid {
         BoxGrid::new(self.settings.spec.depth.boxes, self.lens).unwrap_or_default()
+    }
+
+    /// A cleared tile of `samples`.
+    pub fn cleared_tile(&self, samples: &TileSamples) -> DepthTile {
+        let (count, Clear { depth, stencil }) = (samples.len, self.clear);
+        let mut tile = DepthTile::cleared(self.depth_grid(), samples, depth);
+        if self.draws.iter().any(|draw| draw.state.stencil.is_some()) {
+            tile.stencil = vec![stencil; count];
+        }
+        if self.is_ordered && !self.is_depth_only() {
+            tile.colour = vec![self.settings.background.extend(1.0); count];
+        }
+        tile
     }
 
     /// Whether the pass computes depths only.
@@ -230,16 +250,28 @@ pub struct Draw<'a> {
     pub geometry: Geometry<'a>,
     /// Shader.
     pub shader: &'a dyn Shader,
-    /// Culled faces.
-    pub cull: Cull,
+    /// Which samples are stored, and how.
+    pub state: DrawState,
     /// Addresses of its data, if an earlier pass of the frame has used them.
     pub resident: Resident,
 }
 
 impl<'a> Draw<'a> {
-    /// A draw whose data are new to the GPU.
+    /// A draw of opaque triangles whose data are new to the GPU.
     pub fn new(geometry: Geometry<'a>, shader: &'a dyn Shader, cull: Cull) -> Self {
-        Self { geometry, shader, cull, resident: Resident::default() }
+        Self { geometry, shader, state: DrawState::new(cull), resident: Resident::default() }
+    }
+
+    /// The draw with other faces culled.
+    #[must_use]
+    pub fn culling(self, cull: Cull) -> Self {
+        self.with_state(DrawState { cull, ..self.state })
+    }
+
+    /// The draw with another state.
+    #[must_use]
+    pub fn with_state(self, state: DrawState) -> Self {
+        Self { state, ..self }
     }
 
     /// The draw with the texture of its shader in `surface`, as an earlier pass wrote it.
@@ -278,6 +310,8 @@ pub struct RasterPass<'a> {
     pub settings: &'a Settings<'a>,
     /// What is drawn.
     pub target: Target<'a>,
+    /// Depth and stencil value of all samples before the first draw.
+    pub clear: Clear,
     /// Whether the result has the pixels of the images.
     pub image: bool,
     /// Whether the result has the visible triangle and the depth of every sample.
@@ -315,8 +349,8 @@ impl Target<'_> {
 impl<'a> RasterPass<'a> {
     /// A pass that draws one image.
     pub fn new(camera: &'a Camera, draws: &'a [Draw<'a>], settings: &'a Settings<'a>) -> Self {
-        let (name, target) = ("draw", Target::Image);
-        Self { name, camera, draws, settings, target, image: true, visible: false, heat: &[] }
+        let (name, target, clear) = ("draw", Target::Image, Clear::default());
+        Self { name, camera, draws, settings, target, clear, image: true, visible: false, heat: &[] }
     }
 
     /// The pass with another name.
@@ -329,6 +363,12 @@ impl<'a> RasterPass<'a> {
     #[must_use]
     pub fn onto(self, target: Target<'a>) -> Self {
         Self { target, ..self }
+    }
+
+    /// The pass with samples cleared to other values.
+    #[must_use]
+    pub fn cleared(self, clear: Clear) -> Self {
+        Self { clear, ..self }
     }
 
     /// The pass without pixels in its result. Its work is the same.

@@ -119,10 +119,11 @@ impl<'a> Replay<'a> {
         counts[Event::DepthReads] = work.hit - work.unread;
         counts[Event::DepthReadsSkipped] = work.unread;
         counts[Event::DepthWrites] = work.written;
-        counts[Event::ColourWrites] = if self.pass.is_depth_only() { 0 } else { work.written };
+        counts[Event::ColourWrites] = work.coloured;
+        counts[Event::SamplesBlended] = work.blended;
         self.compress(work);
         let base = self.pass.addresses.depth.address();
-        self.lines(work.tile, work.read_pixels, |this, line, pixels| {
+        self.lines(work.tile, work.read_pixels | work.written_pixels, |this, line, pixels| {
             let write = pixels & work.written_pixels != 0;
             let fresh = !std::mem::replace(&mut this.depth_used[line as usize], true);
             this.memory.depth(base + line * LINE_BYTES, write, fresh, counts);
@@ -133,11 +134,8 @@ impl<'a> Replay<'a> {
                 Shading::PerSample => self.shade_samples(work.triangle, quads, counts),
             }
         }
-        if self.pass.is_depth_only() {
-            return packet;
-        }
         let base = self.pass.addresses.colour.address();
-        self.lines(work.tile, work.written_pixels, |this, line, _| {
+        self.lines(work.tile, work.coloured_pixels, |this, line, _| {
             let fresh = !std::mem::replace(&mut this.colour_used[line as usize], true);
             this.memory.colour(base + line * LINE_BYTES, true, fresh, counts);
         });

@@ -38,8 +38,8 @@ pub(super) fn resolve(pass: &Pass<'_>, bins: &[Bin]) -> Vec<Vec<Vec3>> {
 /// Visible triangle and depth bits of every sample, pixel by pixel in rows.
 pub(super) fn visible(pass: &Pass<'_>, bins: &[Bin]) -> Vec<(u32, u32)> {
     let (viewport, per_pixel) = (pass.settings.viewport, pass.settings.samples.per_pixel());
-    let mut seen =
-        vec![(DepthTile::NO_TRIANGLE, f32::INFINITY.to_bits()); viewport.pixels() * per_pixel as usize];
+    let nothing = (DepthTile::NO_TRIANGLE, pass.clear.depth.to_bits());
+    let mut seen = vec![nothing; viewport.pixels() * per_pixel as usize];
     let mut samples = TileSamples::default();
     for bin in bins {
         for (index, tile) in bin.tiles.iter().enumerate() {
@@ -82,10 +82,10 @@ struct Scratch {
     /// Slots of a tile, grouped by triangle.
     slots: Vec<u16>,
     /// Cells of one triangle shaded so far.
-    shaded: HashMap<[i32; 2], Vec3, BuildHasherDefault<CellHasher>>,
+    shaded: ByCell<Vec3>,
 }
 
-/// Shade a tile: each cell of a triangle once, or every sample.
+/// Colours of a tile: those stored, or those of the visible triangles, each cell of which is shaded once, or every sample.
 fn resolve_tile(
     pass: &Pass<'_>,
     tile: &DepthTile,
@@ -101,6 +101,10 @@ fn resolve_tile(
         let views = pass.views.iter().enumerate().filter(|(_, samples)| samples.contains(&index));
         views.for_each(|(view, _)| sums[view * pixels + pixel] += colour);
     };
+    if pass.is_ordered {
+        tile.colour.iter().enumerate().for_each(|(slot, colour)| add(slot, colour.truncate()));
+        return means(pass, &sums, pixels);
+    }
     scratch.slots.clear();
     scratch.slots.extend(0..samples.len as u16);
     // The stable sort fixes the order of sums.
@@ -128,13 +132,21 @@ fn resolve_tile(
             add(slot, colour);
         }
     }
+    means(pass, &sums, pixels)
+}
+
+/// Means of the samples of each pixel of each view.
+fn means(pass: &Pass<'_>, sums: &[Vec3], pixels: usize) -> Vec<Vec3> {
     let counts = pass.views.iter().map(|samples| samples.len().max(1) as f32);
     sums.chunks_exact(pixels).zip(counts).flat_map(|(sums, n)| sums.iter().map(move |sum| *sum / n)).collect()
 }
 
+/// Values by cell.
+pub(super) type ByCell<T> = HashMap<[i32; 2], T, BuildHasherDefault<CellHasher>>;
+
 /// Hasher of the two coordinates of a cell. The map is never iterated, so the order has no effect.
 #[derive(Default)]
-struct CellHasher(u64);
+pub(super) struct CellHasher(u64);
 
 impl Hasher for CellHasher {
     fn finish(&self) -> u64 {

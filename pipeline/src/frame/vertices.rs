@@ -63,7 +63,7 @@ pub(super) fn front_end(
 /// Outcome of a triangle as an event, and the triangle if it is kept.
 fn outcome(pass: &Pass<'_>, id: u32) -> (Event, Option<Ready>) {
     let viewport = pass.settings.viewport;
-    let Draw { geometry, cull, .. } = &pass.draws[pass.locate(id).0];
+    let Draw { geometry, state, .. } = &pass.draws[pass.locate(id).0];
     let (Staged { vertices, lens }, near) = (pass.staged(id), pass.projection.near);
     let shear = pass.projection.shear;
     let shear = if lens { shear } else { shear.sharp() };
@@ -71,7 +71,7 @@ fn outcome(pass: &Pass<'_>, id: u32) -> (Event, Option<Ready>) {
     if within.is_empty() {
         return (Event::TrianglesOutside, None);
     }
-    match set_up(id, vertices.each_ref(), *cull, &shear, near, viewport.half_px()) {
+    match set_up(id, vertices.each_ref(), state.cull, &shear, near, viewport.half_px()) {
         Outcome::Degenerate => (Event::TrianglesDegenerate, None),
         Outcome::Outside => (Event::TrianglesOutside, None),
         Outcome::FaceCulled => (Event::TrianglesFaceCulled, None),
@@ -105,7 +105,7 @@ fn emit_packet(
         packet.counts[Event::TrianglesIn] += 1;
         packet.counts[Event::Indices] += 3;
         packet.counts[Event::SetupMadds] +=
-            madds(corners.iter().any(|v| !v.is_still()), pass.draws[draw].cull);
+            madds(corners.iter().any(|v| !v.is_still()), pass.draws[draw].state.cull);
         packet.counts[Event::SetupMadds] += if still_px > 0.0 { thresholds::MOTION_MADDS } else { 0 }
             + if in_focus_px > 0.0 { thresholds::BLUR_MADDS } else { 0 }
             + ready.as_ref().map_or(0, Ready::line_madds);

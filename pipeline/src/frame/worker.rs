@@ -4,19 +4,21 @@ use activity::Packet;
 
 use super::bin::Bin;
 use super::bin::{BinLog, SamplesHere, TestsHere, TileWork, Work};
+use super::fragments::{FragmentTests, Fragments};
 use super::pass::Pass;
 use super::surface::{Grid, own_pixel};
 use super::test_selection::TestSelector;
 use super::tile_tests::{Remaining, Subject, TestContext, TestTile};
 use super::vertices::Ready;
 use super::{Settings, Shading};
-use crate::depth::{Bounder, BoxGrid, DepthTile, Visible, interval_madds, set_up_madds};
+use crate::depth::{Bounder, Visible, interval_madds, set_up_madds};
 use crate::geometry::Shear;
 use crate::memory::depths_fit;
 use crate::sample_test::{Hits, SampleTest, Target, Width};
 use crate::sampling::TileSamples;
 use crate::setup::{PixelRect, Triangle};
 use crate::shading::QuadSet;
+use crate::state::DrawState;
 use crate::traversal::{Box5, Screen, TileRect};
 use crate::{sample_test, traversal};
 
@@ -30,6 +32,7 @@ pub(super) struct Scratch {
     sharp: Vec<TileSamples>,
     sharpened: Vec<bool>,
     hits: Hits,
+    fragments: Fragments,
     quads: QuadSet,
 }
 
@@ -43,8 +46,6 @@ pub(super) struct Worker<'a, 'p> {
     draw: u32,
     /// Tile tests since the last packet.
     tests: TileWork,
-    /// Division of lens and time for depth culling.
-    grid: BoxGrid,
     /// Depth bounds of the current triangle.
     bounder: Option<(u32, Bounder)>,
 }
@@ -57,9 +58,8 @@ impl<'a, 'p> Worker<'a, 'p> {
             flags.clear();
             flags.resize(bin.tiles.len(), false);
         }
-        let grid = pass.depth_grid();
         let (log, tests) = (BinLog::default(), TileWork::default());
-        Self { pass, bin, scratch, log, draw: Packet::NONE, tests, grid, bounder: None }
+        Self { pass, bin, scratch, log, draw: Packet::NONE, tests, bounder: None }
     }
 
     /// Rasterize the `listed` triangles of a batch.
@@ -164,9 +164,7 @@ impl<'a, 'p> Worker<'a, 'p> {
             }
             let tested = self.samples(subject, &tile, &mut remaining, index);
             if self.scratch.hits.screened + self.scratch.hits.tested > 0 {
-                if !self.pass.is_depth_only() {
-                    self.request_quads(subject.triangle, index, origin);
-                }
+                self.shade_and_store(subject.triangle, index, origin);
                 let small = self.small_pixels(subject.triangle, index, origin);
                 self.record(subject.triangle.id, (tested, small), in_front, origin);
             }
@@ -186,10 +184,13 @@ impl<'a, 'p> Worker<'a, 'p> {
         let Scratch { samples, sharp, hits, .. } = &mut *self.scratch;
         let drawn_sharp = self.pass.lens && !remaining.within.lens;
         let samples = if drawn_sharp { &sharp[index] } else { &samples[index] };
-        let grid = self.grid;
-        let stored = self.bin.tiles[index].get_or_insert_with(|| DepthTile::cleared(grid, samples));
-        if self.pass.heat {
+        let pass = self.pass;
+        let stored = self.bin.tiles[index].get_or_insert_with(|| pass.cleared_tile(samples));
+        if pass.heat {
             hits.by_pixel.get_or_insert_default();
+        }
+        if pass.is_ordered {
+            hits.covered.get_or_insert_default();
         }
         hits.clear();
         let mut target = Target { depth: &mut stored.depth, triangle: &mut stored.triangle };
@@ -215,11 +216,30 @@ impl<'a, 'p> Worker<'a, 'p> {
         if self.pass.settings.spec.features.auto {
             savings.record(hits, [triangle.moving, within.lens], remaining, &mut self.bin.selector);
         }
+        [triangle.moving, within.lens]
+    }
+
+    /// Store the covered samples in passes whose order matters, where the sample test only lists them; request the quads
+    /// to shade and update the depth bounds.
+    fn shade_and_store(&mut self, triangle: &Triangle, index: usize, origin: [u32; 2]) {
+        let state = self.state();
+        let Scratch { samples, hits, fragments, .. } = &mut *self.scratch;
+        let Some(tile) = &mut self.bin.tiles[index] else { return };
+        if self.pass.is_ordered {
+            FragmentTests::new(self.pass, triangle, &samples[index], origin).store(tile, hits, fragments);
+        } else if !self.pass.is_depth_only() {
+            fragments.nearest(hits);
+        }
         if !hits.written.is_empty() {
-            let lowered = stored.record_writes(&hits.written);
+            let lowered = tile.record_writes(&hits.written, state.may_raise_depth());
             self.tests.z_min_updates += if self.pass.settings.spec.depth.z_min { lowered } else { 0 };
         }
-        [triangle.moving, within.lens]
+        self.request_quads(triangle, index, origin);
+    }
+
+    /// State of the current draw.
+    fn state(&self) -> &'a DrawState {
+        &self.pass.draws[self.draw as usize].state
     }
 
     /// Index in the bin of the tile at `origin`.
@@ -248,7 +268,7 @@ impl<'a, 'p> Worker<'a, 'p> {
         let (samples, side) = (&self.scratch.samples[index], spec.tile_px);
         let per_pixel = source.per_pixel();
         let grid = Grid::new(self.pass, &triangle.corners, triangle.moving);
-        for slot in self.scratch.hits.written.iter().map(|&slot| slot as usize) {
+        for slot in self.scratch.fragments.shaded.iter().map(|&slot| slot as usize) {
             match spec.shading {
                 Shading::Cached => self.scratch.quads.request(grid.cell(samples, slot, origin, side), 0),
                 Shading::PerSample => {
@@ -274,8 +294,8 @@ impl<'a, 'p> Worker<'a, 'p> {
         in_front: bool,
         origin: [u32; 2],
     ) {
-        let index = self.tile_index(origin);
-        let hits = &self.scratch.hits;
+        let (index, state) = (self.tile_index(origin), self.state());
+        let (hits, fragments) = (&self.scratch.hits, &self.scratch.fragments);
         if let Some(edge_madds) = hits.by_pixel.as_deref().filter(|_| self.pass.heat) {
             let madds = [traversal::screen_madds(moving, lens), sample_test::madds(moving, lens)];
             self.log.samples.resize(self.bin.tiles.len(), None);
@@ -291,10 +311,13 @@ impl<'a, 'p> Worker<'a, 'p> {
             tested: hits.tested,
             hit: hits.hit,
             unread: if in_front { hits.hit } else { 0 },
-            written: hits.written.len() as u32,
+            written: hits.written.len() as u32 + fragments.stencils,
+            coloured: fragments.coloured,
+            blended: if state.reads_colour() { fragments.coloured } else { 0 },
             sample_madds: hits.tested * sample_test::madds(moving, lens),
-            read_pixels: hits.read_pixels,
+            read_pixels: if state.reads_depth() { hits.read_pixels } else { 0 },
             written_pixels: hits.written_pixels,
+            coloured_pixels: fragments.coloured_pixels,
             small_pixels,
             quads_end: self.log.quads.len() as u32,
         });
@@ -358,7 +381,8 @@ impl Worker<'_, '_> {
         };
         let samples = &self.scratch.samples[index];
         let grid = Grid::new(self.pass, &triangle.corners, triangle.moving);
-        let colours = compression.colour && spec.shading == Shading::Cached;
+        // Stored colours may be mixed from those of several cells.
+        let colours = compression.colour && spec.shading == Shading::Cached && !self.pass.is_ordered;
         let mut pixels = [Pixel::NONE; 64];
         for slot in 0..samples.len {
             let pixel = samples.pixel[slot] as usize;
@@ -442,17 +466,24 @@ impl Worker<'_, '_> {
         index: usize,
     ) -> Option<(Box5, bool)> {
         let (features, depth) = (&self.pass.settings.spec.features, &self.pass.settings.spec.depth);
-        if !features.z_max && !depth.z_min {
+        let state = self.state();
+        if !state.reads_depth() {
+            return Some((*within, true));
+        }
+        let culls = features.z_max && state.fails_without_effect();
+        let skips_reads = depth.z_min && state.may_skip_reads();
+        if !culls && !skips_reads {
             return Some((*within, false));
         }
         if !self.wants_depth(triangle, within, index) {
             return Some((*within, false));
         }
         self.prepare(triangle);
-        let mut visible = Visible::unknown(within);
+        let mut visible = Visible::in_cleared(within, state.depth.test, self.pass.clear.depth);
         if let (Some((_, bounder)), Some(tile)) = (&self.bounder, &mut self.bin.tiles[index]) {
-            self.tests.z_updates += if features.z_max { tile.update_farthest() } else { 0 };
-            visible = tile.boxes.compare(within, |part| bounder.over(rect, part));
+            self.tests.z_updates += if features.z_max { tile.update() } else { 0 };
+            let test = (state.depth.test, culls);
+            visible = tile.boxes.compare(within, test, |part| bounder.over(rect, part));
         }
         self.tests.z_tests += visible.compared;
         self.tests.interval_madds +=
@@ -460,14 +491,14 @@ impl Worker<'_, '_> {
         if features.auto {
             self.record_depth(triangle, within, &visible);
         }
-        if !features.z_max {
-            return Some((*within, visible.in_front && visible.behind == 0));
+        if !culls {
+            return Some((*within, skips_reads && visible.in_front && visible.behind == 0));
         }
         self.tests.boxes_culled += visible.behind;
         self.tests.z_culled += u32::from(visible.within.is_none());
         // The sample test considers a still triangle at all times.
         let time = |part: Box5| Box5 { t: if triangle.moving { part.t } else { within.t }, ..part };
-        let front = depth.z_min && visible.in_front && (triangle.moving || visible.behind == 0);
+        let front = skips_reads && visible.in_front && (triangle.moving || visible.behind == 0);
         visible.within.map(|part| (time(part), front))
     }
 

@@ -27,10 +27,11 @@ fn see(corner: &Corner, slope: [f32; 2], lens: [f32; 2], t: f32) -> Seen {
     [(-slope[0]).mul_add(w, x - lens[0]), (-slope[1]).mul_add(w, y - lens[1]), w]
 }
 
-/// Depth at which a sample hits a triangle with the given drawn faces.
-pub(crate) fn hit(seen: &[Seen; 3], faces: [bool; 2]) -> Option<f32> {
+/// Depth at which a sample hits a triangle with the given drawn faces, and whether the triangle is counter-clockwise
+/// there.
+pub(crate) fn hit(seen: &[Seen; 3], faces: [bool; 2]) -> Option<(f32, bool)> {
     let (weights, counter_clockwise) = weights(seen)?;
-    faces[usize::from(counter_clockwise)].then(|| depth(seen, &weights))
+    faces[usize::from(counter_clockwise)].then(|| (depth(seen, &weights), counter_clockwise))
 }
 
 /// Barycentric weights of the origin in the triangle, or `None` if it is outside. They add up to 1 and are

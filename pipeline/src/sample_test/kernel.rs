@@ -20,8 +20,19 @@ pub struct Target<'a> {
     pub triangle: &'a mut [u32],
 }
 
+/// A sample inside a triangle and beyond the near depth.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Covered {
+    /// Place of the sample in its tile.
+    pub slot: u16,
+    /// Whether the triangle is counter-clockwise as the sample sees it.
+    pub counter_clockwise: bool,
+    /// Depth of the triangle.
+    pub depth: f32,
+}
+
 /// Result of a range of sample tests.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Hits {
     /// Samples screened by the linearized edges.
     pub screened: u32,
@@ -37,6 +48,8 @@ pub struct Hits {
     pub written_pixels: u64,
     /// The same by pixel of the tile, if requested.
     pub by_pixel: Option<Box<PixelHits>>,
+    /// If requested, samples are listed here instead of being stored. Those that two tests share are listed twice.
+    pub covered: Option<Vec<Covered>>,
 }
 
 /// Sample events of each pixel of a tile, row by row.
@@ -48,13 +61,15 @@ pub struct PixelHits {
     pub tested: [u32; 64],
     /// Samples inside the triangle and beyond the near depth.
     pub hit: [u32; 64],
-    /// Samples that now see the triangle.
+    /// Samples with a new depth or stencil value.
     pub written: [u32; 64],
+    /// Samples with a new colour.
+    pub coloured: [u32; 64],
 }
 
 impl Default for PixelHits {
     fn default() -> Self {
-        Self { screened: [0; 64], tested: [0; 64], hit: [0; 64], written: [0; 64] }
+        Self { screened: [0; 64], tested: [0; 64], hit: [0; 64], written: [0; 64], coloured: [0; 64] }
     }
 }
 
@@ -66,7 +81,11 @@ impl Hits {
             *pixels = PixelHits::default();
             pixels
         });
-        *self = Self { written: std::mem::take(&mut self.written), by_pixel, ..Self::default() };
+        let covered = self.covered.take().map(|mut covered| {
+            covered.clear();
+            covered
+        });
+        *self = Self { written: std::mem::take(&mut self.written), by_pixel, covered, ..Self::default() };
     }
 }
 
@@ -198,6 +217,9 @@ impl SampleTest<'_, '_> {
     /// Resolve ties, apply facing and the near depth, and store the nearest hits.
     #[inline(always)]
     fn store<V: Lanes>(&mut self, base: usize, crossing: &Crossing<V>, active: Mask) {
+        if self.hits.covered.is_some() {
+            return self.list(base, crossing, active);
+        }
         let mut inside = crossing.shown(self.triangle.faces) & active;
         if inside != 0 {
             let mut depth = [0.0; LANES];
@@ -236,22 +258,54 @@ impl SampleTest<'_, '_> {
     #[cold]
     fn keep_exact(&mut self, base: usize, lane: usize) {
         let seen = exact::seen(&self.triangle.corners, &self.rows(base), lane);
-        if let Some(depth) = exact::hit(&seen, self.triangle.faces) {
+        if let Some((depth, _)) = exact::hit(&seen, self.triangle.faces) {
             self.keep(base + lane, depth);
         }
     }
 
-    #[inline(always)]
-    fn keep(&mut self, slot: usize, depth: f32) {
-        if depth <= self.near || depth.is_nan() {
-            return;
+    /// List the samples that see the triangle.
+    #[cold]
+    fn list<V: Lanes>(&mut self, base: usize, crossing: &Crossing<V>, active: Mask) {
+        let (shown, tie) = (crossing.shown(self.triangle.faces) & active, crossing.tie() & active);
+        let counter_clockwise = crossing.shown([false, true]);
+        let mut depth = [0.0; LANES];
+        crossing.depth().store(&mut depth);
+        for lane in (0..LANES).filter(|lane| (shown | tie) >> lane & 1 == 1) {
+            let found = if tie >> lane & 1 == 1 {
+                let seen = exact::seen(&self.triangle.corners, &self.rows(base), lane);
+                exact::hit(&seen, self.triangle.faces)
+            } else {
+                Some((depth[lane], counter_clockwise >> lane & 1 == 1))
+            };
+            let Some((depth, counter_clockwise)) = found.filter(|(depth, _)| self.sees(base + lane, *depth))
+            else {
+                continue;
+            };
+            let covered = Covered { slot: (base + lane) as u16, counter_clockwise, depth };
+            self.hits.covered.get_or_insert_default().push(covered);
         }
-        let pixel = 1_u64 << self.samples.pixel[slot];
+    }
+
+    /// Whether a depth is beyond the near depth; if so, the hit is counted.
+    #[inline(always)]
+    fn sees(&mut self, slot: usize, depth: f32) -> bool {
+        if depth <= self.near || depth.is_nan() {
+            return false;
+        }
         self.hits.hit += 1;
-        self.hits.read_pixels |= pixel;
+        self.hits.read_pixels |= 1 << self.samples.pixel[slot];
         if let Some(pixels) = &mut self.hits.by_pixel {
             pixels.hit[usize::from(self.samples.pixel[slot])] += 1;
         }
+        true
+    }
+
+    #[inline(always)]
+    fn keep(&mut self, slot: usize, depth: f32) {
+        if !self.sees(slot, depth) {
+            return;
+        }
+        let pixel = 1_u64 << self.samples.pixel[slot];
         let (stored, owner) = (self.target.depth[slot], self.target.triangle[slot]);
         if depth < stored || (depth == stored && self.triangle.id < owner) {
             self.target.depth[slot] = depth;

@@ -26,4 +26,4 @@ pub mod exact;
 mod kernel;
 
 pub use crate::simd::Width;
-pub use kernel::{Hits, PixelHits, SampleTest, Target, madds, test_run};
+pub use kernel::{Covered, Hits, PixelHits, SampleTest, Target, madds, test_run};

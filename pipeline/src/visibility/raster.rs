@@ -221,7 +221,7 @@ impl Worker<'_> {
         let mut written = false;
         for lane in (0..LANES).filter(|lane| tie >> lane & 1 != 0) {
             let seen = exact::seen(&triangle.corners, &self.samples.packets[packet].rows(), lane);
-            let Some(depth) = exact::hit(&seen, triangle.faces) else { continue };
+            let Some((depth, _)) = exact::hit(&seen, triangle.faces) else { continue };
             let (stored, owner) =
                 (&mut self.surface.depth[packet].0[lane], &mut self.surface.triangle[packet][lane]);
             let seen = depth > self.layout.projection.near;

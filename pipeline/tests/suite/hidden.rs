@@ -48,7 +48,7 @@ fn a_front_face_is_counter_clockwise_and_the_other_is_culled() {
     ] {
         let lifted = corners.map(|p| p * 1.5);
         for close in [&corners, &lifted] {
-            let image = stage.draw(&[Draw { cull, ..quad(&corners, close, &RED) }]);
+            let image = stage.draw(&[quad(&corners, close, &RED).culling(cull)]);
             assert!(image.iter().all(|&pixel| (pixel == RED.0) == seen), "{cull:?} {corners:?}");
         }
     }
@@ -62,7 +62,7 @@ fn a_card_that_turns_over_is_culled_for_half_the_shutter() {
     let close = open.map(|p| Vec3::new(-p.x, p.y, p.z));
     for (cull, early) in [(Cull::Back, true), (Cull::Front, false)] {
         let mut seen = [0; 2];
-        for (_, s, id, _) in stage.see(&[Draw { cull, ..quad(&open, &close, &RED) }]) {
+        for (_, s, id, _) in stage.see(&[quad(&open, &close, &RED).culling(cull)]) {
             if id < 2 {
                 assert_eq!(s.t < 0.5, early, "{cull:?} {s:?}");
                 seen[usize::from(s.t < 0.5)] += 1;

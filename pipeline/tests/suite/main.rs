@@ -27,6 +27,7 @@ mod per_sample;
 mod rounding;
 mod settings;
 mod slack;
+mod state;
 mod ties;
 mod views;
 mod visibility;

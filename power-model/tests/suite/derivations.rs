@@ -130,6 +130,7 @@ fn back(event: Event) -> Option<Interval> {
         Event::TextureFetches => [filter / 2.0, filter, filter * ALADDIN],
         Event::TextureLines => sram(16, 64.0, READ),
         Event::TextureMisses => sram(16, 64.0, WRITE),
+        Event::SamplesBlended => sum([wire(32.0, 0.5), float(4.0 * HADD + 4.0 * (2.0 * HMUL + HADD))]),
         Event::ColourWrites | Event::SamplesResolved => sum([wire(32.0, 0.5), float(4.0 * HADD)]),
         Event::PixelsResolved => [4.0 * HMUL, 4.0 * HMUL + gamma[1], 4.0 * HMUL * ALADDIN + gamma[2]],
         Event::L2Reads => sum([sram(256, 64.0, READ), wire(512.0, 2.0)]),

@@ -89,7 +89,8 @@ fn corners<'a>(draws: &'a [Draw<'a>]) -> impl Iterator<Item = (&'a Draw<'a>, [[V
 fn cut(camera: &Camera, draws: &[Draw<'_>], viewport: Viewport) -> u64 {
     let aspect = f64::from(viewport.width()) / f64::from(viewport.height());
     let space = NearSpace::new(camera, aspect, f64::from(camera.near()));
-    let nearest = |(draw, [open, close]): (&Draw<'_>, [[Vec3; 3]; 2])| space.nearest(open, close, draw.cull);
+    let nearest =
+        |(draw, [open, close]): (&Draw<'_>, [[Vec3; 3]; 2])| space.nearest(open, close, draw.state.cull);
     corners(draws).filter_map(nearest).count() as u64
 }
 

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use clap::Args;
 use output::table::{Table, digits, grouped};
 use serde::Serialize;
+use workloads::Alpha;
 use workloads::catalog;
 use workloads::job::{OptionSource, Request};
 use workloads::scene::{CameraUsed, SceneInfo, SettingsInfo};
@@ -298,7 +299,7 @@ fn meshes(info: &SceneInfo) -> String {
 }
 
 fn materials(info: &SceneInfo) -> String {
-    let mut table = Table::new(["material", "color", "texture", "sides", "light"]);
+    let mut table = Table::new(["material", "color", "texture", "sides", "light", "opacity"]);
     for material in info.materials.iter().take(MAX_ROWS) {
         let texture = material.texture.and_then(|texture| info.textures.get(texture));
         table.row([
@@ -307,6 +308,11 @@ fn materials(info: &SceneInfo) -> String {
             texture.map_or("-".to_owned(), |texture| format!("{}x{}", texture.width, texture.height)),
             if material.double_sided { "both" } else { "front" }.to_owned(),
             if material.unlit { "unlit" } else { "lit" }.to_owned(),
+            match material.alpha {
+                Alpha::Opaque => "opaque".to_owned(),
+                Alpha::CutOut { cutoff } => format!("cut out at {}", digits(f64::from(cutoff))),
+                Alpha::Blended => format!("{} blended", digits(f64::from(material.opacity))),
+            },
         ]);
     }
     more(info.materials.len(), section("materials", &table))

@@ -172,7 +172,7 @@ codes! {
     MissingMaterial = "missing-material" in Scene,
     /// A surface lacks the coordinates that its texture needs.
     MissingTexcoord = "missing-texcoord" in Scene,
-    /// A material is cut out or blended, and its alpha is not 1 throughout.
+    /// A material has an opacity in a place that is not read.
     AlphaIgnored = "alpha-ignored" in Scene,
     /// A material has a normal or bump map.
     NormalMapIgnored = "normal-map-ignored" in Scene,

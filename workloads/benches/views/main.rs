@@ -10,7 +10,7 @@ mod sweep;
 use cpu_time::ProcessTime;
 use glam::{DVec3, Vec3};
 use pipeline::sampling::SampleSpec;
-use pipeline::{Cull, Draw, Gpu, LensShape, PipelineSpec, SampleTable, Viewport};
+use pipeline::{Cull, Gpu, LensShape, PipelineSpec, SampleTable, Viewport};
 use workloads::accumulation::SharedSamples;
 use workloads::multiview::{Layout, Rig, Target};
 use workloads::soft_shadows::{AreaLight, LightSpec, Method, ShadowMap};
@@ -64,7 +64,7 @@ fn gloss(spec: &PipelineSpec) {
     let scene = glossy::default_scene(false).unwrap();
     let frame = scene.frame(0).unwrap();
     let draws: Vec<_> =
-        frame.draws(&scene).unwrap().into_iter().map(|draw| Draw { cull: Cull::None, ..draw }).collect();
+        frame.draws(&scene).unwrap().into_iter().map(|draw| draw.culling(Cull::None)).collect();
     let eye = (DVec3::new(0.3, 2.0, 3.0), DVec3::new(-0.1, -1.0, -0.8));
     let map = glossy::Map::new(&glossy::receiver(), eye, glossy::Effect::Reflection, 0.25, 128).unwrap();
     for count in [16, 64] {
@@ -83,7 +83,7 @@ fn shadows(spec: &PipelineSpec) {
     let scene = soft_shadows::default_scene().unwrap();
     let frame = scene.frame(1).unwrap();
     let draws: Vec<_> =
-        frame.draws(&scene).unwrap().into_iter().map(|draw| Draw { cull: Cull::None, ..draw }).collect();
+        frame.draws(&scene).unwrap().into_iter().map(|draw| draw.culling(Cull::None)).collect();
     let light = AreaLight::new(&LightSpec::default()).unwrap();
     let disk = SampleSpec { lens: LensShape::Disk, ..SampleSpec::default() };
     for count in [16, 64] {

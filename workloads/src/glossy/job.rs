@@ -192,7 +192,7 @@ impl DrawsScene for Glossy {
     fn draw_frame(&self, frame: &Frame, gpu: &mut Gpu<'_>) -> Result<Drawn, JobError> {
         let map = self.map(frame).map_err(refused)?;
         let draws: Vec<_> =
-            frame.draws(&self.scene)?.into_iter().map(|draw| Draw { cull: Cull::None, ..draw }).collect();
+            frame.draws(&self.scene)?.into_iter().map(|draw| draw.culling(Cull::None)).collect();
         let draws = gpu.resident(&draws);
         let samples = self.table(self.options.map_samples)?;
         let drawn = map.one_pass(&draws, &samples, self.scene.background(), gpu)?;

@@ -19,16 +19,22 @@ pub(super) fn emissive(material: &str) -> Warning {
     about_material(Code::EmissiveIgnored, "emissive material", "drawn without emitting light", material)
 }
 
-/// A material with an alpha cut-out.
-pub(super) fn cut_out(material: &str) -> Warning {
-    let what = "drawn without its cut-outs";
-    about_material(Code::AlphaIgnored, "cut-out material", what, material)
+/// A material with a map of its opacity alone.
+pub(super) fn opacity_map(material: &str) -> Warning {
+    let what = "ignored: the opacity of the material is the same everywhere";
+    about_material(Code::AlphaIgnored, "opacity map", what, material)
 }
 
-/// A material with alpha blending.
-pub(super) fn blended(material: &str) -> Warning {
-    let what = "drawn opaque: surfaces behind are hidden";
-    about_material(Code::AlphaIgnored, "blended material", what, material)
+/// A material that filters the light behind it.
+pub(super) fn filter(material: &str) -> Warning {
+    let what = "drawn without filtering the light of what is behind";
+    about_material(Code::AlphaIgnored, "transmissive material", what, material)
+}
+
+/// A material whose opacity is that of its vertices.
+pub(super) fn vertex_alpha(material: &str) -> Warning {
+    let what = "with opacities of vertices, which are ignored";
+    about_material(Code::AlphaIgnored, "material", what, material)
 }
 
 /// A texture that cannot be read, for the reason `why`.

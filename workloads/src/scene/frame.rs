@@ -9,6 +9,7 @@ use serde::Serialize;
 use super::Scene;
 use super::deform::{InstanceTransforms, Pose};
 use super::mesh::{Instance, Mesh, Normals, smooth_normals};
+use crate::material::Alpha;
 
 /// A scene during one shutter interval: everything that changes from frame to frame.
 ///
@@ -80,13 +81,27 @@ pub enum FrameError {
 }
 
 impl Frame {
-    /// Draws of the frame, one for each mesh that has triangles. `scene` has to be the
-    /// scene that made this frame.
+    /// Draws of the frame, one for each mesh that has triangles: meshes in the scene's order, then blended ones from far
+    /// to near by their middles. `scene` has to be the scene that made this frame.
     ///
     /// # Errors
     /// [`FrameError::Draw`] if the pipeline rejects a mesh.
     pub fn draws<'a>(&'a self, scene: &'a Scene) -> Result<Vec<Draw<'a>>, FrameError> {
-        self.meshes.iter().filter(|mesh| !mesh.triangles.is_empty()).map(|mesh| mesh.draw(scene)).collect()
+        self.drawn(scene).into_iter().map(|mesh| mesh.draw(scene)).collect()
+    }
+
+    /// Meshes with triangles, in the order in which they are drawn.
+    fn drawn(&self, scene: &Scene) -> Vec<&FrameMesh> {
+        let is_blended = |mesh: &&FrameMesh| {
+            scene.materials().get(mesh.material).is_some_and(|material| material.alpha == Alpha::Blended)
+        };
+        let meshes = self.meshes.iter().filter(|mesh| !mesh.triangles.is_empty());
+        let (mut blended, mut drawn): (Vec<_>, Vec<_>) = meshes.partition(is_blended);
+        let eye = 0.5 * (self.camera.open().translation + self.camera.close().translation);
+        let distance = |mesh: &FrameMesh| mesh.middle().distance_squared(eye.into());
+        blended.sort_by(|a, b| distance(b).total_cmp(&distance(a)));
+        drawn.append(&mut blended);
+        drawn
     }
 
     /// Whether the camera or any vertex moves while the shutter is open.
@@ -104,6 +119,13 @@ impl FrameMesh {
     /// Whether the mesh is still while the shutter is open.
     pub fn is_still(&self) -> bool {
         Arc::ptr_eq(&self.open, &self.close)
+    }
+
+    /// Middle of the box around the mesh at both ends of the shutter.
+    fn middle(&self) -> Vec3 {
+        let points = || self.open.iter().chain(self.close.iter()).copied();
+        let corner = |pick: fn(Vec3, Vec3) -> Vec3| points().reduce(pick).unwrap_or_default();
+        0.5 * (corner(Vec3::min) + corner(Vec3::max))
     }
 
     /// Depth of the nearest point of the mesh in `space`.
@@ -130,8 +152,8 @@ impl FrameMesh {
         if !self.colors.is_empty() {
             geometry = geometry.with_colors(&self.colors).map_err(|e| refused(e.to_string()))?;
         }
-        let cull = if scene.materials()[self.material].double_sided { Cull::None } else { Cull::Back };
-        Ok(Draw::new(geometry, shader, cull))
+        let state = scene.materials()[self.material].state();
+        Ok(Draw::new(geometry, shader, state.cull).with_state(state))
     }
 }
 

@@ -13,6 +13,7 @@ use super::camera_used::{CameraUsed, field_of_view};
 use super::frame::FrameError;
 use super::graph::movers;
 use super::settings::Settings;
+use crate::material::Alpha;
 
 /// Summary of a scene. Lengths are in scene units; bounds are those of the first requested frame, while its shutter is open.
 #[derive(Clone, Debug, Serialize)]
@@ -78,6 +79,9 @@ pub struct MaterialInfo {
     pub texture: Option<usize>,
     pub double_sided: bool,
     pub unlit: bool,
+    /// Opacity, and what it does.
+    pub opacity: f32,
+    pub alpha: Alpha,
 }
 
 /// A texture.
@@ -239,6 +243,8 @@ impl Scene {
                 texture,
                 double_sided: material.double_sided,
                 unlit: material.unlit,
+                opacity: material.opacity,
+                alpha: material.alpha,
             });
         }
         let texture = |texture: &&Arc<pipeline::Texture>| {

@@ -180,7 +180,7 @@ impl DrawsScene for SoftShadows {
 
 /// The draws of a frame without culling, and the reflectance of each.
 pub(crate) fn parts<'a>(scene: &'a Scene, frame: &'a Frame) -> Result<(Vec<Draw<'a>>, Vec<Vec3>), JobError> {
-    let draws = frame.draws(scene)?.into_iter().map(|draw| Draw { cull: Cull::None, ..draw }).collect();
+    let draws = frame.draws(scene)?.into_iter().map(|draw| draw.culling(Cull::None)).collect();
     let drawn = frame.meshes.iter().filter(|mesh| !mesh.triangles.is_empty());
     Ok((draws, drawn.map(|mesh| scene.materials()[mesh.material].base_color).collect()))
 }

@@ -149,7 +149,14 @@ pub fn set_up_all<'a>(
     (0..).zip(triangles).filter_map(move |(id, (draw, corners))| {
         let (open, close) = (draw.geometry.open(), draw.geometry.close());
         let [a, b, c] = corners.map(|v| projection.vertex(open[v as usize], close[v as usize]));
-        match set_up(id, [&a, &b, &c], draw.cull, &projection.shear, projection.near, viewport.half_px()) {
+        match set_up(
+            id,
+            [&a, &b, &c],
+            draw.state.cull,
+            &projection.shear,
+            projection.near,
+            viewport.half_px(),
+        ) {
             Outcome::Ready(triangle) => Some(triangle),
             _ => None,
         }

@@ -2,7 +2,7 @@
 
 use crate::common::{Builder, Files, expect, failure, load_glb};
 use serde_json::json;
-use workloads::load;
+use workloads::{Alpha, load};
 
 /// The error of a broken file, which must be a failure (not a mistake of usage) that names the file.
 fn broken(change: impl FnOnce(&mut Builder)) -> String {
@@ -209,7 +209,7 @@ fn a_missing_buffer_is_a_failure_and_a_missing_image_a_warning() {
 }
 
 #[test]
-fn points_are_dropped_with_a_warning_and_alpha_is_drawn_opaque_with_one() {
+fn points_are_dropped_with_a_warning_and_needless_alpha_is_opaque() {
     let mut file = Builder::triangle();
     let points = json!({"attributes": {"POSITION": 0}, "mode": 0});
     file.json["meshes"][0]["primitives"].as_array_mut().unwrap().push(points);
@@ -227,8 +227,10 @@ fn points_are_dropped_with_a_warning_and_alpha_is_drawn_opaque_with_one() {
     let scene = load_glb(&file.bytes()).unwrap();
     let warnings: Vec<_> =
         scene.warnings().iter().map(|warning| (warning.code.name(), warning.count)).collect();
-    // A mask at 0.5 keeps half-transparent texels, and an opaque blended material is drawn correctly.
-    assert_eq!(warnings, [("alpha-ignored", 1), ("alpha-ignored", 1), ("primitive-dropped", 1)]);
+    assert_eq!(warnings, [("primitive-dropped", 1)]);
+    // A mask at 0.5 keeps half-transparent texels, and a blended material of opacity 1 hides what is behind.
+    let alpha: Vec<_> = scene.materials().iter().map(|material| material.alpha).collect();
+    assert_eq!(alpha[..4], [Alpha::CutOut { cutoff: 0.75 }, Alpha::Blended, Alpha::Opaque, Alpha::Opaque]);
     assert_eq!(scene.triangle_count(), 5);
     let text = broken(|file| file.json["meshes"][0]["primitives"][0]["mode"] = json!(1));
     expect(&text, &["it has no triangles"]);

@@ -81,8 +81,7 @@ fn one_pass_accumulation_and_rays_agree() {
     for (effect, below) in [(Effect::Reflection, false), (Effect::Refraction(1.33), true)] {
         let scene = default_scene(below).unwrap();
         let frame = scene.frame(0).unwrap();
-        let draws: Vec<_> =
-            frame.draws(&scene).unwrap().into_iter().map(|d| Draw { cull: Cull::None, ..d }).collect();
+        let draws: Vec<_> = frame.draws(&scene).unwrap().into_iter().map(|d| d.culling(Cull::None)).collect();
         let world = frame.camera.open().inverse();
         let eye = (world.translation.as_dvec3(), world.matrix3.z_axis.as_dvec3());
         let map = Map::new(&receiver(), eye, effect, 0.3, 24).unwrap();

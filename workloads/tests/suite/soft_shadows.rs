@@ -184,8 +184,7 @@ fn a_floor_in_the_light_follows_the_cosine_while_it_tilts() {
 fn rays_and_a_fine_map_agree() {
     let scene = workloads::soft_shadows::default_scene().unwrap();
     let frame = scene.frame(1).unwrap();
-    let draws: Vec<_> =
-        frame.draws(&scene).unwrap().into_iter().map(|d| Draw { cull: Cull::None, ..d }).collect();
+    let draws: Vec<_> = frame.draws(&scene).unwrap().into_iter().map(|d| d.culling(Cull::None)).collect();
     let light = AreaLight::new(&LightSpec::default()).unwrap();
     let viewport = Viewport::new(48, 27).unwrap();
     let (camera, set) = (frame.camera.with_lens(None), set(16, 5));

@@ -10,7 +10,7 @@ use pipeline::depth::DepthSpec;
 use pipeline::random::mix;
 use pipeline::sample_test::{Hits, Target, test_run};
 use pipeline::sampling::{Sample, TileSamples};
-use pipeline::setup::{Outcome, set_up};
+use pipeline::setup::{Outcome, Triangle, set_up};
 use pipeline::traversal::Box5;
 use pipeline::*;
 pub use probe::{Probe, SamplePosition, repeated, sample_positions, weight};
@@ -210,15 +210,33 @@ pub fn camera(optics: impl Into<Optics>) -> Camera {
     camera.with_lens(lens.then(|| Lens::new(0.3, 6.0).unwrap()))
 }
 
-/// Triangle (`u32::MAX` for none) and depth of every sample, pixel by pixel in rows, by testing all triangles
-/// against all samples.
-pub fn brute_force(
+/// Samples of a tile of 8x8 pixels, and all triangles of a soup set up for them.
+pub struct TileOfSoup<'a> {
+    pub samples: &'a TileSamples,
+    pub origin: [u32; 2],
+    set_up: &'a dyn Fn(usize, Cull) -> Option<Triangle>,
+}
+
+impl TileOfSoup<'_> {
+    /// Tests all samples against triangle `id`, on the full path: no dimension is dropped.
+    pub fn test(&self, id: usize, cull: Cull, depth: &mut [f32], triangle: &mut [u32]) -> Vec<u16> {
+        let mut hits = Hits::default();
+        if let Some(ready) = (self.set_up)(id, cull) {
+            let mut target = Target { depth, triangle };
+            test_run(&ready, self.samples, &Box5::whole(true), 0.25, &mut target, &mut hits);
+        }
+        hits.written
+    }
+}
+
+/// Calls `each` with every tile of the image of a soup.
+pub fn every_tile(
     soup: &Soup,
-    cull: Cull,
     optics: impl Into<Optics>,
     viewport: Viewport,
     table: &SampleTable,
-) -> Vec<(u32, u32)> {
+    mut each: impl FnMut(&TileOfSoup<'_>),
+) {
     let optics = optics.into();
     let camera = camera(optics);
     let shear = if optics.lens {
@@ -234,34 +252,44 @@ pub fn brute_force(
     };
     let vertex =
         |i: u32| MovingVertex { open: image(soup.open[i as usize]), close: image(soup.close[i as usize]) };
-    let per_pixel = table.per_pixel() as usize;
-    let mut seen = vec![(u32::MAX, f32::INFINITY.to_bits()); viewport.pixels() * per_pixel];
+    let set_up = |id: usize, cull: Cull| {
+        let v = soup.triangles[id].map(vertex);
+        let half = [0.5 * viewport.width() as f32, 0.5 * viewport.height() as f32];
+        match set_up(id as u32, [&v[0], &v[1], &v[2]], cull, &shear, 0.25, half) {
+            Outcome::Ready(ready) => Some(Triangle { moving: true, ..ready }),
+            _ => None,
+        }
+    };
     let mut samples = TileSamples::default();
     for py in (0..viewport.height()).step_by(8) {
         for px in (0..viewport.width()).step_by(8) {
             samples.fill(table, viewport, &shear, [px, py], 8);
-            let mut depth = vec![f32::INFINITY; samples.len];
-            let mut triangle = vec![u32::MAX; samples.len];
-            for (id, corners) in soup.triangles.iter().enumerate() {
-                let v = corners.map(vertex);
-                let half = [0.5 * viewport.width() as f32, 0.5 * viewport.height() as f32];
-                let Outcome::Ready(mut ready) =
-                    set_up(id as u32, [&v[0], &v[1], &v[2]], cull, &shear, 0.25, half)
-                else {
-                    continue;
-                };
-                // The full path for everything: no dimension is dropped.
-                ready.moving = true;
-                let within = Box5::whole(true);
-                let mut target = Target { depth: &mut depth, triangle: &mut triangle };
-                test_run(&ready, &samples, &within, 0.25, &mut target, &mut Hits::default());
-            }
-            for slot in 0..samples.len {
-                let index = samples.in_image(slot, [px, py], 8, viewport, table.per_pixel());
-                seen[index] = (triangle[slot], depth[slot].to_bits());
-            }
+            each(&TileOfSoup { samples: &samples, origin: [px, py], set_up: &set_up });
         }
     }
+}
+
+/// Triangle (`u32::MAX` for none) and depth of every sample, pixel by pixel in rows, by testing all triangles
+/// against all samples.
+pub fn brute_force(
+    soup: &Soup,
+    cull: Cull,
+    optics: impl Into<Optics>,
+    viewport: Viewport,
+    table: &SampleTable,
+) -> Vec<(u32, u32)> {
+    let mut seen = vec![(u32::MAX, f32::INFINITY.to_bits()); viewport.pixels() * table.per_pixel() as usize];
+    every_tile(soup, optics, viewport, table, |tile| {
+        let mut depth = vec![f32::INFINITY; tile.samples.len];
+        let mut triangle = vec![u32::MAX; tile.samples.len];
+        for id in 0..soup.triangles.len() {
+            tile.test(id, cull, &mut depth, &mut triangle);
+        }
+        for slot in 0..tile.samples.len {
+            let index = tile.samples.in_image(slot, tile.origin, 8, viewport, table.per_pixel());
+            seen[index] = (triangle[slot], depth[slot].to_bits());
+        }
+    });
     seen
 }
 

@@ -287,7 +287,7 @@ impl Bench {
 
     fn draws(&self) -> Result<Vec<Draw<'_>>, StudyError> {
         let draws = self.frame.draws(&self.scene)?;
-        Ok(draws.into_iter().map(|draw| Draw { cull: Cull::None, ..draw }).collect())
+        Ok(draws.into_iter().map(|draw| draw.culling(Cull::None)).collect())
     }
 
     /// Brute force by rays through a lens.

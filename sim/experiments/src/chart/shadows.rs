@@ -292,12 +292,8 @@ impl Stage {
     }
 
     pub fn with<T>(&self, run: impl FnOnce(&Bench<'_>) -> Result<T, StudyError>) -> Result<T, StudyError> {
-        let draws: Vec<_> = self
-            .frame
-            .draws(&self.scene)?
-            .into_iter()
-            .map(|draw| Draw { cull: Cull::None, ..draw })
-            .collect();
+        let draws: Vec<_> =
+            self.frame.draws(&self.scene)?.into_iter().map(|draw| draw.culling(Cull::None)).collect();
         let albedos: Vec<_> =
             self.frame.meshes.iter().map(|mesh| self.scene.materials()[mesh.material].base_color).collect();
         let [width, height] = self.effort.size;

@@ -15,7 +15,7 @@ use super::document::{self, Document};
 use super::nodes::Tree;
 use crate::import::ignored::{self, about_material};
 use crate::import::reader;
-use crate::material::Material;
+use crate::material::{Alpha, Material};
 
 /// All materials and, last, the default one for primitives without any (glTF 2.0, 3.9.6). Textures of those that are not in use
 /// are not read.
@@ -25,15 +25,27 @@ pub(super) fn materials(document: &Document, used: &Used, warnings: &mut Vec<War
     for (index, material) in document.root.materials.iter().enumerate() {
         let name = material.name.clone().unwrap_or_else(|| format!("material {index}"));
         let surface = &material.pbr_metallic_roughness;
-        let [r, g, b, _] = surface.base_color_factor.0.map(|part| part.clamp(0.0, 1.0));
+        let [r, g, b, opacity] = surface.base_color_factor.0.map(|part| part.clamp(0.0, 1.0));
         let texture = surface.base_color_texture.as_ref().filter(|_| used.materials[index]);
         let texture = texture.and_then(|info| images.texture(info.index.value(), &name, warnings));
         let unlit = material.extensions.as_ref().is_some_and(|extensions| extensions.unlit.is_some());
         let base_color = Vec3::new(r, g, b);
-        materials.push(Material { name, base_color, texture, double_sided: material.double_sided, unlit });
+        let (alpha, double_sided) = (alpha(material), material.double_sided);
+        let made = Material { name, base_color, opacity, alpha, texture, double_sided, unlit };
+        materials.push(made.simplified());
     }
     materials.push(Material::colored("default", Vec3::ONE));
     materials
+}
+
+fn alpha(material: &Described) -> Alpha {
+    match material.alpha_mode {
+        Checked::Valid(AlphaMode::Mask) => {
+            Alpha::CutOut { cutoff: material.alpha_cutoff.as_ref().map_or(0.5, |cutoff| cutoff.0) }
+        }
+        Checked::Valid(AlphaMode::Blend) => Alpha::Blended,
+        _ => Alpha::Opaque,
+    }
 }
 
 struct Images<'d, 'a> {
@@ -129,7 +141,9 @@ pub(super) fn left_out(document: &Document, used: &Used, made: &[Material], alph
     let mut warnings = Vec::new();
     for (index, described) in root.materials.iter().enumerate().filter(|(index, _)| used.materials[*index]) {
         let name = &made[index].name;
-        warnings.extend(transparent(described, &made[index], alpha[index]));
+        if !matches!(described.alpha_mode, Checked::Valid(AlphaMode::Opaque)) && alpha[index] < 1.0 {
+            warnings.push(ignored::vertex_alpha(name));
+        }
         // Unlit materials have none of these (KHR_materials_unlit).
         if !made[index].unlit {
             warnings.extend(maps(described, name));
@@ -139,20 +153,6 @@ pub(super) fn left_out(document: &Document, used: &Used, made: &[Material], alph
     let changing = root.extensions_used.iter().filter(|name| changes_the_picture(name));
     warnings.extend(changing.map(|name| Warning::about(Code::ExtensionIgnored, "extension", what, name)));
     warnings
-}
-
-/// Warns about alpha that would change the image. Opaque texels of blended materials are drawn correctly.
-fn transparent(described: &Described, made: &Material, vertex_alpha: f32) -> Option<Warning> {
-    let texture = made.texture.as_ref().map_or(1.0, |texture| f32::from(texture.min_alpha()) / 255.0);
-    let least = described.pbr_metallic_roughness.base_color_factor.0[3] * texture * vertex_alpha;
-    match described.alpha_mode {
-        Checked::Valid(AlphaMode::Mask) => {
-            let cutoff = described.alpha_cutoff.as_ref().map_or(0.5, |cutoff| cutoff.0);
-            (least < cutoff).then(|| ignored::cut_out(&made.name))
-        }
-        Checked::Valid(AlphaMode::Blend) => (least < 1.0).then(|| ignored::blended(&made.name)),
-        _ => None,
-    }
 }
 
 fn maps(described: &Described, name: &str) -> Vec<Warning> {

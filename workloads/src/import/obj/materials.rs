@@ -12,7 +12,7 @@ use super::statements::{Statements, broken, lines};
 use crate::error::{LoadError, Source};
 use crate::import::soup::{Looks, Paint, Soup, grey, linear};
 use crate::import::{ignored, reader};
-use crate::material::Material;
+use crate::material::{Alpha, Material};
 
 /// Gives each triangle of `soup` the material that the file at `path` names for it.
 pub(super) fn dress(soup: &mut Soup, found: &Statements, path: &Path) -> Result<(), LoadError> {
@@ -103,8 +103,8 @@ impl Textures {
     fn paint(&mut self, described: &Described, folder: &Path, warnings: &mut Vec<Warning>) -> Paint {
         let name = &described.name;
         let left_out = [
-            described.cut_out.then(|| ignored::cut_out(name)),
-            (described.is_see_through() && !described.cut_out).then(|| ignored::blended(name)),
+            described.opacity_map.then(|| ignored::opacity_map(name)),
+            described.shine.filters.then(|| ignored::filter(name)),
             described.bumpy.then(|| ignored::normal_map(name)),
             described.displaced.then(|| ignored::displacement(name)),
             (described.metallic > 0.0).then(|| ignored::metallic(name)),
@@ -123,7 +123,10 @@ impl Textures {
         let plain = if texture.is_some() { Vec3::ONE } else { grey().base_color };
         let base_color = described.color.map_or(plain, linear);
         let [scale, offset] = map.map_or([Vec2::ONE, Vec2::ZERO], placed);
-        Paint { material: Material { name: name.clone(), base_color, texture, ..grey() }, scale, offset }
+        let (name, opacity) = (name.clone(), described.opacity.clamp(0.0, 1.0));
+        let alpha = if opacity < 1.0 { Alpha::Blended } else { Alpha::Opaque };
+        let material = Material { name, base_color, opacity, alpha, texture, ..grey() };
+        Paint { material, scale, offset }
     }
 
     fn texture(&mut self, map: &Map, folder: &Path) -> Result<Arc<Texture>, String> {
@@ -176,7 +179,7 @@ pub(super) struct Described {
     /// `d`, or `1 - Tr`; 1 is opaque.
     pub opacity: f32,
     /// Whether there is a `map_d`.
-    pub cut_out: bool,
+    pub opacity_map: bool,
     /// Whether there is a normal or bump map.
     pub bumpy: bool,
     /// Whether there is a displacement map.
@@ -249,7 +252,7 @@ impl Described {
             "d" => self.opacity = opacity(rest)?,
             "Tr" => self.opacity = 1.0 - opacity(rest)?,
             "map_Kd" => self.texture = Some(Map::new(rest)?),
-            "map_d" => self.cut_out = true,
+            "map_d" => self.opacity_map = true,
             "map_Ke" => self.emissive = true,
             "map_Ks" | "map_Ns" | "map_Pr" => self.shine.mapped = true,
             "map_Pm" => self.metallic = 1.0,
@@ -267,11 +270,6 @@ impl Described {
         let Shine { specular, mapped, reflects, roughness, model, .. } = self.shine;
         let has_highlight = !matches!(model, Some(0 | 1)) && specular.unwrap_or(mapped);
         has_highlight || reflects || self.metallic <= 0.0 && roughness.is_some_and(|rough| rough < 1.0)
-    }
-
-    /// Whether it is transparent.
-    pub fn is_see_through(&self) -> bool {
-        self.opacity < 1.0 || self.shine.filters
     }
 }
 
@@ -382,8 +380,8 @@ mod tests {
         assert_eq!((none.material.base_color, red.material.base_color), (grey().base_color, Vec3::X));
         assert!(wall.material.texture.is_some() && wall.material.double_sided);
         assert_eq!((wall.scale, wall.offset), (Vec2::splat(2.0), Vec2::new(0.0, -1.0)));
-        let [alpha, missing, bump] = &warnings[..] else { panic!("{warnings:#?}") };
-        assert!(alpha.starts_with("[alpha-ignored] 1 blended material"), "{alpha}");
+        assert_eq!((wall.material.alpha, wall.material.opacity), (Alpha::Blended, 0.5));
+        let [missing, bump] = &warnings[..] else { panic!("{warnings:#?}") };
         assert!(missing.contains("missing-material") && missing.contains("`gone`"), "{missing}");
         assert!(bump.contains("1 normal map ignored") && bump.contains("`red`"), "{bump}");
     }
@@ -425,7 +423,7 @@ mod tests {
         };
         assert_eq!((&found[1].texture, found[1].color), (&Some(map), Some([0.5; 3])));
         assert_eq!(
-            (found[1].bumpy, found[1].cut_out, found[1].emissive, found[1].opacity),
+            (found[1].bumpy, found[1].opacity_map, found[1].emissive, found[1].opacity),
             (true, true, false, 1.0)
         );
         assert_eq!((found[2].emissive, found[2].opacity, found[2].color), (true, 0.5, None));
@@ -435,7 +433,7 @@ mod tests {
     fn only_what_changes_the_picture_shines_or_shows_what_is_behind() {
         let of = |text: &str| {
             let found = parse(&format!("newmtl a\n{text}\n")).unwrap();
-            (found[0].shines(), found[0].is_see_through())
+            (found[0].shines(), found[0].shine.filters)
         };
         for harmless in [
             "Ks 0 0 0\nNs 500\nillum 2",

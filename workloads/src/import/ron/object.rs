@@ -12,7 +12,7 @@ use super::{Context, broken, color, vector};
 use crate::builtin::checker;
 use crate::error::LoadError;
 use crate::import::{self, Format, bare, gltf, ignored, reader, soup};
-use crate::material::Material;
+use crate::material::{Alpha, Material};
 use crate::scene::{Interpolation, Local, Mesh, Node, Parts, Spin, Target, Track, Trs, rotation};
 use crate::shapes;
 
@@ -209,8 +209,10 @@ fn make_material(
         }
         None => None,
     };
+    let (name, opacity) = (place.to_owned(), spec.opacity.unwrap_or(1.0));
+    let alpha = spec.alpha.unwrap_or(if opacity < 1.0 { Alpha::Blended } else { Alpha::Opaque });
     let (double_sided, unlit) = (spec.double_sided, spec.unlit);
-    Ok(Material { name: place.to_owned(), base_color, texture, double_sided, unlit })
+    Ok(Material { name, base_color, opacity, alpha, texture, double_sided, unlit }.simplified())
 }
 
 fn node(context: Context, place: &str, object: &ObjectSpec) -> Result<Node, LoadError> {

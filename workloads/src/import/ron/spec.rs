@@ -6,6 +6,7 @@
 use serde::Deserialize;
 
 use crate::bounded;
+use crate::material::Alpha;
 use crate::scene::{CameraSpec, InterpolationSpec};
 
 /// A scene file.
@@ -219,6 +220,11 @@ pub(super) struct MaterialSpec {
     /// Reflectance; multiplies the texture. White with a texture, else grey by default.
     #[serde(default, deserialize_with = "bounded::color")]
     pub color: Option<[f32; 3]>,
+    /// Opacity; multiplies that of the texture. 1 by default.
+    #[serde(default, deserialize_with = "bounded::share")]
+    pub opacity: Option<f32>,
+    /// What the opacity does. By default surfaces with an opacity below 1 are blended.
+    pub alpha: Option<Alpha>,
     /// Colour texture; the object needs texture coordinates.
     pub texture: Option<TextureSpec>,
     /// Whether back faces are drawn; so by default.

@@ -3,7 +3,7 @@
 use activity::{Counts, Event};
 use glam::Vec3;
 use pipeline::depth::{DepthBound, DepthSpec};
-use pipeline::{Cull, Draw, Features, PipelineSpec, RasterPass, Rendered, Settings, Target};
+use pipeline::{Cull, Features, PipelineSpec, RasterPass, Rendered, Settings, Target};
 use rayon::prelude::*;
 use workloads::stress::{Size, StressScene, brute_force};
 use workloads::visibility::Unshaded;
@@ -43,7 +43,7 @@ impl Compared {
     fn of(scene: &StressScene, spec: &PipelineSpec) -> Result<Self, RunError> {
         let mut all = Self::default();
         for cull in [Cull::None, Cull::Back] {
-            let draws = [Draw { cull, ..scene.draw(&Unshaded).map_err(RunError::setting)? }];
+            let draws = [scene.draw(&Unshaded).map_err(RunError::setting)?.culling(cull)];
             let truth = brute_force(&scene.camera, &draws, scene.viewport, &scene.samples);
             let settings =
                 Settings { spec, viewport: scene.viewport, samples: &scene.samples, background: Vec3::ZERO };

@@ -1,0 +1,159 @@
+//! Fragments: covered samples of passes whose result depends on the order of triangles. Each is tested, shaded and stored
+//! before the next triangle; other passes store the nearest triangle and shade what is visible in the end.
+
+use glam::Vec4;
+
+use super::Shading;
+use super::pass::Pass;
+use super::resolve::ByCell;
+use super::surface::{Grid, SampleView, Surface};
+use crate::depth::DepthTile;
+use crate::sample_test::{Covered, Hits};
+use crate::sampling::TileSamples;
+use crate::setup::Triangle;
+use crate::shader::Lane;
+use crate::state::DrawState;
+
+/// What became of the covered samples of a triangle in a tile, besides their depths.
+#[derive(Default)]
+pub(super) struct Fragments {
+    /// Slots of samples that were shaded.
+    pub shaded: Vec<u16>,
+    /// Samples with a new stencil value and the depth of before.
+    pub stencils: u32,
+    /// Samples with a new colour.
+    pub coloured: u32,
+    /// Pixels of these.
+    pub coloured_pixels: u64,
+}
+
+impl Fragments {
+    fn clear(&mut self) {
+        self.shaded.clear();
+        *self = Self { shaded: std::mem::take(&mut self.shaded), ..Self::default() };
+    }
+
+    /// The nearest samples in `hits`, which were stored by the sample test, get the colour of their triangle.
+    pub fn nearest(&mut self, hits: &mut Hits) {
+        self.clear();
+        self.shaded.extend_from_slice(&hits.written);
+        (self.coloured, self.coloured_pixels) = (hits.written.len() as u32, hits.written_pixels);
+        if let Some(pixels) = &mut hits.by_pixel {
+            pixels.coloured = pixels.written;
+        }
+    }
+}
+
+/// A triangle and a tile whose covered samples are stored.
+pub(super) struct FragmentTests<'a> {
+    pass: &'a Pass<'a>,
+    triangle: &'a Triangle,
+    state: &'a DrawState,
+    may_discard: bool,
+    samples: &'a TileSamples,
+    /// First pixel of the tile.
+    origin: [u32; 2],
+    surface: Surface<'a>,
+    grid: Grid<'a>,
+    /// Colours of cells shaded so far, without one where the shader discards.
+    shaded: ByCell<Option<Vec4>>,
+}
+
+impl<'a> FragmentTests<'a> {
+    pub fn new(
+        pass: &'a Pass<'a>,
+        triangle: &'a Triangle,
+        samples: &'a TileSamples,
+        origin: [u32; 2],
+    ) -> Self {
+        let draw = &pass.draws[pass.locate(triangle.id).0];
+        Self {
+            pass,
+            triangle,
+            state: &draw.state,
+            may_discard: draw.shader.may_discard(),
+            samples,
+            origin,
+            surface: Surface::new(pass, triangle.id),
+            grid: Grid::new(pass, &triangle.corners, triangle.moving),
+            shaded: ByCell::default(),
+        }
+    }
+
+    /// Tests and stores the covered samples in `hits`.
+    pub fn store(&mut self, tile: &mut DepthTile, hits: &mut Hits, fragments: &mut Fragments) {
+        fragments.clear();
+        let Some(mut covered) = hits.covered.take() else { return };
+        // A sample at the time where two pieces of the shutter meet is in both.
+        covered.sort_unstable_by_key(|sample| sample.slot);
+        covered.dedup_by_key(|sample| sample.slot);
+        for sample in &covered {
+            self.sample(sample, tile, hits, fragments);
+        }
+        hits.covered = Some(covered);
+    }
+
+    fn sample(&mut self, sample: &Covered, tile: &mut DepthTile, hits: &mut Hits, fragments: &mut Fragments) {
+        let slot = usize::from(sample.slot);
+        let stencil = tile.stencil.get(slot).copied().unwrap_or(0);
+        let depths = [sample.depth, tile.depth[slot]];
+        let outcome = self.state.test(sample.counter_clockwise, depths, stencil);
+        let writes_depth = outcome.passes && self.state.depth.write;
+        let writes_colour = outcome.passes && self.writes_colour();
+        let writes_stencil = outcome.stencil != stencil;
+        if !(writes_depth || writes_colour || writes_stencil) {
+            return;
+        }
+        let mut colour = Vec4::ZERO;
+        if writes_colour || self.may_discard {
+            fragments.shaded.push(sample.slot);
+            let Some(shaded) = self.shade(slot) else { return };
+            colour = shaded;
+        }
+        let pixel = usize::from(self.samples.pixel[slot]);
+        if writes_depth {
+            tile.depth[slot] = sample.depth;
+            hits.written.push(sample.slot);
+        }
+        if writes_stencil {
+            tile.stencil[slot] = outcome.stencil;
+            fragments.stencils += u32::from(!writes_depth);
+        }
+        if writes_colour {
+            tile.colour[slot] = self.state.colour(colour, tile.colour[slot]);
+            fragments.coloured += 1;
+            fragments.coloured_pixels |= 1 << pixel;
+        }
+        if writes_depth || writes_colour {
+            tile.triangle[slot] = self.triangle.id;
+        }
+        if writes_depth || writes_stencil {
+            hits.written_pixels |= 1 << pixel;
+        }
+        if let Some(pixels) = &mut hits.by_pixel {
+            pixels.written[pixel] += u32::from(writes_depth || writes_stencil);
+            pixels.coloured[pixel] += u32::from(writes_colour);
+        }
+    }
+
+    fn writes_colour(&self) -> bool {
+        !self.pass.is_depth_only() && self.state.writes_colour()
+    }
+
+    /// Colour of the sample in `slot`, or `None` if the shader discards it.
+    fn shade(&mut self, slot: usize) -> Option<Vec4> {
+        let spec = self.pass.settings.spec;
+        let lane = Lane::default();
+        let kept = |lane: &Lane, colour| (!self.may_discard || !lane.is_discarded()).then_some(colour);
+        match spec.shading {
+            Shading::PerSample => {
+                let view = SampleView::of_slot(&self.triangle.corners, self.samples, slot);
+                kept(&lane, self.surface.shade_at(&lane, &view))
+            }
+            Shading::Cached => {
+                let cell = self.grid.cell(self.samples, slot, self.origin, spec.tile_px);
+                *self.shaded.entry(cell).or_insert_with(|| kept(&lane, self.surface.shade(&lane, cell)))
+            }
+        }
+    }
+}
