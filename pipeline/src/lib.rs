@@ -61,8 +61,8 @@ pub mod traversal;
 pub mod visibility;
 
 pub use frame::{
-    Draw, Features, FrameReport, Gpu, PassError, PassReport, PipelineSpec, RasterPass, Rendered, Settings,
-    Shading, Target,
+    Client, Draw, Features, FrameReport, Gpu, PassError, PassReport, PipelineSpec, RasterPass, Rendered,
+    Settings, Shading, Target, TileWork, Touch, TriangleStream,
 };
 pub use geometry::{
     Camera, CameraError, Clip, Cull, DrawError, Geometry, Lens, MovingVertex, Shear, Viewport,

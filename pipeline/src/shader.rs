@@ -62,6 +62,31 @@ pub trait Operand: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output =
     fn smaller(self, other: Self) -> Self;
 }
 
+/// A value of three components.
+pub trait Vector: Operand {
+    /// One component.
+    type Part: Operand;
+    /// `self . other`.
+    fn inner(self, other: Self) -> Self::Part;
+    /// Divided by its length; zero for zero.
+    fn unit(self) -> Self;
+}
+
+macro_rules! vectors {
+    ($($value:ty: $part:ty),*) => {
+        $(impl Vector for $value {
+            type Part = $part;
+            fn inner(self, other: Self) -> $part {
+                self.dot(other)
+            }
+            fn unit(self) -> Self {
+                self.normalize_or_zero()
+            }
+        })*
+    };
+}
+vectors!(Vec3: f32, DVec3: f64);
+
 macro_rules! operands {
     ($($value:ty: $components:literal),*) => {
         $(impl Operand for $value {
@@ -166,9 +191,16 @@ impl Lane {
 
     /// `a . b`: three multiply-adds.
     #[inline(always)]
-    pub fn dot(&self, a: Vec3, b: Vec3) -> f32 {
+    pub fn dot<T: Vector>(&self, a: T, b: T) -> T::Part {
         self.count(3);
-        a.dot(b)
+        a.inner(b)
+    }
+
+    /// `a / b`: a reciprocal and a product.
+    #[inline(always)]
+    pub fn div(&self, a: f64, b: f64) -> f64 {
+        self.count(2);
+        a / b
     }
 
     /// `1 / a`.
@@ -199,10 +231,11 @@ impl Lane {
         libm::exp2f(a)
     }
 
-    /// `a` divided by its length: a dot product, a reciprocal square root in two operations and the products.
+    /// `a` divided by its length, zero for zero: a dot product, a square root, a reciprocal and the products.
     #[inline(always)]
-    pub fn normalize(&self, a: Vec3) -> Vec3 {
-        self.scale(a, self.recip(self.sqrt(self.dot(a, a))))
+    pub fn normalize<T: Vector>(&self, a: T) -> T {
+        self.count(8);
+        a.unit()
     }
 
     /// `point` moved by `pose`: nine multiply-adds.

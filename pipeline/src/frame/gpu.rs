@@ -189,21 +189,25 @@ impl<'e> Gpu<'e> {
         self.space.take(bytes)
     }
 
-    /// Starts a pass whose packets come from the caller, and returns its number.
-    pub fn begin(&mut self, name: &str) -> u32 {
+    /// Starts a pass whose packets are made outside of rasterization.
+    pub(super) fn open(&mut self, name: &str) {
         let (name, draws, others) = (name.to_owned(), Vec::new(), Counts::default());
         self.passes.push(PassReport { name, triangles: 0, draws, others });
         self.last_batch = 0;
-        self.last_pass()
+    }
+
+    /// Triangles of the last pass so far.
+    pub(super) fn triangles_of_pass(&self) -> usize {
+        self.passes.last().map_or(0, |pass| pass.triangles)
     }
 
     /// Caches, for the packets of a pass that was begun.
-    pub fn memory(&mut self) -> &mut MemorySystem {
+    pub(super) fn memory(&mut self) -> &mut MemorySystem {
         &mut self.memory
     }
 
     /// Emits a packet of a pass that was begun, which sets up `triangles`, with the lines requested since the one before.
-    pub fn push(&mut self, packet: &Packet, triangles: usize) {
+    pub(super) fn push(&mut self, packet: &Packet, triangles: usize) {
         if let Some(report) = self.passes.last_mut() {
             report.triangles += triangles;
             report.add(packet);
@@ -213,7 +217,7 @@ impl<'e> Gpu<'e> {
         self.memory.clear_log();
     }
 
-    /// Marks a surface as a result of the pass that was begun.
+    /// Marks a surface as a result of the last pass.
     pub fn keep(&mut self, surface: Surface) {
         self.results.push(surface);
         self.pending.push(surface);
@@ -288,7 +292,7 @@ impl<'e> Gpu<'e> {
     }
 
     /// Number of the last pass; 0 before the first.
-    fn last_pass(&self) -> u32 {
+    pub(super) fn last_pass(&self) -> u32 {
         self.passes.len().saturating_sub(1) as u32
     }
 

@@ -10,6 +10,7 @@ mod resolve;
 mod settings;
 mod surface;
 mod test_selection;
+mod tile_pass;
 mod tile_tests;
 mod vertices;
 mod worker;
@@ -27,6 +28,7 @@ use pass::Pass;
 pub use pass::{Draw, RasterPass, Resident, Target};
 use replay::Replay;
 pub use settings::{Features, PipelineSpec, Settings, Shading, SpecError};
+pub use tile_pass::{Client, TileWork, Touch, TriangleStream};
 use worker::Worker;
 
 /// A unit of finished work, in the order of the modelled hardware.

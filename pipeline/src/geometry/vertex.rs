@@ -206,7 +206,7 @@ impl Projection {
     }
 
     /// Operations of moving one vertex to the image plane at one end of the shutter.
-    pub(crate) fn vertex_ops(&self) -> u32 {
+    pub fn vertex_ops(&self) -> u32 {
         let lane = Lane::default();
         self.image_on(&lane, &self.open, Vec3::ZERO);
         lane.ops()

@@ -31,7 +31,10 @@ pub enum Pattern {
         #[serde(deserialize_with = "points")]
         points: u32,
     },
-    /// The same with a given set: `(u, v, t)` on the lens and in time, used unchanged.
+    /// The standard positions of multisample antialiasing with 1, 2, 4, 8 or 16 samples, the same in every pixel, at the
+    /// centre of the lens and in the middle of the shutter (Direct3D 11 Functional Specification 3.0, section 19.2.4).
+    Multisample,
+    /// The same as [`Pattern::Interleaved`] with a given set: `(u, v, t)` on the lens and in time, used unchanged.
     Given {
         /// Lens coordinates from -1 to 1, time from 0 to below 1.
         #[serde(deserialize_with = "given")]
@@ -75,7 +78,12 @@ impl Pattern {
 
     /// Whether `u, v` are lens positions rather than points of the unit square.
     pub(super) fn is_on_lens(&self) -> bool {
-        matches!(self, Self::Given { .. })
+        matches!(self, Self::Given { .. } | Self::Multisample)
+    }
+
+    /// Whether there is a pattern of so many samples.
+    pub(super) fn has(&self, per_pixel: u32) -> bool {
+        *self != Self::Multisample || !multisample(per_pixel).is_empty()
     }
 
     /// Whether the points are valid in number and range.
@@ -97,6 +105,7 @@ impl Pattern {
         if matches!(self, Self::Jittered) {
             return jittered(seed, pixel, into);
         }
+        let fixed = multisample(into.len() as u32);
         for (sample, index) in into.iter_mut().zip(0_u32..) {
             let scrambled =
                 |dim| fraction(owen(sobol(index, dim), word(seed, pixel.into(), dim as u64) as u32));
@@ -116,8 +125,41 @@ impl Pattern {
                     let (u, v, t) = points[in_set(points.len()) as usize];
                     Sample { u, v, t, ..here }
                 }
+                Self::Multisample => {
+                    let [x, y] = fixed[index as usize].map(|sixteenths| 0.5 + f32::from(sixteenths) / 16.0);
+                    Sample { x, y, t: 0.5, ..Sample::default() }
+                }
             };
         }
+    }
+}
+
+/// Standard positions of this many samples in sixteenths of a pixel from its centre, `y` downwards; empty for other numbers.
+fn multisample(count: u32) -> &'static [[i8; 2]] {
+    match count {
+        1 => &[[0, 0]],
+        2 => &[[4, 4], [-4, -4]],
+        4 => &[[-2, -6], [6, -2], [-6, 2], [2, 6]],
+        8 => &[[1, -3], [-1, 3], [5, 1], [-3, -5], [-5, 5], [-7, -1], [3, 7], [7, -7]],
+        16 => &[
+            [1, 1],
+            [-1, -3],
+            [-3, 2],
+            [4, -1],
+            [-5, -2],
+            [2, 5],
+            [5, 3],
+            [3, -5],
+            [-2, 6],
+            [0, -7],
+            [-4, -6],
+            [-6, 4],
+            [-8, 0],
+            [7, -4],
+            [6, 7],
+            [-7, -8],
+        ],
+        _ => &[],
     }
 }
 

@@ -49,11 +49,14 @@ pub enum TableError {
     /// A fixed set of points is invalid.
     #[error("a fixed set has 1 to 65536 points, u and v within -1 and 1, t from 0 to below 1")]
     Points,
+    /// There is no multisample pattern with this number of samples.
+    #[error("{0} samples per pixel; multisample patterns have 1, 2, 4, 8 or 16")]
+    Multisample(u32),
     /// The number of iris blades is out of range.
     #[error("{0} blades; an iris has 3 to 64")]
     Blades(u32),
     /// Given points are lens positions, which cannot be divided among regions.
-    #[error("given points are lens samples as they are: leave `regions` out")]
+    #[error("given points and multisample patterns are lens samples as they are: leave `regions` out")]
     GivenRegions,
 }
 
@@ -87,6 +90,9 @@ impl SampleTable {
         }
         if !spec.pattern.is_sane() {
             return Err(TableError::Points);
+        }
+        if !spec.pattern.has(per_pixel) {
+            return Err(TableError::Multisample(per_pixel));
         }
         if let LensShape::Polygon { blades, .. } = spec.lens
             && !LensShape::BLADES.contains(&blades)
@@ -220,12 +226,13 @@ pub struct SampleSpec {
 }
 
 /// Named tables with a description each.
-const NAMED: [(&str, &str); 5] = [
+const NAMED: [(&str, &str); 6] = [
     ("owen", "Sobol points, Owen scrambled by pixel; the default"),
     ("sobol", "Sobol points as they are, the same in every pixel"),
     ("random", "independent uniform numbers"),
     ("jittered", "a random point in each cell of pixel, lens and shutter"),
     ("interleaved", "64 places on lens and in time, shared by all pixels"),
+    ("msaa", "standard positions of 1, 2, 4, 8 or 16 samples, without lens and shutter"),
 ];
 
 impl SampleSpec {
@@ -242,6 +249,7 @@ impl SampleSpec {
             "random" => Pattern::Random,
             "jittered" => Pattern::Jittered,
             "interleaved" => Pattern::Interleaved { points: 64 },
+            "msaa" => Pattern::Multisample,
             _ => return None,
         };
         Some(Self { pattern, ..Self::default() })
@@ -272,6 +280,23 @@ mod tests {
         let mut strata: Vec<_> = table.pixel(17, 5).iter().map(|s| (s.t * 16.0) as u32).collect();
         strata.sort_unstable();
         assert_eq!(strata, (0..16).collect::<Vec<_>>());
+    }
+
+    /// Each row and each column of sixteenths holds one sample at most, so edges near an axis are resolved evenly.
+    #[test]
+    fn multisample_positions_share_no_row_and_no_column() {
+        for per_pixel in [1, 2, 4, 8, 16] {
+            let table = SampleTable::new(&SampleSpec::named("msaa").unwrap(), per_pixel, 1).unwrap();
+            assert_eq!(table.pixel(3, 70), table.pixel(0, 0));
+            let samples = table.pixel(0, 0);
+            for axis in [|s: &Sample| s.x, |s: &Sample| s.y] {
+                let mut places: Vec<_> = samples.iter().map(|s| (axis(s) * 16.0) as u32).collect();
+                places.sort_unstable();
+                places.dedup();
+                assert_eq!(places.len(), per_pixel as usize);
+            }
+            assert!(samples.iter().all(|s| [s.u, s.v, s.t] == [0.0, 0.0, 0.5]));
+        }
     }
 
     #[test]
@@ -335,9 +360,11 @@ mod tests {
     #[test]
     fn every_name_makes_a_table() {
         for (name, _) in SampleSpec::names() {
-            let table = SampleTable::new(&SampleSpec::named(name).unwrap(), 6, 1).unwrap();
-            assert_eq!(table.per_pixel(), 6, "{name}");
+            let table = SampleTable::new(&SampleSpec::named(name).unwrap(), 8, 1).unwrap();
+            assert_eq!(table.per_pixel(), 8, "{name}");
         }
+        let msaa = SampleSpec::named("msaa").unwrap();
+        assert_eq!(SampleTable::new(&msaa, 6, 1).unwrap_err(), TableError::Multisample(6));
         assert_eq!(SampleSpec::named("owen"), Some(SampleSpec::default()));
         assert_eq!(SampleSpec::named("sobel"), None);
     }

@@ -149,3 +149,37 @@ fn threads_change_nothing() {
     let (one, three) = (with(1), with(3));
     assert_eq!((one.images, one.counts), (three.images, three.counts));
 }
+
+/// Multisample antialiasing: coverage and depth by sample, one shade per pixel and triangle, or per sample on request.
+#[test]
+fn multisampling_shades_once_per_pixel() {
+    let viewport = Viewport::new(SIDE, SIDE).unwrap();
+    let (left, whole) = (rectangle([-40.0, 0.24], [-40.0, 40.0], 1.0), all(2.0));
+    let (red, blue) = (Flat(Vec3::X), Flat(Vec3::Z));
+    let draws = [quad(&whole, &whole, &blue), quad(&left, &left, &red)];
+    let render = |shading, per_pixel| {
+        let table = SampleTable::new(&SampleSpec::named("msaa").unwrap(), per_pixel, 1).unwrap();
+        let spec = PipelineSpec { shading, ..spec(Features::ALL) };
+        let settings = Settings { spec: &spec, viewport, samples: &table, background: Vec3::ZERO };
+        RasterPass::new(&pixel_camera(viewport, 0.25), &draws, &settings).render(|_, _| ()).unwrap()
+    };
+    let quads = |shading, per_pixel| render(shading, per_pixel).counts[Event::QuadsShaded];
+    // The edge is a quarter into its column: samples more than 4 sixteenths left of the centre are covered.
+    for (per_pixel, covered) in [(1, 0), (2, 0), (4, 1), (8, 2), (16, 4)] {
+        let drawn = render(Shading::Cached, per_pixel);
+        let red = covered as f32 / per_pixel as f32;
+        for (i, &pixel) in (0..).zip(&drawn.images[0]) {
+            let expected = match i % SIDE {
+                0..8 => Vec3::X,
+                8 => Vec3::new(red, 0.0, 1.0 - red),
+                _ => Vec3::Z,
+            };
+            assert_eq!(pixel, expected, "{per_pixel} samples, pixel {i}");
+        }
+        if covered > 0 {
+            assert_eq!(quads(Shading::Cached, per_pixel), quads(Shading::Cached, 4));
+        }
+        let by_sample = quads(Shading::PerSample, per_pixel) as f64 / quads(Shading::PerSample, 1) as f64;
+        assert!((0.9..1.1).contains(&(by_sample / f64::from(per_pixel))), "{by_sample}");
+    }
+}

@@ -73,6 +73,22 @@ fn crates_use_only_allowed_crates() {
     assert_eq!(found, known, "a new crate needs its place in the arrows");
 }
 
+/// Every counted event comes from the pipeline: workloads, runs and experiments say what their code did, and make no packets.
+#[test]
+fn packets_are_built_in_the_pipeline_alone() {
+    let made = ["Packet::new", "PacketCounts", "PacketKind"];
+    let above = ["workloads/src", "sim/run/src", "sim/experiments/src", "sim/src"];
+    let files: Vec<PathBuf> = above.iter().flat_map(|folder| rust_files(&root().join(folder))).collect();
+    assert!(files.len() > 200, "{} files", files.len());
+    let found = files.iter().filter(|file| {
+        let text = fs::read_to_string(file).expect("a source file");
+        let code = text.split("#[cfg(test)]").next().unwrap_or_default();
+        made.iter().any(|name| code.contains(name))
+    });
+    let found: Vec<_> = found.collect();
+    assert!(found.is_empty(), "{found:?}");
+}
+
 #[test]
 fn documented_dependencies_exist() {
     let arrows = arrows();

@@ -1,8 +1,7 @@
 //! The job `quintile run caustics`.
 
-use activity::{Event, PacketCounts};
 use glam::{DVec3, Vec3};
-use pipeline::Gpu;
+use pipeline::{Client, Gpu, TileWork, Touch, TriangleStream};
 use serde::{Deserialize, Serialize};
 
 use super::check::{accuracy_warnings, crossing};
@@ -10,10 +9,7 @@ use super::draw::{Covered, draw_with_work};
 use super::generator::Ocean;
 use super::{Beam, Eye, Floor, Light, Method, Picture};
 use crate::error::LoadError;
-use crate::job::{
-    Drawn, Draws, Fact, Flag, Flags, FrontEnd, Job, JobError, OptionSource, PIXEL_BYTES, Passes, Request,
-    TileWork, Touch,
-};
+use crate::job::{Drawn, Draws, Fact, Flag, Flags, Job, JobError, OptionSource, Request};
 use crate::scene::Settings;
 
 /// View of the light.
@@ -117,9 +113,12 @@ pub fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<dyn Job>
     Ok(Box::new(Caustics { options, ocean, settings }))
 }
 
-/// Bytes of a vertex at both ends of a beam, operations of the vertex shader that refracts the light and
-/// follows it to the floor, and multiply-adds of the set-up of a moving triangle.
-const FRONT_END: FrontEnd = FrontEnd { vertex_bytes: 24, vertex_ops: 70, setup_madds: 60 };
+/// Bytes of a vertex at both ends of a beam.
+const VERTEX_BYTES: u32 = 24;
+/// Operations of the vertex shader that refracts the light and follows it to the floor.
+const VERTEX_OPS: u32 = 70;
+/// Multiply-adds of the set-up of a moving triangle.
+const SETUP_MADDS: u32 = 60;
 /// Multiply-adds of a conservative tile test: four sides at both times, three edges at eight corners, and
 /// planes of depth.
 const TILE_MADDS: u32 = 180;
@@ -127,6 +126,8 @@ const TILE_MADDS: u32 = 180;
 const TIME_MADDS: u32 = 60;
 /// Bytes per pixel of the buffer that accumulates light.
 const LIGHT_BYTES: u64 = 4;
+/// Bytes per pixel of the image.
+const PIXEL_BYTES: u64 = 4;
 /// Pixels of a tile.
 const TILE_PIXELS: u64 = 64;
 
@@ -147,7 +148,7 @@ impl Draws for Caustics {
         let eye = self.eye().ok_or_else(|| JobError::Setting("the view has no extent".to_owned()))?;
         let method = self.options.method;
         let (picture, work) = draw_with_work(&beams, &eye, method, Some(self.light()), true);
-        self.emit_packets(&beams, &eye, &work, &mut Passes::new(gpu));
+        self.charge(&beams, &eye, &work, gpu);
         Ok(Drawn {
             image: toned(&picture.light),
             moving: method == Method::Moving,
@@ -183,43 +184,47 @@ impl Caustics {
         Eye::new([middle + distance * toward, middle, up], needed[1].max(needed[0] / aspect), size)
     }
 
-    /// Emits the work as packets: one draw of all beams, and each tile of each beam.
-    fn emit_packets(&self, beams: &[Beam], eye: &Eye, work: &[Covered], passes: &mut Passes<'_, '_>) {
+    /// Adds the work to the frame: one draw of all beams, and each tile of each beam.
+    fn charge(&self, beams: &[Beam], eye: &Eye, work: &[Covered], gpu: &mut Gpu<'_>) {
         let triangles = beams.len() * self.options.method.triangles();
         let pixels = eye.viewport().pixels() as u64;
         let tiles =
             u64::from(eye.viewport().width().div_ceil(8)) * u64::from(eye.viewport().height().div_ceil(8));
-        passes.begin("light");
-        let light = passes.surface(tiles * TILE_PIXELS * LIGHT_BYTES);
-        let vertices = passes.surface(3 * triangles as u64 * u64::from(FRONT_END.vertex_bytes));
-        passes.draw(triangles, vertices.address(), &FRONT_END);
+        let light = gpu.surface(tiles * TILE_PIXELS * LIGHT_BYTES);
+        let vertices = gpu.surface(3 * triangles as u64 * u64::from(VERTEX_BYTES));
+        let stream = TriangleStream {
+            vertices,
+            vertex_bytes: VERTEX_BYTES,
+            vertex_ops: VERTEX_OPS,
+            setup_madds: SETUP_MADDS,
+        };
+        gpu.begin("light");
+        gpu.draw_stream(triangles, &stream);
         let mut used = vec![false; tiles as usize];
         for covered in work {
             let runs = covered.pixels.count_ones();
-            let mut counts = PacketCounts::default();
-            counts[Event::TilesVisited] = 1;
-            counts[Event::TileMadds] = TILE_MADDS;
             // The pixel centre is its only sample, tested at all times at once.
-            counts[Event::SamplesTested] = runs;
-            counts[Event::SamplesHit] = runs;
-            counts[Event::SampleMadds] = TIME_MADDS * runs;
-            counts[Event::PixelInvocations] = runs;
-            counts[Event::ShaderOps] = runs * self.light().ops();
-            counts[Event::ColourWrites] = runs;
+            let work = TileWork {
+                tile: covered.tile,
+                triangle: Some(covered.beam),
+                tiles: 1,
+                tile_madds: TILE_MADDS,
+                samples: runs,
+                sample_madds: TIME_MADDS * runs,
+                hits: runs,
+                lanes: runs,
+                shader_ops: runs * self.light().ops(),
+                colours: runs,
+                ..TileWork::default()
+            };
             let fresh = !std::mem::replace(&mut used[covered.tile as usize], true);
             let bytes = TILE_PIXELS * LIGHT_BYTES;
-            let touch = Touch {
-                address: light.address() + u64::from(covered.tile) * bytes,
-                bytes,
-                write: true,
-                fresh,
-            };
-            let tile = TileWork { tile: covered.tile, triangle: covered.beam, counts };
-            passes.tile(&tile, &[], &[touch]);
+            let address = light.address() + u64::from(covered.tile) * bytes;
+            gpu.tile(&work, [Touch { client: Client::Colour, address, bytes, write: true, fresh }]);
         }
-        passes.begin("tone");
-        let image = passes.surface(pixels * PIXEL_BYTES);
-        passes.resolve(image, TILE_PIXELS as u32);
+        let image = gpu.surface(pixels * PIXEL_BYTES);
+        gpu.begin("tone");
+        gpu.write_image(image, TILE_PIXELS as u32);
     }
 }
 
@@ -250,7 +255,7 @@ const TINT: Vec3 = Vec3::new(0.55, 0.9, 1.0);
 
 #[cfg(test)]
 mod tests {
-    use activity::Counts;
+    use activity::{Counts, Event};
 
     use super::*;
     use crate::job::testing::hardware;

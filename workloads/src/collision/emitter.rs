@@ -1,19 +1,22 @@
 //! Emitter of the passes of collision detection, as packets of work and as an image.
 
-use activity::{Event, PacketCounts};
 use glam::Vec3;
-use pipeline::Gpu;
 use pipeline::memory::Surface;
+use pipeline::{Client, Gpu, TileWork, Touch, TriangleStream};
 
 use super::bounds::Bounds;
 use super::object::Object;
 use super::pass::{Fragment, Observer, Part, Pass};
 use super::{Method, Search};
-use crate::job::{FrontEnd, PIXEL_BYTES, Passes, TileWork, Touch};
 
-/// Bytes of a vertex at both times, operations of its transformation, and multiply-adds of the set-up of a
-/// triangle with moving conservative edges.
-const FRONT_END: FrontEnd = FrontEnd { vertex_bytes: 24, vertex_ops: 24, setup_madds: 77 };
+/// Bytes of a vertex at both times.
+const VERTEX_BYTES: u32 = 24;
+/// Operations of its transformation.
+const VERTEX_OPS: u32 = 24;
+/// Multiply-adds of the set-up of a triangle with moving conservative edges.
+const SETUP_MADDS: u32 = 77;
+/// Bytes of a pixel of the image.
+const PIXEL_BYTES: u64 = 4;
 /// Multiply-adds of the conservative test of a triangle in a tile: three edges by four corners at both times,
 /// and the depths.
 const TEST_MADDS: u32 = 3 * 4 * 2 * 2 + 18;
@@ -37,9 +40,9 @@ fn targets(method: Method, boxes: [Surface; 2]) -> [Target; 2] {
 
 /// Observer that emits packets and draws the image.
 pub(super) struct PacketEmitter<'a, 'e> {
-    passes: Passes<'a, 'e>,
+    gpu: &'a mut Gpu<'e>,
     tile_px: u32,
-    vertices: Surface,
+    stream: TriangleStream,
     picture: Picture,
     side: usize,
     bins: u32,
@@ -72,21 +75,27 @@ impl<'a, 'e> PacketEmitter<'a, 'e> {
         let side = search.resolution as usize;
         let tile_px = gpu.spec().tile_px;
         let most = objects.iter().map(Object::len).max().unwrap_or(0) as u64;
-        let mut passes = Passes::new(gpu);
-        let vertices = passes.surface(3 * most * u64::from(FRONT_END.vertex_bytes));
+        let vertices = gpu.surface(3 * most * u64::from(VERTEX_BYTES));
+        let stream = TriangleStream {
+            vertices,
+            vertex_bytes: VERTEX_BYTES,
+            vertex_ops: VERTEX_OPS,
+            setup_madds: SETUP_MADDS,
+        };
         let pixels = u64::from(search.resolution.next_multiple_of(tile_px)).pow(2);
-        let boxes = [(); 2].map(|()| passes.surface(pixels * u64::from(search.bins) * BOX_BYTES));
+        let boxes = [(); 2].map(|()| gpu.surface(pixels * u64::from(search.bins) * BOX_BYTES));
         let (picture, targets) = (Picture::new(objects, side), targets(search.method, boxes));
         let (bins, fragments, pending) = (search.bins, 0, None);
-        Self { passes, tile_px, vertices, picture, side, bins, targets, fragments, pending }
+        Self { gpu, tile_px, stream, picture, side, bins, targets, fragments, pending }
     }
 
     /// Emits the writes of the image and returns the totals.
     pub fn finish(mut self) -> Emitted {
         self.flush();
         let image = self.picture.image();
-        let surface = self.passes.surface(image.len() as u64 * PIXEL_BYTES);
-        self.passes.resolve(surface, self.tile_px.pow(2));
+        let surface = self.gpu.surface(image.len() as u64 * PIXEL_BYTES);
+        self.gpu.begin("image");
+        self.gpu.write_image(surface, self.tile_px.pow(2));
         Emitted { image, fragments: self.fragments }
     }
 
@@ -99,20 +108,22 @@ impl<'a, 'e> PacketEmitter<'a, 'e> {
     /// Emits the pending packet.
     pub fn flush(&mut self) {
         let Some(pending) = self.pending.take() else { return };
-        let mut counts = PacketCounts::default();
         let pixels = pending.pixels.count_ones();
-        counts[Event::TilesVisited] = 1;
-        counts[Event::EdgeBoundMadds] = pixels * TEST_MADDS;
-        counts[Event::TileMadds] = pixels * TEST_MADDS;
-        counts[Event::DepthReads] = pending.fragments;
         let target = self.targets[pending.which];
-        counts[Event::DepthWrites] = if target.write { pending.fragments } else { 0 };
-        counts[Event::SamplesHit] = pending.fragments;
+        let work = TileWork {
+            tile: pending.tile,
+            triangle: Some(pending.item),
+            tiles: 1,
+            tile_madds: pixels * TEST_MADDS,
+            hits: pending.fragments,
+            depths_read: pending.fragments,
+            depths_written: if target.write { pending.fragments } else { 0 },
+            ..TileWork::default()
+        };
         let bytes = u64::from(pixels) * u64::from(self.bins) * BOX_BYTES;
         let address = target.address + pending.first_place * u64::from(self.bins) * BOX_BYTES;
-        let touch = Touch { address, bytes, write: target.write, fresh: false };
-        let work = TileWork { tile: pending.tile, triangle: pending.item, counts };
-        self.passes.tile(&work, &[touch], &[]);
+        let client = Client::Depth;
+        self.gpu.tile(&work, [Touch { client, address, bytes, write: target.write, fresh: false }]);
     }
 }
 
@@ -120,9 +131,9 @@ impl Observer for PacketEmitter<'_, '_> {
     fn part(&mut self, _: &Pass, which: usize, part: Part<'_>) {
         self.flush();
         if which == 0 {
-            self.passes.begin("pair");
+            self.gpu.begin("pair");
         }
-        self.passes.draw(part.list.len(), self.vertices.address(), &FRONT_END);
+        self.gpu.draw_stream(part.list.len(), &self.stream);
     }
 
     fn fragment(&mut self, pass: &Pass, which: usize, fragment: &Fragment) {

@@ -3,12 +3,9 @@
 //! A [`Job`] draws frames like a scene, but in its own passes on a [`Gpu`], which counts and times them. [`crate::catalog`] makes jobs by name from their options ([`OptionSource`]).
 
 mod options;
-mod passes;
 
 pub use options::OptionSource;
 pub(crate) use options::{Flag, Flags, must_hold};
-pub(crate) use passes::PIXEL_BYTES;
-pub use passes::{FrontEnd, Passes, TileWork, Touch};
 
 use glam::Vec3;
 use pipeline::{Gpu, PassError};

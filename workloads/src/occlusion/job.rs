@@ -2,24 +2,21 @@
 
 use std::sync::Arc;
 
-use activity::{Event, PacketCounts};
 use glam::{Affine3A, Vec3, Vec4};
 use pipeline::depth::BoxGrid;
 use pipeline::geometry::Projection;
 use pipeline::random::mix;
 use pipeline::sampling::SampleSource;
 use pipeline::{
-    Camera, Cull, Draw, DrawError, Geometry, Gpu, Lane, Lens, RasterPass, Shader, ShadingPoint, Viewport,
+    Camera, Cull, Draw, DrawError, Geometry, Gpu, Lane, Lens, RasterPass, Shader, ShadingPoint, TileWork,
+    TriangleStream, Viewport,
 };
 use serde::{Deserialize, Serialize};
 use warnings::{Code, Warning};
 
 use super::{Answer, MovingBox, Pyramid, Queries};
 use crate::error::LoadError;
-use crate::job::{
-    Drawn, Draws, Fact, Flag, Flags, FrontEnd, Job, JobError, OptionSource, Passes, Request, TileWork,
-    must_hold,
-};
+use crate::job::{Drawn, Draws, Fact, Flag, Flags, Job, JobError, OptionSource, Request, must_hold};
 use crate::samples::SampleChoice;
 use crate::scene::Settings;
 
@@ -107,8 +104,8 @@ pub fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<dyn Job>
     Ok(Box::new(Occlusion { options, settings, samples, wall_scene }))
 }
 
-/// Bytes of a box corner at both times, its transformation, and the set-up of its triangles.
-const FRONT_END: FrontEnd = FrontEnd { vertex_bytes: 24, vertex_ops: 24, setup_madds: 77 };
+/// Bytes of a box corner at both times.
+const VERTEX_BYTES: u32 = 24;
 /// Share of half-covered tiles above which a warning is given. Small occluders hide objects together, which a
 /// farthest depth per tile cannot detect.
 pub const MAX_HALF_COVERED_SHARE: f64 = 0.25;
@@ -135,7 +132,8 @@ impl Draws for Occlusion {
         let occluders = RasterPass::new(camera, &walls, &settings).named("occluders").with_visible();
         let (answers, half_covered) = self.ask(&gpu.draw(&occluders)?.visible, viewport)?;
         gpu.wait();
-        emit_packets(&answers, gpu);
+        let vertex_ops = 2 * Projection::new(camera, viewport).vertex_ops();
+        charge(&answers, vertex_ops, gpu);
         // The host draws what is not hidden.
         gpu.wait();
         let seen = self.wall_scene.boxes.iter().zip(&answers).filter(|(_, answer)| !answer.hidden);
@@ -168,20 +166,23 @@ impl Occlusion {
     }
 }
 
-/// Emits the queries as packets of their own pass. The farthest depths are in fast memory beside the tile
-/// tests, so no cache is accessed.
-fn emit_packets(answers: &[Answer], gpu: &mut Gpu<'_>) {
-    let mut passes = Passes::new(gpu);
-    passes.begin("queries");
+/// Adds the work of the queries as a pass of their own. The farthest depths are in fast memory beside the tile tests, so no
+/// cache is accessed. Set-up is part of the multiply-adds of an answer.
+fn charge(answers: &[Answer], vertex_ops: u32, gpu: &mut Gpu<'_>) {
     let triangles = 12 * answers.len();
-    let vertices = passes.surface(3 * triangles as u64 * u64::from(FRONT_END.vertex_bytes));
-    passes.draw(triangles, vertices.address(), &FRONT_END);
+    let vertices = gpu.surface(3 * triangles as u64 * u64::from(VERTEX_BYTES));
+    let stream = TriangleStream { vertices, vertex_bytes: VERTEX_BYTES, vertex_ops, setup_madds: 0 };
+    gpu.begin("queries");
+    gpu.draw_stream(triangles, &stream);
     for (number, answer) in (0..).zip(answers) {
-        let mut counts = PacketCounts::default();
-        counts[Event::TilesVisited] = answer.tiles as u32;
-        counts[Event::TileMadds] = answer.madds as u32;
-        counts[Event::ZCullTests] = answer.compared as u32;
-        passes.tile(&TileWork { tile: 0, triangle: 12 * number, counts }, &[], &[]);
+        let work = TileWork {
+            triangle: Some(12 * number),
+            tiles: answer.tiles as u32,
+            tile_madds: answer.madds as u32,
+            depth_bounds: answer.compared as u32,
+            ..TileWork::default()
+        };
+        gpu.tile(&work, []);
     }
 }
 

@@ -1,7 +1,7 @@
 //! Cameras of a scene, and the pipeline's camera made from them for one frame.
 
 use glam::{Affine3A, DAffine3, DMat3, DVec3};
-use pipeline::{Camera, CameraError, Lens};
+use pipeline::{Camera, CameraError, Lane, Lens};
 use serde::{Deserialize, Serialize};
 
 use super::deform::Pose;
@@ -186,8 +186,13 @@ impl CameraFrame {
 
     /// Camera coordinates of a world point: x right, y up, z forward.
     pub fn view(&self, point: DVec3) -> DVec3 {
-        let from = point - self.eye;
-        DVec3::new(from.dot(self.right), from.dot(self.up), from.dot(self.forward))
+        self.view_on(&Lane::default(), point)
+    }
+
+    /// The same, computed on a lane.
+    pub fn view_on(&self, lane: &Lane, point: DVec3) -> DVec3 {
+        let from = lane.sub(point, self.eye);
+        DVec3::new(lane.dot(from, self.right), lane.dot(from, self.up), lane.dot(from, self.forward))
     }
 
     /// Transform from the world to the camera: x right, y up, z forward.

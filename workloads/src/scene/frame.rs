@@ -91,7 +91,7 @@ impl Frame {
     }
 
     /// Meshes with triangles, in the order in which they are drawn.
-    fn drawn(&self, scene: &Scene) -> Vec<&FrameMesh> {
+    pub(crate) fn drawn(&self, scene: &Scene) -> Vec<&FrameMesh> {
         let is_blended = |mesh: &&FrameMesh| {
             scene.materials().get(mesh.material).is_some_and(|material| material.alpha == Alpha::Blended)
         };

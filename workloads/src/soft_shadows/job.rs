@@ -3,7 +3,7 @@
 
 use std::collections::HashSet;
 
-use activity::{Counts, Event};
+use activity::Event;
 use glam::{DVec3, Vec3};
 use pipeline::sampling::{Pattern, Sample, SampleSource, SampleSpec};
 use pipeline::{Cull, Draw, Gpu, Viewport};
@@ -12,7 +12,7 @@ use warnings::{Code, Warning};
 
 use super::light::{AreaLight, LightSpec};
 use super::map::{Method, ShadowMap, View, depth_pass};
-use super::shade::{Shadows, World, look_up_packets};
+use super::shade::{World, look_ups};
 use crate::accumulation::SharedSamples;
 use crate::error::LoadError;
 use crate::job::{Drawn, DrawsScene, Fact, Flag, Flags, Job, JobError, OptionSource, Request};
@@ -106,12 +106,12 @@ impl SoftShadows {
         if self.options.accumulate { self.set.samples().len() as u16 } else { 1 }
     }
 
-    fn facts(&self, map: &ShadowMap, shaded: &Counts) -> Vec<Fact> {
+    fn facts(&self, map: &ShadowMap, look_ups: u64) -> Vec<Fact> {
         vec![
             Fact { name: "shadow_map_bytes", value: map.bytes() as f64 },
             Fact { name: "shadow_map_passes", value: f64::from(self.passes()) },
             Fact { name: "shadow_map_samples_tested", value: map.counts[Event::SamplesTested] as f64 },
-            Fact { name: "look_ups", value: shaded[Event::TextureFetches] as f64 },
+            Fact { name: "look_ups", value: look_ups as f64 },
         ]
     }
 
@@ -169,10 +169,8 @@ impl DrawsScene for SoftShadows {
         let visible = depth_pass(&view, viewport, &self.set, self.method(), gpu)?;
         let world = World::new(&view, viewport, &self.light, &albedos, self.scene.background());
         let lookups = (&self.set as &dyn SampleSource, &visible.samples[..]);
-        let shaded = look_up_packets(&world, lookups, &map, gpu);
-        let shadows = Shadows::Map { map: &map, bias: self.options.bias };
-        let image = world.image(&self.set, &visible.samples, shadows);
-        let facts = self.facts(&map, &shaded);
+        let (image, look_ups) = look_ups(&world, lookups, (&map, self.options.bias), gpu);
+        let facts = self.facts(&map, look_ups);
         let (moving, warnings) = (frame.is_moving(), self.regime_warnings());
         Ok(Drawn { image, moving, lens: true, facts, warnings })
     }
@@ -181,7 +179,7 @@ impl DrawsScene for SoftShadows {
 /// The draws of a frame without culling, and the reflectance of each.
 pub(crate) fn parts<'a>(scene: &'a Scene, frame: &'a Frame) -> Result<(Vec<Draw<'a>>, Vec<Vec3>), JobError> {
     let draws = frame.draws(scene)?.into_iter().map(|draw| draw.culling(Cull::None)).collect();
-    let drawn = frame.meshes.iter().filter(|mesh| !mesh.triangles.is_empty());
+    let drawn = frame.drawn(scene).into_iter();
     Ok((draws, drawn.map(|mesh| scene.materials()[mesh.material].base_color).collect()))
 }
 

@@ -1,7 +1,7 @@
 //! An area light as a camera with a lens.
 
 use glam::{DAffine3, DVec3, Vec3};
-use pipeline::{Camera, Lens};
+use pipeline::{Camera, Lane, Lens};
 use serde::{Deserialize, Serialize};
 
 use crate::error::LoadError;
@@ -103,19 +103,20 @@ impl AreaLight {
     }
 
     /// World position of the point `(u, v)` of the light.
-    pub fn point(&self, [u, v]: [f32; 2]) -> DVec3 {
-        let [u, v] = [u, v].map(|c| f64::from(c) * self.radius);
-        self.stand.eye + u * self.stand.right + v * self.stand.up
+    pub fn point(&self, lane: &Lane, [u, v]: [f32; 2]) -> DVec3 {
+        let [u, v] = [u, v].map(|c| DVec3::splat(lane.mul(f64::from(c), self.radius)));
+        lane.madd(v, self.stand.up, lane.madd(u, self.stand.right, self.stand.eye))
     }
 
     /// Texel of a map `side` texels wide, and depth, at which the point `(u, v)` of the light sees `point`;
     /// `None` outside the map.
-    pub fn texel(&self, point: Vec3, lens: [f32; 2], side: u32) -> Option<([u32; 2], f64)> {
-        let seen = self.stand.view(point.as_dvec3());
-        let [u, v] = lens.map(|c| f64::from(c) * self.radius);
-        let per_unit = 0.5 * f64::from(side) / (self.tan_half * seen.z);
-        let at = [(seen.x - u) * per_unit, -(seen.y - v) * per_unit].map(|c| c + 0.5 * f64::from(side));
-        let inside = seen.z > 0.0 && at.iter().all(|c| (0.0..f64::from(side)).contains(c));
+    pub fn texel(&self, lane: &Lane, point: Vec3, lens: [f32; 2], side: u32) -> Option<([u32; 2], f64)> {
+        let seen = self.stand.view_on(lane, point.as_dvec3());
+        let [u, v] = lens.map(|c| lane.mul(f64::from(c), self.radius));
+        let middle = 0.5 * f64::from(side);
+        let per_unit = lane.div(middle, lane.mul(self.tan_half, seen.z));
+        let at = [lane.sub(seen.x, u), -lane.sub(seen.y, v)].map(|c| lane.madd(c, per_unit, middle));
+        let inside = lane.branch(seen.z > 0.0 && at.iter().all(|c| (0.0..f64::from(side)).contains(c)));
         inside.then(|| (at.map(|c| c as u32), seen.z))
     }
 
@@ -139,16 +140,17 @@ mod tests {
         let spec =
             LightSpec { position: [0.0, 4.0, 0.0], radius: 0.5, fov_deg: 90.0, ..LightSpec::default() };
         let light = AreaLight::new(&spec).unwrap();
-        assert_eq!(light.texel(Vec3::new(0.01, 0.0, 0.01), [0.0; 2], 64).map(|(_, w)| w), Some(4.0));
+        let lane = &Lane::default();
+        assert_eq!(light.texel(lane, Vec3::new(0.01, 0.0, 0.01), [0.0; 2], 64).map(|(_, w)| w), Some(4.0));
         // Half a unit at depth 4, of 8 units over 64 texels, is four texels in the opposite direction.
-        let [right, up] = [light.point([1.0, 0.0]), light.point([0.0, 1.0])];
-        assert!((right - light.point([0.0; 2])).length() == 0.5 && (up - right).length() > 0.5);
-        let shifted = |lens| light.texel(Vec3::new(0.01, 0.0, 0.01), lens, 64).unwrap().0;
+        let [right, up] = [light.point(lane, [1.0, 0.0]), light.point(lane, [0.0, 1.0])];
+        assert!((right - light.point(lane, [0.0; 2])).length() == 0.5 && (up - right).length() > 0.5);
+        let shifted = |lens| light.texel(lane, Vec3::new(0.01, 0.0, 0.01), lens, 64).unwrap().0;
         let [here, u, v] = [[0.0; 2], [1.0, 0.0], [0.0, 1.0]].map(shifted);
         assert_eq!([here[0] - u[0], v[1] - here[1]], [4, 4]);
         assert!((light.texel_width(DVec3::ZERO, 64) - 0.125).abs() < 1e-12);
-        assert_eq!(light.texel(Vec3::new(9.0, 0.0, 0.0), [0.0; 2], 64), None);
-        assert_eq!(light.texel(Vec3::new(0.0, 5.0, 0.0), [0.0; 2], 64), None, "behind the light");
+        assert_eq!(light.texel(lane, Vec3::new(9.0, 0.0, 0.0), [0.0; 2], 64), None);
+        assert_eq!(light.texel(lane, Vec3::new(0.0, 5.0, 0.0), [0.0; 2], 64), None, "behind the light");
     }
 
     #[test]

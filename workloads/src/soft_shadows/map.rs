@@ -4,7 +4,7 @@ use activity::Counts;
 use glam::Vec3;
 use pipeline::memory::Surface;
 use pipeline::sampling::Sample;
-use pipeline::{Camera, Draw, Gpu, RasterPass, Rendered, Settings, Target, Viewport};
+use pipeline::{Camera, Draw, Gpu, Lane, RasterPass, Rendered, Settings, Target, Viewport};
 
 use super::light::AreaLight;
 use crate::accumulation::{SharedSamples, Snapshot, SnapshotError};
@@ -72,9 +72,9 @@ impl ShadowMap {
 
     /// Index in [`Self::depths`] that decides about a point for sample `index` of the set, and the point's
     /// depth; `None` outside the map.
-    pub fn place(&self, light: &AreaLight, point: Vec3, index: usize) -> Option<(usize, f64)> {
+    pub fn place(&self, lane: &Lane, light: &AreaLight, point: Vec3, index: usize) -> Option<(usize, f64)> {
         let Sample { u, v, .. } = self.set.samples()[index];
-        let ([x, y], depth) = light.texel(point, [u, v], self.side)?;
+        let ([x, y], depth) = light.texel(lane, point, [u, v], self.side)?;
         let texel = y as usize * self.side as usize + x as usize;
         Some((texel * self.set.samples().len() + index, depth))
     }
@@ -90,9 +90,18 @@ impl ShadowMap {
     }
 
     /// Whether a point is lit for sample `index` of the set: no stored depth is nearer by more than `bias`
-    /// scene units.
-    pub fn is_lit(&self, light: &AreaLight, point: Vec3, index: usize, bias: f64) -> bool {
-        self.place(light, point, index).is_none_or(|(at, depth)| depth - bias <= f64::from(self.depths[at]))
+    /// scene units. Passes the place of the depth that is fetched to `fetch`.
+    pub fn is_lit(
+        &self,
+        lane: &Lane,
+        light: &AreaLight,
+        (point, index): (Vec3, usize),
+        bias: f64,
+        mut fetch: impl FnMut(usize),
+    ) -> bool {
+        let Some((at, depth)) = self.place(lane, light, point, index) else { return true };
+        fetch(at);
+        lane.branch(lane.sub(depth, bias) <= f64::from(self.depths[at]))
     }
 }
 

@@ -20,4 +20,4 @@ pub(crate) use job::FLAGS;
 pub use job::{Options, SoftShadows, default_scene, job};
 pub use light::{AreaLight, LightSpec};
 pub use map::{DepthPass, Method, ShadowMap, View, depth_pass};
-pub use shade::{Shadows, World, look_up_packets};
+pub use shade::{Shadows, World, look_ups};

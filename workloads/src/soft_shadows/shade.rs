@@ -1,13 +1,13 @@
 //! The shading pass. Each sample is shaded alone, because its light depends on its time and its point of the
 //! light.
 
-use activity::{Counts, Event, Packet, PacketKind};
 use glam::{DVec3, Vec3};
 use pipeline::geometry::Projection;
+use pipeline::memory::Surface;
 use pipeline::sample_test::exact::weights;
 use pipeline::sampling::{Sample, SampleSource};
 use pipeline::setup::Corner;
-use pipeline::{Camera, Gpu, Viewport};
+use pipeline::{Camera, Client, Gpu, Lane, TileWork, Touch, Viewport};
 use rayon::prelude::*;
 
 use super::light::AreaLight;
@@ -75,17 +75,27 @@ impl<'a> World<'a> {
     pub fn image(&self, samples: &dyn SampleSource, seen: &[(u32, u32)], shadows: Shadows<'_>) -> Vec<Vec3> {
         let (width, per_pixel) = (self.viewport.width(), samples.per_pixel() as usize);
         let pixel = |(place, seen): (usize, &[(u32, u32)])| {
-            let [px, py] = [place as u32 % width, place as u32 / width];
-            let mut at = vec![Sample::default(); per_pixel];
-            samples.pixel_into(px, py, &mut at);
-            let colours = at.iter().zip(seen).enumerate();
-            let colours = colours.map(|(index, (sample, (triangle, _)))| {
-                self.point([px, py], sample, *triangle)
-                    .map_or(self.background, |point| self.shade(&point, sample, index, shadows))
-            });
-            colours.sum::<Vec3>() / per_pixel as f32
+            let place = [place as u32 % width, place as u32 / width];
+            self.pixel(place, (samples, seen), shadows, &mut Shaded::default())
         };
         seen.par_chunks_exact(per_pixel).enumerate().map(pixel).collect()
+    }
+
+    /// Mean of the samples of a pixel, whose visible triangles are in `seen`; the work is added to `shaded`.
+    fn pixel(
+        &self,
+        [px, py]: [u32; 2],
+        (samples, seen): (&dyn SampleSource, &[(u32, u32)]),
+        shadows: Shadows<'_>,
+        shaded: &mut Shaded,
+    ) -> Vec3 {
+        let mut at = vec![Sample::default(); seen.len()];
+        samples.pixel_into(px, py, &mut at);
+        let colours = at.iter().zip(seen).enumerate().map(|(index, (sample, (triangle, _)))| {
+            let Some(point) = self.point([px, py], sample, *triangle) else { return self.background };
+            self.shade(&point, (sample, index), shadows, shaded)
+        });
+        colours.sum::<Vec3>() / seen.len() as f32
     }
 
     /// For each sample, whether its point is lit; `None` if it sees no surface that faces the light.
@@ -102,19 +112,17 @@ impl<'a> World<'a> {
             samples.pixel_into(px, py, &mut at);
             let of = |(index, (sample, (triangle, _))): (usize, (&Sample, &(u32, u32)))| {
                 let point = self.point([px, py], sample, *triangle)?;
-                let toward = self.light.point([sample.u, sample.v]) - point.place;
-                (point.normal.dot(toward) > 0.0).then(|| self.is_lit(&point, sample, index, shadows))
+                let lane = Lane::default();
+                let toward = self.light.point(&lane, [sample.u, sample.v]) - point.place;
+                let is_lit = || self.is_lit(&lane, &point, (sample, index), shadows, &mut Vec::new());
+                (point.normal.dot(toward) > 0.0).then(is_lit)
             };
             at.iter().zip(seen).enumerate().map(of).collect::<Vec<_>>()
         };
         seen.par_chunks_exact(per_pixel).enumerate().flat_map_iter(pixel).collect()
     }
 
-    /// World position of a sample's point, for counting the cost of the look-up.
-    pub fn position(&self, pixel: [u32; 2], sample: &Sample, triangle: u32) -> Option<Vec3> {
-        self.point(pixel, sample, triangle).map(|point| point.place.as_vec3())
-    }
-
+    /// Surface point of a sample: interpolation and normals are fixed functions, as in the pipeline.
     fn point(&self, [px, py]: [u32; 2], sample: &Sample, triangle: u32) -> Option<Point> {
         let face = self.rays.faces().get(triangle as usize)?;
         let [x, y] = [(px, sample.x, self.viewport.width()), (py, sample.y, self.viewport.height())]
@@ -135,18 +143,33 @@ impl<'a> World<'a> {
     }
 
     /// Lambert's law for one point of the light, plus ambient light.
-    fn shade(&self, point: &Point, sample: &Sample, index: usize, shadows: Shadows<'_>) -> Vec3 {
-        let toward = (self.light.point([sample.u, sample.v]) - point.place).normalize_or_zero();
-        let facing = point.normal.dot(toward).max(0.0) as f32;
-        let lit = facing > 0.0 && self.is_lit(point, sample, index, shadows);
-        point.albedo * (AMBIENT + if lit { facing } else { 0.0 })
+    fn shade(&self, point: &Point, at: (&Sample, usize), shadows: Shadows<'_>, shaded: &mut Shaded) -> Vec3 {
+        let lane = Lane::default();
+        let light = self.light.point(&lane, [at.0.u, at.0.v]);
+        let toward = lane.normalize(lane.sub(light, point.place));
+        let facing = lane.max(lane.dot(point.normal, toward), 0.0) as f32;
+        let lit = lane.branch(facing > 0.0) && self.is_lit(&lane, point, at, shadows, &mut shaded.fetches);
+        let colour = lane.scale(point.albedo, lane.add(AMBIENT, if lit { facing } else { 0.0 }));
+        shaded.lanes += 1;
+        shaded.ops += lane.ops();
+        colour
     }
 
-    fn is_lit(&self, point: &Point, sample: &Sample, index: usize, shadows: Shadows<'_>) -> bool {
+    fn is_lit(
+        &self,
+        lane: &Lane,
+        point: &Point,
+        (sample, index): (&Sample, usize),
+        shadows: Shadows<'_>,
+        fetches: &mut Vec<usize>,
+    ) -> bool {
         match shadows {
-            Shadows::Map { map, bias } => map.is_lit(self.light, point.place.as_vec3(), index, bias),
+            Shadows::Map { map, bias } => {
+                let at = (point.place.as_vec3(), index);
+                map.is_lit(lane, self.light, at, bias, |place| fetches.push(place))
+            }
             Shadows::Rays => {
-                let light = self.light.point([sample.u, sample.v]);
+                let light = self.light.point(&Lane::default(), [sample.u, sample.v]);
                 !self.rays.is_blocked(point.place, light, sample.t, point.triangle)
             }
             Shadows::None => true,
@@ -154,51 +177,101 @@ impl<'a> World<'a> {
     }
 }
 
-/// Operations per sample: vertices at its time (15), weights of its point (12), the point (9), the normal
-/// (15), the point in the light's map (14), the comparison (2), Lambert's law (9).
-const OPS: u32 = 76;
-/// Bytes of a stored depth and of an image pixel.
+/// Work of shading samples.
+#[derive(Default)]
+struct Shaded {
+    /// Samples that see a surface.
+    lanes: u32,
+    /// Operations of their shader.
+    ops: u32,
+    /// Places of the fetched depths in the map.
+    fetches: Vec<usize>,
+}
+
+/// Bytes of an image pixel and of a stored depth.
 const BYTES: u64 = 4;
 
-/// Emits the packets of the pass that shades the visible samples, one per tile, and returns their sum.
-pub fn look_up_packets(
+/// Colours of the pixels of a tile, row by row, with the work and the accesses of shading them.
+struct ShadedTile {
+    first: [u32; 2],
+    colours: Vec<Vec3>,
+    work: TileWork,
+    touches: Vec<Touch>,
+}
+
+/// Shades the visible samples by the map in a pass of its own, and returns the image and the number of fetches.
+pub fn look_ups(
     world: &World<'_>,
     (samples, seen): (&dyn SampleSource, &[(u32, u32)]),
-    map: &ShadowMap,
+    (map, bias): (&ShadowMap, f64),
     gpu: &mut Gpu<'_>,
-) -> Counts {
+) -> (Vec<Vec3>, u64) {
     gpu.wait();
-    let pass = gpu.begin("look-ups");
-    let image = gpu.surface(world.viewport.pixels() as u64 * BYTES);
-    let (width, height) = (world.viewport.width(), world.viewport.height());
-    let (side, per_pixel) = (gpu.spec().tile_px, samples.per_pixel() as usize);
-    let mut counts = Counts::default();
-    let mut at = vec![Sample::default(); per_pixel];
-    let tiles = (0..height)
-        .step_by(side as usize)
-        .flat_map(|y| (0..width).step_by(side as usize).map(move |x| [x, y]));
-    for (tile, [x0, y0]) in (0..).zip(tiles) {
-        let mut packet = Packet { tile, ..Packet::new(PacketKind::Tile, pass) };
-        for [px, py] in
-            (y0..height.min(y0 + side)).flat_map(|y| (x0..width.min(x0 + side)).map(move |x| [x, y]))
-        {
-            let pixel = py as usize * width as usize + px as usize;
-            samples.pixel_into(px, py, &mut at);
-            for (index, (sample, (triangle, _))) in at.iter().zip(&seen[pixel * per_pixel..]).enumerate() {
-                let Some(point) = world.position([px, py], sample, *triangle) else { continue };
-                packet.counts[Event::PixelInvocations] += 1;
-                packet.counts[Event::ShaderOps] += OPS;
-                if let Some((place, _)) = map.place(world.light, point, index) {
-                    packet.counts[Event::TextureFetches] += 1;
-                    gpu.memory().texture(map.address(place), &mut packet.counts);
-                }
+    let viewport = world.viewport;
+    let image = gpu.surface(viewport.pixels() as u64 * BYTES);
+    let look_up = LookUp { world, samples, seen, map, bias, image, side: gpu.spec().tile_px };
+    gpu.begin("look-ups");
+    let (mut colours, mut fetches) = (vec![Vec3::ZERO; viewport.pixels()], 0);
+    for row in (0..viewport.height()).step_by(look_up.side as usize) {
+        let columns: Vec<u32> = (0..viewport.width()).step_by(look_up.side as usize).collect();
+        let tiles: Vec<ShadedTile> = columns.par_iter().map(|&column| look_up.tile([column, row])).collect();
+        for tile in tiles {
+            fetches += u64::from(tile.work.texture_fetches);
+            for ([x, y], colour) in look_up.pixels(tile.first).zip(&tile.colours) {
+                colours[(y * viewport.width() + x) as usize] = *colour;
             }
-            packet.counts[Event::PixelsResolved] += 1;
-            gpu.memory().colour(image.address() + pixel as u64 * BYTES, true, true, &mut packet.counts);
+            gpu.tile(&tile.work, tile.touches);
         }
-        counts += &packet.counts;
-        gpu.push(&packet, 0);
     }
     gpu.keep(image);
-    counts
+    (colours, fetches)
+}
+
+/// Inputs of the pass that shades by a map.
+struct LookUp<'a> {
+    world: &'a World<'a>,
+    samples: &'a dyn SampleSource,
+    seen: &'a [(u32, u32)],
+    map: &'a ShadowMap,
+    bias: f64,
+    image: Surface,
+    /// Side of a tile in pixels.
+    side: u32,
+}
+
+impl LookUp<'_> {
+    /// Pixels of the tile with a given first pixel, row by row.
+    fn pixels(&self, [x0, y0]: [u32; 2]) -> impl Iterator<Item = [u32; 2]> + use<> {
+        let (viewport, side) = (self.world.viewport, self.side);
+        let columns = x0..viewport.width().min(x0 + side);
+        (y0..viewport.height().min(y0 + side)).flat_map(move |y| columns.clone().map(move |x| [x, y]))
+    }
+
+    fn tile(&self, first: [u32; 2]) -> ShadedTile {
+        let (width, per_pixel) = (self.world.viewport.width(), self.samples.per_pixel() as usize);
+        let (mut shaded, mut touches, mut colours) = (Shaded::default(), Vec::new(), Vec::new());
+        let touch = |client, address| {
+            let write = client == Client::Colour;
+            Touch { client, address, bytes: BYTES, write, fresh: write }
+        };
+        for [x, y] in self.pixels(first) {
+            let pixel = (y * width + x) as usize;
+            let seen = &self.seen[pixel * per_pixel..(pixel + 1) * per_pixel];
+            let (shadows, before) = (Shadows::Map { map: self.map, bias: self.bias }, shaded.fetches.len());
+            colours.push(self.world.pixel([x, y], (self.samples, seen), shadows, &mut shaded));
+            let read =
+                shaded.fetches[before..].iter().map(|&at| touch(Client::Texture, self.map.address(at)));
+            touches.extend(read);
+            touches.push(touch(Client::Colour, self.image.address() + pixel as u64 * BYTES));
+        }
+        let work = TileWork {
+            tile: first[1] / self.side * width.div_ceil(self.side) + first[0] / self.side,
+            lanes: shaded.lanes,
+            shader_ops: shaded.ops,
+            texture_fetches: shaded.fetches.len() as u32,
+            pixels: colours.len() as u32,
+            ..TileWork::default()
+        };
+        ShadedTile { first, colours, work, touches }
+    }
 }

@@ -3,7 +3,7 @@
 use activity::{Event, Unit};
 use glam::{DVec3, Vec3};
 use pipeline::sampling::{Pattern, Sample, SampleSpec};
-use pipeline::{Cull, Draw, Geometry, Gpu, Viewport};
+use pipeline::{Cull, Draw, Geometry, Gpu, Lane, Viewport};
 use proptest::prelude::*;
 use workloads::Overrides;
 use workloads::accumulation::SharedSamples;
@@ -52,6 +52,27 @@ const TRIANGLES: [[u32; 3]; 2] = [[0, 1, 2], [0, 2, 3]];
 
 fn draw<'a>(open: &'a [Vec3], close: &'a [Vec3], triangles: &'a [[u32; 3]]) -> Draw<'a> {
     Draw::new(Geometry::new(open, close, triangles).unwrap(), &Unshaded, Cull::None)
+}
+
+/// Whether a point is lit for a sample of the set.
+fn is_lit(map: &ShadowMap, light: &AreaLight, at: (Vec3, usize), bias: f64) -> bool {
+    map.is_lit(&Lane::default(), light, at, bias, |_| ())
+}
+
+/// A look-up is a fetch and the operations of moving the point into the map and comparing its depth, and no fetch outside
+/// of the map.
+#[test]
+fn look_ups_cost_what_they_compute() {
+    let (floor, light) = (quad(0.0, [-9.0, 9.0], [-9.0, 9.0]), above(0.6));
+    let map = map(&light, &[draw(&floor, &floor, &TRIANGLES)], 64, &set(4, 3), Method::OnePass);
+    let look_up = |point: Vec3| {
+        let (lane, mut fetches) = (Lane::default(), 0);
+        assert!(map.is_lit(&lane, &light, (point, 0), 0.02, |_| fetches += 1));
+        (lane.ops(), fetches)
+    };
+    // Into the axes of the light 12, lens 2, scale 3, texel 4, border 1; bias and comparison 2.
+    assert_eq!(look_up(Vec3::new(0.1, 0.0, 0.3)), (24, 1));
+    assert_eq!(look_up(Vec3::new(0.1, 9.0, 0.3)), (22, 0));
 }
 
 /// A light straight above, at height 4.
@@ -121,7 +142,7 @@ fn the_penumbra_follows_the_closed_form() {
     let map = map(&light, &draws, 512, &set, Method::OnePass);
     let lit = |x: f32| {
         let point = Vec3::new(x, 0.0, 0.3);
-        (0..256).filter(|&index| map.is_lit(&light, point, index, 0.02)).count() as f64 / 256.0
+        (0..256).filter(|&index| is_lit(&map, &light, (point, index), 0.02)).count() as f64 / 256.0
     };
     // The point u of the light sees the edge on the floor at -u R h / (H - h): here from -0.2 to 0.2.
     for x in [-0.18, -0.1, -0.05, 0.0, 0.07, 0.15, 0.19] {
@@ -141,7 +162,7 @@ fn motion_blurs_the_shadow_by_the_share_of_time() {
     let light = above(1e-4);
     let set = set(256, 9);
     let map = map(&light, &draws, 256, &set, Method::OnePass);
-    let lit = (0..256).filter(|&index| map.is_lit(&light, Vec3::ZERO, index, 0.05)).count();
+    let lit = (0..256).filter(|&index| is_lit(&map, &light, (Vec3::ZERO, index), 0.05)).count();
     // The strip is 1 wide and moves by 4: it covers the point for a quarter of the time.
     assert!((lit as f64 / 256.0 - 0.75).abs() < 0.01, "{lit}");
 }
@@ -157,8 +178,9 @@ fn visible(view: &View<'_>, viewport: Viewport, set: &SharedSamples) -> DepthPas
 fn a_floor_in_the_light_follows_the_cosine_while_it_tilts() {
     let light = above(1e-4);
     let (camera, viewport) = (light.camera().with_lens(None), Viewport::new(8, 8).unwrap());
-    let from = light.point([0.0; 2]);
-    let [right, up] = [[1.0, 0.0], [0.0, 1.0]].map(|at| (light.point(at) - from).normalize());
+    let from = light.point(&Lane::default(), [0.0; 2]);
+    let [right, up] =
+        [[1.0, 0.0], [0.0, 1.0]].map(|at| (light.point(&Lane::default(), at) - from).normalize());
     let open = quad(0.0, [-9.0, 9.0], [-9.0, 9.0]);
     let close = open.map(|corner| Vec3::new(corner.x, corner.x, corner.z));
     let albedo = Vec3::new(0.5, 0.25, 1.0);

@@ -7,7 +7,6 @@
 mod measure;
 
 use glam::Vec3;
-use pipeline::SampleSpec;
 use serde::Serialize;
 
 use super::statistics::exponent;
@@ -108,7 +107,7 @@ impl Study for SamplingChart {
         let stages = measure::scenes(&effort)?;
         let references = stages.iter().map(|stage| measure::reference(stage, &effort));
         let references: Vec<Vec<Vec3>> = references.collect::<Result<_, _>>()?;
-        let tables: Vec<&str> = SampleSpec::names().map(|(name, _)| name).collect();
+        let tables: Vec<&str> = measure::names().collect();
         let bar = progress.bar("sampling", ((stages.len() * tables.len()) + measure::STEPS) as u64);
         let mut rows = Vec::new();
         for (stage, reference) in stages.iter().zip(&references) {
