@@ -236,7 +236,7 @@ fn opacity_shows_what_is_behind() {
     let middle = |material: &str| {
         let results = run(&inputs.put("a.ron", pane(material)), &[]);
         let image = results.image(0);
-        (image.get_pixel(16, 16).0, counts(&results))
+        (image.get_pixel(32, 24).0, counts(&results))
     };
     let of = |counts: &Value, event: &str| number(counts, &format!("/{event}"));
     let (red, opaque) = middle("");
@@ -247,6 +247,30 @@ fn opacity_shows_what_is_behind() {
     assert!(of(&blended, "shader_ops") > of(&opaque, "shader_ops"));
     let (hole, cut) = middle("opacity: 0.25, alpha: CutOut(cutoff: 0.5)");
     assert_eq!((hole, of(&cut, "samples_blended")), ([0, 0, 255], 0.0));
+}
+
+/// User clip planes: an object that is drawn in one half of the shutter has half of the samples.
+#[test]
+fn an_object_may_be_drawn_in_a_part_of_the_shutter() {
+    let inputs = Inputs::new();
+    let scene = |visible: &str| {
+        let plane = "rotation_deg: (90, 0, 0), scale: (9, 9, 9), shape: Plane(size: 2, cells: 1, tiles: 1)";
+        format!(
+            "(camera: (position: (0, 0, 5), target: (0, 0, 0)), background: (0, 0, 0), objects: [({plane}, {visible} material: \
+              (color: (1, 1, 1), unlit: true))], settings: (width: 16, height: 16, samples: 16, frames: (0, 1)))"
+        )
+    };
+    let level = |visible: &str| run(&inputs.put("a.ron", scene(visible)), &[]).image(0).get_pixel(8, 8).0[0];
+    // Half the light is 188 of 255 in sRGB.
+    assert_eq!(
+        [level(""), level("visible: (t: (0, 0.5)),"), level("visible: (t: (0.5, 1)),")],
+        [255, 188, 188]
+    );
+    assert_eq!(level("visible: (u: (-1, 1), t: (0, 1)),"), 255);
+    let ended = quintile().call(["run", &inputs.put("b.ron", scene("visible: (t: (0.5, 0.2)),"))]);
+    assert_eq!(ended.code, Some(2));
+    let says = ["b.ron:1:", "a range within 0 and 1, the lower end first"];
+    assert!(says.iter().all(|says| ended.stderr.contains(says)), "{}", ended.stderr);
 }
 
 #[test]

@@ -101,6 +101,24 @@ fn heat_maps_add_up_to_the_counters() {
     assert_eq!(report, events.len(), "the report shows the frame in the middle");
 }
 
+/// Of a workload, all passes of the size of the image are on one map.
+#[test]
+fn heat_maps_of_workloads_show_all_passes() {
+    let args = ["--size", "48x32", "--samples", "4", "--set", "map_px=32", "--frames", "0..1"];
+    let heat = ["--heat", "shader_ops", "--heat", "samples_tested"];
+    let results = quintile().run("soft-shadows", &[&args[..], &heat].concat());
+    let counts = &results.summary()["counts"];
+    let placed = |event: &str| {
+        let csv = fs::read_to_string(results.path(&format!("heat/{event}_0000.csv"))).unwrap();
+        let count = |row: &str| row.rsplit(',').next().unwrap().parse::<u64>().unwrap();
+        (csv.lines().skip(1).map(count).sum::<u64>(), counts[event].as_u64().unwrap())
+    };
+    let (shaded, all) = placed("shader_ops");
+    assert!(shaded > all / 2 && shaded < all, "look-ups without the vertices: {shaded} of {all}");
+    let (tested, all) = placed("samples_tested");
+    assert!(tested > 0 && tested < all, "the map has another size: {tested} of {all}");
+}
+
 #[test]
 fn counters_without_a_position_are_refused() {
     for (counter, message) in [("draws", "before it is known where"), ("samples_testd", "`samples_tested`")] {

@@ -89,6 +89,18 @@ pub(crate) fn share<'de, D: Deserializer<'de>>(from: D) -> Result<Option<f32>, D
     checked(from, |value| (0.0..=1.0).contains(value), "a share from 0 to 1")
 }
 
+/// A range within the lens.
+pub(crate) fn lens_part<'de, D: Deserializer<'de>>(from: D) -> Result<Option<[f32; 2]>, D::Error> {
+    let fits = |[low, high]: &[f32; 2]| -1.0 <= *low && low < high && *high <= 1.0;
+    checked(from, fits, "a range within -1 and 1, the lower end first")
+}
+
+/// A range within the shutter.
+pub(crate) fn shutter_part<'de, D: Deserializer<'de>>(from: D) -> Result<Option<[f32; 2]>, D::Error> {
+    let fits = |[low, high]: &[f32; 2]| 0.0 <= *low && low < high && *high <= 1.0;
+    checked(from, fits, "a range within 0 and 1, the lower end first")
+}
+
 pub(crate) fn blades<'de, D: Deserializer<'de>>(from: D) -> Result<u32, D::Error> {
     required(from, |value| (1..=64).contains(value), "a number of blades from 1 to 64")
 }

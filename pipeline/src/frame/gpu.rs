@@ -1,12 +1,13 @@
 //! GPU during a frame: passes follow each other through one address space and one set of caches.
 
-use activity::{Counts, LineAccess, Packet, PacketCounts, PacketKind, Waits};
+use activity::{Counts, Event, LineAccess, Packet, PacketCounts, PacketKind, Waits};
 use glam::Vec3;
 
-use super::heat::HeatMap;
+use super::heat::{FrameHeat, HeatMap};
 use super::pass::{AddressMap, Draw, Pass, RasterPass, Resident, Target, resident};
 use super::replay::Replay;
 use super::{Finished, PipelineSpec, rasterize, resolve};
+use crate::geometry::Viewport;
 use crate::memory::{AddressSpace, CacheError, MemorySystem, Surface};
 
 /// Receiver of packets, each with the lines it requests from the L2.
@@ -26,6 +27,9 @@ pub struct Gpu<'e> {
     results: Vec<Surface>,
     /// Results since the last barrier: other units cannot read them yet.
     pending: Vec<Surface>,
+    heat: FrameHeat,
+    /// Whether the tiles of the pass that was begun are those of the heat maps.
+    is_on_map: bool,
 }
 
 /// Result of a pass.
@@ -38,8 +42,6 @@ pub struct Rendered {
     pub visible: Vec<(u32, u32)>,
     /// Count of every event of the pass.
     pub counts: Counts,
-    /// Heat map of each requested event.
-    pub heat: Vec<HeatMap>,
     /// Images or depths in memory.
     pub surface: Surface,
 }
@@ -49,7 +51,6 @@ impl Rendered {
     #[must_use]
     pub fn with_write_back(mut self, report: &FrameReport) -> Self {
         self.counts += &report.write_back;
-        self.heat.iter_mut().for_each(|map| map.elsewhere += report.write_back[map.event]);
         self
     }
 
@@ -103,6 +104,8 @@ pub struct FrameReport {
     pub passes: Vec<PassReport>,
     /// Events of writing results back to memory when the frame ends.
     pub write_back: Counts,
+    /// Heat map of each requested event.
+    pub heat: Vec<HeatMap>,
 }
 
 impl FrameReport {
@@ -150,7 +153,7 @@ impl<'e> Gpu<'e> {
     ) -> Result<Self, PassError> {
         let emit = Box::new(emit);
         let memory = MemorySystem::new(&spec.memory)?;
-        let (passes, results, pending) = Default::default();
+        let (passes, results, pending, heat) = Default::default();
         Ok(Self {
             spec,
             memory,
@@ -160,7 +163,16 @@ impl<'e> Gpu<'e> {
             last_batch: 0,
             results,
             pending,
+            heat,
+            is_on_map: false,
         })
+    }
+
+    /// The GPU with heat maps of `events` over images of the size of `viewport`. Events of passes of another size have no
+    /// position.
+    #[must_use]
+    pub fn with_heat(self, events: &[Event], viewport: Viewport) -> Self {
+        Self { heat: FrameHeat::new(events, self.spec, viewport), ..self }
     }
 
     /// A GPU whose packets are only counted.
@@ -189,8 +201,10 @@ impl<'e> Gpu<'e> {
         self.space.take(bytes)
     }
 
-    /// Starts a pass whose packets are made outside of rasterization.
-    pub(super) fn open(&mut self, name: &str) {
+    /// Starts a pass whose packets are made outside of rasterization. Their tiles are those of an image of the size of
+    /// `viewport`, if any.
+    pub(super) fn open(&mut self, name: &str, viewport: Option<Viewport>) {
+        self.is_on_map = viewport.is_some_and(|viewport| self.heat.is_of(viewport));
         let (name, draws, others) = (name.to_owned(), Vec::new(), Counts::default());
         self.passes.push(PassReport { name, triangles: 0, draws, others });
         self.last_batch = 0;
@@ -213,6 +227,7 @@ impl<'e> Gpu<'e> {
             report.add(packet);
         }
         self.last_batch = self.last_batch.max(packet.batch);
+        self.heat.add(packet, self.is_on_map);
         (self.emit)(packet, self.memory.log());
         self.memory.clear_log();
     }
@@ -234,7 +249,8 @@ impl<'e> Gpu<'e> {
     /// [`PassError`] if a cache of the settings is invalid, or if the surfaces of the frame are too large.
     pub fn draw(&mut self, pass: &RasterPass<'_>) -> Result<Rendered, PassError> {
         let number = self.passes.len() as u32;
-        let prepared = Pass::new(pass, number, &mut self.space);
+        let has_heat = self.heat.is_of(pass.settings.viewport);
+        let prepared = Pass::new(pass, (number, has_heat), &mut self.space);
         if !self.space.fits() {
             return Err(PassError::Memory { pass: pass.name.to_owned(), bytes: self.space.bytes() });
         }
@@ -249,17 +265,16 @@ impl<'e> Gpu<'e> {
     }
 
     fn pass(&mut self, prepared: &Pass<'_>, pass: &RasterPass<'_>) -> Result<Rendered, PassError> {
-        let mut heat: Vec<_> = pass.heat.iter().map(|&event| HeatMap::new(event, prepared)).collect();
         let (emit, report) = (&mut self.emit, &mut self.passes[prepared.number as usize]);
+        let heat = &mut self.heat;
         let mut done = |work: Finished<'_>| match work {
             Finished::Packet(packet, lines) => {
                 report.add(packet);
-                heat.iter_mut().for_each(|map| map.packet(packet));
+                heat.drawn(packet, prepared.heat);
                 emit(packet, lines);
             }
-            Finished::Tests(number, bin, log) => {
-                heat.iter_mut().for_each(|map| map.tests(prepared, number, bin, log));
-            }
+            Finished::Tests(number, bin, log) if prepared.heat => heat.tests(prepared, number, bin, log),
+            Finished::Tests(..) => {}
         };
         let mut replay = Replay::new(prepared, &mut self.memory)?;
         let is_empty = prepared.is_depth_only() && pass.target != Target::Depth;
@@ -269,7 +284,6 @@ impl<'e> Gpu<'e> {
             images: if pass.image { resolve::resolve(prepared, &bins) } else { Vec::new() },
             visible,
             counts: report.counts(),
-            heat,
             surface: prepared.addresses.result(),
         })
     }
@@ -303,9 +317,10 @@ impl<'e> Gpu<'e> {
         let (batch, pass) = (self.last_batch, self.last_pass());
         let packet = Packet { batch, counts, ..Packet::new(PacketKind::Resolve, pass) };
         (self.emit)(&packet, self.memory.log());
+        self.heat.add(&packet, false);
         let mut write_back = Counts::default();
         write_back += &counts;
-        FrameReport { passes: self.passes, write_back }
+        FrameReport { passes: self.passes, write_back, heat: self.heat.into_maps() }
     }
 }
 

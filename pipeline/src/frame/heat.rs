@@ -2,9 +2,11 @@
 
 use activity::{Event, Packet, PacketKind, Unit};
 
+use super::PipelineSpec;
 use super::bin::Bin;
 use super::bin::{BinLog, SamplesHere};
 use super::pass::Pass;
+use crate::geometry::Viewport;
 
 /// Count of one event in each tile of the image.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,6 +21,8 @@ pub struct HeatMap {
     pub elsewhere: u64,
     /// Count in every pixel, row by row, for events of samples; otherwise empty.
     pub samples: Vec<u32>,
+    /// Events of samples in each fine tile whose pixels are not known.
+    spread: Vec<u64>,
     width: u32,
     height: u32,
 }
@@ -47,8 +51,7 @@ impl HeatMap {
         !matches!(event.unit(), Unit::Command | Unit::Setup) && event != Event::VertexInvocations
     }
 
-    pub(super) fn new(event: Event, pass: &Pass<'_>) -> Self {
-        let (spec, viewport) = (pass.settings.spec, pass.settings.viewport);
+    fn new(event: Event, spec: &PipelineSpec, viewport: Viewport) -> Self {
         let [width, height] = [viewport.width(), viewport.height()];
         let tiles = |side: u32| {
             let across = width.div_ceil(side);
@@ -59,22 +62,33 @@ impl HeatMap {
             };
             (0..across * height.div_ceil(side)).map(tile).collect()
         };
+        let is_of_samples = SamplesHere::EVENTS.contains(&event);
         Self {
             event,
             tiles: tiles(spec.tile_px),
             coarse: tiles(spec.coarse_tile_px),
             elsewhere: 0,
-            samples: vec![
-                0;
-                if SamplesHere::EVENTS.contains(&event) { (width * height) as usize } else { 0 }
-            ],
+            samples: if is_of_samples { vec![0; viewport.pixels()] } else { Vec::new() },
+            spread: vec![0; tiles(spec.tile_px).len()],
             width,
             height,
         }
     }
 
+    /// Add a packet of a pass over tiles of the caller.
+    fn tile(&mut self, packet: &Packet) {
+        let count = u64::from(packet.counts[self.event]);
+        match self.tiles.get_mut(packet.tile as usize) {
+            Some(tile) => {
+                tile.count += count;
+                self.spread[packet.tile as usize] += count;
+            }
+            None => self.elsewhere += count,
+        }
+    }
+
     /// Add a packet. Tile tests may be in packets of other tiles; [`Self::tests`] adds them.
-    pub(super) fn packet(&mut self, packet: &Packet) {
+    fn packet(&mut self, packet: &Packet) {
         let count = u64::from(packet.counts[self.event]);
         let placed = match packet.kind {
             PacketKind::Draw | PacketKind::Vertices | PacketKind::Barrier(_) => false,
@@ -89,7 +103,7 @@ impl HeatMap {
     }
 
     /// Add the tile tests of bin `number`.
-    pub(super) fn tests(&mut self, pass: &Pass<'_>, number: usize, bin: &Bin, log: &BinLog) {
+    fn tests(&mut self, pass: &Pass<'_>, number: usize, bin: &Bin, log: &BinLog) {
         if !self.samples.is_empty() {
             self.by_pixel(pass, bin, log);
         }
@@ -124,11 +138,13 @@ impl HeatMap {
 
     /// Value of every pixel, row by row. Events known only by tile are spread evenly over the tile.
     pub fn pixels(&self) -> Vec<f32> {
-        if !self.samples.is_empty() {
-            return self.samples.iter().map(|&count| count as f32).collect();
-        }
         let mut pixels = vec![0.0_f32; (self.width * self.height) as usize];
-        for tile in self.tiles.iter().chain(&self.coarse) {
+        let of_samples = !self.samples.is_empty();
+        pixels.iter_mut().zip(&self.samples).for_each(|(pixel, &count)| *pixel = count as f32);
+        let spread = |(tile, &count): (&TileHeat, &u64)| TileHeat { count, ..*tile };
+        let fine = self.tiles.iter().zip(&self.spread);
+        let fine = fine.map(|both| if of_samples { spread(both) } else { *both.0 });
+        for tile in fine.chain(self.coarse.iter().copied()).filter(|tile| tile.count > 0) {
             let value = tile.per_pixel() as f32;
             for y in tile.origin[1]..tile.origin[1] + tile.size[1] {
                 let first = (y * self.width + tile.origin[0]) as usize;
@@ -141,6 +157,50 @@ impl HeatMap {
     /// Total count in the frame.
     pub fn total(&self) -> u64 {
         self.tiles.iter().chain(&self.coarse).map(|tile| tile.count).sum::<u64>() + self.elsewhere
+    }
+}
+
+/// Heat maps of a frame, over the images of one size.
+#[derive(Default)]
+pub(super) struct FrameHeat {
+    viewport: Option<Viewport>,
+    maps: Vec<HeatMap>,
+}
+
+impl FrameHeat {
+    pub fn new(events: &[Event], spec: &PipelineSpec, viewport: Viewport) -> Self {
+        let maps = events.iter().map(|&event| HeatMap::new(event, spec, viewport)).collect();
+        Self { viewport: Some(viewport).filter(|_| !events.is_empty()), maps }
+    }
+
+    /// Whether there are maps over images of this size.
+    pub fn is_of(&self, viewport: Viewport) -> bool {
+        self.viewport == Some(viewport)
+    }
+
+    /// Add a packet of a drawn pass, of images of the size of the maps or of another one.
+    pub fn drawn(&mut self, packet: &Packet, is_on_map: bool) {
+        for map in &mut self.maps {
+            if is_on_map { map.packet(packet) } else { map.elsewhere += u64::from(packet.counts[map.event]) }
+        }
+    }
+
+    /// Add the tile tests of bin `number` of a pass.
+    pub fn tests(&mut self, pass: &Pass<'_>, number: usize, bin: &Bin, log: &BinLog) {
+        self.maps.iter_mut().for_each(|map| map.tests(pass, number, bin, log));
+    }
+
+    /// Add a packet of a pass over tiles of the caller, of a barrier or of the end of the frame.
+    pub fn add(&mut self, packet: &Packet, is_on_map: bool) {
+        let is_placed = is_on_map && matches!(packet.kind, PacketKind::Tile | PacketKind::Resolve);
+        for map in &mut self.maps {
+            if is_placed { map.tile(packet) } else { map.elsewhere += u64::from(packet.counts[map.event]) }
+        }
+    }
+
+    /// The maps.
+    pub fn into_maps(self) -> Vec<HeatMap> {
+        self.maps
     }
 }
 

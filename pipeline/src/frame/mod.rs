@@ -61,17 +61,28 @@ fn rasterize<F: FnMut(Finished<'_>)>(pass: &Pass<'_>, replay: &mut Replay<'_>, d
             pass.settings.spec.coarse_tile_px,
         );
         let logs = rasterize_bins(pass, &mut bins, &ready, &lists);
+        let last =
+            if next.is_none() && pass.shades_last() { shade_bins(pass, &mut bins) } else { Vec::new() };
         for ((bin, log), number) in bins.iter().zip(&logs).zip(0..) {
-            done(Finished::Tests(number, bin, log));
-            let emit = &mut |packet: &Packet, lines: &[LineAccess]| done(Finished::Packet(packet, lines));
-            replay.bin(batch, log, emit);
+            for log in [Some(log), last.get(number)].into_iter().flatten() {
+                done(Finished::Tests(number, bin, log));
+                let emit = &mut |packet: &Packet, lines: &[LineAccess]| done(Finished::Packet(packet, lines));
+                replay.bin(batch, log, emit);
+            }
             if next.is_none() {
+                let emit = &mut |packet: &Packet, lines: &[LineAccess]| done(Finished::Packet(packet, lines));
                 replay.resolve(batch, bin, emit);
             }
         }
         batch += 1;
     }
     bins
+}
+
+/// Logs of shading the visible samples of every bin.
+fn shade_bins(pass: &Pass<'_>, bins: &mut [Bin]) -> Vec<BinLog> {
+    let shade = |scratch: &mut worker::Scratch, bin| Worker::new(pass, bin, scratch).shade_visible();
+    bins.par_iter_mut().map_init(worker::Scratch::default, shade).collect()
 }
 
 /// Logs of a batch, by bin. While the feature `auto` has no statistics, some bins run first, and the others

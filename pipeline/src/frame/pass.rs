@@ -2,7 +2,6 @@
 
 use std::ops::Range;
 
-use activity::Event;
 use glam::Vec4;
 
 use super::{Features, Settings};
@@ -61,7 +60,7 @@ pub(super) struct Pass<'a> {
 
 impl<'a> Pass<'a> {
     /// Prepares pass `number` of a frame and gives its surfaces addresses in `space`.
-    pub fn new(pass: &RasterPass<'a>, number: u32, space: &mut AddressSpace) -> Self {
+    pub fn new(pass: &RasterPass<'a>, (number, heat): (u32, bool), space: &mut AddressSpace) -> Self {
         let RasterPass { camera, draws, settings, .. } = *pass;
         let views = pass.target.views(settings.samples.per_pixel());
         let projection = Projection::new(camera, settings.viewport);
@@ -86,7 +85,7 @@ impl<'a> Pass<'a> {
             clip: camera.clip(),
             still_camera: camera.open() == camera.close(),
             eye: projection.eye(),
-            heat: !pass.heat.is_empty(),
+            heat,
             views,
             projection,
             clear: pass.clear,
@@ -145,6 +144,11 @@ impl<'a> Pass<'a> {
     /// Division of lens and time for depth culling.
     pub fn depth_grid(&self) -> BoxGrid {
         BoxGrid::new(self.settings.spec.depth.boxes, self.lens).unwrap_or_default()
+    }
+
+    /// Whether visible samples are shaded after the last triangle.
+    pub fn shades_last(&self) -> bool {
+        self.settings.spec.features.hidden_surface_removal && !self.is_ordered && !self.is_depth_only()
     }
 
     /// A cleared tile of `samples`.
@@ -316,8 +320,6 @@ pub struct RasterPass<'a> {
     pub image: bool,
     /// Whether the result has the visible triangle and the depth of every sample.
     pub visible: bool,
-    /// Events of which the result has heat maps.
-    pub heat: &'a [Event],
 }
 
 /// Result that a pass leaves in memory.
@@ -350,7 +352,7 @@ impl<'a> RasterPass<'a> {
     /// A pass that draws one image.
     pub fn new(camera: &'a Camera, draws: &'a [Draw<'a>], settings: &'a Settings<'a>) -> Self {
         let (name, target, clear) = ("draw", Target::Image, Clear::default());
-        Self { name, camera, draws, settings, target, clear, image: true, visible: false, heat: &[] }
+        Self { name, camera, draws, settings, target, clear, image: true, visible: false }
     }
 
     /// The pass with another name.
@@ -381,12 +383,6 @@ impl<'a> RasterPass<'a> {
     #[must_use]
     pub fn with_visible(self) -> Self {
         Self { visible: true, ..self }
-    }
-
-    /// The pass with heat maps of `events` in its result.
-    #[must_use]
-    pub fn with_heat(self, events: &'a [Event]) -> Self {
-        Self { heat: events, ..self }
     }
 
     /// Triangles of all draws.

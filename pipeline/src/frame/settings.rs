@@ -69,6 +69,9 @@ pub struct Features {
     pub z_max: bool,
     /// Run only those of the enabled tests that pay off.
     pub auto: bool,
+    /// Shade the visible samples of a bin after its last triangle, and no others (hidden-surface removal of tile-based
+    /// deferred renderers). Passes whose result depends on the order of triangles shade in that order.
+    pub hidden_surface_removal: bool,
     /// A triangle whose points are all within this distance in pixels of their mid-shutter position is drawn
     /// still at that position. 0 disables it.
     pub still_px: f32,
@@ -95,6 +98,7 @@ impl Features {
         screen: true,
         z_max: true,
         auto: false,
+        hidden_surface_removal: false,
         still_px: 0.0,
         in_focus_px: 0.0,
     };

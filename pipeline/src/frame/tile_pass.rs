@@ -4,6 +4,7 @@
 use activity::{Event, Packet, PacketKind};
 
 use super::Gpu;
+use crate::geometry::Viewport;
 use crate::memory::{LINE_BYTES, Surface};
 
 /// Triangles of a packet of vertices.
@@ -93,9 +94,10 @@ impl Touch {
 }
 
 impl Gpu<'_> {
-    /// Begins a pass whose tiles the caller processes, with the methods below.
-    pub fn begin(&mut self, name: &str) {
-        self.open(name);
+    /// Begins a pass whose tiles the caller processes, with the methods below. The tiles are those of an image of the size
+    /// of `viewport`, if any.
+    pub fn begin(&mut self, name: &str, viewport: Option<Viewport>) {
+        self.open(name, viewport);
     }
 
     /// Draws `triangles` triangles of a stream.

@@ -11,12 +11,12 @@ use super::test_selection::TestSelector;
 use super::tile_tests::{Remaining, Subject, TestContext, TestTile};
 use super::vertices::Ready;
 use super::{Settings, Shading};
-use crate::depth::{Bounder, Visible, interval_madds, set_up_madds};
+use crate::depth::{Bounder, DepthTile, Visible, interval_madds, set_up_madds};
 use crate::geometry::Shear;
 use crate::memory::depths_fit;
 use crate::sample_test::{Hits, SampleTest, Target, Width};
 use crate::sampling::TileSamples;
-use crate::setup::{PixelRect, Triangle};
+use crate::setup::{Corner, PixelRect, Triangle};
 use crate::shading::QuadSet;
 use crate::state::DrawState;
 use crate::traversal::{Box5, Screen, TileRect};
@@ -227,14 +227,14 @@ impl<'a, 'p> Worker<'a, 'p> {
         let Some(tile) = &mut self.bin.tiles[index] else { return };
         if self.pass.is_ordered {
             FragmentTests::new(self.pass, triangle, &samples[index], origin).store(tile, hits, fragments);
-        } else if !self.pass.is_depth_only() {
+        } else if !self.pass.is_depth_only() && !self.pass.shades_last() {
             fragments.nearest(hits);
         }
         if !hits.written.is_empty() {
             let lowered = tile.record_writes(&hits.written, state.may_raise_depth());
             self.tests.z_min_updates += if self.pass.settings.spec.depth.z_min { lowered } else { 0 };
         }
-        self.request_quads(triangle, index, origin);
+        self.request_quads((&triangle.corners, triangle.moving), index, origin);
     }
 
     /// State of the current draw.
@@ -263,11 +263,12 @@ impl<'a, 'p> Worker<'a, 'p> {
         }
     }
 
-    fn request_quads(&mut self, triangle: &Triangle, index: usize, origin: [u32; 2]) {
+    /// Request the quads of the shaded samples of a tile, seen on a triangle with the given corners that may be moving.
+    fn request_quads(&mut self, (corners, moving): (&[Corner; 3], bool), index: usize, origin: [u32; 2]) {
         let Settings { spec, viewport, samples: source, .. } = *self.pass.settings;
         let (samples, side) = (&self.scratch.samples[index], spec.tile_px);
         let per_pixel = source.per_pixel();
-        let grid = Grid::new(self.pass, &triangle.corners, triangle.moving);
+        let grid = Grid::new(self.pass, corners, moving);
         for slot in self.scratch.fragments.shaded.iter().map(|&slot| slot as usize) {
             match spec.shading {
                 Shading::Cached => self.scratch.quads.request(grid.cell(samples, slot, origin, side), 0),
@@ -333,6 +334,58 @@ impl<'a, 'p> Worker<'a, 'p> {
             triangle: Packet::NONE,
             tile: Bin::tile_number(self.pass, self.bin.origin),
             tests: std::mem::take(&mut self.tests),
+            quads_end: self.log.quads.len() as u32,
+            ..Work::default()
+        });
+    }
+}
+
+impl Worker<'_, '_> {
+    /// Shades the visible samples of the bin, tile by tile and triangle by triangle.
+    pub fn shade_visible(mut self) -> BinLog {
+        for index in 0..self.bin.tiles.len() {
+            let Some(tile) = &self.bin.tiles[index] else { continue };
+            let of = |slot: &u16| tile.triangle[usize::from(*slot)];
+            let mut seen: Vec<u16> = (0..tile.triangle.len() as u16).collect();
+            seen.retain(|slot| of(slot) != DepthTile::NO_TRIANGLE);
+            seen.sort_by_key(of);
+            let groups: Vec<(u32, &[u16])> =
+                seen.chunk_by(|a, b| of(a) == of(b)).map(|group| (of(&group[0]), group)).collect();
+            let origin = self.bin.tile_origin(self.pass, index);
+            self.fill(index, origin, true);
+            for (triangle, slots) in groups {
+                self.shade_slots(triangle, slots, index, origin);
+            }
+        }
+        self.log
+    }
+
+    fn shade_slots(&mut self, triangle: u32, slots: &[u16], index: usize, origin: [u32; 2]) {
+        let Scratch { samples, hits, fragments, .. } = &mut *self.scratch;
+        hits.clear();
+        for &slot in slots {
+            let pixel = usize::from(samples[index].pixel[usize::from(slot)]);
+            hits.written_pixels |= 1 << pixel;
+            if let Some(pixels) = &mut hits.by_pixel {
+                pixels.written[pixel] += 1;
+            }
+        }
+        hits.written.extend_from_slice(slots);
+        fragments.nearest(hits);
+        if let Some(pixels) = &mut hits.by_pixel {
+            pixels.written = [0; 64];
+            self.log.samples.resize(self.bin.tiles.len(), None);
+            self.log.samples[index].get_or_insert_with(SamplesHere::new).add(pixels, [0; 2]);
+        }
+        let (coloured, coloured_pixels) = (fragments.coloured, fragments.coloured_pixels);
+        let (corners, moving) = self.pass.moving_corners(triangle);
+        self.request_quads((&corners, moving), index, origin);
+        self.log.work.push(Work {
+            draw: self.pass.locate(triangle).0 as u32,
+            triangle,
+            tile: Bin::tile_number(self.pass, origin),
+            coloured,
+            coloured_pixels,
             quads_end: self.log.quads.len() as u32,
             ..Work::default()
         });

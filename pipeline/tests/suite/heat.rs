@@ -11,11 +11,13 @@ fn maps(size: [u32; 2], spec: &PipelineSpec, draws: &[Draw<'_>], camera: &Camera
     let viewport = Viewport::new(size[0], size[1]).unwrap();
     let table = SampleTable::low_discrepancy(4, 3, LensShape::Disk).unwrap();
     let settings = Settings { spec, viewport, samples: &table, background: Vec3::ZERO };
-    let rendered =
-        RasterPass::new(camera, draws, &settings).with_heat(&Event::ALL).render(|_, _| ()).unwrap();
-    let plain = RasterPass::new(camera, draws, &settings).render(|_, _| ()).unwrap();
-    assert_eq!((plain.images, plain.counts), (rendered.images, rendered.counts), "looking changes nothing");
-    (rendered.heat, rendered.counts)
+    let pass = RasterPass::new(camera, draws, &settings);
+    let mut gpu = Gpu::quiet(spec).unwrap().with_heat(&Event::ALL, viewport);
+    let rendered = gpu.draw(&pass).unwrap();
+    let report = gpu.finish();
+    let plain = pass.render(|_, _| ()).unwrap();
+    assert_eq!((plain.images, plain.counts), (rendered.images, report.counts()), "looking changes nothing");
+    (report.heat, plain.counts)
 }
 
 #[test]
@@ -96,4 +98,35 @@ fn tests_without_a_packet_are_counted_in_their_tile() {
             _ => assert_eq!(*count, 1, "tile {column}, {row}"),
         }
     }
+}
+
+/// Over several passes of a frame every event is counted once: in its place in passes of the size of the maps, elsewhere in
+/// others.
+#[test]
+fn passes_of_a_frame_add_up_on_one_map() {
+    let (spec, soup) = (spec(Features::ALL), Soup::new(Kind::Moving, 120, 4));
+    let table = SampleTable::low_discrepancy(4, 3, LensShape::Disk).unwrap();
+    let (camera, draws) = (camera(true), [soup.draw(&Plain, Cull::None)]);
+    let [image, map] = [[75, 53], [32, 32]].map(|[width, height]| Viewport::new(width, height).unwrap());
+    let mut gpu = Gpu::quiet(&spec).unwrap().with_heat(&Event::ALL, image);
+    for viewport in [map, image, image] {
+        let settings = Settings { spec: &spec, viewport, samples: &table, background: Vec3::ZERO };
+        gpu.draw(&RasterPass::new(&camera, &draws, &settings)).unwrap();
+    }
+    let work = TileWork { tile: 12, tiles: 3, tile_madds: 7, samples: 5, ..TileWork::default() };
+    for viewport in [Some(image), Some(map), None] {
+        gpu.begin("tiles", viewport);
+        gpu.tile(&work, []);
+    }
+    let report = gpu.finish();
+    let counts = report.counts();
+    for map in &report.heat {
+        assert_eq!(map.total(), counts[map.event], "{:?}", map.event);
+        let pixels: f64 = map.pixels().iter().map(|&value| f64::from(value)).sum();
+        let placed = (map.total() - map.elsewhere) as f64;
+        assert!((pixels - placed).abs() <= 1e-4 * placed, "{:?}: {pixels} of {placed}", map.event);
+    }
+    let tested = report.heat.iter().find(|map| map.event == Event::SamplesTested).unwrap();
+    let passes = report.passes.iter().map(|pass| pass.counts()[Event::SamplesTested]);
+    assert_eq!(tested.elsewhere, passes.clone().next().unwrap() + 2 * 5);
 }

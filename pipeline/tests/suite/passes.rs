@@ -186,10 +186,10 @@ fn tiles_of_the_caller_become_packets() {
         kinds.push((packet.kind, packet.pass));
     })
     .unwrap();
-    gpu.begin("first");
+    gpu.begin("first", None);
     let vertices = gpu.surface(20 * 3 * 24);
     gpu.draw_stream(20, &TriangleStream { vertices, vertex_bytes: 24, vertex_ops: 8, setup_madds: 60 });
-    gpu.begin("second");
+    gpu.begin("second", None);
     let [depths, image] = [130, 400].map(|bytes| gpu.surface(bytes));
     let touch =
         Touch { client: Client::Depth, address: depths.address(), bytes: 130, write: true, fresh: true };

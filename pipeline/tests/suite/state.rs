@@ -237,14 +237,14 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..ProptestConfig::default() })]
     #[test]
     fn every_state_gives_the_image_of_storing_samples_in_order(
-        kind in kinds(), lens: bool, parallel: bool, switches in 0..SWITCHES, auto: bool, z_min: bool, bound in 0..4_usize,
+        kind in kinds(), lens: bool, parallel: bool, switches in 0..SWITCHES, auto: bool, waits: bool, z_min: bool, bound in 0..4_usize,
         boxes in prop::sample::select(&[[1, 1, 1], [1, 1, 4], [2, 2, 2]][..]), batch_triangles in 1..40_u32,
         sizes in 0..3_usize, count in 1..60_usize, seed: u64,
     ) {
         let (tile_px, coarse_tile_px) = [(8, 32), (4, 16), (2, 64)][sizes];
         let depth = DepthSpec { bound: DepthBound::ALL[bound], boxes, z_min };
         let spec = PipelineSpec {
-            tile_px, coarse_tile_px, batch_triangles, depth, ..spec(Features { auto, ..switched(switches) })
+            tile_px, coarse_tile_px, batch_triangles, depth, ..spec(Features { auto, hidden_surface_removal: waits, ..switched(switches) })
         };
         let scene = Scene::new(kind, Optics { lens, parallel }, count, seed);
         let (ours, (seen, image)) = (scene.render(&spec), scene.reference());
@@ -430,4 +430,29 @@ fn hi_z_serves_other_depth_tests() {
     let all = counts(Compare::Always, [0, 1, 2]);
     assert_eq!([all[Event::DepthReads], all[Event::ZCullTests]], [0; 2]);
     assert_eq!(all[Event::DepthWrites], 3 * samples);
+}
+
+/// Hidden-surface removal shades what is visible and nothing else; the image is the same. Passes with blending shade in order.
+#[test]
+fn hidden_surfaces_are_not_shaded_if_shading_waits() {
+    let stage = Stage::sampled(32, 32, 4);
+    let layers: Vec<_> = (1..6).rev().map(|z| rectangle([-16.0, 16.0], [-16.0, 16.0], z as f32)).collect();
+    let render = |waits, state: DrawState, batch_triangles| {
+        let features = Features { hidden_surface_removal: waits, ..Features::ALL };
+        let spec = PipelineSpec { batch_triangles, ..spec(features) };
+        let draws: Vec<_> = layers.iter().map(|layer| still(layer, &RED).with_state(state)).collect();
+        RasterPass::new(&stage.camera, &draws, &settings(&stage, &spec)).render(|_, _| ()).unwrap()
+    };
+    let shaded = |drawn: &Rendered| {
+        [Event::ColourWrites, Event::PixelInvocations, Event::SamplesTested].map(|event| drawn.counts[event])
+    };
+    for batch in [1, 100] {
+        let [now, last] = [false, true].map(|waits| render(waits, DrawState::default(), batch));
+        assert_eq!(now.images, last.images);
+        let ([colours, lanes, tested], [colours_now, lanes_now, tested_now]) = (shaded(&last), shaded(&now));
+        assert_eq!((5 * colours, 5 * lanes, tested), (colours_now, lanes_now, tested_now));
+        let blend = DrawState { blend: Blend::Add, ..DrawState::default() };
+        let [now, last] = [false, true].map(|waits| render(waits, blend, batch));
+        assert_eq!((now.images, now.counts), (last.images, last.counts));
+    }
 }

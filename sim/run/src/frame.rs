@@ -110,8 +110,9 @@ fn simulate_frame(
 ) -> Result<(RunFrame, Vec<Vec3>, Vec<HeatMap>), RunError> {
     let mut clock =
         FrameClock::new(plan.options.timing, plan.gpu.machine()?, Recorder::new(BIN_PS, max_bins));
-    let DrawnFrame { drawn, regime, heat, mut report } =
+    let DrawnFrame { drawn, regime, mut report } =
         draw(plan, number, &plan.options.heat, |packet, lines| clock.push(packet, lines))?;
+    let heat = std::mem::take(&mut report.heat);
     passes::limit_draws(&mut report);
     let timed = clock.finish()?;
     let accuracy = AccuracyWarning::all(plan.options.timing, &timed);
@@ -164,7 +165,6 @@ fn write_image(plan: &Plan, dir: &OutDir, number: u32, image: &[Vec3]) -> Result
 pub(super) struct DrawnFrame {
     drawn: Drawn,
     regime: Regime,
-    heat: Vec<HeatMap>,
     report: FrameReport,
 }
 
@@ -178,10 +178,10 @@ fn draw(
     match &plan.work {
         Work::Scene(scene) => draw_scene(plan, scene, &scene.frame(number)?, plan.viewport, events, emit),
         Work::Job { job, .. } => {
-            let mut gpu = Gpu::new(&plan.gpu.pipeline, emit).map_err(RunError::setting)?;
+            let gpu = Gpu::new(&plan.gpu.pipeline, emit).map_err(RunError::setting)?;
+            let mut gpu = gpu.with_heat(events, plan.viewport);
             let drawn = job.frame(number, &mut gpu)?;
-            let (regime, heat) = Default::default();
-            Ok(DrawnFrame { drawn, regime, heat, report: gpu.finish() })
+            Ok(DrawnFrame { drawn, regime: Regime::default(), report: gpu.finish() })
         }
     }
 }
@@ -199,12 +199,11 @@ pub(super) fn draw_scene(
     let draws = frame.draws(scene)?;
     let background = scene.background();
     let settings = Settings { spec: &plan.gpu.pipeline, viewport, samples: &*plan.samples, background };
-    let mut gpu = Gpu::new(&plan.gpu.pipeline, emit).map_err(RunError::setting)?;
-    let pass = RasterPass::new(&frame.camera, &draws, &settings).named("scene").with_heat(events);
+    let gpu = Gpu::new(&plan.gpu.pipeline, emit).map_err(RunError::setting)?;
+    let mut gpu = gpu.with_heat(events, viewport);
+    let pass = RasterPass::new(&frame.camera, &draws, &settings).named("scene");
     let rendered = gpu.draw(&pass).map_err(RunError::setting)?;
     let report = gpu.finish();
-    let mut rendered = rendered.with_write_back(&report);
-    let heat = std::mem::take(&mut rendered.heat);
     let drawn = Drawn {
         image: rendered.into_image(),
         moving: frame.is_moving(),
@@ -212,5 +211,5 @@ pub(super) fn draw_scene(
         ..Drawn::default()
     };
     let regime = Regime::of(&frame.camera, &draws, viewport, plan.samples.per_pixel());
-    Ok(DrawnFrame { drawn, regime, heat, report })
+    Ok(DrawnFrame { drawn, regime, report })
 }

@@ -149,7 +149,7 @@ mod tests {
             let passes = vec![pass("map", vec![hits(5)]), pass("image", vec![hits(1), hits(2)])];
             let time = |begin_ps, end_ps| PassTime { begin_ps, end_ps, busy_ps: [0; activity::Unit::COUNT] };
             let times = [time(0, 3_000_000), time(2_000_000, 5_000_000)];
-            add(&mut groups, &FrameReport { passes, write_back: Counts::default() }, &times, 2.0);
+            add(&mut groups, &FrameReport { passes, ..FrameReport::default() }, &times, 2.0);
         }
         let found: Vec<_> = groups.iter().map(|group| (group.name.as_str(), group.passes)).collect();
         assert_eq!(found, [("map", 2), ("image", 2)]);
@@ -162,7 +162,7 @@ mod tests {
     #[test]
     fn too_many_draws_are_one_sum() {
         let draws = vec![counts(Event::SamplesHit, 1); MAX_DRAWS + 1];
-        let mut report = FrameReport { passes: vec![pass("scene", draws)], write_back: Counts::default() };
+        let mut report = FrameReport { passes: vec![pass("scene", draws)], ..FrameReport::default() };
         let before = report.counts();
         limit_draws(&mut report);
         assert!(report.passes[0].draws.is_empty() && report.counts() == before);

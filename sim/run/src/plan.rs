@@ -60,9 +60,6 @@ impl Plan {
             )));
         }
         let (work, table) = work(&options)?;
-        if !options.heat.is_empty() {
-            work.scene("--heat")?;
-        }
         if options.sampling != Sampling::Every {
             work.scene("--timing sampled")?;
         }

@@ -33,7 +33,7 @@ use crate::cli::quantity::rate;
     quintile run Fox.glb --frames 0..300 --accuracy 2% --verify --out fox\n  \
     quintile run ccd --set resolution=64 --set bins=8 --out ccd\n\n\
     The chapter of a workload in the book lists its options and defaults; an unknown name after `--set` lists the known ones. Workloads take no \
-    --accuracy, --budget, --timing sampled or --heat, which need a scene, and refuse flags without effect.\n\n\
+    --accuracy, --budget or --timing sampled, which need a scene, and refuse flags without effect.\n\n\
     Results are in DIR: images/, report.html, summary.json, frames.csv, trace.parquet, trace.csv, plots/ and \
     timeline.perfetto-trace (open it at ui.perfetto.dev). They appear together when all are whole; results of an earlier run \
     are replaced then, and other files in DIR are left alone."

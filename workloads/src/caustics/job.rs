@@ -198,7 +198,9 @@ impl Caustics {
             vertex_ops: VERTEX_OPS,
             setup_madds: SETUP_MADDS,
         };
-        gpu.begin("light");
+        // The maps of a GPU with other tiles cannot show these.
+        let viewport = (gpu.spec().tile_px == 8).then(|| eye.viewport());
+        gpu.begin("light", viewport);
         gpu.draw_stream(triangles, &stream);
         let mut used = vec![false; tiles as usize];
         for covered in work {
@@ -223,7 +225,7 @@ impl Caustics {
             gpu.tile(&work, [Touch { client: Client::Colour, address, bytes, write: true, fresh }]);
         }
         let image = gpu.surface(pixels * PIXEL_BYTES);
-        gpu.begin("tone");
+        gpu.begin("tone", viewport);
         gpu.write_image(image, TILE_PIXELS as u32);
     }
 }

@@ -94,7 +94,7 @@ impl<'a, 'e> PacketEmitter<'a, 'e> {
         self.flush();
         let image = self.picture.image();
         let surface = self.gpu.surface(image.len() as u64 * PIXEL_BYTES);
-        self.gpu.begin("image");
+        self.gpu.begin("image", None);
         self.gpu.write_image(surface, self.tile_px.pow(2));
         Emitted { image, fragments: self.fragments }
     }
@@ -131,7 +131,7 @@ impl Observer for PacketEmitter<'_, '_> {
     fn part(&mut self, _: &Pass, which: usize, part: Part<'_>) {
         self.flush();
         if which == 0 {
-            self.gpu.begin("pair");
+            self.gpu.begin("pair", None);
         }
         self.gpu.draw_stream(part.list.len(), &self.stream);
     }

@@ -172,7 +172,7 @@ fn charge(answers: &[Answer], vertex_ops: u32, gpu: &mut Gpu<'_>) {
     let triangles = 12 * answers.len();
     let vertices = gpu.surface(3 * triangles as u64 * u64::from(VERTEX_BYTES));
     let stream = TriangleStream { vertices, vertex_bytes: VERTEX_BYTES, vertex_ops, setup_madds: 0 };
-    gpu.begin("queries");
+    gpu.begin("queries", None);
     gpu.draw_stream(triangles, &stream);
     for (number, answer) in (0..).zip(answers) {
         let work = TileWork {

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use glam::{Affine3A, DAffine3, DVec3, DVec4, Vec2, Vec3};
-use pipeline::{Camera, Cull, Draw, Geometry};
+use pipeline::{Camera, Clip, Cull, Draw, Geometry};
 use serde::Serialize;
 
 use super::Scene;
@@ -45,6 +45,8 @@ pub struct FrameMesh {
     pub triangles: Arc<[[u32; 3]]>,
     /// Index of the material in [`Scene::materials`].
     pub material: usize,
+    /// Part of lens and shutter in which it is drawn.
+    pub clip: Clip,
 }
 
 /// Reason why a frame cannot be made.
@@ -153,6 +155,7 @@ impl FrameMesh {
             geometry = geometry.with_colors(&self.colors).map_err(|e| refused(e.to_string()))?;
         }
         let state = scene.materials()[self.material].state();
+        let geometry = geometry.with_clip(self.clip);
         Ok(Draw::new(geometry, shader, state.cull).with_state(state))
     }
 }
@@ -200,6 +203,7 @@ impl Interval {
             colors: Arc::clone(&mesh.colors),
             triangles,
             material: mesh.material,
+            clip: instance.clip,
         })
     }
 }

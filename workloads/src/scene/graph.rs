@@ -38,7 +38,12 @@ impl Graph {
     /// Adds a mesh as an instance on a node.
     pub fn attach(&mut self, mesh: Mesh, node: usize) {
         self.meshes.push(mesh);
-        self.instances.push(Instance { node, mesh: self.meshes.len() - 1, skin: None });
+        self.instances.push(Instance {
+            node,
+            mesh: self.meshes.len() - 1,
+            skin: None,
+            clip: pipeline::Clip::NONE,
+        });
     }
 
     /// Adds all of `other` as children of `parent`.
@@ -57,6 +62,7 @@ impl Graph {
             node: instance.node + nodes,
             mesh: instance.mesh + meshes,
             skin: instance.skin.map(|skin| skin + skins),
+            ..instance
         }));
         self.skins.extend(other.skins.into_iter().map(|mut skin| {
             skin.joints.iter_mut().for_each(|joint| *joint += nodes);

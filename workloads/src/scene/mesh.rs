@@ -71,7 +71,7 @@ pub struct Skin {
 }
 
 /// An instance of a mesh on a node.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Instance {
     /// Index of the node.
     pub node: usize,
@@ -79,6 +79,8 @@ pub struct Instance {
     pub mesh: usize,
     /// Index of the skin; a skinned mesh follows its joints, not its node.
     pub skin: Option<usize>,
+    /// Part of lens and shutter in which it is drawn.
+    pub clip: pipeline::Clip,
 }
 
 impl Mesh {

@@ -210,7 +210,7 @@ pub fn look_ups(
     let viewport = world.viewport;
     let image = gpu.surface(viewport.pixels() as u64 * BYTES);
     let look_up = LookUp { world, samples, seen, map, bias, image, side: gpu.spec().tile_px };
-    gpu.begin("look-ups");
+    gpu.begin("look-ups", Some(viewport));
     let (mut colours, mut fetches) = (vec![Vec3::ZERO; viewport.pixels()], 0);
     for row in (0..viewport.height()).step_by(look_up.side as usize) {
         let columns: Vec<u32> = (0..viewport.width()).step_by(look_up.side as usize).collect();

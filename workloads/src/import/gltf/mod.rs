@@ -102,7 +102,7 @@ fn instances(
             if let Some(skin) = skin {
                 check_joints(document, index, &graph.meshes[mesh], graph.skins[skin].joints.len())?;
             }
-            instances.push(Instance { node: tree.place[index], mesh, skin });
+            instances.push(Instance { node: tree.place[index], mesh, skin, clip: pipeline::Clip::NONE });
         }
     }
     // Joint influences need a skin.

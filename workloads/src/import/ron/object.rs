@@ -7,7 +7,7 @@ use glam::{DQuat, DVec3, Vec3};
 use pipeline::{Wrap, linear_to_srgb8};
 use warnings::Warning;
 
-use super::spec::{MaterialSpec, ObjectSpec, ShapeSpec, TextureSpec};
+use super::spec::{MaterialSpec, ObjectSpec, ShapeSpec, TextureSpec, VisibleSpec};
 use super::{Context, broken, color, vector};
 use crate::builtin::checker;
 use crate::error::LoadError;
@@ -27,15 +27,29 @@ pub(super) fn add(
         object.name.as_ref().map_or_else(|| format!("objects[{index}]"), |name| format!("object `{name}`"));
     let node = node(context, &place, object)?;
     let node = parts.graph.push_node(node);
+    let first = parts.graph.instances.len();
+    add_meshes(context, parts, &place, (object, node))?;
+    if let Some(clip) = object.visible.as_ref().and_then(VisibleSpec::clip) {
+        parts.graph.instances[first..].iter_mut().for_each(|instance| instance.clip = clip);
+    }
+    Ok(())
+}
+
+fn add_meshes(
+    context: Context,
+    parts: &mut Parts,
+    place: &str,
+    (object, node): (&ObjectSpec, usize),
+) -> Result<(), LoadError> {
     match (&object.file, &object.shape) {
         (Some(file), None) => {
-            add_file(context, parts, &place, object, (file, node)).map_err(|error| context.named(file, error))
+            add_file(context, parts, place, object, (file, node)).map_err(|error| context.named(file, error))
         }
         (None, Some(shape)) => {
             if object.end.is_some() || object.clip.is_some() {
                 return Err(context.wrong(place, "`end` and `clip` go with a `file`, not with a `shape`"));
             }
-            let material = material(context, parts, &place, object.material.as_ref())?;
+            let material = material(context, parts, place, object.material.as_ref())?;
             let mesh = solid(shape, material);
             parts.graph.attach(
                 Mesh { name: object.name.clone().unwrap_or_else(|| mesh.name.clone()), ..mesh },

@@ -3,6 +3,7 @@
 //! Lengths are in scene units, times in seconds, angles in degrees, colours in linear RGB; `y` is up. Fields
 //! that are left out take their defaults, unknown ones are errors.
 
+use pipeline::Clip;
 use serde::Deserialize;
 
 use crate::bounded;
@@ -96,6 +97,8 @@ pub(super) struct ObjectSpec {
     pub end_s: Option<f64>,
     /// Which animation clip of a glTF file plays, by name or number; the first by default.
     pub clip: Option<String>,
+    /// Part of lens and shutter in which it is drawn (user clip planes).
+    pub visible: Option<VisibleSpec>,
     /// How it looks; glTF files bring their own materials, which this one replaces.
     pub material: Option<MaterialSpec>,
     /// Where it is.
@@ -121,6 +124,33 @@ pub(super) struct ObjectSpec {
     /// Whether the keys start over after the last.
     #[serde(default)]
     pub repeat: bool,
+}
+
+/// Part of lens and shutter; what is left out is not limited. A sample on the lower bound is inside, one on the upper bound only
+/// at the end of the axis.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct VisibleSpec {
+    /// Across the lens, -1 to 1.
+    #[serde(default, deserialize_with = "bounded::lens_part")]
+    pub u: Option<[f32; 2]>,
+    /// Up the lens, -1 to 1.
+    #[serde(default, deserialize_with = "bounded::lens_part")]
+    pub v: Option<[f32; 2]>,
+    /// Within the shutter, 0 to 1.
+    #[serde(default, deserialize_with = "bounded::shutter_part")]
+    pub t: Option<[f32; 2]>,
+}
+
+impl VisibleSpec {
+    pub fn clip(&self) -> Option<Clip> {
+        let open = |part: Option<[f32; 2]>, [first, last]: [f32; 2]| {
+            let [low, high] = part.unwrap_or([first, last]);
+            let low = if low <= first { f32::NEG_INFINITY } else { low };
+            [low, if high >= last { f32::INFINITY } else { high }]
+        };
+        Clip::new(open(self.u, [-1.0, 1.0]), open(self.v, [-1.0, 1.0]), open(self.t, [0.0, 1.0]))
+    }
 }
 
 /// Where an object is at one time; what is left out is the object's own.
