@@ -34,7 +34,7 @@ pub enum ReadError {
         /// The format found.
         found: &'static str,
         /// The remedy.
-        remedy: &'static str,
+        remedy: String,
     },
     /// Input that cannot be repaired.
     #[error("{path}: {reason}; cut that part out by hand", path = path.display())]
@@ -301,7 +301,7 @@ pub enum WriteError {
         path: PathBuf,
     },
     /// A name that stands for no format.
-    #[error("{path}: its ending is none of {formats}", path = path.display(), formats = super::FORMATS.join(", "))]
+    #[error("{path}: its ending is not {endings}", path = path.display(), endings = super::endings())]
     Ending {
         /// The path.
         path: PathBuf,

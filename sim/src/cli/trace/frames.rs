@@ -9,6 +9,7 @@ use serde::Serialize;
 use serde_json::{Value, json};
 use traces::energy::{FrameTable, InverseUnits, Summary, whole};
 use traces::frames::{Rule, Threshold};
+use traces::io::TraceFormat;
 use warnings::Code;
 
 use super::input::Frames;
@@ -82,15 +83,14 @@ pub(super) fn run(args: &FramesArgs, terminal: &Terminal) -> Result<(), Failure>
 /// Refuses a name that promises another kind of file.
 fn is_table(out: &Path) -> Result<(), Failure> {
     let ending = out.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
-    match ending.as_deref() {
-        Some(
-            other @ ("parquet" | "json" | "jls" | "tsv" | "gz" | "svg" | "png" | "pdf" | "perfetto-trace"),
-        ) => Err(wrong(format!(
+    let of_trace = TraceFormat::of(out).map(|format| format.ending).filter(|ending| *ending != "csv");
+    let of_others = ending.as_deref().filter(|ending| ["json", "gz", "svg", "png", "pdf"].contains(ending));
+    of_trace.or(of_others).map_or(Ok(()), |other| {
+        Err(wrong(format!(
             "--out {}: frames are written as CSV, which is no .{other}; name a file that ends in .csv",
             out.display()
-        ))),
-        _ => Ok(()),
-    }
+        )))
+    })
 }
 
 #[derive(Serialize)]

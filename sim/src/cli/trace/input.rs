@@ -3,11 +3,15 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use output::terminal::Terminal;
 use traces::energy::{FrameEnergy, PowerIntegral};
 use traces::frames::{Found, Marks, Method, Options, Proposal, Window, find_with, propose};
-use traces::io::{ReadOptions, Recording, Repair, Rows, TraceReader, open, rail_of_sums, read};
+use traces::io::{
+    FORMATS, ReadOptions, Recording, Repair, Rows, TraceFormat, TraceReader, open, rail_of_sums, read,
+    readable,
+};
 use traces::times::read_times;
 use traces::trace::RATE_LIMITS_HZ;
 use traces::{Metadata, Trace, stream};
@@ -18,41 +22,18 @@ use super::wrong;
 use crate::cli::Failure;
 use crate::cli::quantity::{milliseconds, positive_voltage, rate, time};
 
-/// Formats of traces that are written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-#[allow(missing_docs, reason = "the names of the formats")]
-pub enum TraceFormat {
-    Csv,
-    Tsv,
-    #[value(name = "csv.gz")]
-    CsvGz,
-    #[value(name = "tsv.gz")]
-    TsvGz,
-    Parquet,
-    Jls,
-    PerfettoTrace,
-}
-
-impl TraceFormat {
-    /// The ending of files of this format.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Csv => "csv",
-            Self::Tsv => "tsv",
-            Self::CsvGz => "csv.gz",
-            Self::TsvGz => "tsv.gz",
-            Self::Parquet => "parquet",
-            Self::Jls => "jls",
-            Self::PerfettoTrace => "perfetto-trace",
-        }
-    }
+/// Parser of `--format`: the formats of traces by the endings of their files.
+pub(super) fn trace_format() -> impl TypedValueParser<Value = &'static TraceFormat> {
+    let named = |ending: String| FORMATS.iter().find(|format| format.ending == ending);
+    PossibleValuesParser::new(FORMATS.each_ref().map(|format| format.ending))
+        .try_map(move |ending| named(ending).ok_or("unknown format"))
 }
 
 /// A trace and how to read it.
 #[derive(Clone, Debug, Args)]
 pub struct InputArgs {
-    /// A trace: Parquet, JLS (Joulescope), CSV or TSV, the latter two also compressed with gzip; `-` reads standard input
-    #[arg(value_name = "TRACE")]
+    /// A trace in any of the formats that are read; `-` reads standard input
+    #[arg(value_name = "TRACE", help = format!("A trace: {}; `-` reads standard input", readable()))]
     pub trace: PathBuf,
     /// A rail to read, by the name its columns carry; several are added up. All without it
     #[arg(long, value_name = "NAME")]

@@ -48,7 +48,7 @@ pub enum TraceCommand {
     Energy(Box<EnergyArgs>),
     /// Put recorded time stamps onto the time of a trace
     Align(Box<AlignArgs>),
-    /// Read a trace and write it as Parquet, JLS (Joulescope), CSV, TSV (with .gz if so named) or a Perfetto timeline
+    /// Read a trace and write it in another format
     Convert(ConvertArgs),
     /// Record a trace anew with a coarser device: rate, range, bits, errors, noise
     Sample(Box<SampleArgs>),

@@ -84,12 +84,12 @@ pub enum PlotFormat {
 }
 
 impl PlotFormat {
-    /// The ending of files of this format.
-    pub fn name(self) -> &'static str {
+    /// The ending of files of this format, and whether they are text.
+    pub(super) fn ending(self) -> (&'static str, bool) {
         match self {
-            Self::Svg => "svg",
-            Self::Png => "png",
-            Self::Pdf => "pdf",
+            Self::Svg => ("svg", true),
+            Self::Png => ("png", false),
+            Self::Pdf => ("pdf", false),
         }
     }
 }

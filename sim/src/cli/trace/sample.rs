@@ -8,10 +8,10 @@ use output::terminal::Terminal;
 use serde_json::json;
 use traces::device::{Device, DeviceSpec, MAX_PACKET_SAMPLES, Peaks, RATES_HZ};
 use traces::energy::energies_j;
-use traces::io::TraceReader;
+use traces::io::{TraceFormat, TraceReader};
 use warnings::Code;
 
-use super::convert::{check, may_be_saved, save};
+use super::convert::{format_of, may_be_saved, save};
 use super::report;
 use super::wrong;
 use crate::cli::Failure;
@@ -21,7 +21,7 @@ use crate::cli::quantity::{
     current, length_of_time, positive_current, positive_voltage, rate, resistance, size_of_current,
     size_of_voltage, voltage,
 };
-use crate::cli::trace::input::{InputArgs, TraceFormat};
+use crate::cli::trace::input::{InputArgs, trace_format};
 
 /// Arguments of `trace sample`.
 #[derive(Clone, Debug, Args)]
@@ -95,8 +95,8 @@ pub struct SampleArgs {
     #[arg(long)]
     pub json: bool,
     /// Format of standard output, where --out is `-` (default: csv)
-    #[arg(long, value_enum, value_name = "FORMAT")]
-    pub format: Option<TraceFormat>,
+    #[arg(long, value_name = "FORMAT", value_parser = trace_format())]
+    pub format: Option<&'static TraceFormat>,
     /// Whether the result goes to standard output.
     #[arg(skip)]
     pub piped: bool,
@@ -106,9 +106,9 @@ pub struct SampleArgs {
 const FEW_CODES: f64 = 0.05;
 
 pub(super) fn run(args: &SampleArgs, terminal: &Terminal) -> Result<(), Failure> {
-    check(&args.out)?;
+    let format = format_of(&args.out)?;
     let inputs = args.device.as_deref().into_iter().chain([args.input.trace.as_path()]);
-    may_be_saved("--out", &args.out, inputs)?;
+    may_be_saved("--out", &args.out, format, inputs)?;
     args.check_rate()?;
     let (trace, _) = args.input.source(terminal)?;
     let peaks = Peaks::of(&*trace)?;
