@@ -217,7 +217,7 @@ fn wrong_input_is_one_line_and_the_right_code() {
         (
             &["energy", "t.csv", "--mark", "0.2", "--end", "0.5", "--pass", "late=50"],
             2,
-            "--pass late=50: no frame is longer than 10.",
+            "--pass late begins 50 ms after the start of its frame, but no frame is longer than 10.",
         ),
     ];
     for (args, code, says) in cases {

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use output::table::{counted, grouped};
 use output::terminal::Terminal;
 use serde_json::json;
 use traces::io::{self, TraceFormat, TraceHeader, TraceReader, csv, endings};
@@ -57,7 +58,11 @@ pub(super) fn run(args: &ConvertArgs, terminal: &Terminal) -> Result<(), Failure
             true,
         );
     }
-    report(&format!("{}: {samples} samples at {rate_hz} Hz", args.out.display()), args.piped, terminal)
+    report(
+        &format!("{}: {} at {rate_hz} Hz", args.out.display(), counted(samples as usize, "sample")),
+        args.piped,
+        terminal,
+    )
 }
 
 /// The format of a file to be written; other endings are refused before anything is read.
@@ -94,6 +99,7 @@ pub(super) fn save(trace: &dyn TraceReader, path: &Path, terminal: &Terminal) ->
         terminal.note(&format!("{}: about {gigabytes:.1} GB as text; Parquet takes a tenth", path.display()));
     }
     if let Some(most) = format.max_samples.filter(|&most| samples > most) {
+        let [most, samples] = [most, samples].map(grouped);
         terminal.note(&format!(
             "{}: at most {most} of {samples} samples kept, extremes among them",
             path.display()

@@ -12,7 +12,7 @@ use super::wrong;
 use crate::cli::Failure;
 use crate::cli::trace::{TraceArgs, TraceCommand};
 
-/// What an input from a pipe is called in messages and plots.
+/// Name of an input from a pipe in messages and plots.
 const INPUT: &str = "standard input";
 /// The format of tables.
 const CSV: (&str, bool) = ("csv", true);
