@@ -19,7 +19,7 @@ pub(super) struct Columns {
     pub current_a: Vec<f32>,
 }
 
-/// What a repair did.
+/// Kind of a repair.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum RepairKind {
@@ -42,7 +42,7 @@ pub enum RepairKind {
 /// A repair.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Repair {
-    /// What was done.
+    /// Its kind.
     pub code: RepairKind,
     /// The first row (from 1, as in the file; after sorting, in the sorted order).
     pub row: u64,
@@ -75,7 +75,7 @@ pub(super) fn repair_rows(
     {
         let grid = Grid::new(times, description);
         if !grid.holds(times) {
-            resample(path, &grid, times, columns, &mut repairs)?;
+            repairs.extend(Resampling { path, grid: &grid, times, columns }.run()?);
             description.rate_hz = Some(grid.rate_hz);
         }
     }
@@ -211,30 +211,37 @@ impl Grid {
     }
 }
 
-/// Resamples the rows to an even time base, by straight lines between rows.
-fn resample(
-    path: &Path,
-    grid: &Grid,
-    times: &mut Vec<f64>,
-    columns: &mut Columns,
-    repairs: &mut Vec<Repair>,
-) -> Result<(), ReadError> {
-    let rate_hz = grid.rate_hz;
-    let slots = libm::round(grid.place(times[times.len() - 1])) + 1.0;
-    if !(slots >= 1.0 && slots <= (MAX_GROWTH * times.len()) as f64) {
-        let reason = format!(
-            "filling it evenly at {rate_hz} Hz would take {slots:.0} samples for {} rows",
-            times.len()
-        );
-        return Err(ReadError::Repair { path: path.to_owned(), reason });
+/// Rows that are resampled to an even time base, by straight lines between rows.
+struct Resampling<'a> {
+    /// The file, for errors.
+    path: &'a Path,
+    grid: &'a Grid,
+    /// Times of the rows, s, in order; at least two.
+    times: &'a mut Vec<f64>,
+    columns: &'a mut Columns,
+}
+
+impl Resampling<'_> {
+    /// Replaces times and columns.
+    fn run(self) -> Result<Vec<Repair>, ReadError> {
+        let Self { path, grid, times, columns } = self;
+        let rate_hz = grid.rate_hz;
+        let slots = libm::round(grid.place(times[times.len() - 1])) + 1.0;
+        if !(slots >= 1.0 && slots <= (MAX_GROWTH * times.len()) as f64) {
+            let rows = times.len();
+            let reason =
+                format!("filling it evenly at {rate_hz} Hz would take {slots:.0} samples for {rows} rows");
+            return Err(ReadError::Repair { path: path.to_owned(), reason });
+        }
+        let mut repairs: Vec<Repair> = resampled(grid, times).into_iter().collect();
+        repairs.extend(filled_gaps(grid, times));
+        let places: Vec<f64> = (0..slots as usize).map(|slot| grid.start_s + slot as f64 / rate_hz).collect();
+        for values in [&mut columns.voltage_v, &mut columns.current_a] {
+            *values = interpolated(times, values, &places, MAX_OFFSET_PERIODS / rate_hz);
+        }
+        *times = places;
+        Ok(repairs)
     }
-    repairs.extend(resampled(grid, times));
-    repairs.extend(filled_gaps(grid, times));
-    let places: Vec<f64> = (0..slots as usize).map(|slot| grid.start_s + slot as f64 / rate_hz).collect();
-    columns.voltage_v = interpolated(times, &columns.voltage_v, &places, MAX_OFFSET_PERIODS / rate_hz);
-    columns.current_a = interpolated(times, &columns.current_a, &places, MAX_OFFSET_PERIODS / rate_hz);
-    *times = places;
-    Ok(())
 }
 
 /// Reports rows off the time base.
