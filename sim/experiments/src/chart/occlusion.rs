@@ -38,7 +38,7 @@ pub struct OcclusionEffort {
     pub slats: &'static [u32],
 }
 
-/// What blurs.
+/// The source of blur.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {
@@ -67,7 +67,7 @@ impl Kind {
 /// A kind of query on one kind of scene. Costs are means over all objects.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct OcclusionRow {
-    /// What blurs.
+    /// The source of blur.
     pub kind: Kind,
     /// Slats of a wall.
     pub slats: u32,
@@ -314,7 +314,7 @@ pub(crate) struct Drawn {
     viewport: Viewport,
     table: SampleTable,
     depths: Vec<f32>,
-    /// What sampled queries found, by box.
+    /// Answers of sampled queries, by box.
     pub seen: Vec<SampledAnswer>,
 }
 
@@ -354,7 +354,7 @@ impl Drawn {
     }
 }
 
-/// What one way of asking costs, `[tests, bytes, madds]`, and whether it finds an object hidden.
+/// Answer of one kind of query: whether it finds an object hidden, and its cost `[tests, bytes, madds]`.
 type Answered = (bool, [u64; 3]);
 
 /// A row from the answers for all objects, and whether it is truly hidden.

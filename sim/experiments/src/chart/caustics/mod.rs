@@ -97,7 +97,7 @@ pub struct CausticsChart {
 
 /// Short names of the methods, in the order of [`Method::ALL`].
 const KEYS: [&str; 4] = ["moving", "refined", "hull", "prism"];
-/// What the maps of the methods are called, in the order of [`Method::ALL`].
+/// Names of the maps of the methods, in the order of [`Method::ALL`].
 const MAPS: [&str; 4] =
     ["caustics_map_moving", "caustics_map_refined", "caustics_map_hull", "caustics_map_prism"];
 
@@ -406,7 +406,7 @@ fn lost(chart: &CausticsChart) -> ChartPanel {
     over_crossing("light in the volume", "light missing (%)", curves)
 }
 
-/// What bodies are worth, at the largest number of triangles.
+/// Panel of the useful share of each bounding volume, at the largest number of triangles.
 fn useful(chart: &CausticsChart) -> ChartPanel {
     let most = chart.effort.pleated_cells.last().copied().unwrap_or(0);
     let of = |(place, method): (usize, Method)| {
