@@ -63,7 +63,7 @@ pub struct Report {
     pub auto: Choices,
 }
 
-/// What goes into `summary.json`.
+/// The part of `summary.json`.
 #[derive(Serialize)]
 pub struct Summary<'a> {
     /// Samples lost over all rows: must be none.
@@ -166,7 +166,7 @@ fn stem(name: &str) -> String {
 }
 
 impl Report {
-    /// What goes into `summary.json`.
+    /// The part of `summary.json`.
     pub fn summary(&self) -> Summary<'_> {
         Summary {
             samples_lost: self.rows.iter().map(|row| row.samples_lost).sum(),
@@ -195,7 +195,7 @@ impl Report {
         rows.take(if first { 1 } else { usize::MAX }).map(|row| row.over_best).reduce(f64::max)
     }
 
-    /// What is printed below the table.
+    /// Text below the table.
     fn below(&self) -> String {
         let (summary, rows) = (self.summary(), self.rows.len());
         format!(

@@ -99,7 +99,7 @@ struct Column {
     name: &'static str,
     values: Vec<Value>,
     heading: String,
-    /// What is shown; a column without cells is not shown.
+    /// Texts of the column; one without any is not shown.
     cells: Vec<String>,
     /// Whether it is in Markdown alone.
     detail: bool,
@@ -214,7 +214,7 @@ impl Sheet {
         Some(heading + &rows.collect::<String>())
     }
 
-    /// What is printed; `None` where nothing is.
+    /// The table for a terminal; `None` without a column to print.
     pub fn text(&self) -> Option<String> {
         let printed = || self.columns.iter().filter(|column| column.is_shown() && !column.detail);
         printed().next()?;

@@ -26,7 +26,7 @@ const fn name(method: Method) -> &'static str {
     }
 }
 
-/// What passes have drawn, as the rows print it.
+/// Numbers of a result, as the rows print them.
 fn ran(drawn: &PlainResult) -> Vec<Number> {
     numbers([
         ("passes", drawn.passes as f64),
@@ -119,7 +119,7 @@ impl Looks {
         Some([shares().reduce(f64::min)?, shares().reduce(f64::max)?])
     }
 
-    /// What each way keeps of public queries that do not collide: no error, only work.
+    /// Share of public queries without a collision that each method keeps: no error, only work.
     fn said_of_others(&self, public: &Public) -> String {
         if self.false_positives().is_none() {
             return String::new();
@@ -202,7 +202,7 @@ fn facts(looks: &Looks, public: &Public) -> Vec<Number> {
     ])
 }
 
-/// What of the public data was run.
+/// Remainder of a sentence: the public data that was run.
 fn said(public: &Public, given: bool) -> String {
     if !given {
         return "; no public case, as no folder was given (--collision-data)".to_owned();
@@ -301,7 +301,7 @@ pub(super) fn dodged(task: &Task<'_>) -> Result<Done, RunError> {
     Ok(Done::bare(Row { ran: ran(&drawn), ..made }))
 }
 
-/// What the passes say of a case.
+/// Result of the passes for a case, in words.
 fn told(case: &TwoObjects, ours: &PlainResult, depth: &PlainResult, resolution: u32) -> String {
     let kept = |drawn: &PlainResult| if drawn.may_collide() { "keep" } else { "clear" };
     let along =

@@ -87,7 +87,7 @@ impl Widths {
         self.means(2)
     }
 
-    /// What planes gain beyond that, the gain by time taken out: over all tiles, where the facing changes, and elsewhere.
+    /// Gain of planes beyond that, without the gain by time: over all tiles, where the facing changes, and elsewhere.
     fn over_null(&self) -> [f64; 3] {
         let (planes, null) = (self.means(0), self.null());
         [0, 1, 2].map(|class| planes[class] / null[class])
