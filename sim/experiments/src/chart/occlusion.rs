@@ -150,10 +150,7 @@ impl Study for OcclusionChart {
     fn draw(&self, to: &Gallery<'_>) -> Result<(), OutputError> {
         let samples = self.effort.samples[0];
         let title = "Occlusion queries: by intervals and by samples";
-        let subject = format!(
-            "share of hidden boxes that are found, over bytes of stored depth read for each queried box; {samples} samples a pixel, sampled queries 16 to 64; \
-             dots of a tile from few boxes of lens and time to many"
-        );
+        let subject = self.subject();
         to.chart("occlusion", [title, &subject], Kind::ALL.map(|kind| self.rates(kind)).into())?;
         let title = "Where occlusion queries fail: many small occluders";
         let subject = format!(
@@ -215,6 +212,18 @@ impl Study for OcclusionChart {
 }
 
 impl OcclusionChart {
+    /// Subtitle of the chart of rates.
+    fn subject(&self) -> String {
+        let samples = self.effort.samples;
+        format!(
+            "share of hidden boxes that are found, over bytes of stored depth read for each queried box; {} samples a pixel, \
+             sampled queries {} to {}; dots of a tile from few boxes of lens and time to many",
+            samples[0],
+            samples[0],
+            samples[samples.len() - 1]
+        )
+    }
+
     fn rows(&self) -> impl Iterator<Item = &OcclusionRow> {
         self.intervals.iter().chain(&self.samples).chain(&self.failing)
     }
@@ -477,6 +486,7 @@ mod tests {
             slats: &[1, 8],
         };
         let (folder, chart, done) = written::<OcclusionChart>(least);
+        assert!(chart.subject().contains("4 samples a pixel, sampled queries 4 to 8"), "{}", chart.subject());
         let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
         let json: serde_json::Value = serde_json::from_str(&read("occlusion.json")).unwrap();
         let rows = chart.intervals.len() + chart.samples.len() + chart.failing.len();

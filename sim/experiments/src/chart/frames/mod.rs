@@ -48,7 +48,7 @@ pub enum Way {
     Templates,
     /// Tracking from one mark, templates learnt.
     Tracking,
-    /// One mark and no method requested: that of the others which fits what is found.
+    /// One mark, without a requested method: the finder chooses one of the others.
     Auto,
 }
 

@@ -67,11 +67,11 @@ pub struct Figures {
 /// The reference itself.
 #[derive(Clone, Debug, Serialize)]
 pub struct Reference {
-    /// Units visited in a second of host time.
+    /// Units visited in a second of processor time.
     pub unit_cycles_per_s: f64,
-    /// Cycles of the core clock, those that were skipped included, in a second of host time.
+    /// Cycles of the core clock, those that were skipped included, in a second of processor time.
     pub cycles_per_s: f64,
-    /// Host seconds of all rows.
+    /// Seconds of the host's processor, all rows together.
     pub cpu_s: f64,
 }
 

@@ -270,8 +270,8 @@ impl<'a> Scenes<'a> {
 /// Triangles through a pinhole: of every two one has both ends anywhere, the other drifts and wobbles a little.
 fn random(count: u32, side_px: u32, seed: u64) -> Result<StressScene, RunError> {
     let camera = Camera::new(Affine3A::IDENTITY, 1.0, NEAR).map_err(RunError::setting)?;
-    let viewport =
-        Viewport::new(side_px, side_px).ok_or_else(|| RunError::setting(workloads::job::IMAGE_SIZE))?;
+    let viewport = Viewport::new(side_px, side_px)
+        .ok_or_else(|| RunError::setting(format!("VI-15: {}", workloads::job::IMAGE_SIZE)))?;
     let samples = SampleTable::low_discrepancy(4, seed, LensShape::Disk)?;
     let (mut open, mut close) = (Vec::new(), Vec::new());
     for number in 0..count {
