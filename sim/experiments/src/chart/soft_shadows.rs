@@ -21,7 +21,7 @@ use workloads::soft_shadows::{
 use workloads::{Frame, Overrides, Scene};
 
 use crate::chart::statistics::{errors, mean_square, neighbours};
-use crate::study::table::{Sheet, Table, fixed, plain};
+use crate::study::table::{Sheet, Table, count, fixed, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
 use crate::study::{Gallery, Study, StudyError};
 
@@ -112,10 +112,10 @@ impl Study for SoftShadowsChart {
             .shown("RMSE", |row| row.rmse, fixed(5))
             .shown("neighbours", |row| row.neighbour_correlation, fixed(2))
             .shown("equal", |row| if row.equal { "yes" } else { "NO" }, plain)
-            .shown("vertices", |row| row.one_pass.vertices, plain)
-            .shown("(accumulated)", |row| row.accumulation.vertices, plain)
-            .shown("madds", |row| row.one_pass.madds, plain)
-            .shown("(accumulated)", |row| row.accumulation.madds, plain)
+            .shown("vertices", |row| row.one_pass.vertices, count)
+            .shown("(accumulated)", |row| row.accumulation.vertices, count)
+            .shown("madds", |row| row.one_pass.madds, count)
+            .shown("(accumulated)", |row| row.accumulation.madds, count)
             .shown("host s", |row| row.one_pass.host_s, fixed(3))
             .shown("(accumulated)", |row| row.accumulation.host_s, fixed(3));
         let biases = Table::of(&self.biases)

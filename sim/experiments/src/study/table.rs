@@ -1,6 +1,7 @@
 //! Tables whose columns are declared once, for CSV, JSON, Markdown and the terminal.
 
 use output::dir::BoxError;
+use output::table::grouped;
 use serde::ser::{SerializeMap, SerializeSeq};
 use serde::{Serialize, Serializer};
 
@@ -49,6 +50,11 @@ impl<V: Into<Value>> From<Option<V>> for Value {
 /// Shows a value as it is.
 pub fn plain<V: ToString>(value: V) -> String {
     value.to_string()
+}
+
+/// Shows a count, its digits in groups of three.
+pub fn count(value: impl TryInto<u64>) -> String {
+    value.try_into().map_or(String::new(), grouped)
 }
 
 /// Shows a number with so many decimals.

@@ -10,7 +10,7 @@ use output::progress::Progress;
 use serde::Serialize;
 use workloads::caustics::{MAX_CROSSED_SHARE, Method};
 
-use crate::study::table::{Sheet, Table, fixed, millis, plain};
+use crate::study::table::{Sheet, Table, count, fixed, millis, plain};
 use crate::study::{Gallery, Study, StudyError};
 
 pub use measure::{Crossed, Ocean, ocean};
@@ -163,16 +163,16 @@ impl Study for CausticsChart {
         let pixels = f64::from(ocean.size[0] * ocean.size[1]);
         let methods = Table::of(Method::ALL.into_iter().enumerate())
             .shown("ocean", |(_, method)| method.name(), plain)
-            .shown("executions", |(place, _)| ocean.executions[*place], plain)
+            .shown("executions", |(place, _)| ocean.executions[*place], count)
             .shown("a pixel", |(place, _)| ocean.executions[*place] as f64 / pixels, fixed(1))
-            .shown("most", |(place, _)| ocean.most[*place], plain)
+            .shown("most", |(place, _)| ocean.most[*place], count)
             .shown("of the prism's", |(place, _)| ocean.of_the_prism(*place), fixed(3))
             .before(format!("{} volumes\n", ocean.volumes));
         let sweep = Table::of(&self.rows)
             .shown("slope", |row| row.slope, plain)
             .shown("crossed", |row| row.crossing, fixed(4))
             .shown("method", |row| row.method.name(), plain)
-            .shown("executions", |row| row.executions, plain)
+            .shown("executions", |row| row.executions, count)
             .shown("find light", |row| row.useful, fixed(3))
             .shown("CPU ms", |row| row.cpu_s, millis(1));
         let coarse = Table::of(&self.coarse)

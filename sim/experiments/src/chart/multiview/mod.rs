@@ -9,7 +9,7 @@ use pipeline::Replacement;
 use serde::Serialize;
 use workloads::multiview::{Layout, MAX_RUNS_OVER_INFINITE_CACHE, MAX_VIEW_ANGLE_DEG};
 
-use crate::study::table::{Sheet, Table, fixed, plain};
+use crate::study::table::{Sheet, Table, count, fixed, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
 use crate::study::{Gallery, Study, StudyError};
 use output::OutputError;
@@ -152,7 +152,7 @@ impl Study for MultiviewChart {
             .column("passes", "passes", |(.., run)| run.passes, plain)
             .data("invocations", |(.., run)| run.invocations)
             .column("over_one_view", "lanes over one view", |(.., run)| run.over_one_view, fixed(3))
-            .column("vertices", "vertices", |(.., run)| run.vertices, plain)
+            .column("vertices", "vertices", |(.., run)| run.vertices, count)
             .data("dram_bytes", |(.., run)| run.dram_bytes)
             .column("host_s", "host s", |(.., run)| run.host_s, fixed(3));
         let cached = self.caches.iter().flat_map(|case| case.rows.iter().map(|row| (case.name, row)));
