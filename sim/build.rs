@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::Command;
 
-/// What the program is made of, from the root of the repository. A change of these builds the program anew anyway, so that asking git
+/// Sources of the program, from the root of the repository. A change of these builds the program anew anyway, so that asking git
 /// costs nothing more.
 const SOURCES: [&str; 19] = [
     "Cargo.toml",

@@ -197,6 +197,37 @@ fn list_names_everything_in_text_and_in_json() {
 }
 
 #[test]
+fn list_shows_the_options_of_a_workload() {
+    let text = quintile().call(["list", "occlusion"]);
+    let json = quintile().call(["list", "occlusion", "--json"]);
+    assert_eq!((text.code, json.code), (Some(0), Some(0)), "{}{}", text.stderr, json.stderr);
+    let listing: Value = serde_json::from_str(&json.stdout).expect("list --json prints JSON");
+    assert_eq!(listing["name"], "occlusion");
+    let options = listing["options"].as_array().expect("a list of options");
+    assert!(options.len() > 5);
+    for option in options {
+        let [name, range, meaning] =
+            ["name", "range", "meaning"].map(|key| option[key].as_str().unwrap_or_default());
+        let line = text.stdout.lines().find(|line| line.split_whitespace().next() == Some(name));
+        let line = line.unwrap_or_else(|| panic!("no {name} in {}", text.stdout));
+        assert!(!range.is_empty() && line.contains(range) && line.contains(meaning), "{line}");
+    }
+    let unknown = quintile().call(["list", "oclusion"]);
+    assert_eq!(unknown.code, Some(2));
+    assert!(unknown.stderr.contains("unknown workload `oclusion`, did you mean `occlusion`?"), "{unknown:?}");
+}
+
+#[test]
+fn former_names_of_charts_suggest_those_of_today() {
+    for (former, today) in [("collision", "ccd"), ("shadows", "soft-shadows"), ("views", "multiview")] {
+        let ended = quintile().call(["chart", former]);
+        assert_eq!(ended.code, Some(2), "{}", ended.stderr);
+        assert!(ended.stderr.contains(&format!("a similar value exists: '{today}'")), "{}", ended.stderr);
+        assert!(!quintile().call(["list"]).stdout.contains(&format!("  {former} ")), "{former}");
+    }
+}
+
+#[test]
 fn help_shows_usage() {
     let help = quintile().call(["--help"]);
     assert_eq!((help.code, help.stderr.as_str()), (Some(0), ""));

@@ -14,9 +14,9 @@ fn compared(args: &[&str]) -> (String, Value) {
     (text.stdout, serde_json::from_str(&json.stdout).expect("JSON"))
 }
 
-fn png(inputs: &Inputs, name: &str, size: [u32; 2], color: impl Fn(u32, u32) -> [u8; 3]) -> String {
+fn png(inputs: &Inputs, name: &str, size: [u32; 2], colour: impl Fn(u32, u32) -> [u8; 3]) -> String {
     let path = inputs.path(name);
-    let image = RgbImage::from_fn(size[0], size[1], |x, y| Rgb(color(x, y)));
+    let image = RgbImage::from_fn(size[0], size[1], |x, y| Rgb(colour(x, y)));
     image.save(&path).expect("a PNG");
     path
 }

@@ -69,10 +69,10 @@ fn an_obj_file_is_drawn_in_the_materials_it_names() {
 #[test]
 fn vertex_colours_are_drawn() {
     let corners = [[0, 0], [1, 0], [1, 1], [0, 1]];
-    let color = |x: i32| [1 - x, 0, x];
+    let colour = |x: i32| [1 - x, 0, x];
     let line = |scale: i32| {
         move |[x, y]: &[i32; 2]| {
-            let [r, g, b] = color(*x).map(|channel| channel * scale);
+            let [r, g, b] = colour(*x).map(|channel| channel * scale);
             format!("{x} {y} 0 {r} {g} {b}\n")
         }
     };
@@ -88,10 +88,10 @@ fn vertex_colours_are_drawn() {
     let mut glb = Glb::square();
     let rgba: Vec<f32> = corners
         .iter()
-        .flat_map(|[x, _]| [color(*x).map(|c| c as f32).to_vec(), vec![1.0]].concat())
+        .flat_map(|[x, _]| [colour(*x).map(|c| c as f32).to_vec(), vec![1.0]].concat())
         .collect();
-    let colors = glb.floats(&rgba, 4);
-    glb.primitive()["attributes"]["COLOR_0"] = json!(colors);
+    let colours = glb.floats(&rgba, 4);
+    glb.primitive()["attributes"]["COLOR_0"] = json!(colours);
     let inputs = Inputs::new();
     let files = [
         inputs.put("a.ply", ply),
@@ -116,11 +116,11 @@ fn counts(results: &Results) -> Value {
 #[test]
 fn vertex_colours_are_counted_unless_white() {
     let inputs = Inputs::new();
-    let with = |name: &str, color: Option<[f32; 4]>| {
+    let with = |name: &str, colour: Option<[f32; 4]>| {
         let mut glb = Glb::square();
-        if let Some(color) = color {
-            let colors = glb.floats(&[color; 4].concat(), 4);
-            glb.primitive()["attributes"]["COLOR_0"] = json!(colors);
+        if let Some(colour) = colour {
+            let colours = glb.floats(&[colour; 4].concat(), 4);
+            glb.primitive()["attributes"]["COLOR_0"] = json!(colours);
         }
         run(&inputs.put(name, glb.bytes()), &[])
     };

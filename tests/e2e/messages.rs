@@ -43,8 +43,8 @@ fn errors_of_parser_and_program_have_one_style() {
             "{call:?}: {}",
             plain.stderr
         );
-        let colored = quintile().call(["--color", "always"].iter().chain(call));
-        assert!(colored.stderr.starts_with("\u{1b}[1m\u{1b}[31merror:\u{1b}[0m "), "{:?}", colored.stderr);
+        let coloured = quintile().call(["--color", "always"].iter().chain(call));
+        assert!(coloured.stderr.starts_with("\u{1b}[1m\u{1b}[31merror:\u{1b}[0m "), "{:?}", coloured.stderr);
     }
 }
 

@@ -7,8 +7,8 @@ use image::RgbImage;
 const VIEW: &str = "camera: (position: (0, 0, 5), target: (0, 0, 0), fov_deg: 40), background: (0, 0, 0)";
 const SETTINGS: &str = "width: 160, height: 120, samples: 64, frames: (0, 1)";
 
-fn sphere(place: &str, color: &str) -> String {
-    format!("(shape: Sphere(radius: 0.5, segments: 64), material: (color: {color}, unlit: true), {place})")
+fn sphere(place: &str, colour: &str) -> String {
+    format!("(shape: Sphere(radius: 0.5, segments: 64), material: (color: {colour}, unlit: true), {place})")
 }
 
 fn picture(settings: &str, objects: &[String]) -> RgbImage {

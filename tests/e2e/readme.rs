@@ -77,6 +77,16 @@ fn links_resolve() {
     }
 }
 
+#[test]
+fn every_trace_format_is_in_the_book() {
+    for page in ["docs/guide/traces.md", "docs/formats.md"] {
+        let page_text = text(&root().join(page));
+        for format in &traces::io::FORMATS {
+            assert!(page_text.contains(&format!("`.{}`", format.ending)), "{page}: no `.{}`", format.ending);
+        }
+    }
+}
+
 /// Files and folders in back quotes of `ARCHITECTURE.md` and `CONTRIBUTING.md` that begin with a folder of the repository.
 #[test]
 fn quoted_paths_exist() {

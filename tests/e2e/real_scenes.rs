@@ -40,7 +40,7 @@ fn triangles_in(summary: &Value) -> u64 {
     summary["counts"]["triangles_in"].as_u64().unwrap_or(0)
 }
 
-/// What holds for every scene: it is in view, drawn whole, and costs something.
+/// Properties of every scene: it is in view, drawn whole, and has a cost.
 fn assert_sound(results: &Results, triangles: u64, frames: u32) {
     let summary = results.summary();
     assert_eq!(summary["settings"]["triangles"].as_u64(), Some(triangles));

@@ -227,11 +227,15 @@ fn commands_that_share_a_folder() {
     assert_eq!(ended.code, Some(2), "{}", ended.stderr);
     assert!(ended.stderr.contains("summary.json: `quintile stress` wrote this file"), "{}", ended.stderr);
     assert_eq!(fs::read(Path::new(&out).join("summary.json")).ok(), Some(before));
-    let chart = ["chart", "shadows", "--quick", "--out", &out];
-    fs::write(Path::new(&out).join("shadows.csv"), "mine").expect("a file can be written");
+    let chart = ["chart", "soft-shadows", "--quick", "--out", &out];
+    fs::write(Path::new(&out).join("soft_shadows.csv"), "mine").expect("a file can be written");
     let ended = quintile().call(chart);
     assert_eq!(ended.code, Some(2), "{}", ended.stderr);
-    assert!(ended.stderr.contains("shadows.csv") && ended.stderr.contains("--force"), "{}", ended.stderr);
+    assert!(
+        ended.stderr.contains("soft_shadows.csv") && ended.stderr.contains("--force"),
+        "{}",
+        ended.stderr
+    );
     let reproduce = ["reproduce", "II", "--quick", "--out", &out];
     fs::write(Path::new(&out).join("reproduce_II.json"), "mine").expect("a file can be written");
     assert_eq!(quintile().call(reproduce).code, Some(2));

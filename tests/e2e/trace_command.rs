@@ -5,6 +5,7 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 use serde_json::Value;
+use traces::io::{FORMATS, TraceFormat};
 
 fn quintile(folder: &Path, args: &[&str]) -> Output {
     let binary = env!("CARGO_BIN_EXE_quintile");
@@ -55,9 +56,12 @@ fn frames_of_a_recorders_csv_have_the_columns_and_add_up() {
 fn converted_files_hold_the_same_and_streaming_finds_the_same() {
     let folder = tempfile::tempdir().unwrap();
     write_trace(folder.path());
-    let chain = ["t.csv", "t.parquet", "u.tsv.gz", "v.jls", "v.csv"];
+    let read = FORMATS.iter().filter(|format| format.is_read());
+    let mut chain: Vec<String> = read.map(|format| format!("u.{}", format.ending)).collect();
+    chain.insert(0, "t.csv".to_owned());
+    chain.extend(["t.parquet", "v.jls", "v.csv"].map(str::to_owned));
     for pair in chain.windows(2) {
-        json(folder.path(), &["convert", pair[0], pair[1]]);
+        json(folder.path(), &["convert", &pair[0], &pair[1]]);
     }
     json(folder.path(), &["convert", "v.csv", "--out", "w.csv"]);
     let [named, last] = ["v.csv", "w.csv"].map(|name| fs::read(folder.path().join(name)).unwrap());
@@ -74,6 +78,22 @@ fn converted_files_hold_the_same_and_streaming_finds_the_same() {
         assert!((a["energy_J"].as_f64().unwrap() / b["energy_J"].as_f64().unwrap() - 1.0).abs() < 1e-6);
     }
     assert!(quintile(folder.path(), &["convert", "t.csv", "t.perfetto-trace"]).status.success());
+}
+
+#[test]
+fn help_names_every_format_and_standard_output_takes_it() {
+    let folder = tempfile::tempdir().unwrap();
+    write_trace(folder.path());
+    let help = quintile(folder.path(), &["convert", "--help"]);
+    let help = String::from_utf8_lossy(&help.stdout).split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(help.contains(&traces::io::readable()) && help.contains(&traces::io::endings()), "{help}");
+    for TraceFormat { ending, .. } in &FORMATS {
+        let file = format!("o.{ending}");
+        assert!(quintile(folder.path(), &["convert", "t.csv", &file]).status.success(), "{ending}");
+        let piped = quintile(folder.path(), &["convert", "t.csv", "-", "--format", ending]);
+        assert!(piped.stdout == fs::read(folder.path().join(file)).unwrap(), "{ending}");
+    }
+    refused(folder.path(), &["convert", "t.csv", "-", "--format", "cvs"], "csv");
 }
 
 #[test]
@@ -197,7 +217,7 @@ fn wrong_input_is_one_line_and_the_right_code() {
         (
             &["energy", "t.csv", "--mark", "0.2", "--end", "0.5", "--pass", "late=50"],
             2,
-            "--pass late=50: no frame is longer than 10.",
+            "--pass late begins 50 ms after the start of its frame, but no frame is longer than 10.",
         ),
     ];
     for (args, code, says) in cases {

@@ -189,7 +189,7 @@ fn binary_files_are_refused_without_their_bytes() {
         let ended = quintile().call(["trace", "frames", &trace, "--mark", "1"]);
         assert_eq!(ended.code, Some(2), "{}", ended.stderr);
         assert!(
-            ended.stderr.contains(says) && ended.stderr.contains("Parquet, JLS, CSV"),
+            ended.stderr.contains(says) && ended.stderr.contains(&traces::io::readable()),
             "{}",
             ended.stderr
         );

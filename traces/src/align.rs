@@ -6,9 +6,11 @@
 //! compared with all stamps, each paired with the nearest start, and fitted again to these pairs.
 
 use crate::stats::upper_median;
+use crate::trace::is_within;
 use rayon::prelude::*;
 use serde::Serialize;
 use thiserror::Error;
+use warnings::{Code, Warning};
 
 /// Fewest pairs of a fit: fewer fit anything.
 const MIN_PAIRS: usize = 4;
@@ -17,6 +19,10 @@ const MAX_RIVAL_RATIO: f64 = 2.0;
 
 /// Largest residual of a fit, as a share of the median gap of the starts.
 const MAX_RESIDUAL_SHARE: f64 = 0.1;
+
+/// Largest deviation of the clock of the stamps from that of the trace by anchors, as a share. The crystals of computers deviate
+/// by less than 1e-4; more than this is another unit or another recording.
+const MAX_CLOCK_DEVIATION: f64 = 0.02;
 
 /// Residuals below this are rounding, s.
 const EXACT_S: f64 = 1e-9;
@@ -90,6 +96,23 @@ impl Alignment {
             return Err(AlignError::Anchors { a, b });
         }
         Ok(Self { scale, offset_s: a.1 - scale * a.0, residual_s: 0.0, pairs: 2, ambiguous: false })
+    }
+
+    /// Warnings about anchors (stamp, time) that are likely wrong: stamps in another unit, or of another recording. The stamps
+    /// are sorted, s.
+    pub fn warnings(&self, anchors: [(f64, f64); 2], stamps_s: &[f64]) -> Vec<Warning> {
+        let mut messages = Vec::new();
+        if (self.scale - 1.0).abs() > MAX_CLOCK_DEVIATION {
+            messages
+                .push(format!("by the anchors, a second of the stamps lasts {} s of the trace", self.scale));
+        }
+        if let [first, .., last] | [first @ last] = *stamps_s {
+            let beyond = anchors.into_iter().filter(|(stamp, _)| !is_within([first, last], *stamp));
+            messages.extend(beyond.map(|(stamp, _)| {
+                format!("stamp {stamp} s of an anchor is beyond those of the file, {first} s to {last} s")
+            }));
+        }
+        messages.into_iter().map(|message| Warning::new(Code::AnchorsOff, message)).collect()
     }
 
     /// The pairing of stamps with starts of the least residual: one after another from some shift on or, if
@@ -251,6 +274,18 @@ mod tests {
                 Some(*t)
             })
             .collect()
+    }
+
+    #[test]
+    fn anchors_of_another_unit_or_recording_are_warned_about() {
+        let warned = |anchors: [(f64, f64); 2], stamps_s: &[f64]| {
+            Alignment::by_anchors(anchors[0], anchors[1]).unwrap().warnings(anchors, stamps_s).len()
+        };
+        let stamps_s = [0.0, 10.0, 20.0];
+        assert_eq!(warned([(0.0, 5.0), (20.0, 25.0)], &stamps_s), 0);
+        assert_eq!(warned([(0.0, 5.0), (20.0, 26.0)], &stamps_s), 1);
+        assert_eq!(warned([(-1.0, 5.0), (21.0, 27.0)], &stamps_s), 2);
+        assert_eq!(warned([(-1.0, 5.0), (21.0, 28.0)], &[3.0]), 3);
     }
 
     #[test]

@@ -4,10 +4,10 @@
 //! No simulator is needed. A recording of voltage and current, one marked frame start and the end of the last
 //! frame are enough:
 //!
-//! 1. [`io`] reads a [`Trace`] from Parquet, JLS, CSV or TSV, and writes these formats; the crate [`jls`] can be used
+//! 1. [`io`] reads a [`Trace`] from a file and writes it, in any of the [formats](io::FORMATS); the crate [`jls`] can be used
 //!    alone;
 //! 2. [`frames`] finds every frame that begins like the marked one, with the confidence of each start, and warns of results
-//!    that may be wrong; [`stream`] does so for files that do not fit into memory;
+//!    that may be wrong; [`stream`] does so for files that do not fit into memory, and [`search`] chooses between the two;
 //! 3. [`energy`] integrates from start to start by one rule, so that the frames add up to the whole, and evaluates runs,
 //!    passes, idle power, warm-up and outliers;
 //! 4. [`pareto`] compares settings by time and energy, [`align`] puts time stamps of another clock onto a trace, and
@@ -59,6 +59,7 @@ pub mod pareto;
 pub mod pyramid;
 pub mod random;
 pub mod score;
+pub mod search;
 mod stats;
 pub mod stream;
 pub mod synth;

@@ -175,6 +175,12 @@ impl Trace {
         f64::from(self.voltage_v[index]) * f64::from(self.current_a[index])
     }
 
+    /// Left edge (s) and power (W) of the samples from the one that `from_s` lies in to before the one that `to_s` lies in.
+    pub fn powers_between(&self, from_s: f64, to_s: f64) -> impl ExactSizeIterator<Item = (f64, f64)> + '_ {
+        let place = |time_s: f64| self.position(time_s).clamp(0.0, self.samples() as f64) as usize;
+        (place(from_s)..place(to_s)).map(|index| (self.time_s(index), self.power_w(index)))
+    }
+
     /// Power of every sample, W, in order.
     pub fn powers_w(&self) -> impl ExactSizeIterator<Item = f64> + '_ {
         self.voltage_v.iter().zip(&self.current_a).map(|(&v, &i)| f64::from(v) * f64::from(i))
@@ -314,6 +320,16 @@ mod tests {
         assert!(message(&[1.0], &[1.0], f64::NAN, 0.0).contains("NaN Hz"));
         assert!(message(&[1.0], &[1.0], 1.0, 1e10).contains("10000000000 s"));
         assert!(message(&[1.0, 1.0], &[1.0, f32::NAN], 1.0, 0.0).contains("row 2: current_A is NaN"));
+    }
+
+    #[test]
+    fn powers_between_times_are_those_of_the_samples_there() {
+        let trace = build(vec![2.0; 5], vec![0.0, 1.0, 2.0, 3.0, 4.0], 10.0, 1.0).unwrap();
+        let powers = |from_s, to_s| trace.powers_between(from_s, to_s).map(|(_, w)| w).collect::<Vec<_>>();
+        assert_eq!(powers(1.15, 1.35), [2.0, 4.0]);
+        assert_eq!(powers(0.0, 9.0), [0.0, 2.0, 4.0, 6.0, 8.0]);
+        assert!(powers(1.35, 1.15).is_empty() && powers(7.0, 9.0).is_empty());
+        assert_eq!(trace.powers_between(1.25, 9.0).next(), Some((trace.time_s(2), 4.0)));
     }
 
     #[test]

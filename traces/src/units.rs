@@ -3,7 +3,7 @@
 
 use thiserror::Error;
 
-/// What a column measures.
+/// Quantity of a column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Quantity {
     /// Times, s.

@@ -1,36 +1,36 @@
 //! The list of studies.
 
 use crate::chart::caustics::CausticsChart;
-use crate::chart::collision::CollisionChart;
+use crate::chart::ccd::CcdChart;
 use crate::chart::frames::FramesChart;
 use crate::chart::glossy::GlossyChart;
 use crate::chart::growth::GrowthChart;
+use crate::chart::multiview::MultiviewChart;
 use crate::chart::occlusion::OcclusionChart;
 use crate::chart::points::PointsChart;
 use crate::chart::sampled::SampledChart;
 use crate::chart::sampling::SamplingChart;
-use crate::chart::shadows::ShadowsChart;
+use crate::chart::soft_shadows::SoftShadowsChart;
 use crate::chart::tile_tests::TileTests;
 use crate::chart::timing::TimingChart;
-use crate::chart::views::ViewsChart;
 use crate::stress::Report;
 use crate::study::Entry;
 
 /// The charts of the book.
 pub static CHARTS: [Entry; 13] = [
     Entry::of::<CausticsChart>(),
-    Entry::of::<CollisionChart>(),
+    Entry::of::<CcdChart>(),
     Entry::of::<FramesChart>(),
     Entry::of::<GlossyChart>(),
     Entry::of::<GrowthChart>(),
+    Entry::of::<MultiviewChart>(),
     Entry::of::<OcclusionChart>(),
     Entry::of::<PointsChart>(),
     Entry::of::<SampledChart>(),
     Entry::of::<SamplingChart>(),
-    Entry::of::<ShadowsChart>(),
+    Entry::of::<SoftShadowsChart>(),
     Entry::of::<TileTests>(),
     Entry::of::<TimingChart>(),
-    Entry::of::<ViewsChart>(),
 ];
 
 /// The failure catalogue, which has a command of its own.

@@ -112,9 +112,13 @@ pub fn digits(value: f64) -> String {
     plain(value, 4)
 }
 
-/// An integer in full, any other number without a unit to four digits.
+/// An integer in groups of three, any other number without a unit to four digits.
 pub fn count_or_digits(value: f64) -> String {
-    if value.fract() == 0.0 && value.abs() < 1e15 { format!("{value}") } else { digits(value) }
+    if value.fract() != 0.0 || value.abs() >= 1e15 {
+        return digits(value);
+    }
+    let sign = if value < 0.0 { "-" } else { "" };
+    format!("{sign}{}", grouped(value.abs() as u64))
 }
 
 /// A number without a unit to three digits; large numbers as integers in groups of three.
@@ -136,30 +140,36 @@ fn plain_decimals(value: f64, digits: usize) -> usize {
     (digits as i32 - 1 - power).clamp(0, 12) as usize
 }
 
-/// An integer in groups of three: `1 234 567`.
+/// An integer in groups of three, as everywhere in reports, messages and the book: `1,234,567`.
 pub fn grouped(value: u64) -> String {
     let digits = value.to_string();
     let groups: Vec<&str> =
         digits.as_bytes().rchunks(3).rev().filter_map(|g| str::from_utf8(g).ok()).collect();
-    groups.join(" ")
+    groups.join(",")
 }
 
-/// Count with its noun: `1 frame`, `2 frames`.
+/// Count with its noun: `1 frame`, `2,000 frames`.
 pub fn counted(count: usize, thing: &str) -> String {
     let ending = if count == 1 { "" } else { "s" };
-    format!("{count} {thing}{ending}")
+    format!("{} {thing}{ending}", grouped(count as u64))
 }
 
-/// Text table for a terminal: the first column is left-aligned, the others right-aligned.
+/// Text table for a terminal: the first column is left-aligned, the others right-aligned unless all of them are texts.
 #[derive(Clone, Debug, Default)]
 pub struct Table {
     rows: Vec<Vec<String>>,
+    of_texts: bool,
 }
 
 impl Table {
     /// Empty table with these columns.
     pub fn new<'a>(header: impl IntoIterator<Item = &'a str>) -> Self {
-        Self { rows: vec![header.into_iter().map(str::to_owned).collect()] }
+        Self { rows: vec![header.into_iter().map(str::to_owned).collect()], of_texts: false }
+    }
+
+    /// Empty table with these columns, all left-aligned.
+    pub fn of_texts<'a>(header: impl IntoIterator<Item = &'a str>) -> Self {
+        Self { of_texts: true, ..Self::new(header) }
     }
 
     /// Adds a row; missing cells are empty.
@@ -184,9 +194,9 @@ impl fmt::Display for Table {
             let mut line = String::new();
             for (column, width) in widths.iter().enumerate() {
                 let cell = row.get(column).map_or("", String::as_str);
-                let padded =
-                    if column == 0 { format!("{cell:<width$}") } else { format!("  {cell:>width$}") };
-                line.push_str(&padded);
+                let gap = if column == 0 { "" } else { "  " };
+                let left = column == 0 || self.of_texts;
+                line += &if left { format!("{gap}{cell:<width$}") } else { format!("{gap}{cell:>width$}") };
             }
             writeln!(f, "{}", line.trim_end())?;
         }
@@ -253,7 +263,7 @@ mod tests {
             [si(7.0, ""), si(6.94e-5, ""), si(0.0529, ""), si(0.0, "")],
             ["7.00", "6.94e-5", "0.0529", "0"]
         );
-        assert_eq!([number(12_345_678.4), number(6.94e-5), number(123.4)], ["12 345 678", "6.94e-5", "123"]);
+        assert_eq!([number(12_345_678.4), number(6.94e-5), number(123.4)], ["12,345,678", "6.94e-5", "123"]);
         assert_eq!([si(12_345.0, ""), si_digits(0.529_12, "", 4)], ["12345", "0.5291"]);
         assert_eq!(si_mean_sd(MeanSd { mean: 0.0529, sd: 0.0001 }, ""), "0.05290 ± 0.00010");
     }
@@ -285,12 +295,17 @@ mod tests {
         let mut table = Table::new(["unit", "busy"]);
         table.row(["setup", "3.0 %"]).row(["µ", "12.0 %"]).row(["short"]);
         assert_eq!(table.to_string(), "unit     busy\nsetup   3.0 %\nµ      12.0 %\nshort\n");
+        let mut texts = Table::of_texts(["name", "what"]);
+        texts.row(["setup", "a"]).row(["µ", "long"]);
+        assert_eq!(texts.to_string(), "name   what\nsetup  a\nµ      long\n");
     }
 
     #[test]
     fn groups_of_three() {
         assert_eq!(grouped(0), "0");
-        assert_eq!(grouped(1_234_567), "1 234 567");
+        assert_eq!([count_or_digits(-12_345.0), count_or_digits(0.5)], ["-12,345", "0.5000"]);
+        assert_eq!([counted(1, "frame"), counted(2000, "frame")], ["1 frame", "2,000 frames"]);
+        assert_eq!(grouped(1_234_567), "1,234,567");
     }
 
     #[test]

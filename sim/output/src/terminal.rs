@@ -25,19 +25,19 @@ pub enum Verbosity {
 #[derive(Clone, Debug, Default)]
 pub struct Terminal {
     verbosity: Verbosity,
-    colored: bool,
+    coloured: bool,
 }
 
 impl Terminal {
     /// A terminal for messages up to `verbosity`. With [`ColorChoice::Auto`] colours depend on standard error and on
     /// the variables `NO_COLOR`, `CLICOLOR`, `CLICOLOR_FORCE` and `TERM`.
-    pub fn new(verbosity: Verbosity, color: ColorChoice) -> Self {
-        let colored = match color {
+    pub fn new(verbosity: Verbosity, colour: ColorChoice) -> Self {
+        let coloured = match colour {
             ColorChoice::Always | ColorChoice::AlwaysAnsi => true,
             ColorChoice::Never => false,
             ColorChoice::Auto => AutoStream::choice(&stderr()) != ColorChoice::Never,
         };
-        Self { verbosity, colored }
+        Self { verbosity, coloured }
     }
 
     /// Amount of messages.
@@ -87,7 +87,7 @@ impl Terminal {
     /// Writes a line at once, so that lines of several threads do not mix. Errors of standard error are
     /// ignored.
     fn line(&self, kind: &str, style: Style, message: &str) {
-        let line = match self.colored {
+        let line = match self.coloured {
             true => format!("{style}{kind}:{style:#} {message}\n"),
             false => format!("{kind}: {message}\n"),
         };
@@ -100,9 +100,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn colors_follow_the_choice() {
+    fn colours_follow_the_choice() {
         let [always, never] =
-            [ColorChoice::Always, ColorChoice::Never].map(|color| Terminal::new(Verbosity::Normal, color));
-        assert!(always.colored && !never.colored);
+            [ColorChoice::Always, ColorChoice::Never].map(|choice| Terminal::new(Verbosity::Normal, choice));
+        assert!(always.coloured && !never.coloured);
     }
 }

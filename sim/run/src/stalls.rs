@@ -7,8 +7,8 @@ use serde::Serialize;
 use timing::{Stalls, UnitTime};
 
 use super::{RunFrame, Simulated};
-use output::perfetto::CounterTrack;
 use output::plot::{Look, Picture, StallLane, UnitPlot};
+use traces::io::perfetto::CounterTrack;
 
 /// Largest number of columns of the plot.
 const MAX_COLUMNS: usize = 128;

@@ -1,4 +1,4 @@
-//! What a run draws: the frames of a scene or of a workload, and which of them differ.
+//! The work of a run: the frames of a scene or of a workload, and which of them differ.
 
 use std::collections::HashMap;
 use std::path::Path;

@@ -2,14 +2,14 @@
 
 use activity::Unit;
 use output::dir::{Claim, OutDir, SUMMARY};
-use output::perfetto::{
-    self, CounterTrack, FrameSpan, MAX_SLICES, PassSpan, Timeline, UnitTrack, slices_of_bins,
-};
 use output::progress::Progress;
 use pipeline::PassReport;
 use power_model::Part;
 use timing::PassTime;
 use traces::energy::{ExtraColumn, FrameEnergy, FrameTable};
+use traces::io::perfetto::{
+    self, CounterTrack, FrameSpan, MAX_SLICES, PassSpan, Timeline, UnitTrack, slices_of_bins,
+};
 use traces::score::{TOLERANCE_S, truth_beside};
 
 use crate::frame::image_name;

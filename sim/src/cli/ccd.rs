@@ -36,9 +36,9 @@ pub struct CcdArgs {
     /// Comparison in each pixel
     #[arg(long, value_enum, default_value_t)]
     pub method: MethodArg,
-    /// Render once at the given resolution, without zooming into the remaining pairs
+    /// Render once at the given resolution, without refinement of the remaining pairs
     #[arg(long)]
-    pub no_zoom: bool,
+    pub no_refinement: bool,
     /// File for every pair of every case: case_id,a,b,may_collide; `-` prints that and nothing else
     #[arg(long, value_name = "FILE")]
     pub csv: Option<PathBuf>,
@@ -72,11 +72,11 @@ impl CcdArgs {
             MethodArg::BoxBox => Method::BoxBox,
             MethodArg::DepthOnly => Method::DepthOnly,
         };
-        Search { resolution: self.resolution, bins: self.bins, method, zoom: !self.no_zoom }
+        Search { resolution: self.resolution, bins: self.bins, method, zoom: !self.no_refinement }
     }
 }
 
-/// Product of pixels across and bins above which a pair without zoom takes minutes.
+/// Product of pixels across and bins above which a pair without refinement takes minutes.
 const MAX_FAST_PIXEL_BINS: u32 = 128 * 64;
 
 /// Pair of objects that may collide.
@@ -176,7 +176,7 @@ pub(super) fn run(args: &CcdArgs, terminal: &Terminal) -> Result<(), Failure> {
     let progress = Progress::on(terminal, args.json);
     if !search.zoom && search.resolution * search.bins > MAX_FAST_PIXEL_BINS {
         progress.note(
-            "without zoom, this number of pixels and bins takes minutes per pair; leave --no-zoom out for seconds",
+            "without refinement, this number of pixels and bins takes minutes per pair; leave --no-refinement out for seconds",
         );
     }
     let outcomes = pool.install(|| answered(&cases, &search, &progress));

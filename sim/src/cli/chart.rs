@@ -1,10 +1,12 @@
 //! `quintile chart` and `quintile stress`: studies, opened, made, written and printed.
 
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::error::{ContextKind, ContextValue};
+use clap::{Arg, Args, Command};
 use experiments::catalog::{ALL, CHARTS, all};
 use experiments::stress::{Report, StressEffort, family_named};
 use experiments::study::index::{self, Index, Section};
@@ -53,7 +55,7 @@ pub struct StressArgs {
     Results are in DIR: pictures as SVG and PNG, NAME.csv, NAME.json and NAME.md.")]
 pub struct ChartArgs {
     /// Which chart
-    #[arg(value_parser = charts(), value_name = "NAME")]
+    #[arg(value_parser = ChartParser, value_name = "NAME")]
     pub chart: ChartArg,
     /// Another scene for `sampled`, `tile-tests` or `timing`, by name or file; may be given several times
     #[arg(long, value_name = "SCENE")]
@@ -87,14 +89,45 @@ pub enum ChartArg {
     One(&'static Entry),
 }
 
-/// The names of the charts, each with its line of help.
-fn charts() -> impl TypedValueParser<Value = ChartArg> {
-    let values = CHARTS.iter().map(|chart| (chart.name, chart.about));
-    let values = std::iter::once(ALL).chain(values).map(|(name, help)| PossibleValue::new(name).help(help));
-    PossibleValuesParser::new(values).map(|name: String| {
+/// Charts that had another name in 0.1.0: that name, and the name today. Errors suggest it.
+const RENAMED: [(&str, &str); 3] =
+    [("collision", "ccd"), ("shadows", "soft-shadows"), ("views", "multiview")];
+
+/// Parser of the name of a chart.
+#[derive(Clone, Debug)]
+struct ChartParser;
+
+impl ChartParser {
+    /// The names, each with its line of help.
+    fn names() -> impl Iterator<Item = PossibleValue> {
+        let names = CHARTS.iter().map(|chart| (chart.name, chart.about));
+        std::iter::once(ALL).chain(names).map(|(name, help)| PossibleValue::new(name).help(help))
+    }
+}
+
+impl TypedValueParser for ChartParser {
+    type Value = ChartArg;
+
+    fn parse_ref(
+        &self,
+        command: &Command,
+        argument: Option<&Arg>,
+        value: &OsStr,
+    ) -> Result<ChartArg, clap::Error> {
+        let parsed = PossibleValuesParser::new(Self::names()).parse_ref(command, argument, value);
+        let name = parsed.map_err(|mut error| {
+            if let Some((_, today)) = RENAMED.iter().find(|(former, _)| value == *former) {
+                error.insert(ContextKind::SuggestedValue, ContextValue::String((*today).to_owned()));
+            }
+            error
+        })?;
         let chart = CHARTS.iter().find(|chart| chart.name == name);
-        chart.map_or(ChartArg::All, ChartArg::One)
-    })
+        Ok(chart.map_or(ChartArg::All, ChartArg::One))
+    }
+
+    fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
+        Some(Box::new(Self::names()))
+    }
 }
 
 impl From<StudyError> for Failure {

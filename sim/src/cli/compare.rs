@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use output::table::{Table, digits, grouped, si};
+use output::table::{Table, count_or_digits, digits, grouped, si};
 use run::compare::{
     Change, CompareError, Comparison, FolderComparison, ImageComparison, RunComparison, compare, shown,
 };
@@ -112,13 +112,7 @@ fn quantity(value: f64, unit: &str) -> String {
     if SI.contains(&unit) {
         return si(value, unit);
     }
-    let number = if value.fract() == 0.0 && value.abs() < 1e15 {
-        let sign = if value < 0.0 { "-" } else { "" };
-        format!("{sign}{}", grouped(value.abs() as u64))
-    } else {
-        digits(value)
-    };
-    format!("{number} {unit}").trim_end().to_owned()
+    format!("{} {unit}", count_or_digits(value)).trim_end().to_owned()
 }
 
 fn signed(value: f64, unit: &str) -> String {

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use clap::Args;
-use output::table::{Table, digits, grouped};
+use output::table::{Table, counted, digits, grouped};
 use serde::Serialize;
 use workloads::Alpha;
 use workloads::catalog;
@@ -168,10 +168,6 @@ fn print_samples(name: &str, json: bool, samples: &FixedSamples) -> Result<(), F
     ))
 }
 
-fn counted(count: usize, what: &str) -> String {
-    if count == 1 { format!("1 {what}") } else { format!("{} {what}s", grouped(count as u64)) }
-}
-
 /// Point or size as text, each coordinate to four digits.
 fn point(values: [f64; 3]) -> String {
     format!("({})", values.map(digits).join(", "))
@@ -299,7 +295,7 @@ fn meshes(info: &SceneInfo) -> String {
 }
 
 fn materials(info: &SceneInfo) -> String {
-    let mut table = Table::new(["material", "color", "texture", "sides", "light", "opacity"]);
+    let mut table = Table::new(["material", "colour", "texture", "sides", "light", "opacity"]);
     for material in info.materials.iter().take(MAX_ROWS) {
         let texture = material.texture.and_then(|texture| info.textures.get(texture));
         table.row([

@@ -80,7 +80,7 @@ pub enum Command {
     Completions(CompletionsArgs),
     /// Print the manual page, or write one for each command into a folder
     Man(ManArgs),
-    /// List the built-in scenes, GPUs, platforms, energy tables, workloads and figures
+    /// List the built-in scenes, GPUs, platforms, energy tables, workloads and figures, or the options of a workload
     List(ListArgs),
 }
 
@@ -110,8 +110,11 @@ pub struct ManArgs {
 
 /// Arguments of `list`.
 #[derive(Debug, Args)]
-#[command(after_help = "Example:\n  quintile list --json")]
+#[command(after_help = "Examples:\n  quintile list --json\n  quintile list glossy")]
 pub struct ListArgs {
+    /// A workload whose options are listed, with defaults, ranges and meanings
+    #[arg(value_name = "WORKLOAD")]
+    pub workload: Option<String>,
     /// Print as JSON
     #[arg(long)]
     pub json: bool,

@@ -4,6 +4,5 @@
 mod machine_files;
 mod output_dir;
 mod output_image;
-mod output_perfetto;
 mod output_plot;
 mod output_report;

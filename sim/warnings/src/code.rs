@@ -34,7 +34,7 @@ impl Section {
 
 macro_rules! codes {
     ($($(#[doc = $line:literal])+ $code:ident = $name:literal in $section:ident,)+) => {
-        /// What a warning is about. A code never changes its meaning.
+        /// Subject of a warning. A code never changes its meaning.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         pub enum Code {
             $($(#[doc = $line])+ $code,)+

@@ -10,9 +10,9 @@ use crate::Code;
 /// A run has entered a regime its methods are known to be bad at, or has gone on without something its input asks for.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 pub struct Warning {
-    /// What it is about.
+    /// Its subject.
     pub code: Code,
-    /// What happened, to how many things, and what it means for the results; one line.
+    /// The event, the number of things it concerns, and its effect on the results; one line.
     pub message: String,
     /// How many things it concerns (materials, primitives, frames); 1 where it is about the run as a whole.
     pub count: usize,
@@ -22,7 +22,7 @@ pub struct Warning {
     kind: Option<Kind>,
 }
 
-/// What a counted message is made from: "3 point lights ignored: only one directional light is used".
+/// Parts of a counted message: "3 point lights ignored: only one directional light is used".
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct Kind {
     thing: &'static str,

@@ -25,11 +25,11 @@ const ARROWS: [(&str, &[&str]); 12] = [
     ("sim", &BELOW_COMMAND),
 ];
 
-/// What stands below the experiments.
+/// Crates below the experiments.
 const BELOW_EXPERIMENTS: &[&str] =
     &["activity", "output", "pipeline", "power-model", "run", "timing", "traces", "warnings", "workloads"];
 
-/// What stands below the command.
+/// Crates below the command.
 const BELOW_COMMAND: [&str; 10] = [
     "activity",
     "experiments",
@@ -161,7 +161,7 @@ fn only_sim_ends_the_process() {
     }
 }
 
-/// What a run is made from is recorded where it is opened: nothing else opens files there.
+/// Inputs of a run are recorded where they are opened; no other place opens files there.
 #[test]
 fn inputs_are_opened_in_one_place() {
     let ways = ["fs::read", "File::open", "OpenOptions"];

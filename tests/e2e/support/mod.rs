@@ -1,4 +1,4 @@
-//! What the end-to-end tests share: running the command, small input files, reading results.
+//! Helpers of the end-to-end tests: running the command, small input files, reading results.
 
 mod command;
 mod glb;

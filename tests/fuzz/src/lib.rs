@@ -1,4 +1,4 @@
-//! What the fuzz targets share: readers that want a file get one.
+//! Helpers of the fuzz targets: readers that want a file get one.
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,4 +1,4 @@
-//! What one analysis of a case is worth.
+//! Score of one analysis of a case.
 
 use crate::case::Case;
 use std::error::Error;

@@ -4,12 +4,13 @@ use super::Device;
 use super::losses::Gaps;
 use super::sample::{Channels, LowPass, SampleError};
 use crate::curve::CurveError;
-use crate::energy::Sums;
+use crate::energy::{Sums, energies_j};
 use crate::io::{TraceChunk, TraceHeader, TraceReader, TraceWriter, WriteError};
 use crate::stats::PairSum;
 use crate::trace::{check_times, losses, lost_at_end, lost_samples};
 use core::ops::Range;
 use rayon::prelude::*;
+use warnings::{Code, Warning};
 
 /// Mean powers that are converted at once.
 const PIECE_SAMPLES: usize = 1 << 16;
@@ -67,6 +68,22 @@ impl Device {
 }
 
 impl Resampled<'_> {
+    /// Energy of the original over the same time, J.
+    ///
+    /// # Errors
+    /// [`WriteError::Read`] if it cannot be read.
+    pub fn original_energy_j(&self) -> Result<f64, WriteError> {
+        Ok(energies_j(self.trace, &[(self.header.start_s, self.header.end_s())])?[0])
+    }
+
+    /// Warning about samples beyond the range of the device.
+    pub fn clipping(&self) -> Option<Warning> {
+        let [currents, voltages] = [self.clipped_currents, self.clipped_voltages];
+        let message =
+            || format!("{currents} currents and {voltages} voltages were beyond the device's range");
+        (currents + voltages > 0).then(|| Warning::new(Code::Clipped, message()))
+    }
+
     /// The losses of the device, in words; `None` without any.
     pub fn losses(&self) -> Option<String> {
         losses(&self.lost, |index| self.header.time_s(index as u64))

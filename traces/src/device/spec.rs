@@ -5,6 +5,7 @@ use crate::trace::RATE_LIMITS_HZ;
 use core::ops::RangeInclusive;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
+use warnings::{Code, Warning};
 
 /// A field of [`DeviceSpec`] that is out of range.
 #[derive(Clone, Debug, Error, PartialEq)]
@@ -176,6 +177,10 @@ impl TraceWriter for Peaks {
     }
 }
 
+/// Least share of a range that the largest current should use. At 8 bits 5 % are 6 codes of 127, and rounding
+/// by half a code is then 8 % of the current.
+const MIN_USED_SHARE: f64 = 0.05;
+
 /// Ratio of a range to the peak.
 const HEADROOM: f64 = 1.25;
 
@@ -228,9 +233,23 @@ impl DeviceSpec {
         Self { name: format!("daq-{rate}-{}bit", self.bits), ..self }
     }
 
-    /// Which share of the codes of the current's converter a trace with these peaks reaches.
+    /// Share of the codes of the current's converter that a trace with these peaks reaches.
     pub fn share_of_current_codes(&self, peaks: &Peaks) -> f64 {
         peaks.current_a / self.current_range_a.map(f64::abs).into_iter().fold(0.0, f64::max)
+    }
+
+    /// Warning if a trace with these peaks uses few codes.
+    pub fn warning(&self, peaks: &Peaks) -> Option<Warning> {
+        let (share, [low_a, high_a]) = (self.share_of_current_codes(peaks), self.current_range_a);
+        let message = || {
+            format!(
+                "the largest current, {:.3e} A, uses {:.2} % of the device's range of {low_a} to {high_a} A: its energy is rounded \
+                 to few codes",
+                peaks.current_a,
+                share * 100.0
+            )
+        };
+        (share < MIN_USED_SHARE).then(|| Warning::new(Code::RangeUnused, message()))
     }
 }
 
@@ -300,5 +319,8 @@ mod tests {
         let peaks = Peaks::of(&trace).unwrap();
         assert_eq!((peaks.voltage_v, peaks.current_a, peaks.power_w), (12.0, 2.0, 22.0));
         assert_eq!(DeviceSpec::default().share_of_current_codes(&peaks), 2.0 / 30.0);
+        assert!(DeviceSpec::default().warning(&peaks).is_none());
+        let small = Peaks { current_a: 1.0, ..peaks };
+        assert!(DeviceSpec::default().warning(&small).unwrap().message.contains("uses 3.33 % of"));
     }
 }

@@ -3,6 +3,7 @@
 use super::{FrameEnergy, Idle, Spread, energies_j, finishes_s, levels_w, outliers, warm_up};
 use crate::io::{TraceReader, WriteError};
 use thiserror::Error;
+use warnings::{Code, Warning};
 
 /// About how many samples the lowest power is taken from.
 const LEVELS: u64 = 65_536;
@@ -44,6 +45,64 @@ pub struct Pass {
     pub name: String,
     /// When it begins, s after the start of the frame.
     pub begin_s: f64,
+}
+
+/// A pass that cannot be one of these frames.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum PassError {
+    /// Two passes of one name.
+    #[error("pass {name} is given twice: name each pass differently")]
+    Twice {
+        /// The name.
+        name: String,
+    },
+    /// It begins in no frame.
+    #[error(
+        "pass {name} begins {begin_ms} ms after the start of its frame, but no frame is longer than {longest_ms:.3} ms; let it \
+         begin before that"
+    )]
+    Beyond {
+        /// The name.
+        name: String,
+        /// When it begins, ms after the start of a frame.
+        begin_ms: f64,
+        /// The longest frame, ms.
+        longest_ms: f64,
+    },
+}
+
+/// Refuses two passes of one name.
+///
+/// # Errors
+/// [`PassError::Twice`].
+pub fn check_passes(passes: &[Pass]) -> Result<(), PassError> {
+    let twice = |(index, pass): &(usize, &Pass)| passes[..*index].iter().any(|other| other.name == pass.name);
+    match passes.iter().enumerate().find(twice) {
+        Some((_, pass)) => Err(PassError::Twice { name: pass.name.clone() }),
+        None => Ok(()),
+    }
+}
+
+impl Pass {
+    /// Warning if the pass begins in some of the frames only.
+    ///
+    /// # Errors
+    /// [`PassError::Beyond`] if it begins in none.
+    pub fn check(&self, frames: &[FrameEnergy]) -> Result<Option<Warning>, PassError> {
+        let (name, begin_ms) = (&self.name, self.begin_s * 1e3);
+        let beyond = frames.iter().filter(|frame| frame.duration_s() <= self.begin_s).count();
+        if beyond == frames.len() {
+            let longest_ms = frames.iter().map(FrameEnergy::duration_s).fold(0.0, f64::max) * 1e3;
+            return Err(PassError::Beyond { name: name.clone(), begin_ms, longest_ms });
+        }
+        let message = || {
+            let all = frames.len();
+            format!(
+                "{beyond} of {all} frames end before pass {name} begins, {begin_ms} ms after their start: it has no energy there"
+            )
+        };
+        Ok((beyond > 0).then(|| Warning::new(Code::PassBeyond, message())))
+    }
 }
 
 /// Why a run could not be evaluated.
@@ -237,6 +296,21 @@ mod tests {
         assert!((of(Some(&Idle::Mean(1.0)))[1].1.mean - 0.08).abs() < 1e-9);
         assert!((PowerIntegral::new(&trace).total_j() - 2.6).abs() < 1e-9);
         assert!(passes_j(&trace, &run.frames, &[], None).unwrap().is_empty());
+    }
+
+    #[test]
+    fn passes_have_names_of_their_own_and_begin_within_frames() {
+        let pass = |name: &str, begin_s| Pass { name: name.to_owned(), begin_s };
+        assert_eq!(check_passes(&[pass("a", 0.0), pass("b", 0.1)]), Ok(()));
+        let twice = check_passes(&[pass("a", 0.0), pass("b", 0.1), pass("a", 0.2)]).unwrap_err();
+        assert_eq!(twice, PassError::Twice { name: "a".to_owned() });
+        let mut frames = frames();
+        frames[3].end_s = frames[3].start_s + 0.01;
+        assert_eq!(pass("a", 0.005).check(&frames), Ok(None));
+        let warning = pass("a", 0.05).check(&frames).unwrap().unwrap();
+        assert!(warning.message.starts_with("1 of 10 frames end before pass a begins, 50 ms"), "{warning:?}");
+        let error = pass("a", 0.2).check(&frames).unwrap_err().to_string();
+        assert!(error.contains("begins 200 ms") && error.contains("longer than 100.000 ms"), "{error}");
     }
 
     #[test]

@@ -5,6 +5,7 @@ use crate::frames::{Flag, Flags};
 use crate::stats::about_mean;
 use rayon::prelude::*;
 use serde::Serialize;
+use warnings::{Code, Warning};
 
 /// Summary of a table of frames. Averages are over frames; for joules per pixel divide by the pixels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -78,6 +79,33 @@ pub fn pooled(runs: &[Vec<f64>]) -> Option<Pooled> {
     let deviation = if freedom > 0 { libm::sqrt(squares / freedom as f64) } else { 0.0 };
     let mean = runs.iter().flat_map(|run| run.iter()).sum::<f64>() / values as f64;
     Some(Pooled { runs: runs.len(), values, mean, deviation })
+}
+
+/// Repeated runs, frame by frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Repeats {
+    /// Energies of each frame over the runs, as far as all runs reach, J.
+    pub energies_j: Vec<Spread>,
+    /// Fewest and most frames of a run.
+    pub frames: [usize; 2],
+}
+
+impl Repeats {
+    /// Compares the energies of frames over runs, J; `None` without runs.
+    pub fn of(runs: &[Vec<f64>]) -> Option<Self> {
+        let lengths = || runs.iter().map(Vec::len);
+        let frames = [lengths().min()?, lengths().max()?];
+        let of_frame = |index: usize| runs.iter().map(|run| run[index]).collect::<Vec<_>>();
+        let energies_j = (0..frames[0]).filter_map(|index| Spread::of(&of_frame(index))).collect();
+        Some(Self { energies_j, frames })
+    }
+
+    /// Warning about runs of different lengths.
+    pub fn warning(&self) -> Option<Warning> {
+        let [fewest, most] = self.frames;
+        let message = || format!("runs have {fewest} to {most} frames; the first {fewest} are shown");
+        (fewest < most).then(|| Warning::new(Code::UnevenRuns, message()))
+    }
 }
 
 /// Frames on either side that show what is usual.
@@ -316,6 +344,13 @@ mod tests {
 
     #[test]
     fn means_over_what_is_left() {
+        let repeats = Repeats::of(&[vec![1.0, 4.0, 9.0], vec![3.0, 4.0]]).unwrap();
+        assert_eq!(repeats.energies_j.iter().map(|spread| spread.mean).collect::<Vec<_>>(), [2.0, 4.0]);
+        assert_eq!(repeats.frames, [2, 3]);
+        assert!(repeats.warning().unwrap().message.starts_with("runs have 2 to 3 frames"));
+        assert!(
+            Repeats::of(&[vec![1.0], vec![2.0]]).unwrap().warning().is_none() && Repeats::of(&[]).is_none()
+        );
         assert_eq!(mean_over_discarded(&[4.0, 2.0, 1.0]), [7.0 / 3.0, 1.5, 1.0]);
     }
 }

@@ -8,11 +8,12 @@ use super::threshold::{MIN_SEPARATION, Rule, Threshold};
 use crate::trace::Trace;
 use warnings::{Code, Warning};
 
-/// Frames of fewer samples are measured coarsely.
+/// Frames of fewer samples are measured coarsely: half a sample at either end is a hundredth of the frame.
 const MIN_FRAME_SAMPLES: f64 = 50.0;
-/// Largest share of frames of odd length, by number or by covered time, of a regular spacing.
+/// Largest share of frames of odd length, by number or by covered time, of a regular spacing: as for low confidence.
 const MAX_ODD_SHARE: f64 = 0.1;
-/// Largest share of frames of low confidence without a warning about the whole result.
+/// Largest share of frames of low confidence without a warning about the whole result: above the share of
+/// right frames that are flagged in `docs/finding.md`, also in its hard cases (*Flags*).
 const MAX_LOW_CONFIDENCE_SHARE: f64 = 0.1;
 
 /// The confidence of a distance (W^2): 1 at or below the mean of the matches, 0 at or above that of the rest,

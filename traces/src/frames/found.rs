@@ -68,6 +68,15 @@ pub(super) fn marked_starts(placement: &Placement, profile: &[f64]) -> Vec<Frame
     placement.marks.iter().map(start).collect()
 }
 
+/// Frames of lower confidence are flagged. Confidence is 1 at the mean distance of the matches and 0 at that of the other
+/// minima, on a logarithmic scale: below one half a start is nearer to the others.
+pub(super) const MIN_CONFIDENCE: f64 = 0.5;
+/// Confidence factor of a start that may be misplaced: below [`MIN_CONFIDENCE`], so that its frames are flagged however
+/// well it matches. Its exact value only orders flagged frames; confidence is not calibrated.
+pub(super) const SUSPECT_CONFIDENCE: f64 = 0.8 * MIN_CONFIDENCE;
+/// Confidence factor of a start beyond a phase slip: below [`SUSPECT_CONFIDENCE`], as it is off by a part of a frame.
+pub(in crate::frames) const SLIPPED_CONFIDENCE: f64 = 0.6 * MIN_CONFIDENCE;
+
 /// A note on a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Flag {
@@ -106,16 +115,10 @@ impl Flag {
         Self::Coarse,
     ];
 
-    /// Flags of frames whose ends may be misplaced.
-    pub const LOW_CONFIDENCE: [Self; 7] = [
-        Self::Long,
-        Self::Short,
-        Self::LowConfidence,
-        Self::Merged,
-        Self::Split,
-        Self::IrregularLength,
-        Self::Coarse,
-    ];
+    /// Whether an end of the frame may be misplaced. The flags of its position in the trace do not mean that.
+    pub fn lowers_confidence(self) -> bool {
+        !matches!(self, Self::Marked | Self::Last)
+    }
 
     /// The word in the `flags` column.
     pub fn name(self) -> &'static str {
@@ -152,9 +155,9 @@ impl Flags {
         self.0 & flag.bit() != 0
     }
 
-    /// Whether any of [`Flag::LOW_CONFIDENCE`] is set.
+    /// Whether a flag [lowers the confidence](Flag::lowers_confidence) in the frame.
     pub fn has_low_confidence(self) -> bool {
-        Flag::LOW_CONFIDENCE.iter().any(|flag| self.contains(*flag))
+        Flag::ALL.into_iter().any(|flag| flag.lowers_confidence() && self.contains(flag))
     }
 }
 

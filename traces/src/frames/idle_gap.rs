@@ -9,6 +9,7 @@
 //! - A missing gap: a start amidst work, where others nearby have an idle gap, may lie within a frame. Where a frame takes
 //!   two ticks of the display at a slow clock, its middle is on a tick, too.
 
+use super::found::SUSPECT_CONFIDENCE;
 use crate::stats::{mean, nth_smallest, upper_median};
 use rayon::prelude::*;
 
@@ -39,8 +40,6 @@ const SMOOTHED_SAMPLES: usize = 3;
 const MIN_MOVED_SAMPLES: f64 = 4.0;
 /// Least share of suspect starts nearby that makes a start suspect, too.
 const MIN_SUSPECT_SHARE: f64 = 0.125;
-/// Confidence factor of a suspect start.
-pub(super) const SUSPECT_CONFIDENCE: f64 = 0.4;
 
 /// The samples of a profile at which an idle gap begins and ends, by each of the [`BOUNDS`].
 type GapBounds = [Option<[usize; 2]>; BOUNDS.len()];

@@ -215,8 +215,8 @@ pub(crate) fn flat_mark<'a>(
     Some(Warning::new(
         Code::FlatMark,
         format!(
-            "around the mark at {mark_s} s power varies by no more than noise, and any idle time resembles it: what is found may be no \
-             frames; mark where one begins"
+            "around the mark at {mark_s} s power varies by no more than noise, and every flat part of the trace resembles it: the starts \
+             found may not be those of frames; mark where a frame begins"
         ),
     ))
 }

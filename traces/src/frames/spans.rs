@@ -1,6 +1,6 @@
 //! The frames between starts, and their flags.
 
-use super::found::{Flag, Flags, FrameSpan, FrameStart};
+use super::found::{Flag, Flags, FrameSpan, FrameStart, MIN_CONFIDENCE, SUSPECT_CONFIDENCE};
 use super::periodicity;
 use crate::stats::upper_median;
 
@@ -18,8 +18,6 @@ const MIN_WINDOW_SAMPLES: usize = 8;
 const MIN_EVEN_SHARES: [(usize, f64); 2] = [(COARSE_WINDOW_SAMPLES, 0.9), (50, 0.6)];
 /// At a median gap of fewer windows, nothing distinguishes a start from the middle of a frame.
 const MIN_GAP_WINDOWS: f64 = 1.2;
-/// Confidence factor where window and period decide nothing.
-const COARSE_CONFIDENCE: f64 = 0.4;
 /// Frames of fewer samples are coarse: half a sample, the uncertainty of their ends, is a thirtieth of the
 /// frame.
 const COARSE_FRAME_SAMPLES: f64 = 16.0;
@@ -53,7 +51,7 @@ pub(super) fn spans(starts: &[FrameStart], end_s: f64, sampling: Sampling) -> Ve
         });
     }
     lower_coarse_confidence(&mut frames, sampling);
-    for frame in frames.iter_mut().filter(|frame| frame.confidence < 0.5) {
+    for frame in frames.iter_mut().filter(|frame| frame.confidence < MIN_CONFIDENCE) {
         frame.flags.insert(Flag::LowConfidence);
     }
     for frame in frames
@@ -95,7 +93,7 @@ fn lower_coarse_confidence(frames: &mut [FrameSpan], sampling: Sampling) {
         .iter_mut()
         .zip(even)
         .filter(|(_, even)| !even)
-        .for_each(|(frame, _)| frame.confidence *= COARSE_CONFIDENCE);
+        .for_each(|(frame, _)| frame.confidence *= SUSPECT_CONFIDENCE);
 }
 
 fn flag_lengths(frames: &mut [FrameSpan]) {

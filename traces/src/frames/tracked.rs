@@ -1,7 +1,7 @@
 //! Starts by the sequence with the most evidence.
 
 use super::assess::uncovered_work;
-use super::found::{Found, FrameStart, Method, spacing};
+use super::found::{Found, FrameStart, Method, SUSPECT_CONFIDENCE, spacing};
 use super::marks::{MarkError, Marks, Placed, Placement, flat_mark_of};
 use super::matched::noise_variance;
 use super::register::register;
@@ -12,9 +12,6 @@ use super::track::{Start, track};
 use super::vsync::{Snapped, snap_to_ticks};
 use super::{assess, idle_gap};
 use crate::trace::Trace;
-
-/// Confidence factor of a start between the ticks of the display that the others wait for.
-const OFF_TICK_CONFIDENCE: f64 = 0.4;
 
 /// Finds the sequence of starts with the most evidence.
 pub(super) fn find_tracked(trace: &Trace, marks: &Marks) -> Result<Found, MarkError> {
@@ -83,7 +80,7 @@ fn in_phase(
     let (positions, in_phase) = match first_mark.and_then(|mark| snap_to_ticks(&positions, mark, width)) {
         // What begins on a tick is in the phase of the mark, whatever happened on the way.
         Some(Snapped { positions, off_tick }) => {
-            (positions, off_tick.iter().map(|off| if *off { OFF_TICK_CONFIDENCE } else { 1.0 }).collect())
+            (positions, off_tick.iter().map(|off| if *off { SUSPECT_CONFIDENCE } else { 1.0 }).collect())
         }
         None => {
             let factors = spread_from_unmarked(

@@ -4,6 +4,7 @@
 use super::columns::{Layout, Picked, RowBatch, layout};
 use super::description::{Description, to_json};
 use super::samples::{TraceChunk, TraceHeader, TraceReader, TraceWriter};
+use super::source::{Opened, RowSource};
 use super::time_base::Stamps;
 use super::{CURRENT_A, ReadError, ReadOptions, Repair, RepairKind, TIME_S, VOLTAGE_V, WriteError, atomic};
 use crate::decimal;
@@ -43,14 +44,16 @@ pub(crate) fn delimiter(text: &[u8]) -> u8 {
     [b'\t', b';'].into_iter().find(|byte| line.contains(byte)).unwrap_or(b',')
 }
 
+/// Typical size of a row, in bytes.
+pub const ROW_BYTES: u64 = 50;
 /// Rows that a thread formats at once.
 const TASK_ROWS: usize = 1 << 12;
 /// Rows whose text is held at once.
 const HELD_ROWS: usize = 1 << 18;
 
 /// Writes the samples. Times are whole nanoseconds written as seconds; values have the digits that read back
-/// as the same number in f32 and in f64, so that an integral in f64 gives the same joules as here. About 50
-/// bytes a sample.
+/// as the same number in f32 and in f64, so that an integral in f64 gives the same joules as here. A sample takes about
+/// [`ROW_BYTES`].
 ///
 /// # Errors
 /// [`WriteError::Encode`] if the writer fails, [`WriteError::Read`] if the samples cannot be read.
@@ -172,8 +175,10 @@ const CHECKED_ROWS: u64 = 1000;
 type Text = Box<dyn Read + Send>;
 
 /// A text being read.
-pub(super) struct CsvRows {
+struct CsvRows {
     path: PathBuf,
+    /// Whether fields that are not numbers are repaired later.
+    repair: bool,
     reader: Reader<Text>,
     record: ByteRecord,
     names: Vec<String>,
@@ -202,16 +207,26 @@ fn description(path: &Path) -> Result<Description, ReadError> {
     Ok(Description::default())
 }
 
+/// Opens a text.
+pub(super) fn open_rows(path: &Path, options: &ReadOptions) -> Result<Opened, ReadError> {
+    let file = File::open(path).map_err(|error| ReadError::io(path, error))?;
+    open_text(path, options, Box::new(file))
+}
+
+/// Opens a text that is compressed with gzip.
+pub(super) fn open_gzip_rows(path: &Path, options: &ReadOptions) -> Result<Opened, ReadError> {
+    let file = File::open(path).map_err(|error| ReadError::io(path, error))?;
+    open_text(path, options, Box::new(MultiGzDecoder::new(BufReader::new(file))))
+}
+
+fn open_text(path: &Path, options: &ReadOptions, text: Text) -> Result<Opened, ReadError> {
+    let description = description(path)?;
+    let (rows, layout) = CsvRows::open(path, options, text)?;
+    Ok(Opened { rows: Box::new(rows), layout, description, time: TIME_S })
+}
+
 impl CsvRows {
-    pub fn open(
-        path: &Path,
-        options: &ReadOptions,
-        gzip: bool,
-    ) -> Result<(Self, Layout, Description), ReadError> {
-        let header = description(path)?;
-        let file = File::open(path).map_err(|error| ReadError::io(path, error))?;
-        let text: Text =
-            if gzip { Box::new(MultiGzDecoder::new(BufReader::new(file))) } else { Box::new(file) };
+    fn open(path: &Path, options: &ReadOptions, text: Text) -> Result<(Self, Layout), ReadError> {
         let mut text = BufReader::with_capacity(1 << 16, Box::new(LineLimit::new(text)) as Text);
         let guessed = delimiter(text.fill_buf().map_err(|error| ReadError::io(path, error))?);
         let mut reader = ReaderBuilder::new()
@@ -237,23 +252,8 @@ impl CsvRows {
                 .collect()
         };
         let layout = layout(path, &names, options)?;
-        let path = path.to_owned();
-        Ok((Self { path, reader, record, names, row: 0, held, uneven: None, surplus: 0 }, layout, header))
-    }
-
-    pub fn names(&self) -> &[String] {
-        &self.names
-    }
-
-    /// The repair of the rows so far; without times, by the rate and start of the description.
-    pub fn repair(&self, header: &Description) -> Option<Repair> {
-        let (row, time_s, count) = self.uneven?;
-        let time_s = time_s.unwrap_or_else(|| header.time_s(row as usize - 1));
-        let message = format!(
-            "{count} rows have more or fewer fields than there are columns, the first of them row {row} ({time_s} s); \
-             surplus fields were dropped"
-        );
-        Some(Repair { code: RepairKind::UnevenRows, row, time_s, count, message })
+        let (path, repair) = (path.to_owned(), options.repair);
+        Ok((Self { path, repair, reader, record, names, row: 0, held, uneven: None, surplus: 0 }, layout))
     }
 
     /// Moves to the next row; whether there was one.
@@ -280,63 +280,9 @@ impl CsvRows {
         Ok(())
     }
 
-    pub fn skip(&mut self, rows: u64) -> Result<(), ReadError> {
-        for _ in 0..rows {
-            if !self.advance()? {
-                break;
-            }
-        }
-        Ok(())
-    }
-
-    pub fn next(
-        &mut self,
-        layout: &Layout,
-        limit: usize,
-        repair: bool,
-        batch: &mut RowBatch,
-    ) -> Result<usize, ReadError> {
-        let mut times = match std::mem::replace(&mut batch.stamps, Stamps::Absent) {
-            Stamps::Seconds(times) => times,
-            _ => Vec::new(),
-        };
-        times.clear();
-        let mut rows = 0;
-        while rows < limit && self.advance()? {
-            if self.record.len() != self.names.len() && !repair {
-                let reason = format!("{} fields instead of {}", self.record.len(), self.names.len());
-                return Err(ReadError::Row { path: self.path.clone(), row: self.row, reason });
-            }
-            if self.row == 1 && self.record.iter().all(is_word) {
-                return Err(ReadError::Words { path: self.path.clone() });
-            }
-            if let Some(time) = &layout.time {
-                times.push(self.field::<f64>(time, repair, f64::NAN)? * time.scale);
-            }
-            if self.record.len() != self.names.len() {
-                let time_s = times.last().copied().filter(|time_s| time_s.is_finite());
-                self.uneven.get_or_insert((self.row, time_s, 0)).2 += 1;
-            }
-            for (column, values) in layout.values.iter().zip(&mut batch.values) {
-                // Parsed as f32 at once: two roundings, decimal to f64 to f32, can differ from one.
-                values.push(self.field::<f32>(column, repair, f32::NAN)?);
-            }
-            rows += 1;
-        }
-        if layout.time.is_some() {
-            batch.stamps = Stamps::Seconds(times);
-        }
-        Ok(rows)
-    }
-
     /// A finite number; otherwise the placeholder `none` if it is repaired later, or the error that names its
     /// place.
-    fn field<T: std::str::FromStr + Finite>(
-        &self,
-        column: &Picked,
-        repair: bool,
-        none: T,
-    ) -> Result<T, ReadError> {
+    fn field<T: std::str::FromStr + Finite>(&self, column: &Picked, none: T) -> Result<T, ReadError> {
         let field = self.record.get(column.index).unwrap_or_default();
         match number(field) {
             Some(value) => Ok(value),
@@ -346,7 +292,7 @@ impl CsvRows {
                 column: column.name.clone(),
                 value: String::from_utf8_lossy(field).chars().take(40).collect(),
             }),
-            None if repair => Ok(none),
+            None if self.repair => Ok(none),
             None => {
                 let shown: String = String::from_utf8_lossy(field).chars().take(40).collect();
                 let value = match number::<f64>(field) {
@@ -362,6 +308,66 @@ impl CsvRows {
                 })
             }
         }
+    }
+}
+
+impl RowSource for CsvRows {
+    fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    fn skip(&mut self, rows: u64) -> Result<(), ReadError> {
+        for _ in 0..rows {
+            if !self.advance()? {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    fn next(&mut self, layout: &Layout, limit: usize, batch: &mut RowBatch) -> Result<usize, ReadError> {
+        let mut times = match std::mem::replace(&mut batch.stamps, Stamps::Absent) {
+            Stamps::Seconds(times) => times,
+            _ => Vec::new(),
+        };
+        times.clear();
+        let mut rows = 0;
+        while rows < limit && self.advance()? {
+            if self.record.len() != self.names.len() && !self.repair {
+                let reason = format!("{} fields instead of {}", self.record.len(), self.names.len());
+                return Err(ReadError::Row { path: self.path.clone(), row: self.row, reason });
+            }
+            if self.row == 1 && self.record.iter().all(is_word) {
+                return Err(ReadError::Words { path: self.path.clone() });
+            }
+            if let Some(time) = &layout.time {
+                times.push(self.field::<f64>(time, f64::NAN)? * time.scale);
+            }
+            if self.record.len() != self.names.len() {
+                let time_s = times.last().copied().filter(|time_s| time_s.is_finite());
+                self.uneven.get_or_insert((self.row, time_s, 0)).2 += 1;
+            }
+            for (column, values) in layout.values.iter().zip(&mut batch.values) {
+                // Parsed as f32 at once: two roundings, decimal to f64 to f32, can differ from one.
+                values.push(self.field::<f32>(column, f32::NAN)?);
+            }
+            rows += 1;
+        }
+        if layout.time.is_some() {
+            batch.stamps = Stamps::Seconds(times);
+        }
+        Ok(rows)
+    }
+
+    /// The repair of the rows so far; without times, by the rate and start of the description.
+    fn repair(&self, header: &Description) -> Option<Repair> {
+        let (row, time_s, count) = self.uneven?;
+        let time_s = time_s.unwrap_or_else(|| header.time_s(row as usize - 1));
+        let message = format!(
+            "{count} rows have more or fewer fields than there are columns, the first of them row {row} ({time_s} s); \
+             surplus fields were dropped"
+        );
+        Some(Repair { code: RepairKind::UnevenRows, row, time_s, count, message })
     }
 }
 

@@ -34,7 +34,7 @@ pub enum ReadError {
         /// The format found.
         found: &'static str,
         /// The remedy.
-        remedy: &'static str,
+        remedy: String,
     },
     /// Input that cannot be repaired.
     #[error("{path}: {reason}; cut that part out by hand", path = path.display())]
@@ -217,7 +217,7 @@ pub enum ReadError {
     },
     /// Signals that do not make up rows.
     #[error(
-        "{path}: {one}, but {other}: record them at one rate and from one sample to one other, or read one alone (its power, or its current with a voltage by \
+        "{path}: {one}, but {other}: record them at one rate, with the same first and last sample, or read one alone (its power, or its current with a voltage by \
          specification)", path = path.display()
     )]
     Signals {
@@ -229,7 +229,7 @@ pub enum ReadError {
         other: String,
     },
     /// There is no row.
-    #[error("{path}: no samples: give a trace with at least one row under the names", path = path.display())]
+    #[error("{path}: no samples: give a trace with at least one", path = path.display())]
     Empty {
         /// The file.
         path: PathBuf,
@@ -301,7 +301,7 @@ pub enum WriteError {
         path: PathBuf,
     },
     /// A name that stands for no format.
-    #[error("{path}: its ending is none of {formats}", path = path.display(), formats = super::FORMATS.join(", "))]
+    #[error("{path}: its ending is not {endings}", path = path.display(), endings = super::endings())]
     Ending {
         /// The path.
         path: PathBuf,

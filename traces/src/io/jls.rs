@@ -8,8 +8,9 @@ use super::atomic;
 use super::columns::{Layout, RowBatch, layout};
 use super::description::{self, Description};
 use super::samples::{TraceChunk, TraceReader, TraceWriter};
+use super::source::{Opened, RowSource};
 use super::time_base::Stamps;
-use super::{ReadError, ReadOptions, Repair, RepairKind, WriteError};
+use super::{ReadError, ReadOptions, Repair, RepairKind, TIME_S, WriteError};
 use crate::metadata::Metadata;
 use crate::units;
 use ::jls::{MAX_PAYLOAD_BYTES, Reader, SAMPLE_TYPES, SampleReader, Signal, SignalName, Timestamp};
@@ -156,7 +157,7 @@ pub fn save(trace: &dyn TraceReader, path: &Path) -> Result<(), WriteError> {
 }
 
 /// The signals of a JLS file, read as rows: each signal by a reader of its own, all of them in parallel.
-pub(super) struct JlsRows {
+struct JlsRows {
     path: std::path::PathBuf,
     names: Vec<String>,
     tracks: Vec<Track>,
@@ -180,7 +181,7 @@ fn read_error(path: &Path, error: ::jls::ReadError) -> ReadError {
         ::jls::ReadError::NewerVersion => ReadError::Format {
             path,
             found: "a JLS recording of a newer version",
-            remedy: "export it with pyjls or the Joulescope UI to CSV or Parquet",
+            remedy: "export it with pyjls or the Joulescope UI to CSV or Parquet".to_owned(),
         },
         ::jls::ReadError::Damaged(reason) => ReadError::Damaged { path, format: "JLS", reason },
         ::jls::ReadError::SampleType { signal, found } => {
@@ -224,8 +225,14 @@ fn device(reader: &Reader, signal: &Signal) -> String {
     if stated.is_empty() { source.name().to_owned() } else { stated.join(" ") }
 }
 
+/// Opens a file.
+pub(super) fn open_rows(path: &Path, options: &ReadOptions) -> Result<Opened, ReadError> {
+    let (rows, layout, description) = JlsRows::open(path, options)?;
+    Ok(Opened { rows: Box::new(rows), layout, description, time: TIME_S })
+}
+
 impl JlsRows {
-    pub fn open(path: &Path, options: &ReadOptions) -> Result<(Self, Layout, Description), ReadError> {
+    fn open(path: &Path, options: &ReadOptions) -> Result<(Self, Layout, Description), ReadError> {
         let refuse = |error| read_error(path, error);
         let mut reader = Reader::open(path).map_err(refuse)?;
         let signals: Vec<&Signal> = reader.signals().iter().filter(|signal| is_channel(signal)).collect();
@@ -256,29 +263,31 @@ impl JlsRows {
         let path = path.to_owned();
         Ok((Self { path, names, tracks, count, trimmed }, layout, description))
     }
+}
 
-    pub fn names(&self) -> &[String] {
+impl RowSource for JlsRows {
+    fn names(&self) -> &[String] {
         &self.names
     }
 
-    pub fn count(&self) -> u64 {
-        self.count
+    fn count(&self) -> Option<u64> {
+        Some(self.count)
     }
 
     /// The samples left out, and when, by the rate and start of the description.
-    pub fn repair(&self, description: &Description) -> Option<Repair> {
+    fn repair(&self, description: &Description) -> Option<Repair> {
         let mut trimmed = self.trimmed.clone()?;
         trimmed.time_s = description.time_s(trimmed.row as usize - 1);
         trimmed.message += &format!("; row {} is at {} s", trimmed.row, trimmed.time_s);
         Some(trimmed)
     }
 
-    pub fn skip(&mut self, rows: u64) -> Result<(), ReadError> {
+    fn skip(&mut self, rows: u64) -> Result<(), ReadError> {
         let skip = |track: &mut Track| track.samples.skip(rows);
         self.tracks.iter_mut().try_for_each(skip).map_err(|error| read_error(&self.path, error))
     }
 
-    pub fn next(&mut self, limit: usize, batch: &mut RowBatch) -> Result<usize, ReadError> {
+    fn next(&mut self, _: &Layout, limit: usize, batch: &mut RowBatch) -> Result<usize, ReadError> {
         batch.stamps = Stamps::Absent;
         let each = self.tracks.par_iter_mut().zip(&mut batch.values);
         let read: Vec<_> = each.map(|(track, list)| track.samples.read(limit, list)).collect();
@@ -407,12 +416,12 @@ mod tests {
     #[test]
     fn a_skip_between_pieces_goes_on_from_there() {
         let whole = samples_after(&[], 10_000);
-        let (source, _, _) = &mut JlsRows::open(&file(), &ReadOptions::default()).unwrap();
+        let Opened { mut rows, layout, .. } = open_rows(&file(), &ReadOptions::default()).unwrap();
         let mut batch = RowBatch { values: vec![Vec::new(); 2], ..RowBatch::default() };
-        assert_eq!(source.next(100, &mut batch).unwrap(), 100);
-        source.skip(1500).unwrap();
+        assert_eq!(rows.next(&layout, 100, &mut batch).unwrap(), 100);
+        rows.skip(1500).unwrap();
         batch.values.iter_mut().for_each(Vec::clear);
-        assert_eq!(source.next(100, &mut batch).unwrap(), 100);
+        assert_eq!(rows.next(&layout, 100, &mut batch).unwrap(), 100);
         assert_eq!(batch.values, [&whole[1600..1700], &whole[3003 + 1600..3003 + 1700]]);
     }
 }

@@ -1,27 +1,30 @@
 //! Trace files: one file or folder per format, with its reader and its writer.
 //!
-//! [`read`] reads any of them, as [`ReadOptions`] say: Parquet, JLS, CSV, TSV, gzip. [`Rows`] reads in pieces
-//! what does not fit into memory. [`save`] and the modules [`csv`], [`parquet`] and [`jls`] write a
-//! [`TraceReader`]: a trace in memory, or a [`Recording`], a file of any length.
+//! [`FORMATS`] lists all of them. [`read`] reads a file, as [`ReadOptions`] say; [`Rows`] reads one in pieces that does not
+//! fit into memory. [`save`] and the modules of the formats write a [`TraceReader`]: a trace in memory, or a [`Recording`],
+//! a file of any length. [`perfetto`] also writes timelines of frames and units.
 
 pub mod atomic;
 mod columns;
 pub mod csv;
 mod description;
 mod error;
+mod formats;
 pub mod jls;
 pub mod parquet;
+pub mod perfetto;
 mod read;
 mod recording;
 mod repair;
 mod rows;
 mod samples;
-mod save;
+mod source;
 mod sum_of_rails;
 mod time_base;
 pub mod unfinished;
 
 pub use error::{ReadError, WriteError};
+pub use formats::{FORMATS, TraceFormat, endings, readable, save};
 pub use read::{Loaded, open, read, read_csv, read_parquet};
 pub use recording::Recording;
 pub use repair::{Repair, RepairKind};
@@ -29,7 +32,6 @@ pub use rows::Rows;
 #[cfg(test)]
 pub(crate) use samples::SplitTrace;
 pub use samples::{TraceChunk, TraceHeader, TraceReader, TraceWriter};
-pub use save::{FORMATS, save};
 pub use sum_of_rails::{SumOfRails, rail_of_sums};
 
 pub(crate) use columns::RowBatch;

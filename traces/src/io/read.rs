@@ -22,7 +22,7 @@ pub struct Loaded {
     pub repairs: Vec<Repair>,
 }
 
-/// Reads a trace from Parquet, JLS, CSV or TSV (the latter also with gzip), by their first bytes.
+/// Reads a trace in any of the [`FORMATS`](super::FORMATS) that are read; the first bytes of the file decide which.
 ///
 /// # Errors
 /// [`ReadError`] names the file, the row and what to do.
@@ -59,7 +59,7 @@ pub fn open(path: &Path, options: &ReadOptions) -> Result<(Box<dyn TraceReader>,
 /// # Errors
 /// [`ReadError`] names the file, the row and what to do.
 pub fn read_csv(path: &Path) -> Result<Trace, ReadError> {
-    Ok(load(Rows::csv(path, &ReadOptions::default(), false)?)?.trace)
+    Ok(load(Rows::open_as(super::csv::open_rows, path, &ReadOptions::default())?)?.trace)
 }
 
 /// Reads a trace from columns found by name without regard to case: `voltage_V` and `current_A` (f32 or f64)
@@ -68,7 +68,7 @@ pub fn read_csv(path: &Path) -> Result<Trace, ReadError> {
 /// # Errors
 /// [`ReadError`] names the file, the row and what to do.
 pub fn read_parquet(path: &Path) -> Result<Trace, ReadError> {
-    Ok(load(Rows::parquet(path, &ReadOptions::default())?)?.trace)
+    Ok(load(Rows::open_as(super::parquet::open_rows, path, &ReadOptions::default())?)?.trace)
 }
 
 fn load(mut rows: Rows) -> Result<Loaded, ReadError> {

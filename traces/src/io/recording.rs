@@ -149,7 +149,7 @@ mod tests {
     use std::fmt::Write as _;
     use std::fs;
 
-    /// What is wrong with a file, and at which row.
+    /// A fault of a file, with its row.
     #[derive(Clone, Copy, Debug)]
     enum Fault {
         None,
@@ -200,7 +200,7 @@ mod tests {
         text
     }
 
-    /// What a file holds, or what is wrong with it.
+    /// Content of a file, or its fault.
     fn outcome(trace: &dyn TraceReader, folder: &Path) -> Vec<Vec<u8>> {
         let name = |end: &str| folder.join(format!("out.{end}"));
         parquet::save(trace, &name("parquet")).unwrap();

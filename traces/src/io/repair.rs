@@ -19,7 +19,7 @@ pub(super) struct Columns {
     pub current_a: Vec<f32>,
 }
 
-/// What a repair did.
+/// Kind of a repair.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum RepairKind {
@@ -42,7 +42,7 @@ pub enum RepairKind {
 /// A repair.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Repair {
-    /// What was done.
+    /// Its kind.
     pub code: RepairKind,
     /// The first row (from 1, as in the file; after sorting, in the sorted order).
     pub row: u64,
@@ -75,7 +75,7 @@ pub(super) fn repair_rows(
     {
         let grid = Grid::new(times, description);
         if !grid.holds(times) {
-            resample(path, &grid, times, columns, &mut repairs)?;
+            repairs.extend(Resampling { path, grid: &grid, times, columns }.run()?);
             description.rate_hz = Some(grid.rate_hz);
         }
     }
@@ -199,9 +199,21 @@ impl Grid {
         (time_s - self.start_s) * self.rate_hz
     }
 
-    /// Whether a time is too far from its nearest place.
-    fn is_off(&self, time_s: f64) -> bool {
-        (self.place(time_s) - libm::round(self.place(time_s))).abs() > MAX_OFFSET_PERIODS
+    /// Rows that do not keep their values: too far from every place, or farther from theirs than another row.
+    fn rows_off(&self, times: &[f64]) -> Vec<usize> {
+        let nearest = |row: usize| libm::round(self.place(times[row]));
+        let distance = |row: usize| (self.place(times[row]) - nearest(row)).abs();
+        // Of two at the same distance the earlier one stays.
+        let loses_to = |row: usize, other: usize| {
+            let order = distance(other).total_cmp(&distance(row)).then(other.cmp(&row));
+            nearest(row) == nearest(other) && order.is_lt()
+        };
+        let is_off = |&row: &usize| {
+            distance(row) > MAX_OFFSET_PERIODS
+                || row > 0 && loses_to(row, row - 1)
+                || row + 1 < times.len() && loses_to(row, row + 1)
+        };
+        (0..times.len()).filter(is_off).collect()
     }
 
     /// Whether the rows are on it, one after the other.
@@ -211,36 +223,43 @@ impl Grid {
     }
 }
 
-/// Resamples the rows to an even time base, by straight lines between rows.
-fn resample(
-    path: &Path,
-    grid: &Grid,
-    times: &mut Vec<f64>,
-    columns: &mut Columns,
-    repairs: &mut Vec<Repair>,
-) -> Result<(), ReadError> {
-    let rate_hz = grid.rate_hz;
-    let slots = libm::round(grid.place(times[times.len() - 1])) + 1.0;
-    if !(slots >= 1.0 && slots <= (MAX_GROWTH * times.len()) as f64) {
-        let reason = format!(
-            "filling it evenly at {rate_hz} Hz would take {slots:.0} samples for {} rows",
-            times.len()
-        );
-        return Err(ReadError::Repair { path: path.to_owned(), reason });
+/// Rows that are resampled to an even time base, by straight lines between rows.
+struct Resampling<'a> {
+    /// The file, for errors.
+    path: &'a Path,
+    grid: &'a Grid,
+    /// Times of the rows, s, in order; at least two.
+    times: &'a mut Vec<f64>,
+    columns: &'a mut Columns,
+}
+
+impl Resampling<'_> {
+    /// Replaces times and columns.
+    fn run(self) -> Result<Vec<Repair>, ReadError> {
+        let Self { path, grid, times, columns } = self;
+        let rate_hz = grid.rate_hz;
+        let slots = libm::round(grid.place(times[times.len() - 1])) + 1.0;
+        if !(slots >= 1.0 && slots <= (MAX_GROWTH * times.len()) as f64) {
+            let rows = times.len();
+            let reason =
+                format!("filling it evenly at {rate_hz} Hz would take {slots:.0} samples for {rows} rows");
+            return Err(ReadError::Repair { path: path.to_owned(), reason });
+        }
+        let mut repairs: Vec<Repair> = resampled(grid, times).into_iter().collect();
+        repairs.extend(filled_gaps(grid, times));
+        let places: Vec<f64> = (0..slots as usize).map(|slot| grid.start_s + slot as f64 / rate_hz).collect();
+        for values in [&mut columns.voltage_v, &mut columns.current_a] {
+            *values = interpolated(times, values, &places, MAX_OFFSET_PERIODS / rate_hz);
+        }
+        *times = places;
+        Ok(repairs)
     }
-    repairs.extend(resampled(grid, times));
-    repairs.extend(filled_gaps(grid, times));
-    let places: Vec<f64> = (0..slots as usize).map(|slot| grid.start_s + slot as f64 / rate_hz).collect();
-    columns.voltage_v = interpolated(times, &columns.voltage_v, &places, MAX_OFFSET_PERIODS / rate_hz);
-    columns.current_a = interpolated(times, &columns.current_a, &places, MAX_OFFSET_PERIODS / rate_hz);
-    *times = places;
-    Ok(())
 }
 
 /// Reports rows off the time base.
 fn resampled(grid: &Grid, times: &[f64]) -> Option<Repair> {
-    let first = times.iter().position(|&time| grid.is_off(time))?;
-    let count = times.iter().filter(|&&time| grid.is_off(time)).count();
+    let off = grid.rows_off(times);
+    let (&first, count) = (off.first()?, off.len());
     let rows = if count == 1 { "row" } else { "rows" };
     let row = first as u64 + 1;
     let message = format!("{count} {rows} off an even rate of {} Hz, from row {row} on", grid.rate_hz);
@@ -295,15 +314,17 @@ fn lengthen(
     Ok(())
 }
 
-/// Values at the grid's times: a row's own within `near_s`, else on the line between the rows around.
+/// Values at the grid's times: those of the nearest row within `near_s`, else on the line between the rows around.
 fn interpolated(times: &[f64], values: &[f32], grid: &[f64], near_s: f64) -> Vec<f32> {
     let mut row = 0;
     let at = |time: &f64| {
         while row + 1 < times.len() && times[row + 1] <= *time + near_s {
             row += 1;
         }
-        if (times[row] - time).abs() <= near_s || row + 1 >= times.len() {
-            return values[row];
+        let distance_s = |row: usize| (times[row] - time).abs();
+        let nearest = if row > 0 && distance_s(row - 1) <= distance_s(row) { row - 1 } else { row };
+        if distance_s(nearest) <= near_s || row + 1 >= times.len() {
+            return values[nearest];
         }
         let share = (time - times[row]) / (times[row + 1] - times[row]);
         (f64::from(values[row]) + share * (f64::from(values[row + 1]) - f64::from(values[row]))) as f32
@@ -351,6 +372,33 @@ mod tests {
         let gaps: Vec<_> = repairs.iter().map(|repair| (repair.code, repair.row, repair.count)).collect();
         assert_eq!(gaps, [(RepairKind::FilledValues, 4, 1), (RepairKind::FilledGap, 5000, 100)]);
         assert_eq!((columns.current_a.len(), columns.current_a[19_999]), (20_000, 19_899.0));
+    }
+
+    /// A row between two others, near one of them, has no place of its own.
+    #[test]
+    fn a_surplus_row_near_another_is_reported_and_leaves_as_many_times_as_values() {
+        let times: Vec<f64> = (0..200).map(f64::from).chain([100.2]).collect();
+        let (repairs, columns, description) = repaired(times, 3);
+        let codes: Vec<_> = repairs.iter().map(|repair| (repair.code, repair.row, repair.count)).collect();
+        let sorted = (RepairKind::SortedRows, 201, 201);
+        assert_eq!(codes, [sorted, (RepairKind::FilledValues, 4, 1), (RepairKind::Resampled, 102, 1)]);
+        assert_eq!((columns.current_a.len(), columns.stamps.len()), (200, 200));
+        assert_eq!((columns.current_a[100], columns.current_a[101]), (100.0, 101.0));
+        assert_eq!(description.rate_hz, Some(1.0));
+    }
+
+    #[test]
+    fn a_surplus_row_alone_is_repaired_too() {
+        let times: Vec<f64> = (0..200)
+            .flat_map(|row| [Some(f64::from(row)), (row == 100).then_some(100.2)])
+            .flatten()
+            .collect();
+        let mut columns =
+            Columns { voltage_v: vec![1.0; 201], current_a: vec![1.0; 201], stamps: Stamps::Seconds(times) };
+        let mut description = Description::default();
+        let repairs = repair_rows(Path::new("t.csv"), &names(), &mut columns, &mut description).unwrap();
+        assert_eq!(repairs.iter().map(|repair| repair.row).collect::<Vec<_>>(), [102]);
+        assert_eq!((columns.current_a.len(), columns.stamps.len()), (200, 200));
     }
 
     #[test]

@@ -1,116 +1,89 @@
 //! Rows of a file of any format, in pieces, so that no file has to fit into memory.
 
 use super::columns::{Layout, Rail, RowBatch};
-use super::csv::CsvRows;
 use super::description::Description;
-use super::jls::JlsRows;
-use super::parquet::ParquetRows;
+use super::formats::{FORMATS, TraceFormat, readable};
+use super::source::{Open, Opened, RowSource};
 use super::time_base::mean_rate_hz;
-use super::{ReadError, ReadOptions, Repair, TIME_NS, TIME_S, VOLTAGE_V};
+use super::{ReadError, ReadOptions, Repair, VOLTAGE_V, csv};
 use crate::metadata::Metadata;
 use std::fs::File;
 use std::io::Read;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
-/// The first bytes of formats that are not read, and what to do about them.
-const FOREIGN: [(&[u8], &str, &str); 7] = [
-    (b"\xd3tagfmt", "a JLS recording of version 1", "export it to CSV from the program that made it"),
-    (b"\x89HDF\r\n", "an HDF5 file", "export its channels to CSV or Parquet"),
+/// The first bytes of files that hold no trace, or none that is read; what they are, and the remedy if it is not to give a trace.
+const FOREIGN: [(&[u8], &str, Option<&str>); 7] = [
+    (b"\xd3tagfmt", "a JLS recording of version 1", Some("export it to CSV from the program that made it")),
+    (b"\x89HDF\r\n", "an HDF5 file", Some("export its channels to CSV or Parquet")),
     (
         b"PK\x03\x04",
         "an archive (sigrok .sr, .ppk2 or a spreadsheet)",
-        "export it to CSV from its own program",
+        Some("export it to CSV from its own program"),
     ),
-    (b"{", "a JSON file", "give a trace; that of a run is trace.parquet beside its summary.json"),
-    (b"\x89PNG", "a PNG image", TRACE_FORMATS),
-    (b"\xff\xd8\xff", "a JPEG image", TRACE_FORMATS),
-    (b"%PDF", "a PDF document", TRACE_FORMATS),
+    (b"{", "a JSON file", Some("give a trace; that of a run is trace.parquet beside its summary.json")),
+    (b"\x89PNG", "a PNG image", None),
+    (b"\xff\xd8\xff", "a JPEG image", None),
+    (b"%PDF", "a PDF document", None),
 ];
-const TRACE_FORMATS: &str = "give a trace in Parquet, JLS, CSV or TSV";
 
 /// Whether these bytes are not text: control characters other than white space, as in UTF-16.
 fn is_binary(start: &[u8]) -> bool {
     start.iter().any(|byte| byte.is_ascii_control() && !byte.is_ascii_whitespace())
 }
 
-enum Format {
-    Csv(Box<CsvRows>),
-    Jls(Box<JlsRows>),
-    Parquet(Box<ParquetRows>),
+/// The opener for a file, by its first bytes: that of a format with these, else that of texts.
+fn opener(path: &Path) -> Result<Open, ReadError> {
+    let start = first_bytes(path)?;
+    let refused = |found, remedy: Option<&str>| {
+        let remedy = remedy.map_or_else(|| format!("give a trace in {}", readable()), str::to_owned);
+        Err(ReadError::Format { path: path.to_owned(), found, remedy })
+    };
+    let begins = |format: &&TraceFormat| format.magic.is_some_and(|magic| start.starts_with(magic));
+    if let Some(open) = FORMATS.iter().find(begins).and_then(|format| format.open) {
+        return Ok(open);
+    }
+    match FOREIGN.iter().find(|(magic, _, _)| start.starts_with(magic)) {
+        Some((_, found, remedy)) => refused(found, *remedy),
+        None if is_binary(&start) => refused("a binary file of an unknown kind", None),
+        None => Ok(csv::open_rows),
+    }
 }
 
 /// A file being read.
 pub struct Rows {
     path: PathBuf,
-    format: Format,
+    source: Box<dyn RowSource>,
     layout: Layout,
     pub(crate) description: Description,
     repair: bool,
 }
 
 impl Rows {
-    /// Opens Parquet, JLS, CSV or TSV, the latter two also with gzip; the format follows from the first
-    /// bytes.
+    /// Opens a file; its format follows from its first bytes.
     ///
     /// # Errors
     /// [`ReadError`] if the file does not exist, is of no known format, or columns are missing.
     pub fn open(path: &Path, options: &ReadOptions) -> Result<Self, ReadError> {
-        let rows = Self::of_kind(path, options)?;
-        check_rate(&rows, options)?;
+        let open = opener(path)?;
+        let rows = Self::open_as(open, path, options)?;
+        check_rate(&rows, open, options)?;
         Ok(rows)
     }
 
-    fn of_kind(path: &Path, options: &ReadOptions) -> Result<Self, ReadError> {
-        match first_bytes(path)? {
-            start if start.starts_with(b"PAR1") => Self::parquet(path, options),
-            start if start.starts_with(b"jlsfmt\r\n") => Self::jls(path, options),
-            start => match FOREIGN.iter().find(|(magic, _, _)| start.starts_with(magic)) {
-                Some((_, found, remedy)) => Err(ReadError::Format { path: path.to_owned(), found, remedy }),
-                None if is_binary(&start) && !start.starts_with(&[0x1f, 0x8b]) => {
-                    let found = "a binary file of an unknown kind";
-                    Err(ReadError::Format { path: path.to_owned(), found, remedy: TRACE_FORMATS })
-                }
-                None => Self::csv(path, options, start.starts_with(&[0x1f, 0x8b])),
-            },
-        }
-    }
-
-    pub(crate) fn parquet(path: &Path, options: &ReadOptions) -> Result<Self, ReadError> {
-        let opened = catch_unwind(AssertUnwindSafe(|| ParquetRows::open(path, options)));
-        let (format, layout, description) = opened.unwrap_or_else(|_| Err(decoder_panicked(path)))?;
-        Self::new(path, Format::Parquet(Box::new(format)), layout, description, options, TIME_NS)
-    }
-
-    pub(crate) fn csv(path: &Path, options: &ReadOptions, gzip: bool) -> Result<Self, ReadError> {
-        let (format, layout, description) = CsvRows::open(path, options, gzip)?;
-        Self::new(path, Format::Csv(Box::new(format)), layout, description, options, TIME_S)
-    }
-
-    fn jls(path: &Path, options: &ReadOptions) -> Result<Self, ReadError> {
-        let (format, layout, description) = JlsRows::open(path, options)?;
-        Self::new(path, Format::Jls(Box::new(format)), layout, description, options, TIME_S)
-    }
-
-    fn new(
-        path: &Path,
-        format: Format,
-        layout: Layout,
-        mut description: Description,
-        options: &ReadOptions,
-        time: &str,
-    ) -> Result<Self, ReadError> {
+    /// Opens a file of a known format.
+    pub(super) fn open_as(open: Open, path: &Path, options: &ReadOptions) -> Result<Self, ReadError> {
+        let Opened { rows: source, layout, mut description, time } = open(path, options)?;
         check_overrides(path, &layout, &description, options)?;
         description.rate_hz = options.rate_hz.or(description.rate_hz);
         description.start_s = options.start_s.or(description.start_s);
         if layout.time.is_none() && description.rate_hz.is_none() {
-            let found = format.names().join(", ");
+            let found = source.names().join(", ");
             return Err(ReadError::MissingColumn { path: path.to_owned(), column: time.to_owned(), found });
         }
         if layout.names.len() > 1 {
             description.metadata.other.insert("rails".to_owned(), layout.names.clone().into());
         }
-        Ok(Self { path: path.to_owned(), format, layout, description, repair: options.repair })
+        Ok(Self { path: path.to_owned(), source, layout, description, repair: options.repair })
     }
 
     /// The file.
@@ -125,11 +98,7 @@ impl Rows {
 
     /// Number of rows, in formats that state it.
     pub fn count(&self) -> Option<u64> {
-        match &self.format {
-            Format::Csv(_) => None,
-            Format::Jls(rows) => Some(rows.count()),
-            Format::Parquet(rows) => Some(rows.count()),
-        }
+        self.source.count()
     }
 
     /// Refuses non-finite values and names the first one; `first` is the number of rows before these.
@@ -158,11 +127,7 @@ impl Rows {
 
     /// The repair made when the file was opened and in the rows read since.
     pub(crate) fn repair(&self) -> Option<Repair> {
-        match &self.format {
-            Format::Csv(rows) => rows.repair(&self.description),
-            Format::Jls(rows) => rows.repair(&self.description),
-            Format::Parquet(_) => None,
-        }
+        self.source.repair(&self.description)
     }
 
     /// Names of the rails that are read, in order.
@@ -188,20 +153,14 @@ impl Rows {
 
     /// Skips rows.
     pub(crate) fn skip(&mut self, rows: u64) -> Result<(), ReadError> {
-        let path = self.path.clone();
-        match &mut self.format {
-            Format::Csv(format) => format.skip(rows),
-            Format::Jls(format) => format.skip(rows),
-            Format::Parquet(format) => catch_unwind(AssertUnwindSafe(|| format.skip(rows)))
-                .unwrap_or_else(|_| Err(decoder_panicked(&path))),
-        }
+        self.source.skip(rows)
     }
 
     /// Reads up to `limit` rows into `batch`, over its content; returns how many, 0 at the end.
     pub(crate) fn next(&mut self, limit: usize, batch: &mut RowBatch) -> Result<usize, ReadError> {
         batch.values.resize_with(self.layout.values.len(), Vec::new);
         batch.values.iter_mut().for_each(Vec::clear);
-        self.read(limit, batch)
+        self.source.next(&self.layout, limit, batch)
     }
 
     /// Reads up to `limit` rows and appends them, all rails together, to voltages (V) and currents (A);
@@ -213,8 +172,7 @@ impl Rows {
         voltage_v: &mut Vec<f32>,
         current_a: &mut Vec<f32>,
     ) -> Result<usize, ReadError> {
-        let (Format::Parquet(_), Some([voltage, current])) = (&self.format, self.layout.unscaled_channels())
-        else {
+        let Some([voltage, current]) = self.layout.unscaled_channels() else {
             let read = self.next(limit, batch)?;
             self.channels(batch, voltage_v, current_a);
             return Ok(read);
@@ -226,22 +184,9 @@ impl Rows {
             std::mem::swap(&mut batch.values[current], current_a);
         };
         exchange(batch);
-        let read = self.read(limit, batch);
+        let read = self.source.next(&self.layout, limit, batch);
         exchange(batch);
         read
-    }
-
-    /// Appends up to `limit` rows to the values of `batch`; the stamps are those of these rows alone.
-    fn read(&mut self, limit: usize, batch: &mut RowBatch) -> Result<usize, ReadError> {
-        let path = &self.path;
-        match &mut self.format {
-            Format::Csv(format) => format.next(&self.layout, limit, self.repair, batch),
-            Format::Jls(format) => format.next(limit, batch),
-            Format::Parquet(format) => {
-                let read = catch_unwind(AssertUnwindSafe(|| format.next(limit, batch)));
-                read.unwrap_or_else(|_| Err(decoder_panicked(path)))
-            }
-        }
     }
 
     /// Appends a batch's rows, all rails together, to voltages (V) and currents (A). Where rails are added or
@@ -276,16 +221,6 @@ impl Rows {
     }
 }
 
-impl Format {
-    fn names(&self) -> &[String] {
-        match self {
-            Self::Csv(rows) => rows.names(),
-            Self::Jls(rows) => rows.names(),
-            Self::Parquet(rows) => rows.names(),
-        }
-    }
-}
-
 fn first_bytes(path: &Path) -> Result<Vec<u8>, ReadError> {
     let mut start = Vec::new();
     let file = File::open(path).map_err(|error| ReadError::io(path, error))?;
@@ -294,11 +229,6 @@ fn first_bytes(path: &Path) -> Result<Vec<u8>, ReadError> {
     }
     file.take(8).read_to_end(&mut start).map_err(|error| ReadError::io(path, error))?;
     if start.is_empty() { Err(ReadError::Empty { path: path.to_owned() }) } else { Ok(start) }
-}
-
-/// The error for a panic of the Parquet decoder, which happens on some damaged files.
-fn decoder_panicked(path: &Path) -> ReadError {
-    ReadError::Damaged { path: path.to_owned(), format: "Parquet", reason: "its decoder gave up".to_owned() }
 }
 
 /// Largest difference between a requested rate and that of the file, as a share: clocks differ, and JLS
@@ -351,9 +281,9 @@ fn check_overrides(
 
 /// Refuses a rate that contradicts the times of the first rows: repairing to that rate would add or drop
 /// samples.
-fn check_rate(rows: &Rows, options: &ReadOptions) -> Result<(), ReadError> {
+fn check_rate(rows: &Rows, open: Open, options: &ReadOptions) -> Result<(), ReadError> {
     let (Some(requested_hz), Some(column)) = (options.rate_hz, &rows.layout.time) else { return Ok(()) };
-    let mut again = Rows::of_kind(&rows.path, &ReadOptions { rate_hz: None, ..options.clone() })?;
+    let mut again = Rows::open_as(open, &rows.path, &ReadOptions { rate_hz: None, ..options.clone() })?;
     let mut batch = RowBatch::default();
     again.next(CHECKED_ROWS, &mut batch)?;
     let stamps = &batch.stamps;

@@ -61,6 +61,21 @@ enum Store {
     File(cache::Kept),
 }
 
+/// Mean power of each column and of those within half of `width_s` on either side, W.
+pub fn moving_means_w(columns: &[Column], width_s: f64) -> Vec<f64> {
+    let Some(first) = columns.first() else { return Vec::new() };
+    let reach = libm::round(0.5 * width_s / (first.to_s - first.from_s)) as usize;
+    let mut sums_w = vec![0.0];
+    for column in columns {
+        sums_w.push(sums_w[sums_w.len() - 1] + f64::from(column.mean_w));
+    }
+    let mean_w = |index: usize| {
+        let (from, to) = (index.saturating_sub(reach), (index + reach + 1).min(columns.len()));
+        (sums_w[to] - sums_w[from]) / (to - from) as f64
+    };
+    (0..columns.len()).map(mean_w).collect()
+}
+
 /// The cache file of the pyramid of a trace.
 pub fn pyramid_path(trace: &Path) -> PathBuf {
     let mut name = trace.as_os_str().to_owned();
@@ -304,6 +319,22 @@ mod tests {
     use crate::io::{csv, parquet};
     use crate::metadata::Metadata;
     use std::fs;
+
+    #[test]
+    fn moving_means_are_of_the_columns_around_as_far_as_there_are_any() {
+        let column = |index: u8| Column {
+            from_s: f64::from(index),
+            to_s: f64::from(index) + 1.0,
+            low_w: 0.0,
+            high_w: 9.0,
+            mean_w: f32::from(index * index),
+        };
+        let columns: Vec<Column> = (0..5).map(column).collect();
+        assert_eq!(moving_means_w(&columns, 0.0), [0.0, 1.0, 4.0, 9.0, 16.0]);
+        assert_eq!(moving_means_w(&columns, 2.0), [0.5, 5.0 / 3.0, 14.0 / 3.0, 29.0 / 3.0, 12.5]);
+        assert_eq!(moving_means_w(&columns, 1e9), [6.0; 5]);
+        assert!(moving_means_w(&[], 1.0).is_empty());
+    }
 
     #[test]
     fn oracle_extremes_are_exact_at_every_zoom_from_memory_and_from_the_file() {

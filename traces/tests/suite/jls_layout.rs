@@ -1,4 +1,4 @@
-//! What stands where in JLS as we write it: lists, indices, summaries against their samples by definition, times.
+//! Layout of JLS as we write it: lists, indices, summaries against their samples by definition, times.
 
 use crate::common::jls::{crc32c, sealed};
 use crate::common::jls_traces::{channels, metadata, trace, written};

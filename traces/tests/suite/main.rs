@@ -9,5 +9,6 @@ mod foreign_parquet;
 mod jls_layout;
 mod jls_write;
 mod oracle_frames;
+mod perfetto;
 mod property_energy;
 mod roundtrip_files;

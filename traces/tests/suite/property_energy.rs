@@ -1,4 +1,4 @@
-//! What holds for every curve, trace and set of frames.
+//! Properties of every curve, trace and set of frames.
 
 use proptest::prelude::*;
 use traces::device::{Device, DeviceSpec};

@@ -1,4 +1,4 @@
-//! What is written is what is read, to the bit, and the same bytes every time.
+//! Files are read back as they were written, to the bit, and have the same bytes every time.
 
 use proptest::prelude::*;
 use std::collections::BTreeMap;

@@ -19,7 +19,7 @@ use workloads::glossy::{Effect, Lobe, Map, default_scene, receiver};
 use workloads::{Frame, Scene};
 
 use crate::chart::statistics::{White, errors, mean_square};
-use crate::study::table::{Sheet, Table, fixed, plain};
+use crate::study::table::{Sheet, Table, count, fixed, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
 use crate::study::{Gallery, Study, StudyError};
 
@@ -104,8 +104,8 @@ impl Study for GlossyChart {
             .column("samples", "samples", |row| row.samples, plain)
             .column("rmse", "RMSE", |row| row.rmse, fixed(5))
             .column("accumulated_rmse", "(accumulated)", |row| row.accumulated_rmse, fixed(5))
-            .column("vertices", "vertices", |row| row.vertices, plain)
-            .column("accumulated_vertices", "(accumulated)", |row| row.accumulated_vertices, plain)
+            .column("vertices", "vertices", |row| row.vertices, count)
+            .column("accumulated_vertices", "(accumulated)", |row| row.accumulated_vertices, count)
             .data("samples_tested", |row| row.samples_tested)
             .data("accumulated_samples_tested", |row| row.accumulated_samples_tested)
             .column("host_s", "host s", |row| row.host_s, fixed(3))

@@ -31,11 +31,11 @@ pub struct GrowthEffort {
     pub samples: &'static [u32],
     /// Motion, or the diameter of the circle of confusion, or both, in pixels.
     pub blur_px: &'static [f64],
-    /// What the others are while one is swept.
+    /// Values of the others while one is swept.
     pub base: Base,
 }
 
-/// What stays while something else is swept.
+/// Values that stay while another is swept.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Base {
     /// Triangles.
@@ -46,7 +46,7 @@ pub struct Base {
     pub blur_px: f64,
 }
 
-/// What grows.
+/// The quantity that grows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Sweep {
@@ -58,7 +58,7 @@ pub enum Sweep {
     Blur,
 }
 
-/// What blurs.
+/// The source of blur.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {
@@ -75,9 +75,9 @@ pub enum Kind {
 /// One curve.
 #[derive(Clone, Debug, Serialize)]
 pub struct GrowthRow {
-    /// What grows.
+    /// The quantity that grows.
     pub sweep: Sweep,
-    /// What blurs.
+    /// The source of blur.
     pub kind: Kind,
     /// Exponent of time over what grows, from `fitted_from` on.
     pub exponent: Option<f64>,
@@ -110,7 +110,7 @@ impl Sweep {
         }
     }
 
-    /// What of a point grows.
+    /// The value of a point that grows.
     pub fn of(self, point: &Point) -> f64 {
         match self {
             Self::Triangles => f64::from(point.triangles),
@@ -119,7 +119,7 @@ impl Sweep {
         }
     }
 
-    /// What is resolved, from little to much.
+    /// The work of each trial, from little to much.
     fn trials(self, effort: &GrowthEffort) -> Vec<Base> {
         let base = effort.base;
         match self {

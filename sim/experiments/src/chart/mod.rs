@@ -1,34 +1,34 @@
 //! Charts of the book, one module for each; each is a [`Study`](crate::study::Study).
 //!
 //! - [`caustics`]: shader executions of caustics, by how beams are bounded.
-//! - [`collision`]: false positives of collision detection.
+//! - [`ccd`]: false positives of collision detection.
 //! - [`frames`]: how well frame starts are found, by method, over rate, noise, resolution and host time.
 //! - [`glossy`]: glossy reflection and refraction against brute force and accumulation.
 //! - [`growth`]: time of the visibility engine over triangles, samples and blur.
+//! - [`multiview`]: stereo and multi-view in one pass against view by view and accumulation.
 //! - [`occlusion`]: what occlusion queries find, and what they cost.
 //! - [`points`]: quality of points over points a second.
 //! - [`sampled`]: frames predicted from few against all of them.
 //! - [`sampling`]: image error over samples per pixel and over host time.
-//! - [`shadows`]: soft shadows in one pass against accumulation buffering.
+//! - [`soft_shadows`]: soft shadows in one pass against accumulation buffering.
 //! - [`tile_tests`]: what each combination of tile tests gains over what it costs.
 //! - [`timing`]: every level of timing against the reference.
-//! - [`views`]: stereo and multi-view in one pass against view by view and accumulation.
 //! - [`statistics`]: power laws, quantiles, errors of images.
 
 pub mod caustics;
-pub mod collision;
+pub mod ccd;
 pub mod frames;
 pub mod glossy;
 pub mod growth;
+pub mod multiview;
 pub mod occlusion;
 pub mod points;
 pub mod sampled;
 pub mod sampling;
-pub mod shadows;
+pub mod soft_shadows;
 pub mod statistics;
 pub mod tile_tests;
 pub mod timing;
-pub mod views;
 
 #[cfg(test)]
 mod tests {

@@ -38,7 +38,7 @@ pub struct OcclusionEffort {
     pub slats: &'static [u32],
 }
 
-/// What blurs.
+/// The source of blur.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {
@@ -67,7 +67,7 @@ impl Kind {
 /// A kind of query on one kind of scene. Costs are means over all objects.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct OcclusionRow {
-    /// What blurs.
+    /// The source of blur.
     pub kind: Kind,
     /// Slats of a wall.
     pub slats: u32,
@@ -150,10 +150,7 @@ impl Study for OcclusionChart {
     fn draw(&self, to: &Gallery<'_>) -> Result<(), OutputError> {
         let samples = self.effort.samples[0];
         let title = "Occlusion queries: by intervals and by samples";
-        let subject = format!(
-            "share of hidden boxes that are found, over bytes of stored depth read for each queried box; {samples} samples a pixel, sampled queries 16 to 64; \
-             dots of a tile from few boxes of lens and time to many"
-        );
+        let subject = self.subject();
         to.chart("occlusion", [title, &subject], Kind::ALL.map(|kind| self.rates(kind)).into())?;
         let title = "Where occlusion queries fail: many small occluders";
         let subject = format!(
@@ -215,6 +212,18 @@ impl Study for OcclusionChart {
 }
 
 impl OcclusionChart {
+    /// Subtitle of the chart of rates.
+    fn subject(&self) -> String {
+        let samples = self.effort.samples;
+        format!(
+            "share of hidden boxes that are found, over bytes of stored depth read for each queried box; {} samples a pixel, \
+             sampled queries {} to {}; dots of a tile from few boxes of lens and time to many",
+            samples[0],
+            samples[0],
+            samples[samples.len() - 1]
+        )
+    }
+
     fn rows(&self) -> impl Iterator<Item = &OcclusionRow> {
         self.intervals.iter().chain(&self.samples).chain(&self.failing)
     }
@@ -314,7 +323,7 @@ pub(crate) struct Drawn {
     viewport: Viewport,
     table: SampleTable,
     depths: Vec<f32>,
-    /// What sampled queries found, by box.
+    /// Answers of sampled queries, by box.
     pub seen: Vec<SampledAnswer>,
 }
 
@@ -354,7 +363,7 @@ impl Drawn {
     }
 }
 
-/// What one way of asking costs, `[tests, bytes, madds]`, and whether it finds an object hidden.
+/// Answer of one kind of query: whether it finds an object hidden, and its cost `[tests, bytes, madds]`.
 type Answered = (bool, [u64; 3]);
 
 /// A row from the answers for all objects, and whether it is truly hidden.
@@ -477,6 +486,7 @@ mod tests {
             slats: &[1, 8],
         };
         let (folder, chart, done) = written::<OcclusionChart>(least);
+        assert!(chart.subject().contains("4 samples a pixel, sampled queries 4 to 8"), "{}", chart.subject());
         let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
         let json: serde_json::Value = serde_json::from_str(&read("occlusion.json")).unwrap();
         let rows = chart.intervals.len() + chart.samples.len() + chart.failing.len();

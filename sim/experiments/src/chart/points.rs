@@ -15,7 +15,7 @@ use workloads::points::quality::{
 use workloads::points::rivals::{bridson, plain_darts};
 use workloads::points::white::{Density, Named, Numbers, WhiteError, WhiteSpec, counts, shares, white_noise};
 
-use crate::study::table::{Sheet, Table, fixed, plain};
+use crate::study::table::{Sheet, Table, count, fixed, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
 use crate::study::{Gallery, Study, StudyError};
 
@@ -88,8 +88,8 @@ impl Study for PointsChart {
             .data("method", |row| row.method)
             .data("effort", |row| row.effort)
             .shown("method", |row| row.name(), plain)
-            .column("points", "points", |row| row.points, plain)
-            .column("points_per_s", "points/s", |row| row.points_per_s, fixed(0))
+            .column("points", "points", |row| row.points, count)
+            .column("points_per_s", "points/s", |row| row.points_per_s, |per_s| count(per_s.round() as u64))
             .column("packing_density", "density", |row| row.packing_density, fixed(4))
             .data("closer_pairs", |row| row.closer_pairs)
             .detail("closer", |row| row.closer_pairs, plain)
@@ -104,8 +104,8 @@ impl Study for PointsChart {
             .csv("points.csv");
         let coarse = Table::of(&self.coarse)
             .shown("r in spacings of numbers", |c| c.radius_ulp, fixed(0))
-            .shown("points", |c| c.points, plain)
-            .shown("thin regions", |c| c.thin_regions, plain)
+            .shown("points", |c| c.points, count)
+            .shown("thin regions", |c| c.thin_regions, count)
             .shown("hole beyond r", |c| c.beyond, |beyond| format!("{beyond:.1e} r"));
         let columns = Table::of(&self.columns)
             .detail("D", |c| c.dimensions, plain)

@@ -33,7 +33,7 @@ pub struct SampledEffort {
     pub seeds: u64,
 }
 
-/// What the cost is called: previews and timing of a run, over those of a run that simulates every frame.
+/// Name of the cost: previews and timing of a run, over those of a run that simulates every frame.
 pub(super) const HOST_TIME: &str = "host time of a run, relative to all frames simulated";
 
 /// The quantities that are predicted.
@@ -50,9 +50,9 @@ pub struct Trial {
     pub simulated: usize,
     /// The quantity: one of [`QUANTITIES`].
     pub quantity: &'static str,
-    /// What all frames simulated come to: cycles a frame, joules a frame, watts.
+    /// Value with all frames simulated: cycles a frame, joules a frame, watts.
     pub truth: f64,
-    /// What was predicted.
+    /// Predicted value.
     pub value: f64,
     /// The ends of the 95 % interval.
     pub interval: [f64; 2],
@@ -64,7 +64,7 @@ pub struct Trial {
     pub inside: bool,
 }
 
-/// What an animation cost.
+/// Cost of an animation.
 #[derive(Clone, Debug, Serialize)]
 pub struct Cost {
     /// The animation.
@@ -111,7 +111,7 @@ pub struct SampledChart {
     pub effort: SampledEffort,
     /// Over all animations, by quantity and together.
     pub figures: Vec<Figures>,
-    /// What each animation cost.
+    /// Cost of each animation.
     pub costs: Vec<Cost>,
     /// Every trial.
     pub trials: Vec<Trial>,
@@ -197,7 +197,7 @@ impl Study for SampledChart {
     }
 }
 
-/// What the median error of a quantity is called.
+/// Name of the median error of a quantity.
 fn median_error_of(quantity: &str) -> &'static str {
     match quantity {
         "cycles" => "median error of cycles",
@@ -243,7 +243,7 @@ impl SampledChart {
     }
 }
 
-/// What it cost, and every trial.
+/// Cost of an animation, and every trial.
 fn animation(
     scene: &str,
     effort: SampledEffort,
@@ -311,7 +311,7 @@ fn plan(scene: &str, effort: SampledEffort) -> Result<Plan, RunError> {
     )))
 }
 
-/// What all frames come to: cycles a frame, joules a frame while busy, watts while busy.
+/// Values over all frames: cycles a frame, joules a frame while busy, watts while busy.
 fn truth(frames: &[RunFrame], core_hz: f64) -> [f64; 3] {
     let count = frames.len() as f64;
     let cycles: f64 = frames.iter().map(|frame| frame.cost().cycles).sum();

@@ -311,7 +311,7 @@ fn words(letters: &str) -> String {
     on.map(|switch| switch.name).collect::<Vec<_>>().join(" + ")
 }
 
-/// What the letters mean.
+/// Legend of the letters.
 fn key() -> String {
     SWITCHES.map(|switch| format!("{} = {}", switch.letter, switch.name)).join(", ")
 }

@@ -50,7 +50,7 @@ pub struct About {
     pub paper: String,
     /// Condition of the verdict.
     pub holds_when: String,
-    /// What is not tested, and what follows by construction.
+    /// Claims that are not tested, and those that hold by construction.
     pub limits: String,
 }
 

@@ -1,4 +1,4 @@
-//! What `auto` takes beside every fixed choice of tests.
+//! Multiply-adds of `auto` beside those of every fixed choice of tests.
 
 use pipeline::Features;
 use serde::Serialize;
@@ -17,9 +17,9 @@ pub struct Trial {
     pub family: &'static str,
     /// The value of its parameter.
     pub value: f64,
-    /// What `auto` takes.
+    /// Multiply-adds of `auto`.
     pub auto: u64,
-    /// What each of [`combinations`] takes, in their order.
+    /// Those of each of [`combinations`], in their order.
     pub fixed: Vec<u64>,
 }
 
@@ -64,7 +64,7 @@ pub fn trial(
     })
 }
 
-/// What each combination takes; those that cannot differ are measured once.
+/// Multiply-adds of each combination; those that cannot differ are measured once.
 fn fixed<E>(lens: bool, madds: impl Fn(Features) -> Result<u64, E>) -> Result<Vec<u64>, E> {
     let mut known: Vec<(Features, u64)> = Vec::new();
     let all = combinations().into_iter().map(|(_, features)| Features {
@@ -139,7 +139,7 @@ impl Choices {
         over(&self.values)
     }
 
-    /// What is printed: the worst family, and how many values are worse than that may be.
+    /// Printed text: the worst family, and how many values are worse than that may be.
     pub fn text(&self) -> String {
         let (Some(family), Some(value)) = (worst(&self.families), worst(&self.values)) else {
             return String::new();

@@ -13,7 +13,7 @@ use workloads::stress::{Family, Size, set_up_all};
 use super::methods::{Method, Place, Subject, differing, on_subject};
 use super::truth::{Hulls, Truth};
 
-/// What one method made of one value of a family.
+/// Result of one method for one value of a family.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct StressRow {
     /// The family.
@@ -26,9 +26,9 @@ pub struct StressRow {
     pub triangles: u64,
     /// Samples that do not see what they have to: must be none.
     pub samples_lost: u64,
-    /// What that was found by: `brute force` or `no tests`.
+    /// Source of the reference: `brute force` or `no tests`.
     pub compared_with: &'static str,
-    /// What it cost.
+    /// Its cost.
     pub work: Work,
     /// Its multiply-adds over those of the best method at this value.
     pub over_best: f64,
@@ -129,7 +129,7 @@ struct Pair {
     truth: Option<Hulls>,
 }
 
-/// What a set of tests makes of the pairs. Widths are shares of the whole lens and shutter, means over pairs that truly touch.
+/// Intervals of the pairs under a set of tests. Widths are shares of the whole lens and shutter, means over pairs that truly touch.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Intervals {
     /// Pairs looked at, those of the bounding box.
@@ -156,7 +156,7 @@ pub struct Intervals {
     pub tightness: f64,
 }
 
-/// What a box may leave out of the true one before it counts as wrong: the arithmetic of the truth itself.
+/// Largest part of the true box that a box may leave out: the rounding error of the true box itself.
 const TOLERANCE: f64 = 1e-6;
 
 impl Pairs {
@@ -197,12 +197,12 @@ impl Pairs {
         if self.exact { "exact roots" } else { "dense sampling" }
     }
 
-    /// What the tests of `features` make of them.
+    /// Intervals under the tests of `features`.
     pub fn under(&self, features: &Features) -> Intervals {
         self.bounded(|place, triangle| place.bound(features, triangle))
     }
 
-    /// What `bound` makes of them.
+    /// Intervals under `bound`.
     pub fn bounded(&self, bound: impl Fn(&Place, &Triangle) -> Option<Box5>) -> Intervals {
         let mut sum = Intervals { pairs: self.pairs.len() as u64, ..Intervals::default() };
         let (mut volume, mut true_volume) = (0.0, 0.0);

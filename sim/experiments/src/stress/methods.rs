@@ -143,7 +143,7 @@ pub struct Subject<'a> {
     pub viewport: Viewport,
     /// Where and when each pixel looks.
     pub samples: &'a dyn SampleSource,
-    /// What is drawn.
+    /// The draws.
     pub draws: &'a [Draw<'a>],
     /// The hardware; its features are those of each method in turn.
     pub spec: &'a PipelineSpec,
@@ -180,7 +180,7 @@ impl Subject<'_> {
         self.draws.iter().map(|draw| draw.geometry.triangles().len() as u64).sum()
     }
 
-    /// What every sample sees with the tests of `features`.
+    /// The triangle that every sample sees with the tests of `features`.
     pub fn seen(&self, features: Features) -> Result<Seen, PassError> {
         self.with(features, |settings| RasterPass::new(self.camera, self.draws, settings).visibility())
     }
@@ -192,8 +192,8 @@ impl Subject<'_> {
         })
     }
 
-    /// What every sample has to see: from all triangles against all samples where that is not too much, else from the pipeline
-    /// with every test off. Also says whether it was brute force.
+    /// The triangle that every sample has to see: from all triangles against all samples where that is not too much, else from the pipeline
+    /// with every test off. Also returns whether it was brute force.
     pub fn reference(&self) -> Result<(Seen, bool), PassError> {
         let samples = self.viewport.pixels() as u64 * u64::from(self.samples.per_pixel());
         if samples * self.triangles() <= MOST_TESTS {

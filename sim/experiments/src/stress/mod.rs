@@ -16,14 +16,14 @@ use rayon::prelude::*;
 use serde::{Serialize, Serializer};
 use workloads::stress::{Family, Size, families, family};
 
-use crate::study::table::{Sheet, Table, fixed, optional, plain, share};
+use crate::study::table::{Sheet, Table, count, fixed, optional, plain, share};
 use crate::study::{Gallery, Study, StudyError, files};
 use choice::{Choice, Choices, Trial};
 use measure::StressRow;
 use methods::METHODS;
 use output::dir::SUMMARY;
 use output::progress::Progress;
-use output::table::grouped;
+
 use output::{Claim, OutputError};
 use run::{GpuSpec, RunError};
 
@@ -63,7 +63,7 @@ pub struct Report {
     pub auto: Choices,
 }
 
-/// What goes into `summary.json`.
+/// The part of `summary.json`.
 #[derive(Serialize)]
 pub struct Summary<'a> {
     /// Samples lost over all rows: must be none.
@@ -166,7 +166,7 @@ fn stem(name: &str) -> String {
 }
 
 impl Report {
-    /// What goes into `summary.json`.
+    /// The part of `summary.json`.
     pub fn summary(&self) -> Summary<'_> {
         Summary {
             samples_lost: self.rows.iter().map(|row| row.samples_lost).sum(),
@@ -195,7 +195,7 @@ impl Report {
         rows.take(if first { 1 } else { usize::MAX }).map(|row| row.over_best).reduce(f64::max)
     }
 
-    /// What is printed below the table.
+    /// Text below the table.
     fn below(&self) -> String {
         let (summary, rows) = (self.summary(), self.rows.len());
         format!(
@@ -228,8 +228,8 @@ impl Report {
             .shown("method", |row| row.method, plain)
             .shown("lost", |row| row.samples_lost, plain)
             .shown("efficiency", |row| row.work.efficiency(), optional(share(1)))
-            .shown("tile madds", |row| row.work.tile_madds, grouped)
-            .shown("sample madds", |row| row.work.sample_madds, grouped)
+            .shown("tile madds", |row| row.work.tile_madds, count)
+            .shown("sample madds", |row| row.work.sample_madds, count)
             .shown("over best", |row| row.over_best, fixed(2))
             .shown("tiles kept", |row| of(row.intervals.pairs_kept, row), share(1))
             .shown("touched", |row| of(row.intervals.pairs_touching, row), share(1))

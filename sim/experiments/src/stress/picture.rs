@@ -70,9 +70,9 @@ pub(super) fn auto(choices: &Choices, look: &Look) -> Picture {
 /// Panels of a row on a page.
 const ACROSS: usize = 7;
 
-/// What is measured of a method at each value of a family.
+/// A measure of a method at each value of a family.
 pub(super) struct Measure {
-    /// What is behind the family's name in names of files; nothing for the cost.
+    /// Ending after the family's name in names of files; empty for the cost.
     pub stem: &'static str,
     title: &'static str,
     /// The name of the axis.

@@ -1,7 +1,7 @@
 //! The true interval of lens and time in which a triangle touches a tile.
 //!
-//! Before a pinhole it is exact ([`Sweep`]). Under a lens it is found from below, from places where a point of the triangle is seen at a
-//! point of the tile (solved for `u, v`), then, from the outermost of these, exact roots along `t`, `u` and `v` in turn.
+//! For a pinhole it is exact ([`Sweep`]). For a lens it is a lower bound: places where a point of the triangle is seen at a
+//! point of the tile (solved for `u, v`), widened from the outermost of these by exact roots along `t`, `u` and `v` in turn.
 //!
 //! Roots in time: on the homogeneous image plane a vertex is `p(s) = p_0 + s (p_1 - p_0)`. The triangle begins or ceases to touch a rectangle
 //! only where a vertex crosses a side (`x(s) - X w(s)`, linear), a corner of the rectangle crosses an edge (`p_i x p_j`

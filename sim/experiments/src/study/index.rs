@@ -17,7 +17,7 @@ const TEMPLATE_NAME: &str = "charts.html";
 pub struct Section {
     /// Its name on the command line.
     pub name: String,
-    /// What it shows.
+    /// Its subject, in one line.
     pub about: String,
     /// Its tables, as printed.
     pub text: String,

@@ -23,7 +23,7 @@ use tradeoff::TradeoffPoint;
 pub trait Study: Serialize + Sized {
     /// Its name on the command line.
     const NAME: &'static str;
-    /// What it shows, in one line.
+    /// Its subject, in one line.
     const ABOUT: &'static str;
     /// Paths of its pictures, without endings.
     const PICTURES: &'static [&'static str];
@@ -170,7 +170,7 @@ fn write<S: Study>(found: &S, sheets: &[Sheet], dir: &OutDir, look: &Look) -> Re
 pub struct Entry {
     /// Its name on the command line.
     pub name: &'static str,
-    /// What it shows, in one line.
+    /// Its subject, in one line.
     pub about: &'static str,
     /// Whether other scenes than its own can be given.
     pub takes_scenes: bool,

@@ -1,6 +1,7 @@
 //! Tables whose columns are declared once, for CSV, JSON, Markdown and the terminal.
 
 use output::dir::BoxError;
+use output::table::grouped;
 use serde::ser::{SerializeMap, SerializeSeq};
 use serde::{Serialize, Serializer};
 
@@ -51,6 +52,11 @@ pub fn plain<V: ToString>(value: V) -> String {
     value.to_string()
 }
 
+/// Shows a count, its digits in groups of three.
+pub fn count(value: impl TryInto<u64>) -> String {
+    value.try_into().map_or(String::new(), grouped)
+}
+
 /// Shows a number with so many decimals.
 pub fn fixed(decimals: usize) -> impl Fn(f64) -> String {
     move |value| format!("{value:.decimals$}")
@@ -99,7 +105,7 @@ struct Column {
     name: &'static str,
     values: Vec<Value>,
     heading: String,
-    /// What is shown; a column without cells is not shown.
+    /// Texts of the column; one without any is not shown.
     cells: Vec<String>,
     /// Whether it is in Markdown alone.
     detail: bool,
@@ -214,7 +220,7 @@ impl Sheet {
         Some(heading + &rows.collect::<String>())
     }
 
-    /// What is printed; `None` where nothing is.
+    /// The table for a terminal; `None` without a column to print.
     pub fn text(&self) -> Option<String> {
         let printed = || self.columns.iter().filter(|column| column.is_shown() && !column.detail);
         printed().next()?;

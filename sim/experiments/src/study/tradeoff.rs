@@ -58,7 +58,7 @@ impl Metric {
 pub struct TradeoffPoint {
     /// The study that measured it.
     pub study: &'static str,
-    /// What is found, for example `time of a frame`.
+    /// The quantity that is computed, for example `time of a frame`.
     pub subject: String,
     /// The method, for example `packet`.
     pub method: String,
@@ -66,7 +66,7 @@ pub struct TradeoffPoint {
     pub level: String,
     /// How wrong it is.
     pub error: Metric,
-    /// What it costs.
+    /// Its cost.
     pub cost: Metric,
 }
 

@@ -89,7 +89,7 @@ pub(super) struct Extent {
 /// Size of the labels of ticks in pixels.
 pub(super) const TICK_PX: f64 = 12.0;
 /// Share of a logarithmic axis reserved for zero.
-const ZERO_ROW: f64 = 0.13;
+pub(super) const ZERO_ROW: f64 = 0.13;
 
 /// Whether an axis can be drawn from `low` to `high`: both are finite, and so is their sum.
 pub(super) fn is_drawable(low: f64, high: f64) -> bool {
@@ -97,16 +97,18 @@ pub(super) fn is_drawable(low: f64, high: f64) -> bool {
 }
 
 impl AxisSpec {
-    /// Range of the drawable `values`, with `pad` of it added at either end; `None` without any. An axis from zero begins a
-    /// little below zero if there are `markers`, which the axis line would hide.
+    /// Range of the drawable `values`; `None` without any. At either end `pad` of the range is added, or `markers` if that
+    /// is more: the share that markers reach over. It is 0 without markers; an axis from zero then begins at zero.
     pub(super) fn extent(
         &self,
         values: impl IntoIterator<Item = f64>,
         pad: f64,
-        markers: bool,
+        markers: f64,
     ) -> Option<Extent> {
         if let Scale::Listed(names) = &self.scale {
-            return Some(Extent { low: -0.4, high: names.len() as f64 - 0.6, zero: false });
+            let last = names.len() as f64 - 1.0;
+            let room = (markers * last).max(0.4);
+            return Some(Extent { low: -room, high: last + room, zero: false });
         }
         let (mut low, mut high, mut zero) = (f64::INFINITY, f64::NEG_INFINITY, false);
         for value in values {
@@ -126,9 +128,10 @@ impl AxisSpec {
             Scale::Even => (0.0..0.6 * high).contains(&low),
             _ => false,
         };
+        let least = if markers > 0.0 { markers.max(0.5 * pad) } else { 0.0 };
+        let pad = pad.max(markers);
         if from_zero {
-            let low = if markers { (low - 0.5 * pad * high).min(0.0) } else { 0.0 };
-            return Some(Extent { low, high: high * (1.0 + pad), zero });
+            return Some(Extent { low: (low - least * high).min(0.0), high: high * (1.0 + pad), zero });
         }
         let room = match self.scale.is_logarithmic() {
             true => pad.max(0.01) * (high - low).max(1.0),
@@ -418,7 +421,7 @@ mod tests {
 
     fn logarithmic(values: &[f64], along: (Way, f64)) -> Axis {
         let spec = AxisSpec::default();
-        spec.axis(spec.extent(values.iter().copied(), 0.04, true).unwrap(), along)
+        spec.axis(spec.extent(values.iter().copied(), 0.04, 0.02).unwrap(), along)
     }
 
     #[test]
@@ -469,19 +472,19 @@ mod tests {
             }
         }
         let spec = AxisSpec { scale: Scale::Doublings, ..AxisSpec::default() };
-        let axis = spec.axis(spec.extent([4.0, 16_384.0], 0.04, true).unwrap(), (Way::Across, 324.0));
+        let axis = spec.axis(spec.extent([4.0, 16_384.0], 0.04, 0.02).unwrap(), (Way::Across, 324.0));
         assert_eq!(labels(&axis), ["4", "16", "64", "256", "1024", "4096", "16384"]);
     }
 
     #[test]
     fn zero_has_a_row_of_its_own_below() {
         let spec = AxisSpec { zero: "exact".to_owned(), ..AxisSpec::default() };
-        let axis = spec.axis(spec.extent([0.0, 1.0, 100.0], 0.04, true).unwrap(), (Way::Up, 372.0));
+        let axis = spec.axis(spec.extent([0.0, 1.0, 100.0], 0.04, 0.02).unwrap(), (Way::Up, 372.0));
         assert_eq!(axis.ticks[0].label, "exact");
         let broken = axis.fraction_at(axis.broken_at.unwrap());
         let [zero, one] = [0.0, 1.0].map(|value| axis.place(value).unwrap());
         assert!(0.0 < zero && zero < broken && broken < one && axis.place(-1.0).is_none());
-        assert!(spec.extent([0.0], 0.04, true).is_none(), "no decade to be seen");
+        assert!(spec.extent([0.0], 0.04, 0.02).is_none(), "no decade to be seen");
         assert!(logarithmic(&[1.0, 100.0], ACROSS).place(0.0).is_none());
     }
 
@@ -493,7 +496,7 @@ mod tests {
                 if values[0] == 0.0 && scale == Scale::Decades {
                     continue;
                 }
-                let axis = spec.axis(spec.extent(values, 0.04, true).unwrap(), ACROSS);
+                let axis = spec.axis(spec.extent(values, 0.04, 0.02).unwrap(), ACROSS);
                 let [low, high] = values.map(|value| axis.place(value).unwrap());
                 assert!(low > 0.01 && high < 0.99, "{values:?} {axis:?}");
             }
@@ -503,7 +506,7 @@ mod tests {
     #[test]
     fn shares_start_at_zero_and_what_is_far_off_does_not() {
         let extent = |scale, values: [f64; 2]| {
-            AxisSpec { scale, ..AxisSpec::default() }.extent(values, 0.06, false).unwrap()
+            AxisSpec { scale, ..AxisSpec::default() }.extent(values, 0.06, 0.0).unwrap()
         };
         assert_eq!(extent(Scale::Even, [0.2, 1.0]).low, 0.0);
         assert!(extent(Scale::Even, [95.0, 100.0]).low > 90.0);

@@ -1,71 +1,12 @@
 //! Series over axes, in one panel or several.
 
-use std::ops::Range;
-
-use super::axis::{Axis, AxisSpec, Extent, Scale, Way};
-use super::legend::{Key, LEGEND_LINE, LEGEND_PX, legend_column, legend_lines, plate};
-use super::palette::{INK, MARK, MUTED};
-use super::panel::{self, BELOW, Label, Panel, aside};
-use super::picture::Look;
-use super::picture::{Across, Picture, Text, text};
-use super::series::{Mark, Series};
-use super::text::text_width;
-use super::text::{shortened, wrapped};
-
-/// Series over two axes.
-#[derive(Clone, Debug)]
-pub struct ChartPanel {
-    /// Title.
-    pub title: String,
-    /// Horizontal and vertical axis.
-    pub axes: [AxisSpec; 2],
-    /// Series; the first is at the bottom.
-    pub series: Vec<Series>,
-    /// Range of the horizontal axis in which the method fails, and its label.
-    pub failing: Option<(Range<f64>, String)>,
-    /// Whether both axes have the same scale in pixels.
-    pub equal: bool,
-}
-
-impl ChartPanel {
-    /// Series on logarithmic axes with these names, `[horizontal, vertical]`.
-    pub fn new(title: &str, names: [&str; 2], series: Vec<Series>) -> Self {
-        let axes = names.map(|name| AxisSpec { name: name.to_owned(), ..AxisSpec::default() });
-        Self::over(title, axes, series)
-    }
-
-    /// Series on these axes.
-    pub fn over(title: &str, axes: [AxisSpec; 2], series: Vec<Series>) -> Self {
-        Self { title: title.to_owned(), axes, series, failing: None, equal: false }
-    }
-
-    /// Sets the scales of both axes.
-    #[must_use]
-    pub fn on(mut self, across: Scale, up: Scale) -> Self {
-        (self.axes[0].scale, self.axes[1].scale) = (across, up);
-        self
-    }
-
-    /// Makes the horizontal axis a list of these values of `name`, at positions 0, 1, ...
-    #[must_use]
-    pub fn along(mut self, name: &str, values: &[String]) -> Self {
-        self.axes[0] =
-            AxisSpec { name: name.to_owned(), scale: Scale::Listed(values.to_vec()), ..AxisSpec::default() };
-        self
-    }
-
-    /// Marks the range in which the method fails.
-    #[must_use]
-    pub fn failing(self, range: Option<Range<f64>>, name: &str) -> Self {
-        Self { failing: range.map(|range| (range, name.to_owned())), ..self }
-    }
-
-    /// Gives both axes the same scale in pixels, for points in a plane.
-    #[must_use]
-    pub fn equal(self) -> Self {
-        Self { equal: true, ..self }
-    }
-}
+use super::axis::{Extent, Way, ZERO_ROW};
+use super::cell::{Cell, RIGHT, SMALL_GAP, draw_row};
+use super::chart_panel::ChartPanel;
+use super::legend::{Key, LEGEND_PX, legend_lines};
+use super::panel::aside;
+use super::picture::{Across, Look, Picture, Text, text};
+use super::text::{shortened, text_width};
 
 /// Panels with a title. Panels whose vertical axes have the same quantity share its range.
 #[derive(Clone, Debug)]
@@ -88,32 +29,6 @@ const LEAST: [f64; 2] = [290.0, 120.0];
 const NAME_ASIDE: f64 = 44.0;
 /// Largest number of panels in a row, unless they are small.
 const MOST_ACROSS: usize = 3;
-/// Line height of a panel's title.
-const LINE: f64 = 18.0;
-/// Free space right of a panel.
-const RIGHT: f64 = 18.0;
-/// Distance of small panels.
-const SMALL_GAP: f64 = 16.0;
-/// Largest height of a panel with equal axes.
-const MOST_HIGH: f64 = 640.0;
-/// Font size of the label of a marked range.
-const MARK_PX: f64 = 11.5;
-
-/// Position of a panel, and what it shares with others.
-struct Cell<'a> {
-    panel: &'a ChartPanel,
-    left: f64,
-    width: f64,
-    /// Height of the panel itself.
-    height: f64,
-    extents: Option<[Extent; 2]>,
-    /// Whether its horizontal and its vertical axis are labelled.
-    labelled: [bool; 2],
-    /// Whether it is a small panel.
-    small: bool,
-    /// Whether it has its own legend.
-    legend: bool,
-}
 
 impl<'a> Chart<'a> {
     /// Panels with a title and a line below it.
@@ -140,32 +55,36 @@ impl<'a> Chart<'a> {
             picture.height += legend_lines(&mut picture, top, entries) + 2.0;
         }
         let across = self.across(&picture, legend.is_none());
-        let extents = self.extents();
-        let aside = self.small_aside(&extents);
         let top = picture.height;
-        for row in 0..self.panels.len().div_ceil(across) {
-            let places = row * across..((row + 1) * across).min(self.panels.len());
-            let cells = places.map(|place| {
-                let width = (picture.width() - 2.0 * picture.margin() - aside) / across as f64;
-                let last = place + across >= self.panels.len();
-                Cell {
-                    panel: &self.panels[place],
-                    left: picture.margin() + aside + width * (place % across) as f64,
-                    width,
-                    height: self.panel_height(width),
-                    extents: extents[place],
-                    labelled: self.small.map_or([true; 2], |_| [last, place % across == 0]),
-                    small: self.small.is_some(),
-                    legend: legend.is_none() && self.small.is_none(),
-                }
-            });
-            let cells: Vec<Cell<'_>> = cells.collect();
-            draw_row(&mut picture, &cells);
+        for row in self.cells(&picture, across, legend.is_none()).chunks(across) {
+            draw_row(&mut picture, row);
         }
         if self.small.is_some() {
             self.small_names(&mut picture, top);
         }
         picture
+    }
+
+    /// The panels with their positions; `across` are in a row.
+    fn cells(&self, picture: &Picture, across: usize, legends: bool) -> Vec<Cell<'_>> {
+        let room = picture.width() - 2.0 * picture.margin();
+        let extents = self.extents(room / across as f64);
+        let aside = self.small_aside(&extents);
+        let width = (room - aside) / across as f64;
+        let cell = |(place, panel)| Cell {
+            panel,
+            left: picture.margin() + aside + width * (place % across) as f64,
+            width,
+            height: self.panel_height(width),
+            extents: extents[place],
+            labelled: match self.small {
+                Some(_) => [place + across >= self.panels.len(), place % across == 0],
+                None => [true; 2],
+            },
+            small: self.small.is_some(),
+            legend: legends && self.small.is_none(),
+        };
+        self.panels.iter().enumerate().map(cell).collect()
     }
 
     /// Room left of small panels for the labels of the first ones.
@@ -210,33 +129,35 @@ impl<'a> Chart<'a> {
         }
     }
 
-    /// Ranges of all panels. Axes of the same quantity share a range.
-    fn extents(&self) -> Vec<Option<[Extent; 2]>> {
+    /// Ranges of all panels, each `width` wide with its labels. Axes of the same quantity share a range.
+    fn extents(&self, width: f64) -> Vec<Option<[Extent; 2]>> {
         let values: Vec<[Vec<f64>; 2]> = self.panels.iter().map(ChartPanel::values).collect();
-        let extent = |place: usize, axis: usize| {
+        let extent = |place: usize, axis: usize, length: f64| {
             let own = &self.panels[place];
             let shares = |other: usize| {
                 let same = self.panels[other].axes[axis] == own.axes[axis];
                 other == place || (same && !own.equal && (axis == 1 || self.small.is_some()))
             };
-            let shared = (0..self.panels.len()).filter(|&other| shares(other));
-            let markers = own.series.iter().any(|series| series.mark.has_markers());
-            let pad = if axis == 1 {
-                0.06
-            } else if markers {
-                0.035
-            } else {
-                0.0
-            };
-            own.axes[axis].extent(shared.flat_map(|other| values[other][axis].iter().copied()), pad, markers)
+            let shared: Vec<usize> = (0..self.panels.len()).filter(|&other| shares(other)).collect();
+            let reach = |place: &usize| self.panels[*place].marker_reach(self.small.is_some());
+            let reach = shared.iter().map(reach).fold(0.0, f64::max);
+            let pad = [if reach > 0.0 { 0.035 } else { 0.0 }, 0.06][axis];
+            let values = shared.iter().flat_map(|&other| values[other][axis].iter().copied());
+            own.axes[axis].extent(values, pad, share_of_markers(reach, length))
         };
         let both = |place: usize| {
-            let (across, mut up) = (extent(place, 0)?, extent(place, 1)?);
-            if self.panels[place].failing.is_some() {
+            let own = &self.panels[place];
+            let height = self.panel_height(width);
+            let mut up = extent(place, 1, height)?;
+            if own.failing.is_some() {
                 // Room for its name above the curves.
                 up.high += 0.08 * (up.high - up.low);
             }
-            Some([across, up])
+            let labels = match self.small {
+                Some(_) => SMALL_GAP,
+                None => RIGHT + aside(&own.axes[1].axis(up, (Way::Up, height))),
+            };
+            Some([extent(place, 0, width - labels)?, up])
         };
         let own = |place: usize| values[place].iter().all(|values| !values.is_empty());
         (0..self.panels.len()).map(|place| both(place).filter(|_| own(place))).collect()
@@ -256,206 +177,21 @@ impl<'a> Chart<'a> {
     }
 }
 
-/// Draws panels side by side at the bottom of the picture, and increases its height.
-fn draw_row(picture: &mut Picture, cells: &[Cell<'_>]) {
-    let titles = cells.iter().map(|cell| cell.heading().len()).max().unwrap_or(0);
-    let top = picture.height + 8.0 + LINE * titles as f64;
-    let mut bottom = picture.height;
-    for cell in cells {
-        bottom = cell.draw(picture, top).max(bottom);
+/// Share of a range that is added at either end of an axis of `length` pixels, so that markers that reach over `reach` pixels
+/// stay within the panel, also beside a row for zero.
+fn share_of_markers(reach: f64, length: f64) -> f64 {
+    if reach == 0.0 {
+        return 0.0;
     }
-    picture.height = bottom;
-}
-
-impl Cell<'_> {
-    fn heading(&self) -> Vec<String> {
-        let room = self.area(0.0).map_or(self.width - 24.0, |area| self.left + self.width - area.left);
-        if self.small {
-            return vec![shortened(&self.panel.title, 1.1 * self.heading_px(), room)];
-        }
-        wrapped(&self.panel.title, self.heading_px(), true, room)
-    }
-
-    fn heading_px(&self) -> f64 {
-        if self.small { 11.0 } else { 13.0 }
-    }
-
-    /// Draws the panel whose area begins at `top`. Returns the bottom of its labels and legend.
-    fn draw(&self, picture: &mut Picture, top: f64) -> f64 {
-        let Some(area) = self.area(top) else {
-            let at = (self.left + 20.0, top + 0.5 * self.height);
-            picture.text(Text { colour: MUTED, ..text("nothing to show", at) });
-            self.write_heading(picture, self.left + 20.0, top);
-            return top + self.height + BELOW;
-        };
-        self.write_heading(picture, area.left, top);
-        let marked = self.panel.mark(picture, &area);
-        area.grid(picture);
-        if area.x.is_logarithmic() || matches!(self.panel.axes[0].scale, Scale::Listed(_)) {
-            area.grid_up(picture);
-        }
-        marked.into_iter().for_each(|name| picture.text(name));
-        let curves = self.panel.series.len();
-        for (index, series) in self.panel.series.iter().enumerate() {
-            let beneath = if self.small { 0 } else { curves - 1 - index };
-            series.mark.draw(&area, series.style(index), beneath, picture);
-        }
-        self.axes(picture, &area);
-        self.panel.write_names(picture, &area);
-        self.panel.write_notes(picture, &area);
-        let below = match (self.small, self.labelled[0]) {
-            (true, true) => 30.0,
-            (true, false) => 8.0,
-            _ => BELOW,
-        };
-        area.bottom + below + self.own_legend(picture, &area)
-    }
-
-    fn write_heading(&self, picture: &mut Picture, left: f64, top: f64) {
-        for (line, row) in self.heading().iter().rev().enumerate() {
-            let size = self.heading_px();
-            picture.text(Text { bold: true, size, ..text(row, (left, top - 12.0 - LINE * line as f64)) });
-        }
-    }
-
-    /// Area of the panel with its axes; `None` without data.
-    fn area(&self, top: f64) -> Option<Panel> {
-        let [across, up] = self.extents?;
-        let y = self.panel.axes[1].axis(up, (Way::Up, self.height));
-        let left = self.left + if self.small { 0.0 } else { aside(&y) };
-        let right = self.left + self.width - if self.small { SMALL_GAP } else { RIGHT };
-        if !self.panel.equal {
-            let x = self.panel.axes[0].axis(across, (Way::Across, right - left));
-            return Some(Panel { left, top, right, bottom: top + self.height, x, y });
-        }
-        let (wide, high) = (across.high - across.low, up.high - up.low);
-        let px = ((right - left) / wide).min(MOST_HIGH / high);
-        let [x, y]: [Axis; 2] = [(0, across, Way::Across, px * wide), (1, up, Way::Up, px * high)]
-            .map(|(axis, extent, way, length)| self.panel.axes[axis].axis(extent, (way, length)));
-        Some(Panel { left, top, right: left + px * wide, bottom: top + px * high, x, y })
-    }
-
-    fn axes(&self, picture: &mut Picture, area: &Panel) {
-        let mut area = area.clone();
-        if self.small {
-            // Once for all of them.
-            area.x.label.clear();
-            area.y.label.clear();
-        }
-        for (axis, labelled) in [&mut area.x, &mut area.y].into_iter().zip(self.labelled) {
-            if !labelled {
-                axis.ticks.iter_mut().for_each(|tick| tick.label.clear());
-            }
-        }
-        area.axis_across(picture, 0.0);
-        area.axis_up(picture);
-    }
-
-    /// Draws a legend below the panel. Returns its height.
-    fn own_legend(&self, picture: &mut Picture, area: &Panel) -> f64 {
-        if !self.legend {
-            return 0.0;
-        }
-        let entries: Vec<_> =
-            self.panel.named().map(|(key, series)| (key, series.name.clone(), String::new())).collect();
-        let height = LEGEND_LINE * entries.len() as f64;
-        let from = (area.left.min(self.left + 8.0), area.bottom + BELOW + 8.0);
-        legend_column(picture, from, (self.left + self.width, height), &entries);
-        height + 4.0
-    }
-}
-
-impl ChartPanel {
-    /// All values of both axes.
-    fn values(&self) -> [Vec<f64>; 2] {
-        let mut all = [Vec::new(), Vec::new()];
-        for series in &self.series {
-            for (all, values) in all.iter_mut().zip(series.mark.values()) {
-                all.extend(values);
-            }
-        }
-        all
-    }
-
-    /// Named series with their keys.
-    fn named(&self) -> impl Iterator<Item = (Key, &Series)> {
-        let all = self.series.iter().enumerate();
-        all.filter(|(_, series)| !series.name.is_empty())
-            .map(|(index, series)| (series.mark.key(series.style(index)), series))
-    }
-
-    /// Marks the range in which the method fails. Returns its label, which is drawn over the grid.
-    fn mark(&self, picture: &mut Picture, area: &Panel) -> Option<Text> {
-        let (range, name) = self.failing.as_ref()?;
-        let end = |value: f64, beyond: f64| {
-            let place = if value.is_finite() { area.x.place(value) } else { None };
-            place.map_or(beyond, |_| area.x_px(value))
-        };
-        let (from, to) = (end(range.start, area.left), end(range.end, area.right));
-        if to <= from {
-            return None;
-        }
-        picture.rect((from, area.top), (to, area.bottom), MARK.alpha(0.22));
-        let name = shortened(name, MARK_PX, area.right - area.left - 12.0);
-        let fits = from + 6.0 + text_width(&name, MARK_PX, false) <= area.right;
-        let (x, across) = if fits {
-            (from + 6.0, Across::Left)
-        } else {
-            (to.max(area.left + 0.5 * (area.right - area.left)) - 6.0, Across::Right)
-        };
-        Some(Text { size: MARK_PX, colour: MUTED, across, ..text(&name, (x, area.top + 10.0)) })
-    }
-
-    /// Labels of points; those of the last series first.
-    fn write_names(&self, picture: &mut Picture, area: &Panel) {
-        let mut labels = Vec::new();
-        for series in self.series.iter().rev() {
-            let bold = matches!(series.mark, Mark::Spreads(_));
-            let colour = if bold || labels.is_empty() { INK } else { MUTED };
-            let names = series.mark.names(area).into_iter();
-            labels.extend(names.map(|(at, radius, name)| Label { name, at, radius, colour, bold }));
-        }
-        let obstacles: Vec<_> = self.series.iter().flat_map(|series| series.mark.obstacles(area)).collect();
-        let left_out = panel::write(picture, area, &labels, &obstacles);
-        if left_out > 0 {
-            let at = (area.right, area.bottom + 38.0);
-            let words = format!("{left_out} {} without room", if left_out == 1 { "name" } else { "names" });
-            picture.text(Text { size: MARK_PX, colour: MUTED, across: Across::Right, ..text(&words, at) });
-        }
-    }
-
-    /// Draws the notes of the series, in the corner where they cover least.
-    fn write_notes(&self, picture: &mut Picture, area: &Panel) {
-        let noted = self.named().filter(|(_, series)| !series.note.is_empty());
-        let entries: Vec<_> =
-            noted.map(|(key, series)| (key, series.name.clone(), series.note.clone())).collect();
-        let wide = |entry: &(Key, String, String)| {
-            44.0 + text_width(&entry.1, LEGEND_PX, false) + text_width(&entry.2, LEGEND_PX, false)
-        };
-        let width = entries.iter().map(wide).fold(0.0, f64::max);
-        if entries.is_empty() || width > area.right - area.left - 12.0 {
-            return;
-        }
-        let height = LEGEND_LINE * entries.len() as f64;
-        let lefts = [area.left + 6.0, area.right - 6.0 - width];
-        let tops = [area.top + 6.0, area.bottom - 6.0 - height];
-        let obstacles: Vec<_> = self.series.iter().flat_map(|series| series.mark.obstacles(area)).collect();
-        let hidden = |(left, top): (f64, f64)| {
-            let is_in =
-                |(x, y): &(f64, f64)| (left..left + width).contains(x) && (top..top + height).contains(y);
-            obstacles.iter().filter(|point| is_in(point)).count()
-        };
-        let corners = tops.into_iter().flat_map(|top| lefts.into_iter().map(move |left| (left, top)));
-        let Some((left, top)) = corners.min_by_key(|&corner| hidden(corner)) else { return };
-        plate(picture, (left - 4.0, top), (left + width + 4.0, top + height));
-        legend_column(picture, (left, top + 0.5 * LEGEND_LINE), (left + width, height), &entries);
-    }
+    let reach = reach + 1.0;
+    reach / ((1.0 - ZERO_ROW) * length - 2.0 * reach).max(reach)
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::axis::{AxisSpec, Scale};
     use super::super::picture::Shape;
-    use super::super::series::Paint;
+    use super::super::series::{Mark, Paint, Series, Spread};
     use super::*;
 
     fn texts(picture: &Picture) -> Vec<&str> {
@@ -525,6 +261,60 @@ mod tests {
                 .iter()
                 .all(|at| at.0 > left.0 + 4.0 && at.0 < right.0 - 4.0 && at.1 < left.1 - 4.0)
         );
+    }
+
+    #[test]
+    fn markers_of_every_kind_stay_within_their_panel() {
+        let places = [(0.0, 0.0), (1.0, 5.0), (19.0, 1e-3), (19.0, 900.0)];
+        let named = || places.map(|(x, y)| (x, y, String::new())).to_vec();
+        let spread = |(x, y)| Spread { at: (x, y), across: [x, x], up: [y, y], name: String::new() };
+        let marks = || {
+            [
+                Mark::Dots(named()),
+                Mark::Rings(named()),
+                Mark::Curve(places.into()),
+                Mark::Spreads(places.map(spread).into()),
+            ]
+        };
+        let names = (0..20).map(|number| number.to_string()).collect();
+        for scale in [Scale::Decades, Scale::Even, Scale::FromZero, Scale::Listed(names)] {
+            for (count, small) in [(1, None), (3, None), (6, Some(3)), (12, Some(12))] {
+                let up = if matches!(scale, Scale::Listed(_)) { Scale::FromZero } else { scale.clone() };
+                let series: Vec<Series> = marks().map(|mark| Series::new("s", mark)).into();
+                let panel = ChartPanel::new("", ["x", "y"], series).on(scale.clone(), up);
+                let chart = Chart { small, ..Chart::new("t", "s", vec![panel; count]) };
+                let picture = Picture::titled(&Look::default(), (WIDTHS[0], 300.0), ["t", "s"]);
+                for cell in chart.cells(&picture, chart.across(&picture, true), true) {
+                    let area = cell.area(0.0).unwrap();
+                    for (index, series) in cell.panel.series.iter().enumerate() {
+                        let above = if small.is_some() { 0 } else { cell.panel.series.len() - 1 - index };
+                        let reach = series.mark.reach(above);
+                        for (x, y) in series.mark.markers(&area) {
+                            let inside = x - reach >= area.left && x + reach <= area.right;
+                            assert!(
+                                inside && y - reach >= area.top && y + reach <= area.bottom,
+                                "{scale:?} {count} {x} {y}"
+                            );
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_marker_below_another_is_larger() {
+        let series = [[(0.0, 0.0), (3.0, 3.0)], [(1.0, 1.0), (3.0, 3.0)], [(2.0, 0.0), (3.0, 3.0)]];
+        let series = series.map(|points| dots(&points).painted(Paint::Like(0)));
+        let picture = Chart::new("t", "s", vec![even(series.into())]).picture(&Look::default());
+        let radius = |shape: &Shape| match shape {
+            Shape::Dot { radius, .. } => Some(*radius),
+            _ => None,
+        };
+        let radii: Vec<f64> = picture.shapes.iter().filter_map(radius).collect();
+        // The first are those of the legend; then two points of each series.
+        let [.., alone, lowest, _, middle, _, top] = radii[..] else { panic!("{radii:?}") };
+        assert!(lowest > middle && middle > top && top == alone, "{radii:?}");
     }
 
     #[test]

@@ -18,7 +18,9 @@
 //! plot says so; this is no error. Only `render` and `text` use the crate `plotters`.
 
 mod axis;
+mod cell;
 mod chart;
+mod chart_panel;
 mod columns;
 mod frame_plots;
 mod heat_map;
@@ -34,7 +36,8 @@ mod series;
 mod text;
 
 pub use axis::{AxisSpec, Scale};
-pub use chart::{Chart, ChartPanel};
+pub use chart::Chart;
+pub use chart_panel::ChartPanel;
 pub use frame_plots::{FrameEnergy, FrameEnergyPoint};
 pub use frame_plots::{FramePower, PowerPart};
 pub use heat_map::{HeatMapPlot, HeatTile, Shading};

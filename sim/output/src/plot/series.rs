@@ -111,6 +111,24 @@ impl Series {
 const RADII: [f64; 3] = [2.4, 3.0, 5.5];
 /// A series of more points has smaller markers.
 const MANY: usize = 60;
+/// Distance of the corners of triangles and diamonds from their point, relative to the radius.
+const CORNER_REACH: f64 = 1.25;
+/// Growth of a marker for each marker of a later series at the same place, so that its rim stays visible.
+const RIM_PX: f64 = 1.2;
+/// Markers this close are at the same place.
+const SAME_PLACE_PX: f64 = 2.0;
+/// Largest number of markers above one whose rim stays visible.
+const MAX_ABOVE: usize = 3;
+
+/// Radius of the markers of a curve below `above` others.
+fn curve_radius(above: usize) -> f64 {
+    2.8 + 0.4 * above.min(MAX_ABOVE) as f64
+}
+
+/// Radius of one of `count` dots below `above` others.
+fn dot_radius(count: usize, above: usize) -> f64 {
+    RADII[usize::from(count <= MANY)] + RIM_PX * above.min(MAX_ABOVE) as f64
+}
 
 impl Mark {
     /// All values of `x` and `y` that the axes must include.
@@ -128,9 +146,29 @@ impl Mark {
         finite.unzip::<f64, f64, Vec<f64>, Vec<f64>>().into()
     }
 
-    /// Whether it has markers; axes leave room for them.
-    pub(super) fn has_markers(&self) -> bool {
-        matches!(self, Self::Curve(_) | Self::Dots(_) | Self::Rings(_) | Self::Spreads(_))
+    /// Largest distance of the outline of a marker from its point, with `above` series drawn later; 0 without markers. Axes
+    /// leave room for it.
+    pub(super) fn reach(&self, above: usize) -> f64 {
+        CORNER_REACH
+            * match self {
+                Self::Curve(_) => curve_radius(above),
+                Self::Dots(dots) | Self::Rings(dots) => dot_radius(dots.len(), above),
+                Self::Spreads(_) => RADII[2] + 1.5,
+                _ => 0.0,
+            }
+    }
+
+    /// Positions of its markers.
+    pub(super) fn markers(&self, panel: &Panel) -> Vec<Point> {
+        let placed = |points: &mut dyn Iterator<Item = (f64, f64)>| {
+            points.filter_map(|point| panel.place(point)).collect()
+        };
+        match self {
+            Self::Curve(points) => placed(&mut points.iter().copied()),
+            Self::Dots(dots) | Self::Rings(dots) => placed(&mut dots.iter().map(|&(x, y, _)| (x, y))),
+            Self::Spreads(spreads) => placed(&mut spreads.iter().map(|spread| spread.at)),
+            _ => Vec::new(),
+        }
     }
 
     /// Its entry in a legend.
@@ -182,8 +220,9 @@ impl Mark {
         }
     }
 
-    /// Draws it. A curve with `beneath` curves above it is thicker, so that it stays visible beneath them.
-    pub(super) fn draw(&self, panel: &Panel, style: Style, beneath: usize, picture: &mut Picture) {
+    /// Draws it. Curves and markers below those of the series `above`, which are drawn later, are larger, so that they stay
+    /// visible.
+    pub(super) fn draw(&self, panel: &Panel, style: Style, above: &[Series], picture: &mut Picture) {
         let path =
             |points: &[(f64, f64)]| points.iter().filter_map(|&point| panel.place(point)).collect::<Vec<_>>();
         let colour = style.colour;
@@ -197,11 +236,12 @@ impl Mark {
             }
             Self::Line(line) => style.line(picture, &path(line), 1.6),
             Self::Curve(points) => {
-                let (points, thicker) = (path(points), beneath.min(3) as f64);
+                let points = path(points);
                 if points.len() > 1 {
-                    style.line(picture, &points, 1.5 + 0.5 * thicker);
+                    style.line(picture, &points, 1.5 + 0.5 * above.len().min(MAX_ABOVE) as f64);
                 }
-                points.iter().for_each(|&at| style.marker(picture, at, 2.8 + 0.4 * thicker));
+                let radius = curve_radius(above.len());
+                points.iter().for_each(|&at| style.marker(picture, at, radius));
             }
             Self::Faint(lines) => {
                 let alpha =
@@ -209,8 +249,11 @@ impl Mark {
                 lines.iter().for_each(|line| picture.polyline(path(line), colour.alpha(alpha), 1.0));
             }
             Self::Dots(dots) | Self::Rings(dots) => {
-                let radius = RADII[usize::from(dots.len() <= MANY)];
-                for at in dots.iter().filter_map(|&(x, y, _)| panel.place((x, y))) {
+                let later: Vec<Vec<Point>> = above.iter().map(|series| series.mark.markers(panel)).collect();
+                for at in self.markers(panel) {
+                    let covers = |other: &Point| libm::hypot(other.0 - at.0, other.1 - at.1) < SAME_PLACE_PX;
+                    let covering = later.iter().filter(|markers| markers.iter().any(covers)).count();
+                    let radius = dot_radius(dots.len(), covering);
                     match self {
                         Self::Dots(_) => style.marker(picture, at, radius),
                         _ => style.hollow(picture, at, radius),

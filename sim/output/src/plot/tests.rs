@@ -1,4 +1,4 @@
-//! What holds for every plot: text lies inside the picture and on no other text, and odd input is no error.
+//! Properties of every plot: text lies inside the picture and on no other text, and odd input is no error.
 
 use activity::Unit;
 use power_model::Part;
@@ -257,7 +257,7 @@ fn heat_maps_of_any_shape_fit() {
     for (size, value) in [([1280, 720], 12.0), ([3, 800], 1e9), ([1, 1], 0.0), ([900, 2], f64::NAN)] {
         let tiles = [HeatTile { origin: [0, 0], size, value }];
         let (title, subject) =
-            ("samples_tested per pixel, frame 12", "default on reference: 6 364 653 in all");
+            ("samples_tested per pixel, frame 12", "default on reference: 6,364,653 in all");
         for shading in
             [Shading::Even, Shading::Clipped, Shading::UpTo(4.0), Shading::Classes(&["none", "some"])]
         {
@@ -327,7 +327,7 @@ fn a_unit_has_one_colour_in_every_plot() {
     }
 }
 
-/// What a paper asks for: so many millimetres, letters of so many points, its own caption.
+/// Requirements of papers: a width in millimetres, letters in points, a caption of their own.
 #[test]
 fn pictures_are_as_wide_as_requested() {
     let chart = Chart::new(

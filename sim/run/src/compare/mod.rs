@@ -27,7 +27,7 @@ pub enum CompareError {
     Broken {
         /// The file.
         path: String,
-        /// What is wrong, and what to do.
+        /// The fault and the remedy.
         message: String,
     },
     /// The two cannot be compared, or an option does not apply.
@@ -38,7 +38,7 @@ pub enum CompareError {
     Write {
         /// The file.
         path: String,
-        /// What went wrong.
+        /// The cause.
         message: String,
     },
 }

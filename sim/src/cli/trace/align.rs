@@ -14,6 +14,7 @@ use traces::trace::is_within;
 use warnings::Code;
 
 use super::report;
+use super::warn_with;
 use super::wrong;
 use crate::cli::Failure;
 use crate::cli::outputs::may_hold_results;
@@ -66,25 +67,6 @@ fn check_anchor((stamp_s, time_s): (f64, f64), trace: &TraceHeader) -> Result<()
     )))
 }
 
-/// Largest deviation of the clock of the stamps from that of the trace, as a share; clocks of computers deviate far less.
-const MAX_CLOCK_DEVIATION: f64 = 0.02;
-
-/// Warns of anchors that are likely wrong: stamps in another unit, or of another recording.
-fn warn_of_anchors(anchors: [(f64, f64); 2], alignment: &Alignment, sorted: &[f64], terminal: &Terminal) {
-    let warn = |what: String| {
-        terminal.warn_of(Code::AnchorsOff, &format!("{what}; look at --anchor STAMP=TIME"));
-    };
-    if (alignment.scale - 1.0).abs() > MAX_CLOCK_DEVIATION {
-        warn(format!("by the anchors, a second of the stamps lasts {} s of the trace", alignment.scale));
-    }
-    let (first, last) = (sorted[0], sorted[sorted.len() - 1]);
-    for (stamp, _) in anchors {
-        if !is_within([first, last], stamp) {
-            warn(format!("stamp {stamp} s of an anchor is beyond those of the file, {first} s to {last} s"));
-        }
-    }
-}
-
 pub(super) fn run(args: &AlignArgs, terminal: &Terminal) -> Result<(), Failure> {
     may_hold_results(("--out", args.out.as_deref()), [args.stamps.as_path(), &args.input.trace])?;
     let mut stamps = read_times(&args.stamps)?;
@@ -94,11 +76,12 @@ pub(super) fn run(args: &AlignArgs, terminal: &Terminal) -> Result<(), Failure> 
             let trace = args.input.source(terminal)?.0.header();
             [a, b].iter().try_for_each(|anchor| check_anchor(*anchor, &trace))?;
             let alignment = Alignment::by_anchors(a, b)?;
-            warn_of_anchors([a, b], &alignment, &stamps, terminal);
+            let warnings = alignment.warnings([a, b], &stamps);
+            warnings.iter().for_each(|warning| warn_with(warning, "look at --anchor STAMP=TIME", terminal));
             alignment
         }
         [] => {
-            let found = args.find.frames(&args.input, &args.input.trace, terminal)?.found;
+            let found = args.find.frames(&args.input, &args.input.trace, terminal)?.set.found;
             let starts: Vec<f64> = found.starts.iter().map(|start| start.time_s).collect();
             Alignment::by_fit(&stamps, &starts)?
         }

@@ -7,13 +7,13 @@ use output::table::counted;
 use output::terminal::Terminal;
 use serde_json::json;
 use traces::energy::{
-    FrameEnergy, Idle, IdleTooShort, Pass, Pooled, PowerIntegral, RunEnergy, RunError, RunOptions, Spread,
-    energies_j, passes_j, pooled, whole,
+    Idle, IdleTooShort, Pass, Pooled, PowerIntegral, RunEnergy, RunError, RunOptions, SegmentEnergy,
+    SegmentError, Spread, check_passes, passes_j, pooled, whole,
 };
-use traces::io::{Repair, TraceHeader, TraceReader};
+use traces::io::{Repair, TraceReader};
 use traces::trace::check_span;
-use warnings::Code;
 
+use super::input::{Frames, warn_of_frames};
 use super::wrong;
 use crate::cli::Failure;
 use crate::cli::outputs::{print, print_json};
@@ -115,18 +115,20 @@ fn discard(text: &str) -> Result<Discard, String> {
 }
 
 pub(super) fn run(args: &EnergyArgs, terminal: &Terminal) -> Result<(), Failure> {
-    passes_differ(&args.pass)?;
+    let passes = args.passes();
+    check_passes(&passes).map_err(|error| wrong(format!("--{error}")))?;
     let recording = args.idle_trace.as_ref().map(|path| args.input.load_other(path, terminal)).transpose()?;
     let recording = recording.as_ref().map(|(recording, _)| PowerIntegral::new(recording));
     if args.from.is_some() || args.to.is_some() {
         let (trace, repairs) = args.input.source(terminal)?;
-        return span_energy(args, (&*trace, &repairs), recording.as_ref());
+        return segment_energy(args, (&*trace, &repairs), recording.as_ref());
     }
-    let (first, repairs, of_file) = one_run(args, &args.input.trace, recording.as_ref(), terminal)?;
+    let (first, repairs, of_file) =
+        one_run(args, &args.input.trace, (&passes, recording.as_ref()), terminal)?;
     let pixels = args.find.pixels.or(of_file);
     let mut runs = vec![first];
     for path in &args.run {
-        runs.push(one_run(args, path, recording.as_ref(), terminal)?.0);
+        runs.push(one_run(args, path, (&passes, recording.as_ref()), terminal)?.0);
     }
     let energies: Vec<Vec<f64>> = runs.iter().map(|run| run.run.energies_j()).collect();
     let pool = pooled(&energies).ok_or_else(|| wrong("no frame is left; discard fewer"))?;
@@ -152,7 +154,7 @@ fn pooled_text(pool: &Pooled, pixels: Option<u64>) -> String {
 }
 
 /// Energy between two times.
-fn span_energy(
+fn segment_energy(
     args: &EnergyArgs,
     (trace, repairs): (&dyn TraceReader, &[Repair]),
     recording: Option<&PowerIntegral<'_>>,
@@ -160,10 +162,8 @@ fn span_energy(
     let header = trace.header();
     let idle = idle(args, trace, recording)?;
     let (from_s, to_s) = (args.from.unwrap_or(header.start_s), args.to.unwrap_or(header.end_s()));
-    check(&header, from_s, to_s, "--from and --to")?;
-    let total_j = energies_j(trace, &[(from_s, to_s)])?[0];
-    let idle_j = idle.map_or(0.0, |idle| idle.energy_j(header.start_s, from_s, to_s));
-    let (energy_j, power_w) = (total_j - idle_j, (total_j - idle_j) / (to_s - from_s));
+    let segment = SegmentEnergy::of(trace, (from_s, to_s), idle.as_ref());
+    let SegmentEnergy { energy_j, power_w, idle_j } = segment.map_err(segment_failure)?;
     if args.json {
         return print_json(
             &json!({ "from_s": from_s, "to_s": to_s, "energy_J": energy_j, "power_W": power_w, "idle_J": idle_j,
@@ -174,9 +174,11 @@ fn span_energy(
     print(&format!("{from_s} s to {to_s} s: {energy_j:.6} J, {power_w:.4} W (idle taken off: {idle_j:.6} J)"))
 }
 
-fn check(trace: &TraceHeader, from_s: f64, to_s: f64, what: &str) -> Result<(), Failure> {
-    check_span([trace.start_s, trace.end_s()], [from_s, to_s])
-        .map_err(|error| wrong(format!("{what}: {error}")))
+fn segment_failure(error: SegmentError) -> Failure {
+    match error {
+        SegmentError::Span(error) => wrong(format!("--from and --to: {error}")),
+        SegmentError::Read(error) => error.into(),
+    }
 }
 
 fn idle<'a>(
@@ -185,7 +187,9 @@ fn idle<'a>(
     recording: Option<&PowerIntegral<'a>>,
 ) -> Result<Option<Idle<'a>>, Failure> {
     if let Some((from_s, to_s)) = args.idle {
-        check(&trace.header(), from_s, to_s, "--idle")?;
+        let header = trace.header();
+        let span = check_span([header.start_s, header.end_s()], [from_s, to_s]);
+        span.map_err(|error| wrong(format!("--idle: {error}")))?;
         return Ok(Some(Idle::between(trace, from_s, to_s)?));
     }
     if let Some(recording) = recording {
@@ -211,12 +215,12 @@ struct Run {
 fn one_run(
     args: &EnergyArgs,
     path: &Path,
-    recording: Option<&PowerIntegral<'_>>,
+    (passes, recording): (&[Pass], Option<&PowerIntegral<'_>>),
     terminal: &Terminal,
 ) -> Result<(Run, Vec<Repair>, Option<u64>), Failure> {
-    let (found, trace) = args.find.frames_and_samples(&args.input, path, terminal)?;
-    found.warn(terminal);
-    let (trace, frames) = (&*trace, whole(&found.energies).to_vec());
+    let (Frames { set, repairs }, trace) = args.find.frames_and_samples(&args.input, path, terminal)?;
+    warn_of_frames(&set, terminal);
+    let (trace, frames) = (&*trace, whole(&set.energies).to_vec());
     let idle = idle(args, trace, recording)?;
     let options = RunOptions {
         discard: match args.discard {
@@ -227,11 +231,12 @@ fn one_run(
         busy_above_w: args.busy_above,
     };
     let run = RunEnergy::of(trace, frames, idle.as_ref(), &options).map_err(run_failure)?;
-    args.pass.iter().try_for_each(|mark| within_frames(mark, &run.frames, terminal))?;
-    let passes: Vec<Pass> =
-        args.pass.iter().map(|(name, begin_s)| Pass { name: name.clone(), begin_s: *begin_s }).collect();
-    let passes = passes_j(trace, &run.frames, &passes, idle.as_ref())?;
-    Ok((Run { run, passes }, found.repairs, found.metadata.pixels))
+    for pass in passes {
+        let warning = pass.check(&run.frames).map_err(|error| wrong(format!("--{error}")))?;
+        warning.iter().for_each(|warning| terminal.warn_of(warning.code, &warning.message));
+    }
+    let passes = passes_j(trace, &run.frames, passes, idle.as_ref())?;
+    Ok((Run { run, passes }, repairs, set.metadata.pixels))
 }
 
 fn run_failure(error: RunError) -> Failure {
@@ -244,40 +249,11 @@ fn run_failure(error: RunError) -> Failure {
     }
 }
 
-/// Refuses two passes of one name.
-fn passes_differ(passes: &[(String, f64)]) -> Result<(), Failure> {
-    let mut names: Vec<&str> = passes.iter().map(|(name, _)| name.as_str()).collect();
-    names.sort_unstable();
-    match names.windows(2).find(|two| two[0] == two[1]) {
-        Some(two) => Err(wrong(format!("--pass {} is given twice: name each pass differently", two[0]))),
-        None => Ok(()),
+impl EnergyArgs {
+    fn passes(&self) -> Vec<Pass> {
+        let pass = |(name, begin_s): &(String, f64)| Pass { name: name.clone(), begin_s: *begin_s };
+        self.pass.iter().map(pass).collect()
     }
-}
-
-/// Refuses a pass that begins in no frame, and warns of one that begins in some frames only.
-fn within_frames(
-    (name, begins_s): &(String, f64),
-    frames: &[FrameEnergy],
-    terminal: &Terminal,
-) -> Result<(), Failure> {
-    let beyond = frames.iter().filter(|frame| frame.duration_s() <= *begins_s).count();
-    if beyond == frames.len() {
-        let longest_s = frames.iter().map(FrameEnergy::duration_s).fold(0.0, f64::max);
-        return Err(wrong(format!(
-            "--pass {name}={}: no frame is longer than {:.3} ms; let the pass begin before that",
-            begins_s * 1e3,
-            longest_s * 1e3
-        )));
-    }
-    if beyond > 0 {
-        let frames = frames.len();
-        let message = format!(
-            "{beyond} of {frames} frames end before pass {name} begins, {} ms after their start: it has no energy there",
-            begins_s * 1e3
-        );
-        terminal.warn_of(Code::PassBeyond, &message);
-    }
-    Ok(())
 }
 
 impl Run {

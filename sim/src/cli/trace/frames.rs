@@ -9,9 +9,11 @@ use serde::Serialize;
 use serde_json::{Value, json};
 use traces::energy::{FrameTable, InverseUnits, Summary, whole};
 use traces::frames::{Rule, Threshold};
+use traces::io::TraceFormat;
+use traces::search::FrameSet;
 use warnings::Code;
 
-use super::input::Frames;
+use super::input::{Frames, warn_of_frames};
 use super::report;
 use super::wrong;
 use crate::cli::Failure;
@@ -58,8 +60,8 @@ pub(super) fn run(args: &FramesArgs, terminal: &Terminal) -> Result<(), Failure>
     args.out.as_deref().map_or(Ok(()), is_table)?;
     let (frames, table, summary, pixels) = args.threads.pool()?.install(|| {
         let mut frames = args.find.frames(&args.input, &args.input.trace, terminal)?;
-        let pixels = args.find.pixels.or(frames.metadata.pixels);
-        let table = FrameTable::new(std::mem::take(&mut frames.energies), pixels);
+        let pixels = args.find.pixels.or(frames.set.metadata.pixels);
+        let table = FrameTable::new(std::mem::take(&mut frames.set.energies), pixels);
         let write = |out| traces::io::atomic::write_file(out, |file| table.write_csv(file));
         let (written, summary) =
             rayon::join(|| args.out.as_deref().map_or(Ok(()), write), || Summary::of(whole(table.frames())));
@@ -69,8 +71,8 @@ pub(super) fn run(args: &FramesArgs, terminal: &Terminal) -> Result<(), Failure>
     if args.json {
         return print_json(&json_report(&frames, &table, summary, pixels, args.inverse), true);
     }
-    frames.warn(terminal);
-    report(&text(&frames, &table, summary, pixels), args.piped, terminal)?;
+    warn_of_frames(&frames.set, terminal);
+    report(&text(&frames.set, &table, summary, pixels), args.piped, terminal)?;
     if args.inverse {
         report(&inverse_text(&table, pixels, terminal), args.piped, terminal)?;
     }
@@ -82,15 +84,14 @@ pub(super) fn run(args: &FramesArgs, terminal: &Terminal) -> Result<(), Failure>
 /// Refuses a name that promises another kind of file.
 fn is_table(out: &Path) -> Result<(), Failure> {
     let ending = out.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
-    match ending.as_deref() {
-        Some(
-            other @ ("parquet" | "json" | "jls" | "tsv" | "gz" | "svg" | "png" | "pdf" | "perfetto-trace"),
-        ) => Err(wrong(format!(
+    let of_trace = TraceFormat::of(out).map(|format| format.ending).filter(|ending| *ending != "csv");
+    let of_others = ending.as_deref().filter(|ending| ["json", "gz", "svg", "png", "pdf"].contains(ending));
+    of_trace.or(of_others).map_or(Ok(()), |other| {
+        Err(wrong(format!(
             "--out {}: frames are written as CSV, which is no .{other}; name a file that ends in .csv",
             out.display()
-        ))),
-        _ => Ok(()),
-    }
+        )))
+    })
 }
 
 #[derive(Serialize)]
@@ -127,12 +128,13 @@ fn json_report(
             outlier: u8::from(*outlier),
         })
         .collect();
-    let window = frames.found.window;
+    let Frames { set, repairs } = frames;
+    let window = set.found.window;
     let mut report = json!({
-        "samples": frames.samples, "rate_hz": frames.rate_hz, "start_s": frames.start_s, "total_J": frames.total_j,
-        "method": frames.found.method, "threshold": frames.found.threshold,
-        "window_s": [window.pre_s, window.post_s], "end_s": frames.found.end_s,
-        "warnings": frames.found.warnings, "repairs": frames.repairs, "proposal": frames.proposal,
+        "samples": set.samples, "rate_hz": set.rate_hz, "start_s": set.start_s, "total_J": set.total_j,
+        "method": set.found.method, "threshold": set.found.threshold,
+        "window_s": [window.pre_s, window.post_s], "end_s": set.found.end_s,
+        "warnings": set.found.warnings, "repairs": repairs, "proposal": set.proposal,
         "pixels": pixels, "summary": summary, "frames": rows,
     });
     if inverse {
@@ -141,7 +143,7 @@ fn json_report(
     report
 }
 
-fn text(frames: &Frames, table: &FrameTable, summary: Option<Summary>, pixels: Option<u64>) -> String {
+fn text(frames: &FrameSet, table: &FrameTable, summary: Option<Summary>, pixels: Option<u64>) -> String {
     let mut lines = String::new();
     if let Some(p) = &frames.proposal {
         lines += &format!(

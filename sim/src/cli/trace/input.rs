@@ -1,16 +1,18 @@
 //! Reading a trace, its marks and its frames, by the arguments.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use output::terminal::Terminal;
-use traces::energy::{FrameEnergy, PowerIntegral};
-use traces::frames::{Found, Marks, Method, Options, Proposal, Window, find_with, propose};
-use traces::io::{ReadOptions, Recording, Repair, Rows, TraceReader, open, rail_of_sums, read};
+use traces::Trace;
+use traces::frames::{Method, Window};
+use traces::io::{
+    FORMATS, ReadOptions, Recording, Repair, TraceFormat, TraceReader, open, rail_of_sums, read, readable,
+};
+use traces::search::{FrameSet, Search};
 use traces::times::read_times;
 use traces::trace::RATE_LIMITS_HZ;
-use traces::{Metadata, Trace, stream};
 use warnings::Code;
 
 use super::pipes::shown;
@@ -18,41 +20,18 @@ use super::wrong;
 use crate::cli::Failure;
 use crate::cli::quantity::{milliseconds, positive_voltage, rate, time};
 
-/// Formats of traces that are written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-#[allow(missing_docs, reason = "the names of the formats")]
-pub enum TraceFormat {
-    Csv,
-    Tsv,
-    #[value(name = "csv.gz")]
-    CsvGz,
-    #[value(name = "tsv.gz")]
-    TsvGz,
-    Parquet,
-    Jls,
-    PerfettoTrace,
-}
-
-impl TraceFormat {
-    /// The ending of files of this format.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Csv => "csv",
-            Self::Tsv => "tsv",
-            Self::CsvGz => "csv.gz",
-            Self::TsvGz => "tsv.gz",
-            Self::Parquet => "parquet",
-            Self::Jls => "jls",
-            Self::PerfettoTrace => "perfetto-trace",
-        }
-    }
+/// Parser of `--format`: the formats of traces by the endings of their files.
+pub(super) fn trace_format() -> impl TypedValueParser<Value = &'static TraceFormat> {
+    let named = |ending: String| FORMATS.iter().find(|format| format.ending == ending);
+    PossibleValuesParser::new(FORMATS.each_ref().map(|format| format.ending))
+        .try_map(move |ending| named(ending).ok_or("unknown format"))
 }
 
 /// A trace and how to read it.
 #[derive(Clone, Debug, Args)]
 pub struct InputArgs {
-    /// A trace: Parquet, JLS (Joulescope), CSV or TSV, the latter two also compressed with gzip; `-` reads standard input
-    #[arg(value_name = "TRACE")]
+    /// A trace in any of the formats that are read; `-` reads standard input
+    #[arg(value_name = "TRACE", help = format!("A trace: {}; `-` reads standard input", readable()))]
     pub trace: PathBuf,
     /// A rail to read, by the name its columns carry; several are added up. All without it
     #[arg(long, value_name = "NAME")]
@@ -159,11 +138,6 @@ pub(super) fn pass(text: &str) -> Result<(String, f64), String> {
     Ok((name.to_owned(), begins_s))
 }
 
-/// Traces of more samples are read in pieces.
-const MAX_SAMPLES_IN_MEMORY: u64 = 1 << 24;
-/// Texts of more bytes are read in pieces.
-const MAX_BYTES_IN_MEMORY: u64 = 1 << 30;
-
 impl InputArgs {
     pub(super) fn options(&self) -> Result<ReadOptions, Failure> {
         let [low, high] = RATE_LIMITS_HZ;
@@ -239,24 +213,15 @@ fn note_repairs(path: &Path, repairs: &[Repair], terminal: &Terminal) {
     }
 }
 
-/// Frames, found in memory or in pieces.
-pub(super) struct Frames {
-    pub found: Found,
-    pub energies: Vec<FrameEnergy>,
-    pub metadata: Metadata,
-    pub samples: u64,
-    pub rate_hz: f64,
-    pub start_s: f64,
-    pub total_j: f64,
-    pub proposal: Option<Proposal>,
-    pub repairs: Vec<Repair>,
+/// Prints the warnings of a search.
+pub(super) fn warn_of_frames(set: &FrameSet, terminal: &Terminal) {
+    set.found.warnings.iter().for_each(|warning| terminal.warn_of(warning.code, &warning.message));
 }
 
-impl Frames {
-    pub(super) fn warn(&self, terminal: &Terminal) {
-        let warnings = self.found.warnings.iter();
-        warnings.for_each(|warning| terminal.warn_of(warning.code, &warning.message));
-    }
+/// Frames, with the repairs of the trace they were found in.
+pub(super) struct Frames {
+    pub set: FrameSet,
+    pub repairs: Vec<Repair>,
 }
 
 impl FindArgs {
@@ -267,11 +232,12 @@ impl FindArgs {
         path: &Path,
         terminal: &Terminal,
     ) -> Result<Frames, Failure> {
-        if self.streams(input, path)? {
-            return self.in_pieces(input, path, terminal);
+        let search = self.search()?;
+        if search.reads_in_pieces(path, &input.options()?)? {
+            return in_pieces(&search, input, path, terminal);
         }
         let (trace, repairs) = input.load_other(path, terminal)?;
-        self.at_once(&trace, repairs)
+        Ok(Frames { set: search.of_trace(&trace)?, repairs })
     }
 
     /// As [`FindArgs::frames`], with the samples they were found in.
@@ -281,120 +247,47 @@ impl FindArgs {
         path: &Path,
         terminal: &Terminal,
     ) -> Result<(Frames, Box<dyn TraceReader>), Failure> {
-        if self.streams(input, path)? {
+        let search = self.search()?;
+        if search.reads_in_pieces(path, &input.options()?)? {
             let recording = Recording::open(path, &input.options()?)?;
-            return Ok((self.in_pieces(input, path, terminal)?, Box::new(recording)));
+            return Ok((in_pieces(&search, input, path, terminal)?, Box::new(recording)));
         }
         let (trace, repairs) = input.load_other(path, terminal)?;
-        Ok((self.at_once(&trace, repairs)?, Box::new(trace)))
-    }
-
-    fn at_once(&self, trace: &Trace, repairs: Vec<Repair>) -> Result<Frames, Failure> {
-        let (found, proposal) = self.found(trace)?;
-        let integral = PowerIntegral::new(trace);
-        Ok(Frames {
-            energies: integral.frames(&found),
-            found,
-            samples: trace.samples() as u64,
-            rate_hz: trace.rate_hz(),
-            start_s: trace.start_s(),
-            total_j: integral.total_j(),
-            proposal,
-            repairs,
-            metadata: trace.metadata.clone(),
-        })
-    }
-
-    fn streams(&self, input: &InputArgs, path: &Path) -> Result<bool, Failure> {
-        if matches!(self.method, Method::Tracking | Method::Normalized) || input.repair {
-            return if self.stream {
-                Err(wrong("--stream goes with the sum of squares and without --repair; leave one out"))
-            } else {
-                Ok(false)
-            };
-        }
-        let rows = Rows::open(path, &input.options()?)?;
-        let bytes = fs::metadata(path).map_or(0, |metadata| metadata.len());
-        Ok(self.stream
-            || rows.count().map_or(bytes > MAX_BYTES_IN_MEMORY, |count| count > MAX_SAMPLES_IN_MEMORY))
-    }
-
-    fn in_pieces(&self, input: &InputArgs, path: &Path, terminal: &Terminal) -> Result<Frames, Failure> {
-        let options = input.options()?;
-        if self.auto {
-            return Err(wrong("--auto looks at traces that fit into memory; mark a frame with --mark"));
-        }
-        let rows = Rows::open(path, &options)?;
-        let starts_s = self.marks(rows.metadata())?;
-        let end_s = self.end.or_else(|| rows.metadata().end_mark_s()).unwrap_or(f64::INFINITY);
-        let marks = Marks { starts_s, window: self.window_s(), end_s };
-        let streamed = stream::find(path, &options, &marks)?;
-        input.warn_of_sums(path, terminal)?;
-        let clock = streamed.clock;
-        Ok(Frames {
-            found: streamed.found,
-            energies: streamed.energies,
-            metadata: streamed.metadata,
-            samples: clock.samples.unwrap_or(0),
-            rate_hz: clock.rate_hz,
-            start_s: clock.start_s,
-            total_j: streamed.total_j,
-            proposal: None,
-            repairs: Vec::new(),
-        })
+        Ok((Frames { set: search.of_trace(&trace)?, repairs }, Box::new(trace)))
     }
 
     /// Frames of a trace in memory, where nothing is read in pieces.
-    pub(super) fn found_at_once(&self, trace: &Trace) -> Result<Found, Failure> {
+    pub(super) fn frames_of(&self, trace: &Trace) -> Result<FrameSet, Failure> {
         if self.stream {
             return Err(wrong("--stream: to draw frames, all samples are held; leave it out"));
         }
-        Ok(self.found(trace)?.0)
+        Ok(self.search()?.of_trace(trace)?)
     }
 
-    /// Frames of a trace in memory.
-    fn found(&self, trace: &Trace) -> Result<(Found, Option<Proposal>), Failure> {
-        let proposal = if self.auto {
-            let none = || wrong("--auto found no rise of power to propose as a start: mark one with --mark");
-            Some(propose(trace).ok_or_else(none)?)
-        } else {
-            None
-        };
-        let starts_s = match &proposal {
-            Some(proposal) => vec![proposal.mark_s],
-            None => self.marks(&trace.metadata)?,
-        };
-        let end_s = self.end.or_else(|| trace.metadata.end_mark_s()).unwrap_or(trace.end_s());
-        let marks = Marks { starts_s, window: self.window_s(), end_s };
-        let found = find_with(trace, &marks, &Options { method: self.method })?;
-        if let Some(proposal) = proposal.filter(|_| found.starts.len() < 2) {
-            return Err(wrong(format!(
-                "--auto found no start that comes back: nothing else resembles the steepest rises, such as that at {} s; \
-                 mark a frame with --mark",
-                proposal.mark_s
-            )));
-        }
-        Ok((found, proposal))
-    }
-
-    fn window_s(&self) -> Window {
-        let (pre_s, post_s) = self.window;
-        Window { pre_s, post_s }
-    }
-
-    fn marks(&self, metadata: &Metadata) -> Result<Vec<f64>, Failure> {
-        let mut marks = self.mark.clone();
+    fn search(&self) -> Result<Search, Failure> {
+        let mut starts_s = self.mark.clone();
         if let Some(path) = &self.mark_file {
-            marks.extend(read_times(path)?);
+            starts_s.extend(read_times(path)?);
         }
-        if marks.is_empty() {
-            marks.extend(metadata.frame_starts_s());
-        }
-        if marks.is_empty() {
-            return Err(wrong("no frame start is marked: give --mark SECONDS, --mark-file FILE or --auto"));
-        }
-        marks.sort_by(f64::total_cmp);
-        marks.dedup();
-        Ok(marks)
+        let (pre_s, post_s) = self.window;
+        Ok(Search {
+            starts_s,
+            propose: self.auto,
+            window: Window { pre_s, post_s },
+            end_s: self.end,
+            method: self.method,
+            in_pieces: self.stream,
+        })
     }
+}
+
+fn in_pieces(
+    search: &Search,
+    input: &InputArgs,
+    path: &Path,
+    terminal: &Terminal,
+) -> Result<Frames, Failure> {
+    let set = search.of_file(path, &input.options()?)?;
+    input.warn_of_sums(path, terminal)?;
+    Ok(Frames { set, repairs: Vec::new() })
 }

@@ -22,8 +22,9 @@ use plot::PlotArgs;
 use sample::SampleArgs;
 use traces::frames::MarkError;
 use traces::io::{ReadError, WriteError};
-use traces::stream::StreamError;
+use traces::search::SearchError;
 use traces::times::TimesError;
+use warnings::Warning;
 
 use super::Failure;
 use super::outputs::print;
@@ -48,7 +49,7 @@ pub enum TraceCommand {
     Energy(Box<EnergyArgs>),
     /// Put recorded time stamps onto the time of a trace
     Align(Box<AlignArgs>),
-    /// Read a trace and write it as Parquet, JLS (Joulescope), CSV, TSV (with .gz if so named) or a Perfetto timeline
+    /// Read a trace and write it in another format
     Convert(ConvertArgs),
     /// Record a trace anew with a coarser device: rate, range, bits, errors, noise
     Sample(Box<SampleArgs>),
@@ -71,6 +72,11 @@ fn report(line: &str, piped: bool, terminal: &Terminal) -> Result<(), Failure> {
     }
     terminal.detail(line);
     Ok(())
+}
+
+/// Prints a warning with what to change in the arguments.
+fn warn_with(warning: &Warning, remedy: &str, terminal: &Terminal) {
+    terminal.warn_of(warning.code, &format!("{}; {remedy}", warning.message));
 }
 
 fn run_on_files(args: &TraceArgs, terminal: &Terminal) -> Result<(), Failure> {
@@ -108,11 +114,18 @@ impl From<TimesError> for Failure {
     }
 }
 
-impl From<StreamError> for Failure {
-    fn from(error: StreamError) -> Self {
+impl From<SearchError> for Failure {
+    fn from(error: SearchError) -> Self {
         match error {
-            StreamError::Read(error) => error.into(),
-            StreamError::Mark(error) => error.into(),
+            SearchError::Read(error) => error.into(),
+            SearchError::Mark(error) => error.into(),
+            SearchError::Unmarked => {
+                wrong(format!("{error}: give --mark SECONDS, --mark-file FILE or --auto"))
+            }
+            SearchError::NoRise => wrong(format!("--auto {error}: mark one with --mark")),
+            SearchError::NoRepetition { .. } => wrong(format!("--auto {error}; mark a frame with --mark")),
+            SearchError::ProposalInPieces => wrong(format!("--auto: {error}; mark a frame with --mark")),
+            SearchError::NotInPieces => wrong(format!("--stream: {error}; leave it out")),
         }
     }
 }

@@ -54,7 +54,7 @@ pub struct ParetoArgs {
     /// Seed of the draws for probabilities
     #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true, value_parser = crate::cli::parse::seed)]
     pub seed: u64,
-    /// What the plot shows over time: energy, or mean power as Paper IV does
+    /// Quantity of the plot over time: energy, or mean power as Paper IV does
     #[arg(long, value_enum, default_value_t)]
     pub show: ParetoShow,
     /// File for a plot (.svg, .png, .pdf) or a table (.csv); `-` prints the table as CSV and nothing else
@@ -71,7 +71,7 @@ pub struct ParetoArgs {
     pub look: LookArgs,
 }
 
-/// What a plot of frontiers shows over time.
+/// Quantity that a plot of frontiers shows over time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum ParetoShow {
     /// Energy

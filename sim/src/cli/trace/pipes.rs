@@ -7,15 +7,15 @@ use std::path::{Path, PathBuf};
 
 use tempfile::TempDir;
 
+use super::plot::PlotFormat;
 use super::wrong;
 use crate::cli::Failure;
 use crate::cli::trace::{TraceArgs, TraceCommand};
 
-/// What an input from a pipe is called in messages and plots.
+/// Name of an input from a pipe in messages and plots.
 const INPUT: &str = "standard input";
-/// Formats that a terminal cannot show: all that are not text.
-const BINARY: [&str; 7] = ["parquet", "jls", "csv.gz", "tsv.gz", "perfetto-trace", "png", "pdf"];
-
+/// The format of tables.
+const CSV: (&str, bool) = ("csv", true);
 /// The files that stand in for standard input and standard output.
 pub(super) struct Pipes {
     folder: Option<TempDir>,
@@ -41,32 +41,32 @@ impl Pipes {
         match &mut args.command {
             TraceCommand::Frames(args) => {
                 pipes.input(&mut args.input.trace)?;
-                args.piped = pipes.optional_output(&mut args.out, "csv", args.json)?;
+                args.piped = pipes.optional_output(&mut args.out, args.json)?;
             }
             TraceCommand::Energy(args) => pipes.input(&mut args.input.trace)?,
             TraceCommand::Align(args) => {
                 pipes.input(&mut args.input.trace)?;
-                args.piped = pipes.optional_output(&mut args.out, "csv", args.json)?;
+                args.piped = pipes.optional_output(&mut args.out, args.json)?;
             }
             TraceCommand::Convert(args) => {
                 pipes.input(&mut args.input.trace)?;
                 args.out = args.last.take().or(args.named.take()).unwrap_or_default();
-                args.piped =
-                    pipes.output(&mut args.out, args.format.map(|format| format.name()), "csv", args.json)?;
+                let format = args.format.map(|format| (format.ending, format.is_text));
+                args.piped = pipes.output(&mut args.out, format, CSV, args.json)?;
             }
             TraceCommand::Sample(args) => {
                 pipes.input(&mut args.input.trace)?;
-                args.piped =
-                    pipes.output(&mut args.out, args.format.map(|format| format.name()), "csv", args.json)?;
+                let format = args.format.map(|format| (format.ending, format.is_text));
+                args.piped = pipes.output(&mut args.out, format, CSV, args.json)?;
             }
             TraceCommand::Plot(args) => {
                 pipes.input(&mut args.input.trace)?;
-                args.piped =
-                    pipes.output(&mut args.out, args.format.map(|format| format.name()), "svg", args.json)?;
+                let format = args.format.map(PlotFormat::ending);
+                args.piped = pipes.output(&mut args.out, format, PlotFormat::Svg.ending(), args.json)?;
             }
             TraceCommand::Pareto(args) => {
                 pipes.input(&mut args.table)?;
-                args.piped = pipes.optional_output(&mut args.out, "csv", args.json)?;
+                args.piped = pipes.optional_output(&mut args.out, args.json)?;
             }
         }
         Ok(pipes)
@@ -92,26 +92,21 @@ impl Pipes {
         Ok(())
     }
 
-    fn optional_output(
-        &mut self,
-        out: &mut Option<PathBuf>,
-        format: &str,
-        json: bool,
-    ) -> Result<bool, Failure> {
-        out.as_mut().map_or(Ok(false), |out| self.output(out, None, format, json))
+    fn optional_output(&mut self, out: &mut Option<PathBuf>, json: bool) -> Result<bool, Failure> {
+        out.as_mut().map_or(Ok(false), |out| self.output(out, None, CSV, json))
     }
 
-    /// Whether `out` is standard output.
+    /// Whether `out` is standard output. A format is its ending, and whether it is text.
     fn output(
         &mut self,
         out: &mut PathBuf,
-        format: Option<&str>,
-        default: &str,
+        format: Option<(&str, bool)>,
+        default: (&str, bool),
         json: bool,
     ) -> Result<bool, Failure> {
         if !is_dash(out) {
             return match format {
-                Some(format) => Err(wrong(format!(
+                Some((format, _)) => Err(wrong(format!(
                     "--format {format} goes with `-`, standard output; the name of a file says its format: {} has to end in .{format}",
                     out.display()
                 ))),
@@ -123,8 +118,8 @@ impl Pipes {
                 "-: standard output takes the result or --json, not both; name a file, or leave --json out",
             ));
         }
-        let format = format.unwrap_or(default);
-        if BINARY.contains(&format) && io::stdout().is_terminal() {
+        let (format, is_text) = format.unwrap_or(default);
+        if !is_text && io::stdout().is_terminal() {
             return Err(wrong(format!(
                 "-: {format} is binary, and standard output is a terminal; name a file, or send it into one with >"
             )));
@@ -160,26 +155,5 @@ fn copy_out(path: &Path) -> Result<(), Failure> {
             Err(Failure { message: format!("standard output: cannot write to it: {error}"), code: 1 })
         }
         _ => Ok(()),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::cli::trace::input::TraceFormat;
-    use clap::ValueEnum;
-    use traces::io::FORMATS;
-
-    #[test]
-    fn every_format_of_traces_has_a_name_for_pipes_and_is_text_or_binary() {
-        for format in FORMATS.map(|ending| ending.trim_start_matches('.')) {
-            let named = TraceFormat::value_variants().iter().any(|known| known.name() == format);
-            assert!(named, "{format}: add it to TraceFormat in trace/input.rs");
-            let text = ["csv", "tsv"].contains(&format);
-            assert!(
-                text != BINARY.contains(&format),
-                "{format}: add it to BINARY, or to the texts of this test"
-            );
-        }
     }
 }

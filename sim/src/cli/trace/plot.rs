@@ -8,11 +8,10 @@ use output::table::{counted, si};
 use output::terminal::Terminal;
 use serde_json::json;
 use traces::Trace;
-use traces::energy::{FrameEnergy, PowerIntegral, Spread, mean_over_discarded, whole};
+use traces::energy::{FrameEnergy, Histogram, Repeats, mean_over_discarded, whole};
 use traces::io::{ReadError, ReadOptions};
-use traces::pyramid::{Column, Pyramid, pyramid_path};
+use traces::pyramid::{Column, Pyramid, moving_means_w, pyramid_path};
 use traces::trace::check_span;
-use warnings::Code;
 
 use super::pipes::shown as name_of;
 use super::report;
@@ -36,7 +35,7 @@ pub struct PlotArgs {
     /// The frames, for kinds that show them.
     #[command(flatten)]
     pub find: FindArgs,
-    /// What to draw
+    /// Kind of plot
     #[arg(long, value_enum, default_value_t)]
     pub kind: PlotKind,
     /// Where the shown part of the curve begins, in seconds or with its unit
@@ -84,17 +83,17 @@ pub enum PlotFormat {
 }
 
 impl PlotFormat {
-    /// The ending of files of this format.
-    pub fn name(self) -> &'static str {
+    /// The ending of files of this format, and whether they are text.
+    pub(super) fn ending(self) -> (&'static str, bool) {
         match self {
-            Self::Svg => "svg",
-            Self::Png => "png",
-            Self::Pdf => "pdf",
+            Self::Svg => ("svg", true),
+            Self::Png => ("png", false),
+            Self::Pdf => ("pdf", false),
         }
     }
 }
 
-/// What to draw.
+/// Kind of plot.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum PlotKind {
     /// Power over time: lowest and highest of each column, and a mean
@@ -166,7 +165,7 @@ fn span(args: &PlotArgs, start_s: f64, end_s: f64) -> Result<(f64, f64), Failure
 
 type Make = fn(&Path, &ReadOptions) -> Result<Pyramid, ReadError>;
 
-/// What is shown, and its columns: from the pyramid beside the file, or from the samples where these are few.
+/// The shown time and its columns: from the pyramid beside the file, or from the samples where these are few.
 fn columns(args: &PlotArgs, terminal: &Terminal) -> Result<((f64, f64), Vec<Column>), Failure> {
     if args.input.repair {
         // Repairs are listed, so they are made anew each time.
@@ -200,7 +199,8 @@ fn curve(args: &PlotArgs, terminal: &Terminal) -> Result<(Picture, String), Fail
     let middle = |column: &Column| 0.5 * (column.from_s + column.to_s);
     let band = columns.iter().map(|c| (middle(c), f64::from(c.low_w), f64::from(c.high_w))).collect();
     let width_s = args.low_pass.unwrap_or((to_s - from_s) / 50.0);
-    let mean = smoothed(&columns, width_s).into_iter().zip(&columns).map(|(w, c)| (middle(c), w)).collect();
+    let mean =
+        moving_means_w(&columns, width_s).into_iter().zip(&columns).map(|(w, c)| (middle(c), w)).collect();
     let shown = format!("{from_s} s to {to_s} s in {} columns", columns.len());
     let series = vec![
         series("lowest to highest", Mark::Band(band)),
@@ -208,21 +208,6 @@ fn curve(args: &PlotArgs, terminal: &Terminal) -> Result<(Picture, String), Fail
     ];
     let subject = name_of(&args.input.trace);
     Ok((drawn(args, &subject, ("Power", ("time", "s"), POWER, series)), shown))
-}
-
-/// Means of the columns within half a width on either side.
-fn smoothed(columns: &[Column], width_s: f64) -> Vec<f64> {
-    let Some(first) = columns.first() else { return Vec::new() };
-    let reach = libm::round(0.5 * width_s / (first.to_s - first.from_s)) as usize;
-    let mut sums = vec![0.0];
-    for column in columns {
-        sums.push(sums[sums.len() - 1] + f64::from(column.mean_w));
-    }
-    let mean = |index: usize| {
-        let (from, to) = (index.saturating_sub(reach), (index + reach + 1).min(columns.len()));
-        (sums[to] - sums[from]) / (to - from) as f64
-    };
-    (0..columns.len()).map(mean).collect()
 }
 
 /// The kinds that need frames.
@@ -249,8 +234,7 @@ fn drawn(args: &PlotArgs, subject: &str, (title, x, y, series): Drawn) -> Pictur
 /// The kinds that show samples of frames, which are held.
 fn samples(args: &PlotArgs, terminal: &Terminal) -> Result<(usize, Drawn), Failure> {
     let (trace, _) = args.input.load(terminal)?;
-    let found = args.find.found_at_once(&trace)?;
-    let frames = PowerIntegral::new(&trace).frames(&found);
+    let frames = args.find.frames_of(&trace)?.energies;
     let drawn = match args.kind {
         PlotKind::Frame => one_frame(args, &trace, &frames)?,
         _ => overlay(&trace, &frames),
@@ -260,7 +244,7 @@ fn samples(args: &PlotArgs, terminal: &Terminal) -> Result<(usize, Drawn), Failu
 
 /// The energy of each frame of one recording, J, in pieces where it is long.
 fn energies_of(args: &PlotArgs, path: &Path, terminal: &Terminal) -> Result<Vec<f64>, Failure> {
-    let frames = args.find.frames(&args.input, path, terminal)?;
+    let frames = args.find.frames(&args.input, path, terminal)?.set;
     // A last frame that is cut has no energy that belongs into a distribution.
     let shown = if args.kind == PlotKind::Histogram { whole(&frames.energies) } else { &frames.energies };
     Ok(shown.iter().map(|frame| frame.energy_j).collect())
@@ -298,7 +282,7 @@ fn energies(args: &PlotArgs, terminal: &Terminal) -> Result<(usize, Drawn), Fail
 
 type Drawn = (&'static str, (&'static str, &'static str), (&'static str, &'static str), Vec<Series>);
 
-/// What goes up where power is shown.
+/// The vertical axis of power.
 const POWER: (&str, &str) = ("power", "W");
 
 fn series(name: &str, mark: Mark) -> Series {
@@ -315,9 +299,7 @@ fn within(trace: &Trace, frame: &FrameEnergy) -> Vec<(f64, f64)> {
 
 /// Power between two times, over the time since a third.
 fn between(trace: &Trace, (from_s, to_s): (f64, f64), since_s: f64) -> Vec<(f64, f64)> {
-    let place = |time_s: f64| trace.position(time_s).clamp(0.0, trace.samples() as f64) as usize;
-    let samples = place(from_s)..place(to_s);
-    samples.map(|index| (trace.time_s(index) - since_s, trace.power_w(index))).collect()
+    trace.powers_between(from_s, to_s).map(|(time_s, power_w)| (time_s - since_s, power_w)).collect()
 }
 
 fn one_frame(args: &PlotArgs, trace: &Trace, frames: &[FrameEnergy]) -> Result<Drawn, Failure> {
@@ -358,16 +340,8 @@ fn overlay(trace: &Trace, frames: &[FrameEnergy]) -> Drawn {
 }
 
 fn histogram(energies: &[f64]) -> Drawn {
-    let low = energies.iter().copied().fold(f64::INFINITY, f64::min);
-    let high = energies.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let bars = ((energies.len() as f64).sqrt() as usize).clamp(1, BARS);
-    let width = ((high - low) / bars as f64).max(1e-12 * high.abs()).max(f64::MIN_POSITIVE);
-    let mut counts = vec![0_u32; bars];
-    for energy in energies {
-        counts[(((energy - low) / width) as usize).min(bars - 1)] += 1;
-    }
-    let at = |index: usize| low + index as f64 * width;
-    let bars = counts.iter().enumerate().map(|(i, &count)| (at(i), at(i + 1), f64::from(count))).collect();
+    let histogram = Histogram::of(energies, BARS);
+    let bars = histogram.bins().map(|(from, to, count)| (from, to, f64::from(count))).collect();
     (
         "Distribution of frame energies",
         ("energy", "J"),
@@ -382,15 +356,10 @@ fn repeats(args: &PlotArgs, first: &[f64], terminal: &Terminal) -> Result<Drawn,
     for path in &args.run {
         runs.push(energies_of(args, path, terminal)?);
     }
-    let (frames, most) =
-        (runs.iter().map(Vec::len).min().unwrap_or(0), runs.iter().map(Vec::len).max().unwrap_or(0));
-    if frames < most {
-        let message = format!("runs have {frames} to {most} frames; the first {frames} are shown");
-        terminal.warn_of(Code::UnevenRuns, &message);
-    }
-    let spreads =
-        (0..frames).filter_map(|index| Spread::of(&runs.iter().map(|run| run[index]).collect::<Vec<_>>()));
-    let spreads: Vec<Spread> = spreads.collect();
+    let none = || wrong("no run has a frame");
+    let repeats = Repeats::of(&runs).ok_or_else(none)?;
+    repeats.warning().iter().for_each(|warning| terminal.warn_of(warning.code, &warning.message));
+    let spreads = repeats.energies_j;
     let at = |index: usize| index as f64;
     let band = spreads
         .iter()

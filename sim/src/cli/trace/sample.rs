@@ -3,16 +3,16 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use output::table::si;
+use output::table::{counted, si};
 use output::terminal::Terminal;
 use serde_json::json;
 use traces::device::{Device, DeviceSpec, MAX_PACKET_SAMPLES, Peaks, RATES_HZ};
-use traces::energy::energies_j;
-use traces::io::TraceReader;
+use traces::io::{TraceFormat, TraceReader};
 use warnings::Code;
 
-use super::convert::{check, may_be_saved, save};
+use super::convert::{format_of, may_be_saved, save};
 use super::report;
+use super::warn_with;
 use super::wrong;
 use crate::cli::Failure;
 use crate::cli::outputs::print_json;
@@ -21,7 +21,7 @@ use crate::cli::quantity::{
     current, length_of_time, positive_current, positive_voltage, rate, resistance, size_of_current,
     size_of_voltage, voltage,
 };
-use crate::cli::trace::input::{InputArgs, TraceFormat};
+use crate::cli::trace::input::{InputArgs, trace_format};
 
 /// Arguments of `trace sample`.
 #[derive(Clone, Debug, Args)]
@@ -95,40 +95,34 @@ pub struct SampleArgs {
     #[arg(long)]
     pub json: bool,
     /// Format of standard output, where --out is `-` (default: csv)
-    #[arg(long, value_enum, value_name = "FORMAT")]
-    pub format: Option<TraceFormat>,
+    #[arg(long, value_name = "FORMAT", value_parser = trace_format())]
+    pub format: Option<&'static TraceFormat>,
     /// Whether the result goes to standard output.
     #[arg(skip)]
     pub piped: bool,
 }
 
-/// A recorder whose codes are used to a smaller share loses energy to rounding.
-const FEW_CODES: f64 = 0.05;
-
 pub(super) fn run(args: &SampleArgs, terminal: &Terminal) -> Result<(), Failure> {
-    check(&args.out)?;
+    let format = format_of(&args.out)?;
     let inputs = args.device.as_deref().into_iter().chain([args.input.trace.as_path()]);
-    may_be_saved("--out", &args.out, inputs)?;
+    may_be_saved("--out", &args.out, format, inputs)?;
     args.check_rate()?;
     let (trace, _) = args.input.source(terminal)?;
     let peaks = Peaks::of(&*trace)?;
     let device = Device::new(args.spec(&peaks)?).map_err(|error| wrong(error.to_string()))?;
     let sampled = device.resample_in_pieces(&*trace)?;
-    if sampled.clipped_currents + sampled.clipped_voltages > 0 {
-        let message = format!(
-            "{} currents and {} voltages were beyond the device's range; widen it with --current-range or --voltage-range",
-            sampled.clipped_currents, sampled.clipped_voltages
-        );
-        terminal.warn_of(Code::Clipped, &message);
+    if let Some(warning) = sampled.clipping() {
+        warn_with(&warning, "widen it with --current-range or --voltage-range", terminal);
     }
-    warn_of_few_codes(device.spec(), &peaks, terminal);
+    if let Some(warning) = device.spec().warning(&peaks) {
+        warn_with(&warning, "narrow the range with --current-range", terminal);
+    }
     if let Some(losses) = sampled.losses() {
         terminal.warn_of(Code::PacketsLost, &format!("{losses}; --repair fills them"));
     }
     save(&sampled, &args.out, terminal)?;
     let header = sampled.header();
-    let before_j = energies_j(&*trace, &[(header.start_s, header.end_s())])?[0];
-    let after_j = sampled.energy_j;
+    let (before_j, after_j) = (sampled.original_energy_j()?, sampled.energy_j);
     // A trace of no energy has no relative error.
     let error = (before_j != 0.0).then(|| after_j / before_j - 1.0);
     let samples = header.samples;
@@ -143,28 +137,13 @@ pub(super) fn run(args: &SampleArgs, terminal: &Terminal) -> Result<(), Failure>
     let DeviceSpec { rate_hz, bits, current_range_a, .. } = device.spec();
     let relative = error.map_or(String::new(), |error| format!(" ({:+.3} %)", 100.0 * error));
     let line = format!(
-        "{}: {samples} samples at {rate_hz} Hz, {bits} bits of {} to {}; {before_j:.6} J became {after_j:.6} J{relative}",
+        "{}: {} at {rate_hz} Hz, {bits} bits of {} to {}; {before_j:.6} J became {after_j:.6} J{relative}",
         args.out.display(),
+        counted(samples as usize, "sample"),
         si(current_range_a[0], "A"),
         si(current_range_a[1], "A"),
     );
     report(&line, args.piped, terminal)
-}
-
-/// Warns where rounding to codes is coarse against the trace.
-fn warn_of_few_codes(spec: &DeviceSpec, peaks: &Peaks, terminal: &Terminal) {
-    let share = spec.share_of_current_codes(peaks);
-    if share < FEW_CODES {
-        let message = format!(
-            "the largest current, {}, uses {:.2} % of the device's range of {} to {}: its energy is rounded to few codes; \
-             narrow the range with --current-range",
-            si(peaks.current_a, "A"),
-            share * 100.0,
-            si(spec.current_range_a[0], "A"),
-            si(spec.current_range_a[1], "A")
-        );
-        terminal.warn_of(Code::RangeUnused, &message);
-    }
 }
 
 impl SampleArgs {

@@ -1,14 +1,14 @@
 //! Phase slips: past a place where the sequence may have slipped to another phase of the frame, confidence is
 //! lower.
 
+use crate::frames::found::SLIPPED_CONFIDENCE;
+
 /// Ratios of gaps of the same period.
 const SAME_RATIOS: [f64; 2] = [0.92, 1.085];
 /// Ratios of gaps beyond which the later one is odd.
 const ODD_RATIOS: [f64; 2] = [0.887, 1.13];
 /// Two gaps in one (a missed start) are no phase slip if they are as long as two, within this share.
 const MAX_DOUBLE_DEVIATION: f64 = 0.1;
-/// Confidence factor beyond a phase slip.
-const SLIPPED_CONFIDENCE: f64 = 0.3;
 
 /// Whether the period goes on as before after one odd gap that is not two periods. A clock step would change
 /// it for longer.

@@ -8,7 +8,8 @@ mod write;
 
 use super::columns::{Layout, RowBatch, layout};
 use super::description::{Description, KEYS};
-use super::{ReadError, ReadOptions};
+use super::source::{Opened, RowSource};
+use super::{ReadError, ReadOptions, TIME_NS};
 use column::Column;
 pub(crate) use pages::PagedFile;
 use pages::first_page;
@@ -16,13 +17,15 @@ use parquet::file::reader::FileReader;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::fs::File;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 #[cfg(test)]
 pub(crate) use write::bare;
 pub use write::{save, write};
 
 /// A Parquet file being read.
-pub(super) struct ParquetRows {
+struct ParquetRows {
+    path: PathBuf,
     time: Option<Column>,
     values: Vec<Column>,
     names: Vec<String>,
@@ -38,8 +41,20 @@ fn open(path: &Path) -> Result<PagedFile, ReadError> {
     PagedFile::new(path, file).map_err(|error| damaged(path, error.to_string()))
 }
 
+/// Opens a file.
+pub(super) fn open_rows(path: &Path, options: &ReadOptions) -> Result<Opened, ReadError> {
+    let (rows, layout, description) = guarded(path, || ParquetRows::open(path, options))?;
+    Ok(Opened { rows: Box::new(rows), layout, description, time: TIME_NS })
+}
+
+/// Result of a step of the decoder, which panics on some damaged files.
+fn guarded<T>(path: &Path, step: impl FnOnce() -> Result<T, ReadError>) -> Result<T, ReadError> {
+    let panicked = |_| Err(damaged(path, "its decoder gave up".to_owned()));
+    catch_unwind(AssertUnwindSafe(step)).unwrap_or_else(panicked)
+}
+
 impl ParquetRows {
-    pub fn open(path: &Path, options: &ReadOptions) -> Result<(Self, Layout, Description), ReadError> {
+    fn open(path: &Path, options: &ReadOptions) -> Result<(Self, Layout, Description), ReadError> {
         let file = open(path)?;
         let size_bytes = std::fs::metadata(path).map_err(|error| ReadError::io(path, error))?.len();
         let schema = file.metadata().file_metadata().schema_descr();
@@ -52,23 +67,11 @@ impl ParquetRows {
         let column = |picked| Column::open(path, picked, options.repair);
         let time = layout.time.as_ref().map(column).transpose()?;
         let values = layout.values.iter().map(column).collect::<Result<_, _>>()?;
-        Ok((Self { time, values, names, rows }, layout, header))
+        Ok((Self { path: path.to_owned(), time, values, names, rows }, layout, header))
     }
 
-    pub fn names(&self) -> &[String] {
-        &self.names
-    }
-
-    pub fn count(&self) -> u64 {
-        self.rows
-    }
-
-    pub fn skip(&mut self, rows: u64) -> Result<(), ReadError> {
-        self.time.iter_mut().chain(&mut self.values).try_for_each(|column| column.skip(rows))
-    }
-
-    pub fn next(&mut self, limit: usize, batch: &mut RowBatch) -> Result<usize, ReadError> {
-        let Self { time, values, .. } = self;
+    fn read(&mut self, limit: usize, batch: &mut RowBatch) -> Result<usize, ReadError> {
+        let Self { path, time, values, .. } = self;
         let RowBatch { stamps, values: lists } = batch;
         let (stamped, read) = rayon::join(
             || time.as_mut().map_or(Ok(None), |column| column.times(limit, stamps).map(Some)),
@@ -80,10 +83,29 @@ impl ParquetRows {
         let read = read.into_iter().collect::<Result<Vec<usize>, _>>()?;
         let rows = read.first().copied().unwrap_or(0);
         if read.iter().chain(&stamped?).any(|&count| count != rows) {
-            let path = values.first().map_or(PathBuf::new(), |column| column.path.clone());
-            return Err(damaged(&path, "its columns differ in length".to_owned()));
+            return Err(damaged(path, "its columns differ in length".to_owned()));
         }
         Ok(rows)
+    }
+}
+
+impl RowSource for ParquetRows {
+    fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    fn count(&self) -> Option<u64> {
+        Some(self.rows)
+    }
+
+    fn skip(&mut self, rows: u64) -> Result<(), ReadError> {
+        let Self { path, time, values, .. } = self;
+        guarded(path, || time.iter_mut().chain(values).try_for_each(|column| column.skip(rows)))
+    }
+
+    fn next(&mut self, _: &Layout, limit: usize, batch: &mut RowBatch) -> Result<usize, ReadError> {
+        let path = self.path.clone();
+        guarded(&path, || self.read(limit, batch))
     }
 }
 

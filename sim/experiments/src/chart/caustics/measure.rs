@@ -19,7 +19,7 @@ use crate::study::StudyError;
 /// Slopes of the oceans that get coarser.
 const COARSE_SLOPES: [f64; 5] = [0.05, 0.15, 0.4, 0.7, 1.0];
 
-/// What every method does for one ocean seen from the side.
+/// Results of every method for one ocean seen from the side.
 #[derive(Clone, Debug, Serialize)]
 pub struct Ocean {
     /// Generator triangles.

@@ -10,7 +10,7 @@ use output::progress::Progress;
 use serde::Serialize;
 use workloads::caustics::{MAX_CROSSED_SHARE, Method};
 
-use crate::study::table::{Sheet, Table, fixed, millis, plain};
+use crate::study::table::{Sheet, Table, count, fixed, millis, plain};
 use crate::study::{Gallery, Study, StudyError};
 
 pub use measure::{Crossed, Ocean, ocean};
@@ -97,7 +97,7 @@ pub struct CausticsChart {
 
 /// Short names of the methods, in the order of [`Method::ALL`].
 const KEYS: [&str; 4] = ["moving", "refined", "hull", "prism"];
-/// What the maps of the methods are called, in the order of [`Method::ALL`].
+/// Names of the maps of the methods, in the order of [`Method::ALL`].
 const MAPS: [&str; 4] =
     ["caustics_map_moving", "caustics_map_refined", "caustics_map_hull", "caustics_map_prism"];
 
@@ -163,16 +163,16 @@ impl Study for CausticsChart {
         let pixels = f64::from(ocean.size[0] * ocean.size[1]);
         let methods = Table::of(Method::ALL.into_iter().enumerate())
             .shown("ocean", |(_, method)| method.name(), plain)
-            .shown("executions", |(place, _)| ocean.executions[*place], plain)
+            .shown("executions", |(place, _)| ocean.executions[*place], count)
             .shown("a pixel", |(place, _)| ocean.executions[*place] as f64 / pixels, fixed(1))
-            .shown("most", |(place, _)| ocean.most[*place], plain)
+            .shown("most", |(place, _)| ocean.most[*place], count)
             .shown("of the prism's", |(place, _)| ocean.of_the_prism(*place), fixed(3))
             .before(format!("{} volumes\n", ocean.volumes));
         let sweep = Table::of(&self.rows)
             .shown("slope", |row| row.slope, plain)
             .shown("crossed", |row| row.crossing, fixed(4))
             .shown("method", |row| row.method.name(), plain)
-            .shown("executions", |row| row.executions, plain)
+            .shown("executions", |row| row.executions, count)
             .shown("find light", |row| row.useful, fixed(3))
             .shown("CPU ms", |row| row.cpu_s, millis(1));
         let coarse = Table::of(&self.coarse)
@@ -406,7 +406,7 @@ fn lost(chart: &CausticsChart) -> ChartPanel {
     over_crossing("light in the volume", "light missing (%)", curves)
 }
 
-/// What bodies are worth, at the largest number of triangles.
+/// Panel of the useful share of each bounding volume, at the largest number of triangles.
 fn useful(chart: &CausticsChart) -> ChartPanel {
     let most = chart.effort.pleated_cells.last().copied().unwrap_or(0);
     let of = |(place, method): (usize, Method)| {

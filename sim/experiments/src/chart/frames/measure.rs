@@ -17,7 +17,7 @@ const MARKED: [f64; 5] = [0.4, 0.1, 0.25, 0.6, 0.85];
 /// How far off the marks are, s.
 const HAND_S: [f64; 5] = [0.05e-3, -0.1e-3, 0.1e-3, 0.0, -0.05e-3];
 
-/// What came out.
+/// Quality of the starts found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Outcome {
     /// Harmonic mean of precision and recall of starts; of several analyses the mean.

@@ -48,7 +48,7 @@ pub enum Way {
     Templates,
     /// Tracking from one mark, templates learnt.
     Tracking,
-    /// One mark and no method requested: that of the others which fits what is found.
+    /// One mark, without a requested method: the finder chooses one of the others.
     Auto,
 }
 
@@ -68,7 +68,7 @@ impl Way {
     }
 }
 
-/// What is changed; the others stay at 50 kHz, 30 dB and 14 bits.
+/// The property that is changed; the others stay at 50 kHz, 30 dB and 14 bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Axis {
@@ -121,15 +121,15 @@ impl Axis {
 /// One method on one scene recorded in one way, over all seeds.
 #[derive(Clone, Debug, Serialize)]
 pub struct FramesRow {
-    /// What is changed.
+    /// The property that is changed.
     pub axis: Axis,
-    /// To what.
+    /// Its value.
     pub value: f64,
     /// The scene.
     pub scene: &'static str,
     /// The method.
     pub way: Way,
-    /// What came out.
+    /// Quality of the starts found.
     #[serde(flatten)]
     pub outcome: Outcome,
     /// Whether F1 is below [`FAILS_BELOW`].

@@ -13,7 +13,7 @@ use timing::Level;
 
 /// The GPU of the class of the card whose rates are known.
 const CARD: &str = "discrete";
-/// What is asked of `--accuracy` in the chart.
+/// Values of `--accuracy` in the chart.
 const ASKED_PERCENT: [f64; 3] = [1.0, 5.0, 20.0];
 /// Triangles of a batch: few, so that the front end and the tiles take turns.
 const BATCH: u32 = 512;
@@ -21,7 +21,7 @@ const BATCH: u32 = 512;
 /// A stream on a GPU.
 #[derive(Clone, Debug, Serialize)]
 pub struct FailureRow {
-    /// What is wrong with it.
+    /// The property that breaks a level.
     pub stream: &'static str,
     /// The GPU.
     pub gpu: String,
@@ -29,7 +29,7 @@ pub struct FailureRow {
     pub stepped_cycles: u64,
     /// The other levels by name.
     pub levels: BTreeMap<&'static str, FailedLevel>,
-    /// What `--accuracy` would choose.
+    /// Levels that `--accuracy` would choose.
     pub chosen: Vec<Chosen>,
 }
 
@@ -56,11 +56,11 @@ pub struct FailedLevel {
 /// A rate by a microbenchmark that asks for nothing else, in units of 1e9 a second.
 #[derive(Clone, Debug, Serialize)]
 pub struct RateRow {
-    /// What it is the rate of.
+    /// The work that the rate counts.
     pub rate: &'static str,
     /// One of it, over a second.
     pub unit: &'static str,
-    /// What each level finds.
+    /// Rate by each level.
     pub giga_per_s: BTreeMap<&'static str, f64>,
     /// The card: listed or measured (`../shared/energy.md`, unit rates of 2012-class rasterizers).
     pub card: &'static str,

@@ -228,7 +228,7 @@ pub struct AddedRow {
     pub drawn_s: f64,
     /// To draw it, its packets to the clock of the level.
     pub timed_s: f64,
-    /// What the clock adds.
+    /// Time that the clock adds.
     pub added_percent: f64,
 }
 

@@ -25,7 +25,7 @@ pub use failures::{Chosen, FailedLevel, FailureRow, RateRow};
 pub use measure::AddedRow;
 pub use measure::TimingRow;
 
-/// What the cost is called: timing alone, without drawing, over that at `stepped`.
+/// Name of the cost: timing alone, without drawing, over that at `stepped`.
 pub(super) const HOST_TIME: &str = "host time of timing alone, relative to stepped";
 
 /// GPUs in the chart: small, integrated, large.
@@ -58,7 +58,7 @@ pub struct Figures {
     pub speedup_over_stepped: f64,
     /// See above.
     pub speedup_over_stepped_least: f64,
-    /// What the clock adds to a run that only draws, in processor time: median and worst.
+    /// Time that the clock adds to a run that only draws, in processor time: median and worst.
     pub added_percent: f64,
     /// See above.
     pub added_worst_percent: f64,
@@ -67,11 +67,11 @@ pub struct Figures {
 /// The reference itself.
 #[derive(Clone, Debug, Serialize)]
 pub struct Reference {
-    /// Units visited in a second of host time.
+    /// Units visited in a second of processor time.
     pub unit_cycles_per_s: f64,
-    /// Cycles of the core clock, those that were skipped included, in a second of host time.
+    /// Cycles of the core clock, those that were skipped included, in a second of processor time.
     pub cycles_per_s: f64,
-    /// Host seconds of all rows.
+    /// Seconds of the host's processor, all rows together.
     pub cpu_s: f64,
 }
 
@@ -88,7 +88,7 @@ pub struct TimingChart {
     pub animations: Vec<AnimationRow>,
     /// A row for each scene, GPU and level but the reference.
     pub rows: Vec<TimingRow>,
-    /// What the cheap levels add to a run that only draws, scenes by GPUs.
+    /// Time that the cheap levels add to a run that only draws, scenes by GPUs.
     pub added: Vec<AddedRow>,
     /// Streams made to break levels, on each GPU; not in the figures of the levels.
     pub failures: Vec<FailureRow>,

@@ -29,7 +29,7 @@ fn work_ms(frames: &[FramePower], pick: fn(f64, f64) -> f64) -> f64 {
     frames.iter().map(|frame| 1e3 * frame.duration_s()).reduce(pick).unwrap_or(f64::NAN)
 }
 
-/// What both methods measure of the frames of the phone's sequence.
+/// Results of both methods for the frames of the phone's sequence.
 struct Methods {
     new: Vec<f64>,
     old: Vec<f64>,

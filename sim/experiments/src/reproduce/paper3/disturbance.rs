@@ -26,7 +26,7 @@ fn overlaps_s(recording: &Recording) -> Vec<f64> {
     frames.map(|frame| pulses.iter().map(|pulse| pulse.overlap_s(frame.start_s, frame.end_s)).sum()).collect()
 }
 
-/// What the analysis says of the frames against what was done to them.
+/// Counts of frames that were disturbed, flagged or both.
 struct Tally {
     touched: usize,
     flagged: usize,

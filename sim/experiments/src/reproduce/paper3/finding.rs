@@ -100,7 +100,7 @@ impl Found {
     }
 }
 
-/// What was missed, by method and pacing, and how much of it lay under a disturbance.
+/// Missed starts by method and pacing, and how many of them lay under a disturbance.
 fn missed(found: &[Found; 4]) -> String {
     let names =
         ["least squares with V-sync", "least squares without", "tracking with V-sync", "tracking without"];

@@ -64,7 +64,7 @@ impl Planted {
         if (low - self.frames).abs() > (high - self.frames).abs() { low } else { high }
     }
 
-    /// What it draws more, W.
+    /// Excess power, W.
     fn excess_w(&self, period_s: f64) -> f64 {
         self.knees.iter().map(|knee| knee.excess_j).sum::<f64>() / (self.knees.len() as f64 * period_s)
     }

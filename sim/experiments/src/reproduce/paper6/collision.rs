@@ -26,7 +26,7 @@ const fn name(method: Method) -> &'static str {
     }
 }
 
-/// What passes have drawn, as the rows print it.
+/// Numbers of a result, as the rows print them.
 fn ran(drawn: &PlainResult) -> Vec<Number> {
     numbers([
         ("passes", drawn.passes as f64),
@@ -119,8 +119,8 @@ impl Looks {
         Some([shares().reduce(f64::min)?, shares().reduce(f64::max)?])
     }
 
-    /// What each way keeps of public queries that do not collide: no error, only work.
-    fn said_of_others(&self, public: &Public) -> String {
+    /// Share of public queries without a collision that each method keeps: no error, only work.
+    fn text_of_others(&self, public: &Public) -> String {
         if self.false_positives().is_none() {
             return String::new();
         }
@@ -165,9 +165,9 @@ pub(super) fn missed(task: &Task<'_>) -> Result<Done, RunError> {
     let ours = format!(
         "{missed} missed: {} generated pairs that collide{}, by {} kinds of passes and by `quintile ccd`{}",
         generated.len(),
-        said(&public, task.collision_data.is_some()),
+        public_text(&public, task.collision_data.is_some()),
         looks.names.len(),
-        looks.said_of_others(&public)
+        looks.text_of_others(&public)
     );
     let full = row.methods.get(Form::Full).len() * row.resolution_px.values() + 1;
     let band = tried.band(full).ok_or_else(|| RunError::setting("VI-1 has nothing to try"))?;
@@ -202,8 +202,8 @@ fn facts(looks: &Looks, public: &Public) -> Vec<Number> {
     ])
 }
 
-/// What of the public data was run.
-fn said(public: &Public, given: bool) -> String {
+/// Remainder of a sentence: the public data that was run.
+fn public_text(public: &Public, given: bool) -> String {
     if !given {
         return "; no public case, as no folder was given (--collision-data)".to_owned();
     }
@@ -289,7 +289,7 @@ pub(super) fn dodged(task: &Task<'_>) -> Result<Done, RunError> {
                 let fewest = ours.overlaps.into_iter().min().unwrap_or(0);
                 at.push((resolution, fewest as f64, looked.is_distinguished(&ours, &depth)));
                 if resolution == *row.resolution_px.get(form) && method == row.methods.get(form)[0] {
-                    said.push(told(case, &ours, &depth, resolution));
+                    said.push(case_text(case, &ours, &depth, resolution));
                 }
             }
             tried.along(&format!("resolution_px ({}, {})", case.name, name(method)), at);
@@ -301,8 +301,8 @@ pub(super) fn dodged(task: &Task<'_>) -> Result<Done, RunError> {
     Ok(Done::bare(Row { ran: ran(&drawn), ..made }))
 }
 
-/// What the passes say of a case.
-fn told(case: &TwoObjects, ours: &PlainResult, depth: &PlainResult, resolution: u32) -> String {
+/// Result of the passes for a case, in words.
+fn case_text(case: &TwoObjects, ours: &PlainResult, depth: &PlainResult, resolution: u32) -> String {
     let kept = |drawn: &PlainResult| if drawn.may_collide() { "keep" } else { "clear" };
     let along =
         ["x", "y", "z"].into_iter().zip(ours.overlaps).filter(|(_, left)| *left == 0).map(|(axis, _)| axis);
@@ -429,7 +429,7 @@ mod tests {
         let both =
             ["collide", "do_not"].map(|end| ran.iter().filter(|n| n.name.ends_with(end)).collect::<Vec<_>>());
         assert!(both.iter().all(|kind| kind.len() == 2 && kind.iter().all(|number| number.value > 0.0)));
-        let said = looks.said_of_others(&public);
+        let said = looks.text_of_others(&public);
         assert!(said.contains("of 2 public queries that do not collide"), "{said}");
         assert!(said.contains("box against box at 8 px 50.0 %") && said.contains("`quintile ccd` 0.0 %"));
     }
@@ -439,7 +439,7 @@ mod tests {
         let public = Public { collide: vec![query(0.25, 0.25, 0.5)], ..Public::default() };
         let looks = looks(&public);
         assert!(looks.missed().all(|(.., missed)| missed == 1));
-        assert_eq!((looks.false_positives(), looks.said_of_others(&public)), (None, String::new()));
+        assert_eq!((looks.false_positives(), looks.text_of_others(&public)), (None, String::new()));
         assert!(looks.ran().iter().all(|number| !number.name.ends_with("do_not")));
     }
 }

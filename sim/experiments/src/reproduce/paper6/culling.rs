@@ -229,7 +229,7 @@ pub(super) fn unchanged(task: &Task<'_>) -> Result<Done, RunError> {
 mod tests {
     use super::*;
 
-    /// What lens lines spare is compared with brute force, not counted beside it: machines of the settings have side planes, beside
+    /// Savings of lens lines are compared with brute force, not counted beside it: machines of the settings have side planes, beside
     /// which lens lines take nothing away.
     #[test]
     fn every_machine_that_spares_something_is_compared() {

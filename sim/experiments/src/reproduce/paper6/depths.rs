@@ -87,7 +87,7 @@ impl Widths {
         self.means(2)
     }
 
-    /// What planes gain beyond that, the gain by time taken out: over all tiles, where the facing changes, and elsewhere.
+    /// Gain of planes beyond that, without the gain by time: over all tiles, where the facing changes, and elsewhere.
     fn over_null(&self) -> [f64; 3] {
         let (planes, null) = (self.means(0), self.null());
         [0, 1, 2].map(|class| planes[class] / null[class])
@@ -270,8 +270,8 @@ impl<'a> Scenes<'a> {
 /// Triangles through a pinhole: of every two one has both ends anywhere, the other drifts and wobbles a little.
 fn random(count: u32, side_px: u32, seed: u64) -> Result<StressScene, RunError> {
     let camera = Camera::new(Affine3A::IDENTITY, 1.0, NEAR).map_err(RunError::setting)?;
-    let viewport =
-        Viewport::new(side_px, side_px).ok_or_else(|| RunError::setting(workloads::job::IMAGE_SIZE))?;
+    let viewport = Viewport::new(side_px, side_px)
+        .ok_or_else(|| RunError::setting(format!("VI-15: {}", workloads::job::IMAGE_SIZE)))?;
     let samples = SampleTable::low_discrepancy(4, seed, LensShape::Disk)?;
     let (mut open, mut close) = (Vec::new(), Vec::new());
     for number in 0..count {

@@ -25,7 +25,7 @@ use output::progress::Progress;
 use run::RunError;
 use settings::Settings;
 
-/// What every row is computed from.
+/// Input of every row.
 struct Task<'a> {
     settings: Settings,
     form: Form,

@@ -25,7 +25,7 @@ fn drawn(
     (0..scenes).map(one).collect::<Result<_, _>>().map_err(RunError::setting)
 }
 
-/// What queries by intervals found: objects hidden, those of them found, and those called hidden that a sample sees.
+/// Answers of queries by intervals: objects hidden, those of them found, and those called hidden that a sample sees.
 #[derive(Clone, Copy, Default)]
 struct Share {
     hidden: u64,

@@ -14,7 +14,7 @@ use run::RunError;
 /// Two objects that collide.
 pub(super) type Pair = [Object; 2];
 
-/// What was found in the folder.
+/// Content of the folder.
 #[derive(Default)]
 pub(super) struct Public {
     /// Scenes read.
@@ -29,7 +29,7 @@ pub(super) struct Public {
     pub query_files: usize,
     /// Queries in all.
     pub queries: usize,
-    /// What passes have to keep: the pairs seen, and the queries that collide.
+    /// Pairs that passes have to keep: the pairs seen, and the queries that collide.
     pub collide: Vec<Pair>,
     /// The queries that do not collide, which passes may clear or keep.
     pub apart: Vec<Pair>,

@@ -304,7 +304,7 @@ pub(super) enum Planes {
     Tile,
 }
 
-/// What is switched on.
+/// Features that are switched on.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Hardware {

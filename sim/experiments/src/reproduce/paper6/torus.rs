@@ -17,7 +17,7 @@ fn failed(error: impl std::fmt::Display) -> RunError {
     RunError::Setting(format!("torus: {error}"))
 }
 
-/// What a torus is found to hold, with how many standard errors count and integral are off.
+/// Samples found in a torus, and how many standard errors count and integral are off.
 struct Filled {
     found: Covered,
     inside: f64,
@@ -108,7 +108,7 @@ impl Scatter {
         self.p() >= rarity(most)
     }
 
-    /// What that means for a tolerance of `most` standard errors.
+    /// Conclusion for a tolerance of `most` standard errors.
     fn text(&self, most: f64) -> String {
         let meaning = if !self.is_of_independent(most) {
             "more than independent samples scatter".to_owned()
@@ -249,7 +249,7 @@ mod tests {
     use crate::reproduce::paper6::settings::Settings;
     use crate::reproduce::settings::load;
 
-    /// What the committed file says of the tolerance is not repeated; the report says what was computed.
+    /// The report states the computed tolerance and does not repeat that of the committed file.
     #[test]
     fn the_file_does_not_decide_what_the_tolerance_is() {
         let (settings, _) = load::<Settings>(None).unwrap();

@@ -5,7 +5,7 @@ use workloads::multiview::Layout;
 
 use super::Task;
 use super::settings::{Policy, Size, Views};
-use crate::chart::views::{Bench, Lanes};
+use crate::chart::multiview::{Bench, Lanes};
 use crate::reproduce::band::{Cases, one_at_a_time};
 use crate::reproduce::figure::{level, line, over_doublings};
 use crate::reproduce::row::{Row, With, numbers};
@@ -86,7 +86,7 @@ impl Point {
     }
 }
 
-/// What was tried so far.
+/// Points that were tried so far.
 struct Tried<'a> {
     row: &'a Views,
     form: Form,
@@ -137,7 +137,7 @@ impl Tried<'_> {
     }
 }
 
-/// What is varied together: copies one such setting, or the two, from a point to another.
+/// Settings that are varied together: copies one such setting, or the two, from a point to another.
 type Group = fn(&mut Point, &Point);
 
 const GROUPS: [Group; 8] = [

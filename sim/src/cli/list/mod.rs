@@ -1,11 +1,16 @@
 //! `quintile list`.
 
+mod options;
+
 use serde::Serialize;
 
 use super::Failure;
 use super::ListArgs;
 use super::outputs::{print, print_json};
+use activity::spec::suggestion;
 use experiments::catalog::{ALL, CHARTS};
+use options::{Listed, OPTIONS, as_set};
+use output::table::Table;
 use run::GpuSpec;
 
 /// Names of all built-in things, each with a description.
@@ -61,7 +66,42 @@ impl Entry {
     }
 }
 
+/// A workload with its options.
+#[derive(Serialize)]
+struct Workload {
+    #[serde(flatten)]
+    entry: Entry,
+    options: Vec<Listed>,
+}
+
 pub(super) fn list(args: &ListArgs) -> Result<(), Failure> {
+    match &args.workload {
+        Some(name) => workload(name, args.json),
+        None => everything(args),
+    }
+}
+
+/// Prints the options of one workload.
+fn workload(name: &str, json: bool) -> Result<(), Failure> {
+    let mut workloads = workloads::catalog::names().zip(OPTIONS);
+    let found = workloads.find(|((known, _), _)| *known == name);
+    let Some(((name, what), options)) = found else {
+        let known: Vec<&str> = workloads::catalog::names().map(|(name, _)| name).collect();
+        let message = format!("unknown workload `{name}`, {}", suggestion(name, &known));
+        return Err(Failure { message, code: 2 });
+    };
+    let listed = Workload { entry: Entry::new(name, what), options: options.listed()? };
+    if json {
+        return print_json(&listed, true);
+    }
+    let mut table = Table::of_texts(["option", "default", "range", "meaning"]);
+    for option in &listed.options {
+        table.row([option.name, &as_set(&option.default), &option.range, option.meaning].map(str::to_owned));
+    }
+    print(&format!("{name}: {what}\n\n{table}\nSet one with: quintile run {name} --set OPTION=VALUE"))
+}
+
+fn everything(args: &ListArgs) -> Result<(), Failure> {
     let listing = listing();
     if args.json {
         return print_json(&listing, true);

@@ -16,7 +16,7 @@ use crate::chart::statistics::{errors, mean_square};
 use crate::study::StudyError;
 use run::GpuSpec;
 
-/// What a way of rendering all views took.
+/// Cost of one way to render all views.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Run {
     /// Passes over the geometry.

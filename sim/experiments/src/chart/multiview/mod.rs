@@ -1,6 +1,6 @@
-//! `quintile chart views`: stereo and multi-view in one pass against view by view and accumulation.
+//! `quintile chart multiview`: stereo and multi-view in one pass against view by view and accumulation.
 //!
-//! What is shaded once serves all views, the lens and the shutter. The measure is pixel shader lanes run, over those that one of the
+//! Pixels that are shaded once serve all views, the lens and the shutter. The measure is pixel shader lanes run, over those that one of the
 //! views takes alone on the same hardware.
 
 mod measure;
@@ -9,7 +9,7 @@ use pipeline::Replacement;
 use serde::Serialize;
 use workloads::multiview::{Layout, MAX_RUNS_OVER_INFINITE_CACHE, MAX_VIEW_ANGLE_DEG};
 
-use crate::study::table::{Sheet, Table, fixed, plain};
+use crate::study::table::{Sheet, Table, count, fixed, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
 use crate::study::{Gallery, Study, StudyError};
 use output::OutputError;
@@ -20,7 +20,7 @@ pub use measure::{Angle, Bench, Cached, Lanes, Run, ViewsRow};
 
 /// How much is measured.
 #[derive(Clone, Copy, Debug, Serialize)]
-pub struct ViewsEffort {
+pub struct MultiviewEffort {
     /// The built-in scene, and its frame.
     pub scene: (&'static str, u32),
     /// Pixels of each view, across and down.
@@ -57,21 +57,21 @@ pub const POLICIES: [(&str, Replacement); 3] =
 
 /// Everything the chart found.
 #[derive(Clone, Debug, Serialize)]
-pub struct ViewsChart {
+pub struct MultiviewChart {
     /// How much was measured.
-    pub effort: ViewsEffort,
+    pub effort: MultiviewEffort,
     /// By number of views.
     pub rows: Vec<ViewsRow>,
     /// Views near to each other and far apart, by policy and entries of the cache.
     pub caches: Vec<Case>,
-    /// What shading for the middle of the line leaves out, by its length.
+    /// Error of shading for the middle of the line, by its length.
     pub angles: Vec<Angle>,
 }
 
 /// Views for which caches are tried.
 #[derive(Clone, Debug, Serialize)]
 pub struct Case {
-    /// What they are.
+    /// Their name.
     pub name: &'static str,
     /// By policy and entries of the cache.
     pub rows: Vec<Cached>,
@@ -86,22 +86,22 @@ fn layouts(focus: f64) -> [(&'static str, Layout); 3] {
     [("two views", stereo()), ("seven views", line(7)), ("seven views far apart", far)]
 }
 
-impl Study for ViewsChart {
-    const NAME: &'static str = "views";
+impl Study for MultiviewChart {
+    const NAME: &'static str = "multiview";
     const ABOUT: &'static str =
         "Stereo and multi-view: shader runs over views and caches, one pass against its rivals";
-    const PICTURES: &'static [&'static str] = &["views_cost", "views_cache", "views_failures"];
-    const FILES: &'static [&'static str] = &["views.csv", "views_cache.csv", "views.json"];
+    const PICTURES: &'static [&'static str] = &["multiview_cost", "multiview_cache", "multiview_failures"];
+    const FILES: &'static [&'static str] = &["multiview.csv", "multiview_cache.csv", "multiview.json"];
 
-    type Effort = ViewsEffort;
-    const FULL: ViewsEffort = ViewsEffort {
+    type Effort = MultiviewEffort;
+    const FULL: MultiviewEffort = MultiviewEffort {
         scene: ("default", 18),
         size: [320, 180],
         views: &[1, 2, 7, 9, 64],
         entries: &[4, 8, 16, 32, 64, 128, 256, 512, 1024, 2048, 4096, 8192, 16_384],
         baselines: &[0.02, 0.05, 0.1, 0.2, 0.4, 0.8],
     };
-    const QUICK: ViewsEffort = ViewsEffort {
+    const QUICK: MultiviewEffort = MultiviewEffort {
         size: [128, 72],
         views: &[1, 2, 7, 64],
         entries: &[4, 16, 64, 256, 1024, 16_384],
@@ -109,9 +109,9 @@ impl Study for ViewsChart {
         ..Self::FULL
     };
 
-    fn measure(effort: ViewsEffort, _scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
+    fn measure(effort: MultiviewEffort, _scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
         let steps = effort.views.len() + 3 * POLICIES.len() * effort.entries.len() + effort.baselines.len();
-        let bar = progress.bar("views", steps as u64);
+        let bar = progress.bar("multiview", steps as u64);
         let bench = Bench::new(effort.scene, effort.size)?;
         let rows = effort.views.iter().map(|&views| ticked(bench.row(views), &bar));
         let rows = rows.collect::<Result<_, _>>()?;
@@ -132,15 +132,15 @@ impl Study for ViewsChart {
         let [width, height] = self.effort.size;
         let subject =
             format!("{}, {width}x{height} pixels a view, 8 samples each where they fit", self.effort.scene.0);
-        to.chart("views_cost", ["Many views: one pass against its rivals", &subject], self.costs())?;
+        to.chart("multiview_cost", ["Many views: one pass against its rivals", &subject], self.costs())?;
         let title = "Pixel shader lanes of one pass over the shading cache";
         let marked = format!(
             "{subject}. Marked: a cache smaller than what is in use at a time, where a run warns (shading-cache-small)"
         );
         let caches = self.caches.iter().map(Case::panel).collect();
-        to.chart("views_cache", [title, &marked], caches)?;
+        to.chart("multiview_cache", [title, &marked], caches)?;
         let title = "Where one pass fails: shading that depends on who looks";
-        to.chart("views_failures", [title, &subject], vec![self.failures()])
+        to.chart("multiview_failures", [title, &subject], vec![self.failures()])
     }
 
     fn tables(&self) -> Vec<Sheet> {
@@ -152,7 +152,7 @@ impl Study for ViewsChart {
             .column("passes", "passes", |(.., run)| run.passes, plain)
             .data("invocations", |(.., run)| run.invocations)
             .column("over_one_view", "lanes over one view", |(.., run)| run.over_one_view, fixed(3))
-            .column("vertices", "vertices", |(.., run)| run.vertices, plain)
+            .column("vertices", "vertices", |(.., run)| run.vertices, count)
             .data("dram_bytes", |(.., run)| run.dram_bytes)
             .column("host_s", "host s", |(.., run)| run.host_s, fixed(3));
         let cached = self.caches.iter().flat_map(|case| case.rows.iter().map(|row| (case.name, row)));
@@ -173,7 +173,7 @@ impl Study for ViewsChart {
             .shown("camera line over distance", |angle| angle.baseline, plain)
             .shown("RMSE matt", |angle| angle.rmse_matt, fixed(4))
             .shown("RMSE with a highlight", |angle| angle.rmse_shiny, fixed(4));
-        vec![runs.csv("views.csv").sheet(), caches.csv("views_cache.csv").sheet(), angles.sheet()]
+        vec![runs.csv("multiview.csv").sheet(), caches.csv("multiview_cache.csv").sheet(), angles.sheet()]
     }
 
     /// No method has an error of its own besides that of shading for the middle of the line.
@@ -198,7 +198,7 @@ fn runs(row: &ViewsRow) -> [(&'static str, &Run); 3] {
     [("one pass", &row.one_pass), ("view by view", &row.view_by_view), ("accumulation", &row.accumulation)]
 }
 
-impl ViewsChart {
+impl MultiviewChart {
     fn costs(&self) -> Vec<ChartPanel> {
         let panel = |title: &str, up: &str, of: fn(&Run) -> f64| {
             let curve = |method: usize| {
@@ -266,7 +266,7 @@ mod tests {
     use super::*;
     use crate::study::written;
 
-    const LEAST: ViewsEffort = ViewsEffort {
+    const LEAST: MultiviewEffort = MultiviewEffort {
         scene: ("tiny", 1),
         size: [40, 30],
         views: &[1, 2, 7],
@@ -276,7 +276,7 @@ mod tests {
 
     #[test]
     fn one_pass_shades_less_than_its_rivals_and_errs_more_on_a_longer_line() {
-        let (_folder, chart, _) = written::<ViewsChart>(LEAST);
+        let (_folder, chart, _) = written::<MultiviewChart>(LEAST);
         for row in &chart.rows[1..] {
             assert!(row.one_pass.over_one_view < row.view_by_view.over_one_view, "{row:?}");
             assert!(row.one_pass.over_one_view < row.accumulation.over_one_view, "{row:?}");

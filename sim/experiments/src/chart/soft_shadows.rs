@@ -1,4 +1,4 @@
-//! `quintile chart shadows`: soft shadows from a five-dimensional shadow map against accumulation buffering.
+//! `quintile chart soft-shadows`: soft shadows from a five-dimensional shadow map against accumulation buffering.
 //!
 //! Error is the root of the mean squared difference to an image in which every sample asks the light by rays, over all pixels and
 //! channels in linear light. Cost is that of making the map, in one pass and in as many passes as light samples.
@@ -21,13 +21,13 @@ use workloads::soft_shadows::{
 use workloads::{Frame, Overrides, Scene};
 
 use crate::chart::statistics::{errors, mean_square, neighbours};
-use crate::study::table::{Sheet, Table, fixed, plain};
+use crate::study::table::{Sheet, Table, count, fixed, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
 use crate::study::{Gallery, Study, StudyError};
 
 /// How much is measured.
 #[derive(Clone, Copy, Debug, Serialize)]
-pub struct ShadowsEffort {
+pub struct SoftShadowsEffort {
     /// Pixels of the image, across and down.
     pub size: [u32; 2],
     /// Texels of the map across and down.
@@ -42,9 +42,9 @@ pub struct ShadowsEffort {
 
 /// Everything the chart found.
 #[derive(Clone, Debug, Serialize)]
-pub struct ShadowsChart {
+pub struct SoftShadowsChart {
     /// How much was measured.
-    pub effort: ShadowsEffort,
+    pub effort: SoftShadowsEffort,
     /// Samples per pixel of the reference.
     pub reference_samples_per_pixel: u32,
     /// By light samples, from few to many.
@@ -53,22 +53,27 @@ pub struct ShadowsChart {
     pub biases: Vec<Bias>,
 }
 
-impl Study for ShadowsChart {
-    const NAME: &'static str = "shadows";
+impl Study for SoftShadowsChart {
+    const NAME: &'static str = "soft-shadows";
     const ABOUT: &'static str =
         "Soft shadows: error over light samples, one pass against accumulation, and the bias";
-    const PICTURES: &'static [&'static str] = &["shadows_error", "shadows_cost", "shadows_failures"];
-    const FILES: &'static [&'static str] = &["shadows.csv", "shadows.json"];
+    const PICTURES: &'static [&'static str] =
+        &["soft_shadows_error", "soft_shadows_cost", "soft_shadows_failures"];
+    const FILES: &'static [&'static str] = &["soft_shadows.csv", "soft_shadows.json"];
 
-    type Effort = ShadowsEffort;
-    const FULL: ShadowsEffort =
-        ShadowsEffort { size: [96, 54], map_px: 256, most_points: 256, reference_tables: 4, bias: 0.06 };
-    const QUICK: ShadowsEffort =
-        ShadowsEffort { size: [48, 27], map_px: 128, most_points: 64, reference_tables: 1, bias: 0.1 };
+    type Effort = SoftShadowsEffort;
+    const FULL: SoftShadowsEffort =
+        SoftShadowsEffort { size: [96, 54], map_px: 256, most_points: 256, reference_tables: 4, bias: 0.06 };
+    const QUICK: SoftShadowsEffort =
+        SoftShadowsEffort { size: [48, 27], map_px: 128, most_points: 64, reference_tables: 1, bias: 0.1 };
 
-    fn measure(effort: ShadowsEffort, _scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
+    fn measure(
+        effort: SoftShadowsEffort,
+        _scenes: &[String],
+        progress: &Progress,
+    ) -> Result<Self, StudyError> {
         let counts: Vec<u32> = (0..=effort.most_points.ilog2()).map(|power| 1 << power).collect();
-        let bar = progress.bar("shadows", counts.len() as u64 + 2);
+        let bar = progress.bar("soft-shadows", counts.len() as u64 + 2);
         let stage = Stage::new(&effort)?;
         stage.with(|world| {
             let reference = world.reference()?;
@@ -93,12 +98,12 @@ impl Study for ShadowsChart {
             self.effort.map_px, self.reference_samples_per_pixel
         );
         let title = "Soft shadows: error, and correlation of neighbouring errors";
-        to.chart("shadows_error", [title, &subject], self.errors())?;
+        to.chart("soft_shadows_error", [title, &subject], self.errors())?;
         let title = "Soft shadows: one pass against accumulation";
-        to.chart("shadows_cost", [title, &subject], self.costs())?;
+        to.chart("soft_shadows_cost", [title, &subject], self.costs())?;
         let subject =
             "wrong shadows of a map of 16 places against rays; marked: where a run warns (shadow-bias)";
-        to.chart("shadows_failures", ["Where shadow maps fail: the bias", subject], self.failures())
+        to.chart("soft_shadows_failures", ["Where shadow maps fail: the bias", subject], self.failures())
     }
 
     fn tables(&self) -> Vec<Sheet> {
@@ -107,10 +112,10 @@ impl Study for ShadowsChart {
             .shown("RMSE", |row| row.rmse, fixed(5))
             .shown("neighbours", |row| row.neighbour_correlation, fixed(2))
             .shown("equal", |row| if row.equal { "yes" } else { "NO" }, plain)
-            .shown("vertices", |row| row.one_pass.vertices, plain)
-            .shown("(accumulated)", |row| row.accumulation.vertices, plain)
-            .shown("madds", |row| row.one_pass.madds, plain)
-            .shown("(accumulated)", |row| row.accumulation.madds, plain)
+            .shown("vertices", |row| row.one_pass.vertices, count)
+            .shown("(accumulated)", |row| row.accumulation.vertices, count)
+            .shown("madds", |row| row.one_pass.madds, count)
+            .shown("(accumulated)", |row| row.accumulation.madds, count)
             .shown("host s", |row| row.one_pass.host_s, fixed(3))
             .shown("(accumulated)", |row| row.accumulation.host_s, fixed(3));
         let biases = Table::of(&self.biases)
@@ -130,7 +135,7 @@ impl Study for ShadowsChart {
             .data("madds", |(.., cost)| cost.madds)
             .data("dram_bytes", |(.., cost)| cost.dram_bytes)
             .data("host_s", |(.., cost)| cost.host_s)
-            .csv("shadows.csv");
+            .csv("soft_shadows.csv");
         vec![rows.sheet(), biases.sheet(), by_method.sheet()]
     }
 
@@ -160,7 +165,7 @@ fn panel(title: &str, up: &str, curves: Vec<Series>) -> ChartPanel {
     ChartPanel::new(title, ["places (u, v, t)", up], curves).on(Scale::Doublings, Scale::Decades)
 }
 
-impl ShadowsChart {
+impl SoftShadowsChart {
     /// Whether the map of one pass was that of accumulation to the bit, everywhere.
     pub fn is_equal(&self) -> bool {
         self.rows.iter().all(|row| row.equal)
@@ -218,7 +223,7 @@ impl ShadowsChart {
     }
 }
 
-/// What a map took.
+/// Cost of a map.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Cost {
     /// Passes over the geometry.
@@ -267,7 +272,7 @@ pub struct Bias {
 
 /// The scene and the hardware.
 struct Stage {
-    effort: ShadowsEffort,
+    effort: SoftShadowsEffort,
     scene: Scene,
     frame: Frame,
     light: AreaLight,
@@ -283,7 +288,7 @@ struct Bench<'a> {
 }
 
 impl Stage {
-    pub fn new(effort: &ShadowsEffort) -> Result<Self, StudyError> {
+    pub fn new(effort: &SoftShadowsEffort) -> Result<Self, StudyError> {
         let size = Some((effort.size[0], effort.size[1]));
         let scene = default_scene()?.with_overrides(&Overrides { size, ..Overrides::default() })?;
         let frame = scene.frame(1)?;
@@ -418,8 +423,8 @@ mod tests {
     #[test]
     fn more_places_err_less_one_pass_costs_less_and_is_equal() {
         let least =
-            ShadowsEffort { size: [32, 18], map_px: 64, most_points: 16, reference_tables: 1, bias: 0.2 };
-        let (_folder, chart, _) = written::<ShadowsChart>(least);
+            SoftShadowsEffort { size: [32, 18], map_px: 64, most_points: 16, reference_tables: 1, bias: 0.2 };
+        let (_folder, chart, _) = written::<SoftShadowsChart>(least);
         assert!(chart.is_equal());
         let (first, last) = (&chart.rows[0], chart.rows.last().unwrap());
         assert!(last.rmse < 0.6 * first.rmse, "{} {}", first.rmse, last.rmse);

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use output::perfetto::{
+use traces::io::perfetto::{
     BusySlice, CounterTrack, FrameSpan, MAX_POINTS, PassSpan, Timeline, UnitTrack, write,
 };
 

@@ -1,4 +1,4 @@
-//! `quintile chart collision`: false positives of collision detection over resolution, time bins and cost, and failure modes.
+//! `quintile chart ccd`: false positives of collision detection over resolution, time bins and cost, and failure modes.
 
 use cpu_time::ThreadTime;
 use output::OutputError;
@@ -14,7 +14,7 @@ use crate::study::{Gallery, Study, StudyError};
 
 /// How much is measured.
 #[derive(Clone, Copy, Debug, Serialize)]
-pub struct CollisionEffort {
+pub struct CcdEffort {
     /// Cases of each family of two objects, and of each of many.
     pub cases: [usize; 2],
     /// Pixels across.
@@ -48,7 +48,7 @@ impl Way {
         match self {
             Self::ObjectBoxes => "swept boxes of objects".to_owned(),
             Self::TriangleBoxes => "swept boxes of triangles".to_owned(),
-            Self::Images(Search { zoom: true, .. }) => "looking closer".to_owned(),
+            Self::Images(Search { zoom: true, .. }) => "with refinement".to_owned(),
             Self::Images(Search { method: Method::DepthOnly, .. }) => "depth only".to_owned(),
             Self::Images(Search { method: Method::BoxBox, bins, .. }) => format!("box-box, bins {bins}"),
             Self::Images(Search { bins, .. }) => format!("fragment-box, bins {bins}"),
@@ -81,9 +81,9 @@ impl Set {
     }
 }
 
-/// What a way makes of all cases of a set.
+/// Results of one method for all cases of a set.
 #[derive(Clone, Debug, Serialize)]
-pub struct CollisionRow {
+pub struct CcdRow {
     /// The set.
     pub cases: Set,
     /// The way.
@@ -113,21 +113,21 @@ pub struct Slide {
 
 /// Everything the chart found.
 #[derive(Clone, Debug, Serialize)]
-pub struct CollisionChart {
+pub struct CcdChart {
     /// How much was measured.
-    pub effort: CollisionEffort,
+    pub effort: CcdEffort,
     /// Pairs that collide and pairs that do not, of two objects and of many.
     pub pairs: [[usize; 2]; 2],
     /// The same of the cases like the reference cases.
     pub reference_pairs: [[usize; 2]; 2],
     /// Way by way: over the families, then over cases like the reference cases.
-    pub rows: Vec<CollisionRow>,
+    pub rows: Vec<CcdRow>,
     /// Plates that slide, looked at closer.
     pub slides: Vec<Slide>,
 }
 
 /// Two-object cases, then those of many.
-fn all_cases(effort: &CollisionEffort) -> Vec<Case> {
+fn all_cases(effort: &CcdEffort) -> Vec<Case> {
     let two = cases(301, effort.cases[0]).into_iter().filter(|case| case.objects.len() == 2);
     two.chain(cases(301, effort.cases[1]).into_iter().filter(|case| case.objects.len() > 2)).collect()
 }
@@ -136,7 +136,7 @@ fn all_cases(effort: &CollisionEffort) -> Vec<Case> {
 const REFERENCE_PIXELS: u32 = 128;
 
 /// The ways of the reference cases.
-fn reference_ways(effort: &CollisionEffort) -> Vec<Way> {
+fn reference_ways(effort: &CcdEffort) -> Vec<Way> {
     let once = Search { resolution: REFERENCE_PIXELS, bins: 1, method: Method::FragmentBox, zoom: false };
     let depth_only = Search { method: Method::DepthOnly, ..once };
     let binned = effort.reference_bins.iter().map(|&bins| Search { bins, ..once });
@@ -145,7 +145,7 @@ fn reference_ways(effort: &CollisionEffort) -> Vec<Way> {
 }
 
 /// All ways, from the cheapest on.
-fn ways(effort: &CollisionEffort) -> Vec<Way> {
+fn ways(effort: &CcdEffort) -> Vec<Way> {
     let search = Search { resolution: 0, bins: 1, method: Method::FragmentBox, zoom: false };
     let each = effort.resolutions.iter().flat_map(|&resolution| {
         let search = Search { resolution, ..search };
@@ -160,15 +160,15 @@ fn ways(effort: &CollisionEffort) -> Vec<Way> {
     [Way::ObjectBoxes, Way::TriangleBoxes].into_iter().chain(each).collect()
 }
 
-impl Study for CollisionChart {
-    const NAME: &'static str = "collision";
+impl Study for CcdChart {
+    const NAME: &'static str = "ccd";
     const ABOUT: &'static str =
         "False positives of collision detection, over resolution, bins of time and cost, and where it fails";
-    const PICTURES: &'static [&'static str] = &["collision", "collision_failures"];
-    const FILES: &'static [&'static str] = &["collision.csv", "collision.json"];
+    const PICTURES: &'static [&'static str] = &["ccd", "ccd_failures"];
+    const FILES: &'static [&'static str] = &["ccd.csv", "ccd.json"];
 
-    type Effort = CollisionEffort;
-    const FULL: CollisionEffort = CollisionEffort {
+    type Effort = CcdEffort;
+    const FULL: CcdEffort = CcdEffort {
         cases: [12, 2],
         resolutions: &[8, 16, 32, 64],
         bins: &[1, 4, 16],
@@ -177,7 +177,7 @@ impl Study for CollisionChart {
         reference_cases: [12, 3],
         reference_bins: &[1, 16, 64],
     };
-    const QUICK: CollisionEffort = CollisionEffort {
+    const QUICK: CcdEffort = CcdEffort {
         cases: [3, 1],
         resolutions: &[4, 16],
         bins: &[1, 4],
@@ -187,7 +187,7 @@ impl Study for CollisionChart {
         reference_bins: &[1, 16],
     };
 
-    fn measure(effort: CollisionEffort, _scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
+    fn measure(effort: CcdEffort, _scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
         let sets = [
             (Set::Families, all_cases(&effort), ways(&effort)),
             (
@@ -211,11 +211,11 @@ impl Study for CollisionChart {
 
     fn draw(&self, to: &Gallery<'_>) -> Result<(), OutputError> {
         let title = "False positives of collision detection";
-        to.chart("collision", [title, &subject(&self.pairs)], self.panels())?;
+        to.chart("ccd", [title, &subject(&self.pairs)], self.panels())?;
         let title = "Where collision detection fails: grazing contact";
         let subject = "plates of 72 triangles that slide along each other without touching, any way round, looked at closer: the false positive rate over orientations. \
              Marked: nine in ten and more at every resolution, where a run warns (collision-near-everywhere)";
-        to.chart("collision_failures", [title, subject], vec![self.failures()])
+        to.chart("ccd_failures", [title, subject], vec![self.failures()])
     }
 
     fn tables(&self) -> Vec<Sheet> {
@@ -244,12 +244,12 @@ impl Study for CollisionChart {
             .data("many", |row| row.many)
             .data("missed", |row| row.missed)
             .data("pair_s", |row| row.pair_s)
-            .csv("collision.csv");
+            .csv("ccd.csv");
         vec![families.sheet(), reference.sheet(), slides.sheet(), rows.sheet()]
     }
 
     fn tradeoff(&self) -> Vec<TradeoffPoint> {
-        let both = |row: &CollisionRow| {
+        let both = |row: &CcdRow| {
             let level = if row.resolution == 0 { String::new() } else { format!("{} px", row.resolution) };
             [("two objects", row.two), ("many objects", row.many)].map(|(kind, rate)| {
                 let rate = Metric::new("false positive rate", "", rate).beside(0.0);
@@ -270,7 +270,7 @@ impl Study for CollisionChart {
     }
 }
 
-/// What shares are of.
+/// Subtitle: the pairs that shares refer to.
 fn subject([[two_hit, two], [many_hit, many]]: &[[usize; 2]; 2]) -> String {
     format!(
         "shares of pairs that do not collide: {two} of two objects (beside {two_hit} that do), {many} of many ({many_hit})"
@@ -280,7 +280,7 @@ fn subject([[two_hit, two], [many_hit, many]]: &[[usize; 2]; 2]) -> String {
 /// The share from which on a run warns.
 const NEARLY_ALWAYS: f64 = 0.9;
 
-impl CollisionChart {
+impl CcdChart {
     /// Two objects and many over resolution, and over time.
     fn panels(&self) -> Vec<ChartPanel> {
         let mut names: Vec<&str> = Vec::new();
@@ -290,17 +290,17 @@ impl CollisionChart {
                 names.push(&row.way);
             }
         }
-        let curves = |point: &dyn Fn(&CollisionRow) -> (f64, f64)| -> Vec<Series> {
+        let curves = |point: &dyn Fn(&CcdRow) -> (f64, f64)| -> Vec<Series> {
             let of = |name: &&str| {
                 let rows = in_images().filter(|row| row.way == *name);
                 Series::curve(*name, rows.map(point))
             };
             names.iter().map(of).collect()
         };
-        let panel = |title: &str, across: &str, scale, point: &dyn Fn(&CollisionRow) -> (f64, f64)| {
+        let panel = |title: &str, across: &str, scale, point: &dyn Fn(&CcdRow) -> (f64, f64)| {
             ChartPanel::new(title, [across, "false positive rate"], curves(point)).on(scale, Scale::Even)
         };
-        let pixels = |row: &CollisionRow| f64::from(row.resolution);
+        let pixels = |row: &CcdRow| f64::from(row.resolution);
         vec![
             panel("two objects", "pixels across", Scale::Doublings, &|row| (pixels(row), row.two)),
             panel("many objects", "pixels across", Scale::Doublings, &|row| (pixels(row), row.many)),
@@ -348,7 +348,7 @@ fn pairs(cases: &[Case]) -> [[usize; 2]; 2] {
 }
 
 /// All cases by one way, on a thread of its own so that its time is its own.
-fn row(way: &Way, set: Set, cases: &[Case]) -> Result<CollisionRow, StudyError> {
+fn row(way: &Way, set: Set, cases: &[Case]) -> Result<CcdRow, StudyError> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
     Ok(pool.install(|| {
         let (mut vain, mut missed, mut candidates) = ([0; 2], 0, 0);
@@ -363,7 +363,7 @@ fn row(way: &Way, set: Set, cases: &[Case]) -> Result<CollisionRow, StudyError> 
         let of = pairs(cases);
         let share = |kind: usize| f64::from(vain[kind] as u32) / of[kind][1].max(1) as f64;
         let (two, many) = (share(0), share(1));
-        CollisionRow { cases: set, way: way.name(), resolution: way.resolution(), two, many, missed, pair_s }
+        CcdRow { cases: set, way: way.name(), resolution: way.resolution(), two, many, missed, pair_s }
     }))
 }
 
@@ -388,8 +388,8 @@ fn kept(way: &Way, case: &Case, touching: &mut u32) -> Vec<(usize, usize)> {
     }
 }
 
-/// Plates that slide at each gap and resolution, by looking closer.
-fn slides(effort: &CollisionEffort, progress: &Progress) -> Vec<Slide> {
+/// Plates that slide at each gap and resolution, with refinement.
+fn slides(effort: &CcdEffort, progress: &Progress) -> Vec<Slide> {
     let bar = progress.bar("sliding plates", (effort.resolutions.len() * effort.gaps.len()) as u64);
     let each = effort.resolutions.iter().flat_map(|&resolution| {
         effort.gaps.iter().map(move |&gap| (Search { resolution, ..Search::default() }, gap))

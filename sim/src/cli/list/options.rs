@@ -1,0 +1,329 @@
+//! Options of each workload, for `quintile list WORKLOAD`.
+//!
+//! Defaults are those of the workloads themselves. Ranges are checked against what the workloads accept by the tests below.
+
+use serde::Serialize;
+use serde_json::{Map, Value};
+use workloads::{caustics, collision, glossy, multiview, occlusion, points, soft_shadows};
+
+use crate::cli::Failure;
+
+/// Options of a workload.
+pub(super) struct Options {
+    pub workload: &'static str,
+    options: &'static [Doc],
+    defaults: fn() -> Result<String, serde_json::Error>,
+}
+
+/// An option: name, range, meaning.
+struct Doc(&'static str, Range, &'static str);
+
+/// Values that an option takes.
+enum Range {
+    /// Numbers from one to another, alone or each in a list.
+    Numbers(f64, f64),
+    /// One of these names.
+    Names(&'static [&'static str]),
+    /// Others, in words.
+    Words(&'static str),
+}
+
+use Range::{Names, Numbers, Words};
+
+const SCENE: Range = Words("a built-in scene or a file");
+const SWITCH: Range = Words("true or false");
+
+/// The options of every workload, in the order of their declarations.
+pub(super) const OPTIONS: &[Options] = &[
+    Options {
+        workload: "caustics",
+        options: &[
+            Doc(
+                "cells",
+                Numbers(1.0, 1024.0),
+                "squares of two generator triangles along each side of the water",
+            ),
+            Doc("side_m", Numbers(1e-3, 1e4), "side of the water in metres"),
+            Doc("depth_m", Numbers(1e-3, 1e4), "depth of the water in metres"),
+            Doc("wave_m", Numbers(1e-3, 1e4), "longest wave in metres; the shortest is a third of it"),
+            Doc("slope", Numbers(0.0, 1.0), "root mean square slope of the waves"),
+            Doc(
+                "pleat",
+                Numbers(0.0, 0.9),
+                "offset of every other column of corners along its light, as a share of its length",
+            ),
+            Doc("method", Names(&["moving", "refined", "hull", "prism"]), "how light volumes are rasterized"),
+            Doc(
+                "look",
+                Names(&["volume", "floor"]),
+                "light in the water from the side, or on the floor from above",
+            ),
+        ],
+        defaults: || serde_json::to_string(&caustics::Options::default()),
+    },
+    Options {
+        workload: "ccd",
+        options: &[
+            Doc("file", Words("an .mts file"), "moving objects; without it, balls that move at random"),
+            Doc("balls", Numbers(2.0, 100.0), "number of balls"),
+            Doc("resolution", Numbers(1.0, 1024.0), "tiles across each image"),
+            Doc("bins", Numbers(1.0, 256.0), "time bins of a tile"),
+            Doc("method", Names(&["fragment_box", "box_box", "depth_only"]), "comparison in a tile"),
+        ],
+        defaults: || serde_json::to_string(&collision::Options::default()),
+    },
+    Options {
+        workload: "glossy",
+        options: &[
+            Doc("scene", SCENE, "the scene; without it, a test scene of the workload"),
+            Doc(
+                "centre",
+                Numbers(-1e15, 1e15),
+                "centre of the receiver, a horizontal rectangle; scene units",
+            ),
+            Doc("half", Numbers(1e-15, 1e15), "half of the sides of the receiver along x and z; scene units"),
+            Doc(
+                "index",
+                Numbers(1.0, 10.0),
+                "refraction into a medium with this index; without it, reflection",
+            ),
+            Doc(
+                "roughness",
+                Words("0 to 100 times the smaller half side"),
+                "radius of the lens in scene units; 0 is a mirror",
+            ),
+            Doc(
+                "texels",
+                Words("1 to 16384, across as well"),
+                "texels of the map from the near to the far side of the receiver",
+            ),
+            Doc("map_samples", Numbers(1.0, 256.0), "samples per texel"),
+            Doc("fresnel", Numbers(0.0, 1.0), "share of reflected light at normal incidence"),
+        ],
+        defaults: || serde_json::to_string(&glossy::Options::default()),
+    },
+    Options {
+        workload: "multiview",
+        options: &[
+            Doc("scene", SCENE, "the scene"),
+            Doc("views", Numbers(1.0, 64.0), "number of views"),
+            Doc(
+                "spacing",
+                Words("1e-35 or more; with overlap 0 twice the aperture"),
+                "distance between neighbouring views, scene units",
+            ),
+            Doc("aperture", Words("1e-35 or more"), "radius of the aperture of a view, scene units"),
+            Doc(
+                "overlap",
+                Words("0 or more"),
+                "steps of the camera line under the box filter of a view; 0 for separate round lenses",
+            ),
+            Doc(
+                "focus",
+                Words("above 0"),
+                "depth at which all views agree, scene units; without it, that of the scene's lens",
+            ),
+            Doc(
+                "show",
+                Names(&["side_by_side", "interlaced", "one"]),
+                "arrangement of the views in the image",
+            ),
+            Doc(
+                "panel",
+                Words("pitch 1 to 1e6; slant and offset -1e6 to 1e6"),
+                "lenses of a panel: subpixels under one, tangent of the slant, start of the first",
+            ),
+            Doc("view_by_view", SWITCH, "one pass for each view: the same images at another cost"),
+            Doc("check_cache", SWITCH, "draw once more with an infinite cache, and warn of misses"),
+        ],
+        defaults: || serde_json::to_string(&multiview::Options::default()),
+    },
+    Options {
+        workload: "occlusion",
+        options: &[
+            Doc("walls", Numbers(0.0, 1000.0), "number of walls"),
+            Doc("slats", Numbers(1.0, 1000.0), "slats of a wall"),
+            Doc("gaps", Numbers(0.0, 1.0), "share of a wall that is gaps between slats"),
+            Doc("objects", Numbers(0.0, 1e5), "number of boxes, most of them behind a wall"),
+            Doc(
+                "motion",
+                Numbers(0.0, 100.0),
+                "motion of a wall during the shutter in metres; it is 3 m wide",
+            ),
+            Doc("lens", Numbers(0.0, 1.0), "radius of the lens in metres"),
+            Doc("tile_px", Numbers(1.0, 256.0), "side of a tile of the first level in pixels"),
+            Doc("boxes", Numbers(1.0, 16.0), "boxes of lens and time in a tile, along u, v and t"),
+        ],
+        defaults: || serde_json::to_string(&occlusion::Options::default()),
+    },
+    Options {
+        workload: "sampling",
+        options: &[
+            Doc("radius", Numbers(0.005, 0.5), "least distance of points in the unit square"),
+            Doc("rounds", Numbers(1.0, 8.0), "rounds that are rasterized"),
+            Doc("periodic", SWITCH, "whether the domain is a torus instead of a box"),
+        ],
+        defaults: || serde_json::to_string(&points::job::Options::default()),
+    },
+    Options {
+        workload: "soft-shadows",
+        options: &[
+            Doc("scene", SCENE, "the scene; without it, a test scene of the workload"),
+            Doc(
+                "light",
+                Words("radius up to 100 times the distance to the target, fov_deg 1 to 170"),
+                "the area light: position, target, radius, near in scene units; fov_deg is the field of view of its map",
+            ),
+            Doc("map_px", Words("2 to 4096, even"), "texels of the map across and down"),
+            Doc(
+                "bias",
+                Words("0 or more"),
+                "depth behind the map at which a point is still lit, scene units",
+            ),
+            Doc(
+                "points",
+                Words("[(u, v, t), ...]"),
+                "samples of light and time; without them, a scrambled Sobol sequence",
+            ),
+            Doc("accumulate", SWITCH, "accumulation instead of one pass: the same image at another cost"),
+        ],
+        defaults: || serde_json::to_string(&soft_shadows::Options::default()),
+    },
+];
+
+/// An option as it is printed.
+#[derive(Serialize)]
+pub(super) struct Listed {
+    pub name: &'static str,
+    pub default: Value,
+    pub range: String,
+    pub meaning: &'static str,
+}
+
+impl Options {
+    /// The options with their defaults.
+    pub(super) fn listed(&self) -> Result<Vec<Listed>, Failure> {
+        let internal = |error| Failure { message: format!("{}: {error}", self.workload), code: 1 };
+        let defaults: Map<String, Value> =
+            (self.defaults)().and_then(|text| serde_json::from_str(&text)).map_err(internal)?;
+        let listed = |Doc(name, range, meaning): &Doc| Listed {
+            name,
+            default: defaults.get(*name).cloned().unwrap_or_default(),
+            range: range.text(),
+            meaning,
+        };
+        Ok(self.options.iter().map(listed).collect())
+    }
+}
+
+impl Range {
+    fn text(&self) -> String {
+        match self {
+            Numbers(low, high) => format!("{} to {}", plain(*low), plain(*high)),
+            Names(names) => names.join(", "),
+            Words(words) => (*words).to_owned(),
+        }
+    }
+}
+
+/// A number in full, or by powers of ten where it is very small or large.
+fn plain(value: f64) -> String {
+    let in_full = value == 0.0 || (1e-4..1e7).contains(&value.abs());
+    if in_full { format!("{value}") } else { format!("{value:e}") }
+}
+
+/// A default as `--set` takes it.
+pub(super) fn as_set(value: &Value) -> String {
+    match value {
+        Value::Null => "none".to_owned(),
+        Value::String(text) => text.clone(),
+        Value::Number(number) => number.as_f64().map_or_else(|| number.to_string(), plain),
+        Value::Array(values) => format!("[{}]", values.iter().map(as_set).collect::<Vec<_>>().join(", ")),
+        Value::Object(fields) => {
+            let fields = fields.iter().map(|(name, value)| format!("{name}: {}", as_set(value)));
+            format!("({})", fields.collect::<Vec<_>>().join(", "))
+        }
+        Value::Bool(value) => value.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use workloads::job::{OptionSource, Request};
+    use workloads::{Overrides, catalog};
+
+    fn accepts(workload: &str, name: &str, value: &str) -> Result<(), String> {
+        let source = OptionSource { file: None, set: vec![(name.to_owned(), value.to_owned())] };
+        let request = Request { overrides: &Overrides::default(), seed: 1 };
+        catalog::find(workload, &source, &request).unwrap().map(drop).map_err(|error| error.to_string())
+    }
+
+    /// A value of the form of the default.
+    fn like(default: &Value, number: f64) -> String {
+        match default {
+            Value::Array(values) => format!("[{}]", vec![plain(number); values.len()].join(", ")),
+            _ => plain(number),
+        }
+    }
+
+    #[test]
+    fn every_option_of_every_workload_is_listed() {
+        let workloads: Vec<&str> = OPTIONS.iter().map(|options| options.workload).collect();
+        assert_eq!(workloads, catalog::names().map(|(name, _)| name).collect::<Vec<_>>());
+        for options in OPTIONS {
+            let defaults: Map<String, Value> = serde_json::from_str(&(options.defaults)().unwrap()).unwrap();
+            let mut listed: Vec<&str> = options.options.iter().map(|Doc(name, ..)| *name).collect();
+            listed.sort_unstable();
+            let mut known: Vec<&str> = defaults.keys().map(String::as_str).collect();
+            known.sort_unstable();
+            assert_eq!(listed, known, "{}", options.workload);
+        }
+    }
+
+    #[test]
+    fn workloads_accept_the_ends_of_ranges_and_nothing_beyond() {
+        for options in OPTIONS {
+            for (Doc(name, range, _), listed) in options.options.iter().zip(options.listed().ok().unwrap()) {
+                let check = |number: f64| accepts(options.workload, name, &like(&listed.default, number));
+                if let Numbers(low, high) = *range {
+                    let beyond = 1e-3 * (high - low);
+                    for number in [low - beyond, high + beyond.max(1.0)] {
+                        assert!(check(number).is_err(), "{} {name} {number}", options.workload);
+                    }
+                    for number in [low, high] {
+                        let refused = check(number).err().filter(|error| error.contains(name));
+                        assert_eq!(refused, None, "{} {name} {number}", options.workload);
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn workloads_accept_the_names_listed_and_their_defaults() {
+        for options in OPTIONS {
+            for (Doc(name, range, _), listed) in options.options.iter().zip(options.listed().ok().unwrap()) {
+                let workload = options.workload;
+                if let Names(names) = range {
+                    names.iter().for_each(|value| assert_eq!(accepts(workload, name, value), Ok(())));
+                    let known = accepts(workload, name, "?").unwrap_err();
+                    assert!(known.ends_with(&format!("known: {}", names.join(", "))), "{known}");
+                }
+                if !listed.default.is_null() {
+                    assert_eq!(
+                        accepts(workload, name, &as_set(&listed.default)),
+                        Ok(()),
+                        "{workload} {name}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn defaults_are_written_as_they_are_set() {
+        let value = serde_json::json!({ "a": [1.0, 0.25], "b": null, "c": "moving", "d": true, "e": 1e-9 });
+        assert_eq!(as_set(&value), "(a: [1, 0.25], b: none, c: moving, d: true, e: 1e-9)");
+    }
+}
