@@ -3,7 +3,7 @@
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
-use activity::spec;
+use activity::{LEVELS, spec};
 use pipeline::PipelineSpec;
 use power_model::{EnergyTable, Platform};
 use serde::Deserialize;
@@ -171,9 +171,32 @@ impl GpuSpec {
             return Err(("memory_hz".to_owned(), message));
         }
         self.units.validate().map_err(|(field, message)| (format!("units.{field}"), message))?;
+        self.check_levels()?;
         self.pipeline
             .validate()
             .map_err(|error| (format!("pipeline.{}", error.field()), format!("`pipeline`: {error}")))
+    }
+}
+
+impl GpuSpec {
+    /// Checks that each level below the L2 has both a size and a rate.
+    fn check_levels(&self) -> Result<(), (String, String)> {
+        let levels = LEVELS.into_iter().zip(self.pipeline.memory.levels()).zip(self.units.levels());
+        for ((level, size), rate) in levels {
+            let (size_field, rate_field) =
+                (format!("pipeline.memory.{}", level.name()), format!("units.{}", level.name()));
+            let (given, missing, what) = match (size, rate) {
+                (Some(_), None) => (size_field, rate_field, "latency, queue and lines per cycle"),
+                (None, Some(_)) => (rate_field, size_field, "entries and ways"),
+                _ => continue,
+            };
+            let message = format!(
+                "`{given}` is given and `{missing}` is missing: a level below the L2 needs both; add its {what}, or leave \
+                 both out"
+            );
+            return Err((given, message));
+        }
+        Ok(())
     }
 }
 

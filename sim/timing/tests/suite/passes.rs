@@ -104,9 +104,10 @@ fn writes(pass: u32, waits: Waits, depth: u32, colour: u32) -> (Packet, Vec<Line
     let (mut packet, mut lines) = barrier(pass, waits);
     for (client, count, first) in [(Unit::Depth, depth, 0), (Unit::Colour, colour, 1 << 12)] {
         lines.extend((0..count).map(|n| {
-            let victim = if n % 2 == 0 { LineAccess::NONE } else { (1 << 16) + n };
             let kind = if n % 2 == 0 { LineKind::Write } else { LineKind::Allocate };
-            LineAccess { line: first + n, victim, client, kind }
+            let mut access = LineAccess::new(client, first + n, kind);
+            (n % 2 == 1).then(|| access.write((1 << 16) + n));
+            access
         }));
     }
     packet.counts[Event::L2Writes] = depth + colour;
