@@ -2,7 +2,7 @@
 
 use activity::{LEVELS, LineAccess, Unit};
 
-use super::memory::{Dram, NO_WAIT, Reader};
+use super::memory::{Dram, Reader};
 use super::meter::Meter;
 use super::queue::{Queue, Waits};
 use crate::Recorder;
@@ -90,7 +90,7 @@ impl Levels {
                 Unit::Dram
             }
         };
-        if let Some(reader) = reader.filter(|reader| reader.wait != NO_WAIT) {
+        if let Some(reader) = reader {
             waits.requests(reader.wait, unit, now);
         }
     }
@@ -139,10 +139,7 @@ impl Levels {
             || self.0[above + 1..].iter().any(|level| passing.access.levels[level.at].reads > 0);
         passing.reader =
             passing.reader.map(|Reader { wait, latency: rest }| Reader { wait, latency: latency + rest });
-        if !is_read_below
-            && let Some(Reader { wait, latency }) = passing.reader.take()
-            && wait != NO_WAIT
-        {
+        if !is_read_below && let Some(Reader { wait, latency }) = passing.reader.take() {
             waits.arrives(wait, now + latency);
         }
         self.push_below(above + 1, passing, [now, now + period], dram, waits);
