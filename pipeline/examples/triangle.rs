@@ -31,6 +31,8 @@ fn hardware() -> PipelineSpec {
             colour: lines,
             texture: lines,
             l2: lines,
+            llc: None,
+            edram: None,
             compression: Default::default(),
         },
         features: Features::ALL,

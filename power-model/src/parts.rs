@@ -3,7 +3,6 @@
 use std::ops::{AddAssign, Index, IndexMut};
 
 use activity::Unit;
-use serde::ser::SerializeMap;
 use serde::{Serialize, Serializer};
 
 /// A part that draws power: the events of a unit, or power that no event causes.
@@ -50,6 +49,11 @@ impl Part {
         }
     }
 
+    /// Whether it is a unit that a GPU may lack.
+    pub const fn is_optional(self) -> bool {
+        matches!(self, Self::Unit(unit) if unit.is_optional())
+    }
+
     /// Name in files, for example `sample_test` or `leakage`.
     pub const fn name(self) -> &'static str {
         match self {
@@ -94,6 +98,11 @@ impl Energy {
     pub fn iter(&self) -> impl Iterator<Item = (Part, f64)> + '_ {
         Part::ALL.into_iter().zip(self.by_part_j)
     }
+
+    /// The same without units that a GPU may lack and that used no energy.
+    pub fn reported(&self) -> impl Iterator<Item = (Part, f64)> + '_ {
+        self.iter().filter(|(part, joules)| !part.is_optional() || *joules > 0.0)
+    }
 }
 
 impl Default for Energy {
@@ -124,13 +133,9 @@ impl AddAssign<&Self> for Energy {
 }
 
 impl Serialize for Energy {
-    /// Write a map from part name to joules, in the order of [`Part::ALL`].
+    /// Write a map from part name to joules, as [`Energy::reported`].
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut map = serializer.serialize_map(Some(PARTS))?;
-        for (part, joules) in self.iter() {
-            map.serialize_entry(part.name(), &joules)?;
-        }
-        map.end()
+        serializer.collect_map(self.reported().map(|(part, joules)| (part.name(), joules)))
     }
 }
 
@@ -150,6 +155,14 @@ mod tests {
         for (at, part) in Part::ALL.into_iter().enumerate() {
             assert!(Part::ALL[..at].iter().all(|other| other.name() != part.name()), "{part:?}");
         }
+    }
+
+    #[test]
+    fn levels_that_use_no_energy_are_not_reported() {
+        let mut energy = Energy::ZERO;
+        assert_eq!(energy.reported().count(), PARTS - 2);
+        energy[Part::Unit(Unit::Edram)] = 1.0;
+        assert_eq!(energy.reported().count(), PARTS - 1);
     }
 
     #[test]

@@ -31,6 +31,28 @@ fn a_gpu_brings_its_platform_and_its_table() {
     }
 }
 
+/// Traffic is counted after each level; a GPU without levels does not mention them.
+#[test]
+fn a_gpu_with_levels_below_the_l2_counts_traffic_after_each() {
+    let [one, four] =
+        ["1", "4"].map(|threads| quintile().run("tiny", &["--gpu", "iris_pro", "--threads", threads]));
+    let (summary, plain) = (one.summary(), quintile().run("tiny", &["--gpu", "reference"]).summary());
+    let count = |event: &str| summary["counts"][event].as_u64().expect("a count");
+    assert!(count("llc_reads") > 0 && count("llc_misses") > 0);
+    assert_eq!(count("llc_writebacks"), count("edram_writes"));
+    assert_eq!(64 * count("edram_writebacks"), count("dram_write_bytes"));
+    assert!(64 * count("edram_reads") >= count("dram_read_bytes"));
+    for level in ["llc", "edram"] {
+        assert!(summary["energy_by_part_j"][level].as_f64() > Some(0.0), "{level}");
+        assert!(summary["power_by_part_w"][level].is_number() && plain["power_by_part_w"][level].is_null());
+        assert!(plain["energy_by_part_j"][level].is_null());
+    }
+    assert!(plain["counts"]["llc_reads"].is_null());
+    for key in ["truth", "counts", "frames", "energy_by_part_j"] {
+        assert_eq!(summary[key], four.summary()[key], "{key}");
+    }
+}
+
 #[test]
 fn another_platform_is_reported() {
     let discrete = quintile().run("tiny", &["--gpu", "discrete"]);
@@ -94,6 +116,7 @@ fn list_shows_the_pairs() {
             ("mobile", Some("iphone_4s"), Some("28nm")),
             ("discrete", None, None),
             ("hd_4000", Some("hd_4000"), Some("28nm")),
+            ("iris_pro", None, None),
         ]
     );
 }

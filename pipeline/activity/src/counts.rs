@@ -2,7 +2,6 @@
 
 use std::ops::{AddAssign, Index, IndexMut};
 
-use serde::ser::SerializeMap;
 use serde::{Serialize, Serializer};
 
 use crate::events::EVENTS;
@@ -23,6 +22,16 @@ impl Counts {
     /// Every event with its count, in declaration order.
     pub fn iter(&self) -> impl Iterator<Item = (Event, u64)> + '_ {
         Event::ALL.into_iter().zip(self.0.iter().copied())
+    }
+
+    /// The events of every unit that the GPU has, with their counts. Units that a GPU may lack and that did
+    /// nothing are left out.
+    pub fn reported(&self) -> impl Iterator<Item = (Event, u64)> + '_ {
+        let is_reported = |unit: Unit| !unit.is_optional() || self.uses(unit);
+        Unit::ALL
+            .into_iter()
+            .filter(move |&unit| is_reported(unit))
+            .flat_map(|unit| unit.events().map(|at| (Event::ALL[at], self.0[at])))
     }
 
     /// Whether all counts are 0.
@@ -75,13 +84,9 @@ impl AddAssign<&Self> for Counts {
 }
 
 impl Serialize for Counts {
-    /// Write a map from event name to count, in declaration order.
+    /// Write a map from event name to count, in declaration order, as [`Counts::reported`].
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut map = serializer.serialize_map(Some(Event::COUNT))?;
-        for (event, count) in self.iter() {
-            map.serialize_entry(event.name(), &count)?;
-        }
-        map.end()
+        serializer.collect_map(self.reported().map(|(event, count)| (event.name(), count)))
     }
 }
 
@@ -100,6 +105,16 @@ mod tests {
         assert_eq!(total[Event::SamplesTested], 16);
         assert_eq!(total.sample_test_efficiency(), Some(0.25));
         assert_eq!(total[Event::Draws], 0);
+    }
+
+    #[test]
+    fn units_that_a_gpu_lacks_are_not_reported() {
+        let mut counts = Counts::default();
+        let optional: usize = [Unit::Llc, Unit::Edram].iter().map(|unit| unit.events().len()).sum();
+        assert_eq!(counts.reported().count(), Event::COUNT - optional);
+        counts[Event::LlcReads] = 3;
+        assert_eq!(counts.reported().filter(|(event, _)| event.unit() == Unit::Llc).count(), 4);
+        assert!(counts.reported().is_sorted_by_key(|(event, _)| event), "in declaration order");
     }
 
     #[test]

@@ -140,6 +140,18 @@ activity! {
         L2Writes "l2_writes" "A line written back by a client."
         L2Misses "l2_misses" "A line that was not in the L2."
     }
+    Llc "llc" "The last-level cache below the L2, shared with the CPU where the GPU is part of a processor." {
+        LlcReads "llc_reads" "A line read by the L2."
+        LlcWrites "llc_writes" "A line written back by the L2."
+        LlcMisses "llc_misses" "A line that was not in the last-level cache."
+        LlcWritebacks "llc_writebacks" "A dirty line written back to the eDRAM or to memory."
+    }
+    Edram "edram" "Embedded DRAM between the caches of the chip and memory." {
+        EdramReads "edram_reads" "A line read by the level above."
+        EdramWrites "edram_writes" "A line written back by the level above."
+        EdramMisses "edram_misses" "A line that was not in the eDRAM."
+        EdramWritebacks "edram_writebacks" "A dirty line written back to memory."
+    }
     Dram "dram" "Off-chip memory." {
         DramReadBytes "dram_read_bytes" "A byte read from memory."
         DramWriteBytes "dram_write_bytes" "A byte written to memory."
@@ -153,6 +165,11 @@ impl Unit {
     /// The unit with this name in files.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|unit| unit.name() == name)
+    }
+
+    /// Whether a GPU may lack it. Results leave it out if nothing happened in it.
+    pub const fn is_optional(self) -> bool {
+        matches!(self, Self::Llc | Self::Edram)
     }
 
     /// Index range of its events in [`Event::ALL`].

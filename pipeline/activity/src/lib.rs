@@ -33,5 +33,5 @@ mod timeline;
 pub use bounded::{Bounded, OutOfBounds};
 pub use counts::Counts;
 pub use events::{Event, Unit};
-pub use packet::{LineAccess, LineKind, Packet, PacketCounts, PacketKind, Waits};
+pub use packet::{LEVELS, LevelRequests, LineAccess, LineKind, Packet, PacketCounts, PacketKind, Waits};
 pub use timeline::{Bin, Timeline};

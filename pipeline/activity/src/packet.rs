@@ -115,14 +115,46 @@ impl Packet {
 pub enum LineKind {
     /// Read; the line is in the L2.
     Hit,
+    /// Read; the line is in a level below the L2, the last one with a read.
+    Below,
     /// Read; the line is fetched from memory.
     Fetch,
     /// Written whole; replaces the line in the L2.
     Write,
     /// Written whole; the line was not in the L2.
     Allocate,
-    /// Written back to memory at the end of a frame.
+    /// Written back at the end of a frame.
     Drain,
+}
+
+/// Levels of cache between the L2 and memory, from the L2 on. A GPU may have any of them.
+pub const LEVELS: [Unit; 2] = [Unit::Llc, Unit::Edram];
+
+/// Requests that a line request of the L2 causes in a level below it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct LevelRequests {
+    /// Lines read, at most 1.
+    pub reads: u8,
+    /// Lines written back to the level.
+    pub writes: u8,
+    /// Of both: lines that were not in the level.
+    pub misses: u8,
+    /// Dirty lines that the level wrote back.
+    pub writebacks: u8,
+}
+
+impl LevelRequests {
+    /// Reads and writes.
+    pub fn lines(self) -> u32 {
+        u32::from(self.reads) + u32::from(self.writes)
+    }
+
+    /// Events of `level`, one of [`LEVELS`], in declaration order.
+    pub fn events(self, level: Unit) -> impl Iterator<Item = (Event, u32)> {
+        let counts = [self.reads, self.writes, self.misses, self.writebacks];
+        let first = EVENTS[level as usize].0;
+        counts.into_iter().zip(first..).map(|(count, at)| (Event::ALL[at], u32::from(count)))
+    }
 }
 
 /// A request for one line. The line number is the address divided by the line size.
@@ -130,8 +162,10 @@ pub enum LineKind {
 pub struct LineAccess {
     /// Line number.
     pub line: u32,
-    /// Dirty line evicted to make room, written to memory; [`LineAccess::NONE`] if there is none.
-    pub victim: u32,
+    /// Dirty lines written to memory to make room or to end a frame: first these, then [`LineAccess::NONE`].
+    pub written: [u32; Self::MAX_WRITTEN],
+    /// Requests to the levels below the L2, in the order of [`LEVELS`].
+    pub levels: [LevelRequests; LEVELS.len()],
     /// Requesting unit.
     pub client: Unit,
     /// Outcome of the request.
@@ -141,6 +175,44 @@ pub struct LineAccess {
 impl LineAccess {
     /// Stands for no line.
     pub const NONE: u32 = u32::MAX;
+    /// Largest number of lines that one request writes to memory. The L2 evicts one for the line requested; each
+    /// level below evicts one for the line it reads and one for each line written to it.
+    pub const MAX_WRITTEN: usize = 1 + LEVELS.len();
+
+    /// A request that no level below the L2 sees and that writes no line to memory.
+    pub const fn new(client: Unit, line: u32, kind: LineKind) -> Self {
+        let none = LevelRequests { reads: 0, writes: 0, misses: 0, writebacks: 0 };
+        Self { line, written: [Self::NONE; Self::MAX_WRITTEN], levels: [none; LEVELS.len()], client, kind }
+    }
+
+    /// Add a line written to memory.
+    pub fn write(&mut self, line: u32) {
+        let free = self.written.iter_mut().find(|written| **written == Self::NONE);
+        debug_assert!(free.is_some(), "a request writes at most {} lines", Self::MAX_WRITTEN);
+        if let Some(free) = free {
+            *free = line;
+        }
+    }
+
+    /// Whether a line is read.
+    pub fn is_read(&self) -> bool {
+        matches!(self.kind, LineKind::Hit | LineKind::Below | LineKind::Fetch)
+    }
+
+    /// The line read from memory.
+    pub fn fetched(&self) -> Option<u32> {
+        (self.kind == LineKind::Fetch).then_some(self.line)
+    }
+
+    /// The lines written to memory.
+    pub fn written(&self) -> impl Iterator<Item = u32> + Clone {
+        self.written.into_iter().take_while(|&line| line != Self::NONE)
+    }
+
+    /// The lines moved from or to memory.
+    pub fn moved(&self) -> impl Iterator<Item = u32> + Clone {
+        self.fetched().into_iter().chain(self.written())
+    }
 }
 
 impl AddAssign<&PacketCounts> for Counts {

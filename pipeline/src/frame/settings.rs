@@ -194,7 +194,9 @@ impl PipelineSpec {
             ("memory.texture", self.memory.texture),
             ("memory.l2", self.memory.l2),
         ];
-        for (field, cache) in caches {
+        let levels = ["memory.llc", "memory.edram"].into_iter().zip(self.memory.levels());
+        let levels = levels.filter_map(|(field, cache)| Some((field, cache?)));
+        for (field, cache) in caches.into_iter().chain(levels) {
             Cache::new(cache).map_err(|source| SpecError::Cache { field, source })?;
         }
         Ok(())

@@ -2,6 +2,7 @@
 
 mod address;
 mod cache;
+mod shared;
 mod system;
 
 pub use address::{AddressSpace, LINE_BYTES, Surface};

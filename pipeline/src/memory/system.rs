@@ -1,10 +1,11 @@
 //! Cache hierarchy between the units and the memory chips, accessed in the order of the modelled hardware;
 //! addresses and compression of the buffers.
 
-use activity::{Event, LineAccess, LineKind, PacketCounts, Unit};
+use activity::{Event, LEVELS, LineAccess, PacketCounts, Unit};
 use serde::Deserialize;
 
 use super::address::{LINE_BYTES, Surface};
+use super::shared::SharedCaches;
 use super::{Access, Cache, CacheError, CacheSpec};
 
 /// Caches of memory, with lines of 64 bytes as entries.
@@ -19,9 +20,22 @@ pub struct MemorySpec {
     pub texture: CacheSpec,
     /// L2, shared by all.
     pub l2: CacheSpec,
+    /// Last-level cache below the L2: what the GPU can use of it.
+    #[serde(default)]
+    pub llc: Option<CacheSpec>,
+    /// Embedded DRAM below the last-level cache, or below the L2 without one.
+    #[serde(default)]
+    pub edram: Option<CacheSpec>,
     /// Compression between the unit caches and the L2; off by default.
     #[serde(default)]
     pub compression: Compression,
+}
+
+impl MemorySpec {
+    /// The levels below the L2, in the order of [`LEVELS`].
+    pub fn levels(&self) -> [Option<CacheSpec>; LEVELS.len()] {
+        [self.llc, self.edram]
+    }
 }
 
 /// A unit's own cache above the L2, and its events.
@@ -39,15 +53,8 @@ pub struct MemorySystem {
     depth: Client,
     colour: Client,
     texture: Client,
-    l2: Shared,
+    l2: SharedCaches,
     compressed: CompressedLines,
-}
-
-/// The L2, and its requests since the log was last cleared.
-#[derive(Clone, Debug)]
-struct Shared {
-    cache: Cache,
-    log: Vec<LineAccess>,
 }
 
 impl MemorySystem {
@@ -63,7 +70,7 @@ impl MemorySystem {
             depth: client(spec.depth, Event::DepthLines, Event::DepthMisses)?,
             colour: client(spec.colour, Event::ColourLines, Event::ColourMisses)?,
             texture: client(spec.texture, Event::TextureLines, Event::TextureMisses)?,
-            l2: Shared { cache: Cache::new(spec.l2)?, log: Vec::new() },
+            l2: SharedCaches::new(spec)?,
             compressed: CompressedLines::default(),
         })
     }
@@ -80,12 +87,12 @@ impl MemorySystem {
 
     /// Lines requested from the L2 since the log was last cleared, in order.
     pub fn log(&self) -> &[LineAccess] {
-        &self.l2.log
+        self.l2.log()
     }
 
     /// Clear the log.
     pub fn clear_log(&mut self) {
-        self.l2.log.clear();
+        self.l2.clear_log();
     }
 
     /// Read the line at `address` by the depth unit, and write it if `write` is set. A `fresh` line holds the
@@ -106,7 +113,7 @@ impl MemorySystem {
         self.depth.cache.discard(line);
         self.colour.cache.discard(line);
         if self.compressed.is_last(line) {
-            self.l2.cache.discard(self.compressed.moved_line(line));
+            self.l2.discard(self.compressed.moved_line(line));
         }
     }
 
@@ -119,7 +126,7 @@ impl MemorySystem {
     pub fn vertices(&mut self, address: u64, bytes: u64, counts: &mut PacketCounts) {
         let first = address / LINE_BYTES;
         let last = (address + bytes.max(1) - 1) / LINE_BYTES;
-        (first..=last).for_each(|line| shared(&mut self.l2, Unit::Command, line, false, counts));
+        (first..=last).for_each(|line| self.l2.access(Unit::Command, line, false, counts));
     }
 
     /// Move written lines to the L2, as later passes read them through other caches. Texture lines are dropped.
@@ -127,7 +134,7 @@ impl MemorySystem {
         self.texture.cache.flush();
         for client in [&mut self.colour, &mut self.depth] {
             for line in client.cache.flush() {
-                shared(&mut self.l2, client.unit, self.compressed.moved_line(line), true, counts);
+                self.l2.access(client.unit, self.compressed.moved_line(line), true, counts);
             }
         }
     }
@@ -140,21 +147,17 @@ impl MemorySystem {
             for line in client.cache.flush() {
                 if is_kept(line) {
                     unit = client.unit;
-                    shared(&mut self.l2, unit, self.compressed.moved_line(line), true, counts);
+                    self.l2.access(unit, self.compressed.moved_line(line), true, counts);
                 }
             }
         }
-        let written = self.l2.cache.flush().into_iter().filter(|line| is_kept(*line));
-        for line in written {
-            counts[Event::DramWriteBytes] += LINE_BYTES as u32;
-            self.l2.log.push(access_to(unit, line, LineKind::Drain, None));
-        }
+        self.l2.drain(unit, is_kept, counts);
     }
 }
 
 fn access(
     client: &mut Client,
-    (l2, compressed): (&mut Shared, &CompressedLines),
+    (l2, compressed): (&mut SharedCaches, &CompressedLines),
     address: u64,
     write: bool,
     fresh: bool,
@@ -168,44 +171,10 @@ fn access(
     }
     counts[client.misses] += 1;
     if let Access::MissEvicting(victim) = found {
-        shared(l2, client.unit, compressed.moved_line(victim), true, counts);
+        l2.access(client.unit, compressed.moved_line(victim), true, counts);
     }
     if !fresh {
-        shared(l2, client.unit, compressed.moved_line(line), false, counts);
-    }
-}
-
-/// Access one line of the L2. A line written whole is not fetched first.
-fn shared(l2: &mut Shared, client: Unit, line: u64, write: bool, counts: &mut PacketCounts) {
-    counts[if write { Event::L2Writes } else { Event::L2Reads }] += 1;
-    let found = l2.cache.access(line, write);
-    let kind = match (found, write) {
-        (Access::Hit, false) => LineKind::Hit,
-        (Access::Hit, true) => LineKind::Write,
-        (_, false) => LineKind::Fetch,
-        (_, true) => LineKind::Allocate,
-    };
-    let victim = if let Access::MissEvicting(victim) = found { Some(victim) } else { None };
-    l2.log.push(access_to(client, line, kind, victim));
-    if found == Access::Hit {
-        return;
-    }
-    counts[Event::L2Misses] += 1;
-    if victim.is_some() {
-        counts[Event::DramWriteBytes] += LINE_BYTES as u32;
-    }
-    if !write {
-        counts[Event::DramReadBytes] += LINE_BYTES as u32;
-    }
-}
-
-/// Line numbers fit in 32 bits: an image, its vertices and its textures are far below 2^38 bytes.
-fn access_to(client: Unit, line: u64, kind: LineKind, victim: Option<u64>) -> LineAccess {
-    LineAccess {
-        line: line as u32,
-        victim: victim.map_or(LineAccess::NONE, |line| line as u32),
-        client,
-        kind,
+        l2.access(client.unit, compressed.moved_line(line), false, counts);
     }
 }
 
@@ -305,6 +274,8 @@ mod tests {
             colour: small,
             texture: small,
             l2,
+            llc: None,
+            edram: None,
             compression: Compression::default(),
         })
         .unwrap()

@@ -27,13 +27,14 @@ const FLOP_BIT: f64 = 0.009 * FROM_40;
 const REGISTER: f64 = 5.5 / 6.0;
 
 /// CACTI 7 at 28 nm: KB, port bytes, pJ per read and write, for high-performance and low-power cells.
-const CACTI: [(u32, f64, [f64; 2], [f64; 2]); 6] = [
+const CACTI: [(u32, f64, [f64; 2], [f64; 2]); 7] = [
     (1, 16.0, [1.11, 1.69], [0.67, 1.41]),
     (4, 16.0, [1.58, 4.10], [1.53, 2.70]),
     (8, 32.0, [3.99, 9.04], [2.75, 8.75]),
     (16, 32.0, [5.25, 15.48], [5.24, 9.95]),
     (32, 32.0, [9.93, 17.77], [7.29, 12.00]),
     (256, 64.0, [62.11, 93.76], [42.66, 46.92]),
+    (4096, 64.0, [328.84, 341.48], [187.10, 175.33]),
 ];
 
 /// Fraction of an access that is a write.
@@ -86,6 +87,12 @@ fn dram(device: f64) -> Interval {
     [device, 2.0 * (device + 1410.0 / 256.0), 3.0 * (device + 1410.0 / 64.0)]
 }
 
+/// The on-package link of an eDRAM, and its array as an SRAM.
+fn edram(writes: f64) -> Interval {
+    let link = [1.0, 1.11, 1.22].map(|pj| 512.0 * pj);
+    sum([link, sram(4096, 64.0, writes), wire(512.0, 8.0)])
+}
+
 fn front(event: Event) -> Option<Interval> {
     let address = IMUL + 4.0 * IADD;
     Some(match event {
@@ -136,6 +143,11 @@ fn back(event: Event) -> Option<Interval> {
         Event::L2Reads => sum([sram(256, 64.0, READ), wire(512.0, 2.0)]),
         Event::L2Writes => sum([sram(256, 64.0, WRITE), wire(512.0, 2.0)]),
         Event::L2Misses => sram(256, 64.0, WRITE),
+        Event::LlcReads => sum([sram(4096, 64.0, READ), wire(512.0, 8.0)]),
+        Event::LlcWrites => sum([sram(4096, 64.0, WRITE), wire(512.0, 8.0)]),
+        Event::LlcWritebacks => sram(4096, 64.0, READ),
+        Event::EdramReads | Event::EdramWritebacks => edram(READ),
+        Event::EdramWrites => edram(WRITE),
         Event::DramReadBytes => dram(43.0),
         Event::DramWriteBytes => dram(42.0),
         _ => return None,
@@ -176,6 +188,16 @@ fn energy_per_byte_grows_with_distance() {
             joules[Event::DramReadBytes as usize],
         ];
         assert!(per_byte.windows(2).all(|pair| 3.0 * pair[0] < pair[1]), "{per_byte:?}");
+    }
+}
+
+/// A line costs more in each level on the way to memory, so that a hit saves energy.
+#[test]
+fn energy_per_line_grows_from_level_to_level() {
+    for joules in [table().low(), table().nominal(), table().high()] {
+        let dram = 64.0 * joules[Event::DramReadBytes as usize];
+        let levels = [Event::L2Reads, Event::LlcReads, Event::EdramReads].map(|event| joules[event as usize]);
+        assert!(levels.is_sorted() && levels[2] < 0.55 * dram, "{levels:?}, {dram}");
     }
 }
 

@@ -5,6 +5,7 @@ use crate::chart::ccd::CcdChart;
 use crate::chart::frames::FramesChart;
 use crate::chart::glossy::GlossyChart;
 use crate::chart::growth::GrowthChart;
+use crate::chart::memory::MemoryChart;
 use crate::chart::multiview::MultiviewChart;
 use crate::chart::occlusion::OcclusionChart;
 use crate::chart::points::PointsChart;
@@ -17,12 +18,13 @@ use crate::stress::Report;
 use crate::study::Entry;
 
 /// The charts of the book.
-pub static CHARTS: [Entry; 13] = [
+pub static CHARTS: [Entry; 14] = [
     Entry::of::<CausticsChart>(),
     Entry::of::<CcdChart>(),
     Entry::of::<FramesChart>(),
     Entry::of::<GlossyChart>(),
     Entry::of::<GrowthChart>(),
+    Entry::of::<MemoryChart>(),
     Entry::of::<MultiviewChart>(),
     Entry::of::<OcclusionChart>(),
     Entry::of::<PointsChart>(),

@@ -3,7 +3,7 @@
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
-use activity::spec;
+use activity::{LEVELS, spec};
 use pipeline::PipelineSpec;
 use power_model::{EnergyTable, Platform};
 use serde::Deserialize;
@@ -89,11 +89,12 @@ pub enum GpuError {
 const CLOCKS_HZ: RangeInclusive<f64> = 1e6..=1e11;
 
 /// Built-in GPUs: name and RON text.
-const BUILTIN: [(&str, &str); 4] = [
+const BUILTIN: [(&str, &str); 5] = [
     ("reference", include_str!("../gpus/reference.ron")),
     ("mobile", include_str!("../gpus/mobile.ron")),
     ("discrete", include_str!("../gpus/discrete.ron")),
     ("hd_4000", include_str!("../gpus/hd_4000.ron")),
+    ("iris_pro", include_str!("../gpus/iris_pro.ron")),
 ];
 
 impl GpuSpec {
@@ -171,9 +172,32 @@ impl GpuSpec {
             return Err(("memory_hz".to_owned(), message));
         }
         self.units.validate().map_err(|(field, message)| (format!("units.{field}"), message))?;
+        self.check_levels()?;
         self.pipeline
             .validate()
             .map_err(|error| (format!("pipeline.{}", error.field()), format!("`pipeline`: {error}")))
+    }
+}
+
+impl GpuSpec {
+    /// Checks that each level below the L2 has both a size and a rate.
+    fn check_levels(&self) -> Result<(), (String, String)> {
+        let levels = LEVELS.into_iter().zip(self.pipeline.memory.levels()).zip(self.units.levels());
+        for ((level, size), rate) in levels {
+            let (size_field, rate_field) =
+                (format!("pipeline.memory.{}", level.name()), format!("units.{}", level.name()));
+            let (given, missing, what) = match (size, rate) {
+                (Some(_), None) => (size_field, rate_field, "latency, queue and lines per cycle"),
+                (None, Some(_)) => (rate_field, size_field, "entries and ways"),
+                _ => continue,
+            };
+            let message = format!(
+                "`{given}` is given and `{missing}` is missing: a level below the L2 needs both; add its {what}, or leave \
+                 both out"
+            );
+            return Err((given, message));
+        }
+        Ok(())
     }
 }
 
@@ -250,6 +274,35 @@ mod tests {
                 && text.contains("`queue`: 4294967295 is out of range; it has to be 1 to 65536"),
             "{text}"
         );
+    }
+
+    #[test]
+    fn levels_below_the_l2_are_checked() {
+        let iris = BUILTIN[4].1;
+        let spec = GpuSpec::parse(iris, "gpu.ron").unwrap();
+        assert!(spec.pipeline.memory.levels().iter().all(Option::is_some));
+        // A size without a rate, and a rate without a size.
+        let text = message(
+            &REFERENCE.replace("l2: (entries: 4096", "llc: (entries: 8, ways: 2), l2: (entries: 4096"),
+        );
+        assert!(text.starts_with("gpu.ron:20:") && text.contains("`units.llc` is missing"), "{text}");
+        let text = message(&iris.replace("edram: (entries: 2097152, ways: 16),", ""));
+        assert!(text.contains("`units.edram` is given and `pipeline.memory.edram` is missing"), "{text}");
+        // Impossible geometry, unknown keys, sizes out of range.
+        let text = message(&iris.replace("98304, ways: 12", "98304, ways: 5"));
+        assert!(
+            text.starts_with("gpu.ron:") && text.contains("`memory.llc`: a cache of 98304 entries in 5 ways"),
+            "{text}"
+        );
+        let text = message(&iris.replace("edram: (clock", "eddram: (clock"));
+        assert!(text.contains("did you mean `edram`?"), "{text}");
+        let text = message(&iris.replace("latency_cycles: 24, queue: 32", "latency_cycles: 24, queue: 0"));
+        assert!(text.contains("`queue`: 0 is out of range"), "{text}");
+        let text = message(
+            &iris
+                .replace("latency_cycles: 40, queue: 32, channels", "latency_cycles: 40, queue: 3, channels"),
+        );
+        assert!(text.contains("`queue` of `units.dram` is 3") && text.contains("at least 4"), "{text}");
     }
 
     #[test]

@@ -152,14 +152,14 @@ fn units(outcome: &Outcome) -> Vec<UnitRow> {
             note: if share.is_some() { "" } else { "not used by the scene" }.to_owned(),
         }
     };
-    Unit::ALL.into_iter().map(row).collect()
+    let is_listed = |unit: &Unit| !unit.is_optional() || busy.contains_key(unit.name());
+    Unit::ALL.into_iter().filter(is_listed).map(row).collect()
 }
 
 fn counters(outcome: &Outcome) -> Vec<CounterRow> {
     let frames = outcome.simulated.known().count().max(1) as f64;
     let pixels = outcome.plan.pixels() as f64;
-    let row = |event: Event| {
-        let total = outcome.summary.counts[event];
+    let row = |(event, total): (Event, u64)| {
         let per_frame = total as f64 / frames;
         CounterRow {
             unit: event.unit().name().to_owned(),
@@ -170,7 +170,7 @@ fn counters(outcome: &Outcome) -> Vec<CounterRow> {
             per_pixel: per_frame / pixels,
         }
     };
-    Event::ALL.into_iter().map(row).collect()
+    outcome.summary.counts.reported().map(row).collect()
 }
 
 /// Facts below the heading: scene, hardware, model, limits.

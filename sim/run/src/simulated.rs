@@ -270,7 +270,11 @@ impl Modelled {
             distinct_frames: simulated.distinct.len() - predicted,
             predicted_frames: predicted,
             units: used.into_iter().map(Unit::name).collect(),
-            units_not_modelled: unused.into_iter().map(Unit::name).collect(),
+            units_not_modelled: unused
+                .into_iter()
+                .filter(|unit| !unit.is_optional())
+                .map(Unit::name)
+                .collect(),
             timing: plan.options.timing.name(),
             limits,
         }

@@ -91,6 +91,8 @@ const TRACKS: [[&str; 2]; Unit::COUNT] = [
     ["texture starved", "texture blocked"],
     ["colour starved", "colour blocked"],
     ["l2 starved", "l2 blocked"],
+    ["llc starved", "llc blocked"],
+    ["edram starved", "edram blocked"],
     ["dram starved", "dram blocked"],
 ];
 

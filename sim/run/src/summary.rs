@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use activity::{Counts, Event, Unit};
+use activity::{Counts, Unit};
 use output::MeanSd;
 use output::report::Headline;
 use power_model::Energy;
@@ -223,9 +223,11 @@ impl Summary {
             detection: detection(measurement),
             checks: measurement.checks.clone(),
             energy_by_part_j: measurement.run.energy(),
-            power_by_part_w: power_model::Part::ALL
-                .iter()
-                .map(|part| (part.name(), by_part[part.index()]))
+            power_by_part_w: measurement
+                .run
+                .energy()
+                .reported()
+                .map(|(part, _)| (part.name(), by_part[part.index()]))
                 .collect(),
             unit_busy: unit_busy(simulated),
             stalls: stalls::shares(simulated),
@@ -355,8 +357,8 @@ pub struct FrameRow {
 
 /// Hash of counts, continued from `seed`.
 fn hash(seed: u64, counts: &Counts) -> u64 {
-    Event::ALL.iter().fold(seed, |hash: u64, &event| {
-        pipeline::random::mix(hash.rotate_left(1) ^ counts[event].wrapping_add(event as u64))
+    counts.reported().zip(0..).fold(seed, |hash: u64, ((_, count), at)| {
+        pipeline::random::mix(hash.rotate_left(1) ^ count.wrapping_add(at))
     })
 }
 

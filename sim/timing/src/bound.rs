@@ -18,7 +18,7 @@
 //!
 //! Totals accumulated from a stream of packets.
 
-use activity::{Counts, Event, LineAccess, LineKind, Packet, PacketCounts, Unit, Waits};
+use activity::{Counts, Event, LineAccess, Packet, PacketCounts, Unit, Waits};
 
 use crate::address::AddressMap;
 use crate::clock::{Clocks, Time};
@@ -357,8 +357,10 @@ struct Uncontended {
     warp_lanes: u32,
     /// Packets and warps that fit on the cores.
     capacity: [f64; 2],
-    /// Latency of a line in the L2, and the extra latency of a line from memory.
-    line: [Time; 2],
+    /// Latency of a line in the L2.
+    line: Time,
+    /// The extra latency of a line that is read from further below, with the event that counts such lines.
+    below: [(Event, Time); 3],
 }
 
 impl Uncontended {
@@ -373,15 +375,21 @@ impl Uncontended {
             + dram.activate_cycles.get()
             + dram.cas_cycles.get()
             + dram.burst_cycles.get();
+        let latency = |unit| {
+            let common = machine.common(unit);
+            clocks.period(common.clock) * Time::from(common.latency_cycles)
+        };
         Self {
             period,
             latency: std::array::from_fn(|at| period[at] * Time::from(common[at].latency_cycles)),
             operation: clocks.period(shader.clock) * Time::from(cycles),
             warp_lanes: shader.warp_lanes.get(),
             capacity: [f64::from(shader.in_flight), f64::from(shader.cores) * f64::from(shader.warps)],
-            line: [
-                clocks.period(machine.l2.clock) * Time::from(machine.l2.latency_cycles),
-                clocks.period(dram.clock) * Time::from(row),
+            line: latency(Unit::L2),
+            below: [
+                (Event::LlcReads, latency(Unit::Llc)),
+                (Event::EdramReads, latency(Unit::Edram)),
+                (Event::DramReadBytes, clocks.period(dram.clock) * Time::from(row)),
             ],
         }
     }
@@ -407,7 +415,7 @@ impl Uncontended {
             let cycles = work[station.unit() as usize] - u64::from(demand.service[*station as usize]);
             self.period[*station as usize] * cycles
         };
-        let answers = self.line[0] * (clients.clone().count() as Time).saturating_sub(1);
+        let answers = self.line * (clients.clone().count() as Time).saturating_sub(1);
         clients.map(|station| beyond(&station)).sum::<Time>() + answers
     }
 
@@ -418,9 +426,9 @@ impl Uncontended {
             self.latency[station] + self.period[station] * Time::from(demand.service[station])
         };
         let units: Time = (first..=demand.last as usize).map(at).sum();
-        let [line, fetch] = self.line;
-        let lines = if demand.lines == [0; CLIENTS.len()] { 0 } else { line };
-        units + program + lines + if counts[Event::DramReadBytes] > 0 { fetch } else { 0 }
+        let lines = if demand.lines == [0; CLIENTS.len()] { 0 } else { self.line };
+        let below = self.below.iter().filter(|(event, _)| counts[*event] > 0).map(|(_, latency)| latency);
+        units + program + lines + below.sum::<Time>()
     }
 }
 
@@ -455,13 +463,8 @@ impl Banks {
 
     /// Add the lines of a packet.
     pub fn add(&mut self, lines: &[LineAccess]) {
-        for access in lines.iter().filter(|access| access.kind != LineKind::Hit) {
-            if matches!(access.kind, LineKind::Fetch | LineKind::Drain) {
-                self.line(access, access.line);
-            }
-            if access.victim != LineAccess::NONE {
-                self.line(access, access.victim);
-            }
+        for access in lines {
+            access.moved().for_each(|line| self.line(access, line));
         }
     }
 

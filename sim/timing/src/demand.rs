@@ -225,6 +225,8 @@ impl DemandBuilder {
         Station::ALL.into_iter().for_each(|station| add(station.unit(), service(station)));
         add(Unit::Texture, texture);
         add(Unit::Shader, counts[Event::ShaderOps]);
+        add(Unit::Llc, counts[Event::LlcReads] + counts[Event::LlcWrites]);
+        add(Unit::Edram, counts[Event::EdramReads] + counts[Event::EdramWrites]);
         add(Unit::Dram, (counts[Event::DramReadBytes] + counts[Event::DramWriteBytes]) / LINE_BYTES);
         if demand.lines == [0; CLIENTS.len()] {
             return;

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 use activity::spec::suggestion;
-use activity::{Bounded, Event, Unit};
+use activity::{Bounded, Event, LEVELS, Unit};
 use serde::de::{self, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer};
 
@@ -96,17 +96,18 @@ pub struct ShaderSpec {
     pub alu_latency_cycles: Cycles,
 }
 
-/// L2, the cache shared by all clients.
+/// A cache that all clients share: the L2 or a level below it.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct L2Spec {
+pub struct SharedCacheSpec {
     /// Clock of its cycles.
     #[serde(default)]
     pub clock: Clock,
-    /// Cycles from the acceptance of a hit, or from the arrival of a line from memory, until the client has
-    /// the line; at least 1.
+    /// Cycles from the acceptance of a hit, or from the arrival of a line from below, until the client or the level
+    /// above has the line; at least 1.
     pub latency_cycles: Cycles,
-    /// Requests of each client that may wait in front of it.
+    /// Requests of each client that may wait in front of the L2, or requests of the L2 in front of a level below
+    /// it.
     pub queue: Entries,
     /// Lines it accepts per cycle.
     pub lines_per_cycle: Width,
@@ -157,7 +158,11 @@ pub struct MachineSpec {
     pub shading_cache: UnitSpec,
     pub texture: ClientSpec,
     pub colour: ClientSpec,
-    pub l2: L2Spec,
+    pub l2: SharedCacheSpec,
+    #[serde(default)]
+    pub llc: Option<SharedCacheSpec>,
+    #[serde(default)]
+    pub edram: Option<SharedCacheSpec>,
     pub dram: DramSpec,
 }
 
@@ -199,8 +204,35 @@ impl ClientSpec {
     }
 }
 
+impl SharedCacheSpec {
+    fn common(&self) -> Common<'_> {
+        Common {
+            clock: self.clock,
+            latency_cycles: self.latency_cycles.get(),
+            queue: self.queue.get(),
+            in_flight: 0,
+            lines_per_cycle: 0,
+            rates: None,
+        }
+    }
+}
+
 impl MachineSpec {
-    /// Shared properties of `unit`.
+    /// The levels below the L2, in the order of [`LEVELS`].
+    pub fn levels(&self) -> [Option<&SharedCacheSpec>; LEVELS.len()] {
+        [self.llc.as_ref(), self.edram.as_ref()]
+    }
+
+    /// Whether it has `unit`; only a level below the L2 can be missing.
+    pub fn has(&self, unit: Unit) -> bool {
+        match unit {
+            Unit::Llc => self.llc.is_some(),
+            Unit::Edram => self.edram.is_some(),
+            _ => true,
+        }
+    }
+
+    /// Shared properties of `unit`; those of the L2 for a level that is missing.
     pub fn common(&self, unit: Unit) -> Common<'_> {
         let bare = |clock, latency_cycles: Cycles, queue, in_flight| Common {
             clock,
@@ -224,15 +256,18 @@ impl MachineSpec {
             Unit::ShadingCache => self.shading_cache.common(),
             Unit::Texture => self.texture.common(),
             Unit::Colour => self.colour.common(),
-            Unit::L2 => bare(self.l2.clock, self.l2.latency_cycles, self.l2.queue.get(), 0),
+            Unit::L2 => self.l2.common(),
+            Unit::Llc => self.llc.as_ref().unwrap_or(&self.l2).common(),
+            Unit::Edram => self.edram.as_ref().unwrap_or(&self.l2).common(),
             Unit::Dram => bare(self.dram.clock, self.dram.latency_cycles, self.dram.queue.get(), 0),
         }
     }
 
-    /// Check that every rate belongs to the unit it is written for. Types check all single fields.
+    /// Check that every rate belongs to the unit it is written for, and that a channel of memory can queue all lines of
+    /// a request. Types check all single fields.
     ///
     /// # Errors
-    /// The first wrong rate: its field, such as `depth.rates`, and the message.
+    /// The first wrong value: its field, such as `depth.rates`, and the message.
     pub fn validate(&self) -> Result<(), (String, String)> {
         for unit in Unit::ALL {
             let foreign = |rates: &Rates| rates.iter().find(|(event, _)| event.unit() != unit);
@@ -241,6 +276,15 @@ impl MachineSpec {
                 let message = format!("`units.{unit}.rates` has `{event}`; it belongs in `units.{owner}`");
                 return Err((format!("{unit}.rates"), message));
             }
+        }
+        let levels = self.levels().into_iter().flatten().count() as u32;
+        let (queue, least) = (self.dram.queue.get(), 2 + levels);
+        if queue < least {
+            let message = format!(
+                "`queue` of `units.dram` is {queue}; below the L2 and {levels} more levels it has to be at least {least}, as a \
+                 request reads a line and each level may write one back"
+            );
+            return Err(("dram.queue".to_owned(), message));
         }
         Ok(())
     }

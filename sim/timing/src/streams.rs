@@ -18,11 +18,10 @@ fn packet(
     let mut packet = Packet { tile: 0, triangle, ..Packet::new(kind, 0) };
     counts.iter().for_each(|&(event, count)| packet.counts[event] = count);
     for line in &lines {
-        let reads = matches!(line.kind, LineKind::Hit | LineKind::Fetch);
-        packet.counts[if reads { Event::L2Reads } else { Event::L2Writes }] += 1;
+        packet.counts[if line.is_read() { Event::L2Reads } else { Event::L2Writes }] += 1;
         packet.counts[Event::L2Misses] += u32::from(line.kind == LineKind::Fetch);
         packet.counts[Event::DramReadBytes] += 64 * u32::from(line.kind == LineKind::Fetch);
-        packet.counts[Event::DramWriteBytes] += 64 * u32::from(line.victim != LineAccess::NONE);
+        packet.counts[Event::DramWriteBytes] += 64 * line.written().count() as u32;
     }
     (packet, lines)
 }
@@ -37,9 +36,12 @@ fn lines(
     kind: LineKind,
     victim: Option<u32>,
 ) -> Vec<LineAccess> {
-    let line = |n: u32| first + n * stride;
-    let victim = |n: u32| victim.map_or(LineAccess::NONE, |far| line(n) + far);
-    (0..count).map(|n| LineAccess { line: line(n), victim: victim(n), client, kind }).collect()
+    let line = |n: u32| {
+        let mut access = LineAccess::new(client, first + n * stride, kind);
+        victim.into_iter().for_each(|far| access.write(first + n * stride + far));
+        access
+    };
+    (0..count).map(line).collect()
 }
 
 fn vertices(triangle: u32, triangles: u32, ops: u32) -> (Packet, Vec<LineAccess>) {

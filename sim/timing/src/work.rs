@@ -5,7 +5,7 @@ use activity::Unit;
 use crate::clock::{Clocks, Time};
 use crate::spec::MachineSpec;
 
-/// Work of every unit: operations for the cores, lines for the L2 and memory, cycles for all others.
+/// Work of every unit: operations for the cores, lines for the L2, the levels below it and memory, cycles for all others.
 pub(crate) type UnitWork = [u64; Unit::COUNT];
 
 /// Speeds of the units.
@@ -20,6 +20,8 @@ impl UnitSpeeds {
         let servers = |unit: Unit| match unit {
             Unit::Shader => f64::from(machine.shader.cores) * f64::from(machine.shader.lanes),
             Unit::L2 => f64::from(machine.l2.lines_per_cycle),
+            Unit::Llc => machine.llc.as_ref().map_or(1.0, |level| level.lines_per_cycle.into()),
+            Unit::Edram => machine.edram.as_ref().map_or(1.0, |level| level.lines_per_cycle.into()),
             Unit::Dram => f64::from(machine.dram.channels) / f64::from(machine.dram.burst_cycles),
             _ => 1.0,
         };

@@ -21,6 +21,8 @@ pub fn hardware() -> PipelineSpec {
             colour: lines,
             texture: lines,
             l2: CacheSpec::lru(4096, 8),
+            llc: None,
+            edram: None,
             compression: Default::default(),
         },
         features: Features::ALL,

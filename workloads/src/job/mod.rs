@@ -209,7 +209,15 @@ pub(crate) mod testing {
             vertex_reuse: 16,
             shading: Shading::default(),
             shading_cache: CacheSpec::lru(1024, 4),
-            memory: MemorySpec { depth: lines, colour: lines, texture: lines, l2: lines, compression },
+            memory: MemorySpec {
+                depth: lines,
+                colour: lines,
+                texture: lines,
+                l2: lines,
+                llc: None,
+                edram: None,
+                compression,
+            },
             features: Features::ALL,
             depth: DepthSpec::default(),
         }

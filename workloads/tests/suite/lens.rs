@@ -96,6 +96,8 @@ fn pixels_hit(scene: &Scene) -> usize {
             colour: cache,
             texture: cache,
             l2: cache,
+            llc: None,
+            edram: None,
             compression: Default::default(),
         },
         features: Features::ALL,

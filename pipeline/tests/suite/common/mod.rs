@@ -182,6 +182,8 @@ pub fn spec(features: Features) -> PipelineSpec {
             colour: lines,
             texture: lines,
             l2: CacheSpec::lru(4096, 8),
+            llc: None,
+            edram: None,
             compression: Default::default(),
         },
         features,

@@ -5,6 +5,7 @@
 //! - [`frames`]: how well frame starts are found, by method, over rate, noise, resolution and host time.
 //! - [`glossy`]: glossy reflection and refraction against brute force and accumulation.
 //! - [`growth`]: time of the visibility engine over triangles, samples and blur.
+//! - [`memory`]: traffic and energy over the size of the levels below the L2.
 //! - [`multiview`]: stereo and multi-view in one pass against view by view and accumulation.
 //! - [`occlusion`]: what occlusion queries find, and what they cost.
 //! - [`points`]: quality of points over points a second.
@@ -20,6 +21,7 @@ pub mod ccd;
 pub mod frames;
 pub mod glossy;
 pub mod growth;
+pub mod memory;
 pub mod multiview;
 pub mod occlusion;
 pub mod points;

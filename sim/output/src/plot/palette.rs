@@ -55,6 +55,8 @@ const fn unit_colour(unit: Unit) -> Colour {
         Unit::Texture => 0x62_b994,
         Unit::Colour => 0x62_1c56,
         Unit::L2 => 0x68_9fd8,
+        Unit::Llc => 0x00_00f0,
+        Unit::Edram => 0x00_0000,
         Unit::Dram => 0x05_4aa1,
     })
 }

@@ -1,17 +1,18 @@
-//! L2 and memory of the level `packet`: runs of lines enter calendars. Memory has a calendar per bus, and the latest rows of
+//! L2, levels below it and memory of the level `packet`: runs of lines enter calendars. Memory has a calendar per bus, and the latest rows of
 //! each bank.
 
-use activity::{LineAccess, LineKind};
+use activity::{LEVELS, LevelRequests, LineAccess, LineKind, Unit};
 
 use super::Span;
 use super::calendar::{Calendar, QueueTimes, Turn};
+use super::levels::{Levels, Passed};
 use crate::address::AddressMap;
 use crate::clock::{Clocks, Time};
 use crate::demand::CLIENTS;
 use crate::spec::{DramSpec, MachineSpec};
 
-/// Cycles per slot of the L2 calendar.
-const SLOT_CYCLES: u32 = 8;
+/// Cycles per slot of the calendars of the L2 and the levels below it.
+pub(super) const SLOT_CYCLES: u32 = 8;
 
 /// Times of a group of line requests.
 #[derive(Clone, Copy, Debug)]
@@ -68,16 +69,20 @@ impl RequestPacer {
     }
 }
 
-/// The lines moved for an access: the one that memory reads or drains, and the one written back.
-fn moved(line: &LineAccess) -> (Option<u32>, Option<u32>) {
-    let fetch = matches!(line.kind, LineKind::Fetch | LineKind::Drain).then_some(line.line);
-    (fetch, (line.victim != LineAccess::NONE).then_some(line.victim))
+/// Way of a line through memory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Route {
+    /// Where it is read; `None` for writes.
+    kind: Option<LineKind>,
+    levels: [LevelRequests; LEVELS.len()],
+    groups: [Option<u32>; 1 + LineAccess::MAX_WRITTEN],
 }
 
-/// The L2 with its ports, and memory behind it.
+/// The L2 with its ports, the levels below it, and memory behind them.
 #[derive(Clone, Debug)]
 pub(super) struct Memory {
     dram: Dram,
+    levels: Levels,
     l2: Calendar,
     ports: [QueueTimes; CLIENTS.len()],
     /// Lines per cycle that the client of each port can request.
@@ -96,6 +101,7 @@ impl Memory {
         let period = clocks.period(spec.clock);
         Self {
             dram: Dram::new(&machine.dram, clocks),
+            levels: Levels::new(machine, clocks),
             l2: Calendar::new(Time::from(SLOT_CYCLES) * period, spec.lines_per_cycle.get()),
             ports: std::array::from_fn(|_| QueueTimes::new(spec.queue.get())),
             lines_per_cycle: CLIENTS.map(|unit| machine.common(unit).lines_per_cycle),
@@ -146,12 +152,12 @@ impl Memory {
         fetched
     }
 
-    /// Route of a line: whether it is read, and the memory groups of the lines it moves. Lines with equal
-    /// routes form a run.
-    fn route(&self, line: &LineAccess) -> (bool, Option<u32>, Option<u32>) {
-        let (moved, victim) = moved(line);
-        let chunk = |line: u32| self.dram.group(line);
-        (matches!(line.kind, LineKind::Hit | LineKind::Fetch), moved.map(chunk), victim.map(chunk))
+    /// Route of a line: where it is read, its requests to the levels below, and the memory groups of the lines it
+    /// moves. Lines with equal routes form a run.
+    fn route(&self, line: &LineAccess) -> Route {
+        let mut groups = [None; 1 + LineAccess::MAX_WRITTEN];
+        groups.iter_mut().zip(line.moved()).for_each(|(group, line)| *group = Some(self.dram.group(line)));
+        Route { kind: line.is_read().then_some(line.kind), levels: line.levels, groups }
     }
 
     /// Pass a run through the L2; its first line arrives at `seen`. Returns when the first and the last line
@@ -163,17 +169,24 @@ impl Memory {
         if head.kind == LineKind::Hit {
             fetched.arrived = fetched.arrived.max(last + self.latency);
         }
-        let (fetch, victim) = moved(&head);
-        for line in [fetch, victim].into_iter().flatten() {
-            let seen = Span { from: first + self.period, to: last + self.period };
+        let Passed { mut accepted, period, latency, backlog, found } =
+            self.levels.pass(&head, (count, turn), Span { from: first, to: last }, self.period);
+        if let Some(arrived) = found {
+            fetched.arrived = fetched.arrived.max(arrived + self.latency);
+        }
+        fetched.moved = fetched.moved.max(accepted.to + period);
+        for line in head.moved() {
+            let seen = Span { from: accepted.from + period, to: accepted.to + period };
             let moved = self.dram.transfer(line, count, turn, seen);
-            // The channel's queue holds `backlog`; the rest of the run waits in front of the L2.
-            last = last.max(moved.issued.saturating_sub(self.dram.backlog()));
+            // The channel's queue holds `backlog`; the rest of the run waits in front of the level above.
+            accepted.to = accepted.to.max(moved.issued.saturating_sub(self.dram.backlog()));
             fetched.moved = fetched.moved.max(moved.data);
-            if head.kind == LineKind::Fetch && line == head.line {
-                fetched.arrived = fetched.arrived.max(moved.data + self.dram.latency() + self.latency);
+            if head.fetched() == Some(line) {
+                let latency = self.dram.latency() + latency + self.latency;
+                fetched.arrived = fetched.arrived.max(moved.data + latency);
             }
         }
+        last = last.max(accepted.to.saturating_sub(backlog));
         fetched.moved = fetched.moved.max(last + self.period);
         self.end = self.end.max(last + self.period);
         (first, last)
@@ -186,18 +199,24 @@ impl Memory {
 
     /// When the last line is accepted and the last transfer is done.
     pub fn ends_at(&self) -> Time {
-        self.end.max(self.dram.ends_at())
+        self.end.max(self.levels.ends_at()).max(self.dram.ends_at())
     }
 
     /// When the last line that made room for others ends.
     pub fn yielded(&self) -> Time {
-        let buses = self.buses().map(Calendar::yielded);
-        buses.fold(self.l2.yielded(), Time::max)
+        let levels = self.levels.calendars().map(|(_, calendar)| calendar);
+        let below = self.buses().chain(levels).map(Calendar::yielded);
+        below.fold(self.l2.yielded(), Time::max)
     }
 
     /// Calendar of the L2.
     pub fn l2(&self) -> &Calendar {
         &self.l2
+    }
+
+    /// Calendars of the levels below the L2.
+    pub fn levels(&self) -> impl Iterator<Item = (Unit, &Calendar)> {
+        self.levels.calendars()
     }
 
     /// Row time of the busiest bank.

@@ -27,6 +27,7 @@
 
 mod calendar;
 mod cores;
+mod levels;
 mod memory;
 mod station;
 
@@ -259,8 +260,10 @@ impl PacketClock {
         self.passes.note(demand.pass, begin, arrive);
         self.builder.add_work(demand, counts, self.passes.work(demand.pass));
         if memory.from <= memory.to {
-            self.tally.count(Unit::L2, counts, memory.from, memory.to);
-            self.tally.count(Unit::Dram, counts, memory.from, memory.to);
+            let units = [Unit::L2, Unit::Llc, Unit::Edram, Unit::Dram];
+            for unit in units.into_iter().filter(|&unit| self.machine.has(unit)) {
+                self.tally.count(unit, counts, memory.from, memory.to);
+            }
         }
         self.tally.packet_done(counts);
         if turn == Turn::Late {
@@ -301,6 +304,9 @@ impl PacketClock {
         recorder.lasts(end_ps);
         write(&mut recorder, &clocks, Unit::Shader, cores.lanes(), 1, end_ps);
         write(&mut recorder, &clocks, Unit::L2, memory.l2(), 1, end_ps);
+        for (unit, calendar) in memory.levels() {
+            write(&mut recorder, &clocks, unit, calendar, 1, end_ps);
+        }
         for bus in memory.buses() {
             write(&mut recorder, &clocks, Unit::Dram, bus, channels, end_ps);
         }

@@ -1,7 +1,8 @@
 //! All units of a machine, cycle by cycle.
 
-use activity::{LineAccess, Unit};
+use activity::{LEVELS, LineAccess, Unit};
 
+use super::levels::Levels;
 use super::memory::{Dram, L2};
 use super::meter::Meter;
 use super::queue::{Queue, Waits};
@@ -29,6 +30,7 @@ pub(super) struct Machine<'a> {
     textures: Queue<u32>,
     texture_latency: Time,
     l2: L2,
+    levels: Levels,
     dram: Dram,
     waits: Waits,
     meter: Meter,
@@ -55,6 +57,9 @@ impl<'a> Machine<'a> {
         let mut servers = [1; Unit::COUNT];
         servers[Unit::Shader as usize] = machine.shader.cores.get() * machine.shader.lanes.get();
         servers[Unit::L2 as usize] = machine.l2.lines_per_cycle.get();
+        for (unit, spec) in LEVELS.into_iter().zip(machine.levels()) {
+            servers[unit as usize] = spec.map_or(1, |spec| spec.lines_per_cycle.get());
+        }
         servers[Unit::Dram as usize] = machine.dram.channels.get();
         let shared = SharedState {
             clocks,
@@ -82,6 +87,7 @@ impl<'a> Machine<'a> {
             texture_latency: clocks.period(machine.texture.clock)
                 * Time::from(machine.texture.latency_cycles),
             l2: L2::new(machine, &clocks),
+            levels: Levels::new(machine, &clocks),
             dram: Dram::new(machine, &clocks),
             waits: Waits::default(),
             meter: Meter::new(clocks, servers),
@@ -96,7 +102,7 @@ impl<'a> Machine<'a> {
         loop {
             let mut acted = false;
             self.shared.sources.begin_cycle();
-            for &unit in &options.order {
+            for unit in options.order.into_iter().filter(|&unit| self.spec.has(unit)) {
                 if now % periods[unit as usize] == 0 {
                     acted |= self.tick(unit, now);
                     self.visited += 1;
@@ -121,13 +127,15 @@ impl<'a> Machine<'a> {
 
     fn finish(mut self, now: Time) -> Result<Timed, Stalled> {
         let clocks = self.shared.clocks;
-        if self.shared.sources.remaining() > 0 || !self.l2.is_empty() || !self.dram.is_empty() {
+        let is_memory_empty = self.l2.is_empty() && self.levels.is_empty() && self.dram.is_empty();
+        if self.shared.sources.remaining() > 0 || !is_memory_empty {
             return Err(Stalled {
                 cycles: clocks.cycles(crate::Clock::Core, now),
                 remaining: self.shared.sources.remaining(),
             });
         }
-        let end = self.shared.end.max(self.l2.ends_at()).max(self.dram.ends_at());
+        let memory_end = self.l2.ends_at().max(self.levels.ends_at()).max(self.dram.ends_at());
+        let end = self.shared.end.max(memory_end);
         self.meter.finish(end, &mut self.shared.recorder);
         let SharedState { mut recorder, mut passes, stream, builder, .. } = self.shared;
         recorder.lasts(clocks.ps(end));
@@ -152,6 +160,7 @@ impl<'a> Machine<'a> {
             Unit::Shader => self.shader.period(),
             Unit::Texture => self.texture.period(),
             Unit::L2 => self.l2.period(),
+            Unit::Llc | Unit::Edram => self.levels.period(unit).unwrap_or(1),
             Unit::Dram => self.dram.period(),
             _ => self.stages[station_of(unit) as usize].as_ref().map_or(1, Stage::period),
         }
@@ -164,7 +173,12 @@ impl<'a> Machine<'a> {
             Unit::Shader => self.tick_shader(now),
             Unit::Texture => self.tick_texture(now),
             Unit::L2 => {
-                self.l2.tick(now, &mut self.dram, &mut self.waits, &mut self.meter, recorder, &clocks)
+                let below = (&mut self.levels, &mut self.dram);
+                self.l2.tick(now, below, &mut self.waits, &mut self.meter, recorder, &clocks)
+            }
+            Unit::Llc | Unit::Edram => {
+                let below = (&mut self.dram, &mut self.waits);
+                self.levels.tick(unit, now, below, &mut self.meter, recorder, &clocks)
             }
             Unit::Dram => self.dram.tick(now, &mut self.waits, &mut self.meter, recorder, &clocks),
             _ => self.tick_stage(station_of(unit), now),
@@ -220,6 +234,7 @@ impl<'a> Machine<'a> {
             self.shader.wakes_at(now, inputs),
             self.texture.wakes_at(now, &self.textures, &self.waits),
             self.l2.wakes_at(now),
+            self.levels.wakes_at(now),
             self.dram.wakes_at(now),
             self.shared.sources.wakes_at(now),
         ];

@@ -3,6 +3,7 @@
 
 use activity::{Event, LineAccess, LineKind, Unit};
 
+use super::levels::{Levels, Passing};
 use super::meter::Meter;
 use super::queue::{Queue, Waits};
 use crate::address::AddressMap;
@@ -56,52 +57,51 @@ impl L2 {
     pub fn tick(
         &mut self,
         now: Time,
-        dram: &mut Dram,
+        (levels, dram): (&mut Levels, &mut Dram),
         waits: &mut Waits,
         meter: &mut Meter,
         recorder: &mut Recorder,
         clocks: &Clocks,
     ) -> bool {
         let mut taken = 0;
-        let mut blocked = false;
+        let mut blocked = None;
         while taken < self.lines_per_cycle {
             let order = (0..CLIENTS.len()).map(|step| (self.next_port + step) % CLIENTS.len());
             let mut found = None;
             for port in order {
                 let Some(request) = self.ports[port].head(now) else { continue };
-                if dram.has_room(&request.access, now) {
+                let below = levels.full_below(0, &request.access, dram, now);
+                if below.is_none() {
                     found = Some((port, request));
                     break;
                 }
-                blocked = true;
+                blocked = blocked.or(below);
             }
             let Some((port, request)) = found else { break };
             self.ports[port].pop(now);
             self.next_port = (port + 1) % CLIENTS.len();
-            self.take(request, now, dram, waits);
+            self.take(request, now, levels, dram, waits);
             count(&request.access, clocks.ps(now), recorder);
             taken += 1;
             self.ends_at = now + self.period;
         }
-        let reason = if blocked { Reason::Blocked(Unit::Dram) } else { Reason::Idle };
+        let reason = blocked.map_or(Reason::Idle, Reason::Blocked);
         meter.set(Unit::L2, now, taken, reason, recorder);
         taken > 0
     }
 
-    fn take(&mut self, Request { access, wait }: Request, now: Time, dram: &mut Dram, waits: &mut Waits) {
-        let seen_at = now + self.period;
-        if access.victim != LineAccess::NONE {
-            dram.push(access.victim, None, seen_at);
-        }
-        match access.kind {
-            LineKind::Fetch => {
-                waits.fetches(wait, now);
-                return dram.push(access.line, Some(Reader { wait, latency: self.latency }), seen_at);
-            }
-            LineKind::Drain => dram.push(access.line, None, seen_at),
-            LineKind::Hit | LineKind::Write | LineKind::Allocate => {}
-        }
-        if wait != NO_WAIT {
+    fn take(
+        &mut self,
+        Request { access, wait }: Request,
+        now: Time,
+        levels: &mut Levels,
+        dram: &mut Dram,
+        waits: &mut Waits,
+    ) {
+        let is_below = matches!(access.kind, LineKind::Below | LineKind::Fetch);
+        let reader = is_below.then_some(Reader { wait, latency: self.latency });
+        levels.push_below(0, Passing { access, reader }, [now, now + self.period], dram, waits);
+        if !is_below && wait != NO_WAIT {
             waits.arrives(wait, now + self.latency);
         }
     }
@@ -132,10 +132,9 @@ fn count(access: &LineAccess, at_ps: u64, recorder: &mut Recorder) {
 
 /// L2 events of a line.
 fn l2_events(access: &LineAccess) -> [(Event, u64); 3] {
-    let reads = matches!(access.kind, LineKind::Hit | LineKind::Fetch);
     let writes = matches!(access.kind, LineKind::Write | LineKind::Allocate);
-    let misses = matches!(access.kind, LineKind::Fetch | LineKind::Allocate);
-    [(Event::L2Reads, reads), (Event::L2Writes, writes), (Event::L2Misses, misses)]
+    let misses = matches!(access.kind, LineKind::Below | LineKind::Fetch | LineKind::Allocate);
+    [(Event::L2Reads, access.is_read()), (Event::L2Writes, writes), (Event::L2Misses, misses)]
         .map(|(event, yes)| (event, u64::from(yes)))
 }
 
@@ -217,20 +216,23 @@ impl Dram {
 
     /// Whether the lines moved by `access` fit in the queues.
     pub fn has_room(&self, access: &LineAccess, now: Time) -> bool {
-        let moved = matches!(access.kind, LineKind::Fetch | LineKind::Drain).then_some(access.line);
-        let victim = (access.victim != LineAccess::NONE).then_some(access.victim);
-        let channels = [moved, victim].map(|line| line.map(|line| self.map.locate(line).channel));
-        match channels {
-            [Some(a), Some(b)] if a == b => self.channels[a].room(self.queue, now) >= 2,
-            _ => channels
-                .into_iter()
-                .flatten()
-                .all(|channel| self.channels[channel].room(self.queue, now) >= 1),
+        let channels = access.moved().map(|line| self.map.locate(line).channel);
+        channels.clone().all(|channel| {
+            let lines = channels.clone().filter(|other| *other == channel).count();
+            self.channels[channel].room(self.queue, now) >= lines
+        })
+    }
+
+    /// Add the lines moved by `access`, visible from `seen_at` on; `reader` waits for the line read.
+    pub fn push_all(&mut self, access: &LineAccess, reader: Option<Reader>, seen_at: Time) {
+        access.written().for_each(|line| self.push(line, None, seen_at));
+        if let Some(line) = access.fetched() {
+            self.push(line, reader, seen_at);
         }
     }
 
     /// Add a line, visible from `seen_at` on; `reader` as in [`Entry`].
-    pub fn push(&mut self, line: u32, reader: Option<Reader>, seen_at: Time) {
+    fn push(&mut self, line: u32, reader: Option<Reader>, seen_at: Time) {
         let address = self.map.locate(line);
         self.channels[address.channel].entries.push(Entry {
             seen_at,

@@ -59,7 +59,7 @@ impl<T: Copy> Queue<T> {
 /// Pending reads, one entry per packet or warp.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Waits {
-    /// Number of missing lines, arrival of the last one so far, and when memory was first accessed.
+    /// Number of missing lines, arrival of the last one so far, and when units below the L2 were first accessed.
     waits: Vec<Wait>,
     free: Vec<u32>,
 }
@@ -68,8 +68,12 @@ pub(super) struct Waits {
 struct Wait {
     missing: u32,
     at: Time,
-    fetched_at: Option<Time>,
+    /// When a line was first requested below the L2, by the unit in the order of [`BELOW`].
+    requested_at: [Option<Time>; BELOW.len()],
 }
+
+/// Units below the L2.
+const BELOW: [Unit; 3] = [Unit::Llc, Unit::Edram, Unit::Dram];
 
 impl Waits {
     /// Open a wait for `missing` lines.
@@ -90,9 +94,12 @@ impl Waits {
         wait.at = wait.at.max(at);
     }
 
-    /// Record that a line has to come from memory.
-    pub fn fetches(&mut self, id: u32, now: Time) {
-        self.waits[id as usize].fetched_at.get_or_insert(now);
+    /// Record that a line is requested from a unit below the L2.
+    pub fn requests(&mut self, id: u32, from: Unit, now: Time) {
+        let requested_at = BELOW.into_iter().zip(&mut self.waits[id as usize].requested_at);
+        for (_, at) in requested_at.filter(|(unit, _)| *unit == from) {
+            at.get_or_insert(now);
+        }
     }
 
     /// When all lines have arrived, if known.
@@ -101,10 +108,11 @@ impl Waits {
         (wait.missing == 0).then_some(wait.at)
     }
 
-    /// The unit that the reader waits for.
+    /// The unit that the reader waits for: the one farthest from it.
     pub fn waits_for_unit(&self, id: u32, now: Time) -> Unit {
-        let fetched = self.waits[id as usize].fetched_at.is_some_and(|at| at < now);
-        if fetched { Unit::Dram } else { Unit::L2 }
+        let requested_at = BELOW.into_iter().zip(self.waits[id as usize].requested_at);
+        let farthest = requested_at.rev().find(|(_, at)| at.is_some_and(|at| at < now));
+        farthest.map_or(Unit::L2, |(unit, _)| unit)
     }
 
     /// Close a wait.

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::ops::Range;
 
-use activity::{LineAccess, LineKind, Unit};
+use activity::{LineAccess, Unit};
 
 use super::memory::{NO_WAIT, Request};
 use super::queue::Queue;
@@ -43,10 +43,6 @@ struct Serving {
     lines: Range<usize>,
     wait: u32,
     barrier: bool,
-}
-
-fn is_read(kind: LineKind) -> bool {
-    matches!(kind, LineKind::Hit | LineKind::Fetch)
 }
 
 /// State of a stage.
@@ -130,7 +126,7 @@ impl Stage {
         }
         let Some(at) = serving.lines.next() else { return false };
         let access = env.line(at);
-        let wait = if serving.barrier || is_read(access.kind) { serving.wait } else { NO_WAIT };
+        let wait = if serving.barrier || access.is_read() { serving.wait } else { NO_WAIT };
         port.push(Request { access, wait }, now + self.period);
         self.last_requests = (now, requested + 1);
         true
@@ -202,7 +198,7 @@ impl Stage {
         input.pop(now);
         let (cycles, lines) = env.work(id);
         let barrier = env.is_barrier(id);
-        let answered = lines.clone().filter(|&at| barrier || is_read(env.line(at).kind)).count() as u32;
+        let answered = lines.clone().filter(|&at| barrier || env.line(at).is_read()).count() as u32;
         let wait = if answered > 0 { waits.open(answered) } else { NO_WAIT };
         let done_at = now + self.period * Time::from(cycles);
         self.serving = Some(Serving { id, from: now, done_at, lines, wait, barrier });

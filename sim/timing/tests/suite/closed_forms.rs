@@ -1,7 +1,8 @@
 //! Pipelines whose cycles are known exactly.
 
-use activity::{Event, LineAccess, LineKind, Packet, PacketKind, Unit};
+use activity::{Event, LEVELS, LevelRequests, LineAccess, LineKind, Packet, PacketKind, Unit};
 use proptest::prelude::*;
+use timing::{Clock, MachineSpec, SharedCacheSpec};
 
 use crate::common::{
     Packets, bound_level, clocks, packet, packet_level, plain, read, size, stepped, tile, tiles,
@@ -168,6 +169,97 @@ fn the_roofline_includes_row_time() {
     let (truth, found) = (stepped(&machine, &packets).cycles, bound_level(&machine, clocks(), &packets));
     assert!((0.9..1.1).contains(&(found.cycles as f64 / truth as f64)), "{} of {truth}", found.cycles);
     assert!(found.rows.unwrap() > 0.9);
+}
+
+/// A level below the L2 that accepts `lines` lines a cycle.
+fn level(clock: Clock, lines: u32) -> SharedCacheSpec {
+    SharedCacheSpec { clock, latency_cycles: size(20), queue: size(64), lines_per_cycle: size(lines) }
+}
+
+/// Reads of `count` lines that only the last of `levels` has, or memory if it has them not.
+fn stream_through(levels: &[Unit], count: u32, is_found: bool) -> Packets {
+    let access = |line| {
+        let mut access = read(Unit::Depth, line, if is_found { LineKind::Below } else { LineKind::Fetch });
+        for (place, level) in levels.iter().enumerate() {
+            let misses = u8::from(!is_found || place + 1 < levels.len());
+            let at = LEVELS.iter().position(|other| other == level).unwrap();
+            access.levels[at] = LevelRequests { reads: 1, misses, ..LevelRequests::default() };
+        }
+        access
+    };
+    let mut packet = tile(&[(Event::DepthReads, 1), (Event::L2Reads, count), (Event::L2Misses, count)]);
+    packet.counts[Event::DramReadBytes] = if is_found { 0 } else { 64 * count };
+    let lines: Vec<_> = (0..count).map(access).collect();
+    for (level, requests) in lines.iter().flat_map(|access| LEVELS.into_iter().zip(access.levels)) {
+        requests.events(level).for_each(|(event, count)| packet.counts[event] += count);
+    }
+    vec![(packet, lines)]
+}
+
+/// Cycles of every level of timing per line of a long stream, in the limit.
+fn cycles_per_line(machine: &MachineSpec, levels: &[Unit], is_found: bool) -> [f64; 3] {
+    let of = |count| {
+        let packets = stream_through(levels, count, is_found);
+        [
+            stepped(machine, &packets).cycles,
+            packet_level(machine, clocks(), &packets).cycles,
+            bound_level(machine, clocks(), &packets).cycles,
+        ]
+    };
+    let (short, long) = (of(1000), of(5000));
+    std::array::from_fn(|at| (long[at] - short[at]) as f64 / 4000.0)
+}
+
+#[test]
+fn a_stream_runs_at_the_rate_of_the_slowest_level_that_it_needs() {
+    let mut machine = plain();
+    (machine.depth.lines_per_cycle, machine.l2.lines_per_cycle) = (size(8), size(8));
+    machine.llc = Some(level(Clock::Core, 4));
+    machine.edram = Some(level(Clock::Memory, 1));
+    let is = |found: [f64; 3], expected: f64, by: f64| {
+        assert!(found.iter().all(|cycles| (cycles / expected - 1.0).abs() < by), "{found:?} for {expected}");
+    };
+    // Lines that the last-level cache has come four a cycle, those of the eDRAM one a cycle.
+    is(cycles_per_line(&machine, &[Unit::Llc], true), 0.25, 1e-9);
+    is(cycles_per_line(&machine, &[Unit::Llc, Unit::Edram], true), 1.0, 1e-9);
+    // Those of memory take two cycles on the bus.
+    is(cycles_per_line(&machine, &[Unit::Llc, Unit::Edram], false), 2.0, 0.01);
+    // A slow level limits memory, too.
+    machine.dram.channels = size(4);
+    is(cycles_per_line(&machine, &[Unit::Llc, Unit::Edram], false), 1.0, 0.01);
+    machine.edram = None;
+    is(cycles_per_line(&machine, &[Unit::Llc], false), 0.5, 0.01);
+}
+
+#[test]
+fn a_level_adds_its_latency_on_the_way_back_and_a_cycle_on_the_way_down() {
+    let mut machine = plain();
+    machine.llc = Some(level(Clock::Core, 1));
+    machine.edram = Some(level(Clock::Core, 1));
+    let both = [Unit::Llc, Unit::Edram];
+    let cycles = |levels: &[Unit], is_found| {
+        let packets = stream_through(levels, 1, is_found);
+        let found = [stepped(&machine, &packets), packet_level(&machine, clocks(), &packets)];
+        let [truth, other] = found.map(|timed| timed.cycles);
+        assert_eq!(truth, other);
+        truth
+    };
+    // Depth starts at 3, the L2 sees the request at 4 and the level at 5; 20 and 1 back, and 1 out.
+    assert_eq!(cycles(&both[..1], true), 5 + 20 + 1 + 1);
+    assert_eq!(cycles(&both, true), 6 + 20 + 20 + 1 + 1);
+    // Memory sees it at 7: a row opens in 4, data comes until 3 + 2 later, and 1 in the controller.
+    assert_eq!(cycles(&both, false), 7 + 4 + 3 + 2 + 1 + 20 + 20 + 1 + 1);
+}
+
+#[test]
+fn a_level_that_is_full_is_what_the_l2_waits_for() {
+    let mut machine = plain();
+    (machine.depth.lines_per_cycle, machine.l2.lines_per_cycle) = (size(8), size(8));
+    machine.llc = Some(level(Clock::Core, 1));
+    let stalls = stepped(&machine, &stream_through(&[Unit::Llc], 2000, true)).stalls.unwrap();
+    let [l2, llc] = [Unit::L2, Unit::Llc].map(|unit| stalls.of(unit));
+    assert!(llc.busy as f64 > 0.97 * llc.total() as f64, "{llc:?}");
+    assert!(l2.blocked[Unit::Llc as usize] > l2.total() / 2, "{l2:?}");
 }
 
 #[test]

@@ -3,8 +3,8 @@
 use activity::{Bounded, Event, LineAccess, LineKind, Packet, PacketKind, Unit};
 use timing::stepped::{self, StepOptions, Stream};
 use timing::{
-    ClientSpec, Clock, Clocks, DemandBuilder, DramSpec, L2Spec, MachineSpec, Rates, Recorder, ShaderSpec,
-    Timed, UnitSpec,
+    ClientSpec, Clock, Clocks, DemandBuilder, DramSpec, MachineSpec, Rates, Recorder, ShaderSpec,
+    SharedCacheSpec, Timed, UnitSpec,
 };
 
 pub fn rates(text: &str) -> Rates {
@@ -55,7 +55,14 @@ pub fn plain() -> MachineSpec {
         shading_cache: unit("{\"shading_lookups\": 1}"),
         texture: client("{\"texture_fetches\": 1}"),
         colour: client("{\"colour_writes\": 1}"),
-        l2: L2Spec { clock: Clock::Core, latency_cycles: size(1), queue: size(64), lines_per_cycle: size(1) },
+        l2: SharedCacheSpec {
+            clock: Clock::Core,
+            latency_cycles: size(1),
+            queue: size(64),
+            lines_per_cycle: size(1),
+        },
+        llc: None,
+        edram: None,
         dram: DramSpec {
             clock: Clock::Memory,
             latency_cycles: size(1),
@@ -83,7 +90,7 @@ pub fn tile(counts: &[(Event, u32)]) -> Packet {
 }
 
 pub fn read(client: Unit, line: u32, kind: LineKind) -> LineAccess {
-    LineAccess { line, victim: LineAccess::NONE, client, kind }
+    LineAccess::new(client, line, kind)
 }
 
 pub type Packets = Vec<(Packet, Vec<LineAccess>)>;

@@ -1,9 +1,9 @@
 //! Conservation: all packets that enter leave, times add up, and the order of simulation does not matter.
 
-use activity::{Counts, Event, LineAccess, LineKind, Packet, PacketKind, Unit, Waits};
+use activity::{Counts, Event, LEVELS, LevelRequests, LineAccess, LineKind, Packet, PacketKind, Unit, Waits};
 use proptest::prelude::*;
 use timing::stepped::StepOptions;
-use timing::{Clocks, MachineSpec};
+use timing::{Clock, Clocks, MachineSpec, SharedCacheSpec};
 
 use crate::common::{Packets, plain, size, stepped_as};
 
@@ -30,7 +30,9 @@ fn add_lines(packet: &mut Packet, client: Unit, lines: &[Line]) -> Vec<LineAcces
         counts[Event::L2Misses] += u32::from(miss);
         counts[Event::DramReadBytes] += 64 * u32::from(kind == LineKind::Fetch);
         counts[Event::DramWriteBytes] += 64 * u32::from(victim.is_some() || kind == LineKind::Drain);
-        LineAccess { line, victim: victim.unwrap_or(LineAccess::NONE), client, kind }
+        let mut access = LineAccess::new(client, line, kind);
+        victim.or((kind == LineKind::Drain).then_some(line)).into_iter().for_each(|line| access.write(line));
+        access
     };
     lines.iter().map(access).collect()
 }
@@ -153,8 +155,60 @@ pub fn machine() -> impl Strategy<Value = MachineSpec> {
         (m.shader.warps, m.shader.alu_latency_cycles) = (size(s.3), size(s.4));
         (m.dram.queue, m.dram.channels, m.dram.banks) = (size(d.0), size(d.1), size(d.2));
         (m.dram.burst_cycles, m.l2.lines_per_cycle) = (size(d.3), size(d.4));
+        // The same sizes decide which levels it has.
+        let level = |clock, lines| SharedCacheSpec {
+            clock,
+            latency_cycles: size(latency),
+            queue: size(port),
+            lines_per_cycle: size(lines),
+        };
+        m.llc = (d.1 > 1).then(|| level(Clock::Core, d.4));
+        m.edram = (d.2 > 2).then(|| level(Clock::Memory, 1));
+        let levels = m.levels().into_iter().flatten().count() as u32;
+        m.dram.queue = size(d.0 + levels);
         m
     })
+}
+
+/// The same packets on a machine with levels below the L2: each level has some of the lines read, and evicts some
+/// for those that it has not.
+pub fn through_levels(packets: Packets, machine: &MachineSpec) -> Packets {
+    let through = |(mut packet, lines): (Packet, Vec<LineAccess>)| {
+        let lines: Vec<_> = lines.into_iter().map(|access| through_all(access, machine)).collect();
+        for (level, requests) in lines.iter().flat_map(|access| LEVELS.into_iter().zip(access.levels)) {
+            requests.events(level).for_each(|(event, count)| packet.counts[event] += count);
+        }
+        packet.counts[Event::DramReadBytes] =
+            64 * lines.iter().filter_map(LineAccess::fetched).count() as u32;
+        packet.counts[Event::DramWriteBytes] = 64 * lines.iter().flat_map(LineAccess::written).count() as u32;
+        (packet, lines)
+    };
+    packets.into_iter().map(through).collect()
+}
+
+fn through_all(access: LineAccess, machine: &MachineSpec) -> LineAccess {
+    let mut passed = LineAccess::new(access.client, access.line, access.kind);
+    let mut written: Vec<u32> = access.written().collect();
+    for (at, _) in machine.levels().iter().enumerate().filter(|(_, spec)| spec.is_some()) {
+        let is_read = passed.kind == LineKind::Fetch;
+        let misses = |line: u32| (line >> (2 * at)).is_multiple_of(2);
+        let requested = is_read.then_some(passed.line).into_iter().chain(written.iter().copied());
+        let missed: Vec<u32> = requested.filter(|&line| misses(line)).collect();
+        let evicted: Vec<u32> =
+            missed.iter().filter(|line| !line.is_multiple_of(3)).map(|line| line ^ 1024).collect();
+        passed.levels[at] = LevelRequests {
+            reads: is_read.into(),
+            writes: written.len() as u8,
+            misses: missed.len() as u8,
+            writebacks: evicted.len() as u8,
+        };
+        if is_read && !misses(passed.line) {
+            passed.kind = LineKind::Below;
+        }
+        written = evicted;
+    }
+    written.into_iter().for_each(|line| passed.write(line));
+    passed
 }
 
 pub fn total(packets: &Packets) -> Counts {
@@ -174,6 +228,7 @@ proptest! {
 
     #[test]
     fn every_packet_leaves_and_times_add_up(packets in prop_oneof![packets(), passes()], machine in machine(), clocks in two_clocks()) {
+        let packets = through_levels(packets, &machine);
         let timed = stepped_as(&machine, clocks, &packets, &StepOptions::default());
         prop_assert_eq!(timed.timeline.total(), total(&packets));
         let stalls = timed.stalls.unwrap();
@@ -192,6 +247,7 @@ proptest! {
         clocks in two_clocks(),
         order in Just(Unit::ALL.to_vec()).prop_shuffle(),
     ) {
+        let packets = through_levels(packets, &machine);
         let plainly = stepped_as(&machine, clocks, &packets, &StepOptions { skip_idle: false, ..StepOptions::default() });
         let order = std::array::from_fn(|at| order[at]);
         for skip in [false, true] {

@@ -7,7 +7,7 @@ use timing::stepped::StepOptions;
 use crate::common::{
     Packets, bound_level, clocks, packet_level, plain, read, size, stepped, stepped_as, tile, tiles,
 };
-use crate::conservation::{machine, packets};
+use crate::conservation::{machine, packets, through_levels};
 
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
@@ -34,6 +34,7 @@ proptest! {
     /// All levels record the same events, and no unit is busy for longer than the frame.
     #[test]
     fn every_level_counts_the_same(packets in packets(), machine in machine()) {
+        let packets = through_levels(packets, &machine);
         let truth = stepped_as(&machine, clocks(), &packets, &StepOptions::default());
         for found in [packet_level(&machine, clocks(), &packets), bound_level(&machine, clocks(), &packets)] {
             prop_assert_eq!(found.timeline.total(), truth.timeline.total());

@@ -8,7 +8,7 @@ use timing::{MachineSpec, Recorder, Timed};
 use crate::common::{
     Packets, bound_level, clocks, packet_level, packet_level_into, plain, read, size, stepped, stepped_into,
 };
-use crate::conservation::{OF_BARRIERS, machine, passes, total};
+use crate::conservation::{OF_BARRIERS, machine, passes, through_levels, total};
 
 /// Cycles of a front end that works `cycles` in the command unit: one more in set-up, and three latencies.
 fn front_takes(cycles: u32) -> u64 {
@@ -104,9 +104,10 @@ fn writes(pass: u32, waits: Waits, depth: u32, colour: u32) -> (Packet, Vec<Line
     let (mut packet, mut lines) = barrier(pass, waits);
     for (client, count, first) in [(Unit::Depth, depth, 0), (Unit::Colour, colour, 1 << 12)] {
         lines.extend((0..count).map(|n| {
-            let victim = if n % 2 == 0 { LineAccess::NONE } else { (1 << 16) + n };
             let kind = if n % 2 == 0 { LineKind::Write } else { LineKind::Allocate };
-            LineAccess { line: first + n, victim, client, kind }
+            let mut access = LineAccess::new(client, first + n, kind);
+            (n % 2 == 1).then(|| access.write((1 << 16) + n));
+            access
         }));
     }
     packet.counts[Event::L2Writes] = depth + colour;
@@ -235,6 +236,7 @@ proptest! {
     /// Every level reports the passes of a frame, from its start to its end, with the same work.
     #[test]
     fn passes_add_up_to_the_frame(packets in passes(), machine in machine()) {
+        let packets = through_levels(packets, &machine);
         let all = levels(&machine, &packets);
         let busy = all.clone().map(|timed| timed.passes.iter().map(|pass| pass.busy_ps).collect::<Vec<_>>());
         prop_assert_eq!(&busy[1], &busy[0]);
@@ -255,6 +257,7 @@ proptest! {
     /// on each of its channels.
     #[test]
     fn busy_times_of_passes_add_up_to_those_of_units(packets in passes(), machine in machine()) {
+        let packets = through_levels(packets, &machine);
         let [truth, found, bound] = levels(&machine, &packets);
         let clients = [Unit::Command, Unit::Depth, Unit::Texture, Unit::Colour];
         for unit in Unit::ALL {

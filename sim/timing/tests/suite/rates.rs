@@ -129,7 +129,7 @@ fn contended(per_front: u32, per_tile: u32, gpu: &Gpu) -> Packets {
         let is_front = packet.kind == PacketKind::Vertices;
         let (client, count) = if is_front { (Unit::Command, per_front) } else { (Unit::Colour, per_tile) };
         next += count;
-        let read = |line| LineAccess { line, victim: LineAccess::NONE, client, kind: LineKind::Fetch };
+        let read = |line| LineAccess::new(client, line, LineKind::Fetch);
         let counts = [(Event::L2Reads, count), (Event::L2Misses, count), (Event::DramReadBytes, 64 * count)];
         counts.into_iter().for_each(|(event, count)| packet.counts[event] = count);
         (packet, (next - count..next).map(read).collect())

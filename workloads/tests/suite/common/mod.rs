@@ -162,6 +162,8 @@ pub fn spec() -> PipelineSpec {
             colour: lines,
             texture: lines,
             l2: pipeline::CacheSpec::lru(4096, 16),
+            llc: None,
+            edram: None,
             compression: Default::default(),
         },
         features: pipeline::Features::ALL,

@@ -1,0 +1,265 @@
+//! `quintile chart memory`: traffic to memory and energy of a frame over the size of the levels below the L2.
+
+use activity::{Event, Unit};
+use output::OutputError;
+use output::plot::{AxisSpec, ChartPanel, Mark, Paint, Scale, Series};
+use output::progress::Progress;
+use pipeline::CacheSpec;
+use power_model::Part;
+use rayon::prelude::*;
+use run::{GpuSpec, Plan, RunError, RunFrame, RunOptions, frames_of};
+use serde::Serialize;
+use workloads::Overrides;
+
+use crate::study::table::{Sheet, Table, fixed, plain, share};
+use crate::study::{Gallery, Study, StudyError};
+
+/// What is drawn: a scene of one pass, and a workload whose passes read what earlier ones wrote.
+const WORK: [&str; 2] = ["default", "soft-shadows"];
+/// The GPU with both levels, and the platform nearest to it.
+const MACHINE: [&str; 2] = ["iris_pro", "hd_4000"];
+/// The level that is swept, and its sizes in megabytes; 0 leaves it out. The LLC is alone, the eDRAM is below the
+/// LLC of the GPU.
+const SWEEPS: [(Unit, &[f64]); 2] =
+    [(Unit::Llc, &[0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0]), (Unit::Edram, &[0.0, 8.0, 16.0, 32.0, 64.0, 128.0])];
+const BYTES_PER_MB: f64 = 1_048_576.0;
+/// Saving of energy below which a larger level does not pay, as a share.
+const LEAST_SAVING: f64 = 0.01;
+
+/// How much is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct MemoryEffort {
+    /// Width and height of the image in pixels.
+    pub size: (u32, u32),
+    /// Samples in a pixel.
+    pub samples: u32,
+}
+
+/// One frame with one size of a level.
+#[derive(Clone, Debug, Serialize)]
+pub struct MemoryRow {
+    /// The scene or workload.
+    pub work: &'static str,
+    /// The level whose size changes.
+    pub level: &'static str,
+    /// Its size in megabytes of 1,048,576 bytes.
+    pub size_mb: f64,
+    /// Bytes read from and written to memory.
+    pub dram_bytes: u64,
+    /// Reads and writes of the level that hit, as a share.
+    pub hit_share: Option<f64>,
+    /// Energy of the events of the L2, the levels below and memory, in joules.
+    pub memory_j: f64,
+    /// Energy of the frame in joules.
+    pub frame_j: f64,
+    /// Length of the frame in seconds.
+    pub frame_s: f64,
+}
+
+/// The whole chart.
+#[derive(Clone, Debug, Serialize)]
+pub struct MemoryChart {
+    /// How much was drawn.
+    pub effort: MemoryEffort,
+    /// A row for each work, level and size.
+    pub rows: Vec<MemoryRow>,
+}
+
+impl Study for MemoryChart {
+    const NAME: &'static str = "memory";
+    const ABOUT: &'static str =
+        "Traffic to memory and energy over the size of a last-level cache and an eDRAM";
+    const PICTURES: &'static [&'static str] = &["memory"];
+    const FILES: &'static [&'static str] = &["memory.csv", "memory.json"];
+
+    type Effort = MemoryEffort;
+    const FULL: MemoryEffort = MemoryEffort { size: (1280, 720), samples: 8 };
+    const QUICK: MemoryEffort = MemoryEffort { size: (320, 180), samples: 4 };
+
+    fn measure(effort: MemoryEffort, _: &[String], progress: &Progress) -> Result<Self, StudyError> {
+        let sizes = |(level, sizes): (Unit, &'static [f64])| sizes.iter().map(move |&size| (level, size));
+        let cases: Vec<_> = WORK
+            .iter()
+            .flat_map(|&work| SWEEPS.into_iter().flat_map(sizes).map(move |case| (work, case)))
+            .collect();
+        let bar = progress.bar("sizes", cases.len() as u64);
+        let row = |&(work, (level, size_mb)): &(&'static str, (Unit, f64))| {
+            let row = measure(work, level, size_mb, effort);
+            bar.inc();
+            row
+        };
+        Ok(Self { effort, rows: cases.par_iter().map(row).collect::<Result<_, RunError>>()? })
+    }
+
+    fn draw(&self, to: &Gallery<'_>) -> Result<(), OutputError> {
+        let panels = vec![
+            self.panel("bytes to and from memory", "B", |row| row.dram_bytes as f64),
+            self.panel("energy of the frame", "J", |row| row.frame_j),
+        ];
+        let subject = "a frame on the GPU iris_pro and the platform hd_4000; eDRAM below an LLC of 6 MB, LLC without an eDRAM";
+        to.chart("memory", ["Where a level below the L2 stops paying", subject], panels)
+    }
+
+    fn tables(&self) -> Vec<Sheet> {
+        let pays = self.sweeps().map(|rows| {
+            let (MemoryRow { work, level, .. }, best) = (&rows[0], pays_up_to(rows));
+            format!("\n{level} for {work}: the energy of a frame stops falling at {best} MB")
+        });
+        let rows = Table::of(&self.rows)
+            .column("work", "work", |row| row.work, plain)
+            .column("level", "level", |row| row.level, plain)
+            .column("size_mb", "MB", |row| row.size_mb, plain)
+            .column(
+                "dram_bytes",
+                "memory (MB)",
+                |row| row.dram_bytes,
+                |bytes| fixed(2)(bytes as f64 / BYTES_PER_MB),
+            )
+            .column("hit_share", "hits", |row| row.hit_share, |hits| hits.map_or("-".to_owned(), share(1)))
+            .column("memory_j", "memory (mJ)", |row| row.memory_j, millijoules)
+            .column("frame_j", "frame (mJ)", |row| row.frame_j, millijoules)
+            .column("frame_s", "frame (ms)", |row| row.frame_s, |seconds| fixed(2)(1e3 * seconds))
+            .after(pays.collect::<String>() + "\n")
+            .csv("memory.csv");
+        vec![rows.sheet()]
+    }
+}
+
+fn millijoules(joules: f64) -> String {
+    format!("{:.2}", 1e3 * joules)
+}
+
+fn measure(
+    work: &'static str,
+    level: Unit,
+    size_mb: f64,
+    effort: MemoryEffort,
+) -> Result<MemoryRow, RunError> {
+    let overrides = Overrides {
+        size: Some(effort.size),
+        samples: Some(effort.samples),
+        frames: Some(0..1),
+        ..Overrides::default()
+    };
+    let [gpu, platform] = MACHINE.map(Into::into);
+    let options =
+        RunOptions { scene: work.into(), gpu, platform: Some(platform), overrides, ..RunOptions::default() };
+    let mut plan = Plan::resolve(options)?;
+    resize(&mut plan.gpu, level, size_mb);
+    let frames = frames_of(&plan, &[0], &Progress::new(true))?;
+    Ok(row(work, level, size_mb, &frames[0], plan.gpu.core_hz))
+}
+
+/// Change the size of `level`, with its ways; without a size it is left out, and so is a level below the LLC.
+fn resize(gpu: &mut GpuSpec, level: Unit, size_mb: f64) {
+    let (memory, units) = (&mut gpu.pipeline.memory, &mut gpu.units);
+    let of = |spec: CacheSpec| {
+        let entries = (size_mb * BYTES_PER_MB / f64::from(timing::LINE_BYTES)) as u32;
+        CacheSpec { entries: entries - entries % spec.ways, ..spec }
+    };
+    if level == Unit::Llc {
+        (memory.edram, units.edram) = (None, None);
+    }
+    let (size, rate) = match level {
+        Unit::Llc => (&mut memory.llc, &mut units.llc),
+        _ => (&mut memory.edram, &mut units.edram),
+    };
+    *size = size.filter(|_| size_mb > 0.0).map(of);
+    if size.is_none() {
+        *rate = None;
+    }
+}
+
+fn row(work: &'static str, level: Unit, size_mb: f64, frame: &RunFrame, core_hz: f64) -> MemoryRow {
+    let (cost, energy) = (frame.cost(), frame.power.energy());
+    let counts = frame.observed().map(|observed| observed.counts).unwrap_or_default();
+    let [accesses, misses] = match level {
+        Unit::Llc => [counts[Event::LlcReads] + counts[Event::LlcWrites], counts[Event::LlcMisses]],
+        _ => [counts[Event::EdramReads] + counts[Event::EdramWrites], counts[Event::EdramMisses]],
+    };
+    let memory = [Unit::L2, Unit::Llc, Unit::Edram, Unit::Dram];
+    MemoryRow {
+        work,
+        level: level.name(),
+        size_mb,
+        dram_bytes: counts[Event::DramReadBytes] + counts[Event::DramWriteBytes],
+        hit_share: (accesses > 0).then(|| 1.0 - misses as f64 / accesses as f64),
+        memory_j: memory.into_iter().map(|unit| energy[Part::Unit(unit)]).sum(),
+        frame_j: cost.energy_j,
+        frame_s: cost.cycles / core_hz,
+    }
+}
+
+/// The smallest size from which no larger one saves more than [`LEAST_SAVING`] of the energy of a frame.
+fn pays_up_to(rows: &[MemoryRow]) -> f64 {
+    let least = |rows: &[MemoryRow]| rows.iter().map(|row| row.frame_j).fold(f64::INFINITY, f64::min);
+    let pays = |at: usize| least(&rows[at..]) > (1.0 - LEAST_SAVING) * rows[at].frame_j;
+    (0..rows.len()).find(|&at| pays(at)).map_or(0.0, |at| rows[at].size_mb)
+}
+
+impl MemoryChart {
+    /// The rows of each work and level, by size.
+    fn sweeps(&self) -> impl Iterator<Item = &[MemoryRow]> {
+        self.rows.chunk_by(|a, b| (a.work, a.level) == (b.work, b.level))
+    }
+
+    fn panel(&self, name: &str, unit: &str, of: fn(&MemoryRow) -> f64) -> ChartPanel {
+        let series = self.sweeps().enumerate().map(|(number, rows)| {
+            let points = rows.iter().map(|row| (row.size_mb * BYTES_PER_MB, of(row))).collect();
+            let label = format!("{} ({})", rows[0].level, rows[0].work);
+            Series::new(&label, Mark::Curve(points)).painted(Paint::Like(number))
+        });
+        let across = AxisSpec {
+            name: "size of the level".to_owned(),
+            unit: "B".to_owned(),
+            scale: Scale::Doublings,
+            zero: "none".to_owned(),
+        };
+        let up = AxisSpec {
+            name: name.to_owned(),
+            unit: unit.to_owned(),
+            scale: Scale::FromZero,
+            ..AxisSpec::default()
+        };
+        ChartPanel::over("", [across, up], series.collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::study::written;
+
+    #[test]
+    fn a_larger_level_moves_fewer_bytes_and_saves_until_it_holds_all() {
+        let (folder, chart, _) = written::<MemoryChart>(MemoryEffort { size: (160, 90), samples: 4 });
+        let csv = std::fs::read_to_string(folder.path().join("memory.csv")).unwrap();
+        assert_eq!(csv.lines().count(), 1 + chart.rows.len());
+        for rows in chart.sweeps() {
+            assert!(rows.windows(2).all(|pair| pair[1].dram_bytes <= pair[0].dram_bytes), "{rows:?}");
+            let last = rows.last().unwrap();
+            assert!(last.hit_share.unwrap() > 0.0 && rows[0].hit_share.is_none());
+            assert!(last.memory_j <= rows[0].memory_j || last.dram_bytes == rows[0].dram_bytes, "{rows:?}");
+        }
+    }
+
+    #[test]
+    fn a_size_pays_while_a_larger_one_saves_a_percent() {
+        let rows = |energies: &[f64]| -> Vec<MemoryRow> {
+            let row = |(size_mb, frame_j)| MemoryRow {
+                work: "",
+                level: "",
+                size_mb,
+                dram_bytes: 0,
+                hit_share: None,
+                memory_j: 0.0,
+                frame_j,
+                frame_s: 0.0,
+            };
+            [0.0, 1.0, 2.0, 4.0].into_iter().zip(energies.iter().copied()).map(row).collect()
+        };
+        assert_eq!(pays_up_to(&rows(&[10.0, 8.0, 7.0, 6.95])), 2.0);
+        assert_eq!(pays_up_to(&rows(&[10.0, 10.1, 10.2, 10.3])), 0.0);
+        assert_eq!(pays_up_to(&rows(&[10.0, 9.99, 9.98, 5.0])), 4.0);
+    }
+}
