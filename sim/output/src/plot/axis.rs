@@ -83,13 +83,38 @@ pub(super) struct Axis {
 pub(super) struct Extent {
     pub low: f64,
     pub high: f64,
-    zero: bool,
+    /// Share of the axis that the row of zero has; 0 without a row.
+    zero_row: f64,
+}
+
+/// Markers on an axis: how far their outlines reach from their points, and the length of the axis, in pixels.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct MarkerRoom {
+    /// 0 without markers.
+    pub reach: f64,
+    pub length: f64,
+}
+
+impl MarkerRoom {
+    /// Share of a range that is added at either end, so that markers stay within the panel. `length` is the share of the
+    /// axis that shows the range.
+    fn share(self, length: f64) -> f64 {
+        if self.reach == 0.0 {
+            return 0.0;
+        }
+        self.reach / (length * self.length - 2.0 * self.reach).max(self.reach)
+    }
+
+    /// Share of the axis for the row of zero: a marker is in its middle.
+    fn zero_row(self) -> f64 {
+        (2.0 * self.reach / self.length).clamp(ZERO_ROW, 0.5)
+    }
 }
 
 /// Size of the labels of ticks in pixels.
 pub(super) const TICK_PX: f64 = 12.0;
-/// Share of a logarithmic axis reserved for zero.
-pub(super) const ZERO_ROW: f64 = 0.13;
+/// Least share of a logarithmic axis reserved for zero.
+const ZERO_ROW: f64 = 0.13;
 
 /// Whether an axis can be drawn from `low` to `high`: both are finite, and so is their sum.
 pub(super) fn is_drawable(low: f64, high: f64) -> bool {
@@ -97,18 +122,18 @@ pub(super) fn is_drawable(low: f64, high: f64) -> bool {
 }
 
 impl AxisSpec {
-    /// Range of the drawable `values`; `None` without any. At either end `pad` of the range is added, or `markers` if that
-    /// is more: the share that markers reach over. It is 0 without markers; an axis from zero then begins at zero.
+    /// Range of the drawable `values`; `None` without any. At either end `pad` of the range is added, or what `markers` need
+    /// if that is more. An axis from zero begins at zero without markers.
     pub(super) fn extent(
         &self,
         values: impl IntoIterator<Item = f64>,
         pad: f64,
-        markers: f64,
+        markers: MarkerRoom,
     ) -> Option<Extent> {
         if let Scale::Listed(names) = &self.scale {
             let last = names.len() as f64 - 1.0;
-            let room = (markers * last).max(0.4);
-            return Some(Extent { low: -room, high: last + room, zero: false });
+            let room = (markers.share(1.0) * last).max(0.4);
+            return Some(Extent { low: -room, high: last + room, zero_row: 0.0 });
         }
         let (mut low, mut high, mut zero) = (f64::INFINITY, f64::NEG_INFINITY, false);
         for value in values {
@@ -128,21 +153,23 @@ impl AxisSpec {
             Scale::Even => (0.0..0.6 * high).contains(&low),
             _ => false,
         };
-        let least = if markers > 0.0 { markers.max(0.5 * pad) } else { 0.0 };
-        let pad = pad.max(markers);
+        let zero_row = if zero { markers.zero_row() } else { 0.0 };
+        let share = markers.share(1.0 - zero_row);
+        let least = if share > 0.0 { share.max(0.5 * pad) } else { 0.0 };
+        let pad = pad.max(share);
         if from_zero {
-            return Some(Extent { low: (low - least * high).min(0.0), high: high * (1.0 + pad), zero });
+            return Some(Extent { low: (low - least * high).min(0.0), high: high * (1.0 + pad), zero_row });
         }
         let room = match self.scale.is_logarithmic() {
             true => pad.max(0.01) * (high - low).max(1.0),
             false => pad * (high - low).max(1e-3 * high.abs().max(low.abs())),
         };
-        Some(Extent { low: low - room, high: high + room, zero })
+        Some(Extent { low: low - room, high: high + room, zero_row })
     }
 
     /// The axis over `extent` on `length` pixels.
     pub(super) fn axis(&self, extent: Extent, (way, length): (Way, f64)) -> Axis {
-        let Extent { low, high, zero } = extent;
+        let Extent { low, high, zero_row } = extent;
         match &self.scale {
             Scale::Even | Scale::FromZero => {
                 return Axis::new(&self.name, &self.unit, (low, high), (way, length));
@@ -179,8 +206,8 @@ impl AxisSpec {
             label: self.label(),
             broken_at: None,
         };
-        if zero {
-            let row = (ZERO_ROW / (1.0 - ZERO_ROW) * (high - low)).max(0.02);
+        if zero_row > 0.0 {
+            let row = (zero_row / (1.0 - zero_row) * (high - low)).max(0.02);
             axis.low = low - row;
             axis.broken_at = Some(low);
             let label = if self.zero.is_empty() { "0".to_owned() } else { self.zero.clone() };
@@ -414,6 +441,7 @@ mod tests {
     use super::*;
 
     const ACROSS: (Way, f64) = (Way::Across, 800.0);
+    const MARKERS: MarkerRoom = MarkerRoom { reach: 5.0, length: 800.0 };
 
     fn labels(axis: &Axis) -> Vec<&str> {
         axis.ticks.iter().map(|tick| tick.label.as_str()).filter(|label| !label.is_empty()).collect()
@@ -421,7 +449,7 @@ mod tests {
 
     fn logarithmic(values: &[f64], along: (Way, f64)) -> Axis {
         let spec = AxisSpec::default();
-        spec.axis(spec.extent(values.iter().copied(), 0.04, 0.02).unwrap(), along)
+        spec.axis(spec.extent(values.iter().copied(), 0.04, MARKERS).unwrap(), along)
     }
 
     #[test]
@@ -472,19 +500,19 @@ mod tests {
             }
         }
         let spec = AxisSpec { scale: Scale::Doublings, ..AxisSpec::default() };
-        let axis = spec.axis(spec.extent([4.0, 16_384.0], 0.04, 0.02).unwrap(), (Way::Across, 324.0));
+        let axis = spec.axis(spec.extent([4.0, 16_384.0], 0.04, MARKERS).unwrap(), (Way::Across, 324.0));
         assert_eq!(labels(&axis), ["4", "16", "64", "256", "1024", "4096", "16384"]);
     }
 
     #[test]
     fn zero_has_a_row_of_its_own_below() {
         let spec = AxisSpec { zero: "exact".to_owned(), ..AxisSpec::default() };
-        let axis = spec.axis(spec.extent([0.0, 1.0, 100.0], 0.04, 0.02).unwrap(), (Way::Up, 372.0));
+        let axis = spec.axis(spec.extent([0.0, 1.0, 100.0], 0.04, MARKERS).unwrap(), (Way::Up, 372.0));
         assert_eq!(axis.ticks[0].label, "exact");
         let broken = axis.fraction_at(axis.broken_at.unwrap());
         let [zero, one] = [0.0, 1.0].map(|value| axis.place(value).unwrap());
         assert!(0.0 < zero && zero < broken && broken < one && axis.place(-1.0).is_none());
-        assert!(spec.extent([0.0], 0.04, 0.02).is_none(), "no decade to be seen");
+        assert!(spec.extent([0.0], 0.04, MARKERS).is_none(), "no decade to be seen");
         assert!(logarithmic(&[1.0, 100.0], ACROSS).place(0.0).is_none());
     }
 
@@ -496,7 +524,7 @@ mod tests {
                 if values[0] == 0.0 && scale == Scale::Decades {
                     continue;
                 }
-                let axis = spec.axis(spec.extent(values, 0.04, 0.02).unwrap(), ACROSS);
+                let axis = spec.axis(spec.extent(values, 0.04, MARKERS).unwrap(), ACROSS);
                 let [low, high] = values.map(|value| axis.place(value).unwrap());
                 assert!(low > 0.01 && high < 0.99, "{values:?} {axis:?}");
             }
@@ -506,7 +534,9 @@ mod tests {
     #[test]
     fn shares_start_at_zero_and_what_is_far_off_does_not() {
         let extent = |scale, values: [f64; 2]| {
-            AxisSpec { scale, ..AxisSpec::default() }.extent(values, 0.06, 0.0).unwrap()
+            AxisSpec { scale, ..AxisSpec::default() }
+                .extent(values, 0.06, MarkerRoom { reach: 0.0, ..MARKERS })
+                .unwrap()
         };
         assert_eq!(extent(Scale::Even, [0.2, 1.0]).low, 0.0);
         assert!(extent(Scale::Even, [95.0, 100.0]).low > 90.0);

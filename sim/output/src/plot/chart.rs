@@ -1,6 +1,6 @@
 //! Series over axes, in one panel or several.
 
-use super::axis::{Extent, Way, ZERO_ROW};
+use super::axis::{Extent, MarkerRoom, Way};
 use super::cell::{Cell, RIGHT, SMALL_GAP, draw_row};
 use super::chart_panel::ChartPanel;
 use super::legend::{Key, LEGEND_PX, legend_lines};
@@ -68,9 +68,12 @@ impl<'a> Chart<'a> {
     /// The panels with their positions; `across` are in a row.
     fn cells(&self, picture: &Picture, across: usize, legends: bool) -> Vec<Cell<'_>> {
         let room = picture.width() - 2.0 * picture.margin();
-        let extents = self.extents(room / across as f64);
+        let mut extents = self.extents(room / across as f64);
         let aside = self.small_aside(&extents);
         let width = (room - aside) / across as f64;
+        if aside > 0.0 {
+            extents = self.extents(width);
+        }
         let cell = |(place, panel)| Cell {
             panel,
             left: picture.margin() + aside + width * (place % across) as f64,
@@ -143,7 +146,9 @@ impl<'a> Chart<'a> {
             let reach = shared.iter().map(reach).fold(0.0, f64::max);
             let pad = [if reach > 0.0 { 0.035 } else { 0.0 }, 0.06][axis];
             let values = shared.iter().flat_map(|&other| values[other][axis].iter().copied());
-            own.axes[axis].extent(values, pad, share_of_markers(reach, length))
+            // A pixel between marker and frame.
+            let reach = if reach > 0.0 { reach + 1.0 } else { 0.0 };
+            own.axes[axis].extent(values, pad, MarkerRoom { reach, length })
         };
         let both = |place: usize| {
             let own = &self.panels[place];
@@ -175,16 +180,6 @@ impl<'a> Chart<'a> {
         }
         Some(longest.named().map(|(key, series)| (key, series.name.clone())).collect())
     }
-}
-
-/// Share of a range that is added at either end of an axis of `length` pixels, so that markers that reach over `reach` pixels
-/// stay within the panel, also beside a row for zero.
-fn share_of_markers(reach: f64, length: f64) -> f64 {
-    if reach == 0.0 {
-        return 0.0;
-    }
-    let reach = reach + 1.0;
-    reach / ((1.0 - ZERO_ROW) * length - 2.0 * reach).max(reach)
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@ mod energy;
 mod frames;
 mod input;
 mod pareto;
+mod picture_file;
 mod pipes;
 mod plot;
 mod sample;

@@ -12,8 +12,8 @@ use traces::io::atomic::write_file;
 use traces::pareto::{ParetoError, Point, RatedPoint, SettingColumns, frontiers, write_csv};
 use traces::table::{Table as Columns, TableReadError};
 
+use super::picture_file::{PlotFormat, write};
 use super::pipes::shown;
-use super::plot::{PlotFormat, write};
 use super::report;
 use crate::cli::Failure;
 use crate::cli::args::LookArgs;

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use tempfile::TempDir;
 
-use super::plot::PlotFormat;
+use super::picture_file::PlotFormat;
 use super::wrong;
 use crate::cli::Failure;
 use crate::cli::trace::{TraceArgs, TraceCommand};

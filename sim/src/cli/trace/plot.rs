@@ -13,6 +13,7 @@ use traces::io::{ReadError, ReadOptions};
 use traces::pyramid::{Column, Pyramid, moving_means_w, pyramid_path};
 use traces::trace::check_span;
 
+use super::picture_file::{PlotFormat, write};
 use super::pipes::shown as name_of;
 use super::report;
 use super::wrong;
@@ -73,26 +74,6 @@ pub struct PlotArgs {
     pub look: LookArgs,
 }
 
-/// Formats of plots.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-#[allow(missing_docs, reason = "the names of the formats")]
-pub enum PlotFormat {
-    Svg,
-    Png,
-    Pdf,
-}
-
-impl PlotFormat {
-    /// The ending of files of this format, and whether they are text.
-    pub(super) fn ending(self) -> (&'static str, bool) {
-        match self {
-            Self::Svg => ("svg", true),
-            Self::Png => ("png", false),
-            Self::Pdf => ("pdf", false),
-        }
-    }
-}
-
 /// Kind of plot.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum PlotKind {
@@ -132,28 +113,6 @@ pub(super) fn run(args: &PlotArgs, terminal: &Terminal) -> Result<(), Failure> {
         return print_json(&json!({ "out": args.out.display().to_string(), "shown": shown }), true);
     }
     report(&format!("{}: {shown}", args.out.display()), args.piped, terminal)
-}
-
-impl PlotFormat {
-    /// The format of a file, by its name.
-    pub(super) fn of(path: &Path) -> Result<Self, Failure> {
-        match path.extension().and_then(|end| end.to_str()).map(str::to_ascii_lowercase).as_deref() {
-            Some("svg") => Ok(Self::Svg),
-            Some("png") => Ok(Self::Png),
-            Some("pdf") => Ok(Self::Pdf),
-            _ => Err(wrong(format!("{}: a plot has to end in .svg, .png or .pdf", path.display()))),
-        }
-    }
-}
-
-pub(super) fn write(picture: &Picture, path: &Path, format: PlotFormat) -> Result<(), Failure> {
-    let bytes = match format {
-        PlotFormat::Svg => picture.svg().map(String::into_bytes),
-        PlotFormat::Png => picture.png(),
-        PlotFormat::Pdf => Ok(picture.pdf()),
-    }
-    .map_err(|error| Failure { message: format!("{}: {error}", path.display()), code: 1 })?;
-    Ok(traces::io::atomic::write_file(path, |out| std::io::Write::write_all(out, &bytes))?)
 }
 
 fn span(args: &PlotArgs, start_s: f64, end_s: f64) -> Result<(f64, f64), Failure> {
