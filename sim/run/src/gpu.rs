@@ -285,7 +285,7 @@ mod tests {
         let text = message(
             &REFERENCE.replace("l2: (entries: 4096", "llc: (entries: 8, ways: 2), l2: (entries: 4096"),
         );
-        assert!(text.starts_with("gpu.ron:20:") && text.contains("`units.llc` is missing"), "{text}");
+        assert!(text.starts_with("gpu.ron:19:") && text.contains("`units.llc` is missing"), "{text}");
         let text = message(&iris.replace("edram: (entries: 2097152, ways: 16),", ""));
         assert!(text.contains("`units.edram` is given and `pipeline.memory.edram` is missing"), "{text}");
         // Impossible geometry, unknown keys, sizes out of range.
