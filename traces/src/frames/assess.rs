@@ -13,7 +13,7 @@ const MIN_FRAME_SAMPLES: f64 = 50.0;
 /// Largest share of frames of odd length, by number or by covered time, of a regular spacing: as for low confidence.
 const MAX_ODD_SHARE: f64 = 0.1;
 /// Largest share of frames of low confidence without a warning about the whole result: above the share of
-/// right frames that are flagged in `docs/finding.md`, also in its hard cases (*Flags*).
+/// right frames that are flagged in the median over the seeds of `docs/finding.md` (*Flags*).
 const MAX_LOW_CONFIDENCE_SHARE: f64 = 0.1;
 
 /// The confidence of a distance (W^2): 1 at or below the mean of the matches, 0 at or above that of the rest,

@@ -374,31 +374,22 @@ mod tests {
         assert_eq!((columns.current_a.len(), columns.current_a[19_999]), (20_000, 19_899.0));
     }
 
-    /// A row between two others, near one of them, has no place of its own.
+    /// A row between two others, near one of them, has no place of its own at a stated rate.
     #[test]
     fn a_surplus_row_near_another_is_reported_and_leaves_as_many_times_as_values() {
-        let times: Vec<f64> = (0..200).map(f64::from).chain([100.2]).collect();
-        let (repairs, columns, description) = repaired(times, 3);
-        let codes: Vec<_> = repairs.iter().map(|repair| (repair.code, repair.row, repair.count)).collect();
-        let sorted = (RepairKind::SortedRows, 201, 201);
-        assert_eq!(codes, [sorted, (RepairKind::FilledValues, 4, 1), (RepairKind::Resampled, 102, 1)]);
-        assert_eq!((columns.current_a.len(), columns.stamps.len()), (200, 200));
-        assert_eq!((columns.current_a[100], columns.current_a[101]), (100.0, 101.0));
-        assert_eq!(description.rate_hz, Some(1.0));
-    }
-
-    #[test]
-    fn a_surplus_row_alone_is_repaired_too() {
-        let times: Vec<f64> = (0..200)
-            .flat_map(|row| [Some(f64::from(row)), (row == 100).then_some(100.2)])
-            .flatten()
-            .collect();
-        let mut columns =
-            Columns { voltage_v: vec![1.0; 201], current_a: vec![1.0; 201], stamps: Stamps::Seconds(times) };
-        let mut description = Description::default();
+        let mut times: Vec<f64> = (0..200).map(f64::from).collect();
+        times.insert(101, 100.2);
+        let mut columns = Columns {
+            voltage_v: vec![1.0; 201],
+            current_a: (0..201_u16).map(f32::from).collect(),
+            stamps: Stamps::Seconds(times),
+        };
+        let mut description = Description { rate_hz: Some(1.0), ..Description::default() };
         let repairs = repair_rows(Path::new("t.csv"), &names(), &mut columns, &mut description).unwrap();
-        assert_eq!(repairs.iter().map(|repair| repair.row).collect::<Vec<_>>(), [102]);
+        let found: Vec<_> = repairs.iter().map(|repair| (repair.code, repair.row, repair.count)).collect();
+        assert_eq!(found, [(RepairKind::Resampled, 102, 1)]);
         assert_eq!((columns.current_a.len(), columns.stamps.len()), (200, 200));
+        assert_eq!((columns.current_a[100], columns.current_a[101]), (100.0, 102.0));
     }
 
     #[test]
