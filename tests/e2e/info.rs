@@ -50,7 +50,8 @@ fn a_scene_file_is_described_in_full() {
     let codes: Vec<&Value> = found["warnings"].as_array().into_iter().flatten().map(|w| &w["code"]).collect();
     assert_eq!(codes, [""; 0]);
     assert_eq!(found["materials"][0]["alpha"], "Blended");
-    for says in ["triangles 2", "Turn", "1.250 s", "1 of 1 meshes move", "leaf", "0.5 blended", "--camera '("]
+    for says in
+        ["triangles 2", "Turn", "1.250 s", "1 of 1 meshes move", "leaf", "0.5000 blended", "--camera '("]
     {
         assert!(text.contains(says), "`{says}` is not in:\n{text}");
     }

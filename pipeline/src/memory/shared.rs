@@ -6,7 +6,10 @@
 use activity::{Event, LEVELS, LevelRequests, LineAccess, LineKind, PacketCounts, Unit};
 
 use super::address::LINE_BYTES;
-use super::{Access, Cache, CacheError, CacheSpec, MemorySpec};
+use super::{Access, Cache, CacheError, CacheSpec};
+
+/// Levels below the L2, those that there are.
+pub(super) type LevelSpecs = [Option<CacheSpec>; LEVELS.len()];
 
 /// The L2 and the levels below it, and requests of the L2 since the log was last cleared.
 #[derive(Clone, Debug)]
@@ -25,9 +28,9 @@ struct CacheLevel {
 }
 
 impl SharedCaches {
-    /// Empty caches.
-    pub fn new(spec: &MemorySpec) -> Result<Self, CacheError> {
-        Ok(Self { cache: Cache::new(spec.l2)?, levels: levels(spec)?, log: Vec::new() })
+    /// An empty L2 with the levels below it, in the order of [`LEVELS`].
+    pub fn new(l2: CacheSpec, below: LevelSpecs) -> Result<Self, CacheError> {
+        Ok(Self { cache: Cache::new(l2)?, levels: levels(below)?, log: Vec::new() })
     }
 
     /// Requests of the L2 since the log was last cleared, in order.
@@ -132,11 +135,11 @@ fn line_number(line: u64) -> u32 {
     line as u32
 }
 
-fn levels(spec: &MemorySpec) -> Result<Vec<CacheLevel>, CacheError> {
+fn levels(specs: LevelSpecs) -> Result<Vec<CacheLevel>, CacheError> {
     let level = |(at, spec): (usize, Option<CacheSpec>)| {
         spec.map(|spec| Ok(CacheLevel { at, cache: Cache::new(spec)? }))
     };
-    spec.levels().into_iter().enumerate().filter_map(level).collect()
+    specs.into_iter().enumerate().filter_map(level).collect()
 }
 
 #[cfg(test)]
@@ -144,7 +147,7 @@ mod tests {
     use std::collections::VecDeque;
 
     use super::*;
-    use crate::memory::Compression;
+    use crate::memory::{Compression, MemorySpec};
     use crate::random::mix;
 
     /// A cache by its definition: for every set the lines from the most to the least recently used.
@@ -216,7 +219,8 @@ mod tests {
     }
 
     fn run(spec: &MemorySpec, seed: u64, span: u64) -> (SharedCaches, PacketCounts) {
-        let (mut caches, mut counts) = (SharedCaches::new(spec).unwrap(), PacketCounts::default());
+        let (mut caches, mut counts) =
+            (SharedCaches::new(spec.l2, spec.levels()).unwrap(), PacketCounts::default());
         stream(seed, span).for_each(|(line, write)| caches.access(Unit::Depth, line, write, &mut counts));
         (caches, counts)
     }
@@ -286,7 +290,8 @@ mod tests {
     fn a_stream_that_fits_in_a_level_reaches_memory_once() {
         let [none, llc, _, both] = hierarchies();
         let reads = |spec: &MemorySpec, lines: u64| {
-            let (mut caches, mut counts) = (SharedCaches::new(spec).unwrap(), PacketCounts::default());
+            let (mut caches, mut counts) =
+                (SharedCaches::new(spec.l2, spec.levels()).unwrap(), PacketCounts::default());
             (0..10 * lines).for_each(|n| caches.access(Unit::Texture, n % lines, false, &mut counts));
             u64::from(counts[Event::DramReadBytes] / 64)
         };
@@ -299,7 +304,8 @@ mod tests {
     #[test]
     fn a_frame_ends_with_every_kept_line_in_memory_once() {
         for spec in hierarchies() {
-            let (mut caches, mut counts) = (SharedCaches::new(&spec).unwrap(), PacketCounts::default());
+            let (mut caches, mut counts) =
+                (SharedCaches::new(spec.l2, spec.levels()).unwrap(), PacketCounts::default());
             (0..60).for_each(|line| caches.access(Unit::Colour, line, true, &mut counts));
             let written = |caches: &SharedCaches| {
                 caches
@@ -325,7 +331,8 @@ mod tests {
     #[test]
     fn a_discarded_line_is_in_no_level() {
         let [.., both] = hierarchies();
-        let (mut caches, mut counts) = (SharedCaches::new(&both).unwrap(), PacketCounts::default());
+        let (mut caches, mut counts) =
+            (SharedCaches::new(both.l2, both.levels()).unwrap(), PacketCounts::default());
         (0..30).for_each(|line| caches.access(Unit::Depth, line, true, &mut counts));
         (0..30).for_each(|line| caches.discard(line));
         caches.clear_log();

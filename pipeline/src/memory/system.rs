@@ -70,7 +70,7 @@ impl MemorySystem {
             depth: client(spec.depth, Event::DepthLines, Event::DepthMisses)?,
             colour: client(spec.colour, Event::ColourLines, Event::ColourMisses)?,
             texture: client(spec.texture, Event::TextureLines, Event::TextureMisses)?,
-            l2: SharedCaches::new(spec)?,
+            l2: SharedCaches::new(spec.l2, spec.levels())?,
             compressed: CompressedLines::default(),
         })
     }

@@ -231,16 +231,19 @@ mod tests {
     use crate::study::written;
 
     #[test]
-    fn a_larger_level_moves_fewer_bytes_and_saves_until_it_holds_all() {
+    fn a_larger_level_hits_more_often_and_moves_no_more_bytes() {
         let (folder, chart, _) = written::<MemoryChart>(MemoryEffort { size: (160, 90), samples: 4 });
         let csv = std::fs::read_to_string(folder.path().join("memory.csv")).unwrap();
         assert_eq!(csv.lines().count(), 1 + chart.rows.len());
         for rows in chart.sweeps() {
-            assert!(rows.windows(2).all(|pair| pair[1].dram_bytes <= pair[0].dram_bytes), "{rows:?}");
-            let last = rows.last().unwrap();
-            assert!(last.hit_share.unwrap() > 0.0 && rows[0].hit_share.is_none());
-            assert!(last.memory_j <= rows[0].memory_j || last.dram_bytes == rows[0].dram_bytes, "{rows:?}");
+            let grows = |pair: &[MemoryRow]| {
+                pair[1].dram_bytes <= pair[0].dram_bytes && pair[1].hit_share >= pair[0].hit_share
+            };
+            assert!(rows.windows(2).all(grows), "{rows:?}");
+            assert!(rows[0].hit_share.is_none() && rows[1].hit_share.is_some(), "{rows:?}");
         }
+        // A frame of the default scene this small fits in the L2; the shadow maps do not.
+        assert!(chart.rows.iter().any(|row| row.hit_share > Some(0.0)));
     }
 
     #[test]

@@ -2,6 +2,9 @@
 
 use crate::clock::Time;
 
+/// Cycles per slot of the calendars of the L2 and the levels below it.
+pub(super) const SLOT_CYCLES: u32 = 8;
+
 /// How a packet comes to shared resources.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Turn {

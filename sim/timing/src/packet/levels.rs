@@ -3,8 +3,7 @@
 use activity::{LEVELS, LineAccess, LineKind, Unit};
 
 use super::Span;
-use super::calendar::{Calendar, Turn};
-use super::memory::SLOT_CYCLES;
+use super::calendar::{Calendar, SLOT_CYCLES, Turn};
 use crate::clock::{Clocks, Time};
 use crate::spec::{MachineSpec, SharedCacheSpec};
 

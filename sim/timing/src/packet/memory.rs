@@ -4,15 +4,12 @@
 use activity::{LEVELS, LevelRequests, LineAccess, LineKind, Unit};
 
 use super::Span;
-use super::calendar::{Calendar, QueueTimes, Turn};
+use super::calendar::{Calendar, QueueTimes, SLOT_CYCLES, Turn};
 use super::levels::{Levels, Passed};
 use crate::address::AddressMap;
 use crate::clock::{Clocks, Time};
 use crate::demand::CLIENTS;
 use crate::spec::{DramSpec, MachineSpec};
-
-/// Cycles per slot of the calendars of the L2 and the levels below it.
-pub(super) const SLOT_CYCLES: u32 = 8;
 
 /// Times of a group of line requests.
 #[derive(Clone, Copy, Debug)]

@@ -2,7 +2,7 @@
 
 use activity::{LEVELS, LineAccess, Unit};
 
-use super::memory::{Dram, Reader};
+use super::dram::{Dram, Reader};
 use super::meter::Meter;
 use super::queue::{Queue, Waits};
 use crate::Recorder;

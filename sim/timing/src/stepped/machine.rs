@@ -2,8 +2,9 @@
 
 use activity::{LEVELS, LineAccess, Unit};
 
+use super::dram::Dram;
 use super::levels::Levels;
-use super::memory::{Dram, L2};
+use super::memory::L2;
 use super::meter::Meter;
 use super::queue::{Queue, Waits};
 use super::shader::{CoreEnv, Shader};

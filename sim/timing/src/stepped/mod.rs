@@ -4,6 +4,7 @@
 //! matter; a test permutes it. Cycles in which all units only wait are skipped, which does not change the
 //! result; a test runs with and without skipping.
 
+mod dram;
 mod levels;
 mod machine;
 mod memory;
