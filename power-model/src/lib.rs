@@ -34,20 +34,16 @@
 //! ```
 
 mod error;
-mod frame;
-mod ledger;
 mod model;
 mod pacing;
 mod parts;
 mod platform;
 mod quantity;
-mod row;
 mod system;
 mod table;
 
 pub use error::{ModelError, PacingError, PlatformError, TableError, TimelineError};
-pub use frame::FramePower;
-pub use model::PowerModel;
+pub use model::{FramePower, PowerModel};
 pub use pacing::{PacedFrame, Pacing, Run, pace};
 pub use parts::{Energy, PARTS, Part};
 pub use platform::{
@@ -57,6 +53,5 @@ pub use quantity::{
     Basis, Celsius, Exponent, Hertz, Interval, OutOfRange, Picojoules, Quantity, Ratio, Seconds, Share,
     Source, Sourced, Volts, Watts,
 };
-pub use row::{EnergyRow, Supply};
 pub use system::{Cause, Circumstances, Pulse, Surrounded, SurroundedFrame, overlay};
-pub use table::{Bound, EnergyTable, Entry};
+pub use table::{Bound, EnergyRow, EnergyTable, Entry, Supply};

@@ -48,12 +48,10 @@
 
 pub mod align;
 pub mod curve;
-mod decimal;
 pub mod device;
 pub mod energy;
 pub mod frames;
 pub mod io;
-pub mod metadata;
 mod overlap;
 pub mod pareto;
 pub mod pyramid;
@@ -69,5 +67,4 @@ pub mod trace;
 pub mod units;
 
 pub use curve::{Curve, CurveBuilder, CurveError};
-pub use metadata::{Mark, MarkKind, Metadata};
-pub use trace::{Trace, TraceError};
+pub use trace::{Mark, MarkKind, Metadata, Trace, TraceError};

@@ -3,9 +3,8 @@
 use crate::energy::{FrameEnergy, PowerIntegral};
 use crate::frames::{Found, MarkError, Marks, Method, Options, Proposal, Window, find_with, propose};
 use crate::io::{ReadError, ReadOptions, Rows};
-use crate::metadata::Metadata;
 use crate::stream::{self, StreamError};
-use crate::trace::Trace;
+use crate::trace::{Metadata, Trace};
 use std::path::Path;
 use thiserror::Error;
 
@@ -184,7 +183,7 @@ impl Search {
 mod tests {
     use super::*;
     use crate::io::parquet;
-    use crate::metadata::{Mark, MarkKind};
+    use crate::trace::{Mark, MarkKind};
 
     const PERIOD_S: f64 = 0.01;
 

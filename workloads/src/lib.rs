@@ -59,5 +59,5 @@ pub use fingerprint::{Fingerprint, FingerprintError};
 pub use job::Job;
 pub use load::load;
 pub use material::{Alpha, Light, Material};
-pub use samples::SampleChoice;
+pub use samples::{FixedSamples, SampleChoice, write_hits, write_samples};
 pub use scene::{Frame, FrameError, FrameMesh, Overrides, Scene, Settings};

@@ -1,13 +1,15 @@
-//! Sample tables by name or file.
+//! Sample tables by name or file, and the files of sample tables and of results.
 
+use std::io;
+use std::io::Write;
 use std::path::Path;
 
 use activity::spec::suggestion;
-use pipeline::sampling::SampleSource;
-use pipeline::{SampleSpec, SampleTable};
+use pipeline::sampling::{Sample, SampleSource};
+use pipeline::{SampleSpec, SampleTable, Viewport};
 
-use crate::error::LoadError;
-use crate::visibility::FixedSamples;
+use crate::error::{LoadError, Source};
+use crate::import::reader::Bytes;
 
 /// A requested sample table.
 #[derive(Clone, Debug)]
@@ -76,10 +78,129 @@ fn unknown(name: &str) -> LoadError {
     LoadError::Setting { setting: "sample table", message }
 }
 
+/// A sample table for a block of pixels of any size, repeated over the image.
+#[derive(Clone, Debug)]
+pub struct FixedSamples {
+    width: u32,
+    height: u32,
+    per_pixel: u32,
+    samples: Vec<Sample>,
+}
+
+const SAMPLE_BYTES: u64 = 5 * 4;
+
+impl FixedSamples {
+    /// Reads the table at `path`.
+    ///
+    /// # Errors
+    /// [`LoadError`] if the file cannot be read, is truncated, or has samples out of range.
+    pub fn load(path: &Path) -> Result<Self, LoadError> {
+        let data = Source { path }.read()?;
+        Self::parse(path, &data)
+    }
+
+    /// Width and height in pixels; larger images repeat the table.
+    pub fn size(&self) -> [u32; 2] {
+        [self.width, self.height]
+    }
+
+    /// Parses `data`; `path` is for messages.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn parse(path: &Path, data: &[u8]) -> Result<Self, LoadError> {
+        let mut bytes = Bytes::new(path, data, b"M5DSMP1\0")?;
+        let (width, height, per_pixel, _) = (bytes.u32()?, bytes.u32()?, bytes.u32()?, bytes.u32()?);
+        if width == 0 || height == 0 || !(1..=256).contains(&per_pixel) {
+            return Err(bytes.wrong(format!(
+                "{width}x{height} pixels of {per_pixel} samples; sides start at 1, and a pixel takes 1 to 256"
+            )));
+        }
+        // The product may exceed u64; no file is that large.
+        let count = (u64::from(width) * u64::from(height)).saturating_mul(u64::from(per_pixel));
+        bytes.expect_records(count, SAMPLE_BYTES)?;
+        let mut samples = Vec::new();
+        for index in 0..count {
+            let sample = Sample {
+                x: bytes.f32()?,
+                y: bytes.f32()?,
+                u: bytes.f32()?,
+                v: bytes.f32()?,
+                t: bytes.f32()?,
+            };
+            if !sample.is_in_range() {
+                return Err(bytes.wrong(format!(
+                    "sample {index} lies outside [0, 1) in x, y or t, or outside [-1, 1] on the lens"
+                )));
+            }
+            samples.push(sample);
+        }
+        Ok(Self { width, height, per_pixel, samples })
+    }
+}
+
+impl SampleSource for FixedSamples {
+    fn per_pixel(&self) -> u32 {
+        self.per_pixel
+    }
+
+    fn pixel_into(&self, px: u32, py: u32, into: &mut [Sample]) {
+        let place = (py % self.height) as usize * self.width as usize + (px % self.width) as usize;
+        let first = place * self.per_pixel as usize;
+        into.copy_from_slice(&self.samples[first..first + self.per_pixel as usize]);
+    }
+}
+
+/// Writes the samples of every pixel as a table for [`FixedSamples`].
+///
+/// # Errors
+/// Errors of `out`.
+pub fn write_samples(viewport: Viewport, source: &dyn SampleSource, out: &mut dyn Write) -> io::Result<()> {
+    out.write_all(b"M5DSMP1\0")?;
+    for word in [viewport.width(), viewport.height(), source.per_pixel(), 0] {
+        out.write_all(&word.to_le_bytes())?;
+    }
+    let mut samples = vec![Sample::default(); source.per_pixel() as usize];
+    for pixel in 0..viewport.pixels() as u32 {
+        source.pixel_into(pixel % viewport.width(), pixel / viewport.width(), &mut samples);
+        for number in samples.iter().flat_map(|s| [s.x, s.y, s.u, s.v, s.t]) {
+            out.write_all(&number.to_le_bytes())?;
+        }
+    }
+    Ok(())
+}
+
+/// Writes the visible triangle of each sample (`u32::MAX` for none) and its depth (infinite for none), both
+/// in the order `(py * width + px) * per_pixel + s`. The header is `M5DHIT1\0`, width, height, samples per
+/// pixel, and zero.
+///
+/// # Errors
+/// Errors of `out`.
+pub fn write_hits(
+    viewport: Viewport,
+    per_pixel: u32,
+    triangles: &[u32],
+    depths: &[f32],
+    out: &mut dyn Write,
+) -> io::Result<()> {
+    out.write_all(b"M5DHIT1\0")?;
+    for word in [viewport.width(), viewport.height(), per_pixel, 0] {
+        out.write_all(&word.to_le_bytes())?;
+    }
+    for triangle in triangles {
+        out.write_all(&triangle.to_le_bytes())?;
+    }
+    for depth in depths {
+        out.write_all(&depth.to_le_bytes())?;
+    }
+    Ok(())
+}
+
 #[cfg(test)]
 mod tests {
-    use super::*;
     use pipeline::sampling::Sample;
+
+    use super::*;
 
     fn described(text: &str) -> Result<SampleSpec, String> {
         activity::spec::parse(text, "table.ron").map_err(|error| error.to_string())
@@ -129,5 +250,54 @@ mod tests {
             let message = described(text).unwrap_err();
             assert!(message.starts_with(place) && message.contains(what), "{text}: {message}");
         }
+    }
+
+    #[test]
+    fn tables_survive_a_round_trip() {
+        let table = SampleTable::low_discrepancy(3, 5, pipeline::LensShape::Disk).unwrap();
+        let (viewport, mut file) = (Viewport::new(70, 3).unwrap(), Vec::new());
+        write_samples(viewport, &table, &mut file).unwrap();
+        assert_eq!(file.len(), 24 + 70 * 3 * 3 * 20);
+        let read = FixedSamples::parse(Path::new("a.smp"), &file).unwrap();
+        let mut found = [Sample::default(); 3];
+        for (px, py) in [(0, 0), (69, 2), (64, 1)] {
+            read.pixel_into(px, py, &mut found);
+            assert_eq!(found, table.pixel(px, py));
+        }
+    }
+
+    fn file(x: f32) -> Vec<u8> {
+        let mut data = b"M5DSMP1\0".to_vec();
+        [2_u32, 1, 1, 0].iter().for_each(|word| data.extend(word.to_le_bytes()));
+        for number in [0.25, 0.5, -1.0, 1.0, 0.0, x, 0.5, 0.0, 0.0, 0.75] {
+            data.extend(number.to_le_bytes());
+        }
+        data
+    }
+
+    #[test]
+    fn sample_counts_beyond_64_bits_are_refused() {
+        // 2^31 by 2^31 pixels of 16 samples are 2^66, which wraps to 0 in 64 bits.
+        let mut data = file(0.125);
+        for (word, value) in [1_u32 << 31, 1 << 31, 16].into_iter().enumerate() {
+            data[8 + 4 * word..][..4].copy_from_slice(&value.to_le_bytes());
+        }
+        data.truncate(24);
+        let error = FixedSamples::parse(Path::new("a.smp"), &data).unwrap_err();
+        assert!(error.to_string().contains("0 bytes follow"), "{error}");
+    }
+
+    #[test]
+    fn a_table_is_tiled_over_the_image() {
+        let table = FixedSamples::parse(Path::new("a.smp"), &file(0.125)).unwrap();
+        let mut found = [Sample::default()];
+        table.pixel_into(7, 9, &mut found);
+        assert_eq!(found[0], Sample { x: 0.125, y: 0.5, u: 0.0, v: 0.0, t: 0.75 });
+    }
+
+    #[test]
+    fn a_sample_out_of_range_is_named() {
+        let error = FixedSamples::parse(Path::new("a.smp"), &file(1.0)).unwrap_err().to_string();
+        assert!(error.contains("a.smp") && error.contains("sample 1"), "{error}");
     }
 }

@@ -10,8 +10,7 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use workloads::Overrides;
 
 use super::Failure;
-use crate::cli::parse::{depth, frames, lens, per_pixel, shutter, size};
-use crate::cli::quantity::rate;
+use crate::cli::parse::{depth, frames, lens, per_pixel, rate, shutter, size};
 
 /// Worker threads.
 #[derive(Clone, Copy, Debug, Args)]

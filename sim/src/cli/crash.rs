@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use output::table::shell_line;
 use output::terminal::Terminal;
 use run::CrashedFrame;
-use traces::io::unfinished;
+use traces::io::atomic;
 
 /// Panics in all threads of this process.
 #[derive(Clone, Default)]
@@ -102,7 +102,7 @@ const EXIT_CODE: i32 = 130;
 pub(super) fn handle(terminal: Terminal) {
     let end = move || {
         // No file is created while this guard is held.
-        let _held = unfinished::remove_all();
+        let _held = atomic::remove_all();
         if stderr().is_terminal() {
             // Leave the line of the progress bar.
             let _ = writeln!(stderr());

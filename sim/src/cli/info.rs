@@ -7,10 +7,11 @@ use clap::Args;
 use output::table::{Table, counted, digits, grouped};
 use serde::Serialize;
 use workloads::Alpha;
+use workloads::FixedSamples;
 use workloads::catalog;
 use workloads::job::{OptionSource, Request};
 use workloads::scene::{CameraUsed, SceneInfo, SettingsInfo};
-use workloads::visibility::{self, FixedSamples, VisibilityScene};
+use workloads::visibility::{self, VisibilityScene};
 
 use super::Failure;
 use super::outputs::{print, print_json};

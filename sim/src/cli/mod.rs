@@ -7,36 +7,35 @@ mod compare;
 mod crash;
 mod info;
 mod list;
-mod manual;
 mod outputs;
 mod parse;
-mod quantity;
-mod reproduce;
 mod run;
 mod sample;
-mod samples;
 mod trace;
 mod visibility;
 
 use std::ffi::OsString;
+use std::io;
 use std::panic::AssertUnwindSafe;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use ::run::RunError;
 use clap::error::ErrorKind;
 use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
-use crash::Crashes;
+use clap_mangen::Man;
 use output::terminal::Terminal;
+use traces::io::atomic;
 
+use ::run::RunError;
 use args::MessageArgs;
 use chart::{ChartArgs, StressArgs};
 use compare::CompareArgs;
+use crash::Crashes;
 use info::InfoArgs;
+use outputs::print;
 use run::RunArgs;
-use samples::SamplesArgs;
 use trace::TraceArgs;
-use visibility::VisibilityArgs;
+use visibility::{SamplesArgs, VisibilityArgs};
 
 /// A cycle-approximate simulator of a tile-based 5D rasterization pipeline, with an energy trace for every frame.
 #[derive(Debug, Parser)]
@@ -73,7 +72,7 @@ pub enum Command {
     /// Measure and draw a chart of the book
     Chart(ChartArgs),
     /// Compute what a paper reports and compare it with the paper, row by row
-    Reproduce(reproduce::ReproduceArgs),
+    Reproduce(chart::ReproduceArgs),
     /// Analyse a power trace, recorded or synthetic: frames, energies, alignment, formats, plots, Pareto frontiers
     Trace(TraceArgs),
     /// Print a script that completes commands and options in a shell
@@ -177,18 +176,58 @@ fn dispatch(cli: &Cli, terminal: &Terminal) -> Result<(), Failure> {
         Command::Run(args) => run::run(args, terminal),
         Command::Info(args) => info::run(args),
         Command::Compare(args) => compare::run(args),
-        Command::Completions(args) => manual::completions(args),
-        Command::Man(args) => manual::man(args),
+        Command::Completions(args) => completions(args),
+        Command::Man(args) => man(args),
         Command::List(args) => list::list(args),
         Command::Visibility(args) => visibility::run(args, terminal),
         Command::Ccd(args) => ccd::run(args, terminal),
         Command::Sample(args) => sample::run(args, terminal),
-        Command::Samples(args) => samples::run(args),
+        Command::Samples(args) => visibility::write_table(args),
         Command::Stress(args) => chart::stress(args, terminal),
         Command::Chart(args) => chart::run(args, terminal),
-        Command::Reproduce(args) => reproduce::run(args, terminal),
+        Command::Reproduce(args) => chart::reproduce(args, terminal),
         Command::Trace(args) => trace::run(args, terminal),
     }
+}
+
+fn completions(args: &CompletionsArgs) -> Result<(), Failure> {
+    let mut script = Vec::new();
+    clap_complete::generate(args.shell, &mut Cli::command(), "quintile", &mut script);
+    print(&String::from_utf8_lossy(&script))
+}
+
+fn man(args: &ManArgs) -> Result<(), Failure> {
+    let mut command = Cli::command();
+    command.build();
+    let Some(folder) = args.folder.as_ref().or(args.out.as_ref()) else {
+        return print(&String::from_utf8_lossy(
+            &page(&command).map_err(|error| failed("manual page", &error))?,
+        ));
+    };
+    std::fs::create_dir_all(folder).map_err(|error| failed(&folder.display().to_string(), &error))?;
+    let pages = write_pages(&command, folder)?;
+    print(&format!("{}: {pages} manual pages", folder.display()))
+}
+
+/// Writes the pages of `command` and its subcommands; returns their number.
+fn write_pages(command: &clap::Command, folder: &Path) -> Result<usize, Failure> {
+    // The built name of a subcommand contains that of its parent, separated by a hyphen.
+    let name = command.get_display_name().unwrap_or_else(|| command.get_name());
+    let path = folder.join(format!("{name}.1"));
+    let bytes = page(command).map_err(|error| failed(&path.display().to_string(), &error))?;
+    atomic::write_file(&path, |file| io::Write::write_all(file, &bytes))?;
+    let below = command.get_subcommands().filter(|below| below.get_name() != "help" && !below.is_hide_set());
+    below.map(|below| write_pages(below, folder)).try_fold(1, |pages, more| Ok(pages + more?))
+}
+
+fn page(command: &clap::Command) -> io::Result<Vec<u8>> {
+    let mut page = Vec::new();
+    Man::new(command.clone()).render(&mut page)?;
+    Ok(page)
+}
+
+fn failed(what: &str, error: &io::Error) -> Failure {
+    Failure { message: format!("{what}: cannot be written: {error}"), code: 1 }
 }
 
 #[cfg(test)]

@@ -23,8 +23,7 @@ use workloads::job::OptionSource;
 use super::Failure;
 use super::outputs::{print, print_json};
 use crate::cli::args::{LookArgs, SceneArgs, ThreadArgs};
-use crate::cli::parse::{duration, percent, setting, share_below_one};
-use crate::cli::quantity::rate;
+use crate::cli::parse::{duration, percent, rate, setting, share_below_one};
 
 /// Arguments of `run`.
 #[derive(Debug, Args)]

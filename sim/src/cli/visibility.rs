@@ -1,4 +1,4 @@
-//! `quintile visibility`.
+//! `quintile visibility` and `quintile samples`: sample tables, and the triangle that each sample sees.
 
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -9,17 +9,18 @@ use output::table::counted;
 use output::terminal::Terminal;
 use pipeline::sampling::SampleSource;
 use pipeline::visibility::VisibleTriangle;
-use pipeline::{Features, SampleTable};
+use pipeline::{Features, SampleTable, Viewport};
 use run::fits_memory;
 use run::visibility::{Rates, find};
 use serde::Serialize;
 use warnings::{Code, Warning};
-use workloads::visibility::{self, CameraSpec, FixedSamples, VisibilityScene, write_hits};
+use workloads::visibility::{self, CameraSpec, VisibilityScene};
+use workloads::{FixedSamples, SampleChoice, write_hits, write_samples};
 
 use super::Failure;
 use super::outputs::{print, print_json};
 use crate::cli::args::ThreadArgs;
-use crate::cli::parse::tests;
+use crate::cli::parse::{per_pixel, size, tests};
 
 /// Arguments of `visibility`.
 #[derive(Debug, Args)]
@@ -186,4 +187,72 @@ fn samples(args: &VisibilityArgs, scene: &VisibilityScene) -> Result<Box<dyn Sam
         )),
         file => Ok(Box::new(FixedSamples::load(Path::new(file))?)),
     }
+}
+
+/// Arguments of `samples`.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Example:\n  quintile samples jittered --samples 16 --size 640x360 --out mine.smp\n\n\
+    `quintile run --table mine.smp` and `quintile visibility --samples mine.smp` read the file. Its layout is \
+    described in docs/formats.md."
+)]
+pub struct SamplesArgs {
+    /// A built-in sample table (see `quintile list`) or a description of one in a .ron file
+    #[arg(value_name = "TABLE", default_value = "owen")]
+    pub table: String,
+    /// Samples per pixel, 1 to 256
+    #[arg(long, value_name = "N", default_value_t = 16, allow_hyphen_values = true, value_parser = per_pixel)]
+    pub samples: u32,
+    /// Pixels to write; a larger image repeats them
+    #[arg(long, value_name = "WxH", value_parser = size, default_value = "64x64")]
+    pub size: (u32, u32),
+    /// Seed of the samples
+    #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true, value_parser = crate::cli::parse::seed)]
+    pub seed: u64,
+    /// Output file
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+    /// Print a description of the file as one line of JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Description of the written file.
+#[derive(Serialize)]
+struct Written {
+    table: String,
+    width: u32,
+    height: u32,
+    samples_per_pixel: u32,
+    samples: u64,
+    out: String,
+}
+
+pub(super) fn write_table(args: &SamplesArgs) -> Result<(), Failure> {
+    super::outputs::may_hold_results(("--out", Some(&args.out)), [Path::new(&args.table)])?;
+    let (width, height) = args.size;
+    let wrong = |message: String| Failure { message, code: 2 };
+    let viewport = Viewport::new(width, height)
+        .ok_or_else(|| wrong(format!("size: {width}x{height}: each side has to be 1 to 16384 pixels")))?;
+    let source = SampleChoice::load(&args.table)?.source(args.samples, args.seed)?;
+    traces::io::atomic::write_file(&args.out, |file: &mut BufWriter<File>| {
+        write_samples(viewport, &*source, file)?;
+        file.flush()
+    })
+    .map_err(|error| Failure { message: error.to_string(), code: 1 })?;
+    let written = Written {
+        table: args.table.clone(),
+        width,
+        height,
+        samples_per_pixel: source.per_pixel(),
+        samples: viewport.pixels() as u64 * u64::from(source.per_pixel()),
+        out: args.out.display().to_string(),
+    };
+    if args.json {
+        return print_json(&written, false);
+    }
+    print(&format!(
+        "{}: {} samples, {} in each of {width}x{height} pixels, table {}",
+        written.out, written.samples, written.samples_per_pixel, written.table
+    ))
 }

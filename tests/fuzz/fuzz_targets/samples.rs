@@ -6,5 +6,5 @@ use std::path::Path;
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|data: &[u8]| {
-    let _ = workloads::visibility::FixedSamples::parse(Path::new("a.smp"), data);
+    let _ = workloads::FixedSamples::parse(Path::new("a.smp"), data);
 });

@@ -1,6 +1,6 @@
 //! Errors of reading.
 
-use crate::sample::SAMPLE_TYPES;
+use crate::format::SAMPLE_TYPES;
 use std::io;
 use thiserror::Error;
 

@@ -1,4 +1,4 @@
-//! Layout of a JLS file of version 2. All numbers are little-endian.
+//! Layout of a JLS file of version 2, its sample types and times. All numbers are little-endian.
 //!
 //! A file is a header and a sequence of chunks. A chunk is a header, a payload, and checksums of both. The
 //! chunks of one kind and signal form a doubly linked list.
@@ -80,3 +80,140 @@ pub(crate) const ENTRIES_PER_ENTRY: usize = 20;
 
 /// Number of a signal, in the lower bits of the mark of a chunk.
 pub(crate) const SIGNAL_MASK: u16 = 0x0fff;
+
+/// A sample type that is read.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Sample {
+    F32,
+    F64,
+    /// A whole number, to be multiplied by `scale`.
+    Whole {
+        bytes: usize,
+        signed: bool,
+        scale: f64,
+    },
+}
+
+/// The sample types that are read.
+pub const SAMPLE_TYPES: &str = "f32, f64 or a whole number of 8, 16 or 32 bits";
+
+const FLOAT: u32 = 4;
+const UNSIGNED: u32 = 2;
+
+impl Sample {
+    /// From the type of a definition: base type (bits 0 to 3), size in bits (8 to 15), binary digits after
+    /// the point (16 to 23). Its name if it cannot be read.
+    pub fn of(data_type: u32) -> Result<Self, String> {
+        let (base, bits, point) = (data_type & 0xf, (data_type >> 8) & 0xff, (data_type >> 16) as u8 as i8);
+        match (base, bits) {
+            (FLOAT, 32) => Ok(Self::F32),
+            (FLOAT, 64) => Ok(Self::F64),
+            (1 | 3, 8 | 16 | 32) => Ok(Self::Whole {
+                bytes: bits as usize / 8,
+                signed: base & UNSIGNED == 0,
+                scale: libm::exp2(-f64::from(point)),
+            }),
+            (1, bits) => Err(format!("i{bits}")),
+            (3, bits) => Err(format!("u{bits}")),
+            _ => Err(format!("of an unknown type ({data_type:#x})")),
+        }
+    }
+
+    pub fn bytes(self) -> usize {
+        match self {
+            Self::F32 => 4,
+            Self::F64 => 8,
+            Self::Whole { bytes, .. } => bytes,
+        }
+    }
+
+    /// Decodes samples and appends them.
+    pub fn decode(self, bytes: &[u8], into: &mut Vec<f32>) {
+        match self {
+            Self::F32 => into.extend(bytes.as_chunks().0.iter().map(|&bytes| f32::from_le_bytes(bytes))),
+            Self::F64 => {
+                into.extend(bytes.as_chunks().0.iter().map(|&bytes| f64::from_le_bytes(bytes) as f32));
+            }
+            Self::Whole { bytes: size, signed, scale } => {
+                // Moved to the upper end of 32 bits, so that the shift back brings the sign along.
+                let shift = 32 - 8 * size as u32;
+                into.extend(bytes.chunks_exact(size).map(|bytes| {
+                    let raised =
+                        bytes.iter().rev().fold(0_u32, |number, &byte| number << 8 | u32::from(byte))
+                            << shift;
+                    let number =
+                        if signed { f64::from(raised as i32 >> shift) } else { f64::from(raised >> shift) };
+                    (number * scale) as f32
+                }));
+            }
+        }
+    }
+}
+
+/// Ticks per second: JLS counts time in 2^-30 s.
+const TICKS_PER_S: f64 = (1_u64 << 30) as f64;
+/// Origin of JLS times, 2018-01-01, in seconds since 1970-01-01 UTC.
+const EPOCH_S: i64 = 1_514_764_800;
+
+/// A time of day, in units of 2^-30 s since 2018-01-01 UTC.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Timestamp(pub(crate) i64);
+
+impl Timestamp {
+    /// The time `after_s` seconds after `start_s`, the latter since 1970-01-01 UTC; `None` if it is farther
+    /// than about 8.5e9 s from 2018. The start is exact to 2^-31 s.
+    pub fn from_unix_s(start_s: f64, after_s: f64) -> Option<Self> {
+        let ticks = |seconds: f64| libm::round(seconds * TICKS_PER_S) as i128;
+        // A float-to-int cast saturates, far beyond i64.
+        i64::try_from(ticks(start_s) + ticks(after_s) - (i128::from(EPOCH_S) << 30)).ok().map(Self)
+    }
+
+    /// Units of 2^-30 s since 2018-01-01 UTC.
+    pub fn ticks(self) -> i64 {
+        self.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn decoded(data_type: u32, bytes: &[u8]) -> Vec<f32> {
+        let mut into = Vec::new();
+        Sample::of(data_type).unwrap().decode(bytes, &mut into);
+        into
+    }
+
+    #[test]
+    fn whole_numbers_keep_sign_and_point() {
+        assert_eq!(decoded(0x1001, &[0xff, 0xff, 0x00, 0x80]), [-1.0, -32_768.0]);
+        assert_eq!(decoded(0x1003, &[0xff, 0xff, 0x00, 0x80]), [65_535.0, 32_768.0]);
+        assert_eq!(decoded(0x0801, &[0x80, 0x7f]), [-128.0, 127.0]);
+        assert_eq!(decoded(0x0803, &[0x80, 0x7f]), [128.0, 127.0]);
+        assert_eq!(decoded(0x2001, &[0xfe, 0xff, 0xff, 0xff]), [-2.0]);
+        assert_eq!(decoded(0x2003, &[0, 0, 0, 0x80]), [2_147_483_648.0]);
+        assert_eq!(decoded(0x04_1001, &[0x18, 0x00]), [1.5]);
+        assert_eq!(decoded(0x4004, &0.1_f64.to_le_bytes()), [0.1]);
+    }
+
+    #[test]
+    fn other_types_are_named() {
+        assert_eq!(Sample::of(0x0403).unwrap_err(), "u4");
+        assert_eq!(Sample::of(0x1801).unwrap_err(), "i24");
+        assert!(Sample::of(0x1004).unwrap_err().contains("0x1004"));
+    }
+
+    fn ticks(start_s: f64, after_s: f64) -> Option<i64> {
+        Timestamp::from_unix_s(start_s, after_s).map(Timestamp::ticks)
+    }
+
+    #[test]
+    fn times_count_from_2018_in_2_to_the_minus_30_seconds() {
+        assert_eq!(ticks(1_514_764_800.0, 0.0), Some(0));
+        assert_eq!(ticks(1_514_764_801.5, 0.25), Some(7 << 28));
+        assert_eq!(ticks(0.0, 0.0), Some(-1_514_764_800 << 30));
+        // The trace's own limit lies beyond on the side of the past.
+        assert_eq!(ticks(-9e9, 0.0), None);
+        assert!(ticks(9e9, 1.2e9).is_none() && ticks(9e9, 0.0).is_some());
+    }
+}

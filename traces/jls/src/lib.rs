@@ -38,15 +38,10 @@ mod definitions;
 mod error;
 mod format;
 mod read;
-mod sample;
-mod summary;
-mod time;
 mod write;
 
 pub use definitions::{Signal, SignalName, Source};
 pub use error::ReadError;
-pub use format::MAX_PAYLOAD_BYTES;
+pub use format::{MAX_PAYLOAD_BYTES, SAMPLE_TYPES, Timestamp};
 pub use read::{Reader, SampleReader};
-pub use sample::SAMPLE_TYPES;
-pub use time::Timestamp;
 pub use write::Writer;

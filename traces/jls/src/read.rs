@@ -3,8 +3,7 @@
 use crate::ReadError;
 use crate::chunk::{ChunkFile, ChunkHeader};
 use crate::definitions::{self, Definitions, Signal, Source};
-use crate::format::{self, FIXED_RATE, FRONT, JSON, SIGNAL_MASK, USER_DATA, field};
-use crate::sample::Sample;
+use crate::format::{self, FIXED_RATE, FRONT, JSON, SIGNAL_MASK, Sample, USER_DATA, field};
 use std::path::{Path, PathBuf};
 
 const FIXED_RATE_DATA: u8 = FIXED_RATE + format::DATA;

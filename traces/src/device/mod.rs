@@ -1,6 +1,5 @@
 //! The data-acquisition device: from noise-free power to the voltage and current a recorder would write.
 
-mod losses;
 mod resample;
 mod sample;
 mod spec;

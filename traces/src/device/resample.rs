@@ -1,8 +1,7 @@
 //! Sampling a recorded trace again, in pieces.
 
 use super::Device;
-use super::losses::Gaps;
-use super::sample::{Channels, LowPass, SampleError};
+use super::sample::{Channels, Gaps, LowPass, SampleError};
 use crate::curve::CurveError;
 use crate::energy::{Sums, energies_j};
 use crate::io::{TraceChunk, TraceHeader, TraceReader, TraceWriter, WriteError};
@@ -243,7 +242,7 @@ mod tests {
     use super::*;
     use crate::device::DeviceSpec;
     use crate::io::SplitTrace;
-    use crate::metadata::Metadata;
+    use crate::trace::Metadata;
     use crate::trace::Trace;
     use proptest::prelude::*;
 

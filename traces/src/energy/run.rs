@@ -261,7 +261,7 @@ mod tests {
     use super::*;
     use crate::energy::PowerIntegral;
     use crate::frames::Flags;
-    use crate::metadata::Metadata;
+    use crate::trace::Metadata;
     use crate::trace::Trace;
 
     /// Ten frames of 100 samples at 1 kHz: 40 at 5 W, then 60 at 1 W.

@@ -1,7 +1,7 @@
 //! The table of frames, `frames.csv`.
 
 use super::{FrameEnergy, TrueFrame, outliers};
-use crate::decimal;
+use crate::io::csv::push_decimal;
 use core::ops::Range;
 use rayon::prelude::*;
 use std::io::Write;
@@ -182,7 +182,7 @@ fn cells<const N: usize>(out: &mut Vec<u8>, values: [Option<f64>; N]) {
     for value in values {
         out.push(b',');
         if let Some(value) = value {
-            decimal::push(out, value);
+            push_decimal(out, value);
         }
     }
 }

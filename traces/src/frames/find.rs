@@ -6,9 +6,8 @@ use super::matched::find_matched;
 use super::threshold::choose;
 use super::tracked::find_tracked;
 use super::{assess, periodicity};
-use crate::metadata::Metadata;
 use crate::stats::upper_median;
-use crate::trace::Trace;
+use crate::trace::{Metadata, Trace};
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -239,8 +238,8 @@ fn correlation(a: &[f64], b: &[f64]) -> f64 {
 mod tests {
     use super::*;
     use crate::frames::Window;
-    use crate::metadata::Metadata;
     use crate::random::Random;
+    use crate::trace::Metadata;
 
     const RATE_HZ: f64 = 50e3;
 

@@ -1,10 +1,12 @@
-//! The columns of a trace: chosen by their names, or by hand.
+//! The columns of a trace, chosen by their names or by hand, and the interface that a reader of their rows implements.
 
-use super::time_base::Stamps;
-use super::{CURRENT_A, POWER_W, ReadError, ReadOptions, TIME_S, VOLTAGE_V};
-use crate::units::{MICRO, Quantity, quantity_word, trace_unit, written_out_unit};
 use std::collections::BTreeMap;
 use std::path::Path;
+
+use super::description::Description;
+use super::time_base::Stamps;
+use super::{CURRENT_A, POWER_W, ReadError, ReadOptions, Repair, TIME_S, VOLTAGE_V};
+use crate::units::{MICRO, Quantity, quantity_word, trace_unit, written_out_unit};
 
 /// A column that is read.
 #[derive(Clone, Debug, PartialEq)]
@@ -367,6 +369,41 @@ fn is_mega(name: &str, unit: Option<(&str, Quantity, f64)>) -> bool {
             .split(|c: char| !c.is_alphanumeric())
             .any(|token| mega(token) && token == token.to_uppercase())
 }
+
+/// Reader of the rows of a file, in order.
+pub(super) trait RowSource: Send {
+    /// Names of all columns.
+    fn names(&self) -> &[String];
+
+    /// Number of rows, in formats that state it.
+    fn count(&self) -> Option<u64> {
+        None
+    }
+
+    /// Skips rows, up to the end.
+    fn skip(&mut self, rows: u64) -> Result<(), ReadError>;
+
+    /// Appends up to `limit` rows to the values of `batch`, as they are in the file; the stamps are those of these rows alone.
+    /// Returns the number of rows, 0 at the end.
+    fn next(&mut self, layout: &Layout, limit: usize, batch: &mut RowBatch) -> Result<usize, ReadError>;
+
+    /// The repair made when the file was opened and in the rows read since.
+    fn repair(&self, _: &Description) -> Option<Repair> {
+        None
+    }
+}
+
+/// A file that was opened.
+pub(super) struct Opened {
+    pub rows: Box<dyn RowSource>,
+    pub layout: Layout,
+    pub description: Description,
+    /// The column of times that files of this format usually have, for messages.
+    pub time: &'static str,
+}
+
+/// Opener of files of a format.
+pub(super) type Open = fn(&Path, &ReadOptions) -> Result<Opened, ReadError>;
 
 #[cfg(test)]
 mod tests {

@@ -2,7 +2,7 @@
 
 use super::samples::TraceHeader;
 use super::{CURRENT_A, ReadError, TIME_NS, TIME_S, VOLTAGE_V, WriteError};
-use crate::metadata::Metadata;
+use crate::trace::Metadata;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -1,7 +1,7 @@
 //! The formats of trace files: one table for readers, writers, the command, its help and its errors.
 
+use super::columns::Open;
 use super::samples::TraceReader;
-use super::source::Open;
 use super::{WriteError, csv, jls, parquet, perfetto};
 use std::path::{Path, PathBuf};
 
@@ -149,7 +149,7 @@ pub fn save(trace: &dyn TraceReader, path: &Path) -> Result<(), WriteError> {
 mod tests {
     use super::*;
     use crate::io::{ReadOptions, read};
-    use crate::metadata::Metadata;
+    use crate::trace::Metadata;
     use crate::trace::Trace;
 
     #[test]

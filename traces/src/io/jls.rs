@@ -4,14 +4,12 @@
 //! rate. A JSON text among the user data (`{"trace": ...}`) holds the exact rate and start and the metadata
 //! of the trace, which [`read`](super::read()) takes back.
 
-use super::atomic;
-use super::columns::{Layout, RowBatch, layout};
+use super::columns::{Layout, Opened, RowBatch, RowSource, layout};
 use super::description::{self, Description};
 use super::samples::{TraceChunk, TraceReader, TraceWriter};
-use super::source::{Opened, RowSource};
 use super::time_base::Stamps;
-use super::{ReadError, ReadOptions, Repair, RepairKind, TIME_S, WriteError};
-use crate::metadata::Metadata;
+use super::{ReadError, ReadOptions, Repair, RepairKind, TIME_S, WriteError, atomic};
+use crate::trace::Metadata;
 use crate::units;
 use ::jls::{MAX_PAYLOAD_BYTES, Reader, SAMPLE_TYPES, SampleReader, Signal, SignalName, Timestamp};
 use rayon::prelude::*;

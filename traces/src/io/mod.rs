@@ -13,20 +13,16 @@ mod formats;
 pub mod jls;
 pub mod parquet;
 pub mod perfetto;
-mod read;
 mod recording;
 mod repair;
 mod rows;
 mod samples;
-mod source;
 mod sum_of_rails;
 mod time_base;
-pub mod unfinished;
 
 pub use error::{ReadError, WriteError};
 pub use formats::{FORMATS, TraceFormat, endings, readable, save};
-pub use read::{Loaded, open, read, read_csv, read_parquet};
-pub use recording::Recording;
+pub use recording::{Loaded, Recording, open, read, read_csv, read_parquet};
 pub use repair::{Repair, RepairKind};
 pub use rows::Rows;
 #[cfg(test)]

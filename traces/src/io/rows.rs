@@ -1,12 +1,11 @@
 //! Rows of a file of any format, in pieces, so that no file has to fit into memory.
 
-use super::columns::{Layout, Rail, RowBatch};
+use super::columns::{Layout, Open, Opened, Rail, RowBatch, RowSource};
 use super::description::Description;
 use super::formats::{FORMATS, TraceFormat, readable};
-use super::source::{Open, Opened, RowSource};
 use super::time_base::mean_rate_hz;
 use super::{ReadError, ReadOptions, Repair, VOLTAGE_V, csv};
-use crate::metadata::Metadata;
+use crate::trace::Metadata;
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};

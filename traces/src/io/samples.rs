@@ -5,8 +5,7 @@
 //! file of any length are written in the same way, and the bytes do not depend on where pieces end.
 
 use super::WriteError;
-use crate::metadata::Metadata;
-use crate::trace::{Trace, lost_at_end, time_ns};
+use crate::trace::{Metadata, Trace, lost_at_end, time_ns};
 
 /// Everything about a trace but its samples.
 #[derive(Clone, Debug, PartialEq)]

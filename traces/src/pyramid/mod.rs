@@ -317,7 +317,7 @@ impl Pyramid {
 mod tests {
     use super::*;
     use crate::io::{csv, parquet};
-    use crate::metadata::Metadata;
+    use crate::trace::Metadata;
     use std::fs;
 
     #[test]

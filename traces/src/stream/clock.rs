@@ -93,7 +93,7 @@ pub fn clock(path: &Path, options: &ReadOptions) -> Result<Clock, ReadError> {
 mod tests {
     use super::*;
     use crate::io::parquet;
-    use crate::metadata::Metadata;
+    use crate::trace::Metadata;
     use crate::trace::Trace;
 
     /// The clock of a file of some rows of which some are lost.

@@ -7,9 +7,8 @@ use crate::frames::{
     FrameStart, MarkError, Marks, Placement, choose, conclude_at, confidence, flat_mark, misalignment_w2,
     noise_deviation, regularity, start_after_idle,
 };
-use crate::metadata::Metadata;
 use crate::stats::{PairSum, upper_median};
-use crate::trace::Trace;
+use crate::trace::{Metadata, Trace};
 use rayon::prelude::*;
 
 /// A start and the sum of powers (W) before it.

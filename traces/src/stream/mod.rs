@@ -14,7 +14,7 @@ mod screen;
 use crate::energy::FrameEnergy;
 use crate::frames::{Found, MarkError, Marks};
 use crate::io::{ReadError, ReadOptions, Rows};
-use crate::metadata::Metadata;
+use crate::trace::Metadata;
 pub use clock::{Clock, clock};
 use std::path::Path;
 use thiserror::Error;

@@ -4,13 +4,10 @@
 //! deterministically. `quintile stress` measures the methods on it.
 
 mod builder;
-mod lens;
-mod mesh;
 mod motion;
 mod shape;
-mod soup;
 
-pub use soup::Soup;
+pub use builder::Soup;
 
 use pipeline::geometry::Projection;
 use pipeline::sample_test::{Hits, Target, test_run};
@@ -130,7 +127,9 @@ impl StressScene {
 
 /// All families, by cause: shape, motion, lens, meshes.
 pub fn families() -> impl Iterator<Item = &'static Family> {
-    [shape::FAMILIES, motion::FAMILIES, lens::FAMILIES, mesh::FAMILIES].into_iter().flatten()
+    [shape::SHAPE_FAMILIES, motion::MOTION_FAMILIES, motion::LENS_FAMILIES, shape::MESH_FAMILIES]
+        .into_iter()
+        .flatten()
 }
 
 /// The family with a name.

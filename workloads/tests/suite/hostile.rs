@@ -5,7 +5,8 @@
 use std::path::Path;
 
 use crate::common::{Files, failure};
-use workloads::visibility::{FixedSamples, load, parse_m5d, parse_mts};
+use workloads::FixedSamples;
+use workloads::visibility::{load, parse_m5d, parse_mts};
 
 /// Peak address space of the process, in bytes, including untouched memory.
 fn peak_bytes() -> u64 {

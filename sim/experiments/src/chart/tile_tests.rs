@@ -2,25 +2,20 @@
 
 use std::path::Path;
 
-use pipeline::PassError;
-use pipeline::{LensShape, SampleTable, Viewport};
+use pipeline::{LensShape, PassError, SampleTable, Viewport};
 use rayon::prelude::*;
 use serde::Serialize;
 use workloads::Overrides;
 use workloads::stress::{Size, family};
 
-use crate::stress::measure::Pairs;
-use crate::stress::measure::Work;
-use crate::stress::methods::{SWITCHES, combinations};
-use crate::stress::methods::{Subject, differing, on_subject};
+use crate::stress::measure::{Pairs, SWITCHES, Subject, Work, combinations, differing, on_subject};
 use crate::study::table::{Sheet, Table, fixed, plain, share};
 use crate::study::tradeoff::{Metric, TradeoffPoint, front};
 use crate::study::{Gallery, Study, StudyError};
 use output::OutputError;
 use output::plot::{AxisSpec, ChartPanel, Mark, Paint, Scale, Series};
 use output::progress::Progress;
-use run::GpuSpec;
-use run::RunError;
+use run::{GpuSpec, RunError};
 
 /// Families of the failure catalogue in the chart, each at one value.
 const FAMILIES: [(&str, f64); 7] = [

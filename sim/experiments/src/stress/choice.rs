@@ -4,11 +4,8 @@ use pipeline::Features;
 use serde::Serialize;
 use workloads::stress::{Family, Size};
 
-use super::measure::Work;
-use super::methods::combinations;
-use super::methods::on_subject;
-use run::GpuSpec;
-use run::RunError;
+use super::measure::{Work, combinations, on_subject};
+use run::{GpuSpec, RunError};
 
 /// Multiply-adds at one value of a family.
 #[derive(Clone, Debug, PartialEq)]

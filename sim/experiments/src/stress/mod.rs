@@ -1,14 +1,12 @@
 //! `quintile stress`: the failure catalogue, each method on each family.
 //!
-//! - [`methods`]: the sets of tests compared, what they are tried on, and what every sample has to see.
 //! - [`truth`]: when a triangle truly touches a tile.
-//! - [`measure`]: the boxes of tile tests against that, and all of it for one value of a family.
+//! - [`measure`]: the sets of tests compared, what they are tried on, and all of it for one value of a family.
 //! - [`choice`]: `auto` against every fixed choice of tests.
 //! - [`Report`]: every row, as a study with tables, CSV and pictures.
 
 pub mod choice;
 pub mod measure;
-pub mod methods;
 mod picture;
 pub mod truth;
 
@@ -19,8 +17,7 @@ use workloads::stress::{Family, Size, families, family};
 use crate::study::table::{Sheet, Table, count, fixed, optional, plain, share};
 use crate::study::{Gallery, Study, StudyError, files};
 use choice::{Choice, Choices, Trial};
-use measure::StressRow;
-use methods::METHODS;
+use measure::{METHODS, StressRow};
 use output::dir::SUMMARY;
 use output::progress::Progress;
 
@@ -213,7 +210,7 @@ impl Report {
             .shown("family", |family| family.name, plain)
             .before("Cost over that of the best method, at the worst value of each family.\n\n")
             .after(self.below());
-        let method = |table: Table<_>, method: &methods::Method| {
+        let method = |table: Table<_>, method: &measure::Method| {
             let cost = |family: &&&'static Family| self.over_best(family, method.name, false);
             table.shown(method.name, cost, optional(fixed(2)))
         };
@@ -289,8 +286,8 @@ fn choice_sheet<'a>(choices: impl Iterator<Item = &'a Choice>) -> Sheet {
 #[cfg(test)]
 mod tests {
     use super::measure::Pairs;
-    use super::methods::{METHODS, combinations};
-    use super::methods::{Subject, differing};
+    use super::measure::{METHODS, combinations};
+    use super::measure::{Subject, differing};
     use super::*;
     use pipeline::Features;
     use pipeline::traversal::Box5;

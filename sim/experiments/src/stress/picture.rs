@@ -4,8 +4,7 @@ use workloads::stress::Family;
 
 use super::Report;
 use super::choice::{Choice, Choices};
-use super::measure::StressRow;
-use super::methods::{METHODS, Method};
+use super::measure::{METHODS, Method, StressRow};
 use output::plot::{Chart, ChartPanel, Look, Mark, Matrix, MatrixPanel, Paint, Picture, Scale, Series};
 
 /// Cost over that of the best method, by method and family: at the first and at the worst value.

@@ -2,10 +2,8 @@
 //!
 //! - [`Study`]: what a study is; [`Entry`]: one of them in a list.
 //! - [`table`]: tables whose columns are declared once.
-//! - [`tradeoff`]: speed against accuracy, the same few numbers for every method.
-//! - [`index`]: one page of all studies.
+//! - [`tradeoff`]: speed against accuracy, the same few numbers for every method; one page of all studies.
 
-pub mod index;
 pub mod table;
 pub mod tradeoff;
 

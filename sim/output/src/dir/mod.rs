@@ -20,7 +20,7 @@ use std::path::{Component, Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 use sha2::{Digest, Sha256};
-use traces::io::unfinished;
+use traces::io::atomic;
 use work::Swap;
 use work::Work;
 
@@ -103,7 +103,7 @@ impl OutDir {
         let staged = self.work.new_file(relative);
         let failed = |source| OutputError::Write { path: self.path().join(relative), source };
         // The signal handler removes the folder; it must not run between these two.
-        let created = unfinished::uninterrupted(|| {
+        let created = atomic::uninterrupted(|| {
             staged.parent().map_or(Ok(()), fs::create_dir_all)?;
             File::create(&staged)
         });
@@ -137,7 +137,7 @@ impl OutDir {
         let names = written.keys().cloned().collect();
         let swap = Swap::new(self.path(), &self.work, self.listed.clone(), written);
         // Signals wait while old and new results are mixed.
-        self.listed = unfinished::uninterrupted(|| swap.run(self.destination.force))?;
+        self.listed = atomic::uninterrupted(|| swap.run(self.destination.force))?;
         Ok(names)
     }
 

@@ -5,7 +5,7 @@ use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
-use traces::io::unfinished::Unfinished;
+use traces::io::atomic::Unfinished;
 
 use super::manifest::{Entry, MANIFEST, Manifest, Owner, WORK_FOLDER};
 use super::{OutputError, SUMMARY};

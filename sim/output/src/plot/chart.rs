@@ -1,8 +1,7 @@
 //! Series over axes, in one panel or several.
 
 use super::axis::{Extent, MarkerRoom, Way};
-use super::cell::{Cell, RIGHT, SMALL_GAP, draw_row};
-use super::chart_panel::ChartPanel;
+use super::chart_panel::{Cell, ChartPanel, RIGHT, SMALL_GAP, draw_row};
 use super::legend::{Key, LEGEND_PX, legend_lines};
 use super::panel::aside;
 use super::picture::{Across, Look, Picture, Text, text};

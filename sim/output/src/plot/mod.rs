@@ -18,7 +18,6 @@
 //! plot says so; this is no error. Only `render` and `text` use the crate `plotters`.
 
 mod axis;
-mod cell;
 mod chart;
 mod chart_panel;
 mod columns;
@@ -38,14 +37,12 @@ mod text;
 pub use axis::{AxisSpec, Scale};
 pub use chart::Chart;
 pub use chart_panel::ChartPanel;
-pub use frame_plots::{FrameEnergy, FrameEnergyPoint};
-pub use frame_plots::{FramePower, PowerPart};
+pub use frame_plots::{FrameEnergy, FrameEnergyPoint, FramePower, PowerPart};
 pub use heat_map::{HeatMapPlot, HeatTile, Shading};
 pub use lanes::{StallLane, UnitLane, UnitPlot};
 pub use matrix::{Matrix, MatrixPanel};
 pub use palette::{Colour, part_colour};
-pub use picture::Picture;
-pub use picture::{COLUMN_MM, Look};
+pub use picture::{COLUMN_MM, Look, Picture};
 pub use power_run::PowerRun;
 pub use render::PlotError;
 pub use series::{Mark, Paint, Series, Spread};

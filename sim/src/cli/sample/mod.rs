@@ -1,8 +1,7 @@
 //! `quintile sample`, and files of points.
 
+mod independent;
 mod poisson;
-mod volume;
-mod white;
 
 use std::convert::Infallible;
 use std::fmt::Write as _;
@@ -39,9 +38,9 @@ pub enum Kind {
     /// Poisson disk points of the unit square, cube, ...: a minimum distance, and no room for another point
     Poisson(poisson::PoissonArgs),
     /// Independent points of the unit square, cube, ... that follow a density
-    White(white::WhiteArgs),
+    White(independent::WhiteArgs),
     /// Uniform points in a torus or in a closed surface
-    Volume(volume::VolumeArgs),
+    Volume(independent::VolumeArgs),
 }
 
 /// Arguments of all distributions.
@@ -112,8 +111,8 @@ fn usage(message: impl std::fmt::Display) -> Failure {
 pub(super) fn run(args: &SampleArgs, terminal: &Terminal) -> Result<(), Failure> {
     match &args.kind {
         Kind::Poisson(args) => poisson::run(args, terminal),
-        Kind::White(args) => white::run(args),
-        Kind::Volume(args) => volume::run(args),
+        Kind::White(args) => independent::white(args),
+        Kind::Volume(args) => independent::volume(args),
     }
 }
 

@@ -1,18 +1,22 @@
-//! `quintile trace convert`.
+//! `quintile trace convert` and `quintile trace sample`: a trace in another format, and as another recorder would have written it.
 
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use output::table::{counted, grouped};
+use output::table::{counted, grouped, si};
 use output::terminal::Terminal;
 use serde_json::json;
+use traces::device::{Device, DeviceSpec, MAX_PACKET_SAMPLES, Peaks, RATES_HZ};
 use traces::io::{self, TraceFormat, TraceHeader, TraceReader, csv, endings};
+use warnings::Code;
 
-use super::report;
-use super::wrong;
+use super::{report, warn_with, wrong};
 use crate::cli::Failure;
-use crate::cli::outputs::may_hold_results;
-use crate::cli::outputs::print_json;
+use crate::cli::outputs::{may_hold_results, print_json};
+use crate::cli::parse::{
+    current, gain, length_of_time, positive_current, positive_voltage, rate, resistance, share_below_one,
+    size_of_current, size_of_voltage, voltage,
+};
 use crate::cli::trace::input::{InputArgs, trace_format};
 
 /// Arguments of `trace convert`.
@@ -106,4 +110,195 @@ pub(super) fn save(trace: &dyn TraceReader, path: &Path, terminal: &Terminal) ->
         ));
     }
     Ok(io::save(trace, path)?)
+}
+
+/// Arguments of `trace sample`.
+#[derive(Clone, Debug, Args)]
+#[command(
+    after_help = "Example:\n  quintile trace sample meter.parquet --device-rate 1kHz --bits 10 --specified-voltage 12V --out coarse.parquet\n\n\
+    Without --device the recorder has the defaults above and a range that fits the trace. Options with a unit take a number in that \
+    unit, or with any unit of its kind: 1kHz, 20us, 5mV, 250mA, 4mOhm."
+)]
+pub struct SampleArgs {
+    /// The trace.
+    #[command(flatten)]
+    pub input: InputArgs,
+    /// The device in a JSON file, whose defaults are those below and +-30 A, +-20 V; the options below change it
+    #[arg(long, value_name = "FILE.json")]
+    pub device: Option<PathBuf>,
+    /// Samples per second, 1 to 10 million (default: 50kHz)
+    #[arg(long, value_name = "HZ", allow_hyphen_values = true, value_parser = rate)]
+    pub device_rate: Option<f64>,
+    /// Bits of both converters, 1 to 24 (default: 14)
+    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = clap::value_parser!(u32).range(1..=24))]
+    pub bits: Option<u32>,
+    /// Highest current, the lowest is its negative (default: the smallest of 1mA, 3mA, 10mA, ... that holds the trace's peak)
+    #[arg(long, value_name = "A", allow_hyphen_values = true, value_parser = positive_current)]
+    pub current_range: Option<f64>,
+    /// Highest voltage, the lowest is its negative (default: 1.5 times the rail's)
+    #[arg(long, value_name = "V", allow_hyphen_values = true, value_parser = positive_voltage)]
+    pub voltage_range: Option<f64>,
+    /// Voltage of the rail without load (default: the trace's highest)
+    #[arg(long, value_name = "V", allow_hyphen_values = true, value_parser = positive_voltage)]
+    pub rail_voltage: Option<f64>,
+    /// Resistance of the rail (default: 4mOhm, less where the range is above 25 A)
+    #[arg(long, value_name = "OHM", allow_hyphen_values = true, value_parser = resistance)]
+    pub rail_ohm: Option<f64>,
+    /// Noise of the current, rms (default: a 6000th of the highest current)
+    #[arg(long, value_name = "A", allow_hyphen_values = true, value_parser = size_of_current)]
+    pub current_noise: Option<f64>,
+    /// Noise of the voltage, rms (default: a 10000th of the highest voltage)
+    #[arg(long, value_name = "V", allow_hyphen_values = true, value_parser = size_of_voltage)]
+    pub voltage_noise: Option<f64>,
+    /// Factor on the current: 1.01 for a gain 1 % too high (default: 1)
+    #[arg(long, value_name = "FACTOR", allow_hyphen_values = true, value_parser = gain)]
+    pub current_gain: Option<f64>,
+    /// Offset of the current (default: 0A)
+    #[arg(long, value_name = "A", allow_hyphen_values = true, value_parser = current)]
+    pub current_offset: Option<f64>,
+    /// Factor on the voltage (default: 1)
+    #[arg(long, value_name = "FACTOR", allow_hyphen_values = true, value_parser = gain)]
+    pub voltage_gain: Option<f64>,
+    /// Offset of the voltage (default: 0V)
+    #[arg(long, value_name = "V", allow_hyphen_values = true, value_parser = voltage)]
+    pub voltage_offset: Option<f64>,
+    /// Record this voltage, by specification, instead of measuring it (default: measured)
+    #[arg(long, value_name = "V", allow_hyphen_values = true, value_parser = positive_voltage)]
+    pub specified_voltage: Option<f64>,
+    /// Time constant of a low-pass on the power, in seconds or with its unit (default: none)
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = length_of_time)]
+    pub low_pass: Option<f64>,
+    /// Samples in one packet; a packet is lost as a whole (default: 512)
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_PACKET_SAMPLES)))]
+    pub packet_samples: Option<u32>,
+    /// Share of packets that are lost, 0 to below 1: gaps in the file (default: 0)
+    #[arg(long, value_name = "SHARE", allow_hyphen_values = true, value_parser = share_below_one)]
+    pub packet_loss: Option<f64>,
+    /// Seed of noise and losses (default: 1)
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = crate::cli::parse::seed)]
+    pub seed: Option<u64>,
+    /// File to write, as for `trace convert`; `-` is standard output
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+    /// Print as JSON
+    #[arg(long)]
+    pub json: bool,
+    /// Format of standard output, where --out is `-` (default: csv)
+    #[arg(long, value_name = "FORMAT", value_parser = trace_format())]
+    pub format: Option<&'static TraceFormat>,
+    /// Whether the result goes to standard output.
+    #[arg(skip)]
+    pub piped: bool,
+}
+
+pub(super) fn sample(args: &SampleArgs, terminal: &Terminal) -> Result<(), Failure> {
+    let format = format_of(&args.out)?;
+    let inputs = args.device.as_deref().into_iter().chain([args.input.trace.as_path()]);
+    may_be_saved("--out", &args.out, format, inputs)?;
+    args.check_rate()?;
+    let (trace, _) = args.input.source(terminal)?;
+    let peaks = Peaks::of(&*trace)?;
+    let device = Device::new(args.spec(&peaks)?).map_err(|error| wrong(error.to_string()))?;
+    let sampled = device.resample_in_pieces(&*trace)?;
+    if let Some(warning) = sampled.clipping() {
+        warn_with(&warning, "widen it with --current-range or --voltage-range", terminal);
+    }
+    if let Some(warning) = device.spec().warning(&peaks) {
+        warn_with(&warning, "narrow the range with --current-range", terminal);
+    }
+    if let Some(losses) = sampled.losses() {
+        terminal.warn_of(Code::PacketsLost, &format!("{losses}; --repair fills them"));
+    }
+    save(&sampled, &args.out, terminal)?;
+    let header = sampled.header();
+    let (before_j, after_j) = (sampled.original_energy_j()?, sampled.energy_j);
+    // A trace of no energy has no relative error.
+    let error = (before_j != 0.0).then(|| after_j / before_j - 1.0);
+    let samples = header.samples;
+    if args.json {
+        return print_json(
+            &json!({ "samples": samples, "device": device.spec(), "energy_J": before_j, "sampled_energy_J": after_j,
+                "relative_error": error, "lost_samples": header.lost_samples, "clipped_currents": sampled.clipped_currents,
+                "clipped_voltages": sampled.clipped_voltages }),
+            true,
+        );
+    }
+    let DeviceSpec { rate_hz, bits, current_range_a, .. } = device.spec();
+    let relative = error.map_or(String::new(), |error| format!(" ({:+.3} %)", 100.0 * error));
+    let line = format!(
+        "{}: {} at {rate_hz} Hz, {bits} bits of {} to {}; {before_j:.6} J became {after_j:.6} J{relative}",
+        args.out.display(),
+        counted(samples as usize, "sample"),
+        si(current_range_a[0], "A"),
+        si(current_range_a[1], "A"),
+    );
+    report(&line, args.piped, terminal)
+}
+
+impl SampleArgs {
+    /// The device: that of the file, or the default one with a range that fits, and what options change of it.
+    fn spec(&self, peaks: &Peaks) -> Result<DeviceSpec, Failure> {
+        let base = self.base(peaks)?;
+        let ranged = match self.current_range {
+            Some(range_a) => base.clone().with_current_range(range_a),
+            None => base.clone(),
+        };
+        let mut spec = match self.voltage_range {
+            Some(range_v) => ranged.with_voltage_range(range_v),
+            None => ranged,
+        };
+        self.change(&mut spec);
+        if self.device.is_none() {
+            return Ok(spec.named_by_rate_and_bits());
+        }
+        if spec != base {
+            spec.name += " (changed by options)";
+        }
+        Ok(spec)
+    }
+
+    /// The device before options change it.
+    fn base(&self, peaks: &Peaks) -> Result<DeviceSpec, Failure> {
+        let Some(path) = &self.device else {
+            let rail_v = self.rail_voltage.unwrap_or(peaks.voltage_v);
+            return Ok(DeviceSpec::fitting(rail_v, peaks.power_w));
+        };
+        let hint =
+            "--device takes a JSON file with the fields of a device, such as those that `--json` prints";
+        let text = std::fs::read_to_string(path).map_err(|error| Failure {
+            message: format!("{}: cannot read it: {error}; check the path", path.display()),
+            code: 1,
+        })?;
+        serde_json::from_str(&text).map_err(|error| wrong(format!("{}: {error}; {hint}", path.display())))
+    }
+
+    /// Puts the options that are given into `spec`; ranges are there already.
+    fn change(&self, spec: &mut DeviceSpec) {
+        let set = |field: &mut f64, asked: Option<f64>| *field = asked.unwrap_or(*field);
+        set(&mut spec.rate_hz, self.device_rate);
+        set(&mut spec.rail_v, self.rail_voltage);
+        set(&mut spec.rail_ohm, self.rail_ohm);
+        set(&mut spec.current_noise_a, self.current_noise);
+        set(&mut spec.voltage_noise_v, self.voltage_noise);
+        set(&mut spec.current_gain, self.current_gain);
+        set(&mut spec.current_offset_a, self.current_offset);
+        set(&mut spec.voltage_gain, self.voltage_gain);
+        set(&mut spec.voltage_offset_v, self.voltage_offset);
+        set(&mut spec.packet_loss, self.packet_loss);
+        spec.bits = self.bits.unwrap_or(spec.bits);
+        spec.specified_voltage_v = self.specified_voltage.or(spec.specified_voltage_v);
+        spec.low_pass_s = self.low_pass.or(spec.low_pass_s);
+        spec.packet_samples = self.packet_samples.unwrap_or(spec.packet_samples);
+        spec.seed = self.seed.unwrap_or(spec.seed);
+    }
+
+    /// Refuses a rate that no modelled device has.
+    fn check_rate(&self) -> Result<(), Failure> {
+        match self.device_rate.filter(|rate| !RATES_HZ.contains(rate)) {
+            Some(rate) => {
+                Err(wrong(format!("--device-rate {rate}: a device takes 1 to 1e7 samples per second")))
+            }
+            None => Ok(()),
+        }
+    }
 }

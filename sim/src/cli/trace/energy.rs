@@ -17,7 +17,7 @@ use super::input::{Frames, warn_of_frames};
 use super::wrong;
 use crate::cli::Failure;
 use crate::cli::outputs::{print, print_json};
-use crate::cli::quantity::{power, size_of_power, time};
+use crate::cli::parse::{power, size_of_power, time};
 use crate::cli::trace::input::{FindArgs, InputArgs, pass, segment};
 
 /// Arguments about frames; they do not apply to a segment.

@@ -6,21 +6,17 @@ mod energy;
 mod frames;
 mod input;
 mod pareto;
-mod picture_file;
-mod pipes;
 mod plot;
-mod sample;
 
 use align::AlignArgs;
 use clap::{Args, Subcommand};
-use convert::ConvertArgs;
+use convert::{ConvertArgs, SampleArgs};
 use energy::EnergyArgs;
 use frames::FramesArgs;
+use input::Pipes;
 use output::terminal::Terminal;
 use pareto::ParetoArgs;
-use pipes::Pipes;
 use plot::PlotArgs;
-use sample::SampleArgs;
 use traces::frames::MarkError;
 use traces::io::{ReadError, WriteError};
 use traces::search::SearchError;
@@ -86,7 +82,7 @@ fn run_on_files(args: &TraceArgs, terminal: &Terminal) -> Result<(), Failure> {
         TraceCommand::Energy(args) => energy::run(args, terminal),
         TraceCommand::Align(args) => align::run(args, terminal),
         TraceCommand::Convert(args) => convert::run(args, terminal),
-        TraceCommand::Sample(args) => sample::run(args, terminal),
+        TraceCommand::Sample(args) => convert::sample(args, terminal),
         TraceCommand::Plot(args) => plot::run(args, terminal),
         TraceCommand::Pareto(args) => pareto::run(args, terminal),
     }

@@ -12,14 +12,13 @@ use traces::io::atomic::write_file;
 use traces::pareto::{ParetoError, Point, RatedPoint, SettingColumns, frontiers, write_csv};
 use traces::table::{Table as Columns, TableReadError};
 
-use super::picture_file::{PlotFormat, write};
-use super::pipes::shown;
+use super::input::shown;
+use super::plot::{PlotFormat, write};
 use super::report;
 use crate::cli::Failure;
 use crate::cli::args::LookArgs;
-use crate::cli::outputs::may_hold_results;
-use crate::cli::outputs::print_json;
-use crate::cli::quantity::size_of_power;
+use crate::cli::outputs::{may_hold_results, print_json};
+use crate::cli::parse::size_of_power;
 
 /// Arguments of `trace pareto`.
 #[derive(Clone, Debug, Args)]

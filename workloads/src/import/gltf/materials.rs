@@ -10,9 +10,8 @@ use gltf::json::validation::Checked;
 use pipeline::{Texture, Wrap};
 use warnings::{Code, Warning};
 
-use super::Looks;
-use super::document::{self, Document};
 use super::nodes::Tree;
+use super::{Document, Looks, fetch};
 use crate::import::ignored::{self, about_material};
 use crate::import::reader;
 use crate::material::{Alpha, Material};
@@ -100,7 +99,7 @@ fn load(document: &Document, index: usize, wrap: [Wrap; 2]) -> Result<Texture, S
     match (&described.uri, described.buffer_view) {
         (Some(uri), _) => {
             let shown = if uri.starts_with("data:") { "data URI" } else { uri };
-            let bytes = document::fetch(document.source, uri).map_err(|why| format!("`{shown}`: {why}"))?;
+            let bytes = fetch(document.source, uri).map_err(|why| format!("`{shown}`: {why}"))?;
             reader::decode_texture(&bytes, wrap).map_err(|why| format!("`{shown}`: {why}"))
         }
         (None, Some(view)) => {

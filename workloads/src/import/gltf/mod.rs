@@ -3,19 +3,23 @@
 //! The crate `gltf` parses and checks the JSON; whether accessors fit their buffers it does not check, and some
 //! of its readers panic where they do not, so buffers and accessors are read here.
 
-mod document;
 mod materials;
 mod nodes;
 mod primitive;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use gltf::json::mesh::Semantic;
+use gltf::json::validation::{Checked, Error, Validate};
+use gltf::json::{Path as JsonPath, Root};
 use warnings::Warning;
 
 use crate::error::{LoadError, Source};
+use crate::import::reader;
 use crate::scene::far::Bounds;
 use crate::scene::{Clip, Instance, Mesh, Parts};
-use document::Document;
 use materials::Used;
 
 /// Source of the materials.
@@ -117,5 +121,188 @@ fn check_joints(document: &Document, node: usize, mesh: &Mesh, joints: usize) ->
             format!("a vertex uses joint {highest}, but the skin has only {joints}: export it again"),
         )),
         _ => Ok(()),
+    }
+}
+
+/// A glTF file whose JSON indices and buffers are checked. Accessors are checked when they are read.
+struct Document<'a> {
+    pub source: Source<'a>,
+    pub root: Root,
+    pub buffers: Vec<Vec<u8>>,
+}
+
+impl<'a> Document<'a> {
+    pub fn read(source: Source<'a>) -> Result<Self, LoadError> {
+        let bytes = source.read()?;
+        let (json, binary) =
+            if bytes.starts_with(b"glTF") { split(source, &bytes)? } else { (&bytes[..], None) };
+        let root = Root::from_slice(json).map_err(|error| {
+            source.broken("JSON", format!("not a glTF 2.0 file: {error}; export it again"))
+        })?;
+        check_positions(source, &root)?;
+        validate(source, &root)?;
+        let buffers = load(source, &root, binary)?;
+        Ok(Self { source, root, buffers })
+    }
+}
+
+/// JSON and binary chunk of a `.glb` (glTF 2.0, section 4).
+fn split<'b>(source: Source, bytes: &'b [u8]) -> Result<(&'b [u8], Option<&'b [u8]>), LoadError> {
+    let word =
+        |at: usize| bytes.get(at..at + 4).and_then(|word| word.try_into().ok()).map(u32::from_le_bytes);
+    let truncated = |what: &str, needed: usize| {
+        let message =
+            format!("truncated: {needed} bytes are needed, there are {}: get the file again", bytes.len());
+        source.broken(what, message)
+    };
+    let (Some(version), Some(length)) = (word(4), word(8)) else { return Err(truncated("GLB header", 12)) };
+    if version != 2 {
+        return Err(source.broken("GLB header", format!("version {version}; only version 2 is supported")));
+    }
+    if (length as usize) > bytes.len() {
+        return Err(truncated("GLB header", length as usize));
+    }
+    let chunk = |at: usize, kind: &[u8; 4], what: &str| {
+        let Some(length) = word(at) else { return Err(truncated(what, at + 8)) };
+        let (start, end) = (at + 8, (at + 8).saturating_add(length as usize));
+        match (bytes.get(at + 4..at + 8), bytes.get(start..end)) {
+            (Some(found), Some(body)) if found == kind => Ok((body, end)),
+            (Some(found), Some(_)) if found != kind => {
+                Err(source.broken(what, format!("a chunk of type {found:?} instead of {kind:?}")))
+            }
+            _ => Err(truncated(what, end)),
+        }
+    };
+    let (json, end) = chunk(12, b"JSON", "GLB chunk 0")?;
+    let binary = if end + 8 <= bytes.len() { Some(chunk(end, b"BIN\0", "GLB chunk 1")?.0) } else { None };
+    Ok((json, binary))
+}
+
+/// The crate's own check indexes accessors with these before it has checked them.
+fn check_positions(source: Source, root: &Root) -> Result<(), LoadError> {
+    for (mesh, of_mesh) in root.meshes.iter().enumerate() {
+        for (primitive, of_primitive) in of_mesh.primitives.iter().enumerate() {
+            let accessor = of_primitive.attributes.get(&Checked::Valid(Semantic::Positions));
+            if accessor.is_some_and(|accessor| accessor.value() >= root.accessors.len()) {
+                let message = format!(
+                    "index out of range: there are {} accessors: export it again",
+                    root.accessors.len()
+                );
+                return Err(source
+                    .broken(format!("meshes[{mesh}].primitives[{primitive}].attributes.POSITION"), message));
+            }
+        }
+    }
+    Ok(())
+}
+
+fn validate(source: Source, root: &Root) -> Result<(), LoadError> {
+    let mut first = None;
+    root.validate(root, JsonPath::new, &mut |path, error| {
+        let path = path();
+        if first.is_none() && !is_harmless(path.as_str(), error) {
+            first = Some((path.as_str().to_owned(), error));
+        }
+    });
+    let Some((place, error)) = first else { return Ok(()) };
+    let message = match error {
+        Error::IndexOutOfBounds => "index out of range: export it again".to_owned(),
+        Error::Missing => "this is required and missing: export it again".to_owned(),
+        Error::Unsupported => {
+            format!("a required extension is not supported; supported are {}: export it without", supported())
+        }
+        Error::Invalid | Error::Oversize => format!("{error}: export it again"),
+    };
+    Err(source.broken(place, message))
+}
+
+fn supported() -> String {
+    gltf::json::extensions::ENABLED_EXTENSIONS.join(", ")
+}
+
+/// Bounds of positions are not used. A texture without a known image is reported as a missing image.
+fn is_harmless(path: &str, error: Error) -> bool {
+    let bounds = path.contains("POSITION") && (path.ends_with("min") || path.ends_with("max"));
+    let source = path.starts_with("textures[") && path.ends_with("].source") && error == Error::Missing;
+    bounds || source
+}
+
+/// The bytes of every buffer, with the declared length.
+fn load(source: Source, root: &Root, binary: Option<&[u8]>) -> Result<Vec<Vec<u8>>, LoadError> {
+    let mut buffers = Vec::with_capacity(root.buffers.len());
+    for (index, buffer) in root.buffers.iter().enumerate() {
+        let place = format!("buffers[{index}]");
+        let bytes = match (&buffer.uri, binary) {
+            (Some(uri), _) => fetch(source, uri).map_err(|message| source.broken(&place, message))?,
+            (None, Some(binary)) if index == 0 => binary.to_vec(),
+            (None, _) => {
+                return Err(source.broken(place, "it has neither a URI nor a binary chunk: export it again"));
+            }
+        };
+        if (bytes.len() as u64) < buffer.byte_length.0 {
+            let message = format!(
+                "truncated: {} bytes are needed, there are {}: get the file again",
+                buffer.byte_length.0,
+                bytes.len()
+            );
+            return Err(source.broken(place, message));
+        }
+        buffers.push(bytes);
+    }
+    Ok(buffers)
+}
+
+/// Content of a URI: a data URI, or a file beside the scene's file.
+fn fetch(source: Source, uri: &str) -> Result<Vec<u8>, String> {
+    if let Some(data) = uri.strip_prefix("data:") {
+        let (kind, payload) = data.split_once(',').ok_or("a data URI without a comma")?;
+        if !kind.ends_with(";base64") {
+            return Err("a data URI that is not base64: export it as a file or in base64".to_owned());
+        }
+        return STANDARD.decode(payload.trim()).map_err(|error| format!("bad base64: {error}"));
+    }
+    let path = beside(source, uri)?;
+    reader::named(&path).map_err(|error| {
+        format!(
+            "cannot read {}: {error}; put the file there, or export with everything embedded",
+            path.display()
+        )
+    })
+}
+
+fn beside(source: Source, uri: &str) -> Result<PathBuf, String> {
+    if uri.contains("://") {
+        return Err(format!("{uri}: only files and data URIs are read, nothing is fetched"));
+    }
+    let name = unescape(uri).ok_or_else(|| format!("{uri}: a bad percent escape"))?;
+    Ok(source.path.parent().map_or_else(|| PathBuf::from(&name), |folder| folder.join(&name)))
+}
+
+/// Undoes percent escapes.
+fn unescape(uri: &str) -> Option<String> {
+    let mut bytes = Vec::with_capacity(uri.len());
+    let mut rest = uri.as_bytes();
+    while let [first, tail @ ..] = rest {
+        if *first == b'%' {
+            let digits = std::str::from_utf8(tail.get(..2)?).ok()?;
+            bytes.push(u8::from_str_radix(digits, 16).ok()?);
+            rest = &tail[2..];
+        } else {
+            bytes.push(*first);
+            rest = tail;
+        }
+    }
+    String::from_utf8(bytes).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn percent_escapes_are_undone() {
+        assert_eq!(unescape("a%20b.bin").as_deref(), Some("a b.bin"));
+        assert_eq!(unescape("100%"), None);
+        assert_eq!(unescape("%zz"), None);
     }
 }

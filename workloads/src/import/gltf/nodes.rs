@@ -11,7 +11,7 @@ use gltf::json::extensions::scene::khr_lights_punctual::Type as LightType;
 use gltf::json::validation::Checked;
 use warnings::{Code, Warning};
 
-use super::document::Document;
+use super::Document;
 use crate::error::LoadError;
 use crate::material::Light;
 use crate::scene::{

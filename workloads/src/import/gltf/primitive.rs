@@ -6,7 +6,7 @@ use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
 use warnings::{Code, Warning};
 
-use super::document::Document;
+use super::Document;
 use crate::error::LoadError;
 use crate::material::Material;
 use crate::scene::{Influences, Mesh, Normals, Target};

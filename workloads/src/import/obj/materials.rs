@@ -8,7 +8,7 @@ use glam::{Vec2, Vec3};
 use pipeline::{Texture, Wrap};
 use warnings::{Code, Warning};
 
-use super::statements::{Statements, broken, lines};
+use super::{Statements, broken, lines};
 use crate::error::{LoadError, Source};
 use crate::import::soup::{Looks, Paint, Soup, grey, linear};
 use crate::import::{ignored, reader};

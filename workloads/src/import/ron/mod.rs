@@ -1,17 +1,26 @@
-//! RON scene files: what is in them ([`spec`]), and scenes made from that.
+//! RON scene files: what is in them ([`spec`]), and the scene and its objects made from that.
 
-mod object;
 mod spec;
 
 use std::path::Path;
+use std::sync::Arc;
 
-use glam::{DVec3, Vec3};
+use glam::{DQuat, DVec3, Vec3};
+use pipeline::{Wrap, linear_to_srgb8};
 use warnings::{Code, Warning};
 
+use crate::builtin::checker;
 use crate::error::{LoadError, Source};
-use crate::material::Light;
-use crate::scene::{CameraSpec, Parts, Rig, SceneCamera, Settings};
-use spec::{LightSpec, SceneSpec, SettingsSpec};
+use crate::import::{self, Format, bare, gltf, ignored, reader, soup};
+use crate::material::{Alpha, Light, Material};
+use crate::scene::{
+    CameraSpec, Interpolation, Local, Mesh, Node, Parts, Rig, SceneCamera, Settings, Spin, Target, Track,
+    Trs, rotation,
+};
+use crate::shapes;
+use spec::{
+    LightSpec, MaterialSpec, ObjectSpec, SceneSpec, SettingsSpec, ShapeSpec, TextureSpec, VisibleSpec,
+};
 
 /// Reads the scene at `path`.
 pub(super) fn import(path: &Path) -> Result<Parts, LoadError> {
@@ -79,7 +88,7 @@ fn build(spec: SceneSpec, path: &Path) -> Result<Parts, LoadError> {
         return Err(context.wrong("objects", "there are none: add a `file` or a `shape`"));
     }
     for (index, object) in spec.objects.iter().enumerate() {
-        object::add(context, &mut parts, index, object)?;
+        add(context, &mut parts, index, object)?;
     }
     if let Some(camera) = &spec.camera {
         parts.camera = looking(context, camera, &parts.settings)?;
@@ -190,4 +199,260 @@ fn looking(context: Context, spec: &CameraSpec, settings: &Settings) -> Result<S
 /// Errors in a file that a scene names point at that file.
 fn broken(path: &Path, place: &str, message: String) -> LoadError {
     Source { path }.broken(place, message)
+}
+
+/// Adds `object`, number `index` of the file, to `parts`.
+fn add(context: Context, parts: &mut Parts, index: usize, object: &ObjectSpec) -> Result<(), LoadError> {
+    let place =
+        object.name.as_ref().map_or_else(|| format!("objects[{index}]"), |name| format!("object `{name}`"));
+    let node = node(context, &place, object)?;
+    let node = parts.graph.push_node(node);
+    let first = parts.graph.instances.len();
+    add_meshes(context, parts, &place, (object, node))?;
+    if let Some(clip) = object.visible.as_ref().and_then(VisibleSpec::clip) {
+        parts.graph.instances[first..].iter_mut().for_each(|instance| instance.clip = clip);
+    }
+    Ok(())
+}
+
+fn add_meshes(
+    context: Context,
+    parts: &mut Parts,
+    place: &str,
+    (object, node): (&ObjectSpec, usize),
+) -> Result<(), LoadError> {
+    match (&object.file, &object.shape) {
+        (Some(file), None) => {
+            add_file(context, parts, place, object, (file, node)).map_err(|error| context.named(file, error))
+        }
+        (None, Some(shape)) => {
+            if object.end.is_some() || object.clip.is_some() {
+                return Err(context.wrong(place, "`end` and `clip` go with a `file`, not with a `shape`"));
+            }
+            let material = material(context, parts, place, object.material.as_ref())?;
+            let mesh = solid(shape, material);
+            parts.graph.attach(
+                Mesh { name: object.name.clone().unwrap_or_else(|| mesh.name.clone()), ..mesh },
+                node,
+            );
+            Ok(())
+        }
+        _ => Err(context.wrong(place, "give it either a `file` or a `shape`")),
+    }
+}
+
+fn add_file(
+    context: Context,
+    parts: &mut Parts,
+    place: &str,
+    object: &ObjectSpec,
+    (file, node): (&str, usize),
+) -> Result<(), LoadError> {
+    let path = context.beside(file);
+    match Format::of(&path) {
+        Some(Format::Gltf) if object.end.is_some() => {
+            let message = format!("`end` goes with {SURFACES} files; glTF files bring their own animation");
+            Err(context.wrong(place, message))
+        }
+        Some(Format::Gltf) => add_gltf(context, parts, place, object, (&path, node)),
+        Some(_) if object.clip.is_some() => Err(context.wrong(place, "`clip` goes with glTF files")),
+        Some(format) if format.is_surface() => {
+            add_surface(context, parts, place, object, ((&path, format), node))
+        }
+        _ => {
+            let known =
+                import::foreign(&path).unwrap_or_else(|| format!("it is no .gltf, .glb or {SURFACES} file"));
+            Err(context.wrong(place, format!("`{file}`: {known}")))
+        }
+    }
+}
+
+/// Formats that hold one surface, for messages.
+const SURFACES: &str = ".obj, .ply, .off or .stl";
+
+fn add_surface(
+    context: Context,
+    parts: &mut Parts,
+    place: &str,
+    object: &ObjectSpec,
+    ((path, format), node): ((&Path, Format), usize),
+) -> Result<(), LoadError> {
+    let mut start = if object.material.is_some() { bare(path, format)? } else { soup(path, format)? };
+    parts.warnings.append(&mut start.warnings);
+    let looks = std::mem::take(&mut start.looks);
+    let origin = start.origin();
+    let mut whole = start.into_mesh(path, origin)?;
+    // The file's own origin may be far from the surface, and is what the object's transform is about.
+    let middle = Trs { translation: origin, ..Trs::default() };
+    let hook = match origin == DVec3::ZERO {
+        true => node,
+        false => parts.graph.push_node(Node::new("middle", Some(node), Local::Trs(middle))),
+    };
+    if let Some(end) = &object.end {
+        let arrival_s = object.end_s.unwrap_or(1.0 / parts.settings.frame_rate_hz);
+        whole.targets =
+            vec![to_end(&whole, &context.beside(end), origin).map_err(|error| context.named(end, error))?];
+        let track = Track::new(vec![0.0, arrival_s], vec![0.0, 1.0], 1, Interpolation::Linear);
+        parts.graph.nodes[hook].channels.weights = Some(track.map_err(|what| context.wrong(place, what))?);
+    }
+    let first = parts.graph.materials.len();
+    let (meshes, materials) = match &object.material {
+        None => looks.split(whole, first),
+        Some(own) => {
+            let material = make_material(context, &mut parts.warnings, place, own)?;
+            (vec![Mesh { material: first, ..whole }], vec![material])
+        }
+    };
+    parts.graph.materials.extend(materials);
+    meshes.into_iter().for_each(|mesh| parts.graph.attach(mesh, hook));
+    Ok(())
+}
+
+fn add_gltf(
+    context: Context,
+    parts: &mut Parts,
+    place: &str,
+    object: &ObjectSpec,
+    (path, node): (&Path, usize),
+) -> Result<(), LoadError> {
+    let looks = if object.material.is_some() { gltf::Looks::Replaced } else { gltf::Looks::Own };
+    let asset = gltf::import(path, object.clip.as_deref(), looks);
+    let mut asset = asset.map_err(|error| match error {
+        LoadError::Setting { message, .. } => context.wrong(format!("{place}.clip"), message),
+        error => error,
+    })?;
+    if let Some(own) = &object.material {
+        let material = make_material(context, &mut parts.warnings, place, own)?;
+        asset.graph.materials = vec![material];
+        for mesh in &mut asset.graph.meshes {
+            (mesh.material, mesh.colors) = (0, [].into());
+        }
+    }
+    parts.warnings.append(&mut asset.warnings);
+    parts.graph.adopt(asset.graph, node);
+    Ok(())
+}
+
+/// What takes `mesh`, positions relative to `origin`, to the vertices in the file at `end`, as a morph target.
+fn to_end(mesh: &Mesh, end: &Path, origin: DVec3) -> Result<Target, LoadError> {
+    let format = Format::of(end).filter(|format| format.is_surface());
+    let format = format.ok_or_else(|| broken(end, "end", format!("it has to be a {SURFACES} file")))?;
+    let other = bare(end, format)?.into_mesh(end, origin)?;
+    let same = other.positions.len() == mesh.positions.len() && other.triangles == mesh.triangles;
+    if !same {
+        let message = format!(
+            "its {} vertices and {} triangles are not those of {} ({} and {}): both ends need equal topology",
+            other.positions.len(),
+            other.triangles.len(),
+            mesh.name,
+            mesh.positions.len(),
+            mesh.triangles.len()
+        );
+        return Err(broken(end, "end", message));
+    }
+    let positions = mesh.positions.iter().zip(&other.positions).map(|(from, to)| *to - *from).collect();
+    Ok(Target { positions, normals: Vec::new() })
+}
+
+fn solid(shape: &ShapeSpec, material: usize) -> Mesh {
+    match *shape {
+        ShapeSpec::Sphere { radius, segments } => shapes::sphere(radius, segments, material),
+        ShapeSpec::Box { size } => shapes::cuboid(DVec3::from_array(size).as_vec3(), material),
+        ShapeSpec::Plane { size, cells, tiles } => shapes::plane(size, cells, tiles, material),
+        ShapeSpec::Torus { ring, tube, segments } => shapes::torus(ring, tube, segments, material),
+        ShapeSpec::Gear { teeth, radius, thickness } => shapes::gear(teeth, radius, thickness, material),
+        ShapeSpec::Propeller { blades, radius } => shapes::propeller(blades, radius, material),
+    }
+}
+
+fn material(
+    context: Context,
+    parts: &mut Parts,
+    place: &str,
+    spec: Option<&MaterialSpec>,
+) -> Result<usize, LoadError> {
+    let made = match spec {
+        Some(spec) => make_material(context, &mut parts.warnings, place, spec)?,
+        None => soup::grey(),
+    };
+    Ok(parts.graph.push_material(made))
+}
+
+fn make_material(
+    context: Context,
+    warnings: &mut Vec<Warning>,
+    place: &str,
+    spec: &MaterialSpec,
+) -> Result<Material, LoadError> {
+    let plain = soup::grey();
+    let otherwise = if spec.texture.is_some() { Vec3::ONE } else { plain.base_color };
+    let shade = |value| color(context, &format!("{place}.material.color"), value);
+    let base_color = spec.color.map_or(Ok(otherwise), shade)?;
+    let texture = match &spec.texture {
+        Some(TextureSpec::Checker { colors, texels }) => {
+            checker(*texels, colors.map(|color| color.map(linear_to_srgb8))).map(Arc::new)
+        }
+        Some(TextureSpec::Image { file }) => {
+            match reader::load_texture(&context.beside(file), [Wrap::Repeat; 2]) {
+                Ok(texture) => Some(Arc::new(texture)),
+                Err(why) => {
+                    warnings.push(ignored::texture(place, &format!("`{file}`: {why}")));
+                    None
+                }
+            }
+        }
+        None => None,
+    };
+    let (name, opacity) = (place.to_owned(), spec.opacity.unwrap_or(1.0));
+    let alpha = spec.alpha.unwrap_or(if opacity < 1.0 { Alpha::Blended } else { Alpha::Opaque });
+    let (double_sided, unlit) = (spec.double_sided, spec.unlit);
+    Ok(Material { name, base_color, opacity, alpha, texture, double_sided, unlit }.simplified())
+}
+
+fn node(context: Context, place: &str, object: &ObjectSpec) -> Result<Node, LoadError> {
+    let part = |name: &str| format!("{place}.{name}");
+    let rest = Trs {
+        translation: vector(context, &part("position"), object.position)?,
+        rotation: turned(object.rotation_deg),
+        scale: vector(context, &part("scale"), object.scale.unwrap_or([1.0; 3]))?,
+    };
+    vector(context, &part("rotation_deg"), object.rotation_deg)?;
+    let mut node = Node::new(place, None, Local::Trs(rest));
+    node.motion.velocity = vector(context, &part("velocity"), object.velocity)?;
+    if let Some(spin) = &object.spin {
+        let made = Spin::new(DVec3::from_array(spin.axis), spin.rate_hz);
+        let message = "the axis needs a length, and the rate has to be finite";
+        node.motion.spin = Some(made.ok_or_else(|| context.wrong(part("spin"), message))?);
+    }
+    keyframes(object, &rest, &mut node).map_err(|what| context.wrong(part("keyframes"), what))?;
+    Ok(node)
+}
+
+/// About x, then y, then z, in degrees.
+fn turned(degrees: [f64; 3]) -> DQuat {
+    let [x, y, z] = degrees.map(|angle| angle / 360.0);
+    rotation(DVec3::Z, z) * rotation(DVec3::Y, y) * rotation(DVec3::X, x)
+}
+
+fn keyframes(object: &ObjectSpec, rest: &Trs, node: &mut Node) -> Result<(), String> {
+    let keys = &object.keyframes;
+    let Some(last) = keys.last() else { return Ok(()) };
+    let track = |width: usize, numbers: Vec<f64>| {
+        let times = keys.iter().map(|key| key.time_s).collect();
+        let track = Track::new(times, numbers, width, object.interpolation.into())?;
+        Ok::<_, String>(if object.repeat { track.looping(last.time_s) } else { track })
+    };
+    if keys.iter().any(|key| key.position.is_some()) {
+        let of = |key: &spec::ObjectKey| key.position.unwrap_or(rest.translation.to_array());
+        node.channels.translation = Some(track(3, keys.iter().flat_map(of).collect())?);
+    }
+    if keys.iter().any(|key| key.rotation_deg.is_some()) {
+        let of = |key: &spec::ObjectKey| key.rotation_deg.map_or(rest.rotation, turned).to_array();
+        node.channels.rotation = Some(track(4, keys.iter().flat_map(of).collect())?);
+    }
+    if keys.iter().any(|key| key.scale.is_some()) {
+        let of = |key: &spec::ObjectKey| key.scale.unwrap_or(rest.scale.to_array());
+        node.channels.scale = Some(track(3, keys.iter().flat_map(of).collect())?);
+    }
+    Ok(())
 }

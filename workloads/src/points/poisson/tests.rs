@@ -189,3 +189,37 @@ proptest! {
         check::<3>(&PoissonSpec { radius: radius.max(0.2), domain, seed, spacing });
     }
 }
+
+/// The first accepted dart of a level is the one with the earliest time.
+#[test]
+fn darts_of_a_level_are_accepted_in_order_of_time() {
+    const SEEDS: u64 = 2000;
+    let first = |seed| {
+        let spec = PoissonSpec { radius: 0.2, domain: Domain::Torus, seed, spacing: Spacing::Double };
+        let progress: &mut dyn FnMut(usize) = &mut |_| ();
+        let mut throwing = Throwing::<2>::new(&spec, progress).unwrap();
+        let uncovered = UncoveredCells::all(&throwing.grid);
+        throwing.level(&uncovered);
+        throwing.grid.points[0]
+    };
+    let mut mean = [0.0; 2];
+    for [x, y] in (0..SEEDS).map(first) {
+        mean = [mean[0] + x / SEEDS as f64, mean[1] + y / SEEDS as f64];
+    }
+    // The standard error of the mean is 0.0065.
+    assert!(mean.iter().all(|mean| (mean - 0.5).abs() < 0.026), "{mean:?}");
+}
+
+#[test]
+fn cells_without_a_free_point_are_counted_and_others_filled() {
+    let spec = PoissonSpec { radius: 0.25, domain: Domain::Box, seed: 1, spacing: Spacing::Single };
+    let progress: &mut dyn FnMut(usize) = &mut |_| ();
+    let mut throwing = Throwing::<2>::new(&spec, progress).unwrap();
+    let middle = throwing.grid.dart_at(&[0.5, 0.5]);
+    assert!(throwing.keep(&middle) && !throwing.keep(&middle));
+    let level = 20;
+    let at = |x: f64| (x * throwing.grid.across as f64 * f64::from(1 << level)) as u64;
+    let cells = vec![[at(0.51); 2], [at(0.6); 2], [at(0.1); 2]];
+    assert_eq!(throwing.test_representable_points(&UncoveredCells { level, cells }), 2);
+    assert_eq!(throwing.grid.points.len(), 2);
+}

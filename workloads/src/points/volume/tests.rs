@@ -1,7 +1,6 @@
 use glam::DVec3;
 use pipeline::sampling::{HashedSamples, LensShape, Sample, SampleSource};
 
-use super::torus::place;
 use super::*;
 use crate::job::testing::hardware;
 use crate::points::quality::chi_square;

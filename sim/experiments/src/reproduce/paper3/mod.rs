@@ -1,9 +1,8 @@
 //! Paper III, "Measuring Per-Frame Energy Consumption of Real-Time Graphics Applications".
 
 mod blocking;
-mod disturbance;
 mod finding;
-mod launch;
+mod system;
 
 use output::progress::Progress;
 use power_model::{Circumstances, FramePower, Pacing};
@@ -100,10 +99,10 @@ type Compute = fn(&Bench<'_>) -> Result<Done, RunError>;
 const ROWS: [(&str, Compute); 6] = [
     ("III-1", finding::found),
     ("III-2", finding::sums),
-    ("III-3", launch::warm_up),
+    ("III-3", system::warm_up),
     ("III-4", blocking::phone),
     ("III-5", blocking::pc),
-    ("III-6", disturbance::five_seconds),
+    ("III-6", system::five_seconds),
 ];
 
 /// The ids of its rows.

@@ -18,7 +18,7 @@ use crate::reproduce::figure::line;
 use crate::reproduce::row::{Row, numbers};
 use crate::reproduce::settings::Form;
 use crate::reproduce::{Done, Figure};
-use crate::stress::methods::Place;
+use crate::stress::measure::Place;
 use run::RunError;
 
 /// Widths of depth intervals in tiles, over those of the vertices.

@@ -1,14 +1,15 @@
-//! `quintile sample volume`.
+//! `quintile sample white` and `quintile sample volume`: independent points.
 
 use std::path::PathBuf;
 
+use activity::spec::suggestion;
 use clap::Args;
 use serde::Serialize;
 use workloads::points::volume::{Bounds, Inside, Sampled, Solid, Torus};
+use workloads::points::white::{Density, ImageDensity, Named, Numbers, WhiteSpec, columns_for, white_noise};
 use workloads::visibility::load_surface;
 
-use super::Points;
-use super::{Common, Failure, usage};
+use super::{Common, Failure, Points, usage};
 
 /// Arguments of `sample volume`.
 #[derive(Debug, Args)]
@@ -57,9 +58,9 @@ impl VolumeArgs {
     }
 }
 
-/// Facts about the points.
+/// VolumeFacts about the points.
 #[derive(Serialize)]
-struct Facts {
+struct VolumeFacts {
     seed: u64,
     /// Exact volume, from a closed form or the divergence theorem.
     volume: f64,
@@ -69,7 +70,7 @@ struct Facts {
     candidates: u64,
 }
 
-pub(super) fn run(args: &VolumeArgs) -> Result<(), Failure> {
+pub(super) fn volume(args: &VolumeArgs) -> Result<(), Failure> {
     args.common.check(args.mesh.as_deref())?;
     let pool = args.common.threads.pool()?;
     pool.install(|| match &args.mesh {
@@ -77,7 +78,7 @@ pub(super) fn run(args: &VolumeArgs) -> Result<(), Failure> {
             let mesh = load_surface(path)?;
             let solid = Solid::new(&mesh.open, &mesh.triangles, args.tiles)
                 .map_err(|error| Failure { message: format!("{}: {error}", path.display()), code: 1 })?;
-            sample(args, &solid, solid.bounds(), solid.volume().abs())
+            sample_volume(args, &solid, solid.bounds(), solid.volume().abs())
         }
         None => {
             let torus = Torus { ring: args.ring, tube: args.tube };
@@ -89,7 +90,7 @@ pub(super) fn run(args: &VolumeArgs) -> Result<(), Failure> {
             }
             let bounds = torus.bounds(args.tiles);
             thick_enough(args, torus.volume() / bounds.volume())?;
-            sample(args, &torus, &bounds, torus.volume())
+            sample_volume(args, &torus, &bounds, torus.volume())
         }
     })
 }
@@ -111,7 +112,7 @@ fn thick_enough(args: &VolumeArgs, share: f64) -> Result<(), Failure> {
     )))
 }
 
-fn sample(args: &VolumeArgs, solid: &dyn Inside, bounds: &Bounds, volume: f64) -> Result<(), Failure> {
+fn sample_volume(args: &VolumeArgs, solid: &dyn Inside, bounds: &Bounds, volume: f64) -> Result<(), Failure> {
     let seed = args.common.seed;
     let count = args.points() as usize;
     let Sampled { points, candidates } = match args.density {
@@ -129,17 +130,86 @@ fn sample(args: &VolumeArgs, solid: &dyn Inside, bounds: &Bounds, volume: f64) -
         return Err(Failure { message, code: 1 });
     }
     let volume_by_count = points.len() as f64 / candidates.max(1) as f64 * bounds.volume();
-    let facts = Facts { seed, volume, volume_by_count, bounds_volume: bounds.volume(), candidates };
+    let facts = VolumeFacts { seed, volume, volume_by_count, bounds_volume: bounds.volume(), candidates };
     let line = format!("volume {volume:.6}, by count {volume_by_count:.6}; {candidates} candidates");
     args.common.deliver(&Points::new(&points), facts, &line)
+}
+
+/// Arguments of `sample white`.
+#[derive(Debug, Args)]
+pub struct WhiteArgs {
+    /// Dimensions, 1 to 4
+    #[arg(long, value_name = "D", default_value_t = 2, allow_negative_numbers = true, value_parser = clap::value_parser!(u8).range(1..=4))]
+    pub dim: u8,
+    /// Number of points
+    #[arg(long, value_name = "N", default_value_t = 10_000, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..))]
+    pub count: u32,
+    /// The density: constant, ramp, gauss or waves
+    #[arg(long, value_name = "NAME", default_value = "gauss", value_parser = density, conflicts_with = "image")]
+    pub density: Named,
+    /// A PNG or JPEG image as a density in two dimensions: bright is dense
+    #[arg(long, value_name = "FILE")]
+    pub image: Option<PathBuf>,
+    /// Cells along an axis; the density is bounded in each. 1 is plain rejection
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=4096))]
+    pub columns: Option<u32>,
+    /// Take candidates from a low-discrepancy sequence: they follow the density better than independent ones
+    #[arg(long)]
+    pub low_discrepancy: bool,
+    #[command(flatten)]
+    pub common: Common,
+}
+
+fn density(name: &str) -> Result<Named, String> {
+    let known = Named::ALL.map(|(name, _)| name);
+    Named::by_name(name).ok_or_else(|| format!("unknown density `{name}`; {}", suggestion(name, &known)))
+}
+
+/// WhiteFacts about the points.
+#[derive(Serialize)]
+struct WhiteFacts {
+    seed: u64,
+    candidates: u64,
+    columns: u32,
+    low_discrepancy: bool,
+}
+
+pub(super) fn white(args: &WhiteArgs) -> Result<(), Failure> {
+    args.common.check(args.image.as_deref())?;
+    if let Some(path) = &args.image {
+        if args.dim != 2 {
+            return Err(usage("--image: a picture is a density of two dimensions; leave --dim out or say 2"));
+        }
+        let image = ImageDensity::load(path).map_err(|e| Failure { message: e.to_string(), code: 1 })?;
+        return sample_white::<2>(args, &image);
+    }
+    match args.dim {
+        1 => sample_white::<1>(args, &args.density),
+        2 => sample_white::<2>(args, &args.density),
+        3 => sample_white::<3>(args, &args.density),
+        _ => sample_white::<4>(args, &args.density),
+    }
+}
+
+fn sample_white<const D: usize>(args: &WhiteArgs, density: &dyn Density<D>) -> Result<(), Failure> {
+    let numbers = if args.low_discrepancy { Numbers::LowDiscrepancy } else { Numbers::Independent };
+    let columns = args.columns.unwrap_or_else(|| columns_for(D));
+    let seed = args.common.seed;
+    let spec = WhiteSpec { count: args.count as usize, seed, across: columns, numbers };
+    let pool = args.common.threads.pool()?;
+    let found = pool.install(|| white_noise(density, &spec)).map_err(usage)?;
+    let line = format!("{} candidates", found.candidates);
+    let facts =
+        WhiteFacts { seed, candidates: found.candidates, columns, low_discrepancy: args.low_discrepancy };
+    args.common.deliver(&Points::new(&found.points), facts, &line)
 }
 
 #[cfg(test)]
 mod tests {
     use clap::Parser;
+    use output::terminal::Terminal;
 
     use crate::cli::{Cli, Command};
-    use output::terminal::Terminal;
 
     #[test]
     fn a_mesh_has_no_ring_and_no_tube() {
