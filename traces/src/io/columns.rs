@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::description::Description;
+use super::samples::Description;
 use super::time_base::Stamps;
 use super::{CURRENT_A, POWER_W, ReadError, ReadOptions, Repair, TIME_S, VOLTAGE_V};
 use crate::units::{MICRO, Quantity, quantity_word, trace_unit, written_out_unit};

@@ -12,8 +12,7 @@ use flate2::write::GzEncoder;
 use rayon::prelude::*;
 
 use super::columns::{Layout, Opened, Picked, RowBatch, RowSource, layout};
-use super::description::{Description, to_json};
-use super::samples::{TraceChunk, TraceHeader, TraceReader, TraceWriter};
+use super::samples::{Description, TraceChunk, TraceHeader, TraceReader, TraceWriter, to_json};
 use super::time_base::Stamps;
 use super::{CURRENT_A, ReadError, ReadOptions, Repair, RepairKind, TIME_S, VOLTAGE_V, WriteError, atomic};
 

@@ -5,8 +5,7 @@
 //! of the trace, which [`read`](super::read()) takes back.
 
 use super::columns::{Layout, Opened, RowBatch, RowSource, layout};
-use super::description::{self, Description};
-use super::samples::{TraceChunk, TraceReader, TraceWriter};
+use super::samples::{Description, TraceChunk, TraceReader, TraceWriter, describe};
 use super::time_base::Stamps;
 use super::{ReadError, ReadOptions, Repair, RepairKind, TIME_S, WriteError, atomic};
 use crate::trace::Metadata;
@@ -73,7 +72,7 @@ impl<W: Write + Seek> Writer<W> {
     /// not finite, the description is longer than 64 MiB, or `out` cannot be written.
     pub fn new(out: W, rate_hz: f64, start_s: f64, metadata: &Metadata) -> Result<Self, WriteError> {
         let whole_hz = whole_rate_hz(rate_hz)?;
-        let description = description::describe(rate_hz, start_s, None, metadata)?.to_keyed_json()?;
+        let description = describe(rate_hz, start_s, None, metadata)?.to_keyed_json()?;
         if description.len() >= MAX_PAYLOAD_BYTES as usize {
             return Err(WriteError::Encode("the description is longer than 64 MiB: leave out marks".into()));
         }

@@ -7,7 +7,6 @@
 pub mod atomic;
 mod columns;
 pub mod csv;
-mod description;
 mod error;
 mod formats;
 pub mod jls;

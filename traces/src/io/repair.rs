@@ -1,7 +1,7 @@
 //! Repair of input, if requested: sort rows, fill gaps and non-finite values. Every repair is reported.
 
 use super::ReadError;
-use super::description::Description;
+use super::samples::Description;
 use super::time_base::{Stamps, usual_rate_hz};
 use serde::Serialize;
 use std::ops::Range;

@@ -1,8 +1,8 @@
 //! Rows of a file of any format, in pieces, so that no file has to fit into memory.
 
 use super::columns::{Layout, Open, Opened, Rail, RowBatch, RowSource};
-use super::description::Description;
 use super::formats::{FORMATS, TraceFormat, readable};
+use super::samples::Description;
 use super::time_base::mean_rate_hz;
 use super::{ReadError, ReadOptions, Repair, VOLTAGE_V, csv};
 use crate::trace::Metadata;

@@ -23,10 +23,8 @@ use parquet::schema::types::{ColumnPath, Type};
 use rayon::prelude::*;
 
 use super::columns::{Layout, Opened, RowBatch, RowSource, layout};
-use super::description::{Description, KEYS};
-use super::{ReadError, ReadOptions};
-use crate::io::samples::{TraceChunk, TraceHeader, TraceReader, TraceWriter};
-use crate::io::{CURRENT_A, TIME_NS, VOLTAGE_V, WriteError, atomic, description};
+use super::samples::{Description, KEYS, TraceChunk, TraceHeader, TraceReader, TraceWriter, to_json};
+use super::{CURRENT_A, ReadError, ReadOptions, TIME_NS, VOLTAGE_V, WriteError, atomic};
 use column::Column;
 use pages::first_page;
 
@@ -175,7 +173,7 @@ const FIELDS: [(&str, Physical); 3] =
 /// [`WriteError`] if a mark is not finite, the writer fails, or the samples cannot be read.
 pub fn write<W: Write + Send>(trace: &dyn TraceReader, out: W) -> Result<(), WriteError> {
     let header = trace.header();
-    let json = description::to_json(&header, false)?;
+    let json = to_json(&header, false)?;
     write_described(trace, header, json, out)
 }
 

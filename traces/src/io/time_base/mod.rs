@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use multiversion::multiversion;
 
 use super::ReadError;
-use super::description::Description;
+use super::samples::Description;
 use crate::stats::upper_median;
 
 /// Farthest that rounding of the rate may move the last sample, in sample periods.
