@@ -175,13 +175,13 @@ fn used_units(timeline: &Timeline) -> [bool; Unit::COUNT] {
 #[derive(Clone, Debug, PartialEq)]
 pub struct FramePower {
     /// Length of a bin in picoseconds.
-    pub(crate) bin_ps: u64,
+    bin_ps: u64,
     /// Length of the frame in picoseconds.
-    pub(crate) duration_ps: u64,
+    duration_ps: u64,
     /// Power by part and bin in watts; the last bin ends with the frame.
-    pub(crate) watts: Vec<[f64; PARTS]>,
+    watts: Vec<[f64; PARTS]>,
     /// Energy of the frame by part, in joules.
-    pub(crate) energy: Energy,
+    energy: Energy,
 }
 
 /// Seconds in a picosecond.
@@ -258,7 +258,7 @@ impl FramePower {
 }
 
 /// True lengths in picoseconds of the bins that begin before the end of the frame.
-pub(crate) fn bin_lengths_ps(bin_ps: u64, duration_ps: u64) -> impl Iterator<Item = u64> {
+fn bin_lengths_ps(bin_ps: u64, duration_ps: u64) -> impl Iterator<Item = u64> {
     let mut left_ps = duration_ps;
     std::iter::from_fn(move || {
         let length_ps = left_ps.min(bin_ps);

@@ -200,7 +200,7 @@ fn first_tick_from(time_ps: u64, earliest: u64, rate: Hertz) -> u64 {
 /// the integral of the curve equals the energy spent. (Exact power over rounded lengths loses 1e-12 of a
 /// short frame.)
 #[derive(Debug, Default)]
-pub(crate) struct Ledger {
+struct Ledger {
     now_ps: u64,
     /// Energy of spans too short to move the rounded time; it goes into the next longer span.
     pending_j: f64,
@@ -210,17 +210,17 @@ pub(crate) struct Ledger {
 
 impl Ledger {
     /// A ledger that begins at 0 s.
-    pub(crate) fn new() -> Self {
+    fn new() -> Self {
         Self { edges_s: vec![0.0], ..Self::default() }
     }
 
     /// Current time, as the curve has it.
-    pub(crate) fn now_s(&self) -> f64 {
+    fn now_s(&self) -> f64 {
         self.now_ps as f64 * S_PER_PS
     }
 
     /// Spend `joules` evenly over the next `length_ps` picoseconds.
-    pub(crate) fn spend(&mut self, length_ps: u64, joules: f64) -> Result<(), PacingError> {
+    fn spend(&mut self, length_ps: u64, joules: f64) -> Result<(), PacingError> {
         self.now_ps = self.now_ps.checked_add(length_ps).ok_or(PacingError::TooLong)?;
         self.pending_j += joules;
         let (now_s, before_s) = (self.now_s(), self.edges_s.last().copied().unwrap_or(0.0));
@@ -233,7 +233,7 @@ impl Ledger {
     }
 
     /// The finished curve.
-    pub(crate) fn close(mut self) -> Result<Curve, PacingError> {
+    fn close(mut self) -> Result<Curve, PacingError> {
         if let ([.., before_s, end_s], Some(last_w)) = (self.edges_s.as_slice(), self.watts.last_mut()) {
             *last_w += self.pending_j / (end_s - before_s);
         }

@@ -272,7 +272,7 @@ impl EnergyRow {
 /// An event, deserialized from its name.
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(try_from = "String")]
-pub(crate) struct EventName(pub(crate) Event);
+struct EventName(Event);
 
 impl TryFrom<String> for EventName {
     type Error = String;

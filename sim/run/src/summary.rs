@@ -7,7 +7,7 @@ use output::MeanSd;
 use output::report::Headline;
 use power_model::Energy;
 use serde::Serialize;
-use traces::energy::{FrameEnergy, Spread, Summary as FrameSummary};
+use traces::energy::{FrameEnergy, FrameSummary, Spread};
 use warnings::Warning;
 use workloads::scene::CameraUsed;
 

@@ -161,8 +161,8 @@ fn charts() -> Vec<Entry> {
 }
 
 /// Options of a workload.
-pub(super) struct Options {
-    pub workload: &'static str,
+struct WorkloadOptions {
+    workload: &'static str,
     options: &'static [Doc],
     defaults: fn() -> Result<String, serde_json::Error>,
 }
@@ -186,8 +186,8 @@ const SCENE: Range = Words("a built-in scene or a file");
 const SWITCH: Range = Words("true or false");
 
 /// The options of every workload, in the order of their declarations.
-pub(super) const OPTIONS: &[Options] = &[
-    Options {
+const OPTIONS: &[WorkloadOptions] = &[
+    WorkloadOptions {
         workload: "caustics",
         options: &[
             Doc(
@@ -213,7 +213,7 @@ pub(super) const OPTIONS: &[Options] = &[
         ],
         defaults: || serde_json::to_string(&caustics::Options::default()),
     },
-    Options {
+    WorkloadOptions {
         workload: "ccd",
         options: &[
             Doc("file", Words("an .mts file"), "moving objects; without it, balls that move at random"),
@@ -224,7 +224,7 @@ pub(super) const OPTIONS: &[Options] = &[
         ],
         defaults: || serde_json::to_string(&collision::Options::default()),
     },
-    Options {
+    WorkloadOptions {
         workload: "glossy",
         options: &[
             Doc("scene", SCENE, "the scene; without it, a test scene of the workload"),
@@ -254,7 +254,7 @@ pub(super) const OPTIONS: &[Options] = &[
         ],
         defaults: || serde_json::to_string(&glossy::Options::default()),
     },
-    Options {
+    WorkloadOptions {
         workload: "multiview",
         options: &[
             Doc("scene", SCENE, "the scene"),
@@ -290,7 +290,7 @@ pub(super) const OPTIONS: &[Options] = &[
         ],
         defaults: || serde_json::to_string(&multiview::Options::default()),
     },
-    Options {
+    WorkloadOptions {
         workload: "occlusion",
         options: &[
             Doc("walls", Numbers(0.0, 1000.0), "number of walls"),
@@ -308,7 +308,7 @@ pub(super) const OPTIONS: &[Options] = &[
         ],
         defaults: || serde_json::to_string(&occlusion::Options::default()),
     },
-    Options {
+    WorkloadOptions {
         workload: "sampling",
         options: &[
             Doc("radius", Numbers(0.005, 0.5), "least distance of points in the unit square"),
@@ -317,7 +317,7 @@ pub(super) const OPTIONS: &[Options] = &[
         ],
         defaults: || serde_json::to_string(&points::job::Options::default()),
     },
-    Options {
+    WorkloadOptions {
         workload: "soft-shadows",
         options: &[
             Doc("scene", SCENE, "the scene; without it, a test scene of the workload"),
@@ -345,16 +345,16 @@ pub(super) const OPTIONS: &[Options] = &[
 
 /// An option as it is printed.
 #[derive(Serialize)]
-pub(super) struct Listed {
+struct Listed {
     pub name: &'static str,
     pub default: Value,
     pub range: String,
     pub meaning: &'static str,
 }
 
-impl Options {
+impl WorkloadOptions {
     /// The options with their defaults.
-    pub(super) fn listed(&self) -> Result<Vec<Listed>, Failure> {
+    fn listed(&self) -> Result<Vec<Listed>, Failure> {
         let internal = |error| Failure { message: format!("{}: {error}", self.workload), code: 1 };
         let defaults: Map<String, Value> =
             (self.defaults)().and_then(|text| serde_json::from_str(&text)).map_err(internal)?;
@@ -385,7 +385,7 @@ fn plain(value: f64) -> String {
 }
 
 /// A default as `--set` takes it.
-pub(super) fn as_set(value: &Value) -> String {
+fn as_set(value: &Value) -> String {
     match value {
         Value::Null => "none".to_owned(),
         Value::String(text) => text.clone(),

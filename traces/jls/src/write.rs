@@ -334,7 +334,7 @@ const LANES: usize = 8;
 /// Parts are put together by Chan, Golub and LeVeque, "Updating Formulae and a Pairwise Algorithm for
 /// Computing Sample Variances", 1979, equation 2.1.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Moments {
+struct Moments {
     count: u64,
     mean: f64,
     squares: f64,
@@ -370,7 +370,7 @@ impl Moments {
     const NONE: Self = Self { count: 0, mean: 0.0, squares: 0.0, lowest: 0.0, highest: 0.0 };
 
     /// The moments of samples.
-    pub fn of(values: &[f32]) -> Self {
+    fn of(values: &[f32]) -> Self {
         // No sum of so few f32 overflows: it is finite if and only if all of them are.
         if lanes(values, |value| value).is_finite() {
             return Self::finite(values);
@@ -394,7 +394,7 @@ impl Moments {
     }
 
     /// The moments of several parts together.
-    pub fn together(parts: &[Self]) -> Self {
+    fn together(parts: &[Self]) -> Self {
         parts.iter().fold(Self::NONE, |sum, part| sum.and(part))
     }
 
@@ -415,7 +415,7 @@ impl Moments {
 
     /// The entry in a file: mean, standard deviation (over the number), lowest, highest; NaN where all are
     /// missing.
-    pub fn entry(&self) -> [f32; 4] {
+    fn entry(&self) -> [f32; 4] {
         if self.count == 0 {
             return [f32::NAN; 4];
         }

@@ -12,6 +12,6 @@ pub(crate) use integral::Sums;
 pub use integral::{FrameEnergy, PowerIntegral, TrueFrame, energies_j, finishes_s, levels_w};
 pub use run::{InverseUnits, Pass, PassError, RunEnergy, RunError, RunOptions, check_passes, passes_j};
 pub use statistics::{
-    Histogram, Pooled, Repeats, Summary, WarmUp, mean_over_discarded, outliers, pooled, warm_up, whole,
+    FrameSummary, Histogram, Pooled, Repeats, WarmUp, mean_over_discarded, outliers, pooled, warm_up, whole,
 };
 pub use table::{ExtraColumn, FrameTable, TABLE_COLUMNS, TableError};

@@ -10,7 +10,7 @@ use crate::stats::about_mean;
 
 /// Summary of a table of frames. Averages are over frames; for joules per pixel divide by the pixels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Summary {
+pub struct FrameSummary {
     /// How many frames.
     pub frames: usize,
     /// Sum of the energies, J.
@@ -25,7 +25,7 @@ pub struct Summary {
     pub overall_power_w: f64,
 }
 
-impl Summary {
+impl FrameSummary {
     /// The summary of some frames; `None` for no frames.
     pub fn of(frames: &[FrameEnergy]) -> Option<Self> {
         let spread =
@@ -314,7 +314,7 @@ mod tests {
         assert!((spread.deviation - (32.0_f64 / 7.0).sqrt()).abs() < 1e-15);
         assert_eq!(Spread::of(&[3.0]), Some(Spread { mean: 3.0, deviation: 0.0, median: 3.0 }));
         assert_eq!(Spread::of(&[]), None);
-        assert_eq!(Summary::of(&[]), None);
+        assert_eq!(FrameSummary::of(&[]), None);
     }
 
     #[test]

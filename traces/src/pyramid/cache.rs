@@ -73,7 +73,7 @@ fn seal(head: &[u8], sums: &[u8]) -> u32 {
 }
 
 /// The cache file found beside a trace.
-pub(super) enum Found {
+pub(super) enum Cached {
     /// The pyramid of the trace, whole as far as can be seen without its entries.
     Whole(Pyramid),
     /// Nothing, or the pyramid of another trace or version.
@@ -83,28 +83,28 @@ pub(super) enum Found {
 }
 
 /// Searches the pyramid of the trace with this stamp.
-pub(super) fn kept(path: &Path, stamp: u64) -> Found {
-    let Ok(mut file) = File::open(path) else { return Found::Other };
+pub(super) fn kept(path: &Path, stamp: u64) -> Cached {
+    let Ok(mut file) = File::open(path) else { return Cached::Other };
     let mut head = [0; HEADER_BYTES];
     if file.read_exact(&mut head).is_err() {
-        return Found::Damaged;
+        return Cached::Damaged;
     }
     let word = |index: usize| head[8 * index..].first_chunk().map_or(0, |word| u64::from_le_bytes(*word));
     if word(0) == MAGIC_1 {
-        return Found::Other;
+        return Cached::Other;
     }
     let (samples, start_s, rate_hz) = (word(2), f64::from_bits(word(3)), f64::from_bits(word(4)));
-    let Some((sizes, sums)) = checksums(&mut file, samples) else { return Found::Damaged };
+    let Some((sizes, sums)) = checksums(&mut file, samples) else { return Cached::Damaged };
     if word(0) != MAGIC || word(CHECKSUM_WORD) != u64::from(seal(&head, &sums)) {
-        return Found::Damaged;
+        return Cached::Damaged;
     }
     if word(1) != stamp {
-        return Found::Other;
+        return Cached::Other;
     }
     let sums = sums.as_chunks().0.iter().map(|sum| u32::from_le_bytes(*sum)).collect();
     let clock = Clock { start_s, rate_hz, samples: Some(samples) };
     let store = Store::File(Kept { path: path.to_owned(), sizes, sums });
-    Found::Whole(Pyramid { clock, samples, store, was_damaged: false })
+    Cached::Whole(Pyramid { clock, samples, store, was_damaged: false })
 }
 
 /// Entries of each level and the bytes of the checksums, which come next; `None` if the file is not as long
@@ -171,8 +171,8 @@ mod tests {
             bytes[at] ^= 0x10;
             fs::write(&kept_at, &bytes).unwrap();
             let found = kept(&kept_at, stamp(&path, &options));
-            assert!(at >= 64 || matches!(found, Found::Damaged), "byte {at}");
-            let damaged = if let Found::Whole(pyramid) = found { Some(pyramid) } else { None };
+            assert!(at >= 64 || matches!(found, Cached::Damaged), "byte {at}");
+            let damaged = if let Cached::Whole(pyramid) = found { Some(pyramid) } else { None };
             let looks = [(0.0, 200.0, 1000), (0.0, 200.0, 10), (100.0, 200.0, 3000), (0.0, 99.0, 1500)];
             let shown = |(from_s, to_s, columns)| {
                 let shown = damaged.as_ref().and_then(|pyramid| pyramid.columns(from_s, to_s, columns));

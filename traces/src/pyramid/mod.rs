@@ -8,7 +8,7 @@ use core::ops::Range;
 use std::path::{Path, PathBuf};
 
 use crate::io::{ReadError, ReadOptions, RowBatch, Rows, Stamps, rate_of_steps_hz, read};
-use crate::pyramid::cache::Found;
+use crate::pyramid::cache::Cached;
 use crate::stream::{Clock, clock};
 use crate::trace::Trace;
 
@@ -91,9 +91,9 @@ impl Pyramid {
     /// [`ReadError`] if the trace cannot be read.
     pub fn of_file(path: &Path, options: &ReadOptions) -> Result<Self, ReadError> {
         match cache::kept(&pyramid_path(path), cache::stamp(path, options)) {
-            Found::Whole(pyramid) => Ok(pyramid),
-            Found::Other => Self::anew(path, options),
-            Found::Damaged => Ok(Self { was_damaged: true, ..Self::anew(path, options)? }),
+            Cached::Whole(pyramid) => Ok(pyramid),
+            Cached::Other => Self::anew(path, options),
+            Cached::Damaged => Ok(Self { was_damaged: true, ..Self::anew(path, options)? }),
         }
     }
 
@@ -104,9 +104,9 @@ impl Pyramid {
     /// [`ReadError`] if the trace cannot be read.
     pub fn look(path: &Path, options: &ReadOptions) -> Result<Self, ReadError> {
         match cache::kept(&pyramid_path(path), cache::stamp(path, options)) {
-            Found::Whole(pyramid) => Ok(pyramid),
-            Found::Other => Self::build(path, options),
-            Found::Damaged => Ok(Self { was_damaged: true, ..Self::build(path, options)? }),
+            Cached::Whole(pyramid) => Ok(pyramid),
+            Cached::Other => Self::build(path, options),
+            Cached::Damaged => Ok(Self { was_damaged: true, ..Self::build(path, options)? }),
         }
     }
 

@@ -62,7 +62,7 @@ pub struct Report {
 
 /// The part of `summary.json`.
 #[derive(Serialize)]
-pub struct Summary<'a> {
+pub struct StressSummary<'a> {
     /// Samples lost over all rows: must be none.
     pub samples_lost: u64,
     /// Boxes over all rows that leave out what truly touches: must be none.
@@ -164,8 +164,8 @@ fn stem(name: &str) -> String {
 
 impl Report {
     /// The part of `summary.json`.
-    pub fn summary(&self) -> Summary<'_> {
-        Summary {
+    pub fn summary(&self) -> StressSummary<'_> {
+        StressSummary {
             samples_lost: self.rows.iter().map(|row| row.samples_lost).sum(),
             pairs_wrong: self.rows.iter().map(|row| row.intervals.pairs_wrong).sum(),
             side_px: self.size.side_px,

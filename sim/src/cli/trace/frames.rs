@@ -7,7 +7,7 @@ use output::table::{Table, counted, si, si_digits};
 use output::terminal::Terminal;
 use serde::Serialize;
 use serde_json::{Value, json};
-use traces::energy::{FrameTable, InverseUnits, Summary, whole};
+use traces::energy::{FrameSummary, FrameTable, InverseUnits, whole};
 use traces::frames::{Rule, Threshold};
 use traces::io::TraceFormat;
 use traces::search::FrameSet;
@@ -63,8 +63,10 @@ pub(super) fn run(args: &FramesArgs, terminal: &Terminal) -> Result<(), Failure>
         let pixels = args.find.pixels.or(frames.set.metadata.pixels);
         let table = FrameTable::new(std::mem::take(&mut frames.set.energies), pixels);
         let write = |out| traces::io::atomic::write_file(out, |file| table.write_csv(file));
-        let (written, summary) =
-            rayon::join(|| args.out.as_deref().map_or(Ok(()), write), || Summary::of(whole(table.frames())));
+        let (written, summary) = rayon::join(
+            || args.out.as_deref().map_or(Ok(()), write),
+            || FrameSummary::of(whole(table.frames())),
+        );
         written?;
         Ok::<_, Failure>((frames, table, summary, pixels))
     })?;
@@ -110,7 +112,7 @@ struct Row {
 fn json_report(
     frames: &Frames,
     table: &FrameTable,
-    summary: Option<Summary>,
+    summary: Option<FrameSummary>,
     pixels: Option<u64>,
     inverse: bool,
 ) -> Value {
@@ -143,7 +145,7 @@ fn json_report(
     report
 }
 
-fn text(frames: &FrameSet, table: &FrameTable, summary: Option<Summary>, pixels: Option<u64>) -> String {
+fn text(frames: &FrameSet, table: &FrameTable, summary: Option<FrameSummary>, pixels: Option<u64>) -> String {
     let mut lines = String::new();
     if let Some(p) = &frames.proposal {
         lines += &format!(
