@@ -175,8 +175,8 @@ impl Memory {
         for line in head.moved() {
             let seen = Span { from: accepted.from + period, to: accepted.to + period };
             let moved = self.dram.transfer(line, count, turn, seen);
-            // The channel's queue holds `backlog`; the rest of the run waits in front of the level above.
-            accepted.to = accepted.to.max(moved.issued.saturating_sub(self.dram.backlog()));
+            // What the channel's queue does not hold waits in front of the level above.
+            accepted.to = accepted.to.max(moved.queued);
             fetched.moved = fetched.moved.max(moved.data);
             if head.fetched() == Some(line) {
                 let latency = self.dram.latency() + latency + self.latency;
@@ -233,6 +233,11 @@ const BUS_SLOT_LINES: u32 = 4;
 /// Lines per slot of a bank calendar.
 const BANK_SLOT_LINES: u32 = 32;
 
+/// Groups of lines remembered per channel, over the lines that its queue holds. Some come later in time.
+const RECENT_GROUPS: usize = 4;
+/// Most groups that are remembered; larger queues are taken as if in order.
+const MAX_RECENT_GROUPS: usize = 256;
+
 /// Latest rows remembered per bank.
 const REMEMBERED_ROWS: usize = 4;
 
@@ -265,6 +270,42 @@ struct Channel {
     banks: Vec<Bank>,
     /// Lines so far.
     lines: u64,
+    /// The latest groups of lines, a ring, and where the oldest is.
+    recent: Box<[Waiting]>,
+    oldest: usize,
+    /// Scratch memory of [`Self::room_at`].
+    leaving: Vec<(Time, u64)>,
+}
+
+/// Lines in the queue of a channel.
+#[derive(Clone, Copy, Debug, Default)]
+struct Waiting {
+    /// When they come, and when the last is issued.
+    seen: Time,
+    issued: Time,
+    count: u64,
+}
+
+impl Channel {
+    /// When a queue of `queue` lines has room for another, if that comes at `seen`: lines leave in any order.
+    fn room_at(&mut self, seen: Time, queue: u64) -> Time {
+        let waits = |line: &&Waiting| line.seen <= seen && line.issued > seen;
+        self.leaving.clear();
+        self.leaving.extend(self.recent.iter().filter(waits).map(|line| (line.issued, line.count)));
+        self.leaving.sort_unstable();
+        // The last to leave stay in the queue.
+        let mut held = 0;
+        let last = self.leaving.iter().rev().find(|(_, count)| {
+            held += count;
+            held >= queue
+        });
+        last.map_or(seen, |&(issued, _)| issued)
+    }
+
+    fn note(&mut self, lines: Waiting) {
+        self.recent[self.oldest] = lines;
+        self.oldest = (self.oldest + 1) % self.recent.len();
+    }
 }
 
 /// Lines of one row in a bank.
@@ -283,8 +324,8 @@ struct RowUse {
 /// Times of a transfer over the bus.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Moved {
-    /// When the last line is issued.
-    pub issued: Time,
+    /// When the queue of the channel has room for the last line.
+    pub queued: Time,
     /// When its data has been transferred.
     pub data: Time,
 }
@@ -312,7 +353,15 @@ impl Dram {
         let [bus, time] =
             [BUS_SLOT_LINES, BANK_SLOT_LINES].map(|lines| Calendar::new(burst * Time::from(lines), 1));
         let bank = Bank { time, rows: [OpenRow::NONE; REMEMBERED_ROWS] };
-        let channel = Channel { bus, banks: vec![bank; spec.banks.get() as usize], lines: 0 };
+        let remembered = (RECENT_GROUPS * spec.queue.get() as usize).min(MAX_RECENT_GROUPS);
+        let channel = Channel {
+            bus,
+            banks: vec![bank; spec.banks.get() as usize],
+            lines: 0,
+            recent: vec![Waiting::default(); remembered].into(),
+            oldest: 0,
+            leaving: Vec::new(),
+        };
         Self {
             map: AddressMap::new(spec),
             channels: vec![channel; spec.channels.get() as usize],
@@ -330,11 +379,6 @@ impl Dram {
     /// Group of a line; all lines of a group are in the same row.
     pub fn group(&self, line: u32) -> u32 {
         self.map.group(line)
-    }
-
-    /// Transfer time of a full queue.
-    pub fn backlog(&self) -> Time {
-        self.backlog
     }
 
     /// Latency from the end of a transfer to the L2.
@@ -365,9 +409,14 @@ impl Dram {
             count: count.into(),
         };
         bank.note(used, opens.is_some());
+        // A queue in order would hold `backlog`. Lines of other banks leave before, and make room.
+        let in_order = used.issued.saturating_sub(self.backlog);
+        let is_full = in_order > seen.to;
+        let queued = if is_full { channel.room_at(seen.to, self.queue).min(in_order) } else { in_order };
         channel.lines += u64::from(count);
+        channel.note(Waiting { seen: seen.from, issued: used.issued, count: used.count });
         self.end = self.end.max(end);
-        Moved { issued: end - self.burst, data: end + self.cas }
+        Moved { queued, data: end + self.cas }
     }
 
     /// End of the last transfer.
