@@ -70,9 +70,8 @@ fn flags() {
 #[test]
 fn flags_without_effect_on_a_workload_are_refused() {
     let mut refusals = Refusals::default();
-    let cases: [(&[&str], &[&str], &str); 6] = [
+    let cases: [(&[&str], &[&str], &str); 5] = [
         (&["occlusion", "--lens", "0.3"], &["--lens", "`occlusion`"], "give --set lens=... instead"),
-        (&["occlusion", "--timing", "sampled"], &["--timing sampled", "`occlusion`"], "leave it out"),
         (&["ccd", "--samples", "8"], &["--samples", "`ccd`"], "leave it out"),
         (&["ccd", "--size", "64x64"], &["--size", "`ccd`"], "give --set resolution=... instead"),
         (&["caustics", "--focus", "3"], &["--focus", "`caustics`"], "leave it out"),

@@ -101,6 +101,27 @@ fn heat_maps_add_up_to_the_counters() {
     assert_eq!(report, events.len(), "the report shows the frame in the middle");
 }
 
+/// Joules of pixels are events times energies: those of all tiles and of nowhere add up to the energy of all events.
+#[test]
+fn heat_maps_of_energy_add_up_to_that_of_the_events() {
+    for (name, args) in [("tiny", &[][..]), ("occlusion", &["--size", "64x36", "--frames", "0..1"])] {
+        let results = quintile().run(name, &[args, &["--heat", "joules"]].concat());
+        let csv = fs::read_to_string(results.path("heat/joules_0000.csv")).unwrap();
+        assert!(csv.starts_with("x_px,y_px,width_px,height_px,energy_J\n"), "{csv}");
+        let joules = |row: &str| row.rsplit(',').next().unwrap().parse::<f64>().unwrap();
+        let placed: f64 = csv.lines().skip(1).map(joules).sum();
+        let summary = results.summary();
+        let passes = summary["passes"].as_array().unwrap();
+        let events: f64 = passes.iter().map(|pass| pass["events_j"].as_f64().unwrap()).sum();
+        let frames = summary["frames"].as_array().unwrap().len() as f64;
+        assert!(placed > 0.5 * events / frames && placed < events / frames, "{name}: {placed} of {events}");
+        let exr = image::open(results.path("heat/joules_0000.exr")).unwrap().to_rgb32f();
+        let pixels: f64 = exr.pixels().map(|pixel| f64::from(pixel.0[0])).sum();
+        assert!((pixels / placed - 1.0).abs() < 1e-3, "{name}: {pixels} in pixels, {placed} in tiles");
+        assert!(results.text("report.html").contains("joules_000"));
+    }
+}
+
 /// Of a workload, all passes of the size of the image are on one map.
 #[test]
 fn heat_maps_of_workloads_show_all_passes() {

@@ -106,6 +106,73 @@ fn the_requested_accuracy_is_met() {
     }
 }
 
+/// Small images of every workload.
+fn workload(name: &str, args: &[&str]) -> Results {
+    let size: &[&str] = match name {
+        "ccd" => &["--set", "resolution=16", "--set", "balls=8"],
+        "sampling" => &["--size", "64x64"],
+        _ => &["--size", "64x36"],
+    };
+    quintile().run(name, &[size, args].concat())
+}
+
+fn workloads() -> impl Iterator<Item = &'static str> {
+    workloads::catalog::names().map(|(name, _)| name)
+}
+
+/// The expected error of a workload is within the requested accuracy, or it warns; and so is the actual one of every frame.
+#[test]
+fn workloads_meet_the_requested_accuracy() {
+    for name in workloads() {
+        let results = workload(name, &["--frames", "0..2", "--accuracy", "3%", "--verify"]);
+        let summary = results.summary();
+        let [expected, actual, worst] =
+            ["/choice/expected_error", "/verified/error", "/verified/worst_frame_error"]
+                .map(|at| number(&summary, at));
+        assert!(expected <= 0.03 && summary["choice"]["meets_accuracy"] == true, "{name}: {expected}");
+        assert!(actual <= 0.03 && worst <= 0.03, "{name}: {actual}, {worst}, expected {expected}");
+    }
+}
+
+/// Cycles of every frame at `packet` are near those at `stepped`, or the run warns.
+#[test]
+fn packet_is_near_stepped_for_workloads() {
+    for name in workloads() {
+        let results = workload(name, &["--frames", "0..2", "--verify"]);
+        let worst = number(&results.summary(), "/verified/worst_frame_error");
+        let warns = results.warning_codes().contains(&"memory-rows".to_owned());
+        assert!(worst <= 0.08 || warns, "{name}: {worst}");
+    }
+}
+
+/// Frames of workloads are predicted as those of scenes are. Simulated ones are those of `packet`, and the total is near.
+#[test]
+fn frames_of_workloads_are_predicted() {
+    for name in workloads() {
+        let [sampled, whole] =
+            ["sampled", "packet"].map(|level| workload(name, &["--frames", "0..10", "--timing", level]));
+        let pairs: Vec<_> = rows(&sampled).into_iter().zip(rows(&whole)).collect();
+        for (row, truth) in &pairs {
+            let same = row["cycles"] == truth["cycles"] && row["counts_hash"] == truth["counts_hash"];
+            assert!(same || row["predicted"] == true, "{name}: {row} {truth}");
+        }
+        let [found, right] =
+            [&sampled, &whole].map(|run| rows(run).iter().map(|row| number(row, "/cycles")).sum::<f64>());
+        let half = match sampled.summary()["sampled"].is_null() {
+            true => 0.0,
+            false => number(&sampled.summary(), "/sampled/cycles_per_frame/relative_half_width"),
+        };
+        // Twice the 95 % interval.
+        assert!((found / right - 1.0).abs() <= 2.0 * half + 1e-9, "{name}: {found} of {right} within {half}");
+    }
+}
+
+#[test]
+fn a_budget_limits_workloads() {
+    let none = workload("occlusion", &["--frames", "0..3", "--budget", "0.01ms"]).summary();
+    assert_eq!(none["choice"]["level"], "bound");
+}
+
 /// The reference has no error, and is chosen if no other level is accurate enough.
 #[test]
 fn an_accuracy_beyond_other_levels_gives_stepped() {

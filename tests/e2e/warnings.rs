@@ -61,7 +61,7 @@ const NOT_PROVOKED: [(&str, &str); 21] = [
 ];
 
 /// Codes that the tests below produce, and `orthographic-view`, which `visibility_inputs` tests.
-const PROVOKED: [&str; 53] = [
+const PROVOKED: [&str; 54] = [
     "accuracy-missed",
     "alpha-ignored",
     "behind-camera",
@@ -75,6 +75,7 @@ const PROVOKED: [&str; 53] = [
     "coordinates-far-from-origin",
     "coordinates-out-of-range",
     "coordinates-recentred",
+    "costly-preview",
     "degenerate-triangle",
     "displacement-ignored",
     "emissive-ignored",
@@ -539,6 +540,17 @@ fn memory_rows_as_the_bottleneck() {
     for (gpu, level) in [(gpu.as_str(), "stepped"), ("reference", "packet")] {
         assert!(!run(gpu, level).warning_codes().contains(&"memory-rows".to_owned()), "{gpu} {level}");
     }
+}
+
+/// Light passes of caustics are as long for a small image; a scene has small previews.
+#[test]
+fn previews_that_are_as_long_as_frames() {
+    let size = ["--timing", "sampled", "--frames", "0..7"];
+    let caustics = quintile().run("caustics", &[&size[..], &["--size", "64x36"]].concat());
+    assert_warns(&caustics, "costly-preview");
+    let scene = quintile().run("default", &[&size[..], &["--size", "640x360", "--samples", "8"]].concat());
+    let share = number(&scene.summary(), "/sampled/preview_share");
+    assert!(!scene.warning_codes().contains(&"costly-preview".to_owned()), "a share of {share}");
 }
 
 /// The reference platform with less time recorded before the first frame and after the last.

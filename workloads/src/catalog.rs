@@ -1,11 +1,15 @@
-//! Catalogue of all jobs by name.
+//! Catalogue of all jobs: workloads by name, and renderings of scenes.
+
+use std::path::Path;
 
 use crate::error::LoadError;
-use crate::job::{Flags, Job, OptionSource, Request};
+use crate::job::{Flag, Flags, Job, OptionSource, Reduction, Request};
+use crate::rendering::Rendering;
+use crate::scene::Overrides;
 
 type Maker = fn(&OptionSource, &Request<'_>) -> Result<Box<dyn Job>, LoadError>;
 
-/// Entry of a job.
+/// Entry of a workload.
 struct Entry {
     name: &'static str,
     /// Description in a line.
@@ -15,7 +19,7 @@ struct Entry {
     make: Maker,
 }
 
-/// All jobs.
+/// All workloads.
 const JOBS: &[Entry] = &[
     Entry {
         name: "caustics",
@@ -61,12 +65,12 @@ const JOBS: &[Entry] = &[
     },
 ];
 
-/// Names of the jobs, each with a description in a line.
+/// Names of the workloads, each with a description in a line.
 pub fn names() -> impl Iterator<Item = (&'static str, &'static str)> {
     JOBS.iter().map(|job| (job.name, job.what))
 }
 
-/// Extends the error for an unknown scene with the names of jobs; other errors are unchanged.
+/// Extends the error for an unknown scene with the names of workloads; other errors are unchanged.
 #[must_use]
 pub fn or_job(error: LoadError) -> LoadError {
     match error {
@@ -77,7 +81,7 @@ pub fn or_job(error: LoadError) -> LoadError {
     }
 }
 
-/// Makes the job with a name, if it exists.
+/// Makes the workload with a name, if it exists.
 ///
 /// # Errors
 /// [`LoadError`] for invalid options or settings, or flags that it does not use.
@@ -90,23 +94,68 @@ pub fn find(
     Some(job.flags.check(name, request.overrides).and_then(|()| (job.make)(options, request)))
 }
 
-/// Makes the job with a name at another size of its image, by `--size` or by the option that stands for it. A
-/// run's expected time is scaled up from small images.
+/// Makes the job of a name: a workload, or the rendering of the scene of that name or path. Returns the name in results, too.
+///
+/// # Errors
+/// As [`find`] and [`crate::load`]; [`LoadError::Setting`] for options of a scene.
+pub fn load(
+    name: &Path,
+    options: &OptionSource,
+    request: &Request<'_>,
+) -> Result<(String, Box<dyn Job>), LoadError> {
+    // Names of workloads are Unicode; a path that is not cannot name one.
+    let text = name.to_str().unwrap_or_default();
+    if let Some(job) = find(text, options, request) {
+        return Ok((text.to_owned(), job?));
+    }
+    let scene = crate::load(name).map_err(or_job)?;
+    if *options != OptionSource::default() {
+        let jobs: Vec<&str> = names().map(|(name, _)| name).collect();
+        let message =
+            format!("`{}` is a scene; only workloads have options: {}", name.display(), jobs.join(", "));
+        return Err(LoadError::Setting { setting: "set", message });
+    }
+    Ok((scene.name().to_owned(), Box::new(Rendering::new(scene, request)?)))
+}
+
+/// The job that [`load`] made of a name, with less work for each frame. A workload is made again, with the size by `--size` or by
+/// the option that stands for it.
 ///
 /// # Errors
 /// As [`find`]; [`LoadError::Setting`] if the size cannot be changed.
-pub fn at_size(
+pub fn reduced<'a>(
+    job: &'a dyn Job,
+    name: &Path,
+    options: &OptionSource,
+    request: &Request<'_>,
+    to: &Reduction,
+) -> Result<Box<dyn Job + 'a>, LoadError> {
+    match job.reduced(to) {
+        Some(job) => Ok(job),
+        None => remade(name.to_str().unwrap_or_default(), options, request, to),
+    }
+}
+
+/// Makes the workload with a name with less work for each frame.
+///
+/// # Errors
+/// As [`reduced`].
+pub fn remade(
     name: &str,
     options: &OptionSource,
     request: &Request<'_>,
-    size: [u32; 2],
-) -> Option<Result<Box<dyn Job>, LoadError>> {
-    let job = JOBS.iter().find(|job| job.name == name)?;
-    let mut options = options.clone();
-    let mut overrides = request.overrides.clone();
-    match job.flags.instead_of_size() {
-        Some(option) => options.set.push((option.to_owned(), size[1].to_string())),
-        None => overrides.size = Some((size[0], size[1])),
+    to: &Reduction,
+) -> Result<Box<dyn Job>, LoadError> {
+    let entry = JOBS.iter().find(|job| job.name == name);
+    let entry = entry.ok_or_else(|| or_job(crate::load::unknown(name, &[])))?;
+    let (mut options, mut overrides) = (options.clone(), request.overrides.clone());
+    match entry.flags.instead_of_size() {
+        Some(option) => options.set.push((option.to_owned(), to.size[1].to_string())),
+        None => overrides.size = Some((to.size[0], to.size[1])),
     }
-    find(name, &options, &Request { overrides: &overrides, ..*request })
+    let own = || (entry.make)(&options, &Request { overrides: &overrides, ..*request });
+    let samples = to.samples.filter(|_| entry.flags.uses.contains(&Flag::Samples));
+    let Some(samples) = samples else { return own() };
+    let fewer = Overrides { samples: Some(samples), ..overrides.clone() };
+    (entry.make)(&options, &Request { overrides: &fewer, ..*request }).or_else(|_| own())
 }

@@ -254,6 +254,8 @@ pub struct PassRow {
     pub energy_share: f64,
     /// Bytes to and from memory.
     pub dram_bytes: u64,
+    /// What units waited for most; empty if it is not known.
+    pub waits: String,
 }
 
 /// Row of a unit.

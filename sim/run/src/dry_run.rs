@@ -2,22 +2,22 @@
 
 use cpu_time::ProcessTime;
 use output::table::{counted, grouped, si};
-use pipeline::{Gpu, Viewport};
+use pipeline::Gpu;
 use serde::Serialize;
 use timing::{FrameClock, Level, Recorder};
 use warnings::Warning;
-use workloads::job::Request;
-use workloads::{Frame, FrameMesh, Scene, catalog};
+use workloads::Scene;
+use workloads::job::Reduction;
 
 use crate::plan::BYTES_PER_SAMPLE;
-use crate::{Choice, Distinct, Plan, Prepared, RunError, Sampling, Work, frame, gpu};
+use crate::{Choice, Distinct, Plan, Prepared, RunError, Sampling, frame, gpu};
 
 /// Description of a run before it starts.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DryRun {
     /// Name of the scene or of the workload.
     pub scene: String,
-    /// Triangles of the scene; `None` for a workload.
+    /// Triangles of the scene; `None` for a workload without one.
     pub triangles: Option<usize>,
     /// Width and height of the image.
     pub size: [u32; 2],
@@ -63,17 +63,17 @@ impl DryRun {
     /// # Errors
     /// If the expected time cannot be measured.
     pub fn new(prepared: &Prepared) -> Result<Self, RunError> {
-        let (plan, settings) = (&prepared.plan, prepared.plan.work.settings());
+        let (plan, settings) = (&prepared.plan, prepared.plan.job.settings());
         let distinct = prepared.distinct.numbers().len();
         let simulated = match plan.options.sampling {
             Sampling::Every => distinct,
             sampling => sampling.first(prepared.distinct.groups().len()).min(distinct),
         };
-        let mut warnings = plan.work.warnings().to_vec();
+        let mut warnings = plan.job.warnings().to_vec();
         warnings.extend(gpu::check_pairing(&plan.options, &plan.gpu, &plan.platform, &plan.table));
         Ok(Self {
-            scene: plan.work.name().to_owned(),
-            triangles: plan.work.scene("").ok().map(Scene::triangle_count),
+            scene: plan.name.clone(),
+            triangles: plan.job.scene().map(Scene::triangle_count),
             size: [settings.width, settings.height],
             samples: settings.samples,
             table: settings.table.clone(),
@@ -165,6 +165,13 @@ const PROGRAM_BYTES: u64 = 30_000_000;
 /// Memory of one triangle of the scene in bytes.
 const TRIANGLE_BYTES: u64 = 150;
 
+/// Whether a frame is one rendering of a scene. Passes of other jobs keep surfaces, and draw all triangles, of their own.
+pub(super) fn is_rendering(plan: &Plan) -> bool {
+    let settings = plan.job.settings();
+    let size = [settings.width, settings.height];
+    plan.job.reduced(&Reduction { size, samples: None, max_triangles: None }).is_some()
+}
+
 impl Expected {
     /// Expected time and memory of `plan` on the threads of the current pool.
     ///
@@ -176,7 +183,7 @@ impl Expected {
             Sampling::Every => (differ, 0.0),
             sampling => (sampling.first(all).min(differ), PREVIEW_TIME_RATIO * differ as f64),
         };
-        let probe = Probe::new(plan, distinct.numbers()[differ / 2])?;
+        let probe = Probe { plan, number: distinct.numbers()[differ / 2] };
         let mut frames_s = probe.frame_s(plan.options.timing)? * (whole as f64 + previews);
         if plan.options.verify {
             frames_s += probe.frame_s(Level::Stepped)? * differ as f64;
@@ -184,9 +191,9 @@ impl Expected {
         let threads = rayon::current_num_threads();
         let trace_samples = plan.size().trace_samples();
         // Tiles of a scene are drawn side by side, passes of a workload one after another.
-        let (workers, memory_bytes) = match &plan.work {
-            Work::Scene(scene) => (threads, Some(memory_bytes(plan, scene, threads.min(differ)))),
-            Work::Job { .. } => (threads.min(differ), None),
+        let (workers, memory_bytes) = match plan.job.scene().filter(|_| is_rendering(plan)) {
+            Some(scene) => (threads, Some(memory_bytes(plan, scene, threads.min(differ)))),
+            None => (threads.min(differ), None),
         };
         let host_s = FILES_S + TRACE_SAMPLE_S * trace_samples + frames_s / workers as f64;
         Ok(Self { host_s, memory_bytes })
@@ -211,7 +218,7 @@ fn duration(seconds: f64) -> String {
 
 /// Memory in bytes of a run that draws `frames` frames of `scene` at once.
 fn memory_bytes(plan: &Plan, scene: &Scene, frames: usize) -> u64 {
-    let samples = plan.pixels() * u64::from(plan.samples.per_pixel());
+    let samples = plan.pixels() * u64::from(plan.per_pixel());
     PROGRAM_BYTES
         + TRIANGLE_BYTES * scene.triangle_count() as u64
         + BYTES_PER_SAMPLE * samples * frames as u64
@@ -221,99 +228,51 @@ fn memory_bytes(plan: &Plan, scene: &Scene, frames: usize) -> u64 {
 /// A frame of the run, to be rendered at reduced sizes.
 struct Probe<'a> {
     plan: &'a Plan,
-    source: ProbeSource<'a>,
-    /// Triangles of the frame per rendered triangle.
-    triangle_ratio: f64,
-    /// CPU seconds for making the frame.
+    number: u32,
+}
+
+/// A frame rendered at a reduced size, in processor seconds.
+#[derive(Clone, Copy, Debug)]
+struct Rendered {
+    pixels: f64,
+    /// To make the frame.
     made_s: f64,
+    /// To draw and time it with all its triangles.
+    drawn_s: f64,
 }
 
-/// Work of a probe.
-enum ProbeSource<'a> {
-    /// A frame with part of its triangles.
-    Scene(&'a Scene, Box<Frame>),
-    /// Name and frame number of a workload.
-    Job(&'a str, u32),
-}
-
-impl<'a> Probe<'a> {
-    fn new(plan: &'a Plan, number: u32) -> Result<Self, RunError> {
-        let scene = match &plan.work {
-            Work::Scene(scene) => scene,
-            Work::Job { name, .. } => {
-                let source = ProbeSource::Job(name, number);
-                return Ok(Self { plan, source, triangle_ratio: 1.0, made_s: 0.0 });
-            }
-        };
-        let started = ProcessTime::now();
-        let mut frame = scene.frame(number)?;
-        let made_s = started.elapsed().as_secs_f64();
-        let step = frame.triangle_count().div_ceil(MAX_PROBE_TRIANGLES).max(1);
-        let all = frame.triangle_count();
-        frame.meshes.iter_mut().for_each(|mesh| thin_out(mesh, step));
-        let triangle_ratio = all as f64 / frame.triangle_count().max(1) as f64;
-        Ok(Self { plan, source: ProbeSource::Scene(scene, Box::new(frame)), triangle_ratio, made_s })
-    }
-
+impl Probe<'_> {
     /// CPU seconds for a frame of the run at `level`: a line `a + b pixels` through the times of two sizes.
     fn frame_s(&self, level: Level) -> Result<f64, RunError> {
-        let samples = self.plan.pixels() as f64 * f64::from(self.plan.samples.per_pixel());
+        let samples = self.plan.pixels() as f64 * f64::from(self.plan.per_pixel());
         let by = (samples / PROBE_SAMPLES).sqrt().max(1.0);
-        let small = self.drawn(by, level)?;
-        let large = if by > 1.0 { self.drawn((0.5 * by).max(1.0), level)? } else { small };
-        let a_and_b = |[(x0, y0), (x1, y1)]: [(f64, f64); 2]| {
-            let b = if x1 > x0 { ((y1 - y0) / (x1 - x0)).clamp(0.0, y1 / x1) } else { y1 / x1 };
-            (y1 - b * x1, b)
-        };
-        let (a, b) = a_and_b([small, large]);
-        Ok(self.made_s + self.triangle_ratio * (a + b * self.plan.pixels() as f64))
+        let small = self.rendered(by, level)?;
+        let large = if by > 1.0 { self.rendered((0.5 * by).max(1.0), level)? } else { small };
+        let (x0, x1, y1) = (small.pixels, large.pixels, large.drawn_s);
+        let b = if x1 > x0 { ((y1 - small.drawn_s) / (x1 - x0)).clamp(0.0, y1 / x1) } else { y1 / x1 };
+        Ok(small.made_s.min(large.made_s) + y1 + b * (self.plan.pixels() as f64 - x1))
     }
 
-    /// Pixels and CPU seconds of the frame, rendered `by` times smaller along each axis.
-    fn drawn(&self, by: f64, level: Level) -> Result<(f64, f64), RunError> {
-        let plan = self.plan;
+    /// The frame, rendered `by` times smaller along each axis.
+    fn rendered(&self, by: f64, level: Level) -> Result<Rendered, RunError> {
+        let Self { plan, number } = *self;
         let side = |side: u32| ((f64::from(side) / by).ceil() as u32).max(1);
-        let viewport = Viewport::new(side(plan.viewport.width()), side(plan.viewport.height()))
-            .ok_or_else(|| RunError::Setting("size of the probe".to_owned()))?;
+        let size = [side(plan.viewport.width()), side(plan.viewport.height())];
+        let to = Reduction { size, samples: None, max_triangles: Some(MAX_PROBE_TRIANGLES) };
+        let job = plan.reduced(&to)?;
         let started = ProcessTime::now();
+        let ready = job.prepare(number)?;
+        let made_s = started.elapsed().as_secs_f64();
         let recorder = Recorder::new(frame::BIN_PS, frame::MIN_FRAME_BINS);
         let mut clock = FrameClock::new(level, plan.gpu.machine()?, recorder);
-        match &self.source {
-            ProbeSource::Scene(scene, frame) => {
-                let emit = |packet: &_, lines: &_| clock.push(packet, lines);
-                frame::draw_scene(plan, scene, frame, viewport, &[], emit)?;
-            }
-            &ProbeSource::Job(name, number) => draw_job(plan, name, number, viewport, &mut clock)?,
-        }
-        clock.finish()?;
-        Ok((viewport.pixels() as f64, started.elapsed().as_secs_f64()))
-    }
-}
-
-/// Draws and times frame `number` of the workload `name` at the size of `viewport`.
-fn draw_job(
-    plan: &Plan,
-    name: &str,
-    number: u32,
-    viewport: Viewport,
-    clock: &mut FrameClock,
-) -> Result<(), RunError> {
-    let options = &plan.options;
-    let request = Request { overrides: &options.overrides, seed: options.seed };
-    let size = [viewport.width(), viewport.height()];
-    if let Some(job) = catalog::at_size(name, &options.options, &request, size) {
         let emit = |packet: &_, lines: &_| clock.push(packet, lines);
         let mut gpu = Gpu::new(&plan.gpu.pipeline, emit).map_err(RunError::setting)?;
-        job?.frame(number, &mut gpu)?;
-        gpu.finish();
-    }
-    Ok(())
-}
-
-/// Keeps one in `step` triangles.
-fn thin_out(mesh: &mut FrameMesh, step: usize) {
-    if step > 1 {
-        mesh.triangles = mesh.triangles.iter().copied().step_by(step).collect();
+        ready.draw(&mut gpu)?;
+        let triangles = gpu.finish().triangles();
+        clock.finish()?;
+        let all = plan.job.scene().filter(|_| is_rendering(plan)).map_or(triangles, Scene::triangle_count);
+        let drawn_s = (started.elapsed().as_secs_f64() - made_s) * all as f64 / triangles.max(1) as f64;
+        Ok(Rendered { pixels: f64::from(size[0]) * f64::from(size[1]), made_s, drawn_s })
     }
 }
 

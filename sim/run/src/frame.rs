@@ -3,22 +3,19 @@
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
-use activity::{Event, LineAccess, Packet, Timeline, Unit};
+use activity::{Timeline, Unit};
 use glam::Vec3;
 use output::OutDir;
 use output::image::LinearImage;
 use output::progress::Progress;
+use pipeline::Gpu;
 use pipeline::frame::HeatMap;
-use pipeline::{FrameReport, Gpu, RasterPass, Settings, Viewport};
 use rayon::prelude::*;
 use timing::{AccuracyWarning, FrameClock, Recorder};
-use workloads::job::Drawn;
-use workloads::{Frame, Scene};
 
 use crate::heat::{self, HeatPicture};
 use crate::passes;
-use crate::regime::Regime;
-use crate::{Distinct, Observed, Origin, Plan, RunError, RunFrame, Work};
+use crate::{Distinct, Observed, Origin, Plan, RunError, RunFrame};
 
 /// Length of a timeline bin in picoseconds: one microsecond, a twentieth of a sample at 50 kHz.
 pub const BIN_PS: u64 = 1_000_000;
@@ -95,8 +92,7 @@ impl FrameSimulator<'_> {
         let (frame, image, maps) = simulated?;
         let mut heat = Vec::new();
         if let Some(dir) = dir {
-            let write = |map| heat::write(plan, dir, number, map, &image);
-            heat = maps.iter().map(write).collect::<Result<_, _>>()?;
+            heat = heat::write_all(plan, dir, number, &maps, &image)?;
             self.distinct.members(group).try_for_each(|number| write_image(plan, dir, number, &image))?;
         }
         Ok(SimulatedFrame { frame, picture: keep_picture.then_some(image), heat })
@@ -110,8 +106,12 @@ fn simulate_frame(
 ) -> Result<(RunFrame, Vec<Vec3>, Vec<HeatMap>), RunError> {
     let mut clock =
         FrameClock::new(plan.options.timing, plan.gpu.machine()?, Recorder::new(BIN_PS, max_bins));
-    let DrawnFrame { drawn, regime, mut report } =
-        draw(plan, number, &plan.options.heat, |packet, lines| clock.push(packet, lines))?;
+    let emit = |packet: &_, lines: &_| clock.push(packet, lines);
+    let gpu = Gpu::new(&plan.gpu.pipeline, emit).map_err(RunError::setting)?;
+    let mut gpu = gpu.with_heat(&heat::events(&plan.options.heat), plan.viewport);
+    let ready = plan.job.prepare(number)?;
+    let drawn = ready.draw(&mut gpu)?;
+    let mut report = gpu.finish();
     let heat = std::mem::take(&mut report.heat);
     passes::limit_draws(&mut report);
     let timed = clock.finish()?;
@@ -133,7 +133,7 @@ fn simulate_frame(
             times: timed.passes,
             facts: drawn.facts,
             warnings: drawn.warnings,
-            regime,
+            regime: ready.regime()?,
             stalls: timed.stalls,
             accuracy,
         })),
@@ -159,57 +159,4 @@ fn write_image(plan: &Plan, dir: &OutDir, number: u32, image: &[Vec3]) -> Result
         linear.write_exr(dir, &format!("{}.exr", image_name(number)))?;
     }
     Ok(())
-}
-
-/// Result of drawing a frame.
-pub(super) struct DrawnFrame {
-    drawn: Drawn,
-    regime: Regime,
-    report: FrameReport,
-}
-
-/// Draws frame `number`, with heat maps of `events`; `emit` receives the packets.
-fn draw(
-    plan: &Plan,
-    number: u32,
-    events: &[Event],
-    emit: impl FnMut(&Packet, &[LineAccess]),
-) -> Result<DrawnFrame, RunError> {
-    match &plan.work {
-        Work::Scene(scene) => draw_scene(plan, scene, &scene.frame(number)?, plan.viewport, events, emit),
-        Work::Job { job, .. } => {
-            let gpu = Gpu::new(&plan.gpu.pipeline, emit).map_err(RunError::setting)?;
-            let mut gpu = gpu.with_heat(events, plan.viewport);
-            let drawn = job.frame(number, &mut gpu)?;
-            Ok(DrawnFrame { drawn, regime: Regime::default(), report: gpu.finish() })
-        }
-    }
-}
-
-/// Draws `frame` at the size of `viewport`. The frame number must have no influence: frames with equal fingerprints are
-/// drawn once.
-pub(super) fn draw_scene(
-    plan: &Plan,
-    scene: &Scene,
-    frame: &Frame,
-    viewport: Viewport,
-    events: &[Event],
-    emit: impl FnMut(&Packet, &[LineAccess]),
-) -> Result<DrawnFrame, RunError> {
-    let draws = frame.draws(scene)?;
-    let background = scene.background();
-    let settings = Settings { spec: &plan.gpu.pipeline, viewport, samples: &*plan.samples, background };
-    let gpu = Gpu::new(&plan.gpu.pipeline, emit).map_err(RunError::setting)?;
-    let mut gpu = gpu.with_heat(events, viewport);
-    let pass = RasterPass::new(&frame.camera, &draws, &settings).named("scene");
-    let rendered = gpu.draw(&pass).map_err(RunError::setting)?;
-    let report = gpu.finish();
-    let drawn = Drawn {
-        image: rendered.into_image(),
-        moving: frame.is_moving(),
-        lens: frame.camera.lens().is_some(),
-        ..Drawn::default()
-    };
-    let regime = Regime::of(&frame.camera, &draws, viewport, plan.samples.per_pixel());
-    Ok(DrawnFrame { drawn, regime, report })
 }

@@ -1,20 +1,20 @@
-//! Heat maps: counts of an event over the image, as files.
+//! Heat maps: counts of an event over the image, or the energy of all events, as files.
 
 use activity::Event;
 use glam::{Vec3, vec3};
 use pipeline::frame::{HeatMap, TileHeat};
 
-use super::{Plan, RunError};
+use super::{HeatQuantity, Plan, RunError};
 use output::OutDir;
 use output::dir::BoxError;
 use output::image::LinearImage;
 use output::plot::{HeatMapPlot, HeatTile, Picture, Shading};
-use output::table::grouped;
+use output::table::{grouped, si};
 
 /// Heat map of the report.
 pub struct HeatPicture {
-    /// Counter of the map.
-    pub event: Event,
+    /// Quantity of the map.
+    pub of: HeatQuantity,
     /// Number of the frame.
     pub frame: u32,
     /// Contents of a PNG file.
@@ -22,27 +22,198 @@ pub struct HeatPicture {
 }
 
 /// Path of the files of a heat map, without extension.
-pub(super) fn heat_name(event: Event, frame: u32) -> String {
-    format!("heat/{}_{frame:04}", event.name())
+pub(super) fn heat_name(of: HeatQuantity, frame: u32) -> String {
+    format!("heat/{}_{frame:04}", of.name())
 }
 
-/// Writes a heat map as PNG, as EXR (values of pixels) and as CSV (counts of tiles). The brightness of
-/// `image`, the frame's image, shades the PNG. Returns the PNG.
-pub(super) fn write(
+/// Events that have to be counted by place. Energy needs all of them.
+pub(super) fn events(quantities: &[HeatQuantity]) -> Vec<Event> {
+    let mut events = Vec::new();
+    for quantity in quantities {
+        let needed = match quantity {
+            HeatQuantity::Event(event) => std::slice::from_ref(event),
+            HeatQuantity::Joules => &Event::ALL[..],
+        };
+        events.extend(needed.iter().filter(|event| !events.contains(*event)).copied().collect::<Vec<_>>());
+    }
+    events
+}
+
+/// Writes the heat maps of a frame, made of the `maps` of its events: as PNG, as EXR (values of pixels) and as CSV (values of
+/// tiles). The brightness of `image`, the frame's image, shades the PNG.
+pub(super) fn write_all(
     plan: &Plan,
     dir: &OutDir,
     frame: u32,
-    map: &HeatMap,
+    maps: &[HeatMap],
     image: &[Vec3],
-) -> Result<HeatPicture, RunError> {
-    let name = heat_name(map.event, frame);
-    let png = picture(plan, frame, map, &brightness(image)).png()?;
-    dir.write_file(&format!("{name}.png"), |out| Ok(out.write_all(&png)?))?;
-    let pixels: Vec<[f32; 3]> = map.pixels().into_iter().map(|value| [value; 3]).collect();
-    LinearImage::new(plan.viewport.width(), plan.viewport.height(), &pixels)?
-        .write_exr(dir, &format!("{name}.exr"))?;
-    dir.write_file(&format!("{name}.csv"), |out| table(map, out))?;
-    Ok(HeatPicture { event: map.event, frame, png })
+) -> Result<Vec<HeatPicture>, RunError> {
+    let brightness = brightness(image);
+    let write = |&of: &HeatQuantity| {
+        let heat = match of {
+            HeatQuantity::Event(event) => {
+                let map = maps.iter().find(|map| map.event == event);
+                map.map(|map| Heat::new(of, &[(map, 1.0)]))
+            }
+            HeatQuantity::Joules => {
+                let joules: Vec<_> = maps.iter().map(|map| (map, plan.model.event_j(map.event))).collect();
+                Some(Heat::new(of, &joules))
+            }
+        };
+        heat.map(|heat| heat.write(plan, dir, frame, &brightness))
+    };
+    plan.options.heat.iter().filter_map(write).collect()
+}
+
+/// Values of a quantity over the image: events, or joules.
+struct Heat {
+    of: HeatQuantity,
+    /// Fine tiles, and coarse tiles with what belongs to none of their fine tiles.
+    tiles: Vec<ValueTile>,
+    coarse: Vec<ValueTile>,
+    /// Value of every pixel, row by row.
+    pixels: Vec<f32>,
+    /// Whether values of single pixels are known, and not only those of tiles.
+    is_by_pixel: bool,
+    total: f64,
+    elsewhere: f64,
+}
+
+/// A tile clipped to the image, and its value.
+#[derive(Clone, Copy, Debug)]
+struct ValueTile {
+    origin: [u32; 2],
+    size: [u32; 2],
+    value: f64,
+}
+
+impl ValueTile {
+    fn per_pixel(&self) -> f64 {
+        self.value / f64::from(self.size[0] * self.size[1])
+    }
+}
+
+impl Heat {
+    /// Sum of maps, each times a weight. The maps are of one image.
+    fn new(of: HeatQuantity, maps: &[(&HeatMap, f64)]) -> Self {
+        let sum = |pick: fn(&HeatMap) -> &[TileHeat]| {
+            let mut tiles: Vec<ValueTile> = Vec::new();
+            for &(map, weight) in maps {
+                let first = |tile: &TileHeat| ValueTile { origin: tile.origin, size: tile.size, value: 0.0 };
+                if tiles.is_empty() {
+                    tiles.extend(pick(map).iter().map(first));
+                }
+                let values = pick(map).iter().map(|tile| tile.count as f64 * weight);
+                tiles.iter_mut().zip(values).for_each(|(tile, value)| tile.value += value);
+            }
+            tiles
+        };
+        let mut pixels: Vec<f64> = Vec::new();
+        for (map, weight) in maps.iter().filter(|(_, weight)| *weight > 0.0) {
+            let values = map.pixels();
+            pixels.resize(values.len(), 0.0);
+            pixels.iter_mut().zip(values).for_each(|(sum, value)| *sum += f64::from(value) * weight);
+        }
+        Self {
+            of,
+            tiles: sum(|map| &map.tiles),
+            coarse: sum(|map| &map.coarse),
+            pixels: pixels.into_iter().map(|value| value as f32).collect(),
+            is_by_pixel: maps.iter().any(|(map, _)| !map.samples.is_empty()),
+            total: maps.iter().map(|(map, weight)| map.total() as f64 * weight).sum(),
+            elsewhere: maps.iter().map(|(map, weight)| map.elsewhere as f64 * weight).sum(),
+        }
+    }
+
+    fn write(
+        &self,
+        plan: &Plan,
+        dir: &OutDir,
+        frame: u32,
+        brightness: &[f32],
+    ) -> Result<HeatPicture, RunError> {
+        let name = heat_name(self.of, frame);
+        let png = self.picture(plan, frame, brightness).png()?;
+        dir.write_file(&format!("{name}.png"), |out| Ok(out.write_all(&png)?))?;
+        let pixels: Vec<[f32; 3]> = self.pixels.iter().map(|&value| [value; 3]).collect();
+        LinearImage::new(plan.viewport.width(), plan.viewport.height(), &pixels)?
+            .write_exr(dir, &format!("{name}.exr"))?;
+        dir.write_file(&format!("{name}.csv"), |out| self.table(out))?;
+        Ok(HeatPicture { of: self.of, frame, png })
+    }
+
+    fn picture(&self, plan: &Plan, frame: u32, brightness: &[f32]) -> Picture {
+        let side = if self.is_by_pixel { block_px(self.pixels.len()) } else { plan.gpu.pipeline.tile_px };
+        let spread = if side == 1 { String::new() } else { format!(", the mean over {side}x{side} pixels") };
+        let shown = |value: f64| match self.of {
+            HeatQuantity::Event(_) => grouped(value as u64),
+            HeatQuantity::Joules => si(value, "J"),
+        };
+        let elsewhere = match self.elsewhere {
+            0.0 => String::new(),
+            value => format!(", of which {} happened nowhere in the image", shown(value)),
+        };
+        let plot = HeatMapPlot {
+            title: &format!("{} per pixel, frame {frame}{spread}", self.of.name()),
+            subject: &format!("{} on {}: {} in all{elsewhere}", plan.name, plan.gpu.name, shown(self.total)),
+            label: match self.of {
+                HeatQuantity::Event(_) => "events per pixel",
+                HeatQuantity::Joules => "joules per pixel",
+            },
+            size: [plan.viewport.width(), plan.viewport.height()],
+            tiles: &if self.is_by_pixel { self.blocks(plan, side) } else { self.fine_tiles(plan) },
+            shading: Shading::Clipped,
+            brightness,
+        };
+        plot.picture(&plan.options.plot_style)
+    }
+
+    /// Blocks of `side` pixels, clipped to the image, each with the mean of its pixels.
+    fn blocks(&self, plan: &Plan, side: u32) -> Vec<HeatTile> {
+        let [width, height] = [plan.viewport.width(), plan.viewport.height()];
+        let across = width.div_ceil(side);
+        let block = |number: u32| {
+            let origin = [number % across * side, number / across * side];
+            let size = [side.min(width - origin[0]), side.min(height - origin[1])];
+            let row = |y: u32| {
+                let first = (y * width + origin[0]) as usize;
+                self.pixels[first..first + size[0] as usize]
+                    .iter()
+                    .map(|&value| f64::from(value))
+                    .sum::<f64>()
+            };
+            let sum: f64 = (origin[1]..origin[1] + size[1]).map(row).sum();
+            HeatTile { origin, size, value: sum / f64::from(size[0] * size[1]) }
+        };
+        (0..across * height.div_ceil(side)).map(block).collect()
+    }
+
+    /// Fine tiles, each with its own value and its share of that of its coarse tile.
+    fn fine_tiles(&self, plan: &Plan) -> Vec<HeatTile> {
+        let side = plan.gpu.pipeline.coarse_tile_px;
+        let across = plan.viewport.width().div_ceil(side);
+        let tile = |tile: &ValueTile| {
+            let coarse = tile.origin[1] / side * across + tile.origin[0] / side;
+            let value = tile.per_pixel() + self.coarse[coarse as usize].per_pixel();
+            HeatTile { origin: tile.origin, size: tile.size, value }
+        };
+        self.tiles.iter().map(tile).collect()
+    }
+
+    /// Writes the value of each fine tile, then of each coarse tile that has events of its own.
+    fn table(&self, out: &mut dyn std::io::Write) -> Result<(), BoxError> {
+        let mut table = csv::Writer::from_writer(out);
+        let column = if self.of == HeatQuantity::Joules { "energy_J" } else { "count" };
+        table.write_record(["x_px", "y_px", "width_px", "height_px", column])?;
+        let coarse = self.coarse.iter().filter(|tile| tile.value > 0.0);
+        for ValueTile { origin: [x, y], size: [width, height], value } in self.tiles.iter().chain(coarse) {
+            match self.of {
+                HeatQuantity::Event(_) => table.serialize((x, y, width, height, *value as u64))?,
+                HeatQuantity::Joules => table.serialize((x, y, width, height, value))?,
+            }
+        }
+        Ok(table.flush()?)
+    }
 }
 
 /// Displayed brightness of each pixel, 0 to 1.
@@ -51,74 +222,10 @@ fn brightness(image: &[Vec3]) -> Vec<f32> {
     image.iter().map(|pixel| libm::powf(luminance(pixel), 1.0 / 2.2)).collect()
 }
 
-fn picture(plan: &Plan, frame: u32, map: &HeatMap, brightness: &[f32]) -> Picture {
-    let side = if map.samples.is_empty() { plan.gpu.pipeline.tile_px } else { block_px(map) };
-    let spread = if side == 1 { String::new() } else { format!(", the mean over {side}x{side} pixels") };
-    let elsewhere = match map.elsewhere {
-        0 => String::new(),
-        count => format!(", of which {} happened nowhere in the image", grouped(count)),
-    };
-    let plot = HeatMapPlot {
-        title: &format!("{} per pixel, frame {frame}{spread}", map.event.name()),
-        subject: &format!(
-            "{} on {}: {} in all{elsewhere}",
-            plan.work.name(),
-            plan.gpu.name,
-            grouped(map.total())
-        ),
-        label: "events per pixel",
-        size: [plan.viewport.width(), plan.viewport.height()],
-        tiles: &if map.samples.is_empty() { tiles(plan, map) } else { blocks(plan, map, side) },
-        shading: Shading::Clipped,
-        brightness,
-    };
-    plot.picture(&plan.options.plot_style)
-}
-
 /// Largest number of blocks in a picture.
 const MAX_BLOCKS: usize = 1 << 19;
 
-/// Side in pixels of the blocks that are drawn as one.
-fn block_px(map: &HeatMap) -> u32 {
-    (1..).find(|side| map.samples.len() / (side * side) as usize <= MAX_BLOCKS).unwrap_or(1)
-}
-
-/// Blocks of `side` pixels, clipped to the image, each with the mean of its pixels.
-fn blocks(plan: &Plan, map: &HeatMap, side: u32) -> Vec<HeatTile> {
-    let [width, height] = [plan.viewport.width(), plan.viewport.height()];
-    let across = width.div_ceil(side);
-    let block = |number: u32| {
-        let origin = [number % across * side, number / across * side];
-        let size = [side.min(width - origin[0]), side.min(height - origin[1])];
-        let row = |y: u32| {
-            let first = (y * width + origin[0]) as usize;
-            map.samples[first..first + size[0] as usize].iter().map(|&count| u64::from(count)).sum::<u64>()
-        };
-        let sum: u64 = (origin[1]..origin[1] + size[1]).map(row).sum();
-        HeatTile { origin, size, value: sum as f64 / f64::from(size[0] * size[1]) }
-    };
-    (0..across * height.div_ceil(side)).map(block).collect()
-}
-
-/// Fine tiles, each with its own events and its share of the events of its coarse tile.
-fn tiles(plan: &Plan, map: &HeatMap) -> Vec<HeatTile> {
-    let side = plan.gpu.pipeline.coarse_tile_px;
-    let across = plan.viewport.width().div_ceil(side);
-    let tile = |tile: &TileHeat| {
-        let coarse = tile.origin[1] / side * across + tile.origin[0] / side;
-        let value = tile.per_pixel() + map.coarse[coarse as usize].per_pixel();
-        HeatTile { origin: tile.origin, size: tile.size, value }
-    };
-    map.tiles.iter().map(tile).collect()
-}
-
-/// Writes the count of each fine tile, then of each coarse tile that has events of its own.
-fn table(map: &HeatMap, out: &mut dyn std::io::Write) -> Result<(), BoxError> {
-    let mut table = csv::Writer::from_writer(out);
-    table.write_record(["x_px", "y_px", "width_px", "height_px", "count"])?;
-    let coarse = map.coarse.iter().filter(|tile| tile.count > 0);
-    for TileHeat { origin: [x, y], size: [width, height], count } in map.tiles.iter().chain(coarse) {
-        table.serialize((x, y, width, height, count))?;
-    }
-    Ok(table.flush()?)
+/// Side in pixels of the blocks that are drawn as one, of an image of so many pixels.
+fn block_px(pixels: usize) -> u32 {
+    (1..).find(|side| pixels / (side * side) as usize <= MAX_BLOCKS).unwrap_or(1)
 }

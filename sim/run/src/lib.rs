@@ -6,7 +6,7 @@
 //!
 //! - [`RunOptions`]: everything that may be requested; [`Plan`]: with all inputs loaded and checked.
 //! - [`GpuSpec`]: a GPU: its pipeline, its machine, and the platform and energy table it belongs to.
-//! - [`Work`] and [`Distinct`]: what is drawn, and which frames differ.
+//! - [`Distinct`]: which frames differ.
 //! - [`frames_of`]: frames in cycles and joules, without a trace. [`run()`]: all of it, into a folder.
 //! - [`Summary`]: `summary.json`; [`compare`]: two of them side by side.
 //!
@@ -22,6 +22,7 @@
 
 mod choice;
 pub mod compare;
+mod distinct;
 mod dry_run;
 mod error;
 mod frame;
@@ -33,7 +34,6 @@ mod passes;
 mod pictures;
 mod plan;
 mod provenance;
-mod regime;
 mod report;
 mod sampled;
 mod simulate;
@@ -42,30 +42,29 @@ mod stalls;
 mod summary;
 pub mod visibility;
 mod warn;
-mod work;
 mod write;
 
 use output::progress::Progress;
 use output::{Destination, OutDir};
+use workloads::Scene;
 
 pub use choice::{Choice, Dimensions, ProbeSummary, Verified, cheapest_level};
+pub use distinct::Distinct;
 pub use dry_run::{DryRun, Expected};
 pub use error::RunError;
 pub use frame::{BIN_PS, CrashedFrame, frames_of};
 pub use gpu::{GpuError, GpuSpec, PowerFiles};
 pub use heat::HeatPicture;
 pub use measure::{Checks, Measurement, Resolution};
-pub use options::{Method, PacingChoice, Requested, RunOptions, Sampling};
+pub use options::{HeatQuantity, Method, PacingChoice, Requested, RunOptions, Sampling};
 pub use passes::{PassSummary, WorkSummary};
 pub use plan::{Plan, fits_memory};
 pub use provenance::{Host, Input, Provenance, again};
-pub use regime::Regime;
 pub use sampled::{Forecast, FramePreview, Previewer, Previews, Signatures};
 pub use simulate::MachineTexts;
 pub use simulated::{FrameCost, Modelled, Observed, Origin, Quantity, RunFrame, SampledSummary, Simulated};
 pub use stalls::StallShares;
 pub use summary::{Detection, Figures, FrameRow, Summary};
-pub use work::{Distinct, Work};
 
 /// Results of a run.
 pub struct Outcome {
@@ -102,7 +101,7 @@ pub fn prepare(
 ) -> Result<Prepared, RunError> {
     report_camera(&plan, progress);
     let provenance = Provenance::new(&plan, revision)?;
-    let distinct = Distinct::new(&plan.work)?;
+    let distinct = Distinct::new(&*plan.job)?;
     let choice = choice::choose(&mut plan, recorded, &distinct, progress)?;
     Ok(Prepared { plan, provenance, distinct, choice })
 }
@@ -120,7 +119,7 @@ impl Prepared {
     /// whole frame, as its passes over light or objects stay as they are.
     pub fn is_worth_estimating(&self) -> bool {
         let frames = self.distinct.numbers().len();
-        matches!(self.plan.work, Work::Scene(_)) || frames >= dry_run::MIN_WORKLOAD_FRAMES
+        dry_run::is_rendering(&self.plan) || frames >= dry_run::MIN_WORKLOAD_FRAMES
     }
 
     /// Simulates, measures and writes the results into `dir`.
@@ -166,8 +165,7 @@ pub fn run(options: RunOptions, out: &Destination, progress: &Progress) -> Resul
 
 /// Prints the camera of a scene under `--verbose`, before the simulation starts.
 fn report_camera(plan: &Plan, progress: &Progress) {
-    let Work::Scene(scene) = &plan.work else { return };
-    if let Ok(camera) = scene.camera_used() {
+    if let Some(Ok(camera)) = plan.job.scene().map(Scene::camera_used) {
         progress.detail(&format!("camera, {}: --camera '{}'", camera.source, camera.ron));
     }
 }

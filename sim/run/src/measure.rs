@@ -96,7 +96,7 @@ fn metadata(plan: &Plan, device: &Device, marks: &Marks) -> Metadata {
     let mark = |time_s, kind, label: &str| Mark { time_s, kind, label: label.to_owned() };
     Metadata {
         device: device.spec().name.clone(),
-        scene: plan.work.name().to_owned(),
+        scene: plan.name.clone(),
         platform: plan.platform.name.clone(),
         seed: plan.options.seed,
         pixels: Some(plan.pixels()),

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use activity::Event;
 use output::plot::Look;
+use pipeline::frame::HeatMap;
 use power_model::Bound;
 use serde::{Deserialize, Serialize, Serializer};
 use timing::Level;
@@ -51,6 +52,46 @@ impl Requested {
     }
 }
 
+/// Quantity of a heat map.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(into = "&'static str", try_from = "String")]
+pub enum HeatQuantity {
+    /// Counts of an event.
+    Event(Event),
+    /// Energy of all events, in joules.
+    Joules,
+}
+
+impl HeatQuantity {
+    /// Name in files and on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Event(event) => event.name(),
+            Self::Joules => "joules",
+        }
+    }
+
+    /// All quantities that have a position in the image, at least in part.
+    pub fn all() -> impl Iterator<Item = Self> {
+        let placed = Event::ALL.into_iter().filter(|&event| HeatMap::is_of(event));
+        std::iter::once(Self::Joules).chain(placed.map(Self::Event))
+    }
+}
+
+impl From<HeatQuantity> for &'static str {
+    fn from(quantity: HeatQuantity) -> Self {
+        quantity.name()
+    }
+}
+
+impl TryFrom<String> for HeatQuantity {
+    type Error = String;
+
+    fn try_from(name: String) -> Result<Self, String> {
+        Self::all().find(|quantity| quantity.name() == name).ok_or(format!("no heat map of `{name}`"))
+    }
+}
+
 /// Options of a run. Results depend on these and on the contents of the files they name.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -94,8 +135,8 @@ pub struct RunOptions {
     pub seed: u64,
     /// Whether images are also written as EXR.
     pub exr: bool,
-    /// Counters of the heat maps.
-    pub heat: Vec<Event>,
+    /// Quantities of the heat maps.
+    pub heat: Vec<HeatQuantity>,
     /// Width, title and font size of plots.
     pub plot_style: Look,
 }

@@ -1,12 +1,15 @@
 //! Work and energy by pass and by draw, over the simulated frames of a run.
 
+use std::collections::BTreeMap;
+
 use activity::{Counts, Event};
 use pipeline::FrameReport;
 use power_model::PowerModel;
 use serde::Serialize;
-use timing::PassTime;
+use timing::{PassTime, Stalls};
 
-use crate::{Observed, Plan, Simulated};
+use crate::stalls::{self, StalledSpan};
+use crate::{Observed, Plan, Simulated, StallShares};
 
 /// Passes of one name.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -22,6 +25,8 @@ pub struct PassSummary {
     /// Work of all of them.
     #[serde(flatten)]
     pub work: WorkSummary,
+    /// Busy, idle and stalled shares of each unit's time in these passes, if the timing level records stalls.
+    pub stalls: BTreeMap<&'static str, StallShares>,
     /// Draws of a pass, by their place in it. Empty if there is one draw only, or too many.
     pub draws: Vec<WorkSummary>,
 }
@@ -59,24 +64,25 @@ impl WorkSummary {
 
 /// Passes of all simulated frames of a run, in the order of their first use.
 pub(crate) fn summaries(plan: &Plan, simulated: &Simulated) -> Vec<PassSummary> {
-    let mut groups: Vec<Group> = Vec::new();
+    let mut groups: Vec<Group<'_>> = Vec::new();
     let mut write_back = Counts::default();
     for frame in simulated.in_order() {
-        let Some(Observed { report, times, counts, .. }) = frame.observed() else { continue };
+        let Some(Observed { report, times, counts, stalls, .. }) = frame.observed() else { continue };
         write_back += &report.write_back;
         let events_j = plan.model.counts_energy(counts).total_j();
         let others_j = frame.power.energy().total_j() - events_j;
         let others_w = others_j / frame.power.duration_s();
-        add(&mut groups, report, times, others_w);
+        add(&mut groups, report, (times, stalls.as_ref()), others_w);
     }
     let mut rows: Vec<_> = groups.into_iter().map(|group| group.summary(&plan.model)).collect();
     let (name, work) = (WRITE_BACK.to_owned(), WorkSummary::new(write_back, &plan.model));
-    rows.push(PassSummary { name, passes: 0, time_s: 0.0, energy_j: work.events_j, work, draws: Vec::new() });
+    let (stalls, draws) = Default::default();
+    rows.push(PassSummary { name, passes: 0, time_s: 0.0, energy_j: work.events_j, work, stalls, draws });
     rows
 }
 
 /// Passes of one name, so far.
-struct Group {
+struct Group<'a> {
     name: String,
     passes: u64,
     time_s: f64,
@@ -84,22 +90,29 @@ struct Group {
     others_j: f64,
     counts: Counts,
     draws: Vec<Counts>,
+    stalled: Vec<StalledSpan<'a>>,
 }
 
 /// Adds the passes of a frame. `others_w` is its power besides the events.
-fn add(groups: &mut Vec<Group>, report: &FrameReport, times: &[PassTime], others_w: f64) {
+fn add<'a>(
+    groups: &mut Vec<Group<'a>>,
+    report: &FrameReport,
+    (times, stalls): (&[PassTime], Option<&'a Stalls>),
+    others_w: f64,
+) {
     let mut before_ps = 0;
     for (number, pass) in report.passes.iter().enumerate() {
         let place = groups.iter().position(|group| group.name == pass.name).unwrap_or_else(|| {
-            let (counts, draws) = Default::default();
+            let (counts, draws, stalled) = Default::default();
             let name = pass.name.clone();
-            groups.push(Group { name, passes: 0, time_s: 0.0, others_j: 0.0, counts, draws });
+            groups.push(Group { name, passes: 0, time_s: 0.0, others_j: 0.0, counts, draws, stalled });
             groups.len() - 1
         });
         let end_ps = times.get(number).map_or(before_ps, |time| time.end_ps);
         let time_s = (end_ps - before_ps) as f64 * 1e-12;
-        before_ps = end_ps;
+        let span = [std::mem::replace(&mut before_ps, end_ps), end_ps];
         let group = &mut groups[place];
+        group.stalled.extend(stalls.map(|stalls| (stalls, span)));
         group.passes += 1;
         group.time_s += time_s;
         group.others_j += time_s * others_w;
@@ -111,7 +124,7 @@ fn add(groups: &mut Vec<Group>, report: &FrameReport, times: &[PassTime], others
     }
 }
 
-impl Group {
+impl Group<'_> {
     fn summary(self, model: &PowerModel) -> PassSummary {
         let listed = if (2..=MAX_DRAWS).contains(&self.draws.len()) { self.draws } else { Vec::new() };
         let work = WorkSummary::new(self.counts, model);
@@ -120,6 +133,7 @@ impl Group {
             passes: self.passes,
             time_s: self.time_s,
             energy_j: work.events_j + self.others_j,
+            stalls: stalls::shares_of(&self.stalled, &work.counts),
             work,
             draws: listed.into_iter().map(|draw| WorkSummary::new(draw, model)).collect(),
         }
@@ -149,7 +163,7 @@ mod tests {
             let passes = vec![pass("map", vec![hits(5)]), pass("image", vec![hits(1), hits(2)])];
             let time = |begin_ps, end_ps| PassTime { begin_ps, end_ps, busy_ps: [0; activity::Unit::COUNT] };
             let times = [time(0, 3_000_000), time(2_000_000, 5_000_000)];
-            add(&mut groups, &FrameReport { passes, ..FrameReport::default() }, &times, 2.0);
+            add(&mut groups, &FrameReport { passes, ..FrameReport::default() }, (&times, None), 2.0);
         }
         let found: Vec<_> = groups.iter().map(|group| (group.name.as_str(), group.passes)).collect();
         assert_eq!(found, [("map", 2), ("image", 2)]);

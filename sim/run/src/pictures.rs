@@ -18,7 +18,7 @@ pub(super) struct Plot {
 
 /// All plots of a run.
 pub(super) fn plots(outcome: &Outcome) -> Vec<Plot> {
-    let subject = format!("{} on {}", outcome.plan.work.name(), outcome.plan.gpu.name);
+    let subject = format!("{} on {}", outcome.plan.name, outcome.plan.gpu.name);
     let shown = shown_frame(outcome);
     let mut plots = vec![
         Plot {

@@ -4,25 +4,25 @@ use std::path::{Path, PathBuf};
 
 use activity::inputs;
 use pipeline::Viewport;
-use pipeline::sampling::SampleSource;
 use power_model::{EnergyTable, Pacing, Platform, PowerModel};
 use traces::device::RATES_HZ;
-use workloads::{Overrides, SampleChoice};
+use workloads::job::{Reduction, Request};
+use workloads::{Job, Settings, catalog};
 
+use crate::RunError;
 use crate::gpu::GpuSpec;
-use crate::options::{DEFAULT_RATE_HZ, PacingChoice, RunOptions, Sampling};
-use crate::{RunError, Work};
+use crate::options::{DEFAULT_RATE_HZ, PacingChoice, RunOptions};
 
 /// Plan of a run: options, and all inputs loaded and checked.
 pub struct Plan {
     /// The options.
     pub options: RunOptions,
-    /// The scene or workload, with the changes of the options applied.
-    pub work: Work,
+    /// Name of the scene or workload.
+    pub name: String,
+    /// What is drawn: the scene or workload, with the changes of the options applied.
+    pub job: Box<dyn Job>,
     /// Size of the image.
     pub viewport: Viewport,
-    /// Sample table.
-    pub samples: Box<dyn SampleSource>,
     /// The hardware.
     pub gpu: GpuSpec,
     /// The platform.
@@ -59,11 +59,8 @@ impl Plan {
                 "packet loss: {loss}; a share from 0 to below 1 can be lost"
             )));
         }
-        let (work, table) = work(&options)?;
-        if options.sampling != Sampling::Every {
-            work.scene("--timing sampled")?;
-        }
-        let settings = work.settings();
+        let (name, job) = catalog::load(&options.scene, &options.options, &request(&options))?;
+        let settings = job.settings();
         let viewport = Viewport::new(settings.width, settings.height)
             .ok_or_else(|| RunError::Setting(format!("size: {}x{}", settings.width, settings.height)))?;
         let pacing = match options.pacing {
@@ -74,13 +71,12 @@ impl Plan {
         let files = gpu.power.clone().unwrap_or_default();
         let platform = options.platform.as_deref().unwrap_or(Path::new(&files.platform));
         let platform = file_or_name(platform, Platform::load, Platform::builtin)?;
-        size_of(&work, viewport, pacing, &platform, options.trace_rate_hz).check()?;
-        let samples = table.source(settings.samples, options.seed)?;
+        size_of(settings, viewport, pacing, &platform, options.trace_rate_hz).check()?;
         let table = options.energy.as_deref().unwrap_or(Path::new(&files.energy));
         let table = file_or_name(table, EnergyTable::load, EnergyTable::builtin)?;
         let model = PowerModel::at(&table, &platform, options.bound)?;
         let files = Vec::new();
-        Ok(Self { work, viewport, samples, gpu, platform, table, model, pacing, options, files })
+        Ok(Self { name, job, viewport, gpu, platform, table, model, pacing, options, files })
     }
 
     /// The same plan on another GPU, platform and energy table.
@@ -95,7 +91,22 @@ impl Plan {
     }
 
     pub(super) fn size(&self) -> Size {
-        size_of(&self.work, self.viewport, self.pacing, &self.platform, self.options.trace_rate_hz)
+        let settings = self.job.settings();
+        size_of(settings, self.viewport, self.pacing, &self.platform, self.options.trace_rate_hz)
+    }
+
+    /// The job with less work for each frame.
+    ///
+    /// # Errors
+    /// If it cannot be made so small.
+    pub(super) fn reduced(&self, to: &Reduction) -> Result<Box<dyn Job + '_>, RunError> {
+        let options = &self.options;
+        Ok(catalog::reduced(&*self.job, &options.scene, &options.options, &request(options), to)?)
+    }
+
+    /// Samples per pixel.
+    pub fn per_pixel(&self) -> u32 {
+        self.job.settings().samples
     }
 
     /// Pixels of the image.
@@ -106,13 +117,12 @@ impl Plan {
 
 /// Size of a run, from the parts of a plan.
 fn size_of(
-    work: &Work,
+    settings: &Settings,
     viewport: Viewport,
     pacing: Pacing,
     platform: &Platform,
     trace_rate_hz: Option<f64>,
 ) -> Size {
-    let settings = work.settings();
     Size {
         pixels: viewport.pixels() as u64,
         samples: settings.samples,
@@ -123,19 +133,8 @@ fn size_of(
     }
 }
 
-/// Scene or workload with the changes of the options applied, and its sample table. A table in a file sets
-/// the samples per pixel, unless the options do.
-fn work(options: &RunOptions) -> Result<(Work, SampleChoice), RunError> {
-    let work = Work::find(&options.scene, &options.overrides, &options.options, options.seed)?;
-    let table = SampleChoice::load(&work.settings().table)?;
-    let samples = table.per_pixel().filter(|_| options.overrides.samples.is_none());
-    match (work, samples) {
-        (Work::Scene(scene), Some(_)) => {
-            let scene = scene.with_overrides(&Overrides { samples, ..Overrides::default() })?;
-            Ok((Work::Scene(Box::new(scene)), table))
-        }
-        (work, _) => Ok((work, table)),
-    }
+fn request(options: &RunOptions) -> Request<'_> {
+    Request { overrides: &options.overrides, seed: options.seed }
 }
 
 fn file_or_name<T, E>(

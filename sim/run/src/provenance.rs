@@ -9,9 +9,10 @@ use output::dir::sha256_of;
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 use serde_json::error::Category;
+use workloads::Scene;
 use workloads::scene::CameraUsed;
 
-use crate::{Choice, Plan, RunError, RunOptions, Work};
+use crate::{Choice, Plan, RunError, RunOptions};
 
 /// Schema version of `summary.json`, described by `docs/summary.schema.json`. A version may gain keys.
 /// Removing a key or changing its meaning or unit needs a new version.
@@ -107,7 +108,7 @@ pub struct Provenance {
     pub request: RunOptions,
     /// The input files, sorted by name.
     pub inputs: Vec<Input>,
-    /// Camera of a scene; `None` for workloads.
+    /// Camera of a scene; `None` for workloads without one.
     pub camera: Option<CameraUsed>,
     /// The host.
     pub host: Host,
@@ -115,10 +116,7 @@ pub struct Provenance {
 
 impl Provenance {
     pub(super) fn new(plan: &Plan, revision: Option<&str>) -> Result<Self, RunError> {
-        let camera = match &plan.work {
-            Work::Scene(scene) => Some(scene.camera_used()?),
-            Work::Job { .. } => None,
-        };
+        let camera = plan.job.scene().map(Scene::camera_used).transpose()?;
         let inputs = Input::of_plan(plan)?;
         Ok(Self { request: plan.options.clone(), inputs, camera, host: Host::now(revision) })
     }

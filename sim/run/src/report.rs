@@ -14,13 +14,14 @@ use power_model::{Bound, Part};
 use crate::frame::image_name;
 use crate::heat::heat_name;
 use crate::pictures::{Plot, parts_in_use};
-use crate::{Host, Input, Outcome, PassSummary, RunError};
+use crate::stalls;
+use crate::{HeatQuantity, Host, Input, Outcome, PassSummary, RunError};
 
 /// Collects the contents of the report.
 pub(super) fn report<'a>(outcome: &'a Outcome, plots: &[Plot]) -> Result<Report<'a>, RunError> {
     let plan = &outcome.plan;
     Ok(Report {
-        title: format!("{} on {}", plan.work.name(), plan.gpu.name).into(),
+        title: format!("{} on {}", plan.name, plan.gpu.name).into(),
         facts: facts(outcome),
         warnings: warnings(outcome),
         headline: outcome.summary.headline(),
@@ -54,7 +55,7 @@ fn images(outcome: &Outcome) -> Result<Vec<ReportImage>, RunError> {
     // The middle image comes first and large; the others follow in order as thumbnails.
     let middle = pictures.len() / 2;
     pictures[..=middle].rotate_right(1);
-    let shown = outcome.plan.work.shows();
+    let shown = outcome.plan.job.shows();
     let first = |number: u32| match shown {
         "" => format!("frame {number}"),
         shown => format!("frame {number}: {shown}"),
@@ -76,9 +77,14 @@ fn images(outcome: &Outcome) -> Result<Vec<ReportImage>, RunError> {
 
 fn heat(outcome: &Outcome) -> impl Iterator<Item = ReportImage> {
     outcome.simulated.heat.iter().map(|map| ReportImage {
-        caption: format!("where in frame {} the counter {} counted", map.frame, map.event.name()),
+        caption: match map.of {
+            HeatQuantity::Event(event) => {
+                format!("where in frame {} the counter {} counted", map.frame, event.name())
+            }
+            HeatQuantity::Joules => format!("where in frame {} the energy of events was used", map.frame),
+        },
         png: map.png.clone(),
-        link: Some(format!("{}.png", heat_name(map.event, map.frame))),
+        link: Some(format!("{}.png", heat_name(map.of, map.frame))),
     })
 }
 
@@ -136,6 +142,11 @@ fn passes(outcome: &Outcome) -> Vec<PassRow> {
         energy_j: pass.energy_j,
         energy_share: pass.energy_j / energy_j,
         dram_bytes: pass.work.dram_bytes,
+        waits: stalls::waited_for(&pass.stalls)
+            .into_iter()
+            .map(|(unit, share)| format!("{unit} {:.0} %", 100.0 * share))
+            .collect::<Vec<_>>()
+            .join(", "),
     };
     rows.iter().map(row).collect()
 }
@@ -177,7 +188,7 @@ fn counters(outcome: &Outcome) -> Vec<CounterRow> {
 fn facts(outcome: &Outcome) -> Vec<FactRow> {
     let (plan, summary) = (&outcome.plan, &outcome.summary);
     let mut facts = vec![
-        FactRow::new("scene", plan.work.name()),
+        FactRow::new("scene", plan.name.clone()),
         FactRow::new("triangles", grouped(summary.settings.triangles as u64)),
         FactRow::new("GPU", format!("{}: {}", plan.gpu.name, plan.gpu.doc)),
         FactRow::new("platform", format!("{}: {}", plan.platform.name, plan.platform.doc)),
@@ -233,7 +244,7 @@ fn settings(outcome: &Outcome) -> Vec<FactRow> {
     rows
 }
 
-/// Camera of the first frame; for a workload only the lens.
+/// Camera of the first frame; for a workload without a scene only the lens.
 fn camera(outcome: &Outcome) -> Vec<FactRow> {
     let lens = |radius: f32| match radius > 0.0 {
         true => format!("radius {radius} scene units"),
@@ -248,7 +259,7 @@ fn camera(outcome: &Outcome) -> Vec<FactRow> {
         (None, height) => format!("{} scene units high, orthographic", height.unwrap_or_default()),
     };
     let note = |row: FactRow, note: &str| FactRow { note: note.to_owned(), ..row };
-    let given = outcome.plan.work.settings().focus.is_some();
+    let given = outcome.plan.job.settings().focus.is_some();
     vec![
         note(
             FactRow::new("camera position", vector(camera.position)),
@@ -293,7 +304,7 @@ fn host(outcome: &Outcome) -> Vec<FactRow> {
 }
 
 fn frame_range(outcome: &Outcome) -> String {
-    let frames = &outcome.plan.work.settings().frames;
+    let frames = &outcome.plan.job.settings().frames;
     format!("{} ({}..{})", frames.end - frames.start, frames.start, frames.end)
 }
 
@@ -301,7 +312,7 @@ fn frame_range(outcome: &Outcome) -> String {
 fn files(outcome: &Outcome) -> Vec<FileLink> {
     let heat = [(
         "heat/",
-        "where in each frame counters counted: pictures, values of the pixels, counts of the tiles",
+        "where in each frame counters counted, or energy was used: pictures, values of the pixels and of the tiles",
     )];
     let heat = heat.into_iter().filter(|_| !outcome.simulated.heat.is_empty());
     [

@@ -11,36 +11,36 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use activity::{Counts, Event, Unit};
 use output::progress::Progress;
+use pipeline::Gpu;
 use pipeline::random::mix;
-use pipeline::sampling::SampleSource;
-use pipeline::{RasterPass, Settings, Viewport};
 use power_model::PowerModel;
 use rayon::prelude::*;
 use timing::sampled::{Design, Estimate};
 use timing::{FrameClock, Level, Recorder};
-use workloads::SampleChoice;
+use workloads::Job;
+use workloads::job::Reduction;
 
 use crate::frame::{self, FrameSimulator, SimulatedFrame};
 use crate::{Distinct, FrameCost, Origin, Plan, Quantity, RunError, RunFrame, SampledSummary, Simulated};
 
 /// Previews of the frames of a run, and the pilot frame.
-pub struct Previews {
+pub struct Previews<'a> {
     /// Settings of the previews.
-    pub previewer: Previewer,
+    pub previewer: Previewer<'a>,
     /// Preview of each frame.
     pub frames: Vec<FramePreview>,
     /// Index of the pilot frame. It is simulated first, and previews are scaled by it.
     pub pilot: usize,
 }
 
-impl Previews {
+impl<'a> Previews<'a> {
     /// Previews the frames `numbers`.
-    pub fn new(plan: &Plan, numbers: &[u32], progress: &Progress) -> Result<Self, RunError> {
+    pub fn new(plan: &'a Plan, numbers: &[u32], progress: &Progress) -> Result<Self, RunError> {
         let previewer = Previewer::new(plan)?;
         let bar = progress.bar("previews", numbers.len() as u64);
         let preview = |&number: &u32| {
             bar.inc();
-            previewer.frame(plan, number)
+            previewer.frame(number)
         };
         let frames: Vec<FramePreview> = numbers.par_iter().map(preview).collect::<Result<_, _>>()?;
         let pilot = median(&frames);
@@ -110,7 +110,7 @@ const MIN_SCALE: f64 = 0.01;
 fn all_frames(
     plan: &Plan,
     frames: &Distinct,
-    previews: &Previews,
+    previews: &Previews<'_>,
     forecast: &Forecast,
     mut simulated: BTreeMap<usize, SimulatedFrame>,
 ) -> Simulated {
@@ -122,7 +122,9 @@ fn all_frames(
             predict(numbers[group], previews, forecast, place, nearest)
         });
     }
-    let sampled = summary(plan, frames, previews, forecast);
+    let pilot = &simulated[&groups[previews.pilot]].frame;
+    let preview_share = previews.frames[previews.pilot].cycles as f64 / pilot.cycles.max(1) as f64;
+    let sampled = summary(plan, frames, (previews, preview_share), forecast);
     let pictures =
         simulated.iter_mut().filter_map(|(&group, done)| Some((numbers[group], done.picture.take()?)));
     let pictures = pictures.collect();
@@ -139,7 +141,7 @@ fn all_frames(
 }
 
 /// Simulated frame of the same stratum with the most similar preview.
-fn nearest(previews: &Previews, forecast: &Forecast, place: usize) -> usize {
+fn nearest(previews: &Previews<'_>, forecast: &Forecast, place: usize) -> usize {
     let design = forecast.design();
     let apart = |&other: &usize| previews.frames[other].cycles.abs_diff(previews.frames[place].cycles);
     let chosen = &design.strata()[design.stratum_of(place)].chosen;
@@ -149,7 +151,7 @@ fn nearest(previews: &Previews, forecast: &Forecast, place: usize) -> usize {
 /// Predicts a frame: the power curve of `nearest`, scaled to the predicted time and energy.
 fn predict(
     number: u32,
-    previews: &Previews,
+    previews: &Previews<'_>,
     forecast: &Forecast,
     place: usize,
     nearest: &RunFrame,
@@ -173,16 +175,21 @@ fn predict(
 }
 
 /// Summary of a sampled run: simulated frames and intervals.
-fn summary(plan: &Plan, frames: &Distinct, previews: &Previews, forecast: &Forecast) -> SampledSummary {
+fn summary(
+    plan: &Plan,
+    frames: &Distinct,
+    (previews, preview_share): (&Previews<'_>, f64),
+    forecast: &Forecast,
+) -> SampledSummary {
     let (numbers, groups) = (frames.numbers(), frames.groups());
     let chosen: BTreeSet<u32> =
         forecast.design().chosen().into_iter().map(|place| numbers[groups[place]]).collect();
-    let viewport = previews.previewer.viewport;
     SampledSummary {
         frames_per_simulated: groups.len() as f64 / chosen.len() as f64,
         simulated_frames: chosen.into_iter().collect(),
         strata: forecast.design().strata().len(),
-        preview: [viewport.width(), viewport.height(), previews.previewer.per_pixel()],
+        preview: previews.previewer.size(),
+        preview_share,
         confidence: CONFIDENCE,
         cycles_per_frame: forecast.cycles_per_frame(),
         busy_energy_per_frame_j: forecast.energy_per_frame_j(),
@@ -256,11 +263,10 @@ const MAX_REDUCTION: u32 = 8;
 /// Timeline bins of a preview; only totals are used.
 const TIMELINE_BINS: usize = 64;
 
-/// Renders previews: image size, sample table and timing level.
-pub struct Previewer {
-    /// Size of the image.
-    pub viewport: Viewport,
-    samples: Box<dyn SampleSource>,
+/// Renders previews: the job with less work, and the timing level.
+pub struct Previewer<'a> {
+    plan: &'a Plan,
+    job: Box<dyn Job + 'a>,
     level: Level,
 }
 
@@ -281,48 +287,37 @@ pub struct FramePreview {
     pub cycles: u64,
 }
 
-impl Previewer {
-    /// Settings for the frames of `plan`, with one sample per pixel if the sample table allows it.
-    pub fn new(plan: &Plan) -> Result<Self, RunError> {
-        let by = (plan.viewport.width() / TARGET_WIDTH_PX).clamp(1, MAX_REDUCTION);
-        let [width, height] = [plan.viewport.width(), plan.viewport.height()].map(|side| side.div_ceil(by));
-        let viewport = Viewport::new(width, height)
-            .ok_or_else(|| RunError::Setting(format!("size of the preview: {width}x{height}")))?;
-        let settings = plan.work.settings();
-        let table = SampleChoice::load(&settings.table)?;
-        let own = |count| table.source(count, plan.options.seed);
-        let samples = own(1).or_else(|_| own(plan.samples.per_pixel()))?;
+impl<'a> Previewer<'a> {
+    /// Previews of the frames of `plan`, with one sample per pixel if the job can draw so few.
+    pub fn new(plan: &'a Plan) -> Result<Self, RunError> {
+        let to = Reduction {
+            samples: Some(1),
+            ..Reduction::to_width(plan.job.settings(), TARGET_WIDTH_PX, MAX_REDUCTION)
+        };
         let level = if plan.options.timing == Level::Bound { Level::Bound } else { Level::Packet };
-        Ok(Self { viewport, samples, level })
+        Ok(Self { plan, job: plan.reduced(&to)?, level })
     }
 
-    /// Samples per pixel.
-    pub fn per_pixel(&self) -> u32 {
-        self.samples.per_pixel()
+    /// Width and height of a preview in pixels, and samples per pixel.
+    pub fn size(&self) -> [u32; 3] {
+        let settings = self.job.settings();
+        [settings.width, settings.height, settings.samples]
     }
 
     /// Renders and times a preview of frame `number`.
-    pub fn frame(&self, plan: &Plan, number: u32) -> Result<FramePreview, RunError> {
-        let scene = plan.work.scene("predicting frames")?;
-        let frame = scene.frame(number)?;
-        let settings = Settings {
-            spec: &plan.gpu.pipeline,
-            viewport: self.viewport,
-            samples: &*self.samples,
-            background: scene.background(),
-        };
-        let draws = frame.draws(scene)?;
+    pub fn frame(&self, number: u32) -> Result<FramePreview, RunError> {
         let recorder = Recorder::new(frame::BIN_PS, TIMELINE_BINS);
-        let mut clock = FrameClock::new(self.level, plan.gpu.machine()?, recorder);
+        let mut clock = FrameClock::new(self.level, self.plan.gpu.machine()?, recorder);
         let emit = |packet: &_, lines: &_| clock.push(packet, lines);
-        let rendered =
-            RasterPass::new(&frame.camera, &draws, &settings).render(emit).map_err(RunError::setting)?;
+        let mut gpu = Gpu::new(&self.plan.gpu.pipeline, emit).map_err(RunError::setting)?;
+        let drawn = self.job.frame(number, &mut gpu)?;
+        let report = gpu.finish();
         let timed = clock.finish()?;
         Ok(FramePreview {
-            triangles: frame.triangle_count(),
-            moving: frame.is_moving(),
-            lens: frame.camera.lens().is_some(),
-            counts: rendered.counts,
+            triangles: report.triangles(),
+            moving: drawn.moving,
+            lens: drawn.lens,
+            counts: report.counts(),
             busy_ps: timed.timeline.busy_ps(),
             cycles: timed.cycles,
         })

@@ -33,7 +33,7 @@ fn has_few_distinct(distinct: &Distinct, sampling: Sampling) -> bool {
 
 /// Simulates all distinct frames without writing files.
 pub(super) fn without_files(plan: &Plan, progress: &Progress) -> Result<Simulated, RunError> {
-    let distinct = &Distinct::new(&plan.work)?;
+    let distinct = &Distinct::new(&*plan.job)?;
     let max_bins = max_bins_per_frame(distinct.numbers().len());
     every(&FrameSimulator { plan, distinct, dir: None, max_bins }, progress)
 }

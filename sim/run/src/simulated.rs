@@ -8,11 +8,11 @@ use serde::Serialize;
 use timing::sampled::Interval;
 use timing::{AccuracyWarning, PassTime, Stalls};
 use warnings::Warning;
+use workloads::Regime;
 use workloads::job::Fact;
 
 use crate::Plan;
 use crate::heat::HeatPicture;
-use crate::regime::Regime;
 
 /// Frame of a run with its power over time, simulated or predicted.
 pub struct RunFrame {
@@ -173,6 +173,8 @@ pub struct SampledSummary {
     pub strata: usize,
     /// Width and height of the preview in pixels, and samples per pixel.
     pub preview: [u32; 3],
+    /// Cycles of the preview of a frame over those of the frame.
+    pub preview_share: f64,
     /// Confidence level of the intervals.
     pub confidence: f64,
     /// Mean cycles per frame.

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use activity::Unit;
+use activity::{Counts, Unit};
 use serde::Serialize;
 use timing::{Stalls, UnitTime};
 
@@ -14,7 +14,7 @@ use traces::io::perfetto::CounterTrack;
 const MAX_COLUMNS: usize = 128;
 
 /// Shares of a unit's time over the frames of a run; all of them add up to 1.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct StallShares {
     /// Serving work.
     pub busy: f64,
@@ -26,12 +26,23 @@ pub struct StallShares {
     pub blocked: BTreeMap<&'static str, f64>,
 }
 
+/// Part of a frame: its stalls, and where it begins and ends in picoseconds.
+pub(super) type StalledSpan<'a> = (&'a Stalls, [u64; 2]);
+
 /// Shares of every unit in use over all distinct frames; empty if the timing level records no stalls.
 pub(super) fn shares(simulated: &Simulated) -> BTreeMap<&'static str, StallShares> {
-    let used = simulated.total();
+    let frames = simulated.observed().filter_map(|(_, frame)| frame.stalls.as_ref());
+    let spans: Vec<StalledSpan<'_>> = frames.map(|stalls| (stalls, [0, u64::MAX])).collect();
+    shares_of(&spans, &simulated.total())
+}
+
+/// Shares of every unit that counted in `used`, over parts of frames; empty without any.
+pub(super) fn shares_of(spans: &[StalledSpan<'_>], used: &Counts) -> BTreeMap<&'static str, StallShares> {
+    if spans.is_empty() {
+        return BTreeMap::new();
+    }
     let of = |unit: Unit| {
-        let frames = simulated.observed().filter_map(|(_, frame)| frame.stalls.as_ref());
-        let times: Vec<UnitTime> = frames.map(|stalls| stalls.of(unit)).collect();
+        let times: Vec<UnitTime> = spans.iter().map(|(stalls, span)| stalls.between(unit, *span)).collect();
         let total = times.iter().map(UnitTime::total).sum::<u64>().max(1) as f64;
         let share = |pick: &dyn Fn(&UnitTime) -> u64| times.iter().map(pick).sum::<u64>() as f64 / total;
         let by = |pick: fn(&UnitTime, usize) -> u64| {
@@ -41,10 +52,19 @@ pub(super) fn shares(simulated: &Simulated) -> BTreeMap<&'static str, StallShare
         let (starved, blocked) = (by(|time, by| time.starved[by]), by(|time, by| time.blocked[by]));
         StallShares { busy: share(&|time| time.busy), idle: share(&|time| time.idle), starved, blocked }
     };
-    if simulated.observed().all(|(_, frame)| frame.stalls.is_none()) {
-        return BTreeMap::new();
-    }
     Unit::ALL.into_iter().filter(|&unit| used.uses(unit)).map(|unit| (unit.name(), of(unit))).collect()
+}
+
+/// The units that others waited for most, at most three: the mean share over all units in `stalls`.
+pub(super) fn waited_for(stalls: &BTreeMap<&'static str, StallShares>) -> Vec<(&'static str, f64)> {
+    let mut waits: BTreeMap<&'static str, f64> = BTreeMap::new();
+    for (&by, &share) in stalls.values().flat_map(|of| of.starved.iter().chain(&of.blocked)) {
+        *waits.entry(by).or_default() += share / stalls.len() as f64;
+    }
+    let mut most: Vec<_> = waits.into_iter().collect();
+    most.sort_by(|a, b| b.1.total_cmp(&a.1));
+    most.truncate(3);
+    most
 }
 
 /// Busy, starved and blocked share of `unit` in each interval.

@@ -9,6 +9,7 @@ use power_model::Energy;
 use serde::Serialize;
 use traces::energy::{FrameEnergy, FrameSummary, Spread};
 use warnings::Warning;
+use workloads::Scene;
 use workloads::scene::CameraUsed;
 
 use crate::frame::image_name;
@@ -42,7 +43,7 @@ pub struct Summary {
     pub inputs: Vec<Input>,
     /// Settings in use.
     pub settings: SettingsSummary,
-    /// Camera of the first frame; `None` for workloads.
+    /// Camera of the first frame; `None` for workloads without a scene.
     pub camera: Option<CameraUsed>,
     /// Dimensions and units that were modelled.
     pub modelled: Modelled,
@@ -207,7 +208,7 @@ impl Summary {
         Self {
             schema: SCHEMA,
             version: env!("CARGO_PKG_VERSION"),
-            scene: plan.work.name().to_owned(),
+            scene: plan.name.clone(),
             gpu: plan.gpu.name.clone(),
             platform: plan.platform.name.clone(),
             energy_table: [plan.table.name().to_owned(), format!("{:?}", plan.options.bound).to_lowercase()],
@@ -272,13 +273,13 @@ fn true_frames(measurement: &Measurement) -> Vec<FrameEnergy> {
 }
 
 fn settings(plan: &Plan, simulated: &Simulated, measurement: &Measurement) -> SettingsSummary {
-    let scene = plan.work.settings();
+    let scene = plan.job.settings();
     SettingsSummary {
         width: scene.width,
         height: scene.height,
         samples: scene.samples,
         table: scene.table.clone(),
-        clip: plan.work.clip().map(str::to_owned),
+        clip: plan.job.scene().and_then(Scene::clip).map(str::to_owned),
         frame_rate_hz: scene.frame_rate_hz,
         shutter: scene.shutter,
         first_frame: scene.frames.start,
@@ -369,7 +370,7 @@ fn around(value: f64, half: Option<f64>) -> Option<[f64; 2]> {
 
 /// All frames of the run.
 fn rows(plan: &Plan, simulated: &Simulated, measurement: &Measurement) -> Vec<FrameRow> {
-    let first = plan.work.settings().frames.start;
+    let first = plan.job.settings().frames.start;
     measurement
         .run
         .frames

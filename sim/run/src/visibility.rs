@@ -8,9 +8,9 @@ use pipeline::visibility::{SampleLayout, Visibility, VisibleTriangle, resolve};
 use pipeline::{Cull, Draw, Features, Geometry, PipelineSpec, RasterPass, Settings};
 use serde::Serialize;
 use warnings::{Code, Warning};
+use workloads::Regime;
 use workloads::visibility::{Unshaded, VisibilityScene};
 
-use crate::Regime;
 use crate::gpu::GpuSpec;
 
 /// Rates in samples of the image per second.

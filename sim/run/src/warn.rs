@@ -8,13 +8,14 @@ use power_model::PacedFrame;
 use timing::AccuracyWarning;
 use traces::frames::Flag;
 use warnings::{Code, Warning};
+use workloads::Regime;
 
 use crate::measure::MIN_BUSY_SAMPLES;
-use crate::{Choice, Measurement, Observed, Plan, Regime, RunFrame, Simulated, gpu};
+use crate::{Choice, Measurement, Observed, Plan, RunFrame, Simulated, gpu};
 
 /// All warnings of a run, sorted, without duplicates.
 pub(crate) fn gather(plan: &Plan, simulated: &Simulated, measurement: &Measurement) -> Vec<Warning> {
-    let mut all = plan.work.warnings().to_vec();
+    let mut all = plan.job.warnings().to_vec();
     all.extend(gpu::check_pairing(&plan.options, &plan.gpu, &plan.platform, &plan.table));
     all.extend(of_frames(
         simulated
@@ -39,6 +40,7 @@ pub(crate) fn gather(plan: &Plan, simulated: &Simulated, measurement: &Measureme
     all.extend(clipped(measurement));
     all.extend(lost(measurement));
     all.extend(wide_intervals(simulated));
+    all.extend(costly_preview(simulated));
     all.extend(of_regimes(simulated));
     Warning::fold(all)
 }
@@ -150,6 +152,20 @@ fn wide_intervals(simulated: &Simulated) -> Option<Warning> {
                 simulated.frames.len()
             ),
         )
+    })
+}
+
+/// Share of a frame's cycles in its preview from which on a warning is given.
+const COSTLY_PREVIEW_SHARE: f64 = 0.25;
+
+fn costly_preview(simulated: &Simulated) -> Option<Warning> {
+    let share = simulated.sampled.as_ref()?.preview_share;
+    (share >= COSTLY_PREVIEW_SHARE).then(|| {
+        let message = format!(
+            "the preview of a frame takes {:.0} % of its cycles, because its passes do not shrink with the image, or the image is small              already: predicting frames saves little; use --timing packet",
+            share * 100.0
+        );
+        Warning::new(Code::CostlyPreview, message)
     })
 }
 
@@ -422,6 +438,7 @@ mod tests {
                 frames_per_simulated: 12.0,
                 strata: 2,
                 preview: [160, 90, 1],
+                preview_share: 0.1,
                 confidence: 0.95,
                 cycles_per_frame: quantity(0.01),
                 busy_energy_per_frame_j: quantity(relative_half_width),

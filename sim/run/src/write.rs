@@ -19,10 +19,10 @@ use crate::{FIGURES, FrameRow, Observed, Outcome, Plan, RunError, pictures, repo
 /// Files that a run may write.
 pub(super) fn claim(plan: &Plan) -> Claim {
     let ends: &[&str] = if plan.options.exr { &["png", "exr"] } else { &["png"] };
-    let frames = || plan.work.settings().frames.clone();
+    let frames = || plan.job.settings().frames.clone();
     let images =
         frames().flat_map(|frame| ends.iter().map(move |end| format!("{}.{end}", image_name(frame))));
-    let maps = plan.options.heat.iter().flat_map(|&event| frames().map(move |frame| heat_name(event, frame)));
+    let maps = plan.options.heat.iter().flat_map(|&of| frames().map(move |frame| heat_name(of, frame)));
     let heat = maps.flat_map(|name| ["png", "exr", "csv"].map(|end| format!("{name}.{end}")));
     let figures = FIGURES.map(|(figure, _)| figure).into_iter();
     Claim::new("run")
@@ -41,7 +41,7 @@ pub(super) fn write(outcome: &Outcome, dir: &OutDir, progress: &Progress) -> Res
     dir.write_file("trace.json", |out| Ok(traces::io::csv::write_sidecar(trace, out)?))?;
     bar.inc();
     write_frames(outcome, dir)?;
-    let process = format!("quintile {} on {}", outcome.plan.work.name(), outcome.plan.gpu.name);
+    let process = format!("quintile {} on {}", outcome.plan.name, outcome.plan.gpu.name);
     let timeline = timeline(outcome, &process);
     dir.write_file("timeline.perfetto-trace", |out| Ok(perfetto::write(&timeline, out)?))?;
     bar.inc();

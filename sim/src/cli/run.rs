@@ -11,11 +11,10 @@ use output::progress::Progress;
 use output::table::{Table, count_or_digits, counted, si, si_mean_sd};
 use output::terminal::{Terminal, Verbosity};
 use output::{Destination, MeanSd};
-use pipeline::frame::HeatMap;
 use power_model::Bound;
 use run::{
-    DryRun, Method, Outcome, PacingChoice, Plan, Prepared, Requested, RunError, RunOptions, Summary, again,
-    open, prepare,
+    DryRun, HeatQuantity, Method, Outcome, PacingChoice, Plan, Prepared, Requested, RunError, RunOptions,
+    Summary, again, open, prepare,
 };
 use serde::Serialize;
 use workloads::job::OptionSource;
@@ -31,8 +30,8 @@ use crate::cli::parse::{duration, percent, rate, setting, share_below_one};
     after_help = "Example:\n  quintile run Fox.glb --clip Run --frames 0..60 --lens 2 --samples 16 --out fox\n  \
     quintile run Fox.glb --frames 0..300 --accuracy 2% --verify --out fox\n  \
     quintile run ccd --set resolution=64 --set bins=8 --out ccd\n\n\
-    The chapter of a workload in the book lists its options and defaults; an unknown name after `--set` lists the known ones. Workloads take no \
-    --accuracy, --budget or --timing sampled, which need a scene, and refuse flags without effect.\n\n\
+    The chapter of a workload in the book lists its options and defaults; an unknown name after `--set` lists the known ones. Workloads \
+    refuse flags without effect.\n\n\
     Results are in DIR: images/, report.html, summary.json, frames.csv, trace.parquet, trace.csv, plots/ and \
     timeline.perfetto-trace (open it at ui.perfetto.dev). They appear together when all are whole; results of an earlier run \
     are replaced then, and other files in DIR are left alone."
@@ -76,12 +75,11 @@ pub struct RunArgs {
     /// Timing level; `quintile chart timing` shows its accuracy
     #[arg(long, value_enum, default_value_t)]
     pub timing: Method,
-    /// Let a probe choose level, frames and dimensions so that the error of cycles and energy is at most this, for example 2%;
-    /// for scenes, not for workloads
+    /// Let a probe choose level, frames and dimensions so that the error of cycles and energy is at most this, for example 2%
     #[arg(long, value_name = "P%", value_parser = percent, conflicts_with = "timing", allow_hyphen_values = true)]
     pub accuracy: Option<f64>,
     /// Let a probe choose the most accurate options that take no longer than this, for example 30s, 500ms or
-    /// 2min; for scenes, not for workloads
+    /// 2min
     #[arg(long, value_name = "T", value_parser = duration, conflicts_with = "timing", allow_hyphen_values = true)]
     pub budget: Option<f64>,
     /// Simulate every frame at the reference as well, and report the actual error
@@ -106,9 +104,10 @@ pub struct RunArgs {
     /// Also write every frame as EXR (linear light)
     #[arg(long)]
     pub exr: bool,
-    /// Write heat maps of a counter, as PNG, EXR and CSV in heat/; may be given several times
-    #[arg(long, value_name = "COUNTER", value_parser = counter)]
-    pub heat: Vec<Event>,
+    /// Write heat maps of a counter, or of the energy of all counters (joules), as PNG, EXR and CSV in heat/; may be given several
+    /// times
+    #[arg(long, value_name = "COUNTER|joules", value_parser = quantity)]
+    pub heat: Vec<HeatQuantity>,
     /// Worker threads.
     #[command(flatten)]
     pub threads: ThreadArgs,
@@ -172,19 +171,18 @@ fn bound() -> impl TypedValueParser<Value = Bound> {
     })
 }
 
-/// Parser of `--heat`: a counter that has a position in the image.
-fn counter(text: &str) -> Result<Event, String> {
-    let placed = || Event::ALL.into_iter().filter(|&event| HeatMap::is_of(event));
-    match Event::from_name(text) {
-        Some(event) if HeatMap::is_of(event) => Ok(event),
-        Some(_) => {
-            Err(format!("`{text}` is counted before it is known where in the image; samples_tested is not"))
-        }
-        None => {
-            let known: Vec<&str> = placed().map(Event::name).collect();
-            Err(format!("unknown counter `{text}`; {}", suggestion(text, &known)))
-        }
+/// Parser of `--heat`: energy, or a counter that has a position in the image.
+fn quantity(text: &str) -> Result<HeatQuantity, String> {
+    if let Some(known) = HeatQuantity::all().find(|quantity| quantity.name() == text) {
+        return Ok(known);
     }
+    if Event::from_name(text).is_some() {
+        return Err(format!(
+            "`{text}` is counted before it is known where in the image; samples_tested is not"
+        ));
+    }
+    let known: Vec<&str> = HeatQuantity::all().map(HeatQuantity::name).collect();
+    Err(format!("unknown counter `{text}`; {}", suggestion(text, &known)))
 }
 
 /// The git revision of this program.

@@ -60,6 +60,7 @@ fn report(text: &str, number: f64) -> Report<'static> {
             energy_j: number,
             energy_share: 1.0,
             dram_bytes: 64,
+            waits: owned(),
         }],
         units: vec![UnitRow {
             name: owned(),

@@ -50,6 +50,13 @@ impl UnitTime {
         }
     }
 
+    /// `part` of `whole` of the time, rounded down.
+    fn part(&self, part: u64, whole: u64) -> Self {
+        let of = |time: Time| (u128::from(time) * u128::from(part) / u128::from(whole)) as Time;
+        let Self { busy, idle, starved, blocked } = *self;
+        Self { busy: of(busy), idle: of(idle), starved: starved.map(of), blocked: blocked.map(of) }
+    }
+
     fn of(&mut self, reason: Reason) -> &mut Time {
         match reason {
             Reason::Idle => &mut self.idle,
@@ -128,6 +135,25 @@ impl Stalls {
         })
     }
 
+    /// Server time of `unit` between two times of the frame, in picoseconds. An interval that is in it in part counts in
+    /// part.
+    pub fn between(&self, unit: Unit, [from_ps, to_ps]: [u64; 2]) -> UnitTime {
+        let first = (from_ps / self.interval_ps()).saturating_sub(1);
+        let mut sum = UnitTime::default();
+        for (interval, at) in self.intervals.iter().zip(0..).skip(first as usize) {
+            let begin = self.clocks.ps(at * self.length);
+            if begin >= to_ps {
+                break;
+            }
+            let end = self.clocks.ps(self.end.min((at + 1) * self.length));
+            let within = to_ps.min(end).saturating_sub(from_ps.max(begin));
+            if within > 0 {
+                sum.merge(&interval[unit as usize].part(within, end - begin));
+            }
+        }
+        sum
+    }
+
     /// Length of the frame in grains.
     pub fn frame(&self) -> Time {
         self.end
@@ -145,5 +171,27 @@ impl Stalls {
             shares.into_iter().fold(shares[0], |best, this| if this.1 > best.1 { this } else { best })
         };
         self.intervals.iter().map(busiest).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_of_a_frame_add_up_to_it() {
+        let clocks = Clocks::new(1e9, 1e9).unwrap();
+        let mut stalls = Stalls::new(clocks, [1; Unit::COUNT]);
+        stalls.add(Unit::Depth, 1, Reason::Idle, 0, 300);
+        stalls.add(Unit::Depth, 0, Reason::Blocked(Unit::L2), 300, 1000);
+        stalls.end = 1000;
+        let of = |span_cycles: [u64; 2]| {
+            let time = stalls.between(Unit::Depth, span_cycles.map(|cycles| clocks.ps(cycles)));
+            (time.busy, time.blocked[Unit::L2 as usize])
+        };
+        assert_eq!(of([0, 1000]), (300, 700));
+        // The second interval has 44 cycles of work in 256.
+        assert_eq!([of([0, 384]), of([384, 1000])], [(278, 106), (22, 594)]);
+        assert_eq!(of([768, 1000]), (0, 232), "the last interval ends with the frame");
     }
 }

@@ -1,6 +1,7 @@
-//! Jobs: work for the rasterizer beyond one rendering of a scene.
+//! Jobs: what a run draws, be it a rendering of a scene or a workload of many passes.
 //!
-//! A [`Job`] draws frames like a scene, but in its own passes on a [`Gpu`], which counts and times them. [`crate::catalog`] makes jobs by name from their options ([`OptionSource`]).
+//! A [`Job`] draws the passes of each frame on a [`Gpu`], which counts and times them. [`crate::catalog`] makes jobs by name
+//! from their options ([`OptionSource`]), and from scenes.
 
 mod options;
 
@@ -13,6 +14,7 @@ use serde::Serialize;
 use warnings::Warning;
 
 use crate::fingerprint::{Fingerprint, FingerprintError};
+use crate::regime::Regime;
 use crate::scene::{Frame, FrameError, Overrides, Scene, Settings};
 
 /// A result of a job.
@@ -61,6 +63,16 @@ pub trait Draws: Sync + Send {
         ""
     }
 
+    /// The scene whose frames it draws, if any.
+    fn scene(&self) -> Option<&Scene> {
+        None
+    }
+
+    /// The job with less work for each frame, if that takes neither reading files nor options.
+    fn reduced(&self, _to: &Reduction) -> Option<Box<dyn Job + '_>> {
+        None
+    }
+
     /// Prepares the input of frame `number`.
     ///
     /// # Errors
@@ -72,6 +84,14 @@ pub trait Draws: Sync + Send {
     /// # Errors
     /// [`JobError`] if the frame cannot be drawn.
     fn draw(&self, input: &Self::Input, gpu: &mut Gpu<'_>) -> Result<Drawn, JobError>;
+
+    /// Triangles of a frame for which tile tests are ineffective, if the job counts them.
+    ///
+    /// # Errors
+    /// [`JobError`] if the frame cannot be drawn.
+    fn regime(&self, _input: &Self::Input) -> Result<Regime, JobError> {
+        Ok(Regime::default())
+    }
 }
 
 /// A job whose frames are those of a scene.
@@ -99,11 +119,15 @@ impl<D: DrawsScene> Draws for D {
     }
 
     fn warnings(&self) -> &[Warning] {
-        self.scene().warnings()
+        DrawsScene::scene(self).warnings()
+    }
+
+    fn scene(&self) -> Option<&Scene> {
+        Some(DrawsScene::scene(self))
     }
 
     fn input(&self, number: u32) -> Result<Frame, JobError> {
-        Ok(self.scene().frame(number)?)
+        Ok(DrawsScene::scene(self).frame(number)?)
     }
 
     fn draw(&self, frame: &Frame, gpu: &mut Gpu<'_>) -> Result<Drawn, JobError> {
@@ -111,17 +135,51 @@ impl<D: DrawsScene> Draws for D {
     }
 }
 
-/// A job: work for the rasterizer beyond one rendering of a scene. Every type that implements [`Draws`] is a
-/// job.
+/// Less work for each frame, for probes and previews.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Reduction {
+    /// Width and height of the image in pixels.
+    pub size: [u32; 2],
+    /// Samples per pixel; `None` keeps their number. A job that cannot draw so many keeps it, too.
+    pub samples: Option<u32>,
+    /// Largest number of triangles of a scene, chosen at equal steps; `None` for all. Other jobs draw all.
+    pub max_triangles: Option<usize>,
+}
+
+impl Reduction {
+    /// Images about `target_px` wide, but at most `max` times smaller along each axis; larger ones are not enlarged.
+    pub fn to_width(settings: &Settings, target_px: u32, max: u32) -> Self {
+        let by = (settings.width / target_px).clamp(1, max);
+        let size = [settings.width, settings.height].map(|side| side.div_ceil(by));
+        Self { size, samples: None, max_triangles: None }
+    }
+}
+
+/// A frame of a job, ready to be drawn.
+pub trait ReadyFrame {
+    /// Fingerprint of its input. Frames with equal fingerprints have equal results.
+    ///
+    /// # Errors
+    /// [`JobError`] if the input cannot be compared.
+    fn fingerprint(&self) -> Result<Fingerprint, JobError>;
+
+    /// Draws it on `gpu`.
+    ///
+    /// # Errors
+    /// [`JobError`] if it cannot be drawn.
+    fn draw(&self, gpu: &mut Gpu<'_>) -> Result<Drawn, JobError>;
+
+    /// Triangles for which tile tests are ineffective, if the job counts them.
+    ///
+    /// # Errors
+    /// [`JobError`] if it cannot be drawn.
+    fn regime(&self) -> Result<Regime, JobError>;
+}
+
+/// What a run draws: a rendering of a scene, or a workload. Every type that implements [`Draws`] is a job.
 pub trait Job: Sync + Send {
     /// Size of the image, frames and frame rate.
     fn settings(&self) -> &Settings;
-
-    /// Fingerprint of the input of frame `number`. Frames with equal fingerprints have equal results.
-    ///
-    /// # Errors
-    /// [`JobError`] if the frame cannot be made.
-    fn fingerprint(&self, number: u32) -> Result<Fingerprint, JobError>;
 
     /// Warnings about the job's sources, such as a scene file.
     fn warnings(&self) -> &[Warning];
@@ -129,11 +187,34 @@ pub trait Job: Sync + Send {
     /// Content of the images, for captions; empty if it is obvious.
     fn shows(&self) -> &'static str;
 
-    /// Draws frame `number` on `gpu`.
+    /// The scene whose frames it draws, if any.
+    fn scene(&self) -> Option<&Scene>;
+
+    /// The job with less work for each frame, if that takes neither reading files nor options: a rendering of a scene.
+    /// [`crate::catalog::reduced`] reduces any job.
+    fn reduced(&self, to: &Reduction) -> Option<Box<dyn Job + '_>>;
+
+    /// Prepares frame `number`.
+    ///
+    /// # Errors
+    /// [`JobError`] if the frame cannot be made.
+    fn prepare(&self, number: u32) -> Result<Box<dyn ReadyFrame + '_>, JobError>;
+
+    /// Prepares and draws frame `number`.
     ///
     /// # Errors
     /// [`JobError`] if the frame cannot be made or drawn.
-    fn frame(&self, number: u32, gpu: &mut Gpu<'_>) -> Result<Drawn, JobError>;
+    fn frame(&self, number: u32, gpu: &mut Gpu<'_>) -> Result<Drawn, JobError> {
+        self.prepare(number)?.draw(gpu)
+    }
+
+    /// Fingerprint of the input of frame `number`.
+    ///
+    /// # Errors
+    /// [`JobError`] if the frame cannot be made.
+    fn fingerprint(&self, number: u32) -> Result<Fingerprint, JobError> {
+        self.prepare(number)?.fingerprint()
+    }
 }
 
 impl<D: Draws> Job for D {
@@ -149,12 +230,36 @@ impl<D: Draws> Job for D {
         Draws::shows(self)
     }
 
-    fn fingerprint(&self, number: u32) -> Result<Fingerprint, JobError> {
-        Ok(Fingerprint::of(&self.input(number)?)?)
+    fn scene(&self) -> Option<&Scene> {
+        Draws::scene(self)
     }
 
-    fn frame(&self, number: u32, gpu: &mut Gpu<'_>) -> Result<Drawn, JobError> {
-        self.draw(&self.input(number)?, gpu)
+    fn reduced(&self, to: &Reduction) -> Option<Box<dyn Job + '_>> {
+        Draws::reduced(self, to)
+    }
+
+    fn prepare(&self, number: u32) -> Result<Box<dyn ReadyFrame + '_>, JobError> {
+        Ok(Box::new(Ready { job: self, input: self.input(number)? }))
+    }
+}
+
+/// A job with the input of a frame.
+struct Ready<'a, D: Draws> {
+    job: &'a D,
+    input: D::Input,
+}
+
+impl<D: Draws> ReadyFrame for Ready<'_, D> {
+    fn fingerprint(&self) -> Result<Fingerprint, JobError> {
+        Ok(Fingerprint::of(&self.input)?)
+    }
+
+    fn draw(&self, gpu: &mut Gpu<'_>) -> Result<Drawn, JobError> {
+        self.job.draw(&self.input, gpu)
+    }
+
+    fn regime(&self) -> Result<Regime, JobError> {
+        self.job.regime(&self.input)
     }
 }
 

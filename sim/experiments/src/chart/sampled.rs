@@ -250,7 +250,7 @@ fn animation(
     progress: &Progress,
 ) -> Result<(Cost, Vec<Trial>), RunError> {
     let plan = plan(scene, effort)?;
-    let numbers: Vec<u32> = plan.work.settings().frames.clone().collect();
+    let numbers: Vec<u32> = plan.job.settings().frames.clone().collect();
     let started = ProcessTime::now();
     let previews = Previews::new(&plan, &numbers, progress)?;
     let previews_s = started.elapsed().as_secs_f64();
@@ -300,7 +300,7 @@ fn plan(scene: &str, effort: SampledEffort) -> Result<Plan, RunError> {
         ..Overrides::default()
     };
     let plan = Plan::resolve(RunOptions { scene: scene.into(), overrides, ..RunOptions::default() })?;
-    let distinct = Distinct::new(&plan.work)?;
+    let distinct = Distinct::new(&*plan.job)?;
     if distinct.numbers().len() == distinct.groups().len() {
         return Ok(plan);
     }

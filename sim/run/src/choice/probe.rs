@@ -5,8 +5,10 @@ use std::time::Instant;
 use activity::{Counts, Event};
 use cpu_time::ThreadTime;
 use output::progress::Progress;
-use pipeline::{PipelineSpec, RasterPass, Settings, Viewport};
+use pipeline::{Gpu, PipelineSpec};
 use timing::{FrameClock, Level, Recorder};
+use workloads::Job;
+use workloads::job::Reduction;
 
 use super::Findings;
 use super::{ProbeSummary, with_blur_thresholds};
@@ -22,7 +24,7 @@ const MAX_REDUCTION: u32 = 4;
 /// A finished probe: frames, image size and results.
 pub(super) struct Probe {
     numbers: Vec<u32>,
-    viewport: Viewport,
+    size: [u32; 2],
     pub findings: Findings,
 }
 
@@ -43,27 +45,25 @@ impl Probe {
         let some = MAX_FRAMES.min(differ.len());
         let numbers: Vec<u32> =
             (0..some).map(|part| differ[(2 * part + 1) * differ.len() / (2 * some)]).collect();
-        let by = (plan.viewport.width() / TARGET_WIDTH_PX).clamp(1, MAX_REDUCTION);
-        let [width, height] = [plan.viewport.width(), plan.viewport.height()].map(|side| side.div_ceil(by));
-        let viewport = Viewport::new(width, height)
-            .ok_or_else(|| RunError::Setting(format!("size of the probe: {width}x{height}")))?;
+        let job = plan.reduced(&Reduction::to_width(plan.job.settings(), TARGET_WIDTH_PX, MAX_REDUCTION))?;
+        let size = [job.settings().width, job.settings().height];
         let bar = progress.bar("probe", numbers.len() as u64);
         let mut findings = Findings::default();
         for &number in &numbers {
-            probe_frame(plan, number, viewport, by, &mut findings)?;
+            probe_frame(plan, &*job, number, &mut findings)?;
             bar.inc();
         }
-        // Host times are sums over the probe's frames, at a reduced size.
-        let scale = plan.pixels() as f64 / viewport.pixels() as f64 / some as f64;
+        // Host times are sums over the probe's frames, at a reduced size. Passes that do not depend on it are overestimated.
+        let scale = plan.pixels() as f64 / (f64::from(size[0]) * f64::from(size[1])) / some as f64;
         findings.scale_times(scale);
-        Ok(Self { numbers, viewport, findings })
+        Ok(Self { numbers, size, findings })
     }
 
     pub fn summary(&self) -> ProbeSummary {
         let error = |level: Level| (level, self.findings.error(level));
         ProbeSummary {
             frames: self.numbers.clone(),
-            size: [self.viewport.width(), self.viewport.height()],
+            size: self.size,
             error: Level::ALL.map(error).into_iter().collect(),
             dimensions_error: self.findings.dimensions_error,
             dimensions_saved: self.findings.dimensions_error.map(|_| self.findings.saved()),
@@ -72,28 +72,23 @@ impl Probe {
 }
 
 /// Simulates a frame at every level, and once more without small motion and blur.
-fn probe_frame(
-    plan: &Plan,
-    number: u32,
-    viewport: Viewport,
-    by: u32,
-    findings: &mut Findings,
-) -> Result<(), RunError> {
+fn probe_frame(plan: &Plan, job: &dyn Job, number: u32, findings: &mut Findings) -> Result<(), RunError> {
     let spec = &plan.gpu.pipeline;
-    let truth = simulate_frame(plan, number, viewport, spec, Level::Stepped)?;
+    let truth = simulate_frame(plan, job, number, spec, Level::Stepped)?;
     for level in Level::ALL {
         let probed = if level == Level::Stepped {
             None
         } else {
-            Some(simulate_frame(plan, number, viewport, spec, level)?)
+            Some(simulate_frame(plan, job, number, spec, level)?)
         };
         let probed = probed.as_ref().unwrap_or(&truth);
         findings.add(level, relative_error(&probed.cost, &truth.cost), probed.timing_s, probed.pipeline_s);
     }
-    let thresholds = PipelineSpec { features: with_blur_thresholds(spec.features, by as f32), ..*spec };
+    let by = plan.viewport.width() as f32 / job.settings().width as f32;
+    let thresholds = PipelineSpec { features: with_blur_thresholds(spec.features, by), ..*spec };
     let (exact, reduced) = (
-        simulate_frame(plan, number, viewport, spec, Level::Packet)?,
-        simulate_frame(plan, number, viewport, &thresholds, Level::Packet)?,
+        simulate_frame(plan, job, number, spec, Level::Packet)?,
+        simulate_frame(plan, job, number, &thresholds, Level::Packet)?,
     );
     if exact.counts != reduced.counts {
         findings.add_dimensions(
@@ -106,16 +101,12 @@ fn probe_frame(
 
 fn simulate_frame(
     plan: &Plan,
+    job: &dyn Job,
     number: u32,
-    viewport: Viewport,
     spec: &PipelineSpec,
     level: Level,
 ) -> Result<ProbedFrame, RunError> {
     let started = Instant::now();
-    let scene = plan.work.scene("--accuracy or --budget")?;
-    let frame = scene.frame(number)?;
-    let draws = frame.draws(scene)?;
-    let settings = Settings { spec, viewport, samples: &*plan.samples, background: scene.background() };
     let mut clock =
         FrameClock::new(level, plan.gpu.machine()?, Recorder::new(frame::BIN_PS, frame::MIN_FRAME_BINS));
     let mut packets = Vec::new();
@@ -124,8 +115,9 @@ fn simulate_frame(
         lines.extend_from_slice(new_lines);
         packets.push((*packet, lines.len()));
     };
-    let rendered = RasterPass::new(&frame.camera, &draws, &settings).render(emit);
-    let rendered = rendered.map_err(RunError::setting)?;
+    let mut gpu = Gpu::new(spec, emit).map_err(RunError::setting)?;
+    job.frame(number, &mut gpu)?;
+    let counts = gpu.finish().counts();
     let pipeline_s = started.elapsed().as_secs_f64();
     let started = ThreadTime::now();
     let mut first = 0;
@@ -138,7 +130,7 @@ fn simulate_frame(
     let power = plan.model.frame(&timed.timeline);
     let power = power.map_err(|source| RunError::Timeline { frame: number, source })?;
     let cost = FrameCost { cycles: timed.cycles as f64, energy_j: power.energy().total_j() };
-    Ok(ProbedFrame { cost, counts: rendered.counts, timing_s, pipeline_s })
+    Ok(ProbedFrame { cost, counts, timing_s, pipeline_s })
 }
 
 /// Larger of the relative errors of cycles and energy.

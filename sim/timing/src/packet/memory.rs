@@ -175,8 +175,8 @@ impl Memory {
         for line in head.moved() {
             let seen = Span { from: accepted.from + period, to: accepted.to + period };
             let moved = self.dram.transfer(line, count, turn, seen);
-            // The channel's queue holds `backlog`; the rest of the run waits in front of the level above.
-            accepted.to = accepted.to.max(moved.issued.saturating_sub(self.dram.backlog()));
+            // What the channel's queue does not hold waits in front of the level above.
+            accepted.to = accepted.to.max(moved.queued);
             fetched.moved = fetched.moved.max(moved.data);
             if head.fetched() == Some(line) {
                 let latency = self.dram.latency() + latency + self.latency;
@@ -233,8 +233,13 @@ const BUS_SLOT_LINES: u32 = 4;
 /// Lines per slot of a bank calendar.
 const BANK_SLOT_LINES: u32 = 32;
 
-/// Latest rows remembered per bank.
-const REMEMBERED_ROWS: usize = 4;
+/// Groups of lines remembered per channel, over the lines that its queue holds. Some come later in time.
+const RECENT_GROUPS: usize = 4;
+/// Most groups that are remembered; larger queues are taken as if in order.
+const MAX_RECENT_GROUPS: usize = 256;
+
+/// Most rows that are remembered per bank; the queue of a channel may hold lines of as many rows as it has places.
+const MAX_REMEMBERED_ROWS: usize = 32;
 
 /// An opened row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -242,21 +247,25 @@ struct OpenRow {
     row: u32,
     /// Time of the request that opened it.
     since: Time,
+    /// When it is open.
+    opened: Time,
     /// When its last line so far is issued.
     until: Time,
+    /// When the next row begins to open.
+    closes: Time,
     /// Lines of the channel before it was opened, plus its own lines.
     own: u64,
 }
 
 impl OpenRow {
-    const NONE: Self = Self { row: u32::MAX, since: 0, until: 0, own: 0 };
+    const NONE: Self = Self { row: u32::MAX, since: 0, opened: 0, until: 0, closes: 0, own: 0 };
 }
 
 /// A bank: calendar of its row activations, and its latest rows, the newest first.
 #[derive(Clone, Debug)]
 struct Bank {
     time: Calendar,
-    rows: [OpenRow; REMEMBERED_ROWS],
+    rows: Box<[OpenRow]>,
 }
 
 #[derive(Clone, Debug)]
@@ -265,14 +274,51 @@ struct Channel {
     banks: Vec<Bank>,
     /// Lines so far.
     lines: u64,
+    /// The latest groups of lines, a ring, and where the oldest is.
+    recent: Box<[Waiting]>,
+    oldest: usize,
+    /// Scratch memory of [`Self::room_at`].
+    leaving: Vec<(Time, u64)>,
+}
+
+/// Lines in the queue of a channel.
+#[derive(Clone, Copy, Debug, Default)]
+struct Waiting {
+    /// When they come, and when the last is issued.
+    seen: Time,
+    issued: Time,
+    count: u64,
+}
+
+impl Channel {
+    /// When a queue of `queue` lines has room for another, if that comes at `seen`: lines leave in any order.
+    fn room_at(&mut self, seen: Time, queue: u64) -> Time {
+        let waits = |line: &&Waiting| line.seen <= seen && line.issued > seen;
+        self.leaving.clear();
+        self.leaving.extend(self.recent.iter().filter(waits).map(|line| (line.issued, line.count)));
+        self.leaving.sort_unstable();
+        // The last to leave stay in the queue.
+        let mut held = 0;
+        let last = self.leaving.iter().rev().find(|(_, count)| {
+            held += count;
+            held >= queue
+        });
+        last.map_or(seen, |&(issued, _)| issued)
+    }
+
+    fn note(&mut self, lines: Waiting) {
+        self.recent[self.oldest] = lines;
+        self.oldest = (self.oldest + 1) % self.recent.len();
+    }
 }
 
 /// Lines of one row in a bank.
 #[derive(Clone, Copy, Debug)]
 struct RowUse {
     row: u32,
-    /// When they arrive, and when the last one is issued.
+    /// When they arrive, when the row is open, and when the last one is issued.
     seen: Time,
+    opened: Time,
     issued: Time,
     /// Lines of the channel before them.
     lines: u64,
@@ -283,8 +329,8 @@ struct RowUse {
 /// Times of a transfer over the bus.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Moved {
-    /// When the last line is issued.
-    pub issued: Time,
+    /// When the queue of the channel has room for the last line.
+    pub queued: Time,
     /// When its data has been transferred.
     pub data: Time,
 }
@@ -311,8 +357,17 @@ impl Dram {
         let burst = cycles(spec.burst_cycles.get());
         let [bus, time] =
             [BUS_SLOT_LINES, BANK_SLOT_LINES].map(|lines| Calendar::new(burst * Time::from(lines), 1));
-        let bank = Bank { time, rows: [OpenRow::NONE; REMEMBERED_ROWS] };
-        let channel = Channel { bus, banks: vec![bank; spec.banks.get() as usize], lines: 0 };
+        let rows = MAX_REMEMBERED_ROWS.min(spec.queue.get() as usize);
+        let bank = Bank { time, rows: vec![OpenRow::NONE; rows].into() };
+        let remembered = (RECENT_GROUPS * spec.queue.get() as usize).min(MAX_RECENT_GROUPS);
+        let channel = Channel {
+            bus,
+            banks: vec![bank; spec.banks.get() as usize],
+            lines: 0,
+            recent: vec![Waiting::default(); remembered].into(),
+            oldest: 0,
+            leaving: Vec::new(),
+        };
         Self {
             map: AddressMap::new(spec),
             channels: vec![channel; spec.channels.get() as usize],
@@ -332,11 +387,6 @@ impl Dram {
         self.map.group(line)
     }
 
-    /// Transfer time of a full queue.
-    pub fn backlog(&self) -> Time {
-        self.backlog
-    }
-
     /// Latency from the end of a transfer to the L2.
     pub fn latency(&self) -> Time {
         self.latency
@@ -349,25 +399,47 @@ impl Dram {
         let channel = &mut self.channels[address.channel];
         let bank = &mut channel.banks[address.bank];
         let work = self.burst * Time::from(count);
-        let opens = bank.opens(address.row, seen.from, channel.lines, self.queue);
-        let opens = opens.map(|closes| self.activate + if closes { self.precharge } else { 0 });
-        // The next row can open once the last line is issued.
-        let held = work - self.burst;
-        let closes = bank.closes_at(seen.from).min(seen.from + self.backlog);
-        let ready =
-            opens.map_or(seen.from, |opens| bank.time.reserve_as(turn, closes, opens + held).0 + opens);
+        let open = bank.joins(address.row, seen.from, channel.lines, self.queue);
+        let opened = match open {
+            Some(at) => {
+                let open = bank.rows[at];
+                // Rows that are waiting already wait for these lines, too.
+                if open.closes < Time::MAX {
+                    bank.time.reserve_as(turn, open.opened.max(seen.from), work);
+                }
+                // A row that is asked for later in time, though earlier in the stream, does not keep the line waiting.
+                if open.since <= seen.from { open.opened } else { seen.from }
+            }
+            None => {
+                let before = &mut bank.rows[bank.place(seen.from)];
+                let opens = self.activate + if *before == OpenRow::NONE { 0 } else { self.precharge };
+                // The next row can open once the last line is issued.
+                let held = work - self.burst;
+                let closes = before.until.max(seen.from).min(seen.from + self.backlog);
+                let begin = bank.time.reserve_as(turn, closes, opens + held).0;
+                before.closes = begin;
+                begin + opens
+            }
+        };
+        let ready = opened.max(seen.from);
         let end = channel.bus.reserve_as(turn, ready, work).1.max(seen.to + self.burst);
         let used = RowUse {
             row: address.row,
             seen: seen.from,
+            opened,
             issued: end - self.burst,
             lines: channel.lines,
             count: count.into(),
         };
-        bank.note(used, opens.is_some());
+        bank.note(used, open);
+        // A queue in order would hold `backlog`. Lines of other banks leave before, and make room.
+        let in_order = used.issued.saturating_sub(self.backlog);
+        let is_full = in_order > seen.to;
+        let queued = if is_full { channel.room_at(seen.to, self.queue).min(in_order) } else { in_order };
         channel.lines += u64::from(count);
+        channel.note(Waiting { seen: seen.from, issued: used.issued, count: used.count });
         self.end = self.end.max(end);
-        Moved { issued: end - self.burst, data: end + self.cas }
+        Moved { queued, data: end + self.cas }
     }
 
     /// End of the last transfer.
@@ -389,41 +461,37 @@ impl Dram {
 }
 
 impl Bank {
-    /// Whether a line that arrives at `seen`, after `lines` lines of its channel, opens its row. `Some(true)`
-    /// if another row has to be closed first.
+    /// Place of the latest row that was requested by `seen`, in time. Rows before it come later, though earlier in the stream.
+    fn place(&self, seen: Time) -> usize {
+        self.rows.iter().position(|open| open.since <= seen).unwrap_or(self.rows.len() - 1)
+    }
+
+    /// Place of the opening of `row` that a line joins which arrives at `seen`, after `lines` lines of its channel; `None` if
+    /// it has to open its row.
     ///
-    /// First ready first come (Rixner et al. 2000): a line joins pending lines of its row, ahead of older
-    /// requests to other rows. The exception is a queue full of other lines, which hides the line from the
-    /// scheduler.
-    fn opens(&self, row: u32, seen: Time, lines: u64, queue: u64) -> Option<bool> {
-        let latest = self.rows[0].row;
-        let goes_along = |open: &OpenRow| open.row == row && open.until > seen && lines - open.own < queue;
-        (latest != row && !self.rows.iter().any(goes_along)).then_some(latest != u32::MAX)
+    /// First ready first come (Rixner et al. 2000): a line joins pending lines of its row, ahead of older requests to other
+    /// rows, until the next row opens. The exception is a queue full of other lines, which hides the line from the scheduler.
+    fn joins(&self, row: u32, seen: Time, lines: u64, queue: u64) -> Option<usize> {
+        let latest = self.place(seen);
+        let is_pending = |open: &OpenRow| open.row == row && seen < open.closes && lines - open.own < queue;
+        let latest = Some(latest).filter(|&at| self.rows[at].row == row);
+        latest.or_else(|| self.rows.iter().position(is_pending))
     }
 
-    /// When the open row can be closed for a line that arrives at `seen`: after its own lines are issued.
-    /// Lines that arrive later in time, though earlier in the stream, are ignored.
-    fn closes_at(&self, seen: Time) -> Time {
-        let open = &self.rows[0];
-        if open.since <= seen { open.until.max(seen) } else { seen }
-    }
-
-    /// Record lines of a row; `opened` says whether they opened it.
-    fn note(&mut self, used: RowUse, opened: bool) {
-        let RowUse { row, seen, issued, lines, count } = used;
-        let known = self.rows.iter().position(|open| open.row == row);
-        match known {
-            Some(known) if !opened => {
-                let open = &mut self.rows[known];
-                open.until = open.until.max(issued);
-                open.own += count;
-            }
-            _ => {
-                let until = known.map_or(issued, |known| self.rows[known].until.max(issued));
-                self.rows.copy_within(..known.unwrap_or(REMEMBERED_ROWS - 1), 1);
-                self.rows[0] = OpenRow { row, since: seen, until, own: lines + count };
-            }
+    /// Record lines of a row: those that joined the row at `joined`, or opened theirs.
+    fn note(&mut self, used: RowUse, joined: Option<usize>) {
+        let RowUse { row, seen, opened, issued, lines, count } = used;
+        if let Some(open) = joined.map(|at| &mut self.rows[at]) {
+            open.until = open.until.max(issued);
+            open.own += count;
+            return;
         }
+        let at = self.place(seen);
+        let closes = at.checked_sub(1).map_or(Time::MAX, |next| self.rows[next].opened);
+        let known = self.rows.iter().skip(at).position(|open| open.row == row).map(|after| at + after);
+        let until = known.map_or(issued, |known| self.rows[known].until.max(issued));
+        self.rows.copy_within(at..known.unwrap_or(self.rows.len() - 1), at + 1);
+        self.rows[at] = OpenRow { row, since: seen, opened, until, closes, own: lines + count };
     }
 }
 
@@ -432,26 +500,33 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_line_goes_along_with_others_of_its_row_that_have_not_gone() {
-        let used = |row, [seen, issued]: [Time; 2], [lines, count]: [u64; 2]| RowUse {
+    fn a_line_joins_others_of_its_row_until_the_next_opens() {
+        let used = |row, [seen, opened, issued]: [Time; 3], [lines, count]: [u64; 2]| RowUse {
             row,
             seen,
+            opened,
             issued,
             lines,
             count,
         };
-        let mut bank = Bank { time: Calendar::new(16, 1), rows: [OpenRow::NONE; REMEMBERED_ROWS] };
-        assert_eq!(bank.opens(7, 0, 0, 4), Some(false));
-        bank.note(used(7, [0, 10], [0, 1]), true);
-        assert_eq!((bank.opens(7, 50, 9, 4), bank.opens(8, 5, 1, 4)), (None, Some(true)));
-        bank.note(used(8, [5, 20], [1, 1]), true);
-        assert_eq!((bank.opens(7, 9, 2, 4), bank.opens(7, 10, 2, 4)), (None, Some(true)));
-        bank.note(used(7, [9, 30], [2, 1]), false);
-        let [latest, before, ..] = bank.rows.map(|open| (open.row, open.until));
-        assert_eq!((latest, before), ((8, 20), (7, 30)));
-        assert_eq!([3, 6, 25].map(|seen| bank.closes_at(seen)), [3, 20, 25]);
+        let mut bank = Bank { time: Calendar::new(16, 1), rows: vec![OpenRow::NONE; 4].into() };
+        let joins = |bank: &Bank, row, seen, lines| {
+            bank.joins(row, seen, lines, 4).map(|at| bank.rows[at].opened)
+        };
+        assert_eq!(joins(&bank, 7, 0, 0), None);
+        bank.note(used(7, [0, 4, 10], [0, 1]), None);
+        assert_eq!((joins(&bank, 7, 50, 9), joins(&bank, 8, 5, 1)), (Some(4), None));
+        bank.rows[0].closes = 12;
+        bank.note(used(8, [5, 16, 20], [1, 1]), None);
+        assert_eq!([11, 12].map(|seen| joins(&bank, 7, seen, 2)), [Some(4), None]);
+        bank.note(used(7, [9, 4, 30], [2, 1]), Some(1));
+        let rows = |bank: &Bank| [0, 1, 2].map(|at: usize| (bank.rows[at].row, bank.rows[at].until));
+        assert_eq!(rows(&bank)[..2], [(8, 20), (7, 30)]);
         // Four lines of other rows came in between.
-        bank.note(used(8, [40, 60], [3, 3]), false);
-        assert_eq!((bank.opens(7, 9, 5, 4), bank.opens(7, 9, 6, 4)), (None, Some(true)));
+        bank.note(used(8, [40, 16, 60], [3, 3]), Some(0));
+        assert_eq!([5, 6].map(|lines| joins(&bank, 7, 9, lines)), [Some(4), None]);
+        // A row that comes earlier in time, and later in the stream.
+        bank.note(used(9, [3, 12, 13], [6, 1]), None);
+        assert_eq!((rows(&bank), bank.rows[1].closes), ([(8, 60), (9, 13), (7, 30)], 16));
     }
 }

@@ -68,3 +68,46 @@ fn shared_bottlenecks_are_close_to_the_reference() {
     let conflicts: Packets = (0..200).map(|k| lines(k, 8)).collect();
     assert!(error(&machine, &conflicts).abs() < 8.0, "conflicts: {}", error(&machine, &conflicts));
 }
+
+/// Lines of random rows of one bank (`rows`), or of all memory (0), over channels that hold `queue` lines each.
+fn random_rows(rows: u64, [channels, banks, queue, in_flight]: [u32; 4]) -> (timing::MachineSpec, Packets) {
+    let mut machine = plain();
+    machine.l2.queue = size(8);
+    machine.depth.in_flight = size(in_flight);
+    let dram = &mut machine.dram;
+    (dram.channels, dram.banks, dram.queue) = (size(channels), size(banks), size(queue));
+    (dram.row_bytes, dram.interleave_bytes, dram.burst_cycles) = (size(4096), size(256), size(4));
+    (dram.cas_cycles, dram.activate_cycles, dram.precharge_cycles) = (size(7), size(7), size(7));
+    let mut state = 12345_u64;
+    let mut next = |below: u64| {
+        state = state.wrapping_mul(0x5851_F42D_4C95_7F2D).wrapping_add(0x1405_7B7E_F767_814F);
+        ((state >> 33) % below) as u32
+    };
+    let stride = 64 * channels * banks;
+    let mut line = |packet: u32| match rows {
+        0 => next(1 << 18),
+        rows => (packet / 100 * 64 + next(64)) % stride + next(rows) * stride,
+    };
+    let packet = |packet: u32| {
+        let lines = (0..8).map(|_| read(Unit::Depth, line(packet), LineKind::Fetch)).collect();
+        (tile(&[(Event::DepthReads, 1)]), lines)
+    };
+    (machine, (0..1000).map(packet).collect())
+}
+
+/// A queue from which lines of any row may leave first, so that rows of one bank take turns.
+#[test]
+fn disputed_rows_are_near_the_reference() {
+    let sizes = [[1, 8, 16, 32], [2, 8, 16, 4], [2, 8, 32, 32], [2, 8, 8, 32], [4, 8, 16, 32], [2, 4, 16, 4]];
+    let mut errors = Vec::new();
+    for size in sizes {
+        for rows in [0, 4, 8, 16, 64] {
+            let (machine, packets) = random_rows(rows, size);
+            let error = error(&machine, &packets);
+            assert!(error.abs() < 20.0, "{rows} rows, {size:?}: {error:.1} %");
+            errors.push(error.abs());
+        }
+    }
+    let mean = errors.iter().sum::<f64>() / errors.len() as f64;
+    assert!(mean < 6.0, "{mean:.1} %");
+}

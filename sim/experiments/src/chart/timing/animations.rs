@@ -1,21 +1,22 @@
-//! Workloads of the timing chart: one frame of each scene, and animations at every level, drawn and timed as in a run.
+//! What the timing chart times: one frame of each scene and workload, and animations at every level, drawn and timed as in a run.
 
 use std::path::Path;
 
 use activity::{LineAccess, Packet};
 use cpu_time::ProcessTime;
+use glam::Vec3;
 use output::progress::Progress;
-use pipeline::sampling::SampleSource;
-use pipeline::{Camera, Draw, LensShape, RasterPass, SampleTable, Settings, Viewport};
+use pipeline::{Gpu, RasterPass, Settings};
 use run::{
     Distinct, Forecast, GpuSpec, Plan, Previews, RunError, RunFrame, RunOptions, Sampling, Signatures,
     frames_of,
 };
 use serde::Serialize;
 use timing::Level;
+use workloads::job::{OptionSource, Reduction, Request};
 use workloads::stress::{Size, StressScene, family};
 use workloads::visibility::Unshaded;
-use workloads::{Overrides, Scene};
+use workloads::{Job, Overrides, catalog};
 
 /// The name of the level that simulates few frames and predicts the others.
 pub(super) const SAMPLED: &str = "sampled";
@@ -89,7 +90,7 @@ pub(super) fn rows(
         let frames = frames_of(&plan, &numbers, progress)?;
         Ok(Simulated { plan, frames, cpu_s: started.elapsed().as_secs_f64() })
     };
-    if Distinct::new(&plan(scene, gpu, extent, Level::Packet)?.work)?.numbers().len() < numbers.len() {
+    if Distinct::new(&*plan(scene, gpu, extent, Level::Packet)?.job)?.numbers().len() < numbers.len() {
         return Ok(Vec::new());
     }
     let truth = all(Level::Stepped)?;
@@ -192,13 +193,33 @@ impl Packets {
 /// A frame that can be rendered for any GPU.
 pub(super) struct Subject {
     name: String,
+    pub kind: SubjectKind,
     what: What,
 }
 
+/// Kinds of frames in the chart.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SubjectKind {
+    /// A rendering of a scene.
+    Scene,
+    /// A family of the failure catalogue.
+    Family,
+    /// The passes of a workload.
+    Workload,
+}
+
 enum What {
-    Scene { scene: Box<Scene>, frame: u32, viewport: Viewport, samples: SampleTable },
+    Job { job: Box<dyn Job>, frame: u32 },
     Family(Box<StressScene>),
 }
+
+/// Other passes of workloads, by an option.
+const VARIANTS: [(&str, &str, &str); 2] =
+    [("multiview", "view_by_view", "true"), ("soft-shadows", "accumulate", "true")];
+/// Widths that images of workloads are reduced to in pixels, at most by the factor [`MAX_REDUCTION`].
+const WORKLOAD_PX: [u32; 2] = [128, 256];
+const MAX_REDUCTION: u32 = 8;
 
 pub(super) fn all(files: &[String], quick: bool) -> Result<Vec<Subject>, RunError> {
     let scenes = SCENES.iter().map(|name| (*name).to_owned()).chain(files.iter().cloned());
@@ -206,29 +227,49 @@ pub(super) fn all(files: &[String], quick: bool) -> Result<Vec<Subject>, RunErro
     for (name, value) in FAMILIES {
         subjects.push(of_family(name, value)?);
     }
+    for (name, _) in catalog::names() {
+        subjects.push(of_workload(name, None, quick)?);
+    }
+    for (name, option, value) in VARIANTS {
+        subjects.push(of_workload(name, Some((option, value)), quick)?);
+    }
     Ok(subjects)
 }
 
 fn of_scene(name: &str, quick: bool) -> Result<Subject, RunError> {
     let size = if quick { (320, 180) } else { (640, 360) };
     let overrides = Overrides { size: Some(size), samples: Some(8), ..Overrides::default() };
-    let scene = workloads::load(name)?.with_overrides(&overrides)?;
-    let frames = scene.settings().frames.clone();
-    let frame = frames.start + (frames.end - frames.start) / 2;
-    let viewport = Viewport::new(size.0, size.1).ok_or_else(|| RunError::Setting("size: none".to_owned()))?;
-    let samples = SampleTable::low_discrepancy(8, 1, LensShape::Disk)?;
+    let (_, job) = catalog::load(Path::new(name), &OptionSource::default(), &request(&overrides))?;
     let label = Path::new(name).file_name().map_or(name.into(), |file| file.to_string_lossy());
-    Ok(Subject {
-        name: label.into_owned(),
-        what: What::Scene { scene: Box::new(scene), frame, viewport, samples },
-    })
+    Ok(Subject { name: label.into_owned(), kind: SubjectKind::Scene, what: middle_frame(job) })
+}
+
+fn of_workload(name: &str, option: Option<(&str, &str)>, quick: bool) -> Result<Subject, RunError> {
+    let set = option.map(|(option, value)| (option.to_owned(), value.to_owned()));
+    let options = OptionSource { file: None, set: set.into_iter().collect() };
+    let (overrides, path) = (Overrides::default(), Path::new(name));
+    let (_, whole) = catalog::load(path, &options, &request(&overrides))?;
+    let to = Reduction::to_width(whole.settings(), WORKLOAD_PX[usize::from(!quick)], MAX_REDUCTION);
+    let job = catalog::remade(name, &options, &request(&overrides), &to)?;
+    let label = option.map_or(name.to_owned(), |(option, _)| format!("{name} {option}"));
+    Ok(Subject { name: label, kind: SubjectKind::Workload, what: middle_frame(job) })
+}
+
+fn request(overrides: &Overrides) -> Request<'_> {
+    Request { overrides, seed: 1 }
+}
+
+fn middle_frame(job: Box<dyn Job>) -> What {
+    let frames = job.settings().frames.clone();
+    What::Job { job, frame: frames.start + (frames.end - frames.start) / 2 }
 }
 
 fn of_family(name: &'static str, value: f64) -> Result<Subject, RunError> {
     let failed = |message: String| RunError::Setting(format!("{name} at {value}: {message}"));
     let family = family(name).ok_or_else(|| failed("unknown family".to_owned()))?;
     let scene = family.scene(value, Size::QUICK, 1).map_err(|error| failed(error.to_string()))?;
-    Ok(Subject { name: format!("{name} at {value}"), what: What::Family(Box::new(scene)) })
+    let what = What::Family(Box::new(scene));
+    Ok(Subject { name: format!("{name} at {value}"), kind: SubjectKind::Family, what })
 }
 
 impl Subject {
@@ -248,32 +289,19 @@ impl Subject {
 
     /// Renders the frame, every packet to `emit`.
     pub fn render(&self, gpu: &GpuSpec, emit: impl FnMut(&Packet, &[LineAccess])) -> Result<(), RunError> {
+        let failed = |error: String| RunError::Setting(format!("{}: {error}", self.name));
+        let mut on = Gpu::new(&gpu.pipeline, emit).map_err(|error| failed(error.to_string()))?;
         match &self.what {
-            What::Scene { scene, frame, viewport, samples } => {
-                let frame = scene.frame(*frame)?;
-                let draws = frame.draws(scene)?;
-                self.draw(&frame.camera, (*viewport, samples), &draws, gpu, emit)
-            }
+            What::Job { job, frame } => drop(job.frame(*frame, &mut on)?),
             What::Family(scene) => {
-                let failed = |error: String| RunError::Setting(format!("{}: {error}", self.name));
                 let draws = [scene.draw(&Unshaded).map_err(|error| failed(error.to_string()))?];
-                self.draw(&scene.camera, (scene.viewport, &scene.samples), &draws, gpu, emit)
+                let (viewport, samples) = (scene.viewport, &scene.samples);
+                let settings = Settings { spec: &gpu.pipeline, viewport, samples, background: Vec3::ZERO };
+                let pass = RasterPass::new(&scene.camera, &draws, &settings);
+                on.draw(&pass).map_err(|error| failed(error.to_string()))?;
             }
         }
-    }
-
-    fn draw(
-        &self,
-        camera: &Camera,
-        (viewport, samples): (Viewport, &dyn SampleSource),
-        draws: &[Draw<'_>],
-        gpu: &GpuSpec,
-        emit: impl FnMut(&Packet, &[LineAccess]),
-    ) -> Result<(), RunError> {
-        let settings = Settings { spec: &gpu.pipeline, viewport, samples, background: glam::Vec3::ZERO };
-        RasterPass::new(camera, draws, &settings)
-            .render(emit)
-            .map_err(|error| RunError::Setting(format!("{}: {error}", self.name)))?;
+        on.finish();
         Ok(())
     }
 }

@@ -76,7 +76,10 @@ pub(super) fn failures(gpus: &[GpuSpec]) -> Result<Vec<FailureRow>, RunError> {
             let mut gpu = GpuSpec { units: case.units.clone(), ..gpu.clone() };
             gpu.pipeline.batch_triangles = BATCH;
             let packets = Packets::of(&case.packets);
-            rows.push(failure(case.name, measure::rows(case.name, &gpu, &packets, &mut Speed::default())?));
+            rows.push(failure(
+                case.name,
+                measure::rows((case.name, None), &gpu, &packets, &mut Speed::default())?,
+            ));
         }
     }
     Ok(rows)

@@ -12,7 +12,7 @@ use timing::{
 };
 
 use super::Reference;
-use super::animations::{Packets, Subject};
+use super::animations::{Packets, Subject, SubjectKind};
 
 /// Bins of a microsecond, as in a run.
 pub(super) const BIN_PS: u64 = 1_000_000;
@@ -23,8 +23,10 @@ const TIMES: usize = 5;
 /// A level on a stream.
 #[derive(Clone, Debug, Serialize)]
 pub struct TimingRow {
-    /// The scene.
+    /// The scene, family or workload.
     pub scene: String,
+    /// Its kind; `None` for a stream that no pipeline emitted.
+    pub kind: Option<SubjectKind>,
     /// The GPU.
     pub gpu: String,
     /// The level.
@@ -80,7 +82,7 @@ impl Speed {
 
 /// A row for each level but the reference.
 pub(super) fn rows(
-    scene: &str,
+    (scene, kind): (&str, Option<SubjectKind>),
     gpu: &GpuSpec,
     stream: &Packets,
     speed: &mut Speed,
@@ -104,6 +106,7 @@ pub(super) fn rows(
         let found_power = power(&found)?;
         rows.push(TimingRow {
             scene: scene.to_owned(),
+            kind,
             gpu: gpu.name.clone(),
             level,
             packets: stream.packets.len(),

@@ -20,7 +20,7 @@ use run::GpuSpec;
 use run::RunError;
 use timing::Level;
 
-pub use animations::AnimationRow;
+pub use animations::{AnimationRow, SubjectKind};
 pub use failures::{Chosen, FailedLevel, FailureRow, RateRow};
 pub use measure::AddedRow;
 pub use measure::TimingRow;
@@ -99,7 +99,7 @@ pub struct TimingChart {
 impl Study for TimingChart {
     const NAME: &'static str = "timing";
     const ABOUT: &'static str = "Every level of timing: error against the reference over host time";
-    const PICTURES: &'static [&'static str] = &["timing", "timing_failures"];
+    const PICTURES: &'static [&'static str] = &["timing", "timing_subjects", "timing_failures"];
     const FILES: &'static [&'static str] =
         &["timing.csv", "timing_points.csv", "timing_failures.csv", "timing.json"];
     const TAKES_SCENES: bool = true;
@@ -118,8 +118,11 @@ impl Study for TimingChart {
         for subject in &subjects {
             for gpu in &gpus {
                 let stream = subject.stream(gpu)?;
-                rows.extend(measure::rows(subject.name(), gpu, &stream, &mut reference)?);
-                added.extend(measure::added(subject, gpu)?);
+                let named = (subject.name(), Some(subject.kind));
+                rows.extend(measure::rows(named, gpu, &stream, &mut reference)?);
+                if subject.kind != SubjectKind::Workload {
+                    added.extend(measure::added(subject, gpu)?);
+                }
                 bar.inc();
             }
         }
@@ -139,12 +142,14 @@ impl Study for TimingChart {
 
     fn draw(&self, to: &Gallery<'_>) -> Result<(), OutputError> {
         to.add("timing", &self.picture(to.look()))?;
+        to.add("timing_subjects", &self.subject_matrix().picture(to.look()))?;
         to.add("timing_failures", &self.failure_matrix().picture(to.look()))
     }
 
     fn tables(&self) -> Vec<Sheet> {
         vec![
             self.level_sheet(),
+            self.subject_sheet(),
             self.row_sheet(),
             self.point_sheet(),
             self.failure_sheet(),
@@ -169,7 +174,26 @@ impl Study for TimingChart {
         };
         self.levels.iter().flat_map(both).collect()
     }
+
+    /// `packet` is off by no more than a few percent, over scenes and workloads, or warns.
+    fn fault(&self) -> Option<String> {
+        let median = self.levels.get(Level::Packet.name())?.cycle_error_median_percent;
+        let silent = |row: &&TimingRow| {
+            row.level == Level::Packet
+                && row.warns.is_empty()
+                && row.cycle_error_percent.abs() > MAX_WORST_PERCENT
+        };
+        if let Some(row) = self.rows.iter().find(silent) {
+            let (scene, gpu, error) = (&row.scene, &row.gpu, row.cycle_error_percent);
+            return Some(format!("`packet` is {error:+.1} % off for {scene} on {gpu}, and does not warn"));
+        }
+        (median > MAX_MEDIAN_PERCENT).then(|| format!("the median error of `packet` is {median:.1} %"))
+    }
 }
+
+/// Largest errors of the cycles of `packet` in percent: the median, and the worst without a warning.
+const MAX_MEDIAN_PERCENT: f64 = 2.0;
+const MAX_WORST_PERCENT: f64 = 8.0;
 
 /// Whether a preview will do.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -255,12 +279,42 @@ impl TimingChart {
             .sheet()
     }
 
+    /// Errors of the cycles of each scene, family and workload: a row each, over the GPUs.
+    fn subject_sheet(&self) -> Sheet {
+        let of = |scene: &str, level: Level| {
+            let rows = self.rows.iter().filter(move |row| row.scene == scene && row.level == level);
+            let each = rows.map(|row| {
+                let warns = if row.warns.is_empty() { "" } else { " (warns)" };
+                format!("{:+.1}{warns}", row.cycle_error_percent)
+            });
+            each.collect::<Vec<_>>().join(", ")
+        };
+        Table::of(self.subjects())
+            .detail("frame", |row| row.scene.as_str(), plain)
+            .detail("cycles", |row| row.stepped_cycles, plain)
+            .detail(&format!("packet, % on {}", GPUS.join(", ")), |row| of(&row.scene, LEVELS[0]), plain)
+            .detail("bound, %", |row| of(&row.scene, LEVELS[1]), plain)
+            .sheet()
+    }
+
+    /// The first row of each scene, family and workload.
+    fn subjects(&self) -> Vec<&TimingRow> {
+        let mut first: Vec<&TimingRow> = Vec::new();
+        for row in &self.rows {
+            if !first.iter().any(|known| known.scene == row.scene) {
+                first.push(row);
+            }
+        }
+        first
+    }
+
     /// Every scene on every GPU at every level but the reference.
     fn row_sheet(&self) -> Sheet {
         Table::of(&self.rows)
             .data("scene", |row| row.scene.as_str())
             .data("gpu", |row| row.gpu.as_str())
             .data("level", |row| row.level.name())
+            .data("warns", |row| row.warns.join(" "))
             .data("packets", |row| row.packets)
             .data("cycles", |row| row.cycles)
             .data("stepped_cycles", |row| row.stepped_cycles)
@@ -366,35 +420,52 @@ impl TimingChart {
             .sheet()
     }
 
-    /// Errors in cycles, a block for each level, streams by GPUs.
+    /// Errors in cycles of streams that break levels.
     fn failure_matrix(&self) -> Matrix<'_> {
-        let mut gpus: Vec<&str> = Vec::new();
-        let mut streams: Vec<&str> = Vec::new();
-        for row in &self.failures {
-            if !gpus.contains(&row.gpu.as_str()) {
-                gpus.push(&row.gpu);
-            }
-            if !streams.contains(&row.stream) {
-                streams.push(row.stream);
-            }
-        }
-        let error = |gpu: &str, stream: &str, level: Level| {
+        let streams = distinct(self.failures.iter().map(|row| row.stream));
+        let gpus = distinct(self.failures.iter().map(|row| row.gpu.as_str()));
+        matrix("Where levels of timing fail", (streams, gpus), |stream, gpu, level| {
             let row = self.failures.iter().find(|row| row.gpu == gpu && row.stream == stream)?;
-            row.levels.get(level.name()).map(|found| found.cycle_error_percent.abs())
-        };
-        let panel = |level: Level| MatrixPanel {
-            name: level.name(),
-            rows: gpus
-                .iter()
-                .map(|&gpu| (gpu, streams.iter().map(|stream| error(gpu, stream, level)).collect()))
-                .collect(),
-        };
-        Matrix {
-            title: "Where levels of timing fail",
-            subject: "error in cycles against stepped, in percent",
-            scale: ["1 % and less", "32 % and more"],
-            columns: streams.clone(),
-            panels: LEVELS.map(panel).into(),
+            row.levels.get(level.name()).map(|found| found.cycle_error_percent)
+        })
+    }
+
+    /// Errors in cycles of scenes, families and workloads.
+    fn subject_matrix(&self) -> Matrix<'_> {
+        let scenes = distinct(self.rows.iter().map(|row| row.scene.as_str()));
+        let gpus = distinct(self.rows.iter().map(|row| row.gpu.as_str()));
+        matrix("Levels of timing, by scene and workload", (scenes, gpus), |scene, gpu, level| {
+            let is_it = |row: &&TimingRow| row.scene == scene && row.gpu == gpu && row.level == level;
+            self.rows.iter().find(is_it).map(|row| row.cycle_error_percent)
+        })
+    }
+}
+
+fn distinct<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
+    let mut all = Vec::new();
+    for name in names {
+        if !all.contains(&name) {
+            all.push(name);
         }
+    }
+    all
+}
+
+/// Errors in percent, a block for each level, columns by GPUs.
+fn matrix<'a>(
+    title: &'a str,
+    (columns, gpus): (Vec<&'a str>, Vec<&'a str>),
+    error: impl Fn(&str, &str, Level) -> Option<f64>,
+) -> Matrix<'a> {
+    let panel = |level: Level| {
+        let of = |gpu: &str| columns.iter().map(|name| error(name, gpu, level).map(f64::abs)).collect();
+        MatrixPanel { name: level.name(), rows: gpus.iter().map(|&gpu| (gpu, of(gpu))).collect() }
+    };
+    Matrix {
+        title,
+        subject: "error in cycles against stepped, in percent",
+        scale: ["1 % and less", "32 % and more"],
+        panels: LEVELS.map(panel).into(),
+        columns,
     }
 }

@@ -4,8 +4,9 @@ use glam::Vec3;
 use pipeline::geometry::Projection;
 use pipeline::setup::{Triangle, bounds};
 use pipeline::{Camera, Draw, Viewport};
-use workloads::scene::NearSpace;
-use workloads::stress::set_up_all;
+
+use crate::scene::NearSpace;
+use crate::stress::set_up_all;
 
 /// Number of triangles of a frame in each regime. A triangle may be in several.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -166,8 +167,8 @@ fn is_sliver(corners: &[[f64; 2]; 3]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use workloads::stress::{PER_PIXEL, Size, family};
-    use workloads::visibility::Unshaded;
+    use crate::stress::{PER_PIXEL, Size, family};
+    use crate::visibility::Unshaded;
 
     /// Share of triangles in a regime, of a stress family at one value.
     fn share(name: &str, value: f64, of: fn(&Regime) -> u64) -> f64 {
