@@ -13,6 +13,7 @@ use crate::setup::Corner;
 use crate::shader::{Program, Shader};
 use crate::state::{Clear, DrawState};
 use crate::texture::Texture;
+use crate::traversal::LensSpans;
 use crate::traversal::thresholds::{at_rest, blur_px, motion_px};
 
 /// Bytes of a stored depth or colour of one sample, and of a pixel of an image.
@@ -43,6 +44,8 @@ pub(super) struct Pass<'a> {
     pub origin: [f32; 2],
     /// Whether the camera has a lens.
     pub lens: bool,
+    /// Ranges of `u` that are tested each on their own.
+    pub spans: Option<LensSpans>,
     /// Part of lens and shutter in which anything is drawn.
     pub clip: Clip,
     /// Whether the camera is still while the shutter is open.
@@ -62,6 +65,7 @@ impl<'a> Pass<'a> {
     /// Prepares pass `number` of a frame and gives its surfaces addresses in `space`.
     pub fn new(pass: &RasterPass<'a>, (number, heat): (u32, bool), space: &mut AddressSpace) -> Self {
         let RasterPass { camera, draws, settings, .. } = *pass;
+        let features = &settings.spec.features;
         let views = pass.target.views(settings.samples.per_pixel());
         let projection = Projection::new(camera, settings.viewport);
         let vertices = draws.iter().map(|draw| projection.images(&draw.geometry)).collect();
@@ -82,6 +86,7 @@ impl<'a> Pass<'a> {
             programs: draws.iter().map(|draw| Program::of(draw.shader)).collect(),
             origin: [Viewport::edge(0, viewport.width()), Viewport::edge(0, viewport.height())],
             lens: !projection.shear.is_none(),
+            spans: features.lens_regions.then(|| LensSpans::new(settings.samples.lens_regions())).flatten(),
             clip: camera.clip(),
             still_camera: camera.open() == camera.close(),
             eye: projection.eye(),

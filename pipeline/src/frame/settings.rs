@@ -55,6 +55,9 @@ pub struct Features {
     pub lens_lines: bool,
     /// Narrow the box of lens and time by the side planes of a tile.
     pub side_planes: bool,
+    /// Narrow it by the sides along `u` for each region of the lens, where samples have disjoint ones
+    /// ([`crate::sampling::LensRegions`]).
+    pub lens_regions: bool,
     /// Find which face of a triangle is visible over a tile and its box of lens and time.
     pub facing: bool,
     /// Largest number of time bisections while the visible face is undecided; 0 to 3.
@@ -91,6 +94,7 @@ impl Features {
     pub const ALL: Self = Self {
         lens_lines: true,
         side_planes: true,
+        lens_regions: false,
         facing: true,
         facing_splits: 2,
         edges: true,

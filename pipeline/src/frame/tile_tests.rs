@@ -7,8 +7,8 @@ use crate::geometry::Shear;
 use crate::sample_test;
 use crate::setup::Triangle;
 use crate::traversal::{
-    self, Box5, EdgeBounds, Edges, Facing, LensLines, Piece, SCREEN_GAIN_MADDS as GAIN, Screen, TileRect,
-    Timeline, View, narrow_counted,
+    self, Box5, EdgeBounds, Edges, Facing, LensLines, LensSpan, LensSpans, Piece, SCREEN_GAIN_MADDS as GAIN,
+    Screen, TileRect, Timeline, View, narrow_counted,
 };
 
 /// A triangle with the results of its set-up.
@@ -41,6 +41,8 @@ pub(super) struct TestContext<'a> {
 pub(super) struct Remaining {
     pub within: Box5,
     pub times: Timeline,
+    /// Remaining regions of the lens, if they are tested each on their own.
+    spans: Option<LensSpans>,
     edges: Option<Edges>,
     /// Whether the facing test was run.
     pub facing: bool,
@@ -54,30 +56,61 @@ impl Remaining {
         Self {
             within,
             times: Timeline::one(Piece { t: within.t, faces: [true; 2] }),
+            spans: None,
             edges: None,
             facing: false,
             screened: false,
         }
     }
 
+    /// The part in the regions `spans` of the lens, or `None` if it is empty.
+    pub fn in_regions(&self, spans: Option<&LensSpans>) -> Option<Self> {
+        Self { spans: spans.filter(|_| self.within.lens).copied(), ..*self }.narrowed(self.within)
+    }
+
     /// The part inside the box `within`, or `None` if it is empty.
     pub fn narrowed(&self, within: Box5) -> Option<Self> {
+        let (spans, within) = match &self.spans {
+            Some(spans) => spans.within(&within).map(|(spans, hull)| (Some(spans), hull))?,
+            None => (None, within),
+        };
         let times = self.times.meet(&Timeline::one(Piece { t: within.t, faces: [true; 2] }));
         Some(Self {
             within: Box5 { t: times.hull()?, ..within },
             times,
+            spans,
             edges: None,
             facing: self.facing,
             screened: self.screened,
         })
     }
 
+    /// Boxes of the remaining samples in a piece of the time.
+    pub fn boxes(&self, within: Box5) -> impl Iterator<Item = Box5> + use<'_> {
+        let spans = self.spans.iter().flat_map(|spans| spans.as_slice());
+        let parts = spans.filter_map(move |span| span.within(&within));
+        let whole = self.spans.is_none().then_some(within);
+        whole.into_iter().chain(parts.map(move |LensSpan { u, t }| Box5 { u, t, ..within }))
+    }
+
     /// Fraction of the whole lens and shutter that remains. Samples are distributed evenly over it.
     pub fn volume(&self, moving: bool) -> f64 {
         let length = |[lo, hi]: [f32; 2]| f64::from((hi - lo).max(0.0));
-        let time: f64 = self.times.pieces().iter().map(|piece| length(piece.t)).sum();
-        let lens = if self.within.lens { 0.25 * length(self.within.u) * length(self.within.v) } else { 1.0 };
-        lens * if moving { time } else { 1.0 }
+        let time = |[from, to]: [f32; 2]| -> f64 {
+            let pieces = self.times.pieces().iter();
+            if moving {
+                pieces.map(|piece| length([piece.t[0].max(from), piece.t[1].min(to)])).sum()
+            } else {
+                1.0
+            }
+        };
+        match &self.spans {
+            Some(spans) => 0.5 * length(self.within.v) * spans.share(|span| time(span.t)),
+            None if self.within.lens => {
+                0.25 * length(self.within.u) * length(self.within.v) * time(self.within.t)
+            }
+            None => time(self.within.t),
+        }
     }
 }
 
@@ -93,8 +126,12 @@ impl Subject<'_> {
         let mut remaining = Remaining { edges: None, facing: false, ..*remaining };
         let lines = self.lines.filter(|_| context.features.lens_lines && remaining.within.lens);
         if let Some(lines) = lines {
-            remaining =
-                remaining.narrowed(lens_lines_over(lines, &tile.rect, remaining.within, context.work)?)?;
+            let left = lens_lines_over(lines, &tile.rect, remaining.within, context.work)?;
+            let Some(left) = remaining.narrowed(left) else {
+                context.work.culled_lens += 1;
+                return None;
+            };
+            remaining = left;
         }
         let allowed = self.allowed(tile, &remaining, context.features);
         if !context.features.auto || allowed == TestPlan(0) {
@@ -187,9 +224,7 @@ impl Subject<'_> {
         context: &mut TestContext<'_>,
     ) -> Option<Remaining> {
         match test {
-            TestPlan::SIDES => {
-                return remaining.narrowed(self.side_planes(&tile.rect, remaining.within, context.work)?);
-            }
+            TestPlan::SIDES => return self.side_planes(&tile.rect, &remaining, context.work),
             TestPlan::FACING => {
                 self.facing(&tile.rect, &mut remaining, context.features.facing_splits, context.work)?;
                 remaining.facing = true;
@@ -213,11 +248,23 @@ impl Subject<'_> {
         }
     }
 
-    fn side_planes(&self, rect: &TileRect, within: Box5, work: &mut TileWork) -> Option<Box5> {
-        let (next, madds) = narrow_counted::<f64>(self.triangle, self.shear, rect, &within);
+    /// Side planes over the whole lens, or over each of its regions.
+    fn side_planes(&self, rect: &TileRect, remaining: &Remaining, work: &mut TileWork) -> Option<Remaining> {
+        let (triangle, shear, within) = (self.triangle, self.shear, &remaining.within);
+        let (next, madds) = match &remaining.spans {
+            None => {
+                let (next, madds) = narrow_counted::<f64>(triangle, shear, rect, within);
+                (next.map(|next| (None, next)), madds)
+            }
+            Some(spans) => {
+                let (next, madds) = spans.narrow_counted::<f64>(triangle, shear, rect, within);
+                (next.map(|(spans, next)| (Some(spans), next)), madds)
+            }
+        };
         work.side_plane_madds += madds;
         work.culled_sides += u32::from(next.is_none());
-        next
+        let (spans, within) = next?;
+        Remaining { spans, ..*remaining }.narrowed(within)
     }
 
     fn facing(

@@ -91,10 +91,10 @@ impl<'a, 'p> Worker<'a, 'p> {
             tiles: Some(count),
             samples: count * self.samples_of_a_tile(),
         };
-        let Some(remaining) = subject.test(&coarse_tile, &Remaining::all(ready.within), &mut self.context())
-        else {
+        let Some(remaining) = Remaining::all(ready.within).in_regions(self.pass.spans.as_ref()) else {
             return;
         };
+        let Some(remaining) = subject.test(&coarse_tile, &remaining, &mut self.context()) else { return };
         for row in tiles.y0..tiles.y1 {
             for column in tiles.x0..tiles.x1 {
                 let before = (self.tests, self.log.work.len());
@@ -205,12 +205,14 @@ impl<'a, 'p> Worker<'a, 'p> {
                 TestContext { features, work: &mut self.tests, selector: &mut self.bin.selector };
             let screen = screen.filter(|screen| subject.pays(screen, within.lens, &mut context));
             let before = [hits.screened, hits.tested];
-            let (triangle, within, screen, target) = (&triangle, &within, screen.as_ref(), &mut target);
-            SampleTest { triangle, samples, within, screen, near, target, hits: &mut *hits }
-                .run(Width::widest());
+            for within in remaining.boxes(within) {
+                let (triangle, screen, target) = (&triangle, screen.as_ref(), &mut target);
+                SampleTest { triangle, samples, within: &within, screen, near, target, hits: &mut *hits }
+                    .run(Width::widest());
+            }
             if features.auto {
                 let counts = [hits.screened - before[0], hits.tested - before[1]];
-                savings.add(counts, screen, &mut self.bin.selector);
+                savings.add(counts, screen.as_ref(), &mut self.bin.selector);
             }
         }
         if self.pass.settings.spec.features.auto {

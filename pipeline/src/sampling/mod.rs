@@ -49,4 +49,9 @@ pub trait SampleSource: Send + Sync + std::fmt::Debug {
     fn block_by_time(&self, _px: u32, _py: u32) -> Option<&[u16]> {
         None
     }
+
+    /// Regions of the lens that contain the lens position of every sample; empty if nothing is known.
+    fn lens_regions(&self) -> &[LensRegion] {
+        &[]
+    }
 }

@@ -211,6 +211,10 @@ impl SampleSource for SampleTable {
         let per_block = (Self::SHIFT_PX * Self::SHIFT_PX * self.per_pixel) as usize;
         self.by_time.chunks_exact(per_block).nth(block as usize)
     }
+
+    fn lens_regions(&self) -> &[LensRegion] {
+        &self.regions
+    }
 }
 
 /// Description of a sample table, as in a RON file. Missing fields have the values of the default table.

@@ -8,6 +8,7 @@ mod cost;
 mod edges;
 mod facing;
 mod lens_lines;
+mod lens_spans;
 mod number;
 mod region;
 mod screen;
@@ -24,6 +25,7 @@ pub use cost::{
 pub use edges::{EdgeBounds, Edges};
 pub use facing::Facing;
 pub use lens_lines::LensLines;
+pub use lens_spans::{LensSpan, LensSpans};
 pub use number::{Number, Pieces, Quadratic};
 pub use region::{Box5, Faces, Piece, TileRect, Timeline, View};
 pub use screen::{SCREEN_GAIN_MADDS, Screen, screen_madds};

@@ -24,26 +24,38 @@ pub fn narrow_counted<N: Number>(
     tile: &TileRect,
     within: &Box5,
 ) -> (Option<Box5>, u32) {
+    let (left, madds) = narrow_sides::<N>(triangle, shear, tile, within, 0);
+    let Some(left) = left else { return (None, madds) };
+    let (left, more) = narrow_sides::<N>(triangle, shear, tile, &left, 1);
+    (left, madds + more)
+}
+
+/// The same for the two sides along one axis: 0 for x and u, 1 for y and v.
+pub(super) fn narrow_sides<N: Number>(
+    triangle: &Triangle,
+    shear: &Shear,
+    tile: &TileRect,
+    within: &Box5,
+    axis: usize,
+) -> (Option<Box5>, u32) {
     let (mut current, mut madds) = (*within, 0);
     let price = cost::side_madds(triangle.moving, within.lens, triangle.behind);
-    for axis in [0, 1] {
-        let [low, high] = if axis == 0 { tile.x } else { tile.y };
-        for (edge, other, sign) in [(low, high, 1.0), (high, low, -1.0)] {
-            let edges = if triangle.behind { [edge, other] } else { [edge, edge] };
-            let side = Side::<N> {
-                triangle,
-                s: N::from(shear.s[axis]),
-                a: N::from(shear.a[axis]),
-                parallel: shear.parallel,
-                axis,
-                edges: edges.map(N::from),
-                positive: sign > 0.0,
-            };
-            let (next, roots) = side.narrow(&current);
-            madds += price + roots * cost::SIDE_ROOT;
-            let Some(next) = next else { return (None, madds) };
-            current = next;
-        }
+    let [low, high] = if axis == 0 { tile.x } else { tile.y };
+    for (edge, other, sign) in [(low, high, 1.0), (high, low, -1.0)] {
+        let edges = if triangle.behind { [edge, other] } else { [edge, edge] };
+        let side = Side::<N> {
+            triangle,
+            s: N::from(shear.s[axis]),
+            a: N::from(shear.a[axis]),
+            parallel: shear.parallel,
+            axis,
+            edges: edges.map(N::from),
+            positive: sign > 0.0,
+        };
+        let (next, roots) = side.narrow(&current);
+        madds += price + roots * cost::SIDE_ROOT;
+        let Some(next) = next else { return (None, madds) };
+        current = next;
     }
     (Some(current), madds)
 }
@@ -138,7 +150,8 @@ fn above<N: Number>(range: [f32; 2], lo: N, hi: N, roots: &mut u32) -> Option<[f
     }
 }
 
-fn union(a: Option<[f32; 2]>, b: Option<[f32; 2]>) -> Option<[f32; 2]> {
+/// Smallest interval that contains both.
+pub(super) fn union(a: Option<[f32; 2]>, b: Option<[f32; 2]>) -> Option<[f32; 2]> {
     match (a, b) {
         (Some(a), Some(b)) => Some([a[0].min(b[0]), a[1].max(b[1])]),
         (a, b) => a.or(b),
