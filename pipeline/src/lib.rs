@@ -16,6 +16,7 @@
 //! - [`depth`]: depth intervals and culling,
 //! - [`state`]: depth test, stencil test and blending of a draw,
 //! - [`shading`] and [`texture`]: the shading grid, shaders and textures,
+//! - [`surface`]: images that passes write and read, and their formats,
 //! - [`memory`]: caches and addresses,
 //! - [`conservative`]: the tiles that a triangle may touch, without samples,
 //! - [`frame`]: all stages in order.
@@ -56,19 +57,22 @@ pub mod shader;
 pub mod shading;
 pub mod simd;
 pub mod state;
+pub mod surface;
 pub mod texture;
 pub mod traversal;
 pub mod visibility;
 
 pub use frame::{
-    Client, Draw, Features, FrameReport, Gpu, PassError, PassReport, PipelineSpec, RasterPass, Rendered,
-    Settings, Shading, Target, TileWork, Touch, TriangleStream,
+    Attachment, Attachments, Binding, Client, Draw, Features, FrameReport, Gpu, Load, PassError, PassReport,
+    PipelineSpec, RasterPass, Rendered, Settings, Shading, Store, SurfaceId, SurfaceProblem, Target,
+    TileWork, Touch, TriangleStream,
 };
 pub use geometry::{
     Camera, CameraError, Clip, Cull, DrawError, Geometry, Lens, MovingVertex, Shear, Viewport,
 };
 pub use memory::{CacheSpec, MemorySpec, Replacement};
 pub use sampling::{LensShape, SampleSpec, SampleTable};
-pub use shader::{Lane, Shader, ShadingPoint};
-pub use state::{Blend, Clear, Compare, DepthState, DrawState, Stencil, StencilFace, StencilOp};
+pub use shader::{Lane, Outputs, Shader, ShadingPoint};
+pub use state::{Blend, Clear, ColourState, Compare, DepthState, DrawState, Stencil, StencilFace, StencilOp};
+pub use surface::{Format, SurfaceSpec};
 pub use texture::{Texture, TextureError, Wrap, linear_to_srgb8};

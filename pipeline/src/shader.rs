@@ -1,10 +1,12 @@
 //! Shaders: code that a lane of a warp runs, and that counts its operations as it runs.
 
-use std::cell::Cell;
+use std::cell::{Cell, RefCell};
 use std::ops::{Add, Mul, Sub};
 
 use glam::{Affine3A, DAffine3, DVec3, Mat4, Vec2, Vec3, Vec4};
 
+use crate::state::MAX_TARGETS;
+use crate::surface::Bound;
 use crate::texture::Texture;
 
 /// Shader input, interpolated over the triangle at the reference lens position and time. Interpolators and the
@@ -21,13 +23,27 @@ pub struct ShadingPoint {
     pub uv: Vec2,
     /// Vertex colour in linear RGB, each channel 0 to 1; white for draws without any.
     pub color: Vec3,
+    /// Pixel, or cell of the shading grid, from the top left of the image.
+    pub pixel: [i32; 2],
+    /// Index of the sample in its pixel; 0 for cells.
+    pub sample: u32,
 }
 
 impl ShadingPoint {
     /// A point at the origin that faces the camera along `z`.
-    pub const FACING: Self =
-        Self { position: Vec3::ZERO, normal: Vec3::Z, to_camera: Vec3::Z, uv: Vec2::ZERO, color: Vec3::ONE };
+    pub const FACING: Self = Self {
+        position: Vec3::ZERO,
+        normal: Vec3::Z,
+        to_camera: Vec3::Z,
+        uv: Vec2::ZERO,
+        color: Vec3::ONE,
+        pixel: [0; 2],
+        sample: 0,
+    };
 }
+
+/// Colours of a sample, one for each target.
+pub type Outputs = [Vec4; MAX_TARGETS];
 
 /// Shader of vertices and surface points. Results have to depend on the arguments alone: workers shade in any order,
 /// and the shading cache may return one result to many samples. Its operations are counted from the code as it runs
@@ -44,6 +60,13 @@ pub trait Shader: Sync {
 
     /// Linear RGB radiance and opacity. `texel` is the filtered texel in linear RGBA, or white without a texture.
     fn shade(&self, lane: &Lane, at: &ShadingPoint, texel: Vec4) -> Vec4;
+
+    /// Colours for all targets of the pass. A shader of one colour leaves it at that: zeros go to the others.
+    fn outputs(&self, lane: &Lane, at: &ShadingPoint, texel: Vec4) -> Outputs {
+        let mut outputs = [Vec4::ZERO; MAX_TARGETS];
+        outputs[0] = self.shade(lane, at, texel);
+        outputs
+    }
 
     /// Whether [`Lane::discard_below`] may be called. Then samples are shaded before they are stored; a shader without it
     /// discards nothing.
@@ -106,13 +129,62 @@ operands!(f32: 1, f64: 1, Vec2: 2, Vec3: 3, Vec4: 4, DVec3: 3);
 /// one component is one operation; so are a comparison, a reciprocal and a square root, as in the shader cores of the GPU
 /// files. Constants and the choice between programs that is the same for a whole draw are free.
 #[derive(Debug, Default)]
-pub struct Lane {
+pub struct Lane<'a> {
     ops: Cell<u32>,
     branches: Cell<u32>,
     discarded: Cell<bool>,
+    /// What the draw binds, by slot.
+    bound: &'a [Bound<'a>],
+    fetches: Cell<u32>,
+    /// Lines that were read, if they are of interest.
+    lines: Option<&'a RefCell<Vec<u64>>>,
 }
 
-impl Lane {
+impl<'a> Lane<'a> {
+    /// A lane that reads what a draw binds.
+    pub(crate) fn reading(bound: &'a [Bound<'a>]) -> Self {
+        Self { bound, ..Self::default() }
+    }
+
+    /// A lane that reads what a draw binds, and notes the lines it reads.
+    pub(crate) fn noting(bound: &'a [Bound<'a>], lines: &'a RefCell<Vec<u64>>) -> Self {
+        Self { bound, lines: Some(lines), ..Self::default() }
+    }
+
+    fn note(&self, line: u64) {
+        if let Some(lines) = self.lines {
+            lines.borrow_mut().push(line);
+        }
+    }
+
+    /// Filtered texel at `uv` of the texture or surface bound to `slot`, in linear RGBA, at a level of detail (0 for the
+    /// finest; surfaces have one level). An unbound slot reads as zero. The texture unit does the work: a fetch is no
+    /// operation of the lane.
+    pub fn fetch(&self, slot: usize, uv: Vec2, lod: f32) -> Vec4 {
+        let Some(bound) = self.bound.get(slot) else { return Vec4::ZERO };
+        let (texel, fetches) = bound.fetch(uv, lod, |line| self.note(line));
+        self.fetches.set(self.fetches.get() + fetches);
+        texel
+    }
+
+    /// Unfiltered first sample of a pixel of the surface bound to `slot`. Zero outside of it, and for a slot without a
+    /// surface. It counts as a fetch.
+    pub fn load(&self, slot: usize, pixel: [i32; 2]) -> Vec4 {
+        self.load_sample(slot, pixel, 0)
+    }
+
+    /// The same for another sample.
+    pub fn load_sample(&self, slot: usize, pixel: [i32; 2], sample: u32) -> Vec4 {
+        let Some(bound) = self.bound.get(slot) else { return Vec4::ZERO };
+        self.fetches.set(self.fetches.get() + 1);
+        bound.load(pixel, sample, |line| self.note(line))
+    }
+
+    /// Fetches so far.
+    pub fn fetches(&self) -> u32 {
+        self.fetches.get()
+    }
+
     /// Operations so far.
     pub fn ops(&self) -> u32 {
         self.ops.get()

@@ -91,6 +91,11 @@ pub struct DepthState {
     pub write: bool,
 }
 
+impl DepthState {
+    /// For passes without depths: all samples pass, and no depth is stored.
+    pub const NONE: Self = Self { test: Compare::Always, write: false };
+}
+
 impl Default for DepthState {
     fn default() -> Self {
         Self { test: Compare::Less, write: true }
@@ -236,6 +241,35 @@ impl Blend {
     }
 }
 
+/// Largest number of colour targets of a pass.
+pub const MAX_TARGETS: usize = 4;
+
+/// How colours are stored in a target.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ColourState {
+    /// Combination with stored colours.
+    pub blend: Blend,
+    /// Whether red, green, blue and opacity are stored.
+    pub mask: [bool; 4],
+}
+
+impl ColourState {
+    /// Whether storing a colour needs the one before.
+    pub(crate) fn reads(&self) -> bool {
+        self.blend != Blend::Replace || ![[true; 4], [false; 4]].contains(&self.mask)
+    }
+
+    /// Whether colours are stored.
+    pub(crate) fn writes(&self) -> bool {
+        self.mask != [false; 4]
+    }
+
+    /// Colour stored where `new` is drawn over `stored`.
+    pub(crate) fn colour(&self, new: Vec4, stored: Vec4) -> Vec4 {
+        Vec4::select(BVec4A::from(self.mask), self.blend.mix(new, stored), stored)
+    }
+}
+
 /// State of a draw. The default stores the nearest opaque sample of front and back faces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DrawState {
@@ -249,6 +283,8 @@ pub struct DrawState {
     pub blend: Blend,
     /// Whether red, green, blue and opacity are stored.
     pub colour_mask: [bool; 4],
+    /// State of the second to the last colour target; those without one have that of the first.
+    pub others: [Option<ColourState>; MAX_TARGETS - 1],
 }
 
 impl Default for DrawState {
@@ -286,7 +322,7 @@ impl DrawState {
     /// Opaque triangles, the nearest of which is stored.
     pub fn new(cull: Cull) -> Self {
         let (depth, blend) = (DepthState::default(), Blend::Replace);
-        Self { cull, depth, stencil: None, blend, colour_mask: [true; 4] }
+        Self { cull, depth, stencil: None, blend, colour_mask: [true; 4], others: [None; MAX_TARGETS - 1] }
     }
 
     /// Whether the nearest sample and its colour are stored, as the sample test does without further state.
@@ -295,14 +331,10 @@ impl DrawState {
         plain && self.depth == DepthState::default() && self.stencil.is_none()
     }
 
-    /// Whether storing a colour needs the one before.
-    pub(crate) fn reads_colour(&self) -> bool {
-        self.blend != Blend::Replace || ![[true; 4], [false; 4]].contains(&self.colour_mask)
-    }
-
-    /// Whether colours are stored.
-    pub(crate) fn writes_colour(&self) -> bool {
-        self.colour_mask != [false; 4]
+    /// How colours are stored in target `number`.
+    pub fn target(&self, number: usize) -> ColourState {
+        let first = ColourState { blend: self.blend, mask: self.colour_mask };
+        number.checked_sub(1).and_then(|other| *self.others.get(other)?).unwrap_or(first)
     }
 
     /// Whether samples that fail the depth test have no effect, so that tiles in which all fail may be culled.
@@ -339,11 +371,6 @@ impl DrawState {
             (true, true) => face.pass,
         };
         Outcome { passes: inside && nearer, stencil: face.changed(op, stencil) }
-    }
-
-    /// Colour stored where `new` is drawn over `stored`.
-    pub(crate) fn colour(&self, new: Vec4, stored: Vec4) -> Vec4 {
-        Vec4::select(BVec4A::from(self.colour_mask), self.blend.mix(new, stored), stored)
     }
 }
 
@@ -389,7 +416,10 @@ mod tests {
         let high = StencilFace { test: Compare::Equal, reference: 0x5A, read_mask: 0xF0, ..face };
         assert!(high.holds(0x51) && !high.holds(0x6A));
         let red = DrawState { colour_mask: [true, false, false, true], ..DrawState::default() };
-        assert_eq!(red.colour(Vec4::ONE, Vec4::ZERO), Vec4::new(1.0, 0.0, 0.0, 1.0));
+        assert_eq!(red.target(0).colour(Vec4::ONE, Vec4::ZERO), Vec4::new(1.0, 0.0, 0.0, 1.0));
+        let second = ColourState { blend: Blend::Add, mask: [true; 4] };
+        let both = DrawState { others: [Some(second), None, None], ..red };
+        assert_eq!([0, 1, 2].map(|number| both.target(number)), [red.target(0), second, red.target(0)]);
     }
 
     #[test]

@@ -202,10 +202,14 @@ impl<'a> Sampler<'a> {
     pub fn footprint(&self, dx: Vec2, dy: Vec2) -> Footprint {
         let [width, height] = self.texture.size().map(|side| side as f32);
         let texels = |d: Vec2| (d * Vec2::new(width, height)).length();
-        let last = self.texture.levels().len() - 1;
         let longest = texels(dx).max(texels(dy));
-        let lod =
-            if longest.is_finite() { libm::log2f(longest.max(1.0)).min(last as f32) } else { last as f32 };
+        self.at_lod(if longest.is_finite() { libm::log2f(longest.max(1.0)) } else { f32::INFINITY })
+    }
+
+    /// Footprint at a level of detail, 0 for the finest level; NaN is 0.
+    pub fn at_lod(&self, lod: f32) -> Footprint {
+        let last = self.texture.levels().len() - 1;
+        let lod = lod.max(0.0).min(last as f32);
         let fine = lod as usize;
         Footprint { fine, coarse: (fine + 1).min(last), weight: lod - fine as f32 }
     }
@@ -248,15 +252,18 @@ impl<'a> Sampler<'a> {
         a.lerp(b, fraction.x).lerp(c.lerp(d, fraction.x), fraction.y)
     }
 
-    /// The four texels around `uv` and the position between them.
     fn taps(&self, level: &Level, uv: Vec2) -> ([[u32; 2]; 4], Vec2) {
-        let [wrap_x, wrap_y] = self.texture.wrap();
-        let at = uv * Vec2::new(level.width as f32, level.height as f32) - Vec2::splat(0.5);
-        let first = at.floor();
-        let x = [0, 1].map(|step| wrapped(first.x, step, level.width, wrap_x));
-        let y = [0, 1].map(|step| wrapped(first.y, step, level.height, wrap_y));
-        ([[x[0], y[0]], [x[1], y[0]], [x[0], y[1]], [x[1], y[1]]], at - first)
+        taps([level.width, level.height], self.texture.wrap(), uv)
     }
+}
+
+/// The four texels around `uv` in an image of `size`, and the position between them.
+pub(crate) fn taps(size: [u32; 2], wrap: [Wrap; 2], uv: Vec2) -> ([[u32; 2]; 4], Vec2) {
+    let at = uv * Vec2::new(size[0] as f32, size[1] as f32) - Vec2::splat(0.5);
+    let first = at.floor();
+    let x = [0, 1].map(|step| wrapped(first.x, step, size[0], wrap[0]));
+    let y = [0, 1].map(|step| wrapped(first.y, step, size[1], wrap[1]));
+    ([[x[0], y[0]], [x[1], y[0]], [x[0], y[1]], [x[1], y[1]]], at - first)
 }
 
 fn block(level: &Level, x: u32, y: u32) -> u32 {

@@ -222,8 +222,8 @@ pub struct DepthTile {
     pub triangle: Vec<u32>,
     /// Stencil value, if the pass has any.
     pub stencil: Vec<u8>,
-    /// Linear RGB and opacity, if colours are stored in the order of triangles.
-    pub colour: Vec<Vec4>,
+    /// Linear RGB and opacity of each sample, by target, if colours are stored in the order of triangles.
+    pub colours: Vec<Vec<Vec4>>,
     /// Farthest and nearest depths.
     pub boxes: DepthBoxes,
 }
@@ -238,7 +238,7 @@ impl DepthTile {
             depth: vec![depth; samples.len],
             triangle: vec![Self::NO_TRIANGLE; samples.len],
             stencil: Vec::new(),
-            colour: Vec::new(),
+            colours: Vec::new(),
             boxes: DepthBoxes::cleared(grid, samples, depth),
         }
     }

@@ -208,9 +208,8 @@ pub(super) struct Work {
     pub unread: u32,
     /// Depth and stencil words written.
     pub written: u32,
+    /// Samples with a new colour.
     pub coloured: u32,
-    /// Samples whose new colour depends on the stored one.
-    pub blended: u32,
     pub sample_madds: u32,
     pub read_pixels: u64,
     pub written_pixels: u64,

@@ -3,15 +3,15 @@
 
 use glam::Vec4;
 
-use super::Shading;
 use super::pass::Pass;
 use super::resolve::ByCell;
-use super::surface::{Grid, SampleView, Surface};
+use super::surface::{Grid, SampleView, Surface, own_pixel};
+use super::{Settings, Shading};
 use crate::depth::DepthTile;
 use crate::sample_test::{Covered, Hits};
 use crate::sampling::TileSamples;
 use crate::setup::Triangle;
-use crate::shader::Lane;
+use crate::shader::{Lane, Outputs};
 use crate::state::DrawState;
 
 /// What became of the covered samples of a triangle in a tile, besides their depths.
@@ -47,6 +47,7 @@ impl Fragments {
 /// A triangle and a tile whose covered samples are stored.
 pub(super) struct FragmentTests<'a> {
     pass: &'a Pass<'a>,
+    writes_colour: bool,
     triangle: &'a Triangle,
     state: &'a DrawState,
     may_discard: bool,
@@ -55,8 +56,8 @@ pub(super) struct FragmentTests<'a> {
     origin: [u32; 2],
     surface: Surface<'a>,
     grid: Grid<'a>,
-    /// Colours of cells shaded so far, without one where the shader discards.
-    shaded: ByCell<Option<Vec4>>,
+    /// Outputs of cells shaded so far, without any where the shader discards.
+    shaded: ByCell<Option<Outputs>>,
 }
 
 impl<'a> FragmentTests<'a> {
@@ -66,9 +67,11 @@ impl<'a> FragmentTests<'a> {
         samples: &'a TileSamples,
         origin: [u32; 2],
     ) -> Self {
-        let draw = &pass.draws[pass.locate(triangle.id).0];
+        let number = pass.locate(triangle.id).0;
+        let draw = &pass.draws[number];
         Self {
             pass,
+            writes_colour: pass.written_by(number as u32).next().is_some(),
             triangle,
             state: &draw.state,
             may_discard: draw.shader.may_discard(),
@@ -96,23 +99,24 @@ impl<'a> FragmentTests<'a> {
     fn sample(&mut self, sample: &Covered, tile: &mut DepthTile, hits: &mut Hits, fragments: &mut Fragments) {
         let slot = usize::from(sample.slot);
         let stencil = tile.stencil.get(slot).copied().unwrap_or(0);
-        let depths = [sample.depth, tile.depth[slot]];
+        let depth = self.pass.depth.round_depth(sample.depth);
+        let depths = [depth, tile.depth[slot]];
         let outcome = self.state.test(sample.counter_clockwise, depths, stencil);
         let writes_depth = outcome.passes && self.state.depth.write;
-        let writes_colour = outcome.passes && self.writes_colour();
+        let writes_colour = outcome.passes && self.writes_colour;
         let writes_stencil = outcome.stencil != stencil;
         if !(writes_depth || writes_colour || writes_stencil) {
             return;
         }
-        let mut colour = Vec4::ZERO;
+        let mut outputs = Outputs::default();
         if writes_colour || self.may_discard {
             fragments.shaded.push(sample.slot);
             let Some(shaded) = self.shade(slot) else { return };
-            colour = shaded;
+            outputs = shaded;
         }
         let pixel = usize::from(self.samples.pixel[slot]);
         if writes_depth {
-            tile.depth[slot] = sample.depth;
+            tile.depth[slot] = depth;
             hits.written.push(sample.slot);
         }
         if writes_stencil {
@@ -120,7 +124,7 @@ impl<'a> FragmentTests<'a> {
             fragments.stencils += u32::from(!writes_depth);
         }
         if writes_colour {
-            tile.colour[slot] = self.state.colour(colour, tile.colour[slot]);
+            self.store_colours(slot, &outputs, tile);
             fragments.coloured += 1;
             fragments.coloured_pixels |= 1 << pixel;
         }
@@ -136,24 +140,43 @@ impl<'a> FragmentTests<'a> {
         }
     }
 
-    fn writes_colour(&self) -> bool {
-        !self.pass.is_depth_only() && self.state.writes_colour()
-    }
-
-    /// Colour of the sample in `slot`, or `None` if the shader discards it.
-    fn shade(&mut self, slot: usize) -> Option<Vec4> {
-        let spec = self.pass.settings.spec;
-        let lane = Lane::default();
-        let kept = |lane: &Lane, colour| (!self.may_discard || !lane.is_discarded()).then_some(colour);
-        match spec.shading {
-            Shading::PerSample => {
-                let view = SampleView::of_slot(&self.triangle.corners, self.samples, slot);
-                kept(&lane, self.surface.shade_at(&lane, &view))
-            }
-            Shading::Cached => {
-                let cell = self.grid.cell(self.samples, slot, self.origin, spec.tile_px);
-                *self.shaded.entry(cell).or_insert_with(|| kept(&lane, self.surface.shade(&lane, cell)))
+    /// Combines the outputs of the shader with what the targets hold.
+    fn store_colours(&self, slot: usize, outputs: &Outputs, tile: &mut DepthTile) {
+        let targets = self.pass.colours.iter().zip(&mut tile.colours).zip(outputs);
+        for (number, ((plane, stored), colour)) in targets.enumerate() {
+            let state = self.state.target(number);
+            if state.writes() {
+                stored[slot] = plane.round(state.colour(*colour, stored[slot]));
             }
         }
     }
+
+    /// Outputs of the shader for the sample in `slot`, or `None` if it discards it.
+    fn shade(&mut self, slot: usize) -> Option<Outputs> {
+        let Settings { spec, samples: source, .. } = *self.pass.settings;
+        let (lane, surface) = (self.surface.lane(), &self.surface);
+        let is_single = self.pass.colours.len() < 2;
+        let kept = |lane: &Lane, outputs| (!self.may_discard || !lane.is_discarded()).then_some(outputs);
+        if self.pass.shading == Shading::PerSample {
+            let pixel = own_pixel(self.samples, slot, self.origin, spec.tile_px);
+            let at = (pixel, self.samples.in_pixel(slot, source.per_pixel()));
+            let view = SampleView::of_slot(&self.triangle.corners, self.samples, slot, at);
+            let single = || only(surface.shade_at(&lane, &view));
+            return kept(&lane, if is_single { single() } else { surface.outputs_at(&lane, &view) });
+        }
+        let cell = self.grid.cell(self.samples, slot, self.origin, spec.tile_px);
+        let single = || only(surface.shade(&lane, cell));
+        let outputs = || if is_single { single() } else { surface.outputs(&lane, cell) };
+        *self.shaded.entry(cell).or_insert_with(|| {
+            let outputs = outputs();
+            kept(&lane, outputs)
+        })
+    }
+}
+
+/// Outputs of a shader of one colour.
+fn only(colour: Vec4) -> Outputs {
+    let mut outputs = Outputs::default();
+    outputs[0] = colour;
+    outputs
 }

@@ -1,14 +1,18 @@
 //! GPU during a frame: passes follow each other through one address space and one set of caches.
 
-use activity::{Counts, Event, LineAccess, Packet, PacketCounts, PacketKind, Waits};
-use glam::Vec3;
+use std::sync::Arc;
 
+use activity::{Counts, Event, LineAccess, Packet, PacketCounts, PacketKind, Waits};
+use glam::{Vec3, Vec4};
+
+use super::attachments::{Attachments, Store, SurfaceId, SurfaceProblem, Surfaces};
 use super::heat::{FrameHeat, HeatMap};
 use super::pass::{AddressMap, Draw, Pass, RasterPass, Resident, Target, resident};
 use super::replay::Replay;
 use super::{Finished, PipelineSpec, rasterize, resolve};
 use crate::geometry::Viewport;
 use crate::memory::{AddressSpace, CacheError, MemorySystem, Surface};
+use crate::surface::{SurfaceSpec, Texels};
 
 /// Receiver of packets, each with the lines it requests from the L2.
 type Emit<'e> = Box<dyn FnMut(&Packet, &[LineAccess]) + 'e>;
@@ -27,6 +31,10 @@ pub struct Gpu<'e> {
     results: Vec<Surface>,
     /// Results since the last barrier: other units cannot read them yet.
     pending: Vec<Surface>,
+    /// Surfaces that passes may write and read.
+    surfaces: Surfaces,
+    /// Those read since the last barrier: the reads may still be going on.
+    reading: Vec<SurfaceId>,
     heat: FrameHeat,
     /// Whether the tiles of the pass that was begun are those of the heat maps.
     is_on_map: bool,
@@ -128,6 +136,27 @@ pub enum PassError {
     /// A cache is invalid.
     #[error(transparent)]
     Cache(#[from] CacheError),
+    /// A surface cannot be used as it is.
+    #[error("pass `{pass}`, surface `{surface}`: {problem}")]
+    Surface {
+        /// The pass.
+        pass: String,
+        /// The surface.
+        surface: String,
+        /// What is wrong.
+        problem: SurfaceProblem,
+    },
+    /// A draw tests or stores depths or stencil values that the pass does not have.
+    #[error(
+        "pass `{pass}`: draw {draw} has a depth or stencil test, but the pass has no depths; give it a depth target, or the draw \
+         `DepthState::NONE`"
+    )]
+    NoDepths {
+        /// The pass.
+        pass: String,
+        /// The draw.
+        draw: usize,
+    },
     /// The surfaces of a frame are too large.
     #[error(
         "pass `{pass}`: the surfaces of the frame take {bytes} bytes, more than the {} that can be addressed; draw fewer pixels, \
@@ -153,7 +182,7 @@ impl<'e> Gpu<'e> {
     ) -> Result<Self, PassError> {
         let emit = Box::new(emit);
         let memory = MemorySystem::new(&spec.memory)?;
-        let (passes, results, pending, heat) = Default::default();
+        let (passes, results, pending, reading, heat) = Default::default();
         Ok(Self {
             spec,
             memory,
@@ -163,6 +192,8 @@ impl<'e> Gpu<'e> {
             last_batch: 0,
             results,
             pending,
+            surfaces: Surfaces::default(),
+            reading,
             heat,
             is_on_map: false,
         })
@@ -199,6 +230,17 @@ impl<'e> Gpu<'e> {
     /// A new surface of `bytes`.
     pub fn surface(&mut self, bytes: u64) -> Surface {
         self.space.take(bytes)
+    }
+
+    /// A new surface that passes may write and read. Nothing is stored in it yet.
+    pub fn create(&mut self, spec: &SurfaceSpec<'_>) -> SurfaceId {
+        self.surfaces.create(spec, self.spec.tile_px, &mut self.space)
+    }
+
+    /// Values of all samples of a surface as its format keeps them, in the order `(y width + x) samples + index`; `None` while
+    /// nothing is stored in it. Depths are in `x`, stencil values in `y`.
+    pub fn contents(&self, id: SurfaceId) -> Option<Vec<Vec4>> {
+        Some(self.surfaces.get(id)?.texels.as_ref()?.values())
     }
 
     /// Starts a pass whose packets are made outside of rasterization. Their tiles are those of an image of the size of
@@ -246,22 +288,33 @@ impl<'e> Gpu<'e> {
     /// Draws a pass.
     ///
     /// # Errors
-    /// [`PassError`] if a cache of the settings is invalid, or if the surfaces of the frame are too large.
+    /// [`PassError`] if a cache of the settings is invalid, if a surface cannot be used as it is, or if the surfaces of the
+    /// frame are too large.
     pub fn draw(&mut self, pass: &RasterPass<'_>) -> Result<Rendered, PassError> {
         let number = self.passes.len() as u32;
         let has_heat = self.heat.is_of(pass.settings.viewport);
-        let prepared = Pass::new(pass, (number, has_heat), &mut self.space);
-        if !self.space.fits() {
-            return Err(PassError::Memory { pass: pass.name.to_owned(), bytes: self.space.bytes() });
-        }
+        self.check_memory(pass.name)?;
+        self.surfaces.check(pass)?;
+        let prepared = Pass::new(pass, (number, has_heat), &self.surfaces, &mut self.space);
+        self.check_memory(pass.name)?;
         self.passes.push(PassReport::new(pass));
-        if let Some(waits) = self.waits(&prepared.addresses) {
+        if let Some(waits) = self.waits(&prepared.addresses, pass) {
             self.barrier(waits);
         }
+        self.reading.extend(pass.read_surfaces());
         let drawn = self.pass(&prepared, pass)?;
         self.last_batch = prepared.batches().len().max(1) as u32 - 1;
-        self.keep(drawn.surface);
+        if !prepared.is_attached {
+            self.keep(drawn.surface);
+        }
         Ok(drawn)
+    }
+
+    fn check_memory(&self, pass: &str) -> Result<(), PassError> {
+        if self.space.fits() {
+            return Ok(());
+        }
+        Err(PassError::Memory { pass: pass.to_owned(), bytes: self.space.bytes() })
     }
 
     fn pass(&mut self, prepared: &Pass<'_>, pass: &RasterPass<'_>) -> Result<Rendered, PassError> {
@@ -277,24 +330,49 @@ impl<'e> Gpu<'e> {
             Finished::Tests(..) => {}
         };
         let mut replay = Replay::new(prepared, &mut self.memory)?;
-        let is_empty = prepared.is_depth_only() && pass.target != Target::Depth;
+        let is_empty = matches!(pass.target, Target::Views(_)) && prepared.is_depth_only();
         let bins = if is_empty { Vec::new() } else { rasterize(prepared, &mut replay, &mut done) };
         let visible = if pass.visible { resolve::visible(prepared, &bins) } else { Vec::new() };
+        let report = report.counts();
+        if let Target::Surfaces(targets) = pass.target {
+            self.store(targets, resolve::stored(prepared, &bins));
+        }
         Ok(Rendered {
             images: if pass.image { resolve::resolve(prepared, &bins) } else { Vec::new() },
             visible,
-            counts: report.counts(),
-            surface: prepared.addresses.result(),
+            counts: report,
+            surface: prepared.result(),
         })
     }
 
-    /// Packets that have to wait for earlier passes, if any: those that read their results.
-    fn waits(&self, at: &AddressMap) -> Option<Waits> {
+    /// Keeps the contents of the targets of a pass, the depths last.
+    fn store(&mut self, targets: &Attachments, contents: Vec<Texels>) {
+        for ((id, _, store), texels) in targets.all().zip(contents) {
+            let Some(state) = self.surfaces.get_mut(id) else { continue };
+            let place = state.region;
+            state.texels = (store == Store::Store).then(|| Arc::new(texels));
+            // What was stored before is no longer a result either.
+            self.results.retain(|result| *result != place);
+            self.pending.retain(|result| *result != place);
+            if store == Store::Store {
+                self.keep(place);
+            }
+        }
+    }
+
+    /// Packets that have to wait for earlier passes, if any: those that read their results, or write what they read. A target
+    /// of several passes needs no wait, as the units of depth and colour work in order.
+    fn waits(&self, at: &AddressMap, pass: &RasterPass<'_>) -> Option<Waits> {
         let is_pending = |address: u64| self.pending.iter().any(|surface| surface.contains(address));
         if at.vertices.iter().any(|buffer| is_pending(buffer.address)) {
             return Some(Waits::All);
         }
-        at.textures.iter().flatten().copied().any(is_pending).then_some(Waits::Tiles)
+        let read = pass.read_surfaces().filter_map(|id| Some(self.surfaces.get(id)?.region.address()));
+        let reads = at.textures.iter().flatten().copied().chain(read).any(is_pending);
+        let is_read = |id: SurfaceId| self.reading.contains(&id);
+        let overwrites =
+            matches!(pass.target, Target::Surfaces(targets) if targets.all().any(|(id, ..)| is_read(id)));
+        (reads || overwrites).then_some(Waits::Tiles)
     }
 
     /// Lets packets wait for all earlier ones, and makes results readable.
@@ -302,6 +380,7 @@ impl<'e> Gpu<'e> {
         let mut packet = Packet::new(PacketKind::Barrier(waits), self.last_pass());
         self.memory.flush(&mut packet.counts);
         self.pending.clear();
+        self.reading.clear();
         self.push(&packet, 0);
     }
 

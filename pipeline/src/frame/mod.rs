@@ -1,5 +1,6 @@
 //! Frame: passes through the whole pipeline, each from vertices, set-up, bins and tiles to the replay and the image.
 
+mod attachments;
 mod bin;
 mod fragments;
 mod gpu;
@@ -21,6 +22,7 @@ use test_selection::TestSelector;
 use vertices::Ready;
 
 use crate::setup::distribute;
+pub use attachments::{Attachment, Attachments, Binding, Load, Store, SurfaceId, SurfaceProblem};
 use bin::{Bin, BinLog};
 pub use gpu::{FrameReport, Gpu, PassError, PassReport, Rendered};
 pub use heat::{HeatMap, TileHeat};

@@ -1,18 +1,21 @@
 //! Pass: draws and a camera, projected to the image plane, with numbered triangles.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use glam::Vec4;
 
-use super::{Features, Settings};
-use crate::depth::{BoxGrid, DepthTile};
+use super::attachments::{Attachment, Attachments, Binding, Load, Store, SurfaceId, Surfaces};
+use super::{Features, Settings, Shading};
+use crate::depth::{BoxGrid, DepthBoxes, DepthTile};
 use crate::geometry::{Camera, Clip, Cull, Geometry, MovingVertex, Projection, Viewport};
-use crate::memory::{AddressSpace, Surface};
+use crate::memory::{AddressSpace, LINE_BYTES, Surface};
 use crate::sampling::TileSamples;
 use crate::setup::Corner;
 use crate::shader::{Program, Shader};
 use crate::state::{Clear, DrawState};
-use crate::texture::Texture;
+use crate::surface::{Bound, Format, Texels};
+use crate::texture::{Sampler, Texture};
 use crate::traversal::LensSpans;
 use crate::traversal::thresholds::{at_rest, blur_px, motion_px};
 
@@ -40,6 +43,16 @@ pub(super) struct Pass<'a> {
     pub addresses: AddressMap,
     /// Operations of the shader of each draw.
     pub programs: Vec<Program>,
+    /// What the shader of each draw reads, by slot.
+    pub bound: Vec<Vec<Bound<'a>>>,
+    /// Depths of samples. Without a place they are not in memory.
+    pub depth: Plane,
+    /// Colours of samples, by target. Without any the pass computes depths only.
+    pub colours: Vec<Plane>,
+    /// Whether depths and colours are in surfaces of the frame.
+    pub is_attached: bool,
+    /// Where samples are shaded.
+    pub shading: Shading,
     /// Image coordinate of the first column and row.
     pub origin: [f32; 2],
     /// Whether the camera has a lens.
@@ -54,7 +67,7 @@ pub(super) struct Pass<'a> {
     pub eye: Vec4,
     /// Whether workers record tile tests by tile.
     pub heat: bool,
-    /// Range of samples of each image. Without ranges the pass computes depths only.
+    /// Range of samples of each image.
     pub views: Vec<Range<u32>>,
     pub clear: Clear,
     /// Whether the result depends on the order of triangles, so that samples are shaded and stored in it.
@@ -62,8 +75,13 @@ pub(super) struct Pass<'a> {
 }
 
 impl<'a> Pass<'a> {
-    /// Prepares pass `number` of a frame and gives its surfaces addresses in `space`.
-    pub fn new(pass: &RasterPass<'a>, (number, heat): (u32, bool), space: &mut AddressSpace) -> Self {
+    /// Prepares pass `number` of a frame, which was checked, and gives its data addresses in `space`.
+    pub fn new(
+        pass: &RasterPass<'a>,
+        (number, heat): (u32, bool),
+        surfaces: &Surfaces,
+        space: &mut AddressSpace,
+    ) -> Self {
         let RasterPass { camera, draws, settings, .. } = *pass;
         let features = &settings.spec.features;
         let views = pass.target.views(settings.samples.per_pixel());
@@ -76,13 +94,18 @@ impl<'a> Pass<'a> {
             }))
             .collect();
         let viewport = settings.viewport;
+        let (depth, colours) = planes(pass, !views.is_empty(), surfaces, space);
+        let addresses = AddressMap::new(pass, views.len(), space);
+        let is_attached = matches!(pass.target, Target::Surfaces(_));
+        let state_matters = |draw: &Draw<'_>| !draw.state.keeps_nearest() || draw.shader.may_discard();
         Self {
             number,
             draws,
             settings,
             vertices,
             first_triangle,
-            addresses: AddressMap::new(pass, views.len(), space),
+            bound: bound(draws, &addresses, surfaces, space),
+            addresses,
             programs: draws.iter().map(|draw| Program::of(draw.shader)).collect(),
             origin: [Viewport::edge(0, viewport.width()), Viewport::edge(0, viewport.height())],
             lens: !projection.shear.is_none(),
@@ -93,8 +116,12 @@ impl<'a> Pass<'a> {
             heat,
             views,
             projection,
-            clear: pass.clear,
-            is_ordered: draws.iter().any(|draw| !draw.state.keeps_nearest() || draw.shader.may_discard()),
+            clear: depth.cleared(),
+            is_ordered: is_attached || draws.iter().any(state_matters),
+            depth,
+            colours,
+            is_attached,
+            shading: if pass.per_sample { Shading::PerSample } else { settings.spec.shading },
         }
     }
 
@@ -156,22 +183,61 @@ impl<'a> Pass<'a> {
         self.settings.spec.features.hidden_surface_removal && !self.is_ordered && !self.is_depth_only()
     }
 
-    /// A cleared tile of `samples`.
-    pub fn cleared_tile(&self, samples: &TileSamples) -> DepthTile {
+    /// The tile at `origin` with its `samples` before the first draw.
+    pub fn first_tile(&self, samples: &TileSamples, origin: [u32; 2]) -> DepthTile {
         let (count, Clear { depth, stencil }) = (samples.len, self.clear);
         let mut tile = DepthTile::cleared(self.depth_grid(), samples, depth);
         if self.draws.iter().any(|draw| draw.state.stencil.is_some()) {
             tile.stencil = vec![stencil; count];
         }
-        if self.is_ordered && !self.is_depth_only() {
-            tile.colour = vec![self.settings.background.extend(1.0); count];
+        if let Some(format) = self.depth.format {
+            let stored = self.first_values(&self.depth, samples, origin);
+            if self.depth.is_loaded() {
+                tile.depth = stored.iter().map(|value| value.x).collect();
+                tile.boxes = DepthBoxes::of(self.depth_grid(), samples, &tile.depth);
+            }
+            if format.has_stencil() {
+                tile.stencil = stored.iter().map(|value| value.y as u8).collect();
+            }
+        }
+        if self.is_ordered {
+            let first = |plane| self.first_values(plane, samples, origin);
+            tile.colours = self.colours.iter().map(first).collect();
         }
         tile
     }
 
+    /// Values of the samples of a tile before the first draw.
+    fn first_values(&self, plane: &Plane, samples: &TileSamples, origin: [u32; 2]) -> Vec<Vec4> {
+        match &plane.first {
+            First::Cleared(value) => vec![*value; samples.len],
+            First::Loaded(texels) => {
+                (0..samples.len).map(|slot| texels.get(self.in_image(samples, slot, origin))).collect()
+            }
+        }
+    }
+
+    /// Index in the image of the sample in `slot` of the tile at `origin`.
+    pub fn in_image(&self, samples: &TileSamples, slot: usize, origin: [u32; 2]) -> usize {
+        let Settings { spec, viewport, samples: source, .. } = *self.settings;
+        samples.in_image(slot, origin, spec.tile_px, viewport, source.per_pixel())
+    }
+
+    /// Colour targets that `draw` writes to.
+    pub fn written_by(&self, draw: u32) -> impl Iterator<Item = (usize, &Plane)> {
+        let state = self.draws.get(draw as usize).map(|draw| draw.state);
+        let writes = move |number| state.is_some_and(|state| state.target(number).writes());
+        self.colours.iter().enumerate().filter(move |(number, _)| writes(*number))
+    }
+
+    /// What is left of the pass: its images, or the depths of a depth pass.
+    pub fn result(&self) -> Surface {
+        if self.addresses.image.bytes() > 0 { self.addresses.image } else { self.depth.place }
+    }
+
     /// Whether the pass computes depths only.
     pub fn is_depth_only(&self) -> bool {
-        self.views.is_empty()
+        self.colours.is_empty()
     }
 
     /// Fine tiles of the image.
@@ -186,13 +252,124 @@ impl<'a> Pass<'a> {
     }
 }
 
-/// Where a pass finds its data.
+/// Values of all samples of a pass: depths, or the colours of a target.
+pub(super) struct Plane {
+    pub place: Surface,
+    pub sample_bytes: u64,
+    /// Format in a surface of the frame; others keep values as they were computed.
+    pub format: Option<Format>,
+    pub first: First,
+    pub is_stored: bool,
+}
+
+/// Values before the first draw of a pass.
+pub(super) enum First {
+    /// Each the same.
+    Cleared(Vec4),
+    /// Those of an earlier pass.
+    Loaded(Arc<Texels>),
+}
+
+impl Plane {
+    /// Values that end with the pass, or with the frame.
+    fn inner(place: Surface, value: Vec4) -> Self {
+        let first = First::Cleared(value);
+        Self { place, sample_bytes: SAMPLE_BYTES, format: None, first, is_stored: false }
+    }
+
+    /// Values in a surface.
+    fn attached<V: Copy>(to: &Attachment<V>, value: impl Fn(V) -> Vec4, surfaces: &Surfaces) -> Option<Self> {
+        let state = surfaces.get(to.surface)?;
+        let format = state.spec().format;
+        let first = match to.load {
+            Load::Clear(clear) => First::Cleared(format.round(value(clear))),
+            Load::Load => First::Loaded(Arc::clone(state.texels.as_ref()?)),
+            Load::Discard => First::Cleared(Vec4::ZERO),
+        };
+        let (place, is_stored) = (state.region, to.store == Store::Store);
+        Some(Self { place, sample_bytes: format.bytes(), format: Some(format), first, is_stored })
+    }
+
+    /// Lines of the plane.
+    pub fn lines(&self) -> usize {
+        self.place.bytes().div_ceil(LINE_BYTES) as usize
+    }
+
+    /// Value before the first draw as depth and stencil, where it is the same everywhere.
+    fn cleared(&self) -> Clear {
+        let First::Cleared(value) = self.first else { return Clear { depth: 0.0, stencil: 0 } };
+        Clear { depth: value.x, stencil: value.y as u8 }
+    }
+
+    /// Whether lines have to be read before they are changed.
+    pub fn is_loaded(&self) -> bool {
+        matches!(self.first, First::Loaded(_))
+    }
+
+    /// What is left of a value after it was stored.
+    pub fn round(&self, value: Vec4) -> Vec4 {
+        self.format.map_or(value, |format| format.round(value))
+    }
+
+    /// The same for a depth.
+    pub fn round_depth(&self, depth: f32) -> f32 {
+        self.format.map_or(depth, |format| format.round_depth(depth))
+    }
+}
+
+/// Depths and colours of a pass. Those of a pass with `images` that are not in surfaces end with it.
+fn planes(
+    pass: &RasterPass<'_>,
+    has_images: bool,
+    surfaces: &Surfaces,
+    space: &mut AddressSpace,
+) -> (Plane, Vec<Plane>) {
+    let depth_of = |clear: Clear| Vec4::new(clear.depth, f32::from(clear.stencil), 0.0, 1.0);
+    if let Target::Surfaces(targets) = pass.target {
+        let colour = |to| Plane::attached(to, |value| value, surfaces);
+        let depth = targets.depth.as_ref().and_then(|to| Plane::attached(to, depth_of, surfaces));
+        let depth = depth.unwrap_or_else(|| Plane::inner(Surface::NOWHERE, depth_of(pass.clear)));
+        return (depth, targets.colours.iter().filter_map(colour).collect());
+    }
+    let bytes = pass.padded_pixels() * u64::from(pass.settings.samples.per_pixel()) * SAMPLE_BYTES;
+    let depth = |place| Plane::inner(place, depth_of(pass.clear));
+    if !has_images {
+        // The depths of a depth pass are its result.
+        return (depth(space.take(bytes)), Vec::new());
+    }
+    let [depths, colours] = space.samples(bytes);
+    (depth(depths), vec![Plane::inner(colours, pass.settings.background.extend(1.0))])
+}
+
+/// What the shader of each draw reads. A texture bound to several draws has one address.
+fn bound<'a>(
+    draws: &[Draw<'a>],
+    addresses: &AddressMap,
+    surfaces: &Surfaces,
+    space: &mut AddressSpace,
+) -> Vec<Vec<Bound<'a>>> {
+    let own = draws.iter().map(|draw| draw.shader.texture());
+    let own =
+        own.zip(&addresses.textures).filter_map(|(texture, at)| Some((std::ptr::from_ref(texture?), (*at)?)));
+    let mut known: Vec<(*const Texture, u64)> = own.collect();
+    let mut bind = |binding: &Binding<'a>| match *binding {
+        Binding::Texture(texture) => {
+            let place = known.iter().find(|(seen, _)| std::ptr::eq(*seen, texture)).map(|known| known.1);
+            let address = place.unwrap_or_else(|| space.take(texture.bytes()).address());
+            known.push((texture, address));
+            Some(Bound::texture(Sampler::new(texture, address)))
+        }
+        Binding::Surface(id) => {
+            let state = surfaces.get(id)?;
+            Some(Bound::surface(Arc::clone(state.texels.as_ref()?), state.layout))
+        }
+    };
+    draws.iter().map(|draw| draw.bindings.iter().filter_map(&mut bind).collect()).collect()
+}
+
+/// Where a pass finds the data of its draws, and leaves its images.
 #[derive(Clone, Debug)]
 pub(super) struct AddressMap {
-    /// Depths of samples.
-    pub depth: Surface,
-    /// Colours of samples.
-    pub colour: Surface,
     /// Images, one after the other.
     pub image: Surface,
     /// Vertices of each draw.
@@ -203,26 +380,14 @@ pub(super) struct AddressMap {
 
 impl AddressMap {
     fn new(pass: &RasterPass<'_>, images: usize, space: &mut AddressSpace) -> Self {
-        let settings = pass.settings;
-        let (viewport, tile_px) = (settings.viewport, settings.spec.tile_px);
-        let tiles =
-            u64::from(viewport.width().div_ceil(tile_px)) * u64::from(viewport.height().div_ceil(tile_px));
-        let pixels = tiles * u64::from(tile_px * tile_px);
-        let bytes = pixels * u64::from(settings.samples.per_pixel()) * SAMPLE_BYTES;
-        // The depths of a depth pass are its result.
-        let [depth, colour] = if images == 0 { [space.take(bytes); 2] } else { space.samples(bytes) };
+        let viewport = pass.settings.viewport;
         let mip_levels = match pass.target {
             Target::Texture => Texture::bytes_of(viewport.width(), viewport.height()),
             _ => 0,
         };
-        let image = space.take((pixels * SAMPLE_BYTES * images as u64).max(mip_levels));
+        let image = space.take((pass.padded_pixels() * SAMPLE_BYTES * images as u64).max(mip_levels));
         let (vertices, textures) = resident(pass.draws, space).unzip();
-        Self { depth, colour, image, vertices, textures }
-    }
-
-    /// What is left of the pass: its images, or the depths of a depth pass.
-    pub fn result(&self) -> Surface {
-        if self.image.bytes() > 0 { self.image } else { self.depth }
+        Self { image, vertices, textures }
     }
 }
 
@@ -261,6 +426,8 @@ pub struct Draw<'a> {
     pub shader: &'a dyn Shader,
     /// Which samples are stored, and how.
     pub state: DrawState,
+    /// What the shader may read, by slot.
+    pub bindings: &'a [Binding<'a>],
     /// Addresses of its data, if an earlier pass of the frame has used them.
     pub resident: Resident,
 }
@@ -268,7 +435,8 @@ pub struct Draw<'a> {
 impl<'a> Draw<'a> {
     /// A draw of opaque triangles whose data are new to the GPU.
     pub fn new(geometry: Geometry<'a>, shader: &'a dyn Shader, cull: Cull) -> Self {
-        Self { geometry, shader, state: DrawState::new(cull), resident: Resident::default() }
+        let (state, resident) = (DrawState::new(cull), Resident::default());
+        Self { geometry, shader, state, bindings: &[], resident }
     }
 
     /// The draw with other faces culled.
@@ -281,6 +449,12 @@ impl<'a> Draw<'a> {
     #[must_use]
     pub fn with_state(self, state: DrawState) -> Self {
         Self { state, ..self }
+    }
+
+    /// The draw with a shader that reads `bindings`, the first in slot 0.
+    #[must_use]
+    pub fn binding(self, bindings: &'a [Binding<'a>]) -> Self {
+        Self { bindings, ..self }
     }
 
     /// The draw with the texture of its shader in `surface`, as an earlier pass wrote it.
@@ -325,10 +499,12 @@ pub struct RasterPass<'a> {
     pub image: bool,
     /// Whether the result has the visible triangle and the depth of every sample.
     pub visible: bool,
+    /// Whether every sample is shaded at its own position, whatever the hardware does otherwise.
+    pub per_sample: bool,
 }
 
 /// Result that a pass leaves in memory.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Target<'a> {
     /// One image of all samples.
     Image,
@@ -339,6 +515,8 @@ pub enum Target<'a> {
     Views(&'a [Range<u32>]),
     /// The depths of all samples, such as a shadow map. Nothing is shaded.
     Depth,
+    /// Surfaces of the frame. Samples are stored in the order of triangles.
+    Surfaces(&'a Attachments),
 }
 
 impl Target<'_> {
@@ -348,7 +526,7 @@ impl Target<'_> {
         match self {
             Self::Image | Self::Texture => std::iter::once(0..per_pixel).collect(),
             Self::Views(views) => views.iter().map(within).collect(),
-            Self::Depth => Vec::new(),
+            Self::Depth | Self::Surfaces(_) => Vec::new(),
         }
     }
 }
@@ -357,7 +535,7 @@ impl<'a> RasterPass<'a> {
     /// A pass that draws one image.
     pub fn new(camera: &'a Camera, draws: &'a [Draw<'a>], settings: &'a Settings<'a>) -> Self {
         let (name, target, clear) = ("draw", Target::Image, Clear::default());
-        Self { name, camera, draws, settings, target, clear, image: true, visible: false }
+        Self { name, camera, draws, settings, target, clear, image: true, visible: false, per_sample: false }
     }
 
     /// The pass with another name.
@@ -388,6 +566,27 @@ impl<'a> RasterPass<'a> {
     #[must_use]
     pub fn with_visible(self) -> Self {
         Self { visible: true, ..self }
+    }
+
+    /// The pass with every sample shaded at its own position.
+    #[must_use]
+    pub fn shaded_per_sample(self) -> Self {
+        Self { per_sample: true, ..self }
+    }
+
+    /// Surfaces that its draws read.
+    pub(super) fn read_surfaces(&self) -> impl Iterator<Item = SurfaceId> {
+        self.draws.iter().flat_map(|draw| draw.bindings).filter_map(|binding| match binding {
+            Binding::Surface(id) => Some(*id),
+            Binding::Texture(_) => None,
+        })
+    }
+
+    /// Pixels of the image, in whole tiles.
+    fn padded_pixels(&self) -> u64 {
+        let (viewport, tile_px) = (self.settings.viewport, self.settings.spec.tile_px);
+        let [across, down] = [viewport.width(), viewport.height()].map(|side| side.div_ceil(tile_px));
+        u64::from(across) * u64::from(down) * u64::from(tile_px * tile_px)
     }
 
     /// Triangles of all draws.

@@ -5,8 +5,8 @@ use activity::{Event, LineAccess, Packet, PacketCounts, PacketKind};
 use super::Shading;
 use super::bin::Bin;
 use super::bin::{BinLog, Work};
-use super::pass::{Pass, SAMPLE_BYTES, VertexBuffer};
-use super::surface::Surface;
+use super::pass::{Pass, Plane, SAMPLE_BYTES, VertexBuffer};
+use super::surface::{QuadWork, Surface};
 use crate::memory::{Access, Cache, CacheError, LINE_BYTES, MemorySystem};
 use crate::random::mix;
 use crate::sampling::Sample;
@@ -18,9 +18,10 @@ pub(super) struct Replay<'a> {
     memory: &'a mut MemorySystem,
     shading: Cache,
     reuse: Reuse,
-    /// Depth and colour lines that no longer hold the clear value.
+    /// Depth lines that no longer hold the clear value.
     depth_used: Vec<bool>,
-    colour_used: Vec<bool>,
+    /// The same of colours, by target.
+    colour_used: Vec<Vec<bool>>,
     /// Pixels of each tile whose depths and whose colours compress to half; empty without compression.
     small: Vec<[u64; 2]>,
 }
@@ -44,14 +45,16 @@ impl Reuse {
 
 impl<'a> Replay<'a> {
     pub fn new(pass: &'a Pass<'a>, memory: &'a mut MemorySystem) -> Result<Self, CacheError> {
-        let (spec, at) = (pass.settings.spec, &pass.addresses);
-        let lines = at.depth.bytes().div_ceil(LINE_BYTES) as usize;
+        let spec = pass.settings.spec;
+        let used = |plane: &Plane| vec![plane.is_loaded(); plane.lines()];
         let mut small = Vec::new();
         if spec.memory.compression.is_on() {
-            memory.compress([at.depth.address(), at.colour.address(), at.image.address()]);
+            memory.compress(compressed(pass));
+        }
+        if spec.memory.compression.is_on() && !pass.is_attached {
             let tile_bytes =
                 u64::from(spec.tile_px.pow(2) * pass.settings.samples.per_pixel()) * SAMPLE_BYTES;
-            small = vec![[0; 2]; at.depth.bytes().div_ceil(tile_bytes) as usize];
+            small = vec![[0; 2]; pass.depth.place.bytes().div_ceil(tile_bytes) as usize];
         }
         Ok(Self {
             pass,
@@ -59,8 +62,8 @@ impl<'a> Replay<'a> {
             small,
             shading: Cache::new(spec.shading_cache)?,
             reuse: Reuse { recent: vec![(usize::MAX, 0); spec.vertex_reuse as usize], next: 0 },
-            depth_used: vec![false; lines],
-            colour_used: vec![false; lines],
+            depth_used: used(&pass.depth),
+            colour_used: pass.colours.iter().map(used).collect(),
         })
     }
 
@@ -119,27 +122,40 @@ impl<'a> Replay<'a> {
         counts[Event::DepthReads] = work.hit - work.unread;
         counts[Event::DepthReadsSkipped] = work.unread;
         counts[Event::DepthWrites] = work.written;
-        counts[Event::ColourWrites] = work.coloured;
-        counts[Event::SamplesBlended] = work.blended;
+        self.colours(work, counts);
         self.compress(work);
-        let base = self.pass.addresses.depth.address();
-        self.lines(work.tile, work.read_pixels | work.written_pixels, |this, line, pixels| {
+        let base = self.pass.depth.place.address();
+        let used = work.read_pixels | work.written_pixels;
+        self.lines(work.tile, used, SAMPLE_BYTES, |this, line, pixels| {
             let write = pixels & work.written_pixels != 0;
             let fresh = !std::mem::replace(&mut this.depth_used[line as usize], true);
             this.memory.depth(base + line * LINE_BYTES, write, fresh, counts);
         });
         if !quads.is_empty() {
-            match self.pass.settings.spec.shading {
+            match self.pass.shading {
                 Shading::Cached => self.shade(work.triangle, quads, counts),
                 Shading::PerSample => self.shade_samples(work.triangle, quads, counts),
             }
         }
-        let base = self.pass.addresses.colour.address();
-        self.lines(work.tile, work.coloured_pixels, |this, line, _| {
-            let fresh = !std::mem::replace(&mut this.colour_used[line as usize], true);
-            this.memory.colour(base + line * LINE_BYTES, true, fresh, counts);
-        });
+        for (target, plane) in self.pass.written_by(work.draw) {
+            let base = plane.place.address();
+            self.lines(work.tile, work.coloured_pixels, plane.sample_bytes, |this, line, _| {
+                let fresh = !std::mem::replace(&mut this.colour_used[target][line as usize], true);
+                this.memory.colour(base + line * LINE_BYTES, true, fresh, counts);
+            });
+        }
         packet
+    }
+
+    /// Counts the words of colour that the samples of a packet write, in all targets.
+    fn colours(&self, work: &Work, counts: &mut PacketCounts) {
+        for (target, plane) in self.pass.written_by(work.draw) {
+            let words = work.coloured * (plane.sample_bytes / SAMPLE_BYTES) as u32;
+            counts[Event::ColourWrites] += words;
+            if self.pass.draws[work.draw as usize].state.target(target).reads() {
+                counts[Event::SamplesBlended] += words;
+            }
+        }
     }
 
     /// Record which lines of the tile compress to half after a packet. If a line spans several tiles, the one
@@ -149,8 +165,9 @@ impl<'a> Replay<'a> {
         let now: [u64; 2] =
             std::array::from_fn(|of| small[of] & !work.written_pixels | work.small_pixels[of]);
         *small = now;
-        let bases = [self.pass.addresses.depth, self.pass.addresses.colour].map(|surface| surface.address());
-        self.lines(work.tile, work.written_pixels, |this, line, _| {
+        let [depth, colour, _] = compressed(self.pass);
+        let bases = [depth, colour];
+        self.lines(work.tile, work.written_pixels, SAMPLE_BYTES, |this, line, _| {
             let pixels = this.pixels_of(work.tile, line);
             for (base, small) in bases.into_iter().zip(now) {
                 this.memory.set_compressed(base + line * LINE_BYTES, small & pixels == pixels);
@@ -179,10 +196,9 @@ impl<'a> Replay<'a> {
             if hit {
                 continue;
             }
-            count_quad(access, surface.quad_ops(access.quad), counts);
             let memory = &mut self.memory;
-            let fetches = surface.fetch(access.quad, |line| memory.texture(line, counts));
-            counts[Event::TextureFetches] += fetches;
+            let work = surface.quad(access.quad, |line| memory.texture(line, counts));
+            count_quad(access, work, counts);
         }
     }
 
@@ -200,20 +216,25 @@ impl<'a> Replay<'a> {
                 }
             }
             for access in pixels {
-                count_quad(access, surface.quad_ops_at(self.pass, access, &samples), counts);
                 let memory = &mut self.memory;
                 let line = |line| memory.texture(line, counts);
-                let fetches = surface.fetch_at(self.pass, access, &samples, line);
-                counts[Event::TextureFetches] += fetches;
+                let work = surface.quad_at(self.pass, access, &samples, line);
+                count_quad(access, work, counts);
             }
         }
     }
 
-    /// Call `each` for every line of a tile's samples that holds one of `pixels`, with the mask of these
-    /// pixels.
-    fn lines(&mut self, tile: u32, pixels: u64, mut each: impl FnMut(&mut Self, u64, u64)) {
+    /// Call `each` for every line of a tile's samples, of `sample_bytes` each, that holds one of `pixels`, with the mask of
+    /// these pixels.
+    fn lines(
+        &mut self,
+        tile: u32,
+        pixels: u64,
+        sample_bytes: u64,
+        mut each: impl FnMut(&mut Self, u64, u64),
+    ) {
         let spec = self.pass.settings.spec;
-        let pixel_bytes = u64::from(self.pass.settings.samples.per_pixel()) * SAMPLE_BYTES;
+        let pixel_bytes = u64::from(self.pass.settings.samples.per_pixel()) * sample_bytes;
         let first_byte = u64::from(tile) * u64::from(spec.tile_px * spec.tile_px) * pixel_bytes;
         let (mut remaining, mut open) = (pixels, None);
         while remaining != 0 {
@@ -233,15 +254,51 @@ impl<'a> Replay<'a> {
         open.into_iter().for_each(|(line, held)| each(self, line, held));
     }
 
-    /// Emit the packets that resolve the tiles of a bin; a depth pass has none.
+    /// Emit the packets that end the tiles of a bin: their samples are resolved, or stored in surfaces. Depths of a depth
+    /// pass stay where they are.
     pub fn resolve(&mut self, batch: u32, bin: &Bin, emit: &mut impl FnMut(&Packet, &[LineAccess])) {
-        if self.pass.is_depth_only() {
-            return;
-        }
         for (tile, _, pixels, touched) in bin.inside(self.pass) {
-            let packet = Packet { batch, ..self.resolve_tile(tile, pixels, touched) };
-            self.emit(&packet, emit);
+            let packet = if self.pass.is_attached {
+                self.store_tile(tile, pixels)
+            } else if !self.pass.is_depth_only() {
+                Some(self.resolve_tile(tile, pixels, touched))
+            } else {
+                None
+            };
+            if let Some(packet) = packet {
+                self.emit(&Packet { batch, ..packet }, emit);
+            }
         }
+    }
+
+    /// Stores the clear value where nothing was drawn, and drops what is not stored. `None` if there is nothing to do.
+    fn store_tile(&mut self, tile: u32, pixels: u64) -> Option<Packet> {
+        let mut packet = Packet { tile, ..Packet::new(PacketKind::Resolve, self.pass.number) };
+        let (pass, before) = (self.pass, packet.counts);
+        for (target, plane) in pass.colours.iter().enumerate() {
+            self.lines(tile, pixels, plane.sample_bytes, |this, line, _| {
+                let address = plane.place.address() + line * LINE_BYTES;
+                let is_used = std::mem::replace(&mut this.colour_used[target][line as usize], true);
+                if !plane.is_stored {
+                    this.memory.discard(address);
+                } else if !is_used {
+                    this.memory.colour(address, true, true, &mut packet.counts);
+                }
+            });
+        }
+        if pass.depth.format.is_some() {
+            let plane = &pass.depth;
+            self.lines(tile, pixels, plane.sample_bytes, |this, line, _| {
+                let address = plane.place.address() + line * LINE_BYTES;
+                let is_used = std::mem::replace(&mut this.depth_used[line as usize], true);
+                if !plane.is_stored {
+                    this.memory.discard(address);
+                } else if !is_used {
+                    this.memory.depth(address, true, true, &mut packet.counts);
+                }
+            });
+        }
+        (packet.counts != before).then_some(packet)
     }
 
     fn resolve_tile(&mut self, tile: u32, pixels: u64, touched: bool) -> Packet {
@@ -251,9 +308,9 @@ impl<'a> Replay<'a> {
         if touched {
             let samples: u32 = self.pass.views.iter().map(ExactSizeIterator::len).sum::<usize>() as u32;
             counts[Event::SamplesResolved] = pixels.count_ones() * samples;
-            let (colour, depth) = (self.pass.addresses.colour.address(), self.pass.addresses.depth.address());
-            self.lines(tile, pixels, |this, line, _| {
-                let fresh = !this.colour_used[line as usize];
+            let [depth, colour, _] = compressed(self.pass);
+            self.lines(tile, pixels, SAMPLE_BYTES, |this, line, _| {
+                let fresh = !this.colour_used[0][line as usize];
                 this.memory.colour(colour + line * LINE_BYTES, false, fresh, counts);
                 this.memory.discard(colour + line * LINE_BYTES);
                 this.memory.discard(depth + line * LINE_BYTES);
@@ -272,12 +329,20 @@ impl<'a> Replay<'a> {
     }
 }
 
-/// Count a quad of four lanes, each of which takes `ops` operations; lanes that were not requested are helpers.
-fn count_quad(access: &QuadAccess, ops: u32, counts: &mut PacketCounts) {
+/// Addresses of depths and colours that may be compressed, and the end of the colours. Surfaces are not.
+fn compressed(pass: &Pass<'_>) -> [u64; 3] {
+    let colours = pass.colours.first().map_or(pass.depth.place, |plane| plane.place);
+    let all = [pass.depth.place.address(), colours.address(), pass.addresses.image.address()];
+    if pass.is_attached { [0; 3] } else { all }
+}
+
+/// Count a quad of four lanes; lanes that were not requested are helpers.
+fn count_quad(access: &QuadAccess, work: QuadWork, counts: &mut PacketCounts) {
     counts[Event::QuadsShaded] += 1;
     counts[Event::PixelInvocations] += 4;
     counts[Event::HelperInvocations] += 4 - access.lanes.count_ones();
-    counts[Event::ShaderOps] += 4 * ops;
+    counts[Event::ShaderOps] += 4 * work.ops;
+    counts[Event::TextureFetches] += work.fetches;
 }
 
 /// Key of a quad in the shading cache, hashed so that sets are used evenly in all directions.

@@ -3,18 +3,17 @@
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
 
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 
-use super::Shading;
 use super::bin::Bin;
-use super::pass::Pass;
-use super::surface::SampleView;
-use super::surface::{Grid, Surface};
+use super::pass::{First, Pass, Plane};
+use super::surface::{Grid, SampleView, Surface, own_pixel};
+use super::{Settings, Shading};
 use crate::depth::DepthTile;
 use crate::random::mix;
 use crate::sampling::TileSamples;
-use crate::shader::Lane;
+use crate::surface::{SurfaceSpec, Texels};
 
 /// The images; each pixel is the mean of its samples.
 pub(super) fn resolve(pass: &Pass<'_>, bins: &[Bin]) -> Vec<Vec<Vec3>> {
@@ -40,6 +39,9 @@ pub(super) fn visible(pass: &Pass<'_>, bins: &[Bin]) -> Vec<(u32, u32)> {
     let (viewport, per_pixel) = (pass.settings.viewport, pass.settings.samples.per_pixel());
     let nothing = (DepthTile::NO_TRIANGLE, pass.clear.depth.to_bits());
     let mut seen = vec![nothing; viewport.pixels() * per_pixel as usize];
+    if let First::Loaded(texels) = &pass.depth.first {
+        seen.iter_mut().zip(texels.values()).for_each(|(seen, value)| seen.1 = value.x.to_bits());
+    }
     let mut samples = TileSamples::default();
     for bin in bins {
         for (index, tile) in bin.tiles.iter().enumerate() {
@@ -53,6 +55,47 @@ pub(super) fn visible(pass: &Pass<'_>, bins: &[Bin]) -> Vec<(u32, u32)> {
         }
     }
     seen
+}
+
+/// Contents of the targets of a pass after it: colours, then depths if there are any.
+pub(super) fn stored(pass: &Pass<'_>, bins: &[Bin]) -> Vec<Texels> {
+    let depth = pass.depth.format.map(|_| &pass.depth);
+    let planes: Vec<&Plane> = pass.colours.iter().chain(depth).collect();
+    let mut contents: Vec<Texels> = planes.iter().filter_map(|plane| first(pass, plane)).collect();
+    let mut samples = TileSamples::default();
+    let value = |tile: &DepthTile, target: usize, slot: usize| match tile.colours.get(target) {
+        Some(colours) => colours[slot],
+        None => {
+            Vec4::new(tile.depth[slot], f32::from(tile.stencil.get(slot).copied().unwrap_or(0)), 0.0, 1.0)
+        }
+    };
+    for bin in bins {
+        for (index, tile) in bin.tiles.iter().enumerate() {
+            let Some(tile) = tile else { continue };
+            let origin = bin.tile_origin(pass, index);
+            let Settings { spec, viewport, samples: source, .. } = *pass.settings;
+            samples.fill(source, viewport, &pass.projection.shear, origin, spec.tile_px);
+            for slot in 0..samples.len {
+                let at = pass.in_image(&samples, slot, origin);
+                contents
+                    .iter_mut()
+                    .enumerate()
+                    .for_each(|(target, texels)| texels.set(at, value(tile, target, slot)));
+            }
+        }
+    }
+    contents
+}
+
+/// Contents of a target before the first draw.
+fn first(pass: &Pass<'_>, plane: &Plane) -> Option<Texels> {
+    let (viewport, samples) = (pass.settings.viewport, pass.settings.samples.per_pixel());
+    Some(match &plane.first {
+        First::Loaded(texels) => Texels::clone(texels),
+        First::Cleared(value) => {
+            Texels::filled(&SurfaceSpec::new("", viewport, plane.format?).sampled(samples), *value)
+        }
+    })
 }
 
 /// Touched tiles of a bin: first pixel and pixels of each, view by view and row by row.
@@ -102,7 +145,8 @@ fn resolve_tile(
         views.for_each(|(view, _)| sums[view * pixels + pixel] += colour);
     };
     if pass.is_ordered {
-        tile.colour.iter().enumerate().for_each(|(slot, colour)| add(slot, colour.truncate()));
+        let colours = tile.colours.first().into_iter().flatten();
+        colours.enumerate().for_each(|(slot, colour)| add(slot, colour.truncate()));
         return means(pass, &sums, pixels);
     }
     scratch.slots.clear();
@@ -117,12 +161,14 @@ fn resolve_tile(
         }
         let (corners, moving) = pass.moving_corners(triangle);
         let grid = Grid::new(pass, &corners, moving);
-        let (surface, lane) = (Surface::new(pass, triangle), Lane::default());
+        let surface = Surface::new(pass, triangle);
+        let lane = surface.lane();
         scratch.shaded.clear();
         for slot in group.iter().map(|&slot| slot as usize) {
-            let colour = match pass.settings.spec.shading {
+            let colour = match pass.shading {
                 Shading::PerSample => {
-                    surface.shade_at(&lane, &SampleView::of_slot(&corners, samples, slot)).truncate()
+                    let at = (own_pixel(samples, slot, origin, side), samples.in_pixel(slot, per_pixel));
+                    surface.shade_at(&lane, &SampleView::of_slot(&corners, samples, slot, at)).truncate()
                 }
                 Shading::Cached => {
                     let cell = grid.cell(samples, slot, origin, side);

@@ -1,5 +1,7 @@
 //! Surfaces: the shading cell of a sample, and shading at cells and at samples.
 
+use std::cell::RefCell;
+
 use glam::{Vec2, Vec3, Vec4};
 
 use super::pass::Pass;
@@ -7,13 +9,28 @@ use crate::geometry::Viewport;
 use crate::sample_test::exact;
 use crate::sampling::{Sample, TileSamples};
 use crate::setup::Corner;
-use crate::shader::{Lane, Program, Shader, ShadingPoint};
+use crate::shader::{Lane, Outputs, Program, Shader, ShadingPoint};
 use crate::shading;
 use crate::shading::{QuadAccess, REFERENCE_TIME, weights_at};
 use crate::texture::{Footprint, Sampler};
 
 /// Places of the lanes of a quad.
 const LANES: [[i32; 2]; 4] = [[0, 0], [1, 0], [0, 1], [1, 1]];
+
+/// Work of the lanes of a quad.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct QuadWork {
+    /// Operations of each lane.
+    pub ops: u32,
+    /// Fetches of all lanes.
+    pub fetches: u32,
+}
+
+impl QuadWork {
+    fn fetching(self, more: u32) -> Self {
+        Self { fetches: self.fetches + more, ..self }
+    }
+}
 
 /// Shading grid over one triangle.
 pub(super) struct Grid<'a> {
@@ -80,6 +97,18 @@ impl<'a> Surface<'a> {
 
     /// Linear RGB radiance and opacity of a cell, a function of the triangle and the cell alone.
     pub fn shade(&self, lane: &Lane, cell: [i32; 2]) -> Vec4 {
+        let (at, texel) = self.of_cell(cell);
+        self.shader().shade(lane, &at, texel)
+    }
+
+    /// The same for all targets.
+    pub fn outputs(&self, lane: &Lane, cell: [i32; 2]) -> Outputs {
+        let (at, texel) = self.of_cell(cell);
+        self.shader().outputs(lane, &at, texel)
+    }
+
+    /// Shader input and texel of a cell.
+    fn of_cell(&self, cell: [i32; 2]) -> (ShadingPoint, Vec4) {
         let weights = shading::cell_weights(&self.reference, cell, self.pass.origin);
         let texel = self.sampler.map_or(Vec4::ONE, |sampler| {
             let uv = self.uv(weights);
@@ -87,17 +116,22 @@ impl<'a> Surface<'a> {
         });
         let geometry = &self.pass.draws[self.draw].geometry;
         let middle = self.vertices.map(|v| (geometry.open()[v] + geometry.close()[v]) * 0.5);
-        self.shader().shade(lane, &self.point(weights, middle), texel)
+        (ShadingPoint { pixel: cell, ..self.point(weights, middle) }, texel)
+    }
+
+    /// A lane for its shader.
+    pub fn lane(&self) -> Lane<'a> {
+        Lane::reading(&self.pass.bound[self.draw])
     }
 
     /// Shader input at the point with the given weights at time `t`.
-    pub fn point_at(&self, weights: [f32; 3], t: f32) -> ShadingPoint {
+    fn point_at(&self, weights: [f32; 3], t: f32) -> ShadingPoint {
         let geometry = &self.pass.draws[self.draw].geometry;
         let ends = self.vertices.map(|v| (geometry.open()[v], geometry.close()[v]));
         self.point(weights, ends.map(|(open, close)| open + t * (close - open)))
     }
 
-    pub fn shader(&self) -> &'a dyn Shader {
+    fn shader(&self) -> &'a dyn Shader {
         self.pass.draws[self.draw].shader
     }
 
@@ -107,21 +141,52 @@ impl<'a> Surface<'a> {
 
     /// Whether shading at samples needs their positions to be counted.
     pub fn needs_samples(&self) -> bool {
-        self.sampler.is_some() || self.program().pixel_ops.is_none()
+        self.sampler.is_some() || self.program().pixel_ops.is_none() || self.reads_bindings()
     }
 
-    /// Operations of each lane of a quad of cells: those of the longest, as lanes of a quad run in step.
-    pub fn quad_ops(&self, quad: [i32; 2]) -> u32 {
-        let of_cell = |[x, y]: [i32; 2]| {
-            let lane = Lane::default();
-            self.shade(&lane, [2 * quad[0] + x, 2 * quad[1] + y]);
-            lane.ops()
+    fn reads_bindings(&self) -> bool {
+        !self.pass.bound[self.draw].is_empty()
+    }
+
+    /// Work of shading the four cells of a quad; `line` gets every line that they read through the texture cache.
+    pub fn quad(&self, quad: [i32; 2], mut line: impl FnMut(u64)) -> QuadWork {
+        let of_cell = |[x, y]: [i32; 2], lane: &Lane| {
+            self.run_all(lane, self.of_cell([2 * quad[0] + x, 2 * quad[1] + y]));
         };
-        self.program().pixel_ops.unwrap_or_else(|| LANES.map(of_cell).into_iter().max().unwrap_or(0))
+        let fetches = self.fetch(quad, &mut line);
+        self.work(LANES.into_iter(), of_cell, line).fetching(fetches)
     }
 
-    /// Bilinear fetches of shading the four cells of a quad; `line` gets every memory line they read.
-    pub fn fetch(&self, quad: [i32; 2], mut line: impl FnMut(u64)) -> u32 {
+    fn run_all(&self, lane: &Lane, (at, texel): (ShadingPoint, Vec4)) {
+        if self.pass.colours.len() > 1 {
+            self.shader().outputs(lane, &at, texel);
+        } else {
+            self.shader().shade(lane, &at, texel);
+        }
+    }
+
+    /// Work of lanes that `run` runs. Each takes the operations of the longest, as lanes of a quad run in step.
+    fn work<L>(
+        &self,
+        lanes: impl Iterator<Item = L>,
+        run: impl Fn(L, &Lane),
+        line: impl FnMut(u64),
+    ) -> QuadWork {
+        if let Some(ops) = self.program().pixel_ops.filter(|_| !self.reads_bindings()) {
+            return QuadWork { ops, fetches: 0 };
+        }
+        let lines = RefCell::default();
+        let work = lanes.fold(QuadWork::default(), |work, own| {
+            let lane = Lane::noting(&self.pass.bound[self.draw], &lines);
+            run(own, &lane);
+            QuadWork { ops: work.ops.max(lane.ops()), fetches: work.fetches + lane.fetches() }
+        });
+        lines.into_inner().into_iter().for_each(line);
+        work
+    }
+
+    /// Bilinear fetches of the texture for the four cells of a quad; `line` gets every memory line they read.
+    fn fetch(&self, quad: [i32; 2], mut line: impl FnMut(u64)) -> u32 {
         let Some(sampler) = self.sampler else { return 0 };
         let footprint = self.footprint(&sampler, quad);
         for [x, y] in LANES {
@@ -142,7 +207,7 @@ impl<'a> Surface<'a> {
         sampler.footprint(at(1, 0) - corner, at(0, 1) - corner)
     }
 
-    pub fn uv(&self, weights: [f32; 3]) -> Vec2 {
+    fn uv(&self, weights: [f32; 3]) -> Vec2 {
         let uvs = self.pass.draws[self.draw].geometry.uvs();
         if uvs.is_empty() { Vec2::ZERO } else { (0..3).map(|k| uvs[self.vertices[k]] * weights[k]).sum() }
     }
@@ -169,7 +234,8 @@ impl<'a> Surface<'a> {
         let eye = self.pass.eye;
         let to_camera = (eye.truncate() - position * eye.w).normalize_or_zero();
         let normal = if smooth.dot(to_camera) < 0.0 { -smooth } else { smooth };
-        ShadingPoint { position, normal, to_camera, uv: self.uv(weights), color: self.color(weights) }
+        let (uv, color) = (self.uv(weights), self.color(weights));
+        ShadingPoint { position, normal, to_camera, uv, color, ..ShadingPoint::FACING }
     }
 }
 
@@ -181,13 +247,22 @@ pub(super) struct SampleView {
     /// Image position of the sample, including the other part of the lens shear.
     at: [f32; 2],
     t: f32,
+    pixel: [i32; 2],
+    /// Index in the pixel.
+    sample: u32,
 }
 
 impl SampleView {
-    /// View of the sample in `slot` of a tile.
-    pub fn of_slot(corners: &[Corner; 3], samples: &TileSamples, slot: usize) -> Self {
+    /// View of the sample in `slot` of a tile, with its pixel and its index there.
+    pub fn of_slot(
+        corners: &[Corner; 3],
+        samples: &TileSamples,
+        slot: usize,
+        (pixel, sample): ([i32; 2], u32),
+    ) -> Self {
         let rays = [0, 1].map(|axis| [samples.slope[axis][slot], samples.lens[axis][slot]]);
-        Self::new(corners, rays, samples.t[slot], samples.parallel)
+        let view = Self::new(corners, rays, samples.t[slot], samples.parallel);
+        Self { pixel, sample, ..view }
     }
 
     /// View of a sample of pixel (`px`, `py`).
@@ -205,7 +280,8 @@ impl SampleView {
             let [x, y] = [x - across[1], y - down[1]];
             if parallel { [x - across[0] * w, y - down[0] * w, 1.0] } else { [x, y, w] }
         });
-        Self { vertices, at: if parallel { [0.0; 2] } else { [across[0], down[0]] }, t }
+        let at = if parallel { [0.0; 2] } else { [across[0], down[0]] };
+        Self { vertices, at, t, pixel: [0; 2], sample: 0 }
     }
 
     /// Barycentric weights of the point seen the given number of pixels to the right and below, at the same
@@ -218,17 +294,43 @@ impl SampleView {
 impl Surface<'_> {
     /// Linear RGB radiance and opacity at the sample's own point.
     pub fn shade_at(&self, lane: &Lane, view: &SampleView) -> Vec4 {
+        let (at, texel) = self.of_view(view);
+        self.shader().shade(lane, &at, texel)
+    }
+
+    /// The same for all targets.
+    pub fn outputs_at(&self, lane: &Lane, view: &SampleView) -> Outputs {
+        let (at, texel) = self.of_view(view);
+        self.shader().outputs(lane, &at, texel)
+    }
+
+    /// Shader input and texel at the sample's own point.
+    fn of_view(&self, view: &SampleView) -> (ShadingPoint, Vec4) {
         let weights = view.weights(0.0, 0.0);
         let texel = self.sampler.map_or(Vec4::ONE, |sampler| {
             sampler.sample(self.uv(weights), &self.footprint_at(&sampler, view))
         });
-        self.shader().shade(lane, &self.point_at(weights, view.t), texel)
+        let (pixel, sample) = (view.pixel, view.sample);
+        (ShadingPoint { pixel, sample, ..self.point_at(weights, view.t) }, texel)
     }
 
-    /// Bilinear fetches of the four lanes of a quad of pixels at one sample index; `line` gets every memory
-    /// line they read. `samples` has the samples of each pixel of the quad. A helper lane uses the sample of
-    /// its own pixel.
-    pub fn fetch_at(
+    /// Work of the four lanes of a quad of pixels at one sample index; `line` gets every line that they read through the
+    /// texture cache. `samples` has the samples of each pixel of the quad. A helper lane uses the sample of its own pixel.
+    pub fn quad_at(
+        &self,
+        pass: &Pass<'_>,
+        access: &QuadAccess,
+        samples: &[Vec<Sample>; 4],
+        mut line: impl FnMut(u64),
+    ) -> QuadWork {
+        let fetches = self.fetch_at(pass, access, samples, &mut line);
+        let views = self.views_of(pass, access, samples);
+        let of_view = |view: SampleView, lane: &Lane| self.run_all(lane, self.of_view(&view));
+        self.work(views, of_view, line).fetching(fetches)
+    }
+
+    /// Bilinear fetches of the texture; arguments as for [`Self::quad_at`].
+    fn fetch_at(
         &self,
         pass: &Pass<'_>,
         access: &QuadAccess,
@@ -243,18 +345,6 @@ impl Surface<'_> {
         })
     }
 
-    /// Operations of each lane of a quad of pixels at one sample index: those of the longest. Arguments as for
-    /// [`Self::fetch_at`].
-    pub fn quad_ops_at(&self, pass: &Pass<'_>, access: &QuadAccess, samples: &[Vec<Sample>; 4]) -> u32 {
-        let of_view = |view| {
-            let lane = Lane::default();
-            self.shade_at(&lane, &view);
-            lane.ops()
-        };
-        let longest = || self.views_of(pass, access, samples).map(of_view).max().unwrap_or(0);
-        self.program().pixel_ops.unwrap_or_else(longest)
-    }
-
     /// Views of the four lanes of a quad.
     fn views_of(
         &self,
@@ -264,7 +354,8 @@ impl Surface<'_> {
     ) -> impl Iterator<Item = SampleView> {
         LANES.into_iter().zip(samples).map(|(offset, of_pixel)| {
             let pixel = [0, 1].map(|axis| (2 * access.quad[axis] + offset[axis]) as u32);
-            SampleView::of_sample(&self.corners, pass, pixel, &of_pixel[access.sample as usize])
+            let view = SampleView::of_sample(&self.corners, pass, pixel, &of_pixel[access.sample as usize]);
+            SampleView { pixel: pixel.map(|part| part as i32), sample: u32::from(access.sample), ..view }
         })
     }
 

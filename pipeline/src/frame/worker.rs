@@ -162,7 +162,7 @@ impl<'a, 'p> Worker<'a, 'p> {
                 let Some(narrowed) = remaining.narrowed(within) else { return };
                 remaining = narrowed;
             }
-            let tested = self.samples(subject, &tile, &mut remaining, index);
+            let tested = self.samples(subject, &tile, &mut remaining, (index, origin));
             if self.scratch.hits.screened + self.scratch.hits.tested > 0 {
                 self.shade_and_store(subject.triangle, index, origin);
                 let small = self.small_pixels(subject.triangle, index, origin);
@@ -177,7 +177,7 @@ impl<'a, 'p> Worker<'a, 'p> {
         subject: &Subject<'_>,
         tile: &TestTile,
         remaining: &mut Remaining,
-        index: usize,
+        (index, origin): (usize, [u32; 2]),
     ) -> [bool; 2] {
         let screened = subject.wants_screen(tile, remaining, &mut self.context());
         remaining.screened = screened;
@@ -185,7 +185,7 @@ impl<'a, 'p> Worker<'a, 'p> {
         let drawn_sharp = self.pass.lens && !remaining.within.lens;
         let samples = if drawn_sharp { &sharp[index] } else { &samples[index] };
         let pass = self.pass;
-        let stored = self.bin.tiles[index].get_or_insert_with(|| pass.cleared_tile(samples));
+        let stored = self.bin.tiles[index].get_or_insert_with(|| pass.first_tile(samples, origin));
         if pass.heat {
             hits.by_pixel.get_or_insert_default();
         }
@@ -272,7 +272,7 @@ impl<'a, 'p> Worker<'a, 'p> {
         let per_pixel = source.per_pixel();
         let grid = Grid::new(self.pass, corners, moving);
         for slot in self.scratch.fragments.shaded.iter().map(|&slot| slot as usize) {
-            match spec.shading {
+            match self.pass.shading {
                 Shading::Cached => self.scratch.quads.request(grid.cell(samples, slot, origin, side), 0),
                 Shading::PerSample => {
                     let index =
@@ -283,7 +283,7 @@ impl<'a, 'p> Worker<'a, 'p> {
         }
         let first = self.log.quads.len();
         self.scratch.quads.drain_into(&mut self.log.quads);
-        if spec.shading == Shading::PerSample {
+        if self.pass.shading == Shading::PerSample {
             // Samples are shaded pixel by pixel rather than in the order of time.
             self.log.quads[first..]
                 .sort_unstable_by_key(|access| (access.quad[1], access.quad[0], access.sample));
@@ -316,7 +316,6 @@ impl<'a, 'p> Worker<'a, 'p> {
             unread: if in_front { hits.hit } else { 0 },
             written: hits.written.len() as u32 + fragments.stencils,
             coloured: fragments.coloured,
-            blended: if state.reads_colour() { fragments.coloured } else { 0 },
             sample_madds: hits.tested * sample_test::madds(moving, lens),
             read_pixels: if state.reads_depth() { hits.read_pixels } else { 0 },
             written_pixels: hits.written_pixels,
@@ -437,7 +436,7 @@ impl Worker<'_, '_> {
         let samples = &self.scratch.samples[index];
         let grid = Grid::new(self.pass, &triangle.corners, triangle.moving);
         // Stored colours may be mixed from those of several cells.
-        let colours = compression.colour && spec.shading == Shading::Cached && !self.pass.is_ordered;
+        let colours = compression.colour && self.pass.shading == Shading::Cached && !self.pass.is_ordered;
         let mut pixels = [Pixel::NONE; 64];
         for slot in 0..samples.len {
             let pixel = samples.pixel[slot] as usize;
@@ -534,11 +533,18 @@ impl Worker<'_, '_> {
             return Some((*within, false));
         }
         self.prepare(triangle);
+        let stored = &self.pass.depth;
+        if stored.is_loaded() && self.bin.tiles[index].is_none() {
+            let origin = self.bin.tile_origin(self.pass, index);
+            self.bin.tiles[index] = Some(self.pass.first_tile(&self.scratch.samples[index], origin));
+        }
         let mut visible = Visible::in_cleared(within, state.depth.test, self.pass.clear.depth);
         if let (Some((_, bounder)), Some(tile)) = (&self.bounder, &mut self.bin.tiles[index]) {
             self.tests.z_updates += if features.z_max { tile.update() } else { 0 };
             let test = (state.depth.test, culls);
-            visible = tile.boxes.compare(within, test, |part| bounder.over(rect, part));
+            visible = tile.boxes.compare(within, test, |part| {
+                bounder.over(rect, part).map(|depth| stored.round_depth(depth))
+            });
         }
         self.tests.z_tests += visible.compared;
         self.tests.interval_madds +=

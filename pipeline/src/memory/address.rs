@@ -11,6 +11,9 @@ pub struct Surface {
 }
 
 impl Surface {
+    /// Without bytes.
+    pub(crate) const NOWHERE: Self = Self { first: 0, bytes: 0 };
+
     /// Address of the first byte.
     pub fn address(&self) -> u64 {
         self.first

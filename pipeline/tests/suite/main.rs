@@ -28,6 +28,7 @@ mod rounding;
 mod settings;
 mod slack;
 mod state;
+mod surfaces;
 mod ties;
 mod views;
 mod visibility;

@@ -42,11 +42,11 @@ fn viewport() -> Viewport {
     Viewport::new(40, 26).unwrap()
 }
 
-fn pick<T: Copy>(r: &mut Uniform, choices: &[T]) -> T {
+pub(crate) fn pick<T: Copy>(r: &mut Uniform, choices: &[T]) -> T {
     choices[(r.next() * choices.len() as f32) as usize]
 }
 
-fn byte(r: &mut Uniform) -> u8 {
+pub(crate) fn byte(r: &mut Uniform) -> u8 {
     (r.next() * 256.0) as u8
 }
 
@@ -68,7 +68,7 @@ fn stencil_face(r: &mut Uniform) -> StencilFace {
     }
 }
 
-fn state(r: &mut Uniform) -> DrawState {
+pub(crate) fn state(r: &mut Uniform) -> DrawState {
     let mask = std::array::from_fn(|_| r.next() < 0.5);
     DrawState {
         cull: pick(r, &[Cull::None, Cull::None, Cull::Back, Cull::Front]),
@@ -76,6 +76,7 @@ fn state(r: &mut Uniform) -> DrawState {
         stencil: (r.next() < 0.4).then(|| Stencil { front: stencil_face(r), back: stencil_face(r) }),
         blend: pick(r, &Blend::ALL),
         colour_mask: pick(r, &[[true; 4], [true; 4], [false; 4], mask]),
+        others: [None; 3],
     }
 }
 
@@ -192,7 +193,7 @@ impl Part {
     }
 }
 
-fn passes<T: PartialOrd>(test: Compare, new: T, stored: T) -> bool {
+pub(crate) fn passes<T: PartialOrd>(test: Compare, new: T, stored: T) -> bool {
     let order = new.partial_cmp(&stored).unwrap();
     match test {
         Compare::Never => false,
@@ -206,7 +207,7 @@ fn passes<T: PartialOrd>(test: Compare, new: T, stored: T) -> bool {
     }
 }
 
-fn changed(op: StencilOp, stored: u8, reference: u8) -> u8 {
+pub(crate) fn changed(op: StencilOp, stored: u8, reference: u8) -> u8 {
     let by = |step: i32| i32::from(stored) + step;
     let value = match op {
         StencilOp::Keep => by(0),
@@ -221,7 +222,7 @@ fn changed(op: StencilOp, stored: u8, reference: u8) -> u8 {
     value as u8
 }
 
-fn mixed(blend: Blend, new: Vec4, stored: Vec4) -> Vec4 {
+pub(crate) fn mixed(blend: Blend, new: Vec4, stored: Vec4) -> Vec4 {
     let channel = |k: usize| match blend {
         Blend::Replace => new[k],
         Blend::Over => new[k] * if k < 3 { new.w } else { 1.0 } + stored[k] * (1.0 - new.w),

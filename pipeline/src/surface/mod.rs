@@ -1,0 +1,156 @@
+//! Surfaces: named images of a frame that passes write and later ones read, in a [`Format`], with one or more samples per
+//! pixel. What is read is what the format kept.
+
+mod bound;
+mod format;
+
+use glam::Vec4;
+
+pub use bound::Bound;
+pub use format::Format;
+
+use crate::geometry::Viewport;
+
+/// A surface before it has an address.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SurfaceSpec<'a> {
+    /// Name in messages.
+    pub name: &'a str,
+    /// Size in pixels.
+    pub viewport: Viewport,
+    /// Format of a sample.
+    pub format: Format,
+    /// Samples per pixel.
+    pub samples: u32,
+}
+
+impl<'a> SurfaceSpec<'a> {
+    /// A surface with one sample per pixel.
+    pub fn new(name: &'a str, viewport: Viewport, format: Format) -> Self {
+        Self { name, viewport, format, samples: 1 }
+    }
+
+    /// The surface with `samples` per pixel.
+    #[must_use]
+    pub fn sampled(self, samples: u32) -> Self {
+        Self { samples, ..self }
+    }
+}
+
+/// Contents of a surface: every sample as its format keeps it, in the order `(y width + x) samples + index`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Texels {
+    viewport: Viewport,
+    format: Format,
+    samples: u32,
+    bytes: Vec<u8>,
+}
+
+impl Texels {
+    /// All samples hold `value`.
+    pub fn filled(spec: &SurfaceSpec<'_>, value: Vec4) -> Self {
+        let SurfaceSpec { viewport, format, samples, .. } = *spec;
+        let bytes =
+            format.encode(value)[..format.bytes() as usize].repeat(viewport.pixels() * samples as usize);
+        Self { viewport, format, samples, bytes }
+    }
+
+    /// Value of the sample with this index.
+    pub fn get(&self, index: usize) -> Vec4 {
+        let bytes = self.format.bytes() as usize;
+        self.format.decode(&self.bytes[index * bytes..])
+    }
+
+    /// Stores the sample with this index.
+    pub fn set(&mut self, index: usize, value: Vec4) {
+        let bytes = self.format.bytes() as usize;
+        self.bytes[index * bytes..][..bytes].copy_from_slice(&self.format.encode(value)[..bytes]);
+    }
+
+    /// All values in order.
+    pub fn values(&self) -> Vec<Vec4> {
+        self.bytes.chunks_exact(self.format.bytes() as usize).map(|bytes| self.format.decode(bytes)).collect()
+    }
+
+    /// Value of a sample of a pixel; `None` outside.
+    pub fn at(&self, [x, y]: [i32; 2], sample: u32) -> Option<Vec4> {
+        let [x, y] = [u32::try_from(x).ok()?, u32::try_from(y).ok()?];
+        let is_inside = x < self.viewport.width() && y < self.viewport.height() && sample < self.samples;
+        let pixel = y as usize * self.viewport.width() as usize + x as usize;
+        is_inside.then(|| self.get(pixel * self.samples as usize + sample as usize))
+    }
+
+    pub fn format(&self) -> Format {
+        self.format
+    }
+
+    pub fn samples(&self) -> u32 {
+        self.samples
+    }
+
+    pub fn size(&self) -> [u32; 2] {
+        [self.viewport.width(), self.viewport.height()]
+    }
+}
+
+/// Addresses of the samples of a surface: tile by tile, pixel by pixel in rows of the tile.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Layout {
+    /// First byte.
+    pub address: u64,
+    /// Side of a tile in pixels.
+    pub tile_px: u32,
+    /// Tiles in a row.
+    pub tiles_across: u32,
+    /// Samples per pixel.
+    pub samples: u32,
+    /// Bytes of a sample.
+    pub bytes: u64,
+}
+
+impl Layout {
+    /// Layout of a surface from `address` on, and its size in bytes, with the last tiles whole.
+    pub fn new(spec: &SurfaceSpec<'_>, tile_px: u32, address: u64) -> (Self, u64) {
+        let [across, down] =
+            [spec.viewport.width(), spec.viewport.height()].map(|side| side.div_ceil(tile_px));
+        let (samples, bytes) = (spec.samples, spec.format.bytes());
+        let pixels = u64::from(across) * u64::from(down) * u64::from(tile_px * tile_px);
+        (Self { address, tile_px, tiles_across: across, samples, bytes }, pixels * u64::from(samples) * bytes)
+    }
+
+    /// Address of a sample of a pixel inside.
+    pub fn at(&self, [x, y]: [u32; 2], sample: u32) -> u64 {
+        let side = self.tile_px;
+        let tile = u64::from(y / side) * u64::from(self.tiles_across) + u64::from(x / side);
+        let pixel = tile * u64::from(side * side) + u64::from(y % side * side + x % side);
+        self.address + (pixel * u64::from(self.samples) + u64::from(sample)) * self.bytes
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_sample_has_its_own_bytes() {
+        let spec = SurfaceSpec::new("s", Viewport::new(10, 5).unwrap(), Format::Rg32f).sampled(3);
+        let (layout, bytes) = Layout::new(&spec, 4, 640);
+        assert_eq!(bytes, 3 * 2 * 16 * 3 * 8);
+        let pixels = (0..5).flat_map(|y| (0..10).map(move |x| [x, y]));
+        let mut all: Vec<u64> = pixels.flat_map(|at| (0..3).map(move |s| layout.at(at, s))).collect();
+        all.sort_unstable();
+        assert!(all.windows(2).all(|two| two[1] - two[0] >= 8) && all[0] == 640);
+        assert!(all.last().is_some_and(|last| last + 8 <= 640 + bytes));
+    }
+
+    #[test]
+    fn samples_are_read_as_stored_and_nothing_is_outside() {
+        let spec = SurfaceSpec::new("s", Viewport::new(3, 2).unwrap(), Format::R32f).sampled(2);
+        let mut texels = Texels::filled(&spec, Vec4::splat(0.25));
+        texels.set((3 + 2) * 2 + 1, Vec4::splat(7.0));
+        assert_eq!(texels.at([2, 1], 1), Some(Vec4::new(7.0, 0.0, 0.0, 1.0)));
+        assert_eq!(texels.at([2, 1], 0), Some(Vec4::new(0.25, 0.0, 0.0, 1.0)));
+        assert_eq!([texels.at([3, 1], 0), texels.at([-1, 0], 0), texels.at([0, 0], 2)], [None; 3]);
+        assert_eq!(texels.values().len(), 12);
+    }
+}
