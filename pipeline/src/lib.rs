@@ -56,13 +56,15 @@ pub mod shader;
 pub mod shading;
 pub mod simd;
 pub mod state;
+pub mod tally;
 pub mod texture;
 pub mod traversal;
 pub mod visibility;
 
 pub use frame::{
-    Client, Draw, Features, FrameReport, Gpu, PassError, PassReport, PipelineSpec, RasterPass, Rendered,
-    Settings, Shading, Target, TileWork, Touch, TriangleStream,
+    ConservativeDraw, ConservativePass, Draw, Features, FrameReport, Gpu, IntervalAnswer, IntervalQueries,
+    Lanes, MovingBox, PassError, PassReport, PipelineSpec, Primitive, RasterPass, Rendered, SampledAnswer,
+    SampledQueries, Settings, Shading, Target, TileIntervals, TileShader,
 };
 pub use geometry::{
     Camera, CameraError, Clip, Cull, DrawError, Geometry, Lens, MovingVertex, Shear, Viewport,
