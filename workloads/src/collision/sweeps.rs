@@ -190,3 +190,77 @@ fn overlaps(method: Method, known: &TzBox, own: &TzBox) -> [bool; 2] {
         _ => [known.meet(own.t, own.z).is_some(); 2],
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use pipeline::random::{mix, unit};
+
+    use super::super::contact_probe::cross;
+    use super::super::families::cases;
+    use super::*;
+
+    const METHODS: [Method; 3] = [Method::FragmentBox, Method::BoxBox, Method::DepthOnly];
+
+    #[test]
+    fn no_object_that_collides_leaves_the_set() {
+        let mut left = 0;
+        for case in cases(9, 2) {
+            for (method, bins) in METHODS.into_iter().flat_map(|method| [(method, 1), (method, 3)]) {
+                let set = Sweeps { method, resolution: 12, bins }.detect(&case.objects);
+                let pairs = set.pairs(&case.objects);
+                assert!(case.collide.iter().all(|pair| pairs.contains(pair)), "{} {method:?}", case.family);
+                assert!(case.collide.is_empty() || set.work.fragments > 0);
+                left += case.objects.len() - set.objects.len();
+            }
+        }
+        assert!(left > 0);
+    }
+
+    /// Random moving triangles, tested at many times pair by pair.
+    #[test]
+    fn brute_force_finds_no_collision_outside_the_set() {
+        let mut found = [0, 0];
+        for seed in 0..12 {
+            let uniform = |n: u64| unit(mix(mix(seed) ^ n));
+            let object = |n: u64| {
+                let at = |k: u64| 6.0 * uniform(100 * n + k);
+                let corner = |k: u64, from: u64| {
+                    [0, 1, 2].map(|axis| at(from + axis) + uniform(100 * n + 9 * k + axis + 10))
+                };
+                let ends = [0, 3].map(|from| [0, 1, 2].map(|k| corner(k, from)));
+                Object::from_ends(vec![ends], 0.0).unwrap()
+            };
+            let objects: Vec<Object> = (0..16).map(object).collect();
+            let collides = |a: usize, b: usize| {
+                let [one, other] = [a, b].map(|n| &objects[n].triangles[0]);
+                (0..=64).any(|step| cross(one, other, f64::from(step) / 64.0))
+            };
+            for method in METHODS {
+                let set = Sweeps { method, resolution: 32, bins: 2 }.detect(&objects);
+                let pairs = set.pairs(&objects);
+                for (a, b) in (0..16).flat_map(|a| (a + 1..16).map(move |b| (a, b))) {
+                    if collides(a, b) {
+                        assert!(pairs.contains(&(a, b)), "{seed} {a} {b} {method:?}");
+                        found[0] += 1;
+                    }
+                }
+                found[1] += objects.len() - set.objects.len();
+            }
+        }
+        assert!(found[0] > 20 && found[1] > 20, "{found:?}");
+    }
+
+    #[test]
+    fn two_objects_are_separated_as_by_plain_passes() {
+        for case in cases(5, 3).iter().filter(|case| case.objects.len() == 2) {
+            for method in METHODS {
+                let alone =
+                    super::super::PlainPasses::new(method, 16).pair(&case.objects[0], &case.objects[1]);
+                let set = Sweeps { method, resolution: 16, bins: 1 }.detect(&case.objects);
+                if !alone.may_collide() {
+                    assert!(set.objects.is_empty(), "{} {method:?}", case.family);
+                }
+            }
+        }
+    }
+}
