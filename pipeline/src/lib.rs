@@ -58,14 +58,16 @@ pub mod shading;
 pub mod simd;
 pub mod state;
 pub mod surface;
+pub mod tally;
 pub mod texture;
 pub mod traversal;
 pub mod visibility;
 
 pub use frame::{
-    Attachment, Attachments, Binding, Client, Draw, Features, FrameReport, Gpu, Load, PassError, PassReport,
-    PipelineSpec, RasterPass, Rendered, Settings, Shading, Store, SurfaceId, SurfaceProblem, Target,
-    TileWork, Touch, TriangleStream,
+    Attachment, Attachments, Binding, ConservativeDraw, ConservativePass, Draw, Features, FrameReport, Gpu,
+    IntervalAnswer, IntervalQueries, Lanes, Load, MovingBox, PassError, PassReport, PipelineSpec, Primitive,
+    RasterPass, Rendered, SampledAnswer, SampledQueries, Settings, Shading, Store, SurfaceId, SurfaceProblem,
+    Target, TileIntervals, TileShader,
 };
 pub use geometry::{
     Camera, CameraError, Clip, Cull, DrawError, Geometry, Lens, MovingVertex, Shear, Viewport,

@@ -7,6 +7,7 @@ use glam::{Affine3A, DAffine3, DVec3, Mat4, Vec2, Vec3, Vec4};
 
 use crate::state::MAX_TARGETS;
 use crate::surface::Bound;
+use crate::tally::Tally;
 use crate::texture::Texture;
 
 /// Shader input, interpolated over the triangle at the reference lens position and time. Interpolators and the
@@ -287,6 +288,42 @@ impl<'a> Lane<'a> {
     pub fn sqrt(&self, a: f32) -> f32 {
         self.count(1);
         a.sqrt()
+    }
+
+    /// Square root in double precision.
+    #[inline(always)]
+    pub fn root(&self, a: f64) -> f64 {
+        self.count(1);
+        libm::sqrt(a)
+    }
+
+    /// Natural logarithm: one to the base of two, and a product.
+    #[inline(always)]
+    pub fn ln(&self, a: f64) -> f64 {
+        self.count(2);
+        libm::log(a)
+    }
+
+    /// Angle of a vector: a quotient, a polynomial of six terms in its square, and a selection for each octant.
+    #[inline(always)]
+    pub fn atan2(&self, y: f64, x: f64) -> f64 {
+        self.count(12);
+        libm::atan2(y, x)
+    }
+
+    /// `a x b`: three products and three multiply-adds.
+    #[inline(always)]
+    pub fn cross(&self, a: DVec3, b: DVec3) -> DVec3 {
+        self.count(6);
+        a.cross(b)
+    }
+
+    /// Runs a kernel on numbers that count on a tally, as operations of the lane.
+    pub fn tallied<T>(&self, kernel: impl FnOnce(&Tally) -> T) -> T {
+        let tally = Tally::default();
+        let result = kernel(&tally);
+        self.count(tally.madds());
+        result
     }
 
     /// Base-2 logarithm.

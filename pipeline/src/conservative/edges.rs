@@ -9,35 +9,37 @@
 //! is `n_z` plus or minus `|n_x|` and `|n_y|` times half the tile's sides. `n` is linear in u and v and
 //! quadratic in t, so its values at their corners, and its three Bernstein coefficients in t, bound it.
 
-use glam::DVec3;
-
 use super::Region;
 use super::triangle::Seen;
-use crate::depth::Real;
+use crate::depth::{Numbers, Real, cross};
 
 /// Vertices at both ends as homogeneous points.
-type Points = [[DVec3; 3]; 2];
+type Points<R> = [[[R; 3]; 3]; 2];
 
 /// Whether two edges show that the triangle cannot touch the tile.
-pub(super) fn miss(seen: &Seen, region: &Region) -> bool {
+pub(super) fn miss<N: Numbers>(seen: &Seen<N>, region: &Region) -> bool {
     if !seen.view.has_lens() {
         return apart(seen, &[seen.homogeneous()]);
     }
-    let lens_positions = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(i, j)| [region.u[i], region.v[j]]);
+    let [u, v] = [region.u, region.v].map(|side| side.map(|position| seen.numbers.number(position)));
+    let lens_positions = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(i, j)| [u[i], v[j]]);
     apart(seen, &lens_positions.map(|lens| seen.homogeneous_from(lens)))
 }
 
 /// The same test by the vertices as seen from each of the given lens positions.
-fn apart<const POSITIONS: usize>(seen: &Seen, lens_positions: &[Points; POSITIONS]) -> bool {
+fn apart<N: Numbers, const POSITIONS: usize>(
+    seen: &Seen<N>,
+    lens_positions: &[Points<N::Number>; POSITIONS],
+) -> bool {
     let half = seen.tile.map(|[low, high]| high.larger(-low));
     let noise = noise(seen, lens_positions, half);
     let (mut below, mut above) = (false, false);
     for (i, j) in [(1, 2), (2, 0), (0, 1)] {
-        let mut range = [f64::INFINITY, f64::NEG_INFINITY];
+        let mut range = [f64::INFINITY, f64::NEG_INFINITY].map(N::Number::new);
         for points in lens_positions {
-            for normal in normals(points, i, j) {
-                let reach = half[0] * normal.x.abs() + half[1] * normal.y.abs();
-                range = [range[0].smaller(normal.z - reach), range[1].larger(normal.z + reach)];
+            for [x, y, z] in normals(points, i, j) {
+                let reach = half[0] * x.magnitude() + half[1] * y.magnitude();
+                range = [range[0].smaller(z - reach), range[1].larger(z + reach)];
             }
         }
         below |= range[1] < -noise;
@@ -55,17 +57,24 @@ fn apart<const POSITIONS: usize>(seen: &Seen, lens_positions: &[Points; POSITION
 /// the magnitude of the middle is that of the farther side. So the unused half is at least `4 ROUNDING across
 /// down`. The magnitudes in an edge add up to at most twice `across down`, and none passes more than six
 /// operations of 2^-53 each: 12 / 32 of `ROUNDING across down`.
-fn noise<const POSITIONS: usize>(seen: &Seen, lens_positions: &[Points; POSITIONS], half: [f64; 2]) -> f64 {
+fn noise<N: Numbers, const POSITIONS: usize>(
+    seen: &Seen<N>,
+    lens_positions: &[Points<N::Number>; POSITIONS],
+    half: [N::Number; 2],
+) -> N::Number {
     let all = || lens_positions.as_flattened().as_flattened().iter();
     let [across, down] = [0, 1].map(|axis| {
-        let far = |p: &DVec3| p[axis].abs() + half[axis] * p.z.abs();
-        all().fold(0.0, |most: f64, p| most.larger(far(p)))
+        let far = |p: &[N::Number; 3]| p[axis].magnitude() + half[axis] * p[2].magnitude();
+        all().fold(N::Number::new(0.0), |most, p| most.larger(far(p)))
     });
-    4.0 * (seen.noise[0] * down + seen.noise[1] * across) + 4.0 * seen.noise[0] * seen.noise[1]
+    let four = N::Number::new(4.0);
+    four * (seen.noise[0] * down + seen.noise[1] * across) + four * seen.noise[0] * seen.noise[1]
 }
 
 /// Bernstein coefficients in t of the cross product of vertices `i` and `j`.
-fn normals(points: &Points, i: usize, j: usize) -> [DVec3; 3] {
-    let product = |a: usize, b: usize| points[a][i].cross(points[b][j]);
-    [product(0, 0), 0.5 * (product(0, 1) + product(1, 0)), product(1, 1)]
+fn normals<R: Real>(points: &Points<R>, i: usize, j: usize) -> [[R; 3]; 3] {
+    let product = |a: usize, b: usize| cross(points[a][i], points[b][j]);
+    let mixed = [product(0, 1), product(1, 0)];
+    let middle = [0, 1, 2].map(|axis| R::new(0.5) * (mixed[0][axis] + mixed[1][axis]));
+    [product(0, 0), middle, product(1, 1)]
 }

@@ -34,6 +34,6 @@ mod sides;
 mod triangle;
 mod view;
 
-pub use rasterizer::{Grid, Rasterizer};
+pub use rasterizer::{Grid, Rasterizer, TileLoop};
 pub use triangle::{MIN_UNCERTAINTY, MovingTriangle, Prepared};
 pub use view::{Rect, Region, Touch, View};

@@ -7,6 +7,8 @@ use super::sides::narrow;
 use super::triangle::{ROUNDING, Seen};
 use super::{MIN_UNCERTAINTY, MovingTriangle, Prepared, Rect, Region, Touch, View};
 use crate::depth::plane::{Beam, MovingPlane, normal, tightest};
+use crate::depth::{Numbers, Real};
+use crate::tally::Tally;
 
 /// A grid of equal tiles.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,6 +32,27 @@ impl Grid {
             y: [border(1, rows.start), border(1, rows.end)],
         }
     }
+}
+
+/// Work of the tile loop of conservative mode, with the multiply-adds that its numbers counted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct TileLoop {
+    /// Blocks of tiles tested.
+    pub blocks: u32,
+    /// Tiles tested.
+    pub tiles: u32,
+    /// Blocks and tiles culled by their sides.
+    pub culled_sides: u32,
+    /// Blocks and tiles culled by the edges of the triangle or by its depths.
+    pub culled_edges: u32,
+    /// Multiply-adds of bringing vertices to a tile.
+    pub place_madds: u32,
+    /// Multiply-adds of side tests.
+    pub side_madds: u32,
+    /// Multiply-adds of edge tests.
+    pub edge_madds: u32,
+    /// Multiply-adds of depth intervals.
+    pub depth_madds: u32,
 }
 
 /// Conservative rasterizer.
@@ -61,9 +84,8 @@ impl Rasterizer {
 
     /// Call `each` with every tile that `triangle` may touch (column and row) and its intervals, in rows of
     /// blocks. Does not allocate.
-    pub fn rasterize(&self, triangle: &MovingTriangle, grid: &Grid, mut each: impl FnMut([u32; 2], &Touch)) {
-        let prepared = self.prepare(triangle);
-        self.descend(&prepared, grid, 0..grid.columns, 0..grid.rows, &self.clip, &mut each);
+    pub fn rasterize(&self, triangle: &MovingTriangle, grid: &Grid, each: impl FnMut([u32; 2], &Touch)) {
+        self.rasterize_part(&self.prepare(triangle), grid, [0..grid.columns, 0..grid.rows], each);
     }
 
     /// Rasterize a prepared triangle in the tiles of some columns and rows only.
@@ -71,96 +93,188 @@ impl Rasterizer {
         &self,
         prepared: &Prepared,
         grid: &Grid,
-        [columns, rows]: [Range<u32>; 2],
+        part: [Range<u32>; 2],
         mut each: impl FnMut([u32; 2], &Touch),
     ) {
-        self.descend(prepared, grid, columns, rows, &self.clip, &mut each);
+        let mut each = |tile, touch: &Touch, _: &mut TileLoop| each(tile, touch);
+        self.tests(prepared, ()).descend(grid, part, &self.clip, &mut each);
+    }
+
+    /// The same with the work of the tile loop. `each` is given the work since its last call and may take it; the
+    /// rest is returned.
+    pub fn rasterize_counted(
+        &self,
+        prepared: &Prepared,
+        grid: &Grid,
+        part: [Range<u32>; 2],
+        mut each: impl FnMut([u32; 2], &Touch, &mut TileLoop),
+    ) -> TileLoop {
+        let tally = Tally::default();
+        let mut tests = self.tests(prepared, &tally);
+        tests.descend(grid, part, &self.clip, &mut each);
+        tests.work
     }
 
     /// Prepare a triangle for the tests of all tiles.
     pub fn prepare(&self, triangle: &MovingTriangle) -> Prepared {
-        Prepared::new(triangle, &self.view)
+        Prepared::new((), triangle, &self.view)
+    }
+
+    /// The same with its multiply-adds.
+    pub fn prepare_counted(&self, triangle: &MovingTriangle) -> (Prepared, u32) {
+        let tally = Tally::default();
+        (Prepared::new(&tally, triangle, &self.view), tally.madds())
     }
 
     /// Intervals in which a prepared triangle may touch `rect` within `region`, or `None` if it cannot. For
     /// callers with their own tile hierarchy: intervals of a tile are valid for the tiles inside.
     pub fn touch(&self, prepared: &Prepared, rect: &Rect, region: &Region) -> Option<Touch> {
-        let seen = Seen::new(&self.view, prepared, rect, region);
-        self.halved(prepared, seen, region, self.halvings)
+        self.tests(prepared, ()).touch(rect, region).ok()
     }
 
+    fn tests<'a, N: Numbers>(&'a self, prepared: &'a Prepared, numbers: N) -> Tests<'a, N> {
+        Tests { rasterizer: self, prepared, numbers, work: TileLoop::default() }
+    }
+}
+
+/// The test that culled a tile.
+#[derive(Clone, Copy)]
+enum Culled {
+    BySides,
+    ByEdges,
+}
+
+/// The tests of one triangle, and their work.
+struct Tests<'a, N> {
+    rasterizer: &'a Rasterizer,
+    prepared: &'a Prepared,
+    numbers: N,
+    work: TileLoop,
+}
+
+impl<N: Numbers> Tests<'_, N> {
     fn descend(
-        &self,
-        prepared: &Prepared,
+        &mut self,
         grid: &Grid,
-        columns: Range<u32>,
-        rows: Range<u32>,
+        [columns, rows]: [Range<u32>; 2],
         region: &Region,
-        each: &mut impl FnMut([u32; 2], &Touch),
+        each: &mut impl FnMut([u32; 2], &Touch, &mut TileLoop),
     ) {
         if columns.is_empty() || rows.is_empty() {
             return;
         }
         let rect = grid.rect(&columns, &rows);
         if columns.len() == 1 && rows.len() == 1 {
-            if let Some(touch) = self.touch(prepared, &rect, region) {
-                each([columns.start, rows.start], &touch);
+            self.work.tiles += 1;
+            let touch = self.touch(&rect, region);
+            if let Some(touch) = self.kept(touch) {
+                each([columns.start, rows.start], &touch, &mut self.work);
             }
             return;
         }
-        let mut seen = Seen::new(&self.view, prepared, &rect, region);
-        let Some(region) = part(&mut seen, prepared, region) else { return };
+        self.work.blocks += 1;
+        let mut seen = self.seen(&rect, region);
+        let part = self.part(&mut seen, region);
+        let Some(region) = self.kept(part) else { return };
         let middle = |range: &Range<u32>| range.start + (range.end - range.start).div_ceil(2);
         let (column, row) = (middle(&columns), middle(&rows));
         for rows in [rows.start..row, row..rows.end] {
             for columns in [columns.start..column, column..columns.end] {
-                self.descend(prepared, grid, columns, rows.clone(), &region, each);
+                self.descend(grid, [columns, rows.clone()], &region, each);
             }
         }
     }
 
-    fn halved(&self, prepared: &Prepared, mut seen: Seen, region: &Region, halvings: u32) -> Option<Touch> {
-        let region = part(&mut seen, prepared, region)?;
-        if halvings == 0 || !prepared.moving || region.t[0] == region.t[1] {
-            return self.depths(&seen, &region).map(|z| Touch::new(&region, z));
+    /// Counts the tile if it was culled.
+    fn kept<T>(&mut self, tested: Result<T, Culled>) -> Option<T> {
+        match tested {
+            Err(Culled::BySides) => self.work.culled_sides += 1,
+            Err(Culled::ByEdges) => self.work.culled_edges += 1,
+            Ok(_) => {}
         }
-        let halves = region
-            .halves()
-            .map(|half| self.halved(prepared, seen.within(prepared, &half), &half, halvings - 1));
-        halves.into_iter().flatten().reduce(|a, b| a.hull(&b))
+        tested.ok()
+    }
+
+    fn touch(&mut self, rect: &Rect, region: &Region) -> Result<Touch, Culled> {
+        let seen = self.seen(rect, region);
+        self.halved(seen, region, self.rasterizer.halvings)
+    }
+
+    fn seen(&mut self, rect: &Rect, region: &Region) -> Seen<N> {
+        let before = self.numbers.madds();
+        let seen = Seen::new(self.numbers, &self.rasterizer.view, self.prepared, rect, region);
+        self.work.place_madds += self.numbers.madds() - before;
+        seen
+    }
+
+    /// The part of `region` in which the triangle may touch the tile. `seen` is first given for `region`, then
+    /// for that part.
+    fn part(&mut self, seen: &mut Seen<N>, region: &Region) -> Result<Region, Culled> {
+        let before = self.numbers.madds();
+        let region = narrow(seen, self.prepared, region);
+        let between = self.numbers.madds();
+        self.work.side_madds += between - before;
+        let region = region.ok_or(Culled::BySides)?;
+        let missed = miss(seen, &region);
+        self.work.edge_madds += self.numbers.madds() - between;
+        if missed { Err(Culled::ByEdges) } else { Ok(region) }
+    }
+
+    fn halved(&mut self, mut seen: Seen<N>, region: &Region, halvings: u32) -> Result<Touch, Culled> {
+        let region = self.part(&mut seen, region)?;
+        if halvings == 0 || !self.prepared.moving || region.t[0] == region.t[1] {
+            let before = self.numbers.madds();
+            let depths = self.depths(&seen, &region);
+            self.work.depth_madds += self.numbers.madds() - before;
+            return depths.map(|z| Touch::new(&region, z)).ok_or(Culled::ByEdges);
+        }
+        let halves = region.halves().map(|half| {
+            let before = self.numbers.madds();
+            let seen = seen.within(self.prepared, &half);
+            self.work.place_madds += self.numbers.madds() - before;
+            self.halved(seen, &half, halvings - 1).ok()
+        });
+        halves.into_iter().flatten().reduce(|a, b| a.hull(&b)).ok_or(Culled::ByEdges)
     }
 
     /// Depth range in which the triangle may touch the tile (thesis, Paper VI, Appendix A, both tests), or
     /// `None` if it cannot.
-    fn depths(&self, seen: &Seen, region: &Region) -> Option<[f64; 2]> {
+    fn depths(&self, seen: &Seen<N>, region: &Region) -> Option<[f64; 2]> {
         let vertices = seen.points.iter().flatten().map(|p| p[2]);
-        let vertices =
-            vertices.fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], z| [lo.min(z), hi.max(z)]);
-        let beam = match self.view {
-            View::Orthographic { .. } if !self.view.has_lens() => Beam::orthographic(seen.tile),
-            View::Orthographic { s, a, .. } => Beam::oblique(seen.tile, [region.u, region.v], s, a),
-            View::Perspective { .. } if !self.view.has_lens() => Beam::pinhole(seen.tile),
-            View::Perspective { s, a, .. } => Beam::lens(seen.tile, [region.u, region.v], s, a),
-        };
+        let nothing = [f64::INFINITY, f64::NEG_INFINITY].map(N::Number::new);
+        let vertices = vertices.fold(nothing, |[lo, hi], z| [lo.smaller(z), hi.larger(z)]);
+        let beam = self.beam(seen, region);
         let planes = seen.points.iter().map(|points| {
             let normal = normal(points);
             // A shorter normal may consist of underflowed products.
-            if normal.iter().all(|n| n.abs() < MIN_UNCERTAINTY * MIN_UNCERTAINTY) {
+            let shortest = N::Number::new(MIN_UNCERTAINTY * MIN_UNCERTAINTY);
+            if normal.iter().all(|n| n.magnitude() < shortest) {
                 return None;
             }
             let plane = MovingPlane::new(normal, [&seen.points[0], &seen.points[1]], seen.size);
-            plane.depths(plane.whole(), &beam, [0.0; 2])
+            plane.depths(plane.whole(), &beam, [0.0; 2].map(N::Number::new))
         });
         let [lo, hi] = tightest(planes.chain([Some(vertices)]))?;
-        let widened = |z: f64| ROUNDING * z.abs() + 2.0 * seen.depth_noise;
-        let (lo, hi) = ((lo - widened(lo)).max(self.view.near()), hi + widened(hi));
-        (lo <= hi).then_some([lo, hi])
+        let allowance = N::Number::new(2.0) * seen.depth_noise;
+        let widened = |z: N::Number| N::Number::new(ROUNDING) * z.magnitude() + allowance;
+        let near = N::Number::new(self.rasterizer.view.near());
+        let (lo, hi) = ((lo - widened(lo)).larger(near), hi + widened(hi));
+        (lo <= hi).then_some([lo.value(), hi.value()])
     }
-}
 
-/// The part of `region` in which the triangle may touch the tile. `seen` is first given for `region`, then
-/// for that part.
-fn part(seen: &mut Seen, prepared: &Prepared, region: &Region) -> Option<Region> {
-    let region = narrow(seen, prepared, region)?;
-    (!miss(seen, &region)).then_some(region)
+    /// The rays of a tile from a part of the lens.
+    fn beam(&self, seen: &Seen<N>, region: &Region) -> Beam<N::Number> {
+        let numbers = |range: [f64; 2]| range.map(|value| self.numbers.number(value));
+        let view = &self.rasterizer.view;
+        let lens = view.has_lens().then(|| {
+            let (s, a) = view.shear();
+            ([numbers(region.u), numbers(region.v)], numbers(s), numbers(a))
+        });
+        match (lens, view.is_perspective()) {
+            (None, true) => Beam::pinhole(seen.tile),
+            (None, false) => Beam::orthographic(seen.tile),
+            (Some((lens, s, a)), true) => Beam::lens(seen.tile, lens, s, a),
+            (Some((lens, s, a)), false) => Beam::oblique(seen.tile, lens, s, a),
+        }
+    }
 }

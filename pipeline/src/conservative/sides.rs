@@ -5,19 +5,19 @@
 //! in `u` and `t`. The possible times are the hull over the vertices of the times at which `d` is not
 //! negative at one end of `u`; likewise for `u`.
 
-use super::triangle::Seen;
-use super::{Prepared, Region, View};
-use crate::depth::Real;
+use super::triangle::{ROUNDING, Seen};
+use super::{Prepared, Region};
+use crate::depth::{Numbers, Real};
 
 /// The part of `region` in which the triangle may be inside the sides of the tile and beyond the near depth,
 /// or `None`. `seen` is first given for `region`, then for that part.
-pub(super) fn narrow(seen: &mut Seen, prepared: &Prepared, region: &Region) -> Option<Region> {
+pub(super) fn narrow<N: Numbers>(seen: &mut Seen<N>, prepared: &Prepared, region: &Region) -> Option<Region> {
     let part = if seen.view.has_lens() {
         through_lens(seen, prepared, region)?
     } else {
         Region { t: through_pinhole(seen, region.t)?, ..*region }
     };
-    let part = beyond_near(&seen.view, prepared, &part)?;
+    let part = beyond_near(seen, prepared, &part)?;
     if part != *region {
         *seen = seen.within(prepared, &part);
     }
@@ -25,23 +25,26 @@ pub(super) fn narrow(seen: &mut Seen, prepared: &Prepared, region: &Region) -> O
 }
 
 /// Test all sides together: each bound is linear in t alone.
-fn through_pinhole(seen: &Seen, t: [f64; 2]) -> Option<[f64; 2]> {
+fn through_pinhole<N: Numbers>(seen: &Seen<N>, t: [f64; 2]) -> Option<[f64; 2]> {
+    let t = t.map(|t| seen.numbers.number(t));
     let mut part = t;
     for axis in [0, 1] {
-        for (sign, border) in [(1.0, seen.tile[axis][0]), (-1.0, seen.tile[axis][1])] {
-            let d = [0, 1, 2].map(|k| [0, 1].map(|end| sign * seen.through_pinhole(axis, k, end, border)));
-            if d.iter().any(|&[opening, closing]| opening >= 0.0 && closing >= 0.0) {
+        for (side, border) in seen.tile[axis].into_iter().enumerate() {
+            let inward = |d: N::Number| if side == 0 { d } else { -d };
+            let d = [0, 1, 2].map(|k| [0, 1].map(|end| inward(seen.through_pinhole(axis, k, end, border))));
+            let zero = N::Number::new(0.0);
+            if d.iter().any(|&[opening, closing]| opening >= zero && closing >= zero) {
                 continue;
             }
             let times = d.map(|[opening, closing]| above(t, opening, closing, seen.noise[axis]));
             part = meet(part, times.into_iter().fold(None, union)?)?;
         }
     }
-    Some(part)
+    Some(part.map(Real::value))
 }
 
 /// Test one side after another: each test uses the part of lens and time left by the previous ones.
-fn through_lens(seen: &mut Seen, prepared: &Prepared, region: &Region) -> Option<Region> {
+fn through_lens<N: Numbers>(seen: &mut Seen<N>, prepared: &Prepared, region: &Region) -> Option<Region> {
     let mut region = *region;
     for (axis, side) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
         region = narrow_side(seen, axis, side, &region)?;
@@ -50,60 +53,68 @@ fn through_lens(seen: &mut Seen, prepared: &Prepared, region: &Region) -> Option
     Some(region)
 }
 
-fn narrow_side(seen: &Seen, axis: usize, side: usize, region: &Region) -> Option<Region> {
+fn narrow_side<N: Numbers>(seen: &Seen<N>, axis: usize, side: usize, region: &Region) -> Option<Region> {
     let lens = if axis == 0 { region.u } else { region.v };
-    let (sign, border) = (if side == 0 { 1.0 } else { -1.0 }, seen.tile[axis][side]);
+    let [lens, t] = [lens, region.t].map(|range| range.map(|end| seen.numbers.number(end)));
+    let (inward, border) = (|d: N::Number| if side == 0 { d } else { -d }, seen.tile[axis][side]);
     let (mut times, mut positions) = (None, None);
     for k in 0..3 {
-        let d = lens.map(|position| [0, 1].map(|end| sign * seen.from(axis, k, end, position, border)));
+        let d = lens.map(|position| [0, 1].map(|end| inward(seen.from(axis, [k, end], position, border))));
         for [opening, closing] in d {
-            times = union(times, above(region.t, opening, closing, seen.noise[axis]));
+            times = union(times, above(t, opening, closing, seen.noise[axis]));
         }
         for [at_low, at_high] in [0, 1].map(|end| [d[0][end], d[1][end]]) {
             positions = union(positions, above(lens, at_low, at_high, seen.noise[axis]));
         }
     }
-    let mut next = Region { t: times?, ..*region };
-    *if axis == 0 { &mut next.u } else { &mut next.v } = positions?;
+    let mut next = Region { t: times?.map(Real::value), ..*region };
+    *if axis == 0 { &mut next.u } else { &mut next.v } = positions?.map(Real::value);
     Some(next)
 }
 
 /// The part of `region` in which some vertex is beyond the near depth.
-fn beyond_near(view: &View, prepared: &Prepared, region: &Region) -> Option<Region> {
-    let near = view.near();
+fn beyond_near<N: Numbers>(seen: &Seen<N>, prepared: &Prepared, region: &Region) -> Option<Region> {
+    let (near, numbers) = (seen.view.near(), seen.numbers);
     if near == f64::NEG_INFINITY {
         return Some(*region);
     }
-    let noise = super::triangle::ROUNDING * (prepared.size[2] + near.abs()) + prepared.uncertainty()[2];
-    let [open, close] = region.t.map(|t| prepared.at(t));
-    let times = (0..3).map(|k| above(region.t, open[k][2] - near, close[k][2] - near, noise));
-    Some(Region { t: times.fold(None, union)?, ..*region })
+    let near = numbers.number(near);
+    let (size, unsure) = (numbers.number(prepared.size[2]), numbers.number(prepared.uncertainty()[2]));
+    let noise = N::Number::new(ROUNDING) * (size + near.magnitude()) + unsure;
+    let t = region.t.map(|t| numbers.number(t));
+    let times = (0..3).map(|k| {
+        let [open, close] = region.t.map(|t| prepared.coordinate(numbers, [k, 2], t) - near);
+        above(t, open, close, noise)
+    });
+    Some(Region { t: times.fold(None, union)?.map(Real::value), ..*region })
 }
 
 /// The part of `range` in which a linear function may be non-negative. It has the values `lo` and `hi` at the
 /// ends, each with an error of at most `noise`.
-fn above(range: [f64; 2], lo: f64, hi: f64, noise: f64) -> Option<[f64; 2]> {
+fn above<R: Real>(range: [R; 2], lo: R, hi: R, noise: R) -> Option<[R; 2]> {
+    let zero = R::new(0.0);
     // Twice the noise also covers the rounding of the quotient; the nudge covers the mapping to the range.
-    let (lo, hi) = (lo + 2.0 * noise, hi + 2.0 * noise);
-    let nudge = 4.0 * f64::EPSILON * range[0].abs().max(range[1].abs());
+    let allowance = R::new(2.0) * noise;
+    let (lo, hi) = (lo + allowance, hi + allowance);
+    let nudge = || R::new(4.0 * f64::EPSILON) * range[0].magnitude().larger(range[1].magnitude());
     let root = || range[0] + (range[1] - range[0]) * (lo / (lo - hi));
-    match (lo >= 0.0, hi >= 0.0) {
+    match (lo >= zero, hi >= zero) {
         (true, true) => Some(range),
         (false, false) => None,
-        (true, false) => Some([range[0], (root() + nudge).min(range[1])]),
-        (false, true) => Some([(root() - nudge).max(range[0]), range[1]]),
+        (true, false) => Some([range[0], (root() + nudge()).smaller(range[1])]),
+        (false, true) => Some([(root() - nudge()).larger(range[0]), range[1]]),
     }
 }
 
 /// Intersection of two closed ranges.
-fn meet(a: [f64; 2], b: [f64; 2]) -> Option<[f64; 2]> {
+fn meet<R: Real>(a: [R; 2], b: [R; 2]) -> Option<[R; 2]> {
     let shared = [a[0].larger(b[0]), a[1].smaller(b[1])];
     (shared[0] <= shared[1]).then_some(shared)
 }
 
-fn union(a: Option<[f64; 2]>, b: Option<[f64; 2]>) -> Option<[f64; 2]> {
+fn union<R: Real>(a: Option<[R; 2]>, b: Option<[R; 2]>) -> Option<[R; 2]> {
     match (a, b) {
-        (Some(a), Some(b)) => Some([a[0].min(b[0]), a[1].max(b[1])]),
+        (Some(a), Some(b)) => Some([a[0].smaller(b[0]), a[1].larger(b[1])]),
         (a, b) => a.or(b),
     }
 }

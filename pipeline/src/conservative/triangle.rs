@@ -1,8 +1,7 @@
 //! Moving triangles in `f64`, and their vertices relative to a tile.
 
-use glam::DVec3;
-
 use super::{Rect, Region, View};
+use crate::depth::{Numbers, Real};
 
 /// A triangle whose vertices `[x, y, depth]` move linearly from `open` to `close`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,6 +46,8 @@ pub const MIN_UNCERTAINTY: f64 = 1e-90;
 #[derive(Clone, Copy, Debug)]
 pub struct Prepared {
     pub(super) triangle: MovingTriangle,
+    /// Closing minus opening position.
+    delta: [[f64; 3]; 3],
     pub(super) moving: bool,
     /// Largest magnitude on each axis.
     pub(super) size: [f64; 3],
@@ -57,14 +58,25 @@ pub struct Prepared {
 }
 
 impl Prepared {
-    pub(super) fn new(triangle: &MovingTriangle, view: &View) -> Self {
+    pub(super) fn new<N: Numbers>(numbers: N, triangle: &MovingTriangle, view: &View) -> Self {
         let all = || triangle.open.iter().chain(&triangle.close);
         let size = [0, 1, 2].map(|axis| all().map(|p| p[axis].abs()).fold(0.0, f64::max));
-        let perspective = matches!(view, View::Perspective { .. });
+        let perspective = view.is_perspective();
         let uncertainty = triangle.uncertainty.map(|off| off.max(MIN_UNCERTAINTY));
+        let moving = triangle.open != triangle.close;
+        let difference = |k: usize, axis: usize| {
+            let [open, close] = [triangle.open, triangle.close].map(|end| numbers.number(end[k][axis]));
+            (close - open).value()
+        };
+        let delta = if moving {
+            [0, 1, 2].map(|k| [0, 1, 2].map(|axis| difference(k, axis)))
+        } else {
+            Default::default()
+        };
         Self {
             triangle: MovingTriangle { uncertainty, ..*triangle },
-            moving: triangle.open != triangle.close,
+            delta,
+            moving,
             size,
             weight: if perspective { size[2] } else { 1.0 },
             weight_off: if perspective { uncertainty[2] } else { 0.0 },
@@ -76,12 +88,20 @@ impl Prepared {
     }
 
     /// Vertices at time `t`; at the ends of the shutter exactly as given.
-    pub(super) fn at(&self, t: f64) -> [[f64; 3]; 3] {
-        if t == 1.0 {
-            return self.triangle.close;
+    fn at<N: Numbers>(&self, numbers: N, t: f64) -> [[N::Number; 3]; 3] {
+        [0, 1, 2].map(|k| [0, 1, 2].map(|axis| self.coordinate(numbers, [k, axis], t)))
+    }
+
+    /// Coordinate of vertex `k` along `axis` at time `t`.
+    pub(super) fn coordinate<N: Numbers>(&self, numbers: N, [k, axis]: [usize; 2], t: f64) -> N::Number {
+        let open = numbers.number(self.triangle.open[k][axis]);
+        if t == 0.0 || !self.moving {
+            return open;
         }
-        let (open, close) = (&self.triangle.open, &self.triangle.close);
-        [0, 1, 2].map(|k| [0, 1, 2].map(|axis| open[k][axis] + t * (close[k][axis] - open[k][axis])))
+        if t == 1.0 {
+            return numbers.number(self.triangle.close[k][axis]);
+        }
+        open + numbers.number(t) * numbers.number(self.delta[k][axis])
     }
 }
 
@@ -92,91 +112,127 @@ pub(super) const ROUNDING: f64 = 1.0 / (1_u64 << 48) as f64;
 /// Vertices at both ends of a time interval, relative to the middle of a tile, so that large coordinates lose
 /// little precision.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Seen {
+pub(super) struct Seen<N: Numbers> {
+    pub numbers: N,
     pub view: View,
     /// `[x - X w, y - Y w, depth]` by end and vertex; `(X, Y)` is the middle of the tile.
-    pub points: [[[f64; 3]; 3]; 2],
-    middle: [f64; 2],
+    pub points: [[[N::Number; 3]; 3]; 2],
+    middle: [N::Number; 2],
     /// Distances of the tile's sides from its middle.
-    pub tile: [[f64; 2]; 2],
+    pub tile: [[N::Number; 2]; 2],
     /// Error bound in x and y of a vertex seen from a point of the tile and a lens position.
-    pub noise: [f64; 2],
+    pub noise: [N::Number; 2],
     /// Error bound of a depth.
-    pub depth_noise: f64,
+    pub depth_noise: N::Number,
     /// Largest magnitudes of the terms of `points`, uncertainty included.
-    pub size: [f64; 3],
+    pub size: [N::Number; 3],
 }
 
-impl Seen {
-    pub fn new(view: &View, prepared: &Prepared, rect: &Rect, region: &Region) -> Self {
-        let sides = [rect.x, rect.y];
-        let middle = sides.map(|[lo, hi]| 0.5 * (lo + hi));
-        let (s, a) = view.shear();
-        let (weight, unsure, off) = (prepared.weight, prepared.uncertainty(), prepared.weight_off);
+impl<N: Numbers> Seen<N> {
+    pub fn new(numbers: N, view: &View, prepared: &Prepared, rect: &Rect, region: &Region) -> Self {
+        let number = |value: f64| numbers.number(value);
+        let rounding = N::Number::new(ROUNDING);
+        let sides = [rect.x, rect.y].map(|side| side.map(number));
+        let middle = sides.map(|[lo, hi]| N::Number::new(0.5) * (lo + hi));
+        let largest = prepared.size.map(number);
+        let (weight, unsure) = (number(prepared.weight), prepared.uncertainty().map(number));
+        let off = number(prepared.weight_off);
+        let is_perspective = view.is_perspective();
         let noise = [0, 1].map(|axis| {
-            let (lens, side) = (a[axis].abs(), sides[axis][0].abs().max(sides[axis][1].abs()));
-            let sum = prepared.size[axis] + s[axis].abs() + lens * prepared.size[2] + side * weight;
-            ROUNDING * sum + unsure[axis] + lens * unsure[2] + side * off
+            let side = sides[axis][0].magnitude().larger(sides[axis][1].magnitude());
+            let lens = view.has_lens().then(|| {
+                let (s, a) = view.shear();
+                [s, a].map(|of| number(of[axis]).magnitude())
+            });
+            let sum = lens.map_or(largest[axis], |[s, a]| largest[axis] + s + a * largest[2]);
+            let noise = rounding * (sum + side * weight) + unsure[axis];
+            let noise = lens.map_or(noise, |[_, a]| noise + a * unsure[2]);
+            if is_perspective { noise + side * off } else { noise }
         });
         let size = [0, 1, 2].map(|axis| {
-            let moved = if axis < 2 { middle[axis].abs() * weight } else { 0.0 };
-            let unsure = unsure[axis] + if axis < 2 { middle[axis].abs() * off } else { 0.0 };
+            let (mut size, mut unsure) = (largest[axis], unsure[axis]);
+            if axis < 2 {
+                size = size + middle[axis].magnitude() * weight;
+            }
+            if axis < 2 && is_perspective {
+                unsure = unsure + middle[axis].magnitude() * off;
+            }
             // A plane uses `ROUNDING` times this as noise.
-            prepared.size[axis] + moved + unsure / ROUNDING
+            size + unsure / rounding
         });
         Self {
+            numbers,
             view: *view,
-            points: points(view, prepared, middle, region),
+            points: points(numbers, view, prepared, middle, region),
             middle,
             tile: [0, 1].map(|axis| sides[axis].map(|side| side - middle[axis])),
             noise,
-            depth_noise: ROUNDING * prepared.size[2] + unsure[2],
+            depth_noise: rounding * largest[2] + unsure[2],
             size,
         }
     }
 
     /// The same triangle within another region.
     pub fn within(self, prepared: &Prepared, region: &Region) -> Self {
-        Self { points: points(&self.view, prepared, self.middle, region), ..self }
+        Self { points: points(self.numbers, &self.view, prepared, self.middle, region), ..self }
+    }
+
+    /// Weight of a point on the homogeneous image plane.
+    fn weight(&self, depth: N::Number) -> N::Number {
+        weight(&self.view, depth)
     }
 
     /// Vertex `k` at `end` of the time along `axis`, seen through a pinhole from `side`, relative to the
     /// middle of the tile.
-    pub fn through_pinhole(&self, axis: usize, k: usize, end: usize, side: f64) -> f64 {
+    pub fn through_pinhole(&self, axis: usize, k: usize, end: usize, side: N::Number) -> N::Number {
         let p = &self.points[end][k];
-        p[axis] - side * self.view.weight(p[2])
+        p[axis] - side * self.weight(p[2])
     }
 
     /// The same vertex seen from `lens` on the lens.
-    pub fn from(&self, axis: usize, k: usize, end: usize, lens: f64, side: f64) -> f64 {
+    pub fn from(&self, axis: usize, [k, end]: [usize; 2], lens: N::Number, side: N::Number) -> N::Number {
         let depth = self.points[end][k][2];
+        self.through_pinhole(axis, k, end, side) + lens * self.shift(axis, depth)
+    }
+
+    /// Shift of a point at this depth from the middle of the lens to its rim.
+    fn shift(&self, axis: usize, depth: N::Number) -> N::Number {
         let (s, a) = self.view.shear();
-        self.through_pinhole(axis, k, end, side) + lens * (a[axis] * depth - s[axis])
+        self.numbers.number(a[axis]) * depth - self.numbers.number(s[axis])
     }
 
     /// Vertices at both ends as homogeneous points of the image, seen through a pinhole from the middle of
     /// the tile.
-    pub fn homogeneous(&self) -> [[DVec3; 3]; 2] {
-        self.points.map(|end| end.map(|[x, y, depth]| DVec3::new(x, y, self.view.weight(depth))))
+    pub fn homogeneous(&self) -> [[[N::Number; 3]; 3]; 2] {
+        self.points.map(|end| end.map(|[x, y, depth]| [x, y, self.weight(depth)]))
     }
 
     /// The same vertices seen from `lens` on the lens.
-    pub fn homogeneous_from(&self, lens: [f64; 2]) -> [[DVec3; 3]; 2] {
-        let (s, a) = self.view.shear();
+    pub fn homogeneous_from(&self, lens: [N::Number; 2]) -> [[[N::Number; 3]; 3]; 2] {
         self.points.map(|end| {
             end.map(|[x, y, depth]| {
-                let at = |axis: usize, x: f64| x + lens[axis] * (a[axis] * depth - s[axis]);
-                DVec3::new(at(0, x), at(1, y), self.view.weight(depth))
+                let at = |axis: usize, x: N::Number| x + lens[axis] * self.shift(axis, depth);
+                [at(0, x), at(1, y), self.weight(depth)]
             })
         })
     }
 }
 
+fn weight<R: Real>(view: &View, depth: R) -> R {
+    if view.is_perspective() { depth } else { R::new(1.0) }
+}
+
 /// Vertices at both ends of a region's time, seen from `middle`.
-fn points(view: &View, prepared: &Prepared, middle: [f64; 2], region: &Region) -> [[[f64; 3]; 3]; 2] {
+fn points<N: Numbers>(
+    numbers: N,
+    view: &View,
+    prepared: &Prepared,
+    middle: [N::Number; 2],
+    region: &Region,
+) -> [[[N::Number; 3]; 3]; 2] {
     region.t.map(|t| {
-        prepared.at(t).map(|[x, y, depth]| {
-            let w = view.weight(depth);
+        prepared.at(numbers, t).map(|[x, y, depth]| {
+            let w = weight(view, depth);
             [x - middle[0] * w, y - middle[1] * w, depth]
         })
     })

@@ -58,12 +58,8 @@ impl View {
         (*s, *a)
     }
 
-    /// Weight of a point on the homogeneous image plane.
-    pub(super) fn weight(&self, depth: f64) -> f64 {
-        match self {
-            Self::Perspective { .. } => depth,
-            Self::Orthographic { .. } => 1.0,
-        }
+    pub(super) fn is_perspective(&self) -> bool {
+        matches!(self, Self::Perspective { .. })
     }
 
     pub(super) fn near(&self) -> f64 {

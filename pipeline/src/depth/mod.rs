@@ -3,7 +3,8 @@
 //! - [`plane`]: moving planes that bound a triangle from one side, the mathematics of the depth interval,
 //! - [`DepthBound`] and [`Bounder`]: the interval of all depths that the sample test computes in a tile,
 //! - [`DepthBoxes`]: farthest and nearest stored depth of a tile, by boxes of lens and time,
-//! - [`DepthTile`]: the stored samples.
+//! - [`DepthTile`]: the stored samples,
+//! - [`Pyramid`]: farthest stored depths of larger and larger tiles, for occlusion queries.
 
 mod bound;
 mod boxes;
@@ -11,9 +12,11 @@ mod grid;
 
 mod number;
 pub mod plane;
+mod pyramid;
 
 pub use bound::{Bounder, DepthBound, interval_madds, set_up_madds, vertex_range};
 pub use boxes::{DepthBoxes, DepthTile, Visible};
 pub use grid::{BoxGrid, DepthSpec};
 pub use number::Real;
-pub(crate) use number::{round_down, round_up};
+pub(crate) use number::{Numbers, cross, round_down, round_up};
+pub use pyramid::Pyramid;

@@ -1,6 +1,8 @@
-//! Numbers of the depth bounds: `f64`, or in tests a number that counts its operations.
+//! Numbers of the depth bounds and of conservative mode: `f64`, or a number that counts its operations.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
+
+use crate::tally::{Counting, Tally};
 
 /// A real number.
 pub trait Real:
@@ -14,6 +16,9 @@ pub trait Real:
 {
     /// The number `value`.
     fn new(value: f64) -> Self;
+
+    /// Its value.
+    fn value(self) -> f64;
 
     /// `self b + c`, rounded after each operation; one multiply-add.
     fn madd(self, b: Self, c: Self) -> Self;
@@ -39,8 +44,63 @@ impl Real for f64 {
         value
     }
 
+    fn value(self) -> f64 {
+        self
+    }
+
     fn madd(self, b: Self, c: Self) -> Self {
         self * b + c
+    }
+}
+
+impl Real for Counting<'_> {
+    fn new(value: f64) -> Self {
+        Self::constant(value)
+    }
+
+    fn value(self) -> f64 {
+        Self::value(self)
+    }
+
+    fn madd(self, b: Self, c: Self) -> Self {
+        self.multiply_add(b, c)
+    }
+}
+
+/// Source of the numbers that a kernel computes with.
+pub(crate) trait Numbers: Copy {
+    /// Type of the numbers.
+    type Number: Real;
+
+    /// An input of the kernel.
+    fn number(self, value: f64) -> Self::Number;
+
+    /// Multiply-adds of the numbers so far, if they count.
+    fn madds(self) -> u32;
+}
+
+/// Plain numbers.
+impl Numbers for () {
+    type Number = f64;
+
+    fn number(self, value: f64) -> f64 {
+        value
+    }
+
+    fn madds(self) -> u32 {
+        0
+    }
+}
+
+impl<'t> Numbers for &'t Tally {
+    type Number = Counting<'t>;
+
+    fn number(self, value: f64) -> Counting<'t> {
+        Counting::new(value, self)
+    }
+
+    fn madds(self) -> u32 {
+        Tally::madds(self)
     }
 }
 
@@ -50,7 +110,7 @@ pub(super) fn dot<R: Real>(a: [R; 3], b: [R; 3]) -> R {
 }
 
 /// `a x b`.
-pub(super) fn cross<R: Real>(a: [R; 3], b: [R; 3]) -> [R; 3] {
+pub(crate) fn cross<R: Real>(a: [R; 3], b: [R; 3]) -> [R; 3] {
     let part = |i: usize, j: usize| a[i].madd(b[j], -(a[j] * b[i]));
     [part(1, 2), part(2, 0), part(0, 1)]
 }
@@ -128,6 +188,10 @@ pub(super) mod counting {
     impl Real for Counted {
         fn new(value: f64) -> Self {
             Self(value)
+        }
+
+        fn value(self) -> f64 {
+            self.0
         }
 
         fn madd(self, b: Self, c: Self) -> Self {

@@ -257,6 +257,11 @@ impl<'e> Gpu<'e> {
         self.passes.last().map_or(0, |pass| pass.triangles)
     }
 
+    /// Events of the last pass so far.
+    pub fn counts_of_pass(&self) -> Counts {
+        self.passes.last().map_or_else(Counts::default, PassReport::counts)
+    }
+
     /// Caches, for the packets of a pass that was begun.
     pub(super) fn memory(&mut self) -> &mut MemorySystem {
         &mut self.memory

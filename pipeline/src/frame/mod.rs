@@ -2,16 +2,19 @@
 
 mod attachments;
 mod bin;
+mod conservative_pass;
 mod fragments;
 mod gpu;
 mod heat;
+mod lanes;
 mod pass;
+mod query;
 mod replay;
 mod resolve;
+mod screen_pass;
 mod settings;
 mod surface;
 mod test_selection;
-mod tile_pass;
 mod tile_tests;
 mod vertices;
 mod worker;
@@ -24,13 +27,15 @@ use vertices::Ready;
 use crate::setup::distribute;
 pub use attachments::{Attachment, Attachments, Binding, Load, Store, SurfaceId, SurfaceProblem};
 use bin::{Bin, BinLog};
+pub use conservative_pass::{ConservativeDraw, ConservativePass, Primitive, TileIntervals, TileShader};
 pub use gpu::{FrameReport, Gpu, PassError, PassReport, Rendered};
 pub use heat::{HeatMap, TileHeat};
+pub use lanes::Lanes;
 use pass::Pass;
 pub use pass::{Draw, RasterPass, Resident, Target};
+pub use query::{IntervalAnswer, IntervalQueries, MovingBox, SampledAnswer, SampledQueries};
 use replay::Replay;
 pub use settings::{Features, PipelineSpec, Settings, Shading, SpecError};
-pub use tile_pass::{Client, TileWork, Touch, TriangleStream};
 use worker::Worker;
 
 /// A unit of finished work, in the order of the modelled hardware.

@@ -1,7 +1,9 @@
-//! Numbers of the tile tests: `f64` at run time, and in tests a number that counts its operations. Quadratics
-//! of time in Bernstein form, and the intervals where they are not negative.
+//! Numbers of the tile tests: `f64`, or a number that counts its operations. Quadratics of time in Bernstein form,
+//! and the intervals where they are not negative.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
+
+use crate::tally::Counting;
 
 /// Number type of the kernels of the tile tests. A generic kernel can be run with counting numbers to measure
 /// its cost.
@@ -51,6 +53,32 @@ impl Number for f64 {
 
     fn sqrt(self) -> Self {
         Self::sqrt(self)
+    }
+}
+
+impl From<f32> for Counting<'_> {
+    fn from(value: f32) -> Self {
+        Self::constant(f64::from(value))
+    }
+}
+
+impl From<Counting<'_>> for f64 {
+    fn from(counting: Counting<'_>) -> Self {
+        counting.value()
+    }
+}
+
+impl Number for Counting<'_> {
+    fn constant(value: f64) -> Self {
+        Self::constant(value)
+    }
+
+    fn abs(self) -> Self {
+        self.with(self.value().abs())
+    }
+
+    fn sqrt(self) -> Self {
+        self.root()
     }
 }
 

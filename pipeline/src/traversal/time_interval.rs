@@ -10,10 +10,11 @@
 //! A homogeneous triangle also covers its mirror image behind the camera. If vertices have depths of both
 //! signs, the caller has to check the depth at the times found.
 
-use super::number::{Pieces, Quadratic};
+use super::number::{Number, Pieces, Quadratic};
 use super::{EdgeBounds, Edges, Faces, TileRect, View};
 use crate::geometry::Shear;
 use crate::setup::Triangle;
+use crate::tally::{Counting, Tally};
 
 use super::Box5;
 
@@ -45,19 +46,20 @@ impl TimeIntervals {
         self.as_slice().iter().map(|[lo, hi]| hi - lo).sum()
     }
 
-    fn intersect(&self, pieces: Pieces<f64>) -> Self {
+    fn intersect<N: Number>(&self, pieces: Pieces<N>) -> Self {
         let mut both = Self { len: 0, ..*self };
+        let (error, none) = (N::constant(ROOT_ERROR), [N::zero(); 2]);
         let (count, parts) = match pieces {
-            Pieces::None => (0, [[0.0; 2]; 2]),
+            Pieces::None => (0, [none; 2]),
             Pieces::One(piece) => (1, [piece; 2]),
-            Pieces::Two(first, last) if last[0] - first[1] <= 2.0 * ROOT_ERROR => {
-                (1, [[first[0], last[1]]; 2])
-            }
+            Pieces::Two(first, last) if last[0] - first[1] <= error + error => (1, [[first[0], last[1]]; 2]),
             Pieces::Two(first, last) => (2, [first, last]),
         };
+        let widened = |[lo, hi]: [N; 2]| [(lo - error).into(), (hi + error).into()];
+        let parts: [[f64; 2]; 2] = parts.map(widened);
         for mine in self.as_slice() {
             for part in &parts[..count] {
-                let [lo, hi] = [mine[0].max(part[0] - ROOT_ERROR), mine[1].min(part[1] + ROOT_ERROR)];
+                let [lo, hi] = [mine[0].max(part[0]), mine[1].min(part[1])];
                 if lo <= hi && both.len < Self::MAX {
                     both.intervals[both.len] = [lo, hi];
                     both.len += 1;
@@ -79,33 +81,65 @@ const RAISED: f64 = 64.0 * f64::EPSILON;
 /// its clockwise face, and those at which it sees the other face. `shear` only says whether the view is
 /// orthographic. The intervals are widened by the rounding of `f64`.
 pub fn time_interval(triangle: &Triangle, shear: &Shear, x: f64, y: f64) -> [TimeIntervals; 2] {
-    let weight = |depth: f64| if shear.parallel { 1.0 } else { depth };
-    let ends = [0.0, 1.0].map(|t| {
+    times(f64::from, [x, y], triangle, shear)
+}
+
+/// The same, with its multiply-adds on a tally.
+pub fn time_interval_counted(
+    triangle: &Triangle,
+    shear: &Shear,
+    at: [f64; 2],
+    tally: &Tally,
+) -> [TimeIntervals; 2] {
+    let number = |value: f64| Counting::new(value, tally);
+    times(|value| number(f64::from(value)), at.map(number), triangle, shear)
+}
+
+fn times<N: Number>(
+    number: impl Fn(f32) -> N,
+    at: [N; 2],
+    triangle: &Triangle,
+    shear: &Shear,
+) -> [TimeIntervals; 2] {
+    let (one, half) = (N::from(1.0), N::from(0.5));
+    let ends = [false, true].map(|closes| {
         triangle.corners.map(|corner| {
-            let [px, py, w] = [0, 1, 2].map(|k| f64::from(corner.open[k]) + t * f64::from(corner.delta[k]));
-            [px - x * weight(w), py - y * weight(w)]
+            let [x, y, w] = [0, 1, 2].map(|k| {
+                let open = number(corner.open[k]);
+                if closes { open + number(corner.delta[k]) } else { open }
+            });
+            let weight = if shear.parallel { one } else { w };
+            [x - at[0] * weight, y - at[1] * weight]
         })
     });
     let edge = |i: usize, j: usize| {
         let cross = |s: usize, e: usize| ends[s][i][0] * ends[e][j][1] - ends[s][i][1] * ends[e][j][0];
-        Quadratic([cross(0, 0), 0.5 * (cross(0, 1) + cross(1, 0)), cross(1, 1)])
+        Quadratic([cross(0, 0), half * (cross(0, 1) + cross(1, 0)), cross(1, 1)])
     };
     let edges = [edge(1, 2), edge(2, 0), edge(0, 1)];
     // Magnitude of the terms that cancel in an edge.
-    let size = [0, 1].map(|axis| ends.iter().flatten().map(|p| p[axis].abs()).fold(0.0, f64::max));
-    let error = RAISED * (size[0] * size[1]) + rounding_of_places(triangle, shear, [x, y], size);
-    [1.0, -1.0].map(|sign| inside(edges.map(|edge| Quadratic(edge.0.map(|b| sign * b + error)))))
+    let size = [0, 1].map(|axis| ends.iter().flatten().map(|p| p[axis].abs()).fold(N::zero(), N::max));
+    let raised = N::constant(RAISED);
+    let largest = [0, 1].map(|axis| largest(&number, at[axis], axis, triangle, shear));
+    // The second term is the error of an edge by the rounding of positions.
+    let error = raised * (size[0] * size[1]) + raised * (largest[0] * size[1] + largest[1] * size[0]);
+    [false, true].map(|flips| {
+        inside(edges.map(|edge| Quadratic(edge.0.map(|b| if flips { error - b } else { b + error }))))
+    })
 }
 
-/// Error of an edge by the rounding of positions in `f64`.
-fn rounding_of_places(triangle: &Triangle, shear: &Shear, at: [f64; 2], size: [f64; 2]) -> f64 {
-    let largest = |axis: usize| {
-        let reach = |k: usize| triangle.corners.map(|c| f64::from(c.open[k].abs() + c.delta[k].abs()));
-        let [places, depths] = [reach(axis), reach(2)];
-        let weight = |k: usize| if shear.parallel { 1.0 } else { depths[k] };
-        (0..3).map(|k| places[k] + at[axis].abs() * weight(k)).fold(0.0, f64::max)
-    };
-    RAISED * (largest(0) * size[1] + largest(1) * size[0])
+/// Largest magnitude along `axis` of the terms of a vertex seen from a point of the image.
+fn largest<N: Number>(
+    number: &impl Fn(f32) -> N,
+    at: N,
+    axis: usize,
+    triangle: &Triangle,
+    shear: &Shear,
+) -> N {
+    let reach = |k: usize| triangle.corners.map(|c| number(c.open[k].abs() + c.delta[k].abs()));
+    let [places, depths] = [reach(axis), reach(2)];
+    let weight = |k: usize| if shear.parallel { N::from(1.0) } else { depths[k] };
+    (0..3).map(|k| places[k] + at.abs() * weight(k)).fold(N::zero(), N::max)
 }
 
 /// Times at which some point of `rect` may be inside `triangle`, by visible face; conservative. For a
@@ -113,11 +147,11 @@ fn rounding_of_places(triangle: &Triangle, shear: &Shear, at: [f64; 2], size: [f
 /// sample test.
 pub fn time_interval_over(triangle: &Triangle, shear: &Shear, rect: &TileRect) -> [TimeIntervals; 2] {
     let moving = Triangle { moving: true, ..*triangle };
-    let edges = Edges::new(View::new(&moving, &shear.sharp(), rect, &Box5::whole(false)));
+    let edges = Edges::<f64>::new(View::new(&moving, &shear.sharp(), rect, &Box5::whole(false)));
     [[true, false], [false, true]].map(|face: Faces| inside(EdgeBounds::new(&edges).tallest(face)))
 }
 
-fn inside(edges: [Quadratic; 3]) -> TimeIntervals {
+fn inside<N: Number>(edges: [Quadratic<N>; 3]) -> TimeIntervals {
     edges.iter().fold(TimeIntervals::WHOLE, |left, edge| left.intersect(edge.above()))
 }
 

@@ -113,10 +113,10 @@ fn passes_of_a_frame_add_up_on_one_map() {
         let settings = Settings { spec: &spec, viewport, samples: &table, background: Vec3::ZERO };
         gpu.draw(&RasterPass::new(&camera, &draws, &settings)).unwrap();
     }
-    let work = TileWork { tile: 12, tiles: 3, tile_madds: 7, samples: 5, ..TileWork::default() };
-    for viewport in [Some(image), Some(map), None] {
-        gpu.begin("tiles", viewport);
-        gpu.tile(&work, []);
+    for viewport in [image, map] {
+        gpu.shade_pixels("grey", viewport, |lanes, [x, y]| {
+            lanes.run(|lane| Vec3::splat(lane.add(x as f32, y as f32)))
+        });
     }
     let report = gpu.finish();
     let counts = report.counts();
@@ -126,7 +126,13 @@ fn passes_of_a_frame_add_up_on_one_map() {
         let placed = (map.total() - map.elsewhere) as f64;
         assert!((pixels - placed).abs() <= 1e-4 * placed, "{:?}: {pixels} of {placed}", map.event);
     }
-    let tested = report.heat.iter().find(|map| map.event == Event::SamplesTested).unwrap();
-    let passes = report.passes.iter().map(|pass| pass.counts()[Event::SamplesTested]);
-    assert_eq!(tested.elsewhere, passes.clone().next().unwrap() + 2 * 5);
+    let elsewhere = |event: Event| {
+        let map = report.heat.iter().find(|map| map.event == event).unwrap();
+        let passes: Vec<u64> = report.passes.iter().map(|pass| pass.counts()[event]).collect();
+        (map.elsewhere, passes)
+    };
+    let (tested, passes) = elsewhere(Event::SamplesTested);
+    assert_eq!(tested, passes[0]);
+    let (resolved, passes) = elsewhere(Event::PixelsResolved);
+    assert_eq!((resolved, passes[4]), (passes[0] + passes[4], 32 * 32));
 }

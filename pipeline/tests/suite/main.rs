@@ -9,6 +9,7 @@ mod closed;
 mod common;
 mod conservative;
 mod conservative_by_hand;
+mod conservative_pass;
 mod costs;
 mod culling;
 mod depth;

@@ -174,35 +174,3 @@ fn sixty_four_passes_of_one_triangle_are_sixty_four_times_one() {
         assert_eq!(packets.iter().filter(|packet| packet.kind == PacketKind::Draw).count(), 64);
     });
 }
-
-/// Work that the caller does in tiles: its packets add up, and every line is accessed once.
-#[test]
-fn tiles_of_the_caller_become_packets() {
-    let spec = spec(Features::ALL);
-    let (mut sum, mut lines, mut kinds) = (Counts::default(), 0, Vec::new());
-    let mut gpu = Gpu::new(&spec, |packet, accesses| {
-        sum += &packet.counts;
-        lines += accesses.len();
-        kinds.push((packet.kind, packet.pass));
-    })
-    .unwrap();
-    gpu.begin("first", None);
-    let vertices = gpu.surface(20 * 3 * 24);
-    gpu.draw_stream(20, &TriangleStream { vertices, vertex_bytes: 24, vertex_ops: 8, setup_madds: 60 });
-    gpu.begin("second", None);
-    let [depths, image] = [130, 400].map(|bytes| gpu.surface(bytes));
-    let touch =
-        Touch { client: Client::Depth, address: depths.address(), bytes: 130, write: true, fresh: true };
-    gpu.tile(&TileWork { tile: 3, triangle: Some(0), tiles: 1, ..TileWork::default() }, [touch]);
-    gpu.write_image(image, 64);
-    let report = gpu.finish();
-    let total = report.counts();
-    assert_eq!((total, report.triangles()), (sum, 20));
-    assert_eq!((total[Event::VertexBytes], total[Event::ShaderOps]), (20 * 3 * 24, 20 * 3 * 8));
-    assert_eq!((total[Event::DepthLines], total[Event::PixelsResolved]), (3, 100));
-    assert_eq!(total[Event::DramWriteBytes], 7 * 64, "100 pixels are 6.25 lines");
-    assert!(lines > 0);
-    use PacketKind::{Draw, Resolve, Tile, Vertices};
-    let second = [(Tile, 1), (Resolve, 1), (Resolve, 1), (Resolve, 1)];
-    assert_eq!(kinds, [[(Draw, 0), (Vertices, 0), (Vertices, 0)].as_slice(), &second].concat());
-}

@@ -2,6 +2,7 @@
 //! it.
 
 use glam::DVec3;
+use pipeline::Lane;
 
 /// A beam: the points `sum b_i ((1 - t) open_i + t close_i)` for barycentric weights `b` and `t` in [0, 1].
 /// Its flux is uniform over the generator triangle `open`.
@@ -31,7 +32,13 @@ const MAX_NEGATIVE_WEIGHT: f64 = 1e-9;
 impl Beam {
     /// The corners at `t`.
     pub fn corners(&self, t: f64) -> [DVec3; 3] {
-        [0, 1, 2].map(|k| self.open[k] + t * (self.close[k] - self.open[k]))
+        self.corners_on(&Lane::default(), t)
+    }
+
+    /// The same on a lane.
+    pub(super) fn corners_on(&self, lane: &Lane, t: f64) -> [DVec3; 3] {
+        let at = DVec3::splat(t);
+        [0, 1, 2].map(|k| lane.madd(at, lane.sub(self.close[k], self.open[k]), self.open[k]))
     }
 
     /// Path of the light of a corner, from start to end.
@@ -41,61 +48,65 @@ impl Beam {
 
     /// Point at a position.
     pub fn point(&self, hit: &Hit) -> DVec3 {
-        weigh(&self.corners(hit.t), hit.weights)
+        weigh(&Lane::default(), &self.corners(hit.t), hit.weights)
     }
 
     /// Motion at a position: the direction of its light, times its length.
-    pub fn motion(&self, hit: &Hit) -> DVec3 {
-        weigh(&[0, 1, 2].map(|k| self.path(k)), hit.weights)
+    pub fn motion(&self, lane: &Lane, hit: &Hit) -> DVec3 {
+        weigh(lane, &[0, 1, 2].map(|k| lane.sub(self.close[k], self.open[k])), hit.weights)
     }
 
     /// Bernstein coefficients in `t` of the vector area `(x1 - x0) x (x2 - x0)`, twice that of the triangle.
-    pub fn areas(&self) -> [DVec3; 3] {
-        let [first, last] = [&self.open, &self.close].map(|x| [x[1] - x[0], x[2] - x[0]]);
-        let middle = 0.5 * (first[0].cross(last[1]) + last[0].cross(first[1]));
-        [first[0].cross(first[1]), middle, last[0].cross(last[1])]
+    pub fn areas(&self, lane: &Lane) -> [DVec3; 3] {
+        let [first, last] = [&self.open, &self.close].map(|x| [lane.sub(x[1], x[0]), lane.sub(x[2], x[0])]);
+        let both = lane.add(lane.cross(first[0], last[1]), lane.cross(last[0], first[1]));
+        let middle = lane.mul(DVec3::splat(0.5), both);
+        [lane.cross(first[0], first[1]), middle, lane.cross(last[0], last[1])]
     }
 
     /// Jacobian `det(dx/db1, dx/db2, dx/dt)` at a position. Light crosses itself where it changes sign.
-    pub fn jacobian(&self, hit: &Hit) -> f64 {
-        let [a, b, c] = self.corners(hit.t);
-        (b - a).cross(c - a).dot(self.motion(hit))
+    pub fn jacobian(&self, lane: &Lane, hit: &Hit) -> f64 {
+        let [a, b, c] = self.corners_on(lane, hit.t);
+        lane.dot(lane.cross(lane.sub(b, a), lane.sub(c, a)), self.motion(lane, hit))
     }
 
     /// Positions at which `point` lies in the beam, up to three: roots in `t` of the cubic `det[x1 - x0, x2 -
     /// x0, point - x0] = 0`.
-    pub fn inside(&self, point: DVec3) -> impl Iterator<Item = Hit> {
-        let sides = |x: &[DVec3; 3]| [x[1] - x[0], x[2] - x[0], point - x[0]];
+    pub fn inside(&self, lane: &Lane, point: DVec3) -> impl Iterator<Item = Hit> {
+        let sides = |x: &[DVec3; 3]| [lane.sub(x[1], x[0]), lane.sub(x[2], x[0]), lane.sub(point, x[0])];
         let (first, last) = (sides(&self.open), sides(&self.close));
-        let roots = Cubic::of_determinant(&first, &last).roots();
-        roots.into_iter().flatten().filter_map(move |t| self.at(point, t))
+        let roots = Cubic::of_determinant(lane, &first, &last).roots(lane);
+        roots.into_iter().flatten().filter_map(move |t| self.at(lane, point, t))
     }
 
     /// Weights of a point in the plane of the triangle at `t`, if it is in the triangle.
-    fn at(&self, point: DVec3, t: f64) -> Option<Hit> {
-        let [a, b, c] = self.corners(t);
-        let (along, across, to) = (b - a, c - a, point - a);
-        let area = along.cross(across);
-        let squared = area.length_squared();
-        if squared == 0.0 {
+    fn at(&self, lane: &Lane, point: DVec3, t: f64) -> Option<Hit> {
+        let [a, b, c] = self.corners_on(lane, t);
+        let (along, across, to) = (lane.sub(b, a), lane.sub(c, a), lane.sub(point, a));
+        let area = lane.cross(along, across);
+        let squared = lane.dot(area, area);
+        if lane.branch(squared == 0.0) {
             return None;
         }
-        let second = to.cross(across).dot(area) / squared;
-        let third = along.cross(to).dot(area) / squared;
-        let weights = [1.0 - second - third, second, third];
+        let second = lane.div(lane.dot(lane.cross(to, across), area), squared);
+        let third = lane.div(lane.dot(lane.cross(along, to), area), squared);
+        let weights = [lane.sub(lane.sub(1.0, second), third), second, third];
         // Rounding error of the corners, relative to the triangle.
-        let size = [a, b, c, point].iter().map(|p| p.abs().max_element()).fold(0.0, f64::max);
-        let side = libm::sqrt(along.length_squared().max(across.length_squared()));
-        let slack = MAX_NEGATIVE_WEIGHT + 64.0 * f64::EPSILON * size * side / libm::sqrt(squared);
-        weights.iter().all(|weight| *weight >= -slack).then_some(Hit { weights, t })
+        let size = [a, b, c, point].iter().fold(DVec3::ZERO, |most, p| lane.max(most, p.abs()));
+        let size = lane.max(lane.max(size.x, size.y), size.z);
+        let side = lane.root(lane.max(lane.dot(along, along), lane.dot(across, across)));
+        let sized = lane.mul(lane.mul(64.0 * f64::EPSILON, size), side);
+        let slack = lane.add(MAX_NEGATIVE_WEIGHT, lane.div(sized, lane.root(squared)));
+        weights.iter().all(|weight| lane.branch(*weight >= -slack)).then_some(Hit { weights, t })
     }
 
     /// Roots of the Jacobian at the corners, sorted: the light of a corner crosses that of its neighbours.
     /// Between two roots, the Jacobian has either one sign over all of the triangle, or different signs all
     /// the time.
     pub fn folds(&self) -> Vec<f64> {
-        let areas = self.areas();
-        let at_corner = |k: usize| quadratic_roots(areas.map(|area| area.dot(self.path(k))));
+        let lane = Lane::default();
+        let areas = self.areas(&lane);
+        let at_corner = |k: usize| quadratic_roots(&lane, areas.map(|area| area.dot(self.path(k))));
         let mut folds: Vec<f64> = (0..3).flat_map(at_corner).filter(|t| *t > 0.0 && *t < 1.0).collect();
         folds.sort_by(f64::total_cmp);
         folds
@@ -130,8 +141,9 @@ impl Beam {
     }
 }
 
-fn weigh(of: &[DVec3; 3], weights: [f64; 3]) -> DVec3 {
-    of[0] * weights[0] + of[1] * weights[1] + of[2] * weights[2]
+fn weigh(lane: &Lane, of: &[DVec3; 3], weights: [f64; 3]) -> DVec3 {
+    let [a, b, c] = weights.map(DVec3::splat);
+    lane.madd(of[2], c, lane.madd(of[1], b, lane.mul(of[0], a)))
 }
 
 /// A cubic, by its Bernstein coefficients.
@@ -143,12 +155,15 @@ const ROUNDING: f64 = 16.0 * f64::EPSILON;
 
 impl Cubic {
     /// `det[a(t), b(t), c(t)]` of three vectors that are linear in `t`, by the polar form of a product.
-    pub fn of_determinant(first: &[DVec3; 3], last: &[DVec3; 3]) -> Self {
+    pub fn of_determinant(lane: &Lane, first: &[DVec3; 3], last: &[DVec3; 3]) -> Self {
         let det = |at: [usize; 3]| {
             let [a, b, c] = [0, 1, 2].map(|k| if at[k] == 0 { first[k] } else { last[k] });
-            a.cross(b).dot(c)
+            lane.dot(lane.cross(a, b), c)
         };
-        let mean = |of: [[usize; 3]; 3]| (det(of[0]) + det(of[1]) + det(of[2])) / 3.0;
+        let mean = |of: [[usize; 3]; 3]| {
+            let sum = lane.add(lane.add(det(of[0]), det(of[1])), det(of[2]));
+            lane.div(sum, 3.0)
+        };
         Self([
             det([0, 0, 0]),
             mean([[1, 0, 0], [0, 1, 0], [0, 0, 1]]),
@@ -158,8 +173,8 @@ impl Cubic {
     }
 
     /// Value by de Casteljau's algorithm.
-    fn at(&self, t: f64) -> f64 {
-        let step = |a: f64, b: f64| a + t * (b - a);
+    fn at(&self, lane: &Lane, t: f64) -> f64 {
+        let step = |a: f64, b: f64| lane.madd(t, lane.sub(b, a), a);
         let [a, b, c, d] = self.0;
         let (ab, bc, cd) = (step(a, b), step(b, c), step(c, d));
         step(step(ab, bc), step(bc, cd))
@@ -167,17 +182,20 @@ impl Cubic {
 
     /// Roots in order, a double one once. None if the cubic is zero everywhere: then all points lie in one
     /// plane.
-    pub fn roots(&self) -> [Option<f64>; 3] {
+    pub fn roots(&self, lane: &Lane) -> [Option<f64>; 3] {
         let [a, b, c, d] = self.0;
-        let zero = ROUNDING * self.0.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
+        let zero =
+            lane.mul(ROUNDING, self.0.iter().fold(0.0, |most: f64, value| lane.max(most, value.abs())));
         let mut found = [None; 3];
-        if self.0.iter().all(|value| *value > zero) || self.0.iter().all(|value| *value < -zero) {
+        let all = |sign: f64| self.0.iter().all(|value| lane.branch(sign * value > zero));
+        if all(1.0) || all(-1.0) {
             return found;
         }
-        let turns = quadratic_roots([b - a, c - b, d - c]).filter(|t| *t > 0.0 && *t < 1.0);
+        let sides = [lane.sub(b, a), lane.sub(c, b), lane.sub(d, c)];
+        let turns = quadratic_roots(lane, sides).filter(|t| lane.branch(*t > 0.0 && *t < 1.0));
         let (mut from, mut count) = (0.0, 0);
         for to in turns.chain([1.0]) {
-            let root = self.monotone_root(from, to, zero);
+            let root = self.monotone_root(lane, from, to, zero);
             // A turning point that is a root belongs to two pieces.
             let again = |t: f64| count > 0 && found[count - 1].is_some_and(|last| t - last < 1e-12);
             if let Some(t) = root.filter(|t| !again(*t))
@@ -192,39 +210,42 @@ impl Cubic {
     }
 
     /// Root in a monotonic piece.
-    fn monotone_root(&self, from: f64, to: f64, zero: f64) -> Option<f64> {
+    fn monotone_root(&self, lane: &Lane, from: f64, to: f64, zero: f64) -> Option<f64> {
         let (mut low, mut high) = (from, to);
-        let (first, last) = (self.at(low), self.at(high));
-        if first.abs() <= zero {
-            return (last.abs() > zero).then_some(low);
+        let (first, last) = (self.at(lane, low), self.at(lane, high));
+        if lane.branch(first.abs() <= zero) {
+            return lane.branch(last.abs() > zero).then_some(low);
         }
-        if last.abs() <= zero {
+        if lane.branch(last.abs() <= zero) {
             return Some(high);
         }
-        if first * last > 0.0 {
+        if lane.branch(lane.mul(first, last) > 0.0) {
             return None;
         }
-        while high - low > 2.0 * f64::EPSILON * high {
-            let middle = 0.5 * (low + high);
-            if middle <= low || middle >= high {
+        let half_way = |low: f64, high: f64| lane.mul(0.5, lane.add(low, high));
+        while lane.branch(lane.sub(high, low) > lane.mul(2.0 * f64::EPSILON, high)) {
+            let middle = half_way(low, high);
+            if lane.branch(middle <= low || middle >= high) {
                 break;
             }
-            if self.at(middle) * first > 0.0 { low = middle } else { high = middle }
+            let is_before = lane.branch(lane.mul(self.at(lane, middle), first) > 0.0);
+            if is_before { low = middle } else { high = middle }
         }
-        Some(0.5 * (low + high))
+        Some(half_way(low, high))
     }
 }
 
 /// Real roots of a quadratic by its Bernstein coefficients, in order and unbounded; a double root may occur
 /// twice.
-fn quadratic_roots([a, b, c]: [f64; 3]) -> impl Iterator<Item = f64> {
+fn quadratic_roots(lane: &Lane, [a, b, c]: [f64; 3]) -> impl Iterator<Item = f64> + use<> {
     // a (1 - t)^2 + 2 b t (1 - t) + c t^2 = p t^2 + 2 q t + a
-    let (p, q) = (a - 2.0 * b + c, b - a);
-    let discriminant = q * q - p * a;
-    let root = libm::sqrt(discriminant.max(0.0));
+    let (p, q) = (lane.add(lane.madd(-2.0, b, a), c), lane.sub(b, a));
+    let discriminant = lane.madd(-p, a, lane.mul(q, q));
+    let root = lane.root(lane.max(discriminant, 0.0));
     // Computes the larger root first, which avoids cancellation.
-    let far = if q > 0.0 { -q - root } else { root - q };
-    let roots = if discriminant < 0.0 { [f64::NAN; 2] } else { [far / p, a / far] };
+    let far = if lane.branch(q > 0.0) { lane.sub(-q, root) } else { lane.sub(root, q) };
+    let is_real = !lane.branch(discriminant < 0.0);
+    let roots = if is_real { [lane.div(far, p), lane.div(a, far)] } else { [f64::NAN; 2] };
     let sorted = if roots[0] > roots[1] { [roots[1], roots[0]] } else { roots };
     sorted.into_iter().filter(|t| t.is_finite())
 }
@@ -244,7 +265,7 @@ mod tests {
             };
             let hit = random.hit();
             let point = beam.point(&hit);
-            let found: Vec<Hit> = beam.inside(point).collect();
+            let found: Vec<Hit> = beam.inside(&Lane::default(), point).collect();
             several += usize::from(found.len() > 1);
             let near = |a: &Hit| (a.t - hit.t).abs() < 1e-6;
             assert!(found.iter().any(near), "{round}: {hit:?} {found:?}");
@@ -261,7 +282,7 @@ mod tests {
         let most = (0..3000).map(|_| {
             let beam = turned(&mut random);
             let point = beam.point(&random.hit());
-            beam.inside(point).count()
+            beam.inside(&Lane::default(), point).count()
         });
         assert_eq!(most.max(), Some(3));
     }
@@ -294,7 +315,7 @@ mod tests {
                 }
             }
             if !unsure {
-                assert_eq!(beam.inside(point).count(), crossings);
+                assert_eq!(beam.inside(&Lane::default(), point).count(), crossings);
                 outside += usize::from(crossings == 0);
             }
         }
@@ -316,10 +337,10 @@ mod tests {
             let d2 = (moved([a - h, b, c + h], hit.t) - here) / h;
             let dt = (moved(hit.weights, hit.t + h) - here) / h;
             let by_difference = d1.cross(d2).dot(dt);
-            let difference = (by_difference - beam.jacobian(&hit)).abs();
+            let difference = (by_difference - beam.jacobian(&Lane::default(), &hit)).abs();
             assert!(difference < 1e-3 * (1.0 + by_difference.abs()), "{by_difference}: {difference}");
             if let Some(sign) = beam.sign(hit.t) {
-                assert!(sign * beam.jacobian(&hit) >= -1e-12);
+                assert!(sign * beam.jacobian(&Lane::default(), &hit) >= -1e-12);
             } else {
                 crossed += 1;
             }
@@ -344,22 +365,22 @@ mod tests {
             [[0.2, 0.5, 0.9], [-1.0, 0.3, 4.0], [0.1, 0.11, 0.12], [0.0, 0.25, 1.0], [-3.0, -2.0, 7.0]]
         {
             for scale in [1e-6, 1.0, -1e7] {
-                let found = with_roots(roots, scale).roots();
+                let found = with_roots(roots, scale).roots(&Lane::default());
                 let inside: Vec<f64> = roots.into_iter().filter(|t| (0.0..=1.0).contains(t)).collect();
                 let found: Vec<f64> = found.into_iter().flatten().collect();
                 assert_eq!(found.len(), inside.len(), "{roots:?}: {found:?}");
                 assert!(found.iter().zip(&inside).all(|(a, b)| (a - b).abs() < 1e-9), "{found:?}");
             }
         }
-        assert_eq!(Cubic([0.0; 4]).roots(), [None; 3]);
+        assert_eq!(Cubic([0.0; 4]).roots(&Lane::default()), [None; 3]);
     }
 
     #[test]
     fn quadratics_are_solved() {
-        let found: Vec<f64> = quadratic_roots([-1.0, 0.0, 1.0]).collect();
+        let found: Vec<f64> = quadratic_roots(&Lane::default(), [-1.0, 0.0, 1.0]).collect();
         assert_eq!(found, [0.5], "a line");
-        let found: Vec<f64> = quadratic_roots([2.0, -3.0, 2.0]).collect();
+        let found: Vec<f64> = quadratic_roots(&Lane::default(), [2.0, -3.0, 2.0]).collect();
         assert!(found.len() == 2 && found.iter().all(|t| (10.0 * t * t - 10.0 * t + 2.0).abs() < 1e-12));
-        assert_eq!(quadratic_roots([1.0, 1.0, 1.0]).count(), 0);
+        assert_eq!(quadratic_roots(&Lane::default(), [1.0, 1.0, 1.0]).count(), 0);
     }
 }

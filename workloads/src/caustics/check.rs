@@ -1,6 +1,7 @@
 //! Checks of a method: coverage compared with brute force, and warnings about inaccurate beams.
 
 use glam::DVec3;
+use pipeline::Lane;
 use rayon::prelude::*;
 use warnings::{Code, Warning};
 
@@ -49,7 +50,7 @@ pub fn receivers(beams: &[Beam], eye: &Eye, method: Method, floor: &Floor) -> Co
             let Some(point) = floor.point(eye, eye.pixel_centre([x, y])) else { continue };
             for (number, seen) in (0..).zip(&seen) {
                 let near = seen.as_ref().filter(|(bounds, _)| bounds.contains(point));
-                let hits = near.map_or(0, |(_, seen)| seen.image.inside(point).count());
+                let hits = near.map_or(0, |(_, seen)| seen.image.inside(&Lane::default(), point).count());
                 if hits > 0 {
                     found.lit += 1;
                     found.by_hits[hits.min(3) - 1] += 1;
@@ -135,7 +136,7 @@ mod tests {
             let bounds = BoundingBox::of(&beam);
             assert!(bounds.contains(inside));
             let far = inside + DVec3::splat(12.0);
-            assert!(!bounds.contains(far) && beam.inside(far).count() == 0);
+            assert!(!bounds.contains(far) && beam.inside(&Lane::default(), far).count() == 0);
         }
     }
 }

@@ -101,16 +101,14 @@ impl<'a> Cover<'a> {
             let (a, b) = (face[i], face[j]);
             (a.x - x) * (b.y - y) - (b.x - x) * (a.y - y)
         };
+        let slack = slack(self.eye, face);
         let corners = face.map(|p| p.to_array());
         // Depth increases away from the camera.
         if (face[1] - face[0]).cross(face[2] - face[0]).z <= 0.0 {
             return;
         }
         let Some(triangle) = MovingTriangle::new(corners, corners) else { return };
-        let largest = face.iter().map(|p| p.abs().max_element()).fold(0.0, f64::max);
-        let (side, grid) =
-            (f64::from(self.eye.viewport().width().max(self.eye.viewport().height())), self.grid);
-        let slack = 16.0 * f64::EPSILON * (largest + side) * (largest + side);
+        let grid = self.grid;
         Rasterizer::new(View::orthographic()).rasterize(&triangle, &grid, |tile, _| {
             self.test(tile, EVERYWHERE, |at| {
                 [(0, 1), (1, 2), (2, 0)].iter().all(|&(i, j)| edge(i, j, at) >= -slack)
@@ -141,12 +139,19 @@ impl<'a> Cover<'a> {
     }
 }
 
+/// Error of the edges of a face at a pixel by rounding.
+pub(super) fn slack(eye: &Eye, face: &[DVec3; 3]) -> f64 {
+    let largest = face.iter().map(|p| p.abs().max_element()).fold(0.0, f64::max);
+    let side = f64::from(eye.viewport().width().max(eye.viewport().height()));
+    16.0 * f64::EPSILON * (largest + side) * (largest + side)
+}
+
 /// Most halvings of a tile's time.
-const MAX_HALVINGS: u32 = 2;
-const EVERYWHERE: [[f64; 2]; 2] = [[f64::NEG_INFINITY, f64::INFINITY]; 2];
+pub(super) const MAX_HALVINGS: u32 = 2;
+pub(super) const EVERYWHERE: [[f64; 2]; 2] = [[f64::NEG_INFINITY, f64::INFINITY]; 2];
 
 /// Bounding box of the corners while a tile may be touched, with a margin for rounding.
-fn reach(seen: &Seen, touch: &Touch) -> [[f64; 2]; 2] {
+pub(super) fn reach(seen: &Seen, touch: &Touch) -> [[f64; 2]; 2] {
     let ends = touch.t.map(|t| seen.image.corners(t));
     [0, 1].map(|axis| {
         let all = || ends.iter().flatten().map(|p| p[axis]);

@@ -1,8 +1,9 @@
 //! Drawing of beams into an image.
 
+use pipeline::Lane;
 use rayon::prelude::*;
 
-use super::cover::{Cover, TILE_PX};
+use super::cover::{Cover, TILE_PX, times};
 use super::eye::Seen;
 use super::{Beam, Eye, Light, Method};
 
@@ -137,7 +138,9 @@ impl Band {
             let place = ((pixel[1] - self.rows[0] * TILE_PX) * eye.viewport().width() + pixel[0]) as usize;
             self.runs[place] += 1;
             if let Some(light) = light {
-                let found = light.shade(eye, seen, eye.pixel_centre(pixel));
+                let at = eye.pixel_centre(pixel);
+                let times = Some(times(eye, seen, at));
+                let found = light.shade(&Lane::default(), eye, seen, at, times);
                 self.light[place] += found;
                 self.useful += u64::from(found > 0.0);
             }

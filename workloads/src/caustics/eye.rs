@@ -65,6 +65,11 @@ impl Eye {
         self.scale_px
     }
 
+    /// Projection of vertices.
+    pub(super) fn projection(&self) -> &Projection {
+        &self.projection
+    }
+
     /// Projection shear of the rasterizer.
     pub(super) fn shear(&self) -> &Shear {
         &self.projection.shear

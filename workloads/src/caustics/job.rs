@@ -1,12 +1,12 @@
 //! The job `quintile run caustics`.
 
 use glam::{DVec3, Vec3};
-use pipeline::{Client, Gpu, TileWork, Touch, TriangleStream};
+use pipeline::Gpu;
 use serde::{Deserialize, Serialize};
 
 use super::check::{accuracy_warnings, crossing};
-use super::draw::{Covered, draw_with_work};
 use super::generator::Ocean;
+use super::shader::draw_on;
 use super::{Beam, Eye, Floor, Light, Method, Picture};
 use crate::error::LoadError;
 use crate::job::{Drawn, Draws, Fact, Flag, Flags, Job, JobError, OptionSource, Request};
@@ -113,24 +113,6 @@ pub fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<dyn Job>
     Ok(Box::new(Caustics { options, ocean, settings }))
 }
 
-/// Bytes of a vertex at both ends of a beam.
-const VERTEX_BYTES: u32 = 24;
-/// Operations of the vertex shader that refracts the light and follows it to the floor.
-const VERTEX_OPS: u32 = 70;
-/// Multiply-adds of the set-up of a moving triangle.
-const SETUP_MADDS: u32 = 60;
-/// Multiply-adds of a conservative tile test: four sides at both times, three edges at eight corners, and
-/// planes of depth.
-const TILE_MADDS: u32 = 180;
-/// Multiply-adds of the exact times at a pixel.
-const TIME_MADDS: u32 = 60;
-/// Bytes per pixel of the buffer that accumulates light.
-const LIGHT_BYTES: u64 = 4;
-/// Bytes per pixel of the image.
-const PIXEL_BYTES: u64 = 4;
-/// Pixels of a tile.
-const TILE_PIXELS: u64 = 64;
-
 impl Draws for Caustics {
     /// Time of the waves, in seconds.
     type Input = f64;
@@ -147,8 +129,8 @@ impl Draws for Caustics {
         let beams = self.ocean.beams(*time_s);
         let eye = self.eye().ok_or_else(|| JobError::Setting("the view has no extent".to_owned()))?;
         let method = self.options.method;
-        let (picture, work) = draw_with_work(&beams, &eye, method, Some(self.light()), true);
-        self.charge(&beams, &eye, &work, gpu);
+        let picture = draw_on(gpu, &beams, &eye, method, self.light());
+        gpu.write_image("tone", eye.viewport());
         Ok(Drawn {
             image: toned(&picture.light),
             moving: method == Method::Moving,
@@ -183,51 +165,6 @@ impl Caustics {
         };
         Eye::new([middle + distance * toward, middle, up], needed[1].max(needed[0] / aspect), size)
     }
-
-    /// Adds the work to the frame: one draw of all beams, and each tile of each beam.
-    fn charge(&self, beams: &[Beam], eye: &Eye, work: &[Covered], gpu: &mut Gpu<'_>) {
-        let triangles = beams.len() * self.options.method.triangles();
-        let pixels = eye.viewport().pixels() as u64;
-        let tiles =
-            u64::from(eye.viewport().width().div_ceil(8)) * u64::from(eye.viewport().height().div_ceil(8));
-        let light = gpu.surface(tiles * TILE_PIXELS * LIGHT_BYTES);
-        let vertices = gpu.surface(3 * triangles as u64 * u64::from(VERTEX_BYTES));
-        let stream = TriangleStream {
-            vertices,
-            vertex_bytes: VERTEX_BYTES,
-            vertex_ops: VERTEX_OPS,
-            setup_madds: SETUP_MADDS,
-        };
-        // The maps of a GPU with other tiles cannot show these.
-        let viewport = (gpu.spec().tile_px == 8).then(|| eye.viewport());
-        gpu.begin("light", viewport);
-        gpu.draw_stream(triangles, &stream);
-        let mut used = vec![false; tiles as usize];
-        for covered in work {
-            let runs = covered.pixels.count_ones();
-            // The pixel centre is its only sample, tested at all times at once.
-            let work = TileWork {
-                tile: covered.tile,
-                triangle: Some(covered.beam),
-                tiles: 1,
-                tile_madds: TILE_MADDS,
-                samples: runs,
-                sample_madds: TIME_MADDS * runs,
-                hits: runs,
-                lanes: runs,
-                shader_ops: runs * self.light().ops(),
-                colours: runs,
-                ..TileWork::default()
-            };
-            let fresh = !std::mem::replace(&mut used[covered.tile as usize], true);
-            let bytes = TILE_PIXELS * LIGHT_BYTES;
-            let address = light.address() + u64::from(covered.tile) * bytes;
-            gpu.tile(&work, [Touch { client: Client::Colour, address, bytes, write: true, fresh }]);
-        }
-        let image = gpu.surface(pixels * PIXEL_BYTES);
-        gpu.begin("tone", viewport);
-        gpu.write_image(image, TILE_PIXELS as u32);
-    }
 }
 
 fn facts(picture: &Picture, beams: &[Beam]) -> Vec<Fact> {
@@ -238,6 +175,7 @@ fn facts(picture: &Picture, beams: &[Beam]) -> Vec<Fact> {
         ("shader_executions", runs),
         ("shader_executions_per_pixel", runs / picture.runs.len().max(1) as f64),
         ("executions_that_find_light", picture.useful as f64 / runs.max(1.0)),
+        ("pixels_tested", picture.tests as f64),
         ("crossed_share_of_length", crossing(beams)),
         ("beams_left_out", picture.skipped as f64),
     ];
@@ -281,6 +219,9 @@ mod tests {
             assert!(ours.image.iter().filter(|pixel| pixel.y > 0.0).count() > 500, "{look}");
             let executions = ours.facts.iter().find(|fact| fact.name == "shader_executions").unwrap().value;
             assert_eq!(counts[Event::PixelInvocations] as f64, executions);
+            let tested = ours.facts.iter().find(|fact| fact.name == "pixels_tested").unwrap().value;
+            assert_eq!(counts[Event::SamplesTested] as f64, tested);
+            assert!(counts[Event::SamplesHit] == counts[Event::PixelInvocations] && tested > executions);
             let (prism, prism_counts) =
                 drawn(&[("cells", "12"), ("wave_m", "18"), ("look", look), ("method", "prism")]);
             assert_eq!(prism.image, ours.image);

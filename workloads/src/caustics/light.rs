@@ -1,8 +1,9 @@
 //! Light of a beam at a pixel: the pixel shader.
 
 use glam::DVec3;
+use pipeline::Lane;
+use pipeline::traversal::{TimeIntervals, time_interval_counted};
 
-use super::cover::times;
 use super::eye::Seen;
 use super::{Eye, Hit};
 
@@ -23,27 +24,20 @@ pub enum Light {
     Floor(Floor),
 }
 
-/// Multiply-adds of one shader execution in the volume, counted from the code below: three edges and their
-/// quadratics, both faces, the area at three positions and the integral.
-const VOLUME_OPS: u32 = 120;
-/// The same on a floor: the cubic of the inside test, some thirty halvings, and weights and Jacobian of a
-/// hit.
-const FLOOR_OPS: u32 = 260;
-
 impl Light {
-    /// Cost of a shader execution, in multiply-adds.
-    pub const fn ops(&self) -> u32 {
+    /// Light of a beam at a pixel centre. `times` are those at which it is in the beam, by face, if the test of the pixel
+    /// found them.
+    pub(super) fn shade(
+        &self,
+        lane: &Lane,
+        eye: &Eye,
+        seen: &Seen,
+        at: [f64; 2],
+        times: Option<[TimeIntervals; 2]>,
+    ) -> f64 {
         match self {
-            Self::Volume => VOLUME_OPS,
-            Self::Floor(_) => FLOOR_OPS,
-        }
-    }
-
-    /// Light of a beam at a pixel centre.
-    pub(super) fn shade(&self, eye: &Eye, seen: &Seen, at: [f64; 2]) -> f64 {
-        match self {
-            Self::Volume => fluence_along(eye, seen, at),
-            Self::Floor(floor) => floor.irradiance(eye, seen, at),
+            Self::Volume => fluence_along(lane, eye, seen, at, times),
+            Self::Floor(floor) => floor.irradiance(lane, eye, seen, at),
         }
     }
 }
@@ -51,70 +45,93 @@ impl Light {
 /// Integral of the fluence along a ray. Fluence is `2 flux |dx/dt| / |det(dx/db1, dx/db2, dx/dt)|`. Along a
 /// ray, `dz / |det(dx/db1, dx/db2, dx/dt)|` is `dt` over twice the area of the triangle in the image. So the
 /// integral runs over the times at which the pixel is inside.
-fn fluence_along(eye: &Eye, seen: &Seen, at: [f64; 2]) -> f64 {
+fn fluence_along(
+    lane: &Lane,
+    eye: &Eye,
+    seen: &Seen,
+    at: [f64; 2],
+    times: Option<[TimeIntervals; 2]>,
+) -> f64 {
     let scale = eye.scale_px();
-    let areas = seen.image.areas().map(|area| area.z);
+    let areas = seen.image.areas(lane).map(|area| area.z);
     let piece = |&[from, to]: &[f64; 2]| {
-        let (from, to) = (from.max(0.0), to.min(1.0));
-        speed(seen, at, 0.5 * (from + to)) * over_area(areas, from, to)
+        let (from, to) = (lane.max(from, 0.0), lane.min(to, 1.0));
+        let middle = lane.mul(0.5, lane.add(from, to));
+        lane.mul(speed(lane, seen, at, middle), over_area(lane, areas, from, to))
     };
-    let sets = times(eye, seen, at);
-    let sum: f64 = sets.iter().flat_map(|set| set.as_slice()).map(piece).sum();
-    2.0 * seen.world.flux_w * scale * scale * sum
+    let sets = times.unwrap_or_else(|| {
+        lane.tallied(|tally| time_interval_counted(&seen.triangle, eye.shear(), at, tally))
+    });
+    let sum = sets.iter().flat_map(|set| set.as_slice()).fold(0.0, |sum, times| lane.add(sum, piece(times)));
+    // The factor is the same for all pixels of a beam.
+    lane.mul(2.0 * seen.world.flux_w * scale * scale, sum)
 }
 
 /// `|dx/dt|` where the ray meets the triangle. It varies little within a beam, so one value represents an
 /// interval.
-fn speed(seen: &Seen, [x, y]: [f64; 2], t: f64) -> f64 {
-    let corners = seen.image.corners(t);
+fn speed(lane: &Lane, seen: &Seen, [x, y]: [f64; 2], t: f64) -> f64 {
+    let corners = seen.image.corners_on(lane, t).map(|p| [lane.sub(p.x, x), lane.sub(p.y, y)]);
     let edge = |i: usize, j: usize| {
         let (a, b) = (corners[i], corners[j]);
-        (a.x - x) * (b.y - y) - (b.x - x) * (a.y - y)
+        lane.madd(-b[0], a[1], lane.mul(a[0], b[1]))
     };
     let edges = [edge(1, 2), edge(2, 0), edge(0, 1)];
-    let sum: f64 = edges.iter().sum();
-    let weights = if sum == 0.0 { [1.0 / 3.0; 3] } else { edges.map(|e| (e / sum).clamp(0.0, 1.0)) };
-    seen.world.motion(&Hit { weights, t }).length()
+    let sum = lane.add(lane.add(edges[0], edges[1]), edges[2]);
+    let weights = if lane.branch(sum == 0.0) {
+        [1.0 / 3.0; 3]
+    } else {
+        edges.map(|e| lane.min(lane.max(lane.div(e, sum), 0.0), 1.0))
+    };
+    let motion = seen.world.motion(lane, &Hit { weights, t });
+    lane.root(lane.dot(motion, motion))
 }
 
 /// Integral of `1 / |area|` over an interval in which a pixel is inside, so that the quadratic `area` keeps
 /// its sign. With `B` its polar form at both times and `w^2 = B^2 - area(from) area(to)`, it is `(to - from)
 /// atanh(w / B) / w`.
-fn over_area(area: [f64; 3], from: f64, to: f64) -> f64 {
+fn over_area(lane: &Lane, area: [f64; 3], from: f64, to: f64) -> f64 {
     let polar = |s: f64, t: f64| {
-        (1.0 - s) * (1.0 - t) * area[0] + ((1.0 - s) * t + s * (1.0 - t)) * area[1] + s * t * area[2]
+        let [before_s, before_t] = [s, t].map(|at| lane.sub(1.0, at));
+        let first = lane.mul(lane.mul(before_s, before_t), area[0]);
+        let mixed = lane.madd(before_s, t, lane.mul(s, before_t));
+        lane.madd(lane.mul(s, t), area[2], lane.madd(mixed, area[1], first))
     };
     // At a focus the light is limited by floating-point precision. A pixel centre exactly on it would be
     // infinitely bright.
-    let least = f64::EPSILON * area.iter().fold(1e-200, |most: f64, a| most.max(a.abs()));
-    let sign = if polar(from, from) + polar(to, to) < 0.0 { -1.0 } else { 1.0 };
-    let [first, last] = [from, to].map(|t| (sign * polar(t, t)).max(least));
+    let largest = area.iter().fold(1e-200, |most: f64, a| lane.max(most, a.abs()));
+    let least = lane.mul(f64::EPSILON, largest);
+    let ends = [polar(from, from), polar(to, to)];
+    let sign = if lane.branch(lane.add(ends[0], ends[1]) < 0.0) { -1.0 } else { 1.0 };
+    let [first, last] = ends.map(|end| lane.max(sign * end, least));
     let middle = sign * polar(from, to);
-    let squared = middle * middle - first * last;
-    let w = libm::sqrt(squared.abs());
-    let per_length = if w <= 1e-6 * middle.abs() {
-        1.0 / middle.max(least)
-    } else if squared > 0.0 {
+    let product = lane.mul(first, last);
+    let squared = lane.madd(middle, middle, -product);
+    let w = lane.root(squared.abs());
+    let per_length = if lane.branch(w <= lane.mul(1e-6, middle.abs())) {
+        lane.div(1.0, lane.max(middle, least))
+    } else if lane.branch(squared > 0.0) {
         // atanh(w / middle) / w, without cancellation: middle - w = first last / (middle + w).
-        let sum = middle.abs() + w;
-        libm::log(sum * sum / (first * last)) / (2.0 * w)
+        let sum = lane.add(middle.abs(), w);
+        lane.div(lane.ln(lane.div(lane.mul(sum, sum), product)), lane.mul(2.0, w))
     } else {
-        libm::atan2(w, middle) / w
+        lane.div(lane.atan2(w, middle), w)
     };
-    (to - from).max(0.0) * per_length.max(0.0)
+    lane.mul(lane.max(lane.sub(to, from), 0.0), lane.max(per_length, 0.0))
 }
 
 impl Floor {
     /// Irradiance of all hits: `2 flux |dx/dt . n| / |det(dx/db1, dx/db2, dx/dt)|`.
-    fn irradiance(&self, eye: &Eye, seen: &Seen, at: [f64; 2]) -> f64 {
+    fn irradiance(&self, lane: &Lane, eye: &Eye, seen: &Seen, at: [f64; 2]) -> f64 {
+        // The position on the floor is that of the pixel in every beam: an input.
         let Some(point) = self.point(eye, at) else { return 0.0 };
         let scale = eye.scale_px();
         let of = |hit: Hit| {
-            let through = seen.world.motion(&hit).y.abs();
-            let room = seen.image.jacobian(&hit).abs() / (scale * scale);
-            if room > 0.0 { 2.0 * seen.world.flux_w * through / room } else { 0.0 }
+            let through = seen.world.motion(lane, &hit).y.abs();
+            let room = lane.div(seen.image.jacobian(lane, &hit).abs(), scale * scale);
+            let is_open = lane.branch(room > 0.0);
+            if is_open { lane.div(lane.mul(2.0 * seen.world.flux_w, through), room) } else { 0.0 }
         };
-        seen.image.inside(point).map(of).sum()
+        seen.image.inside(lane, point).fold(0.0, |sum, hit| lane.add(sum, of(hit)))
     }
 
     /// Floor point at an image position, in pixels and depth; `None` if the floor is seen edge-on.
@@ -149,13 +166,13 @@ mod tests {
                 let at = |k: usize| from + (to - from) * (k as f64 + 0.5) / steps as f64;
                 let by_steps =
                     (0..steps).map(|k| 1.0 / value(at(k))).sum::<f64>() * (to - from) / steps as f64;
-                let found = over_area(area, from, to);
+                let found = over_area(&Lane::default(), area, from, to);
                 assert!(
                     (found - by_steps).abs() <= 1e-7 * by_steps,
                     "{area:?} {from} {to}: {found} {by_steps}"
                 );
             }
         }
-        assert!(over_area([0.0; 3], 0.0, 1.0).is_finite());
+        assert!(over_area(&Lane::default(), [0.0; 3], 0.0, 1.0).is_finite());
     }
 }

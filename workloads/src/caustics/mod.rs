@@ -28,6 +28,7 @@ mod job;
 mod light;
 pub mod optics;
 mod photons;
+mod shader;
 
 pub use beam::{Beam, Hit};
 pub use bound::Method;

@@ -1,160 +1,169 @@
-//! Emitter of the passes of collision detection, as packets of work and as an image.
+//! The passes of collision detection on the modelled hardware, in conservative mode, and their image.
 
 use glam::Vec3;
 use pipeline::memory::Surface;
-use pipeline::{Client, Gpu, TileWork, Touch, TriangleStream};
+use pipeline::{
+    ConservativeDraw, ConservativePass, Gpu, Lane, Lanes, Primitive, TileIntervals, TileShader, Viewport,
+};
 
-use super::bounds::Bounds;
+use super::Method;
+use super::bounds::{Bounds, TzBox, TzBuffer};
 use super::object::Object;
-use super::pass::{Fragment, Observer, Part, Pass};
-use super::{Method, Search};
+use super::pass::{BinnedPrimitive, Fragment, FragmentBudget, Observer, Part, Pass};
 
 /// Bytes of a vertex at both times.
 const VERTEX_BYTES: u32 = 24;
-/// Operations of its transformation.
-const VERTEX_OPS: u32 = 24;
-/// Multiply-adds of the set-up of a triangle with moving conservative edges.
-const SETUP_MADDS: u32 = 77;
-/// Bytes of a pixel of the image.
-const PIXEL_BYTES: u64 = 4;
-/// Multiply-adds of the conservative test of a triangle in a tile: three edges by four corners at both times,
-/// and the depths.
-const TEST_MADDS: u32 = 3 * 4 * 2 * 2 + 18;
-/// Bytes of a box of time and depth: four numbers of 16 bits.
-const BOX_BYTES: u64 = 8;
+/// Bytes of a box of time and depth: four numbers of 64 bits, as conservative mode has them.
+const BOX_BYTES: u64 = 32;
 
-/// Boxes that the fragments of an object are compared with.
-#[derive(Clone, Copy)]
-struct Target {
-    address: u64,
-    /// Whether the fragments enlarge the boxes.
-    write: bool,
-}
-
-/// Boxes of the first and of the second object. Each has its own when boxes are compared with boxes;
-/// otherwise the second only reads those of the first.
-fn targets(method: Method, boxes: [Surface; 2]) -> [Target; 2] {
-    let [first, second] = boxes.map(|boxes| Target { address: boxes.address(), write: true });
-    [first, if method == Method::BoxBox { second } else { Target { write: false, ..first } }]
-}
-
-/// Observer that emits packets and draws the image.
-pub(super) struct PacketEmitter<'a, 'e> {
+/// Draws the passes on a GPU, and their image.
+pub(super) struct PassesOnGpu<'a, 'e> {
     gpu: &'a mut Gpu<'e>,
-    tile_px: u32,
-    stream: TriangleStream,
+    pass: ConservativePass,
+    vertices: Surface,
     picture: Picture,
-    side: usize,
-    bins: u32,
-    targets: [Target; 2],
+    viewport: Viewport,
+    bins: u64,
+    /// Boxes of the first and of the second object.
+    boxes: [Surface; 2],
+    method: Method,
     fragments: u64,
-    /// Fragments of one triangle in one hardware tile, not yet emitted.
-    pending: Option<Pending>,
 }
 
-/// Fragments of one packet.
-struct Pending {
-    tile: u32,
-    item: u32,
-    which: usize,
-    fragments: u32,
-    /// Bit mask of the touched pixels of the tile.
-    pixels: u64,
-    first_place: u64,
-}
-
-/// Image and number of fragments of the emitted work.
+/// Image and number of fragments of the passes.
 pub(super) struct Emitted {
     pub image: Vec<Vec3>,
     pub fragments: u64,
 }
 
-impl<'a, 'e> PacketEmitter<'a, 'e> {
-    /// Makes an emitter for the passes of `search` over `objects` on `gpu`.
-    pub fn new(search: &Search, objects: &[Object], gpu: &'a mut Gpu<'e>) -> Self {
-        let side = search.resolution as usize;
-        let tile_px = gpu.spec().tile_px;
+impl<'a, 'e> PassesOnGpu<'a, 'e> {
+    /// Makes passes with square images of `viewport` and `bins` boxes in a pixel.
+    pub fn new(
+        (method, viewport, bins): (Method, Viewport, u32),
+        objects: &[Object],
+        gpu: &'a mut Gpu<'e>,
+    ) -> Self {
+        let bins = u64::from(bins);
         let most = objects.iter().map(Object::len).max().unwrap_or(0) as u64;
         let vertices = gpu.surface(3 * most * u64::from(VERTEX_BYTES));
-        let stream = TriangleStream {
-            vertices,
-            vertex_bytes: VERTEX_BYTES,
-            vertex_ops: VERTEX_OPS,
-            setup_madds: SETUP_MADDS,
-        };
-        let pixels = u64::from(search.resolution.next_multiple_of(tile_px)).pow(2);
-        let boxes = [(); 2].map(|()| gpu.surface(pixels * u64::from(search.bins) * BOX_BYTES));
-        let (picture, targets) = (Picture::new(objects, side), targets(search.method, boxes));
-        let (bins, fragments, pending) = (search.bins, 0, None);
-        Self { gpu, tile_px, stream, picture, side, bins, targets, fragments, pending }
+        let side = viewport.width().next_multiple_of(gpu.spec().tile_px);
+        let boxes = [(); 2].map(|()| gpu.surface(u64::from(side).pow(2) * bins * BOX_BYTES));
+        let picture = Picture::new(objects, viewport.width() as usize);
+        let (pass, fragments) = Default::default();
+        Self { gpu, pass, vertices, picture, viewport, bins, boxes, method, fragments }
     }
 
-    /// Emits the writes of the image and returns the totals.
-    pub fn finish(mut self) -> Emitted {
-        self.flush();
-        let image = self.picture.image();
-        let surface = self.gpu.surface(image.len() as u64 * PIXEL_BYTES);
-        self.gpu.begin("image", None);
-        self.gpu.write_image(surface, self.tile_px.pow(2));
+    /// Writes the image and returns the totals.
+    pub fn finish(self) -> Emitted {
+        let (image, side) = (self.picture.image(), self.viewport.width());
+        if let Some(all) = Viewport::new(3 * side, side) {
+            self.gpu.write_image("image", all);
+        }
         Emitted { image, fragments: self.fragments }
     }
 
-    /// Hardware tile of a pixel, and the pixel's position in it.
-    fn tile(&self, [x, y]: [u32; 2]) -> (u32, u32) {
-        let side = self.tile_px;
-        (y / side * (self.side as u32).div_ceil(side) + x / side, y % side * side + x % side)
-    }
-
-    /// Emits the pending packet.
-    pub fn flush(&mut self) {
-        let Some(pending) = self.pending.take() else { return };
-        let pixels = pending.pixels.count_ones();
-        let target = self.targets[pending.which];
-        let work = TileWork {
-            tile: pending.tile,
-            triangle: Some(pending.item),
-            tiles: 1,
-            tile_madds: pixels * TEST_MADDS,
-            hits: pending.fragments,
-            depths_read: pending.fragments,
-            depths_written: if target.write { pending.fragments } else { 0 },
-            ..TileWork::default()
-        };
-        let bytes = u64::from(pixels) * u64::from(self.bins) * BOX_BYTES;
-        let address = target.address + pending.first_place * u64::from(self.bins) * BOX_BYTES;
-        let client = Client::Depth;
-        self.gpu.tile(&work, [Touch { client, address, bytes, write: target.write, fresh: false }]);
+    /// Where the boxes of a part are. The second part only reads those of the first unless boxes are compared.
+    fn target(&self, which: usize, is_test: bool) -> Surface {
+        self.boxes[if is_test || self.method == Method::FragmentBox { 0 } else { which }]
     }
 }
 
-impl Observer for PacketEmitter<'_, '_> {
-    fn part(&mut self, _: &Pass, which: usize, part: Part<'_>) {
-        self.flush();
-        if which == 0 {
-            self.gpu.begin("pair", None);
-        }
-        self.gpu.draw_stream(part.list.len(), &self.stream);
+/// Compares a box with the times and depths of a fragment, or with another box.
+fn meets(lane: &Lane, known: &TzBox, t: [f64; 2], z: [f64; 2]) -> bool {
+    let apart = |a: [f64; 2], b: [f64; 2]| lane.max(a[0], b[0]) > lane.min(a[1], b[1]);
+    !lane.branch(apart(known.t, t)) && !lane.branch(apart(known.z, z))
+}
+
+/// The shader of a pass: a fragment is compared with a box, or enlarges it.
+struct BoxShader<'a> {
+    primitives: &'a [BinnedPrimitive],
+    pass: &'a Pass,
+    target: Surface,
+    known: Option<&'a TzBuffer>,
+    /// Tiles of the hardware in a row, and their side.
+    hardware: [u32; 2],
+    bins: u64,
+}
+
+impl TileShader for BoxShader<'_> {
+    type Body = ();
+    type Output = Fragment;
+
+    fn run(&self, (): &mut (), lanes: &Lanes, tile: &TileIntervals<'_>) -> Option<Fragment> {
+        let fragment = self.primitives[tile.primitive].fragment(tile.tile, tile.touch);
+        let ([x, y], [across, side]) = (tile.tile, self.hardware);
+        let pixel = u64::from((y / side * across + x / side) * side * side + y % side * side + x % side);
+        let offset = (pixel * self.bins + fragment.bin as u64) * BOX_BYTES;
+        let Some(known) = self.known else {
+            lanes.run(|_| ());
+            lanes.merge(self.target, offset, BOX_BYTES);
+            return Some(fragment);
+        };
+        lanes.read(self.target, offset, BOX_BYTES);
+        let place = self.pass.place(fragment.tile, fragment.bin);
+        lanes.run(|lane| meets(lane, known.at(place), tile.touch.t, tile.touch.z));
+        Some(fragment)
+    }
+}
+
+impl Observer for PassesOnGpu<'_, '_> {
+    fn begin(&mut self, name: &str) {
+        self.pass = self.gpu.begin_conservative(name, None);
     }
 
-    fn fragment(&mut self, pass: &Pass, which: usize, fragment: &Fragment) {
-        self.fragments += 1;
-        let (tile, place) = self.tile(fragment.tile);
-        let known = self.pending.as_ref().map(|pending| (pending.tile, pending.item, pending.which));
-        if known != Some((tile, fragment.item, which)) {
-            self.flush();
-        }
-        let first_place = u64::from(tile) * u64::from(self.tile_px.pow(2)) + u64::from(place);
-        let pending = self.pending.get_or_insert(Pending {
-            tile,
-            item: fragment.item,
-            which,
-            fragments: 0,
-            pixels: 0,
-            first_place,
+    fn draw(
+        &mut self,
+        pass: &Pass,
+        (which, part): (usize, Part<'_>),
+        bins: &[Option<Bounds>],
+        _: &mut FragmentBudget,
+        known: Option<&TzBuffer>,
+        each: &mut dyn FnMut(&Fragment),
+    ) -> bool {
+        let binned = pass.primitives(part, bins);
+        let primitives: Vec<Primitive> = binned.iter().map(|binned| binned.primitive.clone()).collect();
+        let side = self.gpu.spec().tile_px;
+        let draw = ConservativeDraw {
+            primitives: &primitives,
+            grid: pass.grid(),
+            block: side,
+            vertices: self.vertices,
+            vertex_bytes: VERTEX_BYTES,
+            projection: None,
+        };
+        let shader = BoxShader {
+            primitives: &binned,
+            pass,
+            target: self.target(which, known.is_some()),
+            known,
+            hardware: [self.viewport.width().div_ceil(side), side],
+            bins: self.bins,
+        };
+        let (picture, fragments) = (&mut self.picture, &mut self.fragments);
+        self.pass.draw(self.gpu, &draw, &shader, |tile, fragment| {
+            *fragments += 1;
+            picture.fragment(pass, tile);
+            each(&fragment);
         });
-        pending.fragments += 1;
-        pending.pixels |= 1 << place;
-        self.picture.fragment(pass, fragment.tile);
+        true
+    }
+
+    fn compare(&mut self, pass: &Pass, bins: usize, [first, second]: [&TzBuffer; 2], merges: bool) {
+        let [columns, rows] = [pass.grid().columns, pass.grid().rows];
+        let Some(viewport) = Viewport::new(columns, rows) else { return };
+        let targets = self.boxes;
+        self.gpu.run_pixels(viewport, |lanes, tile| {
+            for bin in 0..bins {
+                let place = pass.place(tile, bin);
+                let offset = u64::from(place) * BOX_BYTES;
+                targets.iter().for_each(|target| lanes.read(*target, offset, BOX_BYTES));
+                let (one, other) = (first.at(place), second.at(place));
+                lanes.run(|lane| meets(lane, one, other.t, other.z));
+                if merges {
+                    lanes.merge(targets[0], offset, BOX_BYTES);
+                }
+            }
+        });
     }
 
     fn overlap(&mut self, pass: &Pass, tile: [u32; 2]) {

@@ -1,16 +1,17 @@
-//! The job `quintile run ccd`: collision detection on the modelled hardware, in three passes per pair.
+//! The job `quintile run ccd`: collision detection on the modelled hardware, in two sweeps over all objects along each
+//! axis, or narrowed pair by pair.
 
 use std::path::PathBuf;
 
-use pipeline::Gpu;
+use pipeline::{Gpu, Viewport};
 use serde::{Deserialize, Serialize};
 use warnings::{Code, Warning};
 
-use super::emitter::{Emitted, PacketEmitter};
+use super::emitter::{Emitted, PassesOnGpu};
 use super::families::swarm_of;
 use super::object::load_objects;
 use super::pass::Scratch;
-use super::{Method, Object, Search, Verdict, candidates};
+use super::{Method, Object, Search, Sweeps, candidates};
 use crate::error::LoadError;
 use crate::job::{Drawn, Draws, Fact, Flag, Flags, Job, JobError, OptionSource, Request, must_hold};
 use crate::scene::Settings;
@@ -29,11 +30,14 @@ pub struct Options {
     pub bins: u32,
     /// What a pass compares.
     pub method: Method,
+    /// Whether pairs whose swept boxes touch are drawn one by one within the space they share, of which the CPU narrows
+    /// more from axis to axis, instead of two sweeps over all objects.
+    pub narrow: bool,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { file: None, balls: 12, resolution: 64, bins: 1, method: Method::FragmentBox }
+        Self { file: None, balls: 12, resolution: 64, bins: 1, method: Method::FragmentBox, narrow: false }
     }
 }
 
@@ -73,6 +77,8 @@ impl Options {
 /// The job and its objects.
 struct Collision {
     search: Search,
+    narrow: bool,
+    viewport: Viewport,
     objects: Vec<Object>,
     settings: Settings,
 }
@@ -87,11 +93,14 @@ pub(crate) const FLAGS: Flags = Flags { uses: &[], instead: &[(Flag::Size, "reso
 pub fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<dyn Job>, LoadError> {
     let options: Options = options.read()?;
     options.check()?;
-    let Options { resolution, bins, method, .. } = options;
+    let Options { resolution, bins, method, narrow, .. } = options;
     let settings = Settings { width: 3 * resolution, height: resolution, samples: 1, ..Settings::default() };
     let search = Search { resolution, bins, method, zoom: false };
     let settings = settings.with(request.overrides)?;
-    Ok(Box::new(Collision { search, objects: options.objects(request.seed)?, settings }))
+    let refused = || LoadError::Setting { setting: "resolution", message: "1 to 1024 pixels".to_owned() };
+    let viewport = Viewport::new(resolution, resolution).ok_or_else(refused)?;
+    let objects = options.objects(request.seed)?;
+    Ok(Box::new(Collision { search, narrow, viewport, objects, settings }))
 }
 
 /// Share of kept candidates above which a warning is given.
@@ -117,19 +126,24 @@ impl Draws for Collision {
     }
 
     fn draw(&self, (): &(), gpu: &mut Gpu<'_>) -> Result<Drawn, JobError> {
-        let mut emitter = PacketEmitter::new(&self.search, &self.objects, gpu);
+        let Search { method, bins, resolution, .. } = self.search;
+        let mut passes = PassesOnGpu::new((method, self.viewport, bins), &self.objects, gpu);
         let pairs = candidates(&self.objects);
-        let mut scratch = Scratch::default();
-        let mut kept = 0_u32;
-        for &(a, b) in &pairs {
-            let verdict =
-                self.search.pair_observed(&self.objects[a], &self.objects[b], &mut scratch, &mut emitter);
-            emitter.flush();
-            kept += u32::from(matches!(verdict, Verdict::Maybe { .. }));
-        }
-        let Emitted { image, fragments } = emitter.finish();
+        let (may_collide, kept) = if self.narrow {
+            let kept = self.narrowed(&pairs, &mut passes);
+            (in_pairs(&kept), kept)
+        } else {
+            let set = Sweeps { method, resolution, bins }.detect_on(&self.objects, &mut passes);
+            let is_kept = |object: &usize| set.binary_search(object).is_ok();
+            let kept = pairs.iter().filter(|(a, b)| is_kept(a) && is_kept(b)).copied().collect();
+            (set.len(), kept)
+        };
+        let kept = kept.len() as u32;
+        let Emitted { image, fragments } = passes.finish();
         let fact = |name, value| Fact { name, value };
         let facts = vec![
+            fact("objects", self.objects.len() as f64),
+            fact("objects_that_may_collide", may_collide as f64),
             fact("pairs_whose_boxes_touch", pairs.len() as f64),
             fact("pairs_that_may_collide", f64::from(kept)),
             fact("fragments", fragments as f64),
@@ -137,6 +151,23 @@ impl Draws for Collision {
         let warnings = near_everywhere(pairs.len(), kept).into_iter().collect();
         Ok(Drawn { image, moving: true, lens: false, facts, warnings })
     }
+}
+
+impl Collision {
+    /// Pairs that may collide, each drawn alone and narrowed.
+    fn narrowed(&self, pairs: &[(usize, usize)], passes: &mut PassesOnGpu<'_, '_>) -> Vec<(usize, usize)> {
+        let mut scratch = Scratch::default();
+        let mut kept = |&(a, b): &(usize, usize)| {
+            let verdict = self.search.pair_observed(&self.objects[a], &self.objects[b], &mut scratch, passes);
+            verdict.may_collide()
+        };
+        pairs.iter().copied().filter(|pair| kept(pair)).collect()
+    }
+}
+
+/// Objects in pairs.
+fn in_pairs(pairs: &[(usize, usize)]) -> usize {
+    pairs.iter().flat_map(|&(a, b)| [a, b]).collect::<std::collections::BTreeSet<_>>().len()
 }
 
 fn near_everywhere(pairs: usize, kept: u32) -> Option<Warning> {
@@ -164,28 +195,39 @@ mod tests {
     }
 
     #[test]
-    fn packets_add_up_and_the_answer_is_that_of_the_search() {
-        for method in ["fragment_box", "box_box", "depth_only"] {
-            let job = made(&[("resolution", "16"), ("balls", "6"), ("method", method)]).unwrap();
-            let mut sum = Counts::default();
-            let hardware = hardware();
-            let mut gpu = Gpu::new(&hardware, |packet: &Packet, _| sum += &packet.counts).unwrap();
-            let drawn = job.frame(0, &mut gpu).unwrap();
-            let counts = gpu.finish().counts();
-            assert_eq!(sum, counts, "{method}");
-            assert_eq!(drawn.image.len(), 48 * 16);
-            let fact = |name| drawn.facts.iter().find(|fact| fact.name == name).unwrap().value;
-            assert_eq!(counts[Event::SamplesHit] as f64, fact("fragments"), "{method}");
-            // Each object has its own boxes when boxes are compared; otherwise the second only reads.
-            let writes = counts[Event::DepthWrites] == counts[Event::SamplesHit];
-            assert_eq!(writes, method == "box_box", "{method}");
-            let objects = swarm_of(6, 1);
-            let method: Method = serde_json::from_str(&format!("\"{method}\"")).unwrap();
-            let search = Search { resolution: 16, bins: 1, method, zoom: false };
-            let found = detect(&objects, &search);
-            let kept = found.iter().filter(|answer| answer.verdict.may_collide()).count();
-            assert_eq!(fact("pairs_that_may_collide"), kept as f64);
-            assert!(kept > 0 && kept < found.len());
+    fn packets_add_up_and_the_answer_is_that_of_the_search_and_of_the_sweeps() {
+        for (name, method) in [
+            ("fragment_box", Method::FragmentBox),
+            ("box_box", Method::BoxBox),
+            ("depth_only", Method::DepthOnly),
+        ] {
+            for narrow in ["false", "true"] {
+                let job = made(&[("resolution", "16"), ("balls", "6"), ("method", name), ("narrow", narrow)])
+                    .unwrap();
+                let mut sum = Counts::default();
+                let hardware = hardware();
+                let mut gpu = Gpu::new(&hardware, |packet: &Packet, _| sum += &packet.counts).unwrap();
+                let drawn = job.frame(0, &mut gpu).unwrap();
+                let counts = gpu.finish().counts();
+                assert_eq!(sum, counts, "{name}");
+                assert_eq!(drawn.image.len(), 48 * 16);
+                let fact = |name| drawn.facts.iter().find(|fact| fact.name == name).unwrap().value as usize;
+                assert!(counts[Event::PixelInvocations] >= fact("fragments") as u64, "{name}");
+                let objects = swarm_of(6, 1);
+                let kept = if narrow == "true" {
+                    let search = Search { resolution: 16, bins: 1, method, zoom: false };
+                    let found = detect(&objects, &search);
+                    found.iter().filter(|answer| answer.verdict.may_collide()).count()
+                } else {
+                    let found = Sweeps { method, resolution: 16, bins: 1 }.detect(&objects);
+                    assert_eq!(fact("objects_that_may_collide"), found.objects.len());
+                    assert_eq!(found.work.fragments as usize, fact("fragments"));
+                    assert_eq!(found.work.draws, counts[Event::Draws]);
+                    found.pairs(&objects).len()
+                };
+                assert_eq!(fact("pairs_that_may_collide"), kept);
+                assert!(kept > 0 && kept <= candidates(&objects).len());
+            }
         }
     }
 

@@ -15,7 +15,8 @@
 //! - [`candidates`]: the broad phase, pairs whose swept boxes touch.
 //! - [`Search`], [`Method`]: parameters of a search; [`Verdict`]: its result.
 //! - [`detect`]: all pairs of a case.
-//! - [`PlainPasses`]: the passes of the paper alone, without narrowing on the CPU.
+//! - [`Sweeps`]: the method of the paper for many objects, in two sweeps over all of them.
+//! - [`PlainPasses`]: the passes of the paper for two objects, without narrowing on the CPU.
 //! - [`families`]: test cases with known ground truth.
 //! - [`job`]: the passes as a workload of the modelled hardware.
 
@@ -29,6 +30,7 @@ mod object;
 mod pair;
 mod pass;
 mod plain;
+mod sweeps;
 
 pub use bounds::Bounds;
 pub use detect::{Answer, candidates, detect, detect_each};
@@ -37,3 +39,4 @@ pub use job::{Options, job};
 pub use object::{CaseFiles, CollisionCase, Object, components, load_cases};
 pub use pair::{Method, Search, Verdict};
 pub use plain::{PlainPasses, PlainResult};
+pub use sweeps::{CollidingSet, Sweeps};

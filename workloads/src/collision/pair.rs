@@ -261,7 +261,7 @@ impl<'a> Pair<'a> {
 }
 
 /// The window split into equal time bins. Neighbours share the instant between them.
-fn time_bins(window: &Bounds, bins: u32) -> Vec<Option<Bounds>> {
+pub(super) fn time_bins(window: &Bounds, bins: u32) -> Vec<Option<Bounds>> {
     let [first, last] = window.time;
     let bins = if first == last { 1 } else { bins };
     let border = |bin: u32| {

@@ -2,7 +2,8 @@
 
 use std::ops::Range;
 
-use pipeline::conservative::{Grid, MovingTriangle, Prepared, Rasterizer, Region, View};
+use pipeline::Primitive;
+use pipeline::conservative::{Grid, MovingTriangle, Prepared, Rasterizer, Region, Touch, View};
 
 use super::bounds::{Bounds, Ends, NOTHING, TzBox, TzBuffer, hull, meet};
 use super::object::Object;
@@ -129,6 +130,32 @@ impl Pass {
         budget: &mut FragmentBudget,
         mut each: impl FnMut(&Fragment),
     ) -> bool {
+        self.each_bin(part, bins, |drawing, in_bin| drawing.bin(in_bin, budget, &mut each))
+    }
+
+    /// Every triangle of a part in every remaining time bin, for conservative mode. Its edges are tested.
+    pub fn primitives(&self, part: Part<'_>, bins: &[Option<Bounds>]) -> Vec<BinnedPrimitive> {
+        let mut all: Vec<BinnedPrimitive> = Vec::new();
+        self.each_bin(part, bins, |drawing, in_bin| {
+            let again = all.last().is_some_and(|last| last.item == drawing.item);
+            all.extend(drawing.primitive(in_bin, again));
+            true
+        });
+        all
+    }
+
+    /// The tiles.
+    pub fn grid(&self) -> &Grid {
+        &self.grid
+    }
+
+    /// Calls `each` with every triangle in every remaining time bin, until it returns `false`; then so does this.
+    fn each_bin(
+        &self,
+        part: Part<'_>,
+        bins: &[Option<Bounds>],
+        mut each: impl FnMut(&mut Drawing<'_>, &InBin<'_>) -> bool,
+    ) -> bool {
         let Part { object, list } = part;
         let remaining: Vec<(usize, Bounds)> =
             bins.iter().enumerate().filter_map(|(bin, bounds)| bounds.map(|bounds| (bin, bounds))).collect();
@@ -140,7 +167,7 @@ impl Pass {
             for (bin, bounds) in open {
                 let times = meet(bounds.time, times);
                 let in_bin = times.map(|t| InBin { bin: *bin, bounds, t });
-                if in_bin.is_some_and(|in_bin| !drawing.bin(&in_bin, budget, &mut each)) {
+                if in_bin.is_some_and(|in_bin| !each(&mut drawing, &in_bin)) {
                     return false;
                 }
             }
@@ -175,12 +202,11 @@ impl Pass {
         })
     }
 
-    /// The triangle in view space, prepared for rasterization; `None` if its coordinates are too large.
-    fn prepared(&self, ends: &Ends, uncertainty: f64) -> Option<Prepared> {
+    /// The triangle in view space; `None` if its coordinates are too large.
+    fn turned(&self, ends: &Ends, uncertainty: f64) -> Option<MovingTriangle> {
         let turn = |p: [f64; 3]| [p[(self.axis + 1) % 3], p[(self.axis + 2) % 3], p[self.axis]];
         let [open, close] = ends.map(|end| end.map(turn));
-        let turned = MovingTriangle::uncertain(open, close, [uncertainty; 3])?;
-        Some(Rasterizer::new(View::orthographic()).prepare(&turned))
+        MovingTriangle::uncertain(open, close, [uncertainty; 3])
     }
 }
 
@@ -190,6 +216,29 @@ struct InBin<'a> {
     /// Space and time that remain of the bin.
     bounds: &'a Bounds,
     t: [f64; 2],
+}
+
+/// A triangle in a time bin, for conservative mode.
+pub(super) struct BinnedPrimitive {
+    pub primitive: Primitive,
+    /// Position of the triangle in the list of the part.
+    pub item: u32,
+    triangle: u32,
+    bin: usize,
+}
+
+impl BinnedPrimitive {
+    /// The fragment in a tile.
+    pub fn fragment(&self, tile: [u32; 2], touch: &Touch) -> Fragment {
+        let inside = TzBox { t: touch.t, z: touch.z, triangle: self.triangle };
+        Fragment { tile, bin: self.bin, item: self.item, inside }
+    }
+}
+
+/// A rasterizer of a time bin.
+fn rasterizer(t: [f64; 2]) -> Rasterizer {
+    let clip = Region { t, ..Region::WHOLE };
+    Rasterizer::new(View::orthographic()).clipped(clip).halving(MAX_HALVINGS)
 }
 
 /// A triangle being rasterized.
@@ -224,9 +273,7 @@ impl Drawing<'_> {
             }
             return true;
         };
-        let clip = Region { t, ..Region::WHOLE };
-        let rasterizer = Rasterizer::new(View::orthographic()).clipped(clip).halving(MAX_HALVINGS);
-        rasterizer.rasterize_part(prepared, &pass.grid, [columns, rows], |tile, touch| {
+        rasterizer(t).rasterize_part(prepared, &pass.grid, [columns, rows], |tile, touch| {
             emit(tile, touch.t, touch.z)
         });
         true
@@ -236,9 +283,21 @@ impl Drawing<'_> {
     fn edges(&mut self) -> Option<&Prepared> {
         if self.pass.fit == Fit::Edges && self.prepared.is_none() {
             let ends = &self.object.triangles[self.triangle as usize];
-            self.prepared = self.pass.prepared(ends, self.object.raster_uncertainty());
+            let turned = self.pass.turned(ends, self.object.raster_uncertainty());
+            self.prepared = turned.map(|turned| Rasterizer::new(View::orthographic()).prepare(&turned));
         }
         self.prepared.as_ref()
+    }
+
+    /// The triangle in a time bin, `again` or not; `None` if it is not there.
+    fn primitive(&self, in_bin: &InBin<'_>, again: bool) -> Option<BinnedPrimitive> {
+        let (pass, item, triangle, bin) = (self.pass, self.item, self.triangle, in_bin.bin);
+        let part = pass.tiles_of(&near(self.object, triangle, in_bin.t, in_bin.bounds)?);
+        let ends = &self.object.triangles[triangle as usize];
+        let turned = pass.turned(ends, self.object.raster_uncertainty())?;
+        let (rasterizer, body) = (rasterizer(in_bin.t), item);
+        let primitive = Primitive { triangle: turned, rasterizer, part, body, again, back_only: false };
+        Some(BinnedPrimitive { primitive, item, triangle, bin })
     }
 }
 
@@ -293,8 +352,33 @@ struct StoredFragment {
     inside: TzBox,
 }
 
-/// Observer of the work of a pass.
+/// What draws the passes, or observes their work.
 pub(super) trait Observer {
+    /// Begins a pass, whose boxes are empty.
+    fn begin(&mut self, _name: &str) {}
+
+    /// Draws a part, the first (0) or the second (1) of a pair, and passes its fragments to `each`. The fragments of the
+    /// part are compared with the boxes of `known`, or enlarge those of the part. `false` if they exceed `budget`.
+    fn draw(
+        &mut self,
+        pass: &Pass,
+        (which, part): (usize, Part<'_>),
+        bins: &[Option<Bounds>],
+        budget: &mut FragmentBudget,
+        _known: Option<&TzBuffer>,
+        each: &mut dyn FnMut(&Fragment),
+    ) -> bool {
+        self.part(pass, which, part);
+        pass.draw(part, bins, budget, |fragment| {
+            self.fragment(pass, which, fragment);
+            each(fragment);
+        })
+    }
+
+    /// Compares the boxes of both parts in every tile and time bin, of which there are so many, and if it `merges` adds
+    /// those of the second to those of the first.
+    fn compare(&mut self, _pass: &Pass, _bins: usize, _boxes: [&TzBuffer; 2], _merges: bool) {}
+
     /// Reports that a part is drawn: the first (0) or the second (1) of a pair.
     fn part(&mut self, _pass: &Pass, _which: usize, _part: Part<'_>) {}
     /// Reports a fragment of the part.
@@ -388,9 +472,11 @@ impl Comparison<'_> {
         mut each: impl FnMut(StoredFragment),
     ) -> Option<()> {
         boxes.clear(self.pass.tiles() * self.bins.len());
-        observer.part(self.pass, which, self.parts[which]);
-        let all = self.pass.draw(self.parts[which], self.bins, budget, |fragment| {
-            observer.fragment(self.pass, which, fragment);
+        if which == 0 {
+            observer.begin("pair");
+        }
+        let part = (which, self.parts[which]);
+        let all = observer.draw(self.pass, part, self.bins, budget, None, &mut |fragment| {
             let place = self.pass.place(fragment.tile, fragment.bin);
             boxes.add(place, &fragment.inside);
             each(StoredFragment { place, item: fragment.item, inside: fragment.inside });
@@ -411,19 +497,20 @@ impl Comparison<'_> {
         let Resources { scratch, budget, observer } = resources;
         let [boxes, met] = &mut scratch.boxes;
         met.clear(self.pass.tiles() * self.bins.len());
-        observer.part(self.pass, 1, self.parts[1]);
-        let all = self.pass.draw(self.parts[1], self.bins, budget, |fragment| {
+        let (known_boxes, mut overlaps) = (&*boxes, Vec::new());
+        let part = (1, self.parts[1]);
+        let all = observer.draw(self.pass, part, self.bins, budget, Some(known_boxes), &mut |fragment| {
             let Fragment { tile, bin, item, inside } = *fragment;
-            observer.fragment(self.pass, 1, fragment);
             let place = self.pass.place(tile, bin);
-            let known = boxes.at(place);
+            let known = known_boxes.at(place);
             let Some(both) = known.meet(inside.t, inside.z) else { return };
             let Some(found) = self.remaining(tile, bin, both) else { return };
             result.add(bin, &found, [known.triangle, inside.triangle]);
             result.alive[1][item as usize] = true;
             met.add(place, &TzBox { t: both[0], z: both[1], triangle: inside.triangle });
-            observer.overlap(self.pass, tile);
+            overlaps.push(tile);
         });
+        overlaps.into_iter().for_each(|tile| observer.overlap(self.pass, tile));
         mark(&mut result.alive[0], &scratch.fragments[0], met);
         all.then_some(result)
     }
@@ -436,6 +523,7 @@ impl Comparison<'_> {
         self.fill(1, resources)?;
         let Resources { scratch, observer, .. } = resources;
         let [first, second] = &scratch.boxes;
+        observer.compare(self.pass, self.bins.len(), [first, second], false);
         for (place, one) in first.used() {
             let other = second.at(place);
             let (tile, bin) = self.pass.at(place);
@@ -459,6 +547,7 @@ impl Comparison<'_> {
             self.boxed(which, &mut scratch.boxes[which], budget, *observer, |_| ())?;
         }
         let [first, second] = &scratch.boxes;
+        observer.compare(self.pass, self.bins.len(), [first, second], false);
         let both = || {
             let shared = first.used().map(|(place, one)| (one.z, second.at(place).z));
             shared.filter(|(_, other)| other[0] <= other[1])

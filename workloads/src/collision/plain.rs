@@ -46,6 +46,10 @@ impl PlainResult {
 }
 
 impl Observer for PlainResult {
+    fn begin(&mut self, _: &str) {
+        self.passes += 1;
+    }
+
     fn part(&mut self, _: &Pass, _: usize, part: Part<'_>) {
         self.draws += 1;
         self.triangles += part.list.len() as u64;
@@ -94,7 +98,8 @@ impl PlainPasses {
             let pass = Pass::new(axis, &window, tiling, Fit::Edges);
             let comparison = Comparison { pass: &pass, parts, bins: &[Some(window)] };
             result.overlaps[axis] = self.overlaps(&comparison, &mut result);
-            result.passes += if self.method == Method::DepthOnly { 2 } else { 1 };
+            // By depth alone, the other direction is another pass.
+            result.passes += u64::from(self.method == Method::DepthOnly);
         }
         result
     }

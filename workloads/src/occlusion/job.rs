@@ -3,18 +3,18 @@
 use std::sync::Arc;
 
 use glam::{Affine3A, Vec3, Vec4};
-use pipeline::depth::BoxGrid;
+use pipeline::depth::{BoxGrid, Pyramid};
 use pipeline::geometry::Projection;
 use pipeline::random::mix;
 use pipeline::sampling::SampleSource;
 use pipeline::{
-    Camera, Cull, Draw, DrawError, Geometry, Gpu, Lane, Lens, RasterPass, Shader, ShadingPoint, TileWork,
-    TriangleStream, Viewport,
+    Camera, Cull, Draw, DrawError, Geometry, Gpu, IntervalAnswer, IntervalQueries, Lane, Lens, MovingBox,
+    RasterPass, Shader, ShadingPoint, Target, Viewport,
 };
 use serde::{Deserialize, Serialize};
 use warnings::{Code, Warning};
 
-use super::{Answer, MovingBox, Pyramid, Queries};
+use super::query::depths_of;
 use crate::error::LoadError;
 use crate::job::{Drawn, Draws, Fact, Flag, Flags, Job, JobError, OptionSource, Request, must_hold};
 use crate::samples::SampleChoice;
@@ -104,8 +104,6 @@ pub fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<dyn Job>
     Ok(Box::new(Occlusion { options, settings, samples, wall_scene }))
 }
 
-/// Bytes of a box corner at both times.
-const VERTEX_BYTES: u32 = 24;
 /// Share of half-covered tiles above which a warning is given. Small occluders hide objects together, which a
 /// farthest depth per tile cannot detect.
 pub const MAX_HALF_COVERED_SHARE: f64 = 0.25;
@@ -129,11 +127,14 @@ impl Draws for Occlusion {
         let settings = pipeline::Settings { spec: gpu.spec(), viewport, samples: &*self.samples, background };
         let walls = gpu.resident(&[self.wall_scene.walls(&WALL).map_err(JobError::setting)?]);
         let camera = &self.wall_scene.camera;
-        let occluders = RasterPass::new(camera, &walls, &settings).named("occluders").with_visible();
-        let (answers, half_covered) = self.ask(&gpu.draw(&occluders)?.visible, viewport)?;
-        gpu.wait();
-        let vertex_ops = 2 * Projection::new(camera, viewport).vertex_ops();
-        charge(&answers, vertex_ops, gpu);
+        let occluders = RasterPass::new(camera, &walls, &settings).named("occluders");
+        let occluders = gpu.draw(&occluders.onto(Target::Depth).with_visible())?;
+        let pyramid = self.pyramid(&depths_of(&occluders.visible), viewport)?;
+        gpu.gather("farthest depths", &pyramid, occluders.surface);
+        let projection = Projection::new(camera, viewport);
+        let queries = IntervalQueries::new(&pyramid, &projection);
+        let (answers, half_covered) =
+            (gpu.ask("queries", &queries, &self.wall_scene.boxes), pyramid.half_covered());
         // The host draws what is not hidden.
         gpu.wait();
         let seen = self.wall_scene.boxes.iter().zip(&answers).filter(|(_, answer)| !answer.hidden);
@@ -152,37 +153,10 @@ impl Draws for Occlusion {
 }
 
 impl Occlusion {
-    /// Answers about all boxes from the depths of the walls, and the share of half-covered tiles.
-    fn ask(&self, visible: &[(u32, u32)], viewport: Viewport) -> Result<(Vec<Answer>, f64), JobError> {
-        let camera = &self.wall_scene.camera;
-        let grid = BoxGrid::new(self.options.boxes, camera.lens().is_some())
+    fn pyramid(&self, depths: &[f32], viewport: Viewport) -> Result<Pyramid, JobError> {
+        let grid = BoxGrid::new(self.options.boxes, self.wall_scene.camera.lens().is_some())
             .ok_or_else(|| JobError::Setting("boxes: 1 to 16 along each axis".to_owned()))?;
-        let depths: Vec<f32> = visible.iter().map(|(_, bits)| f32::from_bits(*bits)).collect();
-        let pyramid = Pyramid::new(viewport, &*self.samples, &depths, self.options.tile_px, grid);
-        let projection = Projection::new(camera, viewport);
-        let queries = Queries::new(&pyramid, &projection);
-        let answers = self.wall_scene.boxes.iter().map(|object| queries.ask(object)).collect();
-        Ok((answers, pyramid.half_covered()))
-    }
-}
-
-/// Adds the work of the queries as a pass of their own. The farthest depths are in fast memory beside the tile tests, so no
-/// cache is accessed. Set-up is part of the multiply-adds of an answer.
-fn charge(answers: &[Answer], vertex_ops: u32, gpu: &mut Gpu<'_>) {
-    let triangles = 12 * answers.len();
-    let vertices = gpu.surface(3 * triangles as u64 * u64::from(VERTEX_BYTES));
-    let stream = TriangleStream { vertices, vertex_bytes: VERTEX_BYTES, vertex_ops, setup_madds: 0 };
-    gpu.begin("queries", None);
-    gpu.draw_stream(triangles, &stream);
-    for (number, answer) in (0..).zip(answers) {
-        let work = TileWork {
-            triangle: Some(12 * number),
-            tiles: answer.tiles as u32,
-            tile_madds: answer.madds as u32,
-            depth_bounds: answer.compared as u32,
-            ..TileWork::default()
-        };
-        gpu.tile(&work, []);
+        Ok(Pyramid::new(viewport, &*self.samples, depths, self.options.tile_px, grid))
     }
 }
 
@@ -203,18 +177,18 @@ fn mesh(boxes: &[&MovingBox]) -> Mesh {
     mesh
 }
 
-fn facts(answers: &[Answer]) -> Vec<Fact> {
-    let sum = |of: fn(&Answer) -> u64| answers.iter().map(of).sum::<u64>() as f64;
+fn facts(answers: &[IntervalAnswer]) -> Vec<Fact> {
+    let sum = |of: fn(&IntervalAnswer) -> u64| answers.iter().map(of).sum::<u64>() as f64;
     let facts = [
         ("objects", answers.len() as f64),
         ("objects_hidden", sum(|answer| u64::from(answer.hidden))),
-        ("tests", sum(Answer::tests)),
-        ("depth_bytes", sum(Answer::bytes)),
+        ("tests", sum(IntervalAnswer::tests)),
+        ("depth_bytes", sum(IntervalAnswer::bytes)),
     ];
     facts.into_iter().map(|(name, value)| Fact { name, value }).collect()
 }
 
-fn warnings(answers: &[Answer], half_covered: f64) -> Vec<Warning> {
+fn warnings(answers: &[IntervalAnswer], half_covered: f64) -> Vec<Warning> {
     let message = || {
         format!(
             "{:.0} % of the tiles are covered for most of their samples, but not for all (a warning from {:.0} % on): many small occluders hide \

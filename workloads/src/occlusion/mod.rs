@@ -6,17 +6,15 @@
 //! interval, which is compared with the farthest stored depths of the tile. Both answer for the samples of
 //! the image.
 //!
-//! - [`Pyramid`]: the farthest depths of tiles, by boxes of lens and time, level by level.
-//! - [`MovingBox`]: the bounding box of an object, at both ends of the shutter.
-//! - [`Queries`]: interval queries. *A visible object is never reported as hidden.*
-//! - [`Samples`]: sampled queries.
+//! The queries are in the pipeline ([`pipeline::IntervalQueries`], [`pipeline::SampledQueries`]), which counts their
+//! work. *An interval query never reports a visible object as hidden.*
+//!
+//! - [`depths()`]: depths of a scene, of which a [`pipeline::depth::Pyramid`] is made.
 //! - [`WallScene`]: walls, solid or slatted, with boxes behind them.
 
 mod job;
-mod pyramid;
 mod query;
 
 pub(crate) use job::FLAGS;
 pub use job::{MAX_HALF_COVERED_SHARE, Options, WallScene, WallSceneSpec, job};
-pub use pyramid::Pyramid;
-pub use query::{Answer, MovingBox, Queries, SampledAnswer, Samples, depths};
+pub use query::depths;

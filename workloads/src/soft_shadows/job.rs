@@ -169,10 +169,10 @@ impl DrawsScene for SoftShadows {
         let visible = depth_pass(&view, viewport, &self.set, self.method(), gpu)?;
         let world = World::new(&view, viewport, &self.light, &albedos, self.scene.background());
         let lookups = (&self.set as &dyn SampleSource, &visible.samples[..]);
-        let (image, look_ups) = look_ups(&world, lookups, (&map, self.options.bias), gpu);
-        let facts = self.facts(&map, look_ups);
+        let shaded = look_ups(&world, lookups, (&map, self.options.bias), gpu);
+        let facts = self.facts(&map, shaded.counts[Event::TextureFetches]);
         let (moving, warnings) = (frame.is_moving(), self.regime_warnings());
-        Ok(Drawn { image, moving, lens: true, facts, warnings })
+        Ok(Drawn { image: shaded.into_image(), moving, lens: true, facts, warnings })
     }
 }
 

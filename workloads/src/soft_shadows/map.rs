@@ -11,7 +11,7 @@ use crate::accumulation::{SharedSamples, Snapshot, SnapshotError};
 use crate::job::JobError;
 
 /// Bytes of a stored depth.
-const DEPTH_BYTES: u64 = 4;
+pub(super) const DEPTH_BYTES: u64 = 4;
 
 /// An array of shadow maps, one per sample of light and time.
 #[derive(Clone, Debug, PartialEq)]

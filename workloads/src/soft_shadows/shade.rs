@@ -3,15 +3,14 @@
 
 use glam::{DVec3, Vec3};
 use pipeline::geometry::Projection;
-use pipeline::memory::Surface;
 use pipeline::sample_test::exact::weights;
 use pipeline::sampling::{Sample, SampleSource};
 use pipeline::setup::Corner;
-use pipeline::{Camera, Client, Gpu, Lane, TileWork, Touch, Viewport};
+use pipeline::{Camera, Gpu, Lane, Lanes, Rendered, Viewport};
 use rayon::prelude::*;
 
 use super::light::AreaLight;
-use super::map::{ShadowMap, View};
+use super::map::{DEPTH_BYTES, ShadowMap, View};
 use crate::accumulation::Rays;
 
 /// Ambient light, relative to the light on a surface that faces the light.
@@ -76,24 +75,24 @@ impl<'a> World<'a> {
         let (width, per_pixel) = (self.viewport.width(), samples.per_pixel() as usize);
         let pixel = |(place, seen): (usize, &[(u32, u32)])| {
             let place = [place as u32 % width, place as u32 / width];
-            self.pixel(place, (samples, seen), shadows, &mut Shaded::default())
+            self.pixel(place, (samples, seen), shadows, &Lanes::default())
         };
         seen.par_chunks_exact(per_pixel).enumerate().map(pixel).collect()
     }
 
-    /// Mean of the samples of a pixel, whose visible triangles are in `seen`; the work is added to `shaded`.
+    /// Mean of the samples of a pixel, whose visible triangles are in `seen`, each shaded on a lane of its own.
     fn pixel(
         &self,
         [px, py]: [u32; 2],
         (samples, seen): (&dyn SampleSource, &[(u32, u32)]),
         shadows: Shadows<'_>,
-        shaded: &mut Shaded,
+        lanes: &Lanes,
     ) -> Vec3 {
         let mut at = vec![Sample::default(); seen.len()];
         samples.pixel_into(px, py, &mut at);
         let colours = at.iter().zip(seen).enumerate().map(|(index, (sample, (triangle, _)))| {
             let Some(point) = self.point([px, py], sample, *triangle) else { return self.background };
-            self.shade(&point, (sample, index), shadows, shaded)
+            lanes.run(|lane| self.shade(lane, &point, (sample, index), shadows, lanes))
         });
         colours.sum::<Vec3>() / seen.len() as f32
     }
@@ -114,7 +113,7 @@ impl<'a> World<'a> {
                 let point = self.point([px, py], sample, *triangle)?;
                 let lane = Lane::default();
                 let toward = self.light.point(&lane, [sample.u, sample.v]) - point.place;
-                let is_lit = || self.is_lit(&lane, &point, (sample, index), shadows, &mut Vec::new());
+                let is_lit = || self.is_lit(&lane, &point, (sample, index), shadows, &Lanes::default());
                 (point.normal.dot(toward) > 0.0).then(is_lit)
             };
             at.iter().zip(seen).enumerate().map(of).collect::<Vec<_>>()
@@ -143,16 +142,19 @@ impl<'a> World<'a> {
     }
 
     /// Lambert's law for one point of the light, plus ambient light.
-    fn shade(&self, point: &Point, at: (&Sample, usize), shadows: Shadows<'_>, shaded: &mut Shaded) -> Vec3 {
-        let lane = Lane::default();
-        let light = self.light.point(&lane, [at.0.u, at.0.v]);
+    fn shade(
+        &self,
+        lane: &Lane,
+        point: &Point,
+        at: (&Sample, usize),
+        shadows: Shadows<'_>,
+        lanes: &Lanes,
+    ) -> Vec3 {
+        let light = self.light.point(lane, [at.0.u, at.0.v]);
         let toward = lane.normalize(lane.sub(light, point.place));
         let facing = lane.max(lane.dot(point.normal, toward), 0.0) as f32;
-        let lit = lane.branch(facing > 0.0) && self.is_lit(&lane, point, at, shadows, &mut shaded.fetches);
-        let colour = lane.scale(point.albedo, lane.add(AMBIENT, if lit { facing } else { 0.0 }));
-        shaded.lanes += 1;
-        shaded.ops += lane.ops();
-        colour
+        let lit = lane.branch(facing > 0.0) && self.is_lit(lane, point, at, shadows, lanes);
+        lane.scale(point.albedo, lane.add(AMBIENT, if lit { facing } else { 0.0 }))
     }
 
     fn is_lit(
@@ -161,12 +163,12 @@ impl<'a> World<'a> {
         point: &Point,
         (sample, index): (&Sample, usize),
         shadows: Shadows<'_>,
-        fetches: &mut Vec<usize>,
+        lanes: &Lanes,
     ) -> bool {
         match shadows {
             Shadows::Map { map, bias } => {
                 let at = (point.place.as_vec3(), index);
-                map.is_lit(lane, self.light, at, bias, |place| fetches.push(place))
+                map.is_lit(lane, self.light, at, bias, |place| lanes.fetch(map.address(place), DEPTH_BYTES))
             }
             Shadows::Rays => {
                 let light = self.light.point(&Lane::default(), [sample.u, sample.v]);
@@ -177,101 +179,18 @@ impl<'a> World<'a> {
     }
 }
 
-/// Work of shading samples.
-#[derive(Default)]
-struct Shaded {
-    /// Samples that see a surface.
-    lanes: u32,
-    /// Operations of their shader.
-    ops: u32,
-    /// Places of the fetched depths in the map.
-    fetches: Vec<usize>,
-}
-
-/// Bytes of an image pixel and of a stored depth.
-const BYTES: u64 = 4;
-
-/// Colours of the pixels of a tile, row by row, with the work and the accesses of shading them.
-struct ShadedTile {
-    first: [u32; 2],
-    colours: Vec<Vec3>,
-    work: TileWork,
-    touches: Vec<Touch>,
-}
-
-/// Shades the visible samples by the map in a pass of its own, and returns the image and the number of fetches.
+/// Shades the visible samples by the map in a pass of its own.
 pub fn look_ups(
     world: &World<'_>,
     (samples, seen): (&dyn SampleSource, &[(u32, u32)]),
     (map, bias): (&ShadowMap, f64),
     gpu: &mut Gpu<'_>,
-) -> (Vec<Vec3>, u64) {
+) -> Rendered {
     gpu.wait();
-    let viewport = world.viewport;
-    let image = gpu.surface(viewport.pixels() as u64 * BYTES);
-    let look_up = LookUp { world, samples, seen, map, bias, image, side: gpu.spec().tile_px };
-    gpu.begin("look-ups", Some(viewport));
-    let (mut colours, mut fetches) = (vec![Vec3::ZERO; viewport.pixels()], 0);
-    for row in (0..viewport.height()).step_by(look_up.side as usize) {
-        let columns: Vec<u32> = (0..viewport.width()).step_by(look_up.side as usize).collect();
-        let tiles: Vec<ShadedTile> = columns.par_iter().map(|&column| look_up.tile([column, row])).collect();
-        for tile in tiles {
-            fetches += u64::from(tile.work.texture_fetches);
-            for ([x, y], colour) in look_up.pixels(tile.first).zip(&tile.colours) {
-                colours[(y * viewport.width() + x) as usize] = *colour;
-            }
-            gpu.tile(&tile.work, tile.touches);
-        }
-    }
-    gpu.keep(image);
-    (colours, fetches)
-}
-
-/// Inputs of the pass that shades by a map.
-struct LookUp<'a> {
-    world: &'a World<'a>,
-    samples: &'a dyn SampleSource,
-    seen: &'a [(u32, u32)],
-    map: &'a ShadowMap,
-    bias: f64,
-    image: Surface,
-    /// Side of a tile in pixels.
-    side: u32,
-}
-
-impl LookUp<'_> {
-    /// Pixels of the tile with a given first pixel, row by row.
-    fn pixels(&self, [x0, y0]: [u32; 2]) -> impl Iterator<Item = [u32; 2]> + use<> {
-        let (viewport, side) = (self.world.viewport, self.side);
-        let columns = x0..viewport.width().min(x0 + side);
-        (y0..viewport.height().min(y0 + side)).flat_map(move |y| columns.clone().map(move |x| [x, y]))
-    }
-
-    fn tile(&self, first: [u32; 2]) -> ShadedTile {
-        let (width, per_pixel) = (self.world.viewport.width(), self.samples.per_pixel() as usize);
-        let (mut shaded, mut touches, mut colours) = (Shaded::default(), Vec::new(), Vec::new());
-        let touch = |client, address| {
-            let write = client == Client::Colour;
-            Touch { client, address, bytes: BYTES, write, fresh: write }
-        };
-        for [x, y] in self.pixels(first) {
-            let pixel = (y * width + x) as usize;
-            let seen = &self.seen[pixel * per_pixel..(pixel + 1) * per_pixel];
-            let (shadows, before) = (Shadows::Map { map: self.map, bias: self.bias }, shaded.fetches.len());
-            colours.push(self.world.pixel([x, y], (self.samples, seen), shadows, &mut shaded));
-            let read =
-                shaded.fetches[before..].iter().map(|&at| touch(Client::Texture, self.map.address(at)));
-            touches.extend(read);
-            touches.push(touch(Client::Colour, self.image.address() + pixel as u64 * BYTES));
-        }
-        let work = TileWork {
-            tile: first[1] / self.side * width.div_ceil(self.side) + first[0] / self.side,
-            lanes: shaded.lanes,
-            shader_ops: shaded.ops,
-            texture_fetches: shaded.fetches.len() as u32,
-            pixels: colours.len() as u32,
-            ..TileWork::default()
-        };
-        ShadedTile { first, colours, work, touches }
-    }
+    let (width, per_pixel) = (world.viewport.width() as usize, samples.per_pixel() as usize);
+    gpu.shade_pixels("look-ups", world.viewport, |lanes, [x, y]| {
+        let first = (y as usize * width + x as usize) * per_pixel;
+        let shadows = Shadows::Map { map, bias };
+        world.pixel([x, y], (samples, &seen[first..first + per_pixel]), shadows, lanes)
+    })
 }

@@ -1,11 +1,13 @@
 //! Occlusion queries, compared with all samples.
 
 use glam::Vec3;
-use pipeline::depth::BoxGrid;
+use pipeline::depth::{BoxGrid, Pyramid};
 use pipeline::geometry::Projection;
-use pipeline::{LensShape, SampleTable, Settings, Viewport};
+use pipeline::{
+    IntervalQueries, LensShape, MovingBox, RasterPass, SampleTable, SampledQueries, Settings, Viewport,
+};
 use proptest::prelude::*;
-use workloads::occlusion::{MovingBox, Pyramid, Queries, Samples, WallScene, WallSceneSpec, depths};
+use workloads::occlusion::{WallScene, WallSceneSpec, depths};
 use workloads::visibility::Unshaded;
 
 /// Which boxes of a wall scene are hidden: by intervals, for each grid of boxes and tile side, and by
@@ -21,17 +23,25 @@ fn query(wall_scene: &WallScene, size: [u32; 2], per_pixel: u32, grids: &[([u32;
     let samples = SampleTable::low_discrepancy(per_pixel, 7, LensShape::Disk).unwrap();
     let spec = crate::common::spec();
     let settings = Settings { spec: &spec, viewport, samples: &samples, background: Vec3::ZERO };
-    let depths = depths(&wall_scene.camera, &[wall_scene.walls(&Unshaded).unwrap()], &settings).unwrap();
-    let sampled = Samples { camera: &wall_scene.camera, settings: &settings, depths: &depths };
-    let by_samples: Vec<bool> =
-        wall_scene.boxes.iter().map(|object| sampled.ask(object).unwrap().passed == 0).collect();
+    let walls = [wall_scene.walls(&Unshaded).unwrap()];
+    let depths = depths(&wall_scene.camera, &walls, &settings).unwrap();
+    let sampled =
+        SampledQueries { occluders: RasterPass::new(&wall_scene.camera, &walls, &settings), any: false };
+    let all = sampled.ask(&wall_scene.boxes).unwrap();
+    let any = SampledQueries { any: true, ..sampled }.ask(&wall_scene.boxes).unwrap();
+    for (all, any) in all.iter().zip(&any) {
+        assert_eq!(all.passed == 0, any.passed == 0, "both kinds agree");
+        assert!(any.tests() <= all.tests() && any.madds <= all.madds);
+        assert!(all.passed > 0 || all == any, "nothing to end at");
+    }
+    let by_samples: Vec<bool> = all.iter().map(|answer| answer.passed == 0).collect();
     let projection = Projection::new(&wall_scene.camera, viewport);
     let mut half_covered = 0.0;
     let by_intervals = grids.iter().map(|&(boxes, tile_px)| {
         let grid = BoxGrid::new(boxes, wall_scene.camera.lens().is_some()).unwrap();
         let pyramid = Pyramid::new(viewport, &samples, &depths, tile_px, grid);
         half_covered = pyramid.half_covered();
-        let queries = Queries::new(&pyramid, &projection);
+        let queries = IntervalQueries::new(&pyramid, &projection);
         wall_scene.boxes.iter().map(|object| queries.ask(object).hidden).collect()
     });
     let by_intervals: Vec<Vec<bool>> = by_intervals.collect();

@@ -6,7 +6,7 @@ use output::plot::{ChartPanel, Scale, Series};
 use output::progress::Progress;
 use serde::Serialize;
 use workloads::collision::families::{Case, cases, reference_cases, slide, triangles_boxes_touch};
-use workloads::collision::{Method, Search, candidates, detect};
+use workloads::collision::{Method, Search, Sweeps, candidates, detect};
 
 use crate::study::table::{Sheet, Table, fixed, millis, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
@@ -38,7 +38,9 @@ pub enum Way {
     ObjectBoxes,
     /// By the boxes that triangles sweep.
     TriangleBoxes,
-    /// By images.
+    /// By two sweeps over all objects along each axis, as in the paper.
+    Sweeps(Sweeps),
+    /// By images of each pair.
     Images(Search),
 }
 
@@ -48,6 +50,7 @@ impl Way {
         match self {
             Self::ObjectBoxes => "swept boxes of objects".to_owned(),
             Self::TriangleBoxes => "swept boxes of triangles".to_owned(),
+            Self::Sweeps(Sweeps { bins, .. }) => format!("two sweeps, bins {bins}"),
             Self::Images(Search { zoom: true, .. }) => "with refinement".to_owned(),
             Self::Images(Search { method: Method::DepthOnly, .. }) => "depth only".to_owned(),
             Self::Images(Search { method: Method::BoxBox, bins, .. }) => format!("box-box, bins {bins}"),
@@ -57,7 +60,10 @@ impl Way {
 
     /// Pixels across; none where there is no image.
     pub fn resolution(&self) -> u32 {
-        if let Self::Images(search) = self { search.resolution } else { 0 }
+        match self {
+            Self::Images(Search { resolution, .. }) | Self::Sweeps(Sweeps { resolution, .. }) => *resolution,
+            Self::ObjectBoxes | Self::TriangleBoxes => 0,
+        }
     }
 }
 
@@ -141,7 +147,13 @@ fn reference_ways(effort: &CcdEffort) -> Vec<Way> {
     let depth_only = Search { method: Method::DepthOnly, ..once };
     let binned = effort.reference_bins.iter().map(|&bins| Search { bins, ..once });
     let images = [depth_only].into_iter().chain(binned).chain([Search::default()]).map(Way::Images);
-    [Way::ObjectBoxes, Way::TriangleBoxes].into_iter().chain(images).collect()
+    let sweeps = effort.reference_bins.iter().map(|&bins| sweeps(REFERENCE_PIXELS, bins));
+    [Way::ObjectBoxes, Way::TriangleBoxes].into_iter().chain(sweeps).chain(images).collect()
+}
+
+/// Two sweeps over all objects.
+fn sweeps(resolution: u32, bins: u32) -> Way {
+    Way::Sweeps(Sweeps { method: Method::FragmentBox, resolution, bins })
 }
 
 /// All ways, from the cheapest on.
@@ -155,7 +167,8 @@ fn ways(effort: &CcdEffort) -> Vec<Way> {
             Search { method: Method::BoxBox, ..search },
             Search { zoom: true, bins: Search::default().bins, ..search },
         ];
-        binned.chain(others).map(Way::Images)
+        let swept = effort.bins.iter().map(move |&bins| sweeps(resolution, bins));
+        swept.chain(binned.chain(others).map(Way::Images))
     });
     [Way::ObjectBoxes, Way::TriangleBoxes].into_iter().chain(each).collect()
 }
@@ -376,6 +389,10 @@ fn kept(way: &Way, case: &Case, touching: &mut u32) -> Vec<(usize, usize)> {
             *touching += answers.len() as u32;
             let kept = answers.into_iter().filter(|answer| answer.verdict.may_collide());
             kept.map(|answer| (answer.a, answer.b)).collect()
+        }
+        Way::Sweeps(sweeps) => {
+            *touching += candidates(objects).len() as u32;
+            sweeps.detect(objects).pairs(objects)
         }
         Way::ObjectBoxes | Way::TriangleBoxes => {
             let mut pairs = candidates(objects);

@@ -5,16 +5,16 @@ use glam::Vec3;
 use output::OutputError;
 use output::plot::{ChartPanel, Scale, Series};
 use output::progress::{Bar, Progress};
-use pipeline::depth::BoxGrid;
+use pipeline::depth::{BoxGrid, Pyramid};
 use pipeline::geometry::Projection;
-use pipeline::{LensShape, SampleTable, Settings, Viewport};
+use pipeline::{
+    IntervalAnswer, IntervalQueries, LensShape, RasterPass, SampleTable, SampledAnswer, SampledQueries,
+    Settings, Viewport,
+};
 use rayon::prelude::*;
 use run::GpuSpec;
 use serde::Serialize;
-use workloads::occlusion::{
-    Answer, MAX_HALF_COVERED_SHARE, Pyramid, Queries, SampledAnswer, Samples, WallScene, WallSceneSpec,
-    depths,
-};
+use workloads::occlusion::{MAX_HALF_COVERED_SHARE, WallScene, WallSceneSpec, depths};
 use workloads::visibility::Unshaded;
 
 use crate::study::table::{Sheet, Table, fixed, optional, plain};
@@ -323,8 +323,22 @@ pub(crate) struct Drawn {
     viewport: Viewport,
     table: SampleTable,
     depths: Vec<f32>,
-    /// Answers of sampled queries, by box.
+    /// Answers of sampled queries that end at the first sample that sees the box, by box.
     pub seen: Vec<SampledAnswer>,
+    /// Answers of sampled queries that count all samples.
+    pub counted: Vec<SampledAnswer>,
+}
+
+/// Answers of interval queries, and the farthest depths that they were asked against.
+pub(crate) struct Asked {
+    /// By box.
+    pub answers: Vec<IntervalAnswer>,
+    /// Share of tiles in which most, but not all, samples are covered.
+    pub half_covered: f64,
+    /// Depths compared to gather the farthest of every tile and level.
+    pub gathered: u64,
+    /// Bytes of stored depth read for that.
+    pub gathered_bytes: u64,
 }
 
 impl Drawn {
@@ -340,26 +354,32 @@ impl Drawn {
         let table = SampleTable::low_discrepancy(samples, SEED, LensShape::Disk)?;
         let settings = Settings { spec: &gpu.pipeline, viewport, samples: &table, background: Vec3::ZERO };
         let walls = scene.walls(&Unshaded).map_err(|error| StudyError::Pipeline(error.to_string()))?;
-        let depths = depths(&scene.camera, &[walls], &settings)?;
-        let queries = Samples { camera: &scene.camera, settings: &settings, depths: &depths };
-        let seen = scene.boxes.par_iter().map(|object| queries.ask(object));
-        let seen = seen.collect::<Result<_, _>>()?;
-        Ok(Self { scene, viewport, table, depths, seen })
-    }
-
-    /// Samples whose depths are stored.
-    pub fn stored(&self) -> usize {
-        self.depths.len()
+        let depths = depths(&scene.camera, std::slice::from_ref(&walls), &settings)?;
+        let walls = [walls];
+        let occluders = RasterPass::new(&scene.camera, &walls, &settings);
+        let ask = |any: bool| SampledQueries { occluders, any }.ask(&scene.boxes);
+        let (seen, counted) = (ask(true)?, ask(false)?);
+        Ok(Self { scene, viewport, table, depths, seen, counted })
     }
 
     /// By intervals, with so many boxes of lens and time and tiles of this side.
-    pub fn ask(&self, boxes: [u32; 3], tile_px: u32) -> (Vec<Answer>, f64) {
+    pub fn ask(&self, boxes: [u32; 3], tile_px: u32) -> Asked {
         let grid = BoxGrid::new(boxes, self.scene.camera.lens().is_some()).unwrap_or_default();
         let pyramid = Pyramid::new(self.viewport, &self.table, &self.depths, tile_px, grid);
         let projection = Projection::new(&self.scene.camera, self.viewport);
-        let queries = Queries::new(&pyramid, &projection);
-        let answers = self.scene.boxes.iter().map(|object| queries.ask(object)).collect();
-        (answers, pyramid.half_covered())
+        let queries = IntervalQueries::new(&pyramid, &projection);
+        let answers = self.scene.boxes.par_iter().map(|object| queries.ask(object)).collect();
+        let compared = |level: usize| {
+            let [columns, rows] = pyramid.size(level);
+            (0..columns * rows).map(|n| u64::from(pyramid.compared(level, [n % columns, n / columns]))).sum()
+        };
+        let gathered: Vec<u64> = (0..pyramid.levels()).map(compared).collect();
+        Asked {
+            answers,
+            half_covered: pyramid.half_covered(),
+            gathered: gathered.iter().sum(),
+            gathered_bytes: 4 * gathered[0],
+        }
     }
 }
 
@@ -407,10 +427,10 @@ fn blank(kind: Kind, slats: u32, samples: u32) -> OcclusionRow {
 fn by_intervals(scenes: &[Drawn], like: OcclusionRow, boxes: [u32; 3], tile_px: u32) -> OcclusionRow {
     let (mut answered, mut half_covered) = (Vec::new(), 0.0);
     for drawn in scenes {
-        let (answers, half) = drawn.ask(boxes, tile_px);
-        half_covered += half / scenes.len() as f64;
-        let all = answers.iter().zip(&drawn.seen).map(|(answer, seen)| {
-            ((answer.hidden, [answer.tests(), answer.bytes(), answer.madds]), seen.passed == 0)
+        let asked = drawn.ask(boxes, tile_px);
+        half_covered += asked.half_covered / scenes.len() as f64;
+        let all = asked.answers.iter().zip(&drawn.seen).map(|(answer, seen)| {
+            ((answer.hidden, [answer.tests(), answer.bytes(), answer.all_madds()]), seen.passed == 0)
         });
         answered.extend(all);
     }

@@ -1,8 +1,8 @@
 //! The farthest stored depths of tiles, level by level.
 
-use pipeline::Viewport;
-use pipeline::depth::BoxGrid;
-use pipeline::sampling::{Sample, SampleSource};
+use super::BoxGrid;
+use crate::geometry::Viewport;
+use crate::sampling::{Sample, SampleSource};
 
 /// Farthest depth of each tile and box of lens and time, with tile sides that double per level.
 #[derive(Clone, Debug)]
@@ -19,6 +19,8 @@ struct Level {
     columns: u32,
     rows: u32,
     farthest: Vec<f32>,
+    /// Depths compared, by tile.
+    compared: Vec<u32>,
 }
 
 impl Pyramid {
@@ -44,6 +46,7 @@ impl Pyramid {
             for (sample, &depth) in samples.iter().zip(depths) {
                 let place = tile * grid.len() + grid.of_sample(sample.u, sample.v, sample.t);
                 level.farthest[place] = level.farthest[place].max(depth);
+                level.compared[tile] += 1;
                 covered[tile][usize::from(depth.is_finite())] += 1;
             }
         }
@@ -87,6 +90,11 @@ impl Pyramid {
         level.farthest[(row * level.columns + column) as usize * self.grid.len() + index]
     }
 
+    /// Depths compared to find the farthest of a tile: of its samples on the first level, else those of its child tiles.
+    pub fn compared(&self, level: usize, [column, row]: [u32; 2]) -> u32 {
+        self.levels[level].compared[(row * self.levels[level].columns + column) as usize]
+    }
+
     /// Share of tiles in which most, but not all, samples are covered. Their farthest depth is that of the
     /// gaps, so small occluders hide nothing.
     pub fn half_covered(&self) -> f64 {
@@ -99,7 +107,8 @@ impl Level {
     /// A level without samples. A box without samples hides everything, as nothing is visible in it.
     fn empty(viewport: Viewport, side_px: u32, boxes: usize) -> Self {
         let (columns, rows) = (viewport.width().div_ceil(side_px), viewport.height().div_ceil(side_px));
-        Self { columns, rows, farthest: vec![f32::NEG_INFINITY; (columns * rows) as usize * boxes] }
+        let tiles = (columns * rows) as usize;
+        Self { columns, rows, farthest: vec![f32::NEG_INFINITY; tiles * boxes], compared: vec![0; tiles] }
     }
 
     /// The next level, with tiles of twice the side.
@@ -107,9 +116,10 @@ impl Level {
         let mut above = Self::empty(viewport, side_px, boxes);
         for (tile, of_tile) in (0..).zip(self.farthest.chunks_exact(boxes)) {
             let [column, row] = [tile % self.columns / 2, tile / self.columns / 2];
-            let first = (row * above.columns + column) as usize * boxes;
-            for (known, &farthest) in above.farthest[first..].iter_mut().zip(of_tile) {
+            let parent = (row * above.columns + column) as usize;
+            for (known, &farthest) in above.farthest[parent * boxes..].iter_mut().zip(of_tile) {
                 *known = known.max(farthest);
+                above.compared[parent] += 1;
             }
         }
         above
@@ -119,13 +129,13 @@ impl Level {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use pipeline::{LensShape, SampleTable};
+    use crate::sampling::{LensShape, SampleTable};
 
     #[test]
     fn every_level_has_the_farthest_depth_of_its_samples() {
         let viewport = Viewport::new(37, 21).unwrap();
         let table = SampleTable::low_discrepancy(4, 3, LensShape::Disk).unwrap();
-        let depth = |n: usize| (pipeline::random::mix(n as u64) % 1000) as f32;
+        let depth = |n: usize| (crate::random::mix(n as u64) % 1000) as f32;
         let depths: Vec<f32> = (0..viewport.pixels() * 4).map(depth).collect();
         let grid = BoxGrid::new([2, 1, 3], true).unwrap();
         let pyramid = Pyramid::new(viewport, &table, &depths, 8, grid);
@@ -142,6 +152,10 @@ mod tests {
                     *place = place.max(depth(pixel as usize * 4 + index));
                 }
             }
+            let compared: u32 =
+                (0..columns * rows).map(|n| pyramid.compared(level, [n % columns, n / columns])).sum();
+            let below = level.checked_sub(1).map(|below| pyramid.size(below));
+            assert_eq!(compared, below.map_or(37 * 21 * 4, |[columns, rows]| columns * rows * 6));
             for tile in 0..columns * rows {
                 for index in 0..6 {
                     let at = [tile % columns, tile / columns];

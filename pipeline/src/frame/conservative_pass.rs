@@ -1,0 +1,292 @@
+//! Conservative mode as a mode of the pipeline: triangles stream through vertices, set-up and the tile loop, and every
+//! tile that a triangle may touch runs a [`TileShader`]. No sample is tested. The numbers of the tile loop and the lanes
+//! of the shader count what they do.
+
+use std::collections::HashSet;
+use std::ops::Range;
+
+use activity::{Event, Packet, PacketCounts, PacketKind};
+use rayon::prelude::*;
+
+use super::Gpu;
+use super::lanes::{LaneWork, Lanes};
+use crate::conservative::{Grid, MovingTriangle, Rasterizer, TileLoop, Touch};
+use crate::geometry::{Projection, Viewport};
+use crate::memory::Surface;
+use crate::tally::{Counting, Tally};
+
+/// Triangles of a packet of vertices.
+const BATCH: usize = 32;
+/// Triangles whose tiles are in memory at once.
+const TRIANGLES_AT_ONCE: usize = 4096;
+
+/// A triangle in conservative mode.
+#[derive(Clone, Debug)]
+pub struct Primitive {
+    /// Vertices on the image plane, in the units of the tiles' borders.
+    pub triangle: MovingTriangle,
+    /// View, clip planes in lens and time, and halvings of time.
+    pub rasterizer: Rasterizer,
+    /// Columns and rows of tiles that are tested (scissor).
+    pub part: [Range<u32>; 2],
+    /// Number of the body that the triangle belongs to, such as the bounding volume of which it is a face. Triangles of a
+    /// body follow each other and share the state of the shader.
+    pub body: u32,
+    /// Whether it is the triangle before it in another clip region, so that its vertices are there.
+    pub again: bool,
+    /// Whether it is dropped in set-up unless it shows its back: its vertices then appear in the order of x, y.
+    pub back_only: bool,
+}
+
+impl Primitive {
+    /// Whether set-up drops the triangle because of the face it shows, and its multiply-adds.
+    fn is_culled(&self) -> (bool, u32) {
+        if !self.back_only {
+            return (false, 0);
+        }
+        let tally = Tally::default();
+        let [a, b, c] = self.triangle.open().map(|p| p.map(|at| Counting::new(at, &tally)));
+        let [along, across] = [b, c].map(|p| [p[0] - a[0], p[1] - a[1]]);
+        let area = along[0] * across[1] - across[0] * along[1];
+        (area.value() <= 0.0, tally.madds())
+    }
+}
+
+/// Triangles drawn in conservative mode.
+#[derive(Clone, Copy, Debug)]
+pub struct ConservativeDraw<'a> {
+    /// The triangles, in order.
+    pub primitives: &'a [Primitive],
+    /// The tiles.
+    pub grid: &'a Grid,
+    /// Tiles along a side of a block whose tiles of one triangle make one packet: those of a tile of the image.
+    pub block: u32,
+    /// The vertices in memory, three of each triangle.
+    pub vertices: Surface,
+    /// Bytes of a vertex, at both ends of the shutter if it moves.
+    pub vertex_bytes: u32,
+    /// What moved the vertices to the image plane, at both ends; `None` if they are there in memory.
+    pub projection: Option<&'a Projection>,
+}
+
+/// A tile that a triangle may touch.
+#[derive(Clone, Copy, Debug)]
+pub struct TileIntervals<'a> {
+    /// Index of the triangle in the draw.
+    pub primitive: usize,
+    /// Column and row.
+    pub tile: [u32; 2],
+    /// Intervals of lens position, time and depth.
+    pub touch: &'a Touch,
+}
+
+/// Shader of conservative mode: runs for every triangle and tile that it may touch. Results have to depend on the
+/// arguments alone, and on what was stored before the draw.
+pub trait TileShader: Sync {
+    /// State that the triangles of a body share.
+    type Body: Default;
+    /// Result for a tile, which is stored in the order of triangles.
+    type Output: Send;
+
+    /// Runs on a tile; `None` discards it. What it does is counted as it does it.
+    fn run(&self, body: &mut Self::Body, lanes: &Lanes, tile: &TileIntervals<'_>) -> Option<Self::Output>;
+}
+
+/// A pass in conservative mode. Its targets are cleared when it begins.
+#[derive(Debug, Default)]
+pub struct ConservativePass {
+    /// Lines that hold more than the clear value.
+    written: HashSet<u64>,
+}
+
+/// Tiles of one body, in order.
+struct BodyLog<T> {
+    tiles: Vec<TileLog<T>>,
+    /// Work of the tile loop after the last tile of each triangle, with the triangle.
+    rest: Vec<(usize, TileLoop)>,
+}
+
+struct TileLog<T> {
+    primitive: usize,
+    tile: [u32; 2],
+    tests: TileLoop,
+    lanes: LaneWork,
+    output: Option<T>,
+}
+
+impl Gpu<'_> {
+    /// Begins a pass in conservative mode. Its blocks of tiles are those of an image of the size of `viewport`, if any.
+    pub fn begin_conservative(&mut self, name: &str, viewport: Option<Viewport>) -> ConservativePass {
+        self.open(name, viewport);
+        ConservativePass::default()
+    }
+}
+
+impl ConservativePass {
+    /// Draws triangles with `shader`. `store` is given every result, with the column and row of its tile.
+    pub fn draw<S: TileShader>(
+        &mut self,
+        gpu: &mut Gpu<'_>,
+        draw: &ConservativeDraw<'_>,
+        shader: &S,
+        mut store: impl FnMut([u32; 2], S::Output),
+    ) {
+        let first = gpu.triangles_of_pass() as u32;
+        let numbers = numbered(draw.primitives, first);
+        vertices(gpu, draw);
+        for (chunk, from) in chunks(draw.primitives) {
+            let bodies: Vec<&[Primitive]> = chunk.chunk_by(|a, b| a.body == b.body).collect();
+            let starts = bodies.iter().scan(from, |next, body| {
+                let start = *next;
+                *next += body.len();
+                Some(start)
+            });
+            let starts: Vec<usize> = starts.collect();
+            let logs: Vec<BodyLog<S::Output>> =
+                bodies.par_iter().zip(&starts).map(|(body, start)| log(body, *start, draw, shader)).collect();
+            for log in logs {
+                self.body(gpu, draw, &numbers, log, &mut store);
+            }
+        }
+    }
+
+    /// Emits the packets of a body, one for each triangle and block of tiles.
+    fn body<T>(
+        &mut self,
+        gpu: &mut Gpu<'_>,
+        draw: &ConservativeDraw<'_>,
+        numbers: &[u32],
+        log: BodyLog<T>,
+        store: &mut impl FnMut([u32; 2], T),
+    ) {
+        let across = draw.grid.columns.div_ceil(draw.block);
+        let block_of = |tile: [u32; 2]| tile[1] / draw.block * across + tile[0] / draw.block;
+        let mut rest = log.rest.into_iter().peekable();
+        let mut tiles = log.tiles.into_iter().peekable();
+        while let Some(tile) = tiles.next() {
+            while let Some((primitive, tests)) = rest.next_if(|(primitive, _)| *primitive < tile.primitive) {
+                emit_tests(gpu, numbers[primitive], &tests);
+            }
+            let (block, primitive) = (block_of(tile.tile), tile.primitive);
+            let number = numbers[primitive];
+            let mut packet = gpu.packet(PacketKind::Tile, block, Some(number));
+            let mut next = Some(tile);
+            while let Some(TileLog { tile, tests, lanes, output, .. }) = next {
+                add(&tests, &mut packet.counts);
+                let written = &mut self.written;
+                lanes.add_to(&mut packet.counts, gpu.memory(), |line| written.insert(line));
+                if let Some(output) = output {
+                    store(tile, output);
+                }
+                next = tiles.next_if(|next| block_of(next.tile) == block && next.primitive == primitive);
+            }
+            gpu.push(&packet, 0);
+        }
+        for (primitive, tests) in rest {
+            emit_tests(gpu, numbers[primitive], &tests);
+        }
+    }
+}
+
+/// Number of each primitive's triangle in the pass.
+fn numbered(primitives: &[Primitive], first: u32) -> Vec<u32> {
+    let next = primitives.iter().scan(first, |next, primitive| {
+        *next += u32::from(!primitive.again);
+        Some(next.saturating_sub(1).max(first))
+    });
+    next.collect()
+}
+
+/// Whole bodies of some thousand triangles, each with the index of its first.
+fn chunks(primitives: &[Primitive]) -> impl Iterator<Item = (&[Primitive], usize)> {
+    let mut from = 0;
+    std::iter::from_fn(move || {
+        let rest = primitives.get(from..).filter(|rest| !rest.is_empty())?;
+        let mut end = rest.len().min(TRIANGLES_AT_ONCE);
+        while end < rest.len() && rest[end].body == rest[end - 1].body {
+            end += 1;
+        }
+        from += end;
+        Some((&rest[..end], from - end))
+    })
+}
+
+/// Runs the tile loop and the shader on the triangles of a body.
+fn log<S: TileShader>(
+    body: &[Primitive],
+    start: usize,
+    draw: &ConservativeDraw<'_>,
+    shader: &S,
+) -> BodyLog<S::Output> {
+    let (mut tiles, mut rest, mut state) = (Vec::new(), Vec::new(), S::Body::default());
+    for (item, primitive) in body.iter().zip(start..).filter(|(item, _)| !item.is_culled().0) {
+        let prepared = item.rasterizer.prepare(&item.triangle);
+        let after = item.rasterizer.rasterize_counted(
+            &prepared,
+            draw.grid,
+            item.part.clone(),
+            |tile, touch, work: &mut TileLoop| {
+                let lanes = Lanes::default();
+                let output = shader.run(&mut state, &lanes, &TileIntervals { primitive, tile, touch });
+                let tests = std::mem::take(work);
+                tiles.push(TileLog { primitive, tile, tests, lanes: lanes.finish(), output });
+            },
+        );
+        if after != TileLoop::default() {
+            rest.push((primitive, after));
+        }
+    }
+    BodyLog { tiles, rest }
+}
+
+/// Emits the packets of the vertices and of set-up.
+fn vertices(gpu: &mut Gpu<'_>, draw: &ConservativeDraw<'_>) {
+    let mut start = gpu.packet(PacketKind::Draw, Packet::NONE, None);
+    start.counts[Event::Draws] = 1;
+    gpu.push(&start, 0);
+    let vertex_ops = 2 * draw.projection.map_or(0, Projection::vertex_ops);
+    let new: Vec<&Primitive> = draw.primitives.iter().filter(|primitive| !primitive.again).collect();
+    let bytes = u64::from(draw.vertex_bytes);
+    for (number, batch) in (0_u64..).zip(new.chunks(BATCH)) {
+        let (vertices, triangles) = (3 * batch.len() as u32, batch.len() as u32);
+        let mut packet = gpu.packet(PacketKind::Vertices, Packet::NONE, None);
+        let counts = &mut packet.counts;
+        counts[Event::Indices] = vertices;
+        counts[Event::VerticesFetched] = vertices;
+        counts[Event::VertexBytes] = vertices * draw.vertex_bytes;
+        counts[Event::VertexInvocations] = vertices;
+        counts[Event::ShaderOps] = vertices * vertex_ops;
+        counts[Event::TrianglesIn] = triangles;
+        for primitive in batch {
+            let (is_culled, madds) = primitive.is_culled();
+            let outcome = if is_culled { Event::TrianglesFaceCulled } else { Event::TrianglesSetUp };
+            counts[outcome] += 1;
+            counts[Event::SetupMadds] += madds;
+            if !is_culled {
+                counts[Event::SetupMadds] += primitive.rasterizer.prepare_counted(&primitive.triangle).1;
+            }
+        }
+        let from = draw.vertices.address() + 3 * BATCH as u64 * number * bytes;
+        gpu.memory().vertices(from, u64::from(vertices) * bytes, counts);
+        gpu.push(&packet, triangles as usize);
+    }
+}
+
+/// Emits tests after the last tile that a triangle touches.
+fn emit_tests(gpu: &mut Gpu<'_>, triangle: u32, tests: &TileLoop) {
+    let mut packet = gpu.packet(PacketKind::Tile, Packet::NONE, Some(triangle));
+    add(tests, &mut packet.counts);
+    gpu.push(&packet, 0);
+}
+
+fn add(tests: &TileLoop, counts: &mut PacketCounts) {
+    counts[Event::CoarseTilesVisited] += tests.blocks;
+    counts[Event::TilesVisited] += tests.tiles;
+    counts[Event::TilesCulledSides] += tests.culled_sides;
+    counts[Event::TilesCulledEdges] += tests.culled_edges;
+    counts[Event::EdgeMadds] += tests.place_madds;
+    counts[Event::SidePlaneMadds] += tests.side_madds;
+    counts[Event::EdgeBoundMadds] += tests.edge_madds;
+    counts[Event::TileMadds] += tests.place_madds + tests.side_madds + tests.edge_madds;
+    counts[Event::DepthIntervalMadds] += tests.depth_madds;
+}

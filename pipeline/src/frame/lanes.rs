@@ -1,0 +1,171 @@
+//! Lanes of a shader that runs on the tiles of conservative mode or of a full-screen pass. Everything a lane does is
+//! counted as it is done: operations, accesses to memory and tests of points.
+
+use std::cell::RefCell;
+
+use activity::{Event, PacketCounts};
+
+use crate::geometry::Shear;
+use crate::memory::{LINE_BYTES, MemorySystem, Surface};
+use crate::setup::Triangle;
+use crate::shader::Lane;
+use crate::tally::{Counting, Tally};
+use crate::traversal::{TimeIntervals, time_interval_counted};
+
+/// Bytes of a word of depth.
+const WORD_BYTES: u64 = 4;
+
+/// Unit that accesses memory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Client {
+    Depth,
+    Colour,
+    Texture,
+}
+
+/// An access to a range of a surface.
+#[derive(Clone, Copy, Debug)]
+struct Touch {
+    client: Client,
+    address: u64,
+    bytes: u64,
+    write: bool,
+    /// Whether the range is overwritten whole, so that nothing is fetched.
+    whole: bool,
+}
+
+impl Touch {
+    fn lines(&self) -> impl Iterator<Item = u64> + use<> {
+        let last = self.address + self.bytes.max(1) - 1;
+        (self.address / LINE_BYTES..=last / LINE_BYTES).map(|line| line * LINE_BYTES)
+    }
+}
+
+/// The lanes that run for one tile.
+#[derive(Debug, Default)]
+pub struct Lanes {
+    counts: RefCell<PacketCounts>,
+    touches: RefCell<Vec<Touch>>,
+}
+
+impl Lanes {
+    /// Runs a program on a lane.
+    pub fn run<T>(&self, program: impl FnOnce(&Lane) -> T) -> T {
+        let lane = Lane::default();
+        let result = program(&lane);
+        self.count(Event::PixelInvocations, 1);
+        self.count(Event::ShaderOps, lane.ops());
+        result
+    }
+
+    /// Fetches `bytes` at an address through the texture unit.
+    pub fn fetch(&self, address: u64, bytes: u64) {
+        self.count(Event::TextureFetches, 1);
+        self.touch(Touch { client: Client::Texture, address, bytes, write: false, whole: false });
+    }
+
+    /// Reads what is stored at the tile, through the depth unit, which works in the order of triangles.
+    pub fn read(&self, target: Surface, offset: u64, bytes: u64) {
+        self.count(Event::DepthReads, bytes.div_ceil(WORD_BYTES) as u32);
+        let address = target.address() + offset;
+        self.touch(Touch { client: Client::Depth, address, bytes, write: false, whole: false });
+    }
+
+    /// Combines a result with what is stored at the tile, through the depth unit.
+    pub fn merge(&self, target: Surface, offset: u64, bytes: u64) {
+        let words = bytes.div_ceil(WORD_BYTES) as u32;
+        self.count(Event::DepthReads, words);
+        self.count(Event::DepthWrites, words);
+        let address = target.address() + offset;
+        self.touch(Touch { client: Client::Depth, address, bytes, write: true, whole: false });
+    }
+
+    /// Adds a colour of `bytes` to the stored one.
+    pub fn blend(&self, target: Surface, offset: u64, bytes: u64) {
+        self.count(Event::ColourWrites, 1);
+        self.count(Event::SamplesBlended, 1);
+        let address = target.address() + offset;
+        self.touch(Touch { client: Client::Colour, address, bytes, write: true, whole: false });
+    }
+
+    /// Writes a pixel of `bytes` of an image.
+    pub fn write(&self, image: Surface, offset: u64, bytes: u64) {
+        self.count(Event::PixelsResolved, 1);
+        let address = image.address() + offset;
+        self.touch(Touch { client: Client::Colour, address, bytes, write: true, whole: true });
+    }
+
+    /// Times at which a point of the image is inside a moving triangle, by face: the sample test of all times at once.
+    pub fn times_at(&self, triangle: &Triangle, shear: &Shear, at: [f64; 2]) -> [TimeIntervals; 2] {
+        let tally = Tally::default();
+        let times = time_interval_counted(triangle, shear, at, &tally);
+        self.tested(tally.madds(), times.iter().any(|face| !face.as_slice().is_empty()));
+        times
+    }
+
+    /// Whether a point of the image is inside a still triangle whose edges are not negative there, or off by `slack`
+    /// at most.
+    pub fn is_inside(&self, corners: &[[f64; 2]; 3], at: [f64; 2], slack: f64) -> bool {
+        let tally = Tally::default();
+        let number = |value: f64| Counting::new(value, &tally);
+        let [x, y] = at.map(number);
+        let seen = corners.map(|corner| {
+            let [a, b] = corner.map(number);
+            [a - x, b - y]
+        });
+        let is_inside = [(0, 1), (1, 2), (2, 0)].iter().all(|&(i, j): &(usize, usize)| {
+            let edge = seen[i][0] * seen[j][1] - seen[j][0] * seen[i][1];
+            edge.value() >= -slack
+        });
+        self.tested(tally.madds(), is_inside);
+        is_inside
+    }
+
+    fn tested(&self, madds: u32, is_inside: bool) {
+        self.count(Event::SamplesTested, 1);
+        self.count(Event::SampleMadds, madds);
+        self.count(Event::SamplesHit, u32::from(is_inside));
+    }
+
+    fn count(&self, event: Event, count: u32) {
+        self.counts.borrow_mut()[event] += count;
+    }
+
+    fn touch(&self, touch: Touch) {
+        self.touches.borrow_mut().push(touch);
+    }
+
+    /// Ends the lanes of the tile.
+    pub(super) fn finish(self) -> LaneWork {
+        LaneWork { counts: self.counts.into_inner(), touches: self.touches.into_inner() }
+    }
+}
+
+/// What the lanes of a tile did.
+#[derive(Clone, Debug)]
+pub(super) struct LaneWork {
+    counts: PacketCounts,
+    touches: Vec<Touch>,
+}
+
+impl LaneWork {
+    /// Adds the counts, and the accesses in order. `is_cleared` says whether a line has held nothing but the clear value
+    /// so far.
+    pub fn add_to(
+        &self,
+        counts: &mut PacketCounts,
+        memory: &mut MemorySystem,
+        mut is_cleared: impl FnMut(u64) -> bool,
+    ) {
+        *counts += &self.counts;
+        for touch in &self.touches {
+            touch.lines().for_each(|line| match touch.client {
+                Client::Texture => memory.texture(line, counts),
+                Client::Depth => memory.depth(line, touch.write, is_cleared(line), counts),
+                Client::Colour => {
+                    memory.colour(line, touch.write, touch.whole || is_cleared(line), counts);
+                }
+            });
+        }
+    }
+}

@@ -1,0 +1,392 @@
+//! Occlusion queries (thesis, Paper VI, section 3), by samples and by intervals, with their work counted where it is done.
+
+use std::ops::Range;
+
+use activity::{Counts, Event, Packet, PacketKind};
+use glam::{Vec3, Vec4};
+
+use super::{Draw, Gpu, PassError, RasterPass};
+use crate::depth::{Bounder, DepthBound, Pyramid, interval_madds, set_up_madds};
+use crate::geometry::{Cull, Geometry, MovingVertex, Projection};
+use crate::memory::{LINE_BYTES, Surface};
+use crate::setup::{Outcome, Triangle, bounds, madds, set_up};
+use crate::shader::{Lane, Shader, ShadingPoint};
+use crate::state::{Compare, DepthState, DrawState};
+use crate::traversal::{Box5, TileRect, narrow_counted};
+
+/// An axis-aligned box whose corners move linearly.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MovingBox {
+    /// Lowest and highest corner at shutter open.
+    pub open: [Vec3; 2],
+    /// Lowest and highest corner at shutter close.
+    pub close: [Vec3; 2],
+}
+
+/// Faces of a box, two triangles each; the bits of a corner index select the upper coordinate of an axis.
+const FACES: [[u32; 3]; 12] = [
+    [0, 2, 3],
+    [0, 3, 1],
+    [4, 5, 7],
+    [4, 7, 6],
+    [0, 1, 5],
+    [0, 5, 4],
+    [2, 6, 7],
+    [2, 7, 3],
+    [0, 4, 6],
+    [0, 6, 2],
+    [1, 3, 7],
+    [1, 7, 5],
+];
+/// Corners of a box.
+const CORNERS: u32 = 8;
+/// Bytes of a corner at both ends of the shutter.
+const CORNER_BYTES: u32 = 24;
+/// Bytes of a stored depth.
+const DEPTH_BYTES: u64 = 4;
+
+impl MovingBox {
+    /// Triangles, by corner index.
+    pub const TRIANGLES: [[u32; 3]; 12] = FACES;
+
+    /// Corners at shutter open and at shutter close.
+    pub fn corners(&self) -> [[Vec3; 8]; 2] {
+        [self.open, self.close].map(|[low, high]| {
+            std::array::from_fn(|corner| {
+                let pick = |axis: usize| if corner >> axis & 1 == 0 { low[axis] } else { high[axis] };
+                Vec3::new(pick(0), pick(1), pick(2))
+            })
+        })
+    }
+}
+
+/// Result and work of an interval query.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct IntervalAnswer {
+    /// Whether the object is hidden from all samples.
+    pub hidden: bool,
+    /// Triangles set up.
+    pub triangles: u64,
+    /// Tiles tested, on all levels.
+    pub tiles: u64,
+    /// Depth intervals compared with a farthest depth of four bytes.
+    pub compared: u64,
+    /// Multiply-adds of set-up, of tile tests and of depth intervals.
+    pub madds: [u64; 3],
+}
+
+impl IntervalAnswer {
+    /// Number of tests.
+    pub fn tests(&self) -> u64 {
+        self.tiles + self.compared
+    }
+
+    /// Bytes of stored depth read.
+    pub fn bytes(&self) -> u64 {
+        DEPTH_BYTES * self.compared
+    }
+
+    /// Multiply-adds of the whole query.
+    pub fn all_madds(&self) -> u64 {
+        self.madds.iter().sum()
+    }
+}
+
+/// Interval queries against one pyramid.
+#[derive(Clone, Copy, Debug)]
+pub struct IntervalQueries<'a> {
+    pyramid: &'a Pyramid,
+    projection: &'a Projection,
+    bound: DepthBound,
+}
+
+/// A triangle of a box, after set-up.
+struct Side {
+    triangle: Triangle,
+    bounder: Bounder,
+}
+
+impl<'a> IntervalQueries<'a> {
+    /// Makes queries against `pyramid`, whose depths were drawn through `projection`.
+    pub fn new(pyramid: &'a Pyramid, projection: &'a Projection) -> Self {
+        Self { pyramid, projection, bound: DepthBound::LocalPlanes }
+    }
+
+    /// Whether the box, and everything inside, is hidden. Ends at the first tile of the first level that may
+    /// see it.
+    pub fn ask(&self, object: &MovingBox) -> IntervalAnswer {
+        let mut answer = IntervalAnswer::default();
+        let [open, close] = object.corners();
+        let vertices: [MovingVertex; 8] = std::array::from_fn(|n| self.projection.vertex(open[n], close[n]));
+        // If the near plane clips the box, its content may be visible without its sides.
+        let near = self.projection.near;
+        if vertices.iter().any(|vertex| vertex.open[2] <= near || vertex.close[2] <= near) {
+            return answer;
+        }
+        let shear = &self.projection.shear;
+        let half_px = self.pyramid.viewport().half_px();
+        answer.hidden = (0..).zip(FACES).all(|(id, corners)| {
+            let three = corners.map(|corner| &vertices[corner as usize]);
+            let Outcome::Ready(triangle) = set_up(id, three, Cull::None, shear, near, half_px) else {
+                // A triangle without area is invisible.
+                return true;
+            };
+            answer.triangles += 1;
+            answer.madds[0] += u64::from(madds(triangle.moving, Cull::None));
+            answer.madds[2] += u64::from(set_up_madds(self.bound, triangle.moving));
+            let bounder = Bounder::new(&triangle, shear, self.bound);
+            self.triangle(&Side { triangle, bounder }, &mut answer)
+        });
+        answer
+    }
+
+    /// Whether a triangle is hidden, starting at the level where it touches four tiles at most.
+    fn triangle(&self, side: &Side, answer: &mut IntervalAnswer) -> bool {
+        let pixels = bounds(&side.triangle, &self.projection.shear, self.pyramid.viewport());
+        if pixels.is_empty() {
+            return true;
+        }
+        let tiles = |level: usize| pixels.tiles(self.pyramid.side_px(level));
+        let few = |level: &usize| {
+            tiles(*level).x1 - tiles(*level).x0 <= 2 && tiles(*level).y1 - tiles(*level).y0 <= 2
+        };
+        let level = (0..self.pyramid.levels()).find(few).unwrap_or(self.pyramid.levels() - 1);
+        let (tiles, whole) = (tiles(level), Box5::whole(!self.projection.shear.is_none()));
+        (tiles.y0..tiles.y1).all(|row| {
+            (tiles.x0..tiles.x1).all(|column| self.tile(side, level, [column, row], &whole, answer))
+        })
+    }
+
+    /// Whether the triangle is hidden in a tile, directly or in all of its child tiles.
+    fn tile(
+        &self,
+        side: &Side,
+        level: usize,
+        [column, row]: [u32; 2],
+        within: &Box5,
+        answer: &mut IntervalAnswer,
+    ) -> bool {
+        let (shear, px) = (&self.projection.shear, self.pyramid.side_px(level));
+        let rect = TileRect::new(self.pyramid.viewport(), [column * px, row * px], px);
+        answer.tiles += 1;
+        let (narrowed, madds) = narrow_counted::<f64>(&side.triangle, shear, &rect, within);
+        answer.madds[1] += u64::from(madds);
+        let Some(narrowed) = narrowed else { return true };
+        if self.behind(side, level, [column, row], &rect, &narrowed, answer) {
+            return true;
+        }
+        if level == 0 {
+            return false;
+        }
+        let [columns, rows] = self.pyramid.size(level - 1);
+        (2 * row..(2 * row + 2).min(rows)).all(|row| {
+            (2 * column..(2 * column + 2).min(columns))
+                .all(|column| self.tile(side, level - 1, [column, row], &narrowed, answer))
+        })
+    }
+
+    /// Whether the triangle is behind the stored depths in every box of lens and time that it may touch.
+    fn behind(
+        &self,
+        side: &Side,
+        level: usize,
+        tile: [u32; 2],
+        rect: &TileRect,
+        within: &Box5,
+        answer: &mut IntervalAnswer,
+    ) -> bool {
+        let madds = interval_madds(self.bound, side.triangle.moving, within.lens);
+        self.pyramid.grid().overlapping(within).all(|(index, part)| {
+            answer.compared += 1;
+            answer.madds[2] += u64::from(madds);
+            side.bounder.over(rect, &part)[0] > self.pyramid.farthest(level, tile, index)
+        })
+    }
+}
+
+impl Gpu<'_> {
+    /// Gathers the farthest depths of `stored`, the result of a pass over depth, in a pass of its own: every stored depth is
+    /// read and compared once, and the farthest of each box of a tile are compared for the next level. They are kept in fast
+    /// memory.
+    pub fn gather(&mut self, name: &str, pyramid: &Pyramid, stored: Surface) {
+        self.open(name, None);
+        let first = pyramid.size(0);
+        let tiles = u64::from(first[0] * first[1]);
+        for level in 0..pyramid.levels() {
+            let [columns, rows] = pyramid.size(level);
+            for tile in 0..columns * rows {
+                let at = [tile % columns, tile / columns];
+                let mut packet = self.packet(PacketKind::Tile, tile, None);
+                let counts = &mut packet.counts;
+                let compares = pyramid.compared(level, at);
+                counts[Event::ZCullTests] = compares;
+                counts[Event::ZMaxUpdates] = pyramid.grid().len() as u32;
+                if level == 0 {
+                    counts[Event::DepthReads] = compares;
+                    // Depths lie tile by tile, those of all tiles in one surface.
+                    let range = [tile, tile + 1].map(|end| u64::from(end) * stored.bytes() / tiles);
+                    let lines = range.map(|end| (stored.address() + end).div_ceil(LINE_BYTES));
+                    for line in lines[0]..lines[1] {
+                        self.memory().depth(line * LINE_BYTES, false, false, counts);
+                    }
+                }
+                self.push(&packet, 0);
+            }
+        }
+    }
+
+    /// Asks about boxes in a pass of its own. A query ends at its first tile that may see the box.
+    pub fn ask(
+        &mut self,
+        name: &str,
+        queries: &IntervalQueries<'_>,
+        objects: &[MovingBox],
+    ) -> Vec<IntervalAnswer> {
+        let corners = self.surface(objects.len() as u64 * u64::from(CORNERS * CORNER_BYTES));
+        self.open(name, None);
+        let asked = (0..).zip(objects).map(|(number, object)| {
+            let answer = queries.ask(object);
+            self.box_vertices(number, queries.projection, &answer, corners);
+            let mut packet = self.packet(PacketKind::Tile, Packet::NONE, Some(FACES.len() as u32 * number));
+            let counts = &mut packet.counts;
+            let [_, tile_madds, depth_madds] = answer.madds.map(|madds| madds as u32);
+            counts[Event::TilesVisited] = answer.tiles as u32;
+            counts[Event::TileMadds] = tile_madds;
+            counts[Event::SidePlaneMadds] = tile_madds;
+            counts[Event::DepthIntervalMadds] = depth_madds;
+            counts[Event::ZCullTests] = answer.compared as u32;
+            self.push(&packet, 0);
+            answer
+        });
+        asked.collect()
+    }
+
+    /// Emits the draw of a box: its eight corners, and the set-up of the triangles that the query came to.
+    fn box_vertices(
+        &mut self,
+        number: u32,
+        projection: &Projection,
+        answer: &IntervalAnswer,
+        corners: Surface,
+    ) {
+        let mut start = self.packet(PacketKind::Draw, Packet::NONE, None);
+        start.counts[Event::Draws] = 1;
+        self.push(&start, 0);
+        let mut packet = self.packet(PacketKind::Vertices, Packet::NONE, Some(FACES.len() as u32 * number));
+        let counts = &mut packet.counts;
+        counts[Event::Indices] = 3 * FACES.len() as u32;
+        counts[Event::VerticesFetched] = CORNERS;
+        counts[Event::VertexBytes] = CORNERS * CORNER_BYTES;
+        counts[Event::VertexInvocations] = CORNERS;
+        counts[Event::ShaderOps] = CORNERS * 2 * projection.vertex_ops();
+        counts[Event::TrianglesIn] = FACES.len() as u32;
+        counts[Event::TrianglesSetUp] = answer.triangles as u32;
+        counts[Event::SetupMadds] = answer.madds[0] as u32;
+        let bytes = u64::from(CORNERS * CORNER_BYTES);
+        self.memory().vertices(corners.address() + u64::from(number) * bytes, bytes, counts);
+        self.push(&packet, FACES.len());
+    }
+}
+
+/// Result and work of a sampled query.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SampledAnswer {
+    /// Fragments that pass the depth test, until the query ends.
+    pub passed: u64,
+    /// Samples screened and tested.
+    pub tested: u64,
+    /// Tiles tested, coarse ones included.
+    pub tiles: u64,
+    /// Comparisons with the farthest depths of a tile, of four bytes each.
+    pub compared: u64,
+    /// Stored depths of four bytes read.
+    pub read: u64,
+    /// Multiply-adds of the whole query.
+    pub madds: u64,
+}
+
+impl SampledAnswer {
+    /// Number of tests, including depth tests.
+    pub fn tests(&self) -> u64 {
+        self.tested + self.tiles + self.compared + self.read
+    }
+
+    /// Bytes of stored depth read.
+    pub fn bytes(&self) -> u64 {
+        DEPTH_BYTES * (self.compared + self.read)
+    }
+
+    fn add(&mut self, counts: &Counts) {
+        let all = |events: &[Event]| events.iter().map(|event| counts[*event]).sum::<u64>();
+        self.passed += counts[Event::ColourWrites];
+        self.tested += all(&[Event::SamplesTested, Event::SamplesScreened]);
+        self.tiles += all(&[Event::TilesVisited, Event::CoarseTilesVisited]);
+        self.compared += counts[Event::ZCullTests];
+        self.read += counts[Event::DepthReads];
+        self.madds += all(&[
+            Event::SetupMadds,
+            Event::TileMadds,
+            Event::ScreenMadds,
+            Event::SampleMadds,
+            Event::DepthIntervalMadds,
+        ]);
+    }
+}
+
+/// Sampled queries: bounding boxes drawn over stored depths, with the depth test and without storing any.
+#[derive(Clone, Copy)]
+pub struct SampledQueries<'a> {
+    /// The occluders, whose draws have the default state.
+    pub occluders: RasterPass<'a>,
+    /// Whether a query ends at the first packet with a sample that passes.
+    pub any: bool,
+}
+
+/// A query counts fragments and has no colour of its own.
+struct Counted;
+
+impl Shader for Counted {
+    fn shade(&self, _: &Lane, _: &ShadingPoint, _: Vec4) -> Vec4 {
+        Vec4::ONE
+    }
+}
+
+impl SampledQueries<'_> {
+    /// Asks about boxes, one after the other, over what the occluders stored. All culling of the hardware works as for
+    /// other draws; the colours that a pass would write are not part of an answer.
+    ///
+    /// # Errors
+    /// [`PassError`] if the hardware cannot draw it.
+    pub fn ask(&self, objects: &[MovingBox]) -> Result<Vec<SampledAnswer>, PassError> {
+        let corners: Vec<[[Vec3; 8]; 2]> = objects.iter().map(MovingBox::corners).collect();
+        let state = DrawState {
+            depth: DepthState { test: Compare::LessEqual, write: false },
+            ..DrawState::new(Cull::None)
+        };
+        let mut draws = self.occluders.draws.to_vec();
+        let mut asked: Vec<Option<usize>> = Vec::new();
+        for [open, close] in &corners {
+            // A geometry is refused only for values that are not finite, which are invisible.
+            let geometry = Geometry::new(open, close, &MovingBox::TRIANGLES).ok();
+            asked.push(geometry.is_some().then_some(draws.len()));
+            draws
+                .extend(geometry.map(|geometry| Draw::new(geometry, &Counted, Cull::None).with_state(state)));
+        }
+        let range: Range<usize> = self.occluders.draws.len()..draws.len();
+        let mut found = vec![SampledAnswer::default(); draws.len()];
+        let pass = RasterPass { draws: &draws, ..self.occluders.without_image() };
+        pass.render(|packet, _| {
+            let draw = packet.draw as usize;
+            let ended = range.contains(&draw) && self.any && found[draw].passed > 0;
+            if range.contains(&draw) && !ended {
+                let mut counts = Counts::default();
+                counts += &packet.counts;
+                found[draw].add(&counts);
+            }
+        })?;
+        Ok(asked
+            .into_iter()
+            .map(|draw| draw.map_or_else(SampledAnswer::default, |draw| found[draw]))
+            .collect())
+    }
+}

@@ -1,0 +1,108 @@
+//! Full-screen passes: a program runs for every pixel of an image, tile by tile, without triangles.
+
+use activity::{Event, Packet, PacketKind};
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::lanes::{LaneWork, Lanes};
+use super::{Gpu, Rendered};
+use crate::geometry::Viewport;
+use crate::memory::LINE_BYTES;
+
+/// Bytes of a pixel of an image.
+const PIXEL_BYTES: u64 = 4;
+
+impl Gpu<'_> {
+    /// Draws an image in a pass of its own: `pixel` gives the colour of the pixel at a column and row. What its lanes do is
+    /// counted as they do it.
+    pub fn shade_pixels(
+        &mut self,
+        name: &str,
+        viewport: Viewport,
+        pixel: impl Fn(&Lanes, [u32; 2]) -> Vec3 + Sync,
+    ) -> Rendered {
+        let image = self.surface(viewport.pixels() as u64 * PIXEL_BYTES);
+        self.open(name, Some(viewport));
+        let (side, width) = (self.spec().tile_px, viewport.width());
+        let mut colours = vec![Vec3::ZERO; viewport.pixels()];
+        for (row, y0) in (0..).zip((0..viewport.height()).step_by(side as usize)) {
+            let columns: Vec<u32> = (0..width).step_by(side as usize).collect();
+            let shade = |&x0: &u32| {
+                let lanes = Lanes::default();
+                let shaded = pixels([x0, y0], side, viewport).map(|[x, y]| {
+                    let colour = pixel(&lanes, [x, y]);
+                    lanes.write(image, u64::from(y * width + x) * PIXEL_BYTES, PIXEL_BYTES);
+                    colour
+                });
+                (shaded.collect::<Vec<Vec3>>(), lanes.finish())
+            };
+            let tiles: Vec<(Vec<Vec3>, LaneWork)> = columns.par_iter().map(shade).collect();
+            for ((x0, (shaded, work)), column) in columns.iter().zip(tiles).zip(0..) {
+                for ([x, y], colour) in pixels([*x0, y0], side, viewport).zip(shaded) {
+                    colours[(y * width + x) as usize] = colour;
+                }
+                let mut packet = self.packet(PacketKind::Tile, row * columns.len() as u32 + column, None);
+                work.add_to(&mut packet.counts, self.memory(), |_| false);
+                self.push(&packet, 0);
+            }
+        }
+        self.keep(image);
+        Rendered { images: vec![colours], visible: Vec::new(), counts: self.counts_of_pass(), surface: image }
+    }
+
+    /// Runs a program for the pixel at every column and row, in the pass that was begun.
+    pub fn run_pixels(&mut self, viewport: Viewport, pixel: impl Fn(&Lanes, [u32; 2]) + Sync) {
+        let side = self.spec().tile_px;
+        let columns: Vec<u32> = (0..viewport.width()).step_by(side as usize).collect();
+        for y0 in (0..viewport.height()).step_by(side as usize) {
+            let run = |&x0: &u32| {
+                let lanes = Lanes::default();
+                pixels([x0, y0], side, viewport).for_each(|at| pixel(&lanes, at));
+                lanes.finish()
+            };
+            let tiles: Vec<LaneWork> = columns.par_iter().map(run).collect();
+            for (work, column) in tiles.iter().zip(0..) {
+                let tile = y0 / side * columns.len() as u32 + column;
+                let mut packet = self.packet(PacketKind::Tile, tile, None);
+                work.add_to(&mut packet.counts, self.memory(), |_| false);
+                self.push(&packet, 0);
+            }
+        }
+    }
+
+    /// Writes the pixels of an image of `viewport` in a pass of its own, in tiles.
+    pub fn write_image(&mut self, name: &str, viewport: Viewport) {
+        let image = self.surface(viewport.pixels() as u64 * PIXEL_BYTES);
+        self.open(name, Some(viewport));
+        let (pixels, tile_pixels) = (viewport.pixels() as u64, u64::from(self.spec().tile_px.pow(2)));
+        for (tile, first) in (0..).zip((0..pixels).step_by(tile_pixels as usize)) {
+            let count = tile_pixels.min(pixels - first);
+            let mut packet = self.packet(PacketKind::Resolve, tile, None);
+            packet.counts[Event::PixelsResolved] = count as u32;
+            let (from, counts) = (image.address() + first * PIXEL_BYTES, &mut packet.counts);
+            for line in from / LINE_BYTES..=(from + count * PIXEL_BYTES - 1) / LINE_BYTES {
+                self.memory().colour(line * LINE_BYTES, true, true, counts);
+            }
+            self.push(&packet, 0);
+        }
+        self.keep(image);
+    }
+
+    /// A packet of the pass that was begun.
+    pub(super) fn packet(&self, kind: PacketKind, tile: u32, triangle: Option<u32>) -> Packet {
+        let of = triangle.unwrap_or((self.triangles_of_pass() as u32).saturating_sub(1));
+        Packet {
+            batch: of / self.spec().batch_triangles,
+            draw: 0,
+            tile,
+            triangle: triangle.unwrap_or(Packet::NONE),
+            ..Packet::new(kind, self.last_pass())
+        }
+    }
+}
+
+/// Pixels of the tile with a given first pixel, row by row.
+fn pixels([x0, y0]: [u32; 2], side: u32, viewport: Viewport) -> impl Iterator<Item = [u32; 2]> {
+    let columns = x0..viewport.width().min(x0 + side);
+    (y0..viewport.height().min(y0 + side)).flat_map(move |y| columns.clone().map(move |x| [x, y]))
+}

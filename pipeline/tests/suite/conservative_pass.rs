@@ -1,0 +1,163 @@
+//! Conservative mode as a pass of the pipeline: its tiles are those of the rasterizer alone, and every packet counts what was
+//! done.
+
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use crate::common::*;
+use activity::{Counts, Event, PacketKind};
+use glam::Vec3;
+use pipeline::conservative::{Grid, MovingTriangle, Rasterizer, View};
+use pipeline::memory::Surface;
+use pipeline::random::{mix, unit};
+use pipeline::*;
+
+const GRID: Grid = Grid { origin: [0.0, 0.0], tile: [1.0; 2], columns: 8, rows: 8 };
+
+fn primitive(corners: [[[f64; 3]; 3]; 2], body: u32) -> Primitive {
+    Primitive {
+        triangle: MovingTriangle::new(corners[0], corners[1]).unwrap(),
+        rasterizer: Rasterizer::new(View::orthographic()),
+        part: [0..GRID.columns, 0..GRID.rows],
+        body,
+        again: false,
+        back_only: false,
+    }
+}
+
+/// Merges a word at each tile, with two operations.
+struct Merge {
+    target: Surface,
+    runs: AtomicU32,
+}
+
+impl TileShader for Merge {
+    type Body = u32;
+    type Output = [f64; 2];
+
+    fn run(&self, tiles_of_body: &mut u32, lanes: &Lanes, tile: &TileIntervals<'_>) -> Option<[f64; 2]> {
+        self.runs.fetch_add(1, Ordering::Relaxed);
+        *tiles_of_body += 1;
+        lanes.run(|lane| lane.madd(1.0_f32, 2.0, lane.add(1.0, 1.0)));
+        lanes.merge(self.target, u64::from(tile.tile[1] * GRID.columns + tile.tile[0]) * 4, 4);
+        Some(tile.touch.z)
+    }
+}
+
+/// Tiles with their depths that a pass hands to its shader, its packets and its counts.
+fn drawn(primitives: &[Primitive], block: u32) -> (Vec<([u32; 2], [f64; 2])>, Vec<PacketKind>, Counts) {
+    let spec = spec(Features::ALL);
+    let (mut sum, mut kinds, mut found) = (Counts::default(), Vec::new(), Vec::new());
+    let mut gpu = Gpu::new(&spec, |packet, _| {
+        sum += &packet.counts;
+        kinds.push(packet.kind);
+    })
+    .unwrap();
+    let [target, vertices] = [64 * 4, 3 * 24 * primitives.len() as u64].map(|bytes| gpu.surface(bytes));
+    let shader = Merge { target, runs: AtomicU32::new(0) };
+    let mut pass = gpu.begin_conservative("boxes", None);
+    let draw =
+        ConservativeDraw { primitives, grid: &GRID, block, vertices, vertex_bytes: 24, projection: None };
+    pass.draw(&mut gpu, &draw, &shader, |tile, z| found.push((tile, z)));
+    let report = gpu.finish();
+    assert_eq!(report.counts(), sum);
+    assert_eq!(report.triangles(), primitives.iter().filter(|primitive| !primitive.again).count());
+    assert_eq!(shader.runs.into_inner() as usize, found.len());
+    (found, kinds, sum)
+}
+
+#[test]
+fn a_still_triangle_is_counted_by_hand() {
+    let corners = [[0.5, 0.5, 2.0], [3.5, 0.5, 2.0], [0.5, 1.5, 4.0]];
+    let (found, kinds, counts) = drawn(&[primitive([corners; 2], 0)], 8);
+    // As in the example of `pipeline::conservative`.
+    assert_eq!(found.len(), 7);
+    assert_eq!(counts[Event::PixelInvocations], 7);
+    assert_eq!(counts[Event::ShaderOps], 7 * 2);
+    assert_eq!((counts[Event::DepthReads], counts[Event::DepthWrites]), (7, 7));
+    assert_eq!([Event::TrianglesIn, Event::TrianglesSetUp, Event::Draws].map(|event| counts[event]), [1; 3]);
+    // Blocks of 8, 4 and 2 tiles along a side down to the 16 tiles of two blocks of 4 by 2.
+    let tests = counts[Event::TilesVisited];
+    assert!(tests >= 7 && counts[Event::TilesCulledSides] + counts[Event::TilesCulledEdges] > 0);
+    let culled = counts[Event::TilesCulledSides] + counts[Event::TilesCulledEdges];
+    assert!(culled <= tests - 7 + counts[Event::CoarseTilesVisited]);
+    assert_eq!(counts[Event::SetupMadds], 0, "nothing moves");
+    let parts = [Event::EdgeMadds, Event::SidePlaneMadds, Event::EdgeBoundMadds].map(|event| counts[event]);
+    assert!(parts.iter().all(|madds| *madds > 0));
+    assert_eq!(counts[Event::TileMadds], parts.iter().sum::<u64>());
+    assert!(counts[Event::DepthIntervalMadds] > 0);
+    // Two rows of eight tiles are 64 bytes: one line.
+    assert_eq!(counts[Event::DepthLines], 7);
+    assert_eq!(counts[Event::DepthMisses], 1);
+    assert_eq!(kinds[..2], [PacketKind::Draw, PacketKind::Vertices]);
+}
+
+#[test]
+fn a_moving_triangle_counts_the_differences_of_its_vertices_once() {
+    let open = [[0.5, 0.5, 2.0], [3.5, 0.5, 2.0], [0.5, 1.5, 4.0]];
+    let close = open.map(|[x, y, z]| [x + 2.0, y + 1.0, z]);
+    let moving = primitive([open, close], 0);
+    let (_, _, counts) = drawn(std::slice::from_ref(&moving), 8);
+    assert_eq!(counts[Event::SetupMadds], 9);
+    let again = Primitive { again: true, ..moving.clone() };
+    let (found, _, both) = drawn(&[moving, again], 8);
+    assert_eq!((both[Event::VerticesFetched], both[Event::SetupMadds]), (3, 9));
+    assert_eq!(both[Event::TileMadds], 2 * counts[Event::TileMadds]);
+    assert_eq!(found.len() as u64, both[Event::PixelInvocations]);
+}
+
+#[test]
+fn set_up_drops_front_faces_where_only_backs_are_drawn() {
+    let corners = [[0.5, 0.5, 2.0], [3.5, 0.5, 2.0], [0.5, 1.5, 4.0]];
+    let back = Primitive { back_only: true, ..primitive([corners; 2], 0) };
+    let [a, b, c] = corners;
+    let front = Primitive { back_only: true, ..primitive([[a, c, b]; 2], 1) };
+    let (found, _, counts) = drawn(&[back, front], 8);
+    assert_eq!(found.len(), 7);
+    assert_eq!((counts[Event::TrianglesSetUp], counts[Event::TrianglesFaceCulled]), (1, 1));
+    // Four differences and two products of each.
+    assert_eq!(counts[Event::SetupMadds], 2 * 6);
+}
+
+/// Counting numbers give the same tiles and intervals as plain ones, in the same order, whatever the blocks.
+#[test]
+fn the_tiles_are_those_of_the_rasterizer() {
+    let uniform = |n: u64| 12.0 * unit(mix(n)) - 2.0;
+    let triangle = |n: u64| {
+        let corner =
+            |k: u64| [uniform(18 * n + 3 * k), uniform(18 * n + 3 * k + 1), uniform(18 * n + 3 * k + 2)];
+        primitive([[0, 1, 2].map(corner), [3, 4, 5].map(corner)], n as u32 / 2)
+    };
+    let primitives: Vec<Primitive> = (0..200).map(triangle).collect();
+    let mut expected = Vec::new();
+    for primitive in &primitives {
+        primitive
+            .rasterizer
+            .rasterize(&primitive.triangle, &GRID, |tile, touch| expected.push((tile, touch.z)));
+    }
+    for block in [1, 4, 8] {
+        let (found, kinds, counts) = drawn(&primitives, block);
+        assert_eq!(found, expected);
+        assert_eq!(counts[Event::PixelInvocations], expected.len() as u64);
+        assert!(kinds.len() > 200);
+    }
+}
+
+/// A program for every pixel writes every pixel once and counts its lanes.
+#[test]
+fn a_full_screen_pass_runs_every_pixel() {
+    let spec = spec(Features::ALL);
+    let viewport = Viewport::new(21, 13).unwrap();
+    let mut gpu = Gpu::quiet(&spec).unwrap();
+    let source = gpu.surface(4096);
+    let drawn = gpu.shade_pixels("grey", viewport, |lanes, [x, y]| {
+        lanes.fetch(source.address(), 4);
+        lanes.run(|lane| Vec3::splat(lane.add(x as f32, y as f32)))
+    });
+    let pixels = 21 * 13;
+    assert_eq!(drawn.counts[Event::PixelsResolved], pixels);
+    assert_eq!((drawn.counts[Event::PixelInvocations], drawn.counts[Event::ShaderOps]), (pixels, pixels));
+    assert_eq!(drawn.counts[Event::TextureFetches], pixels);
+    assert_eq!(drawn.into_image()[21 * 5 + 7], Vec3::splat(12.0));
+    gpu.write_image("copy", viewport);
+    assert_eq!(gpu.finish().counts()[Event::PixelsResolved], 2 * pixels);
+}
