@@ -407,7 +407,7 @@ impl Dram {
                 if open.closes < Time::MAX {
                     bank.time.reserve_as(turn, open.opened.max(seen.from), work);
                 }
-                // A row that is asked for later in time, though earlier in the stream, does not keep the line waiting.
+                // A row that is requested later in time, though earlier in the stream, does not keep the line waiting.
                 if open.since <= seen.from { open.opened } else { seen.from }
             }
             None => {
@@ -510,9 +510,8 @@ mod tests {
             count,
         };
         let mut bank = Bank { time: Calendar::new(16, 1), rows: vec![OpenRow::NONE; 4].into() };
-        let joins = |bank: &Bank, row, seen, lines| {
-            bank.joins(row, seen, lines, 4).map(|at| bank.rows[at].opened)
-        };
+        let joins =
+            |bank: &Bank, row, seen, lines| bank.joins(row, seen, lines, 4).map(|at| bank.rows[at].opened);
         assert_eq!(joins(&bank, 7, 0, 0), None);
         bank.note(used(7, [0, 4, 10], [0, 1]), None);
         assert_eq!((joins(&bank, 7, 50, 9), joins(&bank, 8, 5, 1)), (Some(4), None));
