@@ -156,7 +156,7 @@ fn wide_intervals(simulated: &Simulated) -> Option<Warning> {
 }
 
 /// Share of a frame's cycles in its preview from which on a warning is given.
-const COSTLY_PREVIEW_SHARE: f64 = 0.25;
+const COSTLY_PREVIEW_SHARE: f64 = 0.5;
 
 fn costly_preview(simulated: &Simulated) -> Option<Warning> {
     let share = simulated.sampled.as_ref()?.preview_share;

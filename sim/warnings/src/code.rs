@@ -105,7 +105,7 @@ codes! {
     ShortPackets = "short-packets" in Simulator,
     /// An interval of `--timing sampled` is wider than 5 % of its value either way.
     WidePredictionInterval = "wide-prediction-interval" in Simulator,
-    /// A preview of `--timing sampled` takes a quarter of a frame or more.
+    /// A preview of `--timing sampled` takes half of a frame's cycles or more.
     CostlyPreview = "costly-preview" in Simulator,
     /// The expected error of the choice exceeds the requested accuracy.
     AccuracyMissed = "accuracy-missed" in Simulator,

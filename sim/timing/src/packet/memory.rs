@@ -407,7 +407,7 @@ impl Dram {
                 if open.closes < Time::MAX {
                     bank.time.reserve_as(turn, open.opened.max(seen.from), work);
                 }
-                // A row that is asked for later in time, though earlier in the stream, does not keep the line waiting.
+                // A row that is requested later in time, though earlier in the stream, does not keep the line waiting.
                 if open.since <= seen.from { open.opened } else { seen.from }
             }
             None => {
