@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use super::light::AreaLight;
 use super::map::{ShadowMap, View};
-use crate::accumulation::Rays;
+use crate::accumulation::{RayWork, Rays};
 
 /// Ambient light, relative to the light on a surface that faces the light.
 const AMBIENT: f32 = 0.18;
@@ -27,7 +27,7 @@ pub enum Shadows<'a> {
         /// Depth bias, scene units.
         bias: f64,
     },
-    /// Rays to the light, against all triangles: the ground truth.
+    /// Rays to the light: the ground truth, and a rival.
     Rays,
     /// No shadows.
     None,
@@ -73,12 +73,25 @@ impl<'a> World<'a> {
 
     /// Renders the image: the mean over each pixel's samples, in order.
     pub fn image(&self, samples: &dyn SampleSource, seen: &[(u32, u32)], shadows: Shadows<'_>) -> Vec<Vec3> {
+        self.image_counted(samples, seen, shadows).0
+    }
+
+    /// The same with the work of its rays.
+    pub fn image_counted(
+        &self,
+        samples: &dyn SampleSource,
+        seen: &[(u32, u32)],
+        shadows: Shadows<'_>,
+    ) -> (Vec<Vec3>, RayWork) {
         let (width, per_pixel) = (self.viewport.width(), samples.per_pixel() as usize);
         let pixel = |(place, seen): (usize, &[(u32, u32)])| {
-            let place = [place as u32 % width, place as u32 / width];
-            self.pixel(place, (samples, seen), shadows, &mut Shaded::default())
+            let (place, mut shaded) = ([place as u32 % width, place as u32 / width], Shaded::default());
+            (self.pixel(place, (samples, seen), shadows, &mut shaded), shaded.rays)
         };
-        seen.par_chunks_exact(per_pixel).enumerate().map(pixel).collect()
+        let pixels: Vec<_> = seen.par_chunks_exact(per_pixel).enumerate().map(pixel).collect();
+        let mut work = RayWork::default();
+        pixels.iter().for_each(|(_, rays)| work += *rays);
+        (pixels.into_iter().map(|(colour, _)| colour).collect(), work)
     }
 
     /// Mean of the samples of a pixel, whose visible triangles are in `seen`; the work is added to `shaded`.
@@ -114,7 +127,7 @@ impl<'a> World<'a> {
                 let point = self.point([px, py], sample, *triangle)?;
                 let lane = Lane::default();
                 let toward = self.light.point(&lane, [sample.u, sample.v]) - point.place;
-                let is_lit = || self.is_lit(&lane, &point, (sample, index), shadows, &mut Vec::new());
+                let is_lit = || self.is_lit(&lane, &point, (sample, index), shadows, &mut Shaded::default());
                 (point.normal.dot(toward) > 0.0).then(is_lit)
             };
             at.iter().zip(seen).enumerate().map(of).collect::<Vec<_>>()
@@ -148,7 +161,7 @@ impl<'a> World<'a> {
         let light = self.light.point(&lane, [at.0.u, at.0.v]);
         let toward = lane.normalize(lane.sub(light, point.place));
         let facing = lane.max(lane.dot(point.normal, toward), 0.0) as f32;
-        let lit = lane.branch(facing > 0.0) && self.is_lit(&lane, point, at, shadows, &mut shaded.fetches);
+        let lit = lane.branch(facing > 0.0) && self.is_lit(&lane, point, at, shadows, shaded);
         let colour = lane.scale(point.albedo, lane.add(AMBIENT, if lit { facing } else { 0.0 }));
         shaded.lanes += 1;
         shaded.ops += lane.ops();
@@ -161,16 +174,16 @@ impl<'a> World<'a> {
         point: &Point,
         (sample, index): (&Sample, usize),
         shadows: Shadows<'_>,
-        fetches: &mut Vec<usize>,
+        shaded: &mut Shaded,
     ) -> bool {
         match shadows {
             Shadows::Map { map, bias } => {
                 let at = (point.place.as_vec3(), index);
-                map.is_lit(lane, self.light, at, bias, |place| fetches.push(place))
+                map.is_lit(lane, self.light, at, bias, |place| shaded.fetches.push(place))
             }
             Shadows::Rays => {
                 let light = self.light.point(&Lane::default(), [sample.u, sample.v]);
-                !self.rays.is_blocked(point.place, light, sample.t, point.triangle)
+                !self.rays.is_blocked(point.place, light, sample.t, point.triangle, &mut shaded.rays)
             }
             Shadows::None => true,
         }
@@ -186,6 +199,7 @@ struct Shaded {
     ops: u32,
     /// Places of the fetched depths in the map.
     fetches: Vec<usize>,
+    rays: RayWork,
 }
 
 /// Bytes of an image pixel and of a stored depth.
