@@ -4,7 +4,7 @@
 //! - [`SharedSamples`]: the same samples in all pixels, which accumulation requires.
 //! - [`Snapshot`]: moving geometry at one time and one lens position, for a rendering without either.
 //! - [`pinhole`]: the camera at one lens position.
-//! - [`Rays`]: ray casting, as the ground truth of visibility.
+//! - [`Rays`]: ray casting, as the ground truth of visibility and as a rival.
 
 use glam::{Affine3A, DVec3, Vec2, Vec3};
 use pipeline::geometry::Projection;
@@ -12,7 +12,8 @@ use pipeline::sampling::{Pattern, Sample, SampleSource, SampleSpec, TableError};
 use pipeline::setup::Corner;
 use pipeline::{Camera, CameraError, Draw, DrawError, Geometry, SampleTable, Viewport};
 
-use crate::scene::hit;
+pub use crate::bvh::RayWork;
+use crate::bvh::{Bvh, Ray, bounds_of};
 
 /// A triangle in world space, at both ends of the shutter.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,10 +32,11 @@ impl Face {
     }
 }
 
-/// Triangles for ray casting, numbered as in a pass.
+/// Moving triangles for ray casting, numbered as in a pass, in a bounding volume hierarchy.
 #[derive(Clone, Debug, Default)]
 pub struct Rays {
     faces: Vec<Face>,
+    tree: Bvh,
 }
 
 impl Rays {
@@ -47,7 +49,13 @@ impl Rays {
             };
             geometry.triangles().iter().map(move |corners| Face { ends: ends(corners), draw })
         });
-        Self { faces: faces.collect() }
+        Self::of(faces.collect())
+    }
+
+    fn of(faces: Vec<Face>) -> Self {
+        let bounds = |face: &Face| face.ends.map(|end| bounds_of(&end.map(|corner| corner.as_dvec3())));
+        let tree = Bvh::new(&faces.iter().map(bounds).collect::<Vec<_>>());
+        Self { faces, tree }
     }
 
     /// The triangles.
@@ -55,23 +63,23 @@ impl Rays {
         &self.faces
     }
 
-    /// Whether a triangle other than `but` lies between two points at time `t`.
-    pub fn is_blocked(&self, from: DVec3, to: DVec3, t: f32, but: u32) -> bool {
-        let inside = (1e-6, 1.0 - 1e-6);
-        let others = self.faces.iter().enumerate().filter(|(id, _)| *id != but as usize);
-        others
-            .map(|(_, face)| hit(from, to - from, &face.at(t)))
-            .any(|at| at.is_some_and(|(distance, _)| inside.0 < distance && distance < inside.1))
+    /// Whether a triangle other than `but` lies between two points at time `t`; the cost is added to `work`.
+    pub fn is_blocked(&self, from: DVec3, to: DVec3, t: f32, but: u32, work: &mut RayWork) -> bool {
+        let ray = Ray { from, along: to - from, t, beyond: 1e-6 };
+        let other = |id: usize| (id != but as usize).then(|| self.faces[id].at(t));
+        self.tree.any(&ray, 1.0 - 1e-6, other, work)
     }
 
     /// First triangle along a ray at time `t` beyond `nearest` times `along`, with its distance in lengths of
-    /// `along`.
-    pub fn first(&self, from: DVec3, along: DVec3, t: f32, nearest: f64) -> Option<(usize, f64)> {
-        let hits = self.faces.iter().enumerate().filter_map(|(id, face)| {
-            let (distance, _) = hit(from, along, &face.at(t))?;
-            (distance > nearest).then_some((id, distance))
-        });
-        hits.min_by(|a, b| a.1.total_cmp(&b.1))
+    /// `along`; the cost is added to `work`.
+    pub fn first(
+        &self,
+        (from, along): (DVec3, DVec3),
+        t: f32,
+        nearest: f64,
+        work: &mut RayWork,
+    ) -> Option<(usize, f64)> {
+        self.tree.first(&Ray { from, along, t, beyond: nearest }, |id| self.faces[id].at(t), work)
     }
 }
 
@@ -221,13 +229,16 @@ mod tests {
     #[test]
     fn a_ray_hits_a_moving_triangle_at_its_time() {
         let at = |x: f32| [Vec3::new(x, -1.0, 2.0), Vec3::new(x + 2.0, -1.0, 2.0), Vec3::new(x, 3.0, 2.0)];
-        let rays = Rays { faces: vec![Face { ends: [at(-4.5), at(3.5)], draw: 0 }] };
-        let first = |t| rays.first(DVec3::ZERO, DVec3::Z, t, 0.0);
+        let rays = Rays::of(vec![Face { ends: [at(-4.5), at(3.5)], draw: 0 }]);
+        let work = &mut RayWork::default();
+        let mut first = |t| rays.first((DVec3::ZERO, DVec3::Z), t, 0.0, work);
         assert_eq!(first(0.5), Some((0, 2.0)));
         assert_eq!((first(0.0), first(1.0)), (None, None));
-        assert!(rays.is_blocked(DVec3::ZERO, DVec3::Z * 4.0, 0.5, 7));
-        assert!(!rays.is_blocked(DVec3::ZERO, DVec3::Z * 4.0, 0.5, 0), "its own triangle does not count");
-        assert!(!rays.is_blocked(DVec3::ZERO, DVec3::Z * 1.9, 0.5, 7));
+        let is_blocked =
+            |along, but| rays.is_blocked(DVec3::ZERO, DVec3::Z * along, 0.5, but, &mut RayWork::default());
+        assert!(is_blocked(4.0, 7));
+        assert!(!is_blocked(4.0, 0), "its own triangle does not count");
+        assert!(!is_blocked(1.9, 7));
     }
 
     /// Compares with the lens formula, at depths before, in and behind the focus.

@@ -33,6 +33,7 @@
 pub mod accumulation;
 mod bounded;
 pub mod builtin;
+mod bvh;
 pub mod catalog;
 pub mod caustics;
 pub mod collision;

@@ -7,7 +7,7 @@ use pipeline::{Camera, Draw, Gpu, Lens, RasterPass, Rendered, Settings, Target, 
 use rayon::prelude::*;
 
 use super::receiver::{Effect, Receiver};
-use crate::accumulation::{Rays, SharedSamples, pinhole};
+use crate::accumulation::{RayWork, Rays, SharedSamples, pinhole};
 use crate::error::LoadError;
 use crate::job::JobError;
 use crate::scene::camera::CameraFrame;
@@ -149,33 +149,35 @@ impl Map {
         Ok((sum, counts))
     }
 
-    /// Computes the map by brute force: one ray per sample of every texel against all triangles, with a
-    /// colour per draw. The result is the mean over all tables.
+    /// Traces the map: one ray per sample of every texel, with a colour per draw. The result is the mean over all
+    /// tables, and the work.
     pub fn by_rays(
         &self,
         (rays, colours): (&Rays, &[Vec3]),
         tables: &[&dyn SampleSource],
         background: Vec3,
         lobe: Lobe,
-    ) -> Vec<Vec3> {
+    ) -> (Vec<Vec3>, RayWork) {
         let width = self.viewport.width();
         let texel = |place: usize| {
             let at = [place as u32 % width, place as u32 / width];
-            let (mut sum, mut count) = (DVec3::ZERO, 0_u32);
+            let (mut sum, mut count, mut work) = (DVec3::ZERO, 0_u32, RayWork::default());
             for table in tables {
                 let mut samples = vec![Sample::default(); table.per_pixel() as usize];
                 table.pixel_into(at[0], at[1], &mut samples);
                 for sample in &samples {
-                    let (from, along) = self.ray(at, sample, lobe);
-                    let seen = rays.first(from, along, 0.0, 1.0);
+                    let seen = rays.first(self.ray(at, sample, lobe), 0.0, 1.0, &mut work);
                     let colour = seen.map_or(background, |(face, _)| colours[rays.faces()[face].draw]);
                     sum += colour.as_dvec3();
                     count += 1;
                 }
             }
-            (sum / f64::from(count.max(1))).as_vec3()
+            ((sum / f64::from(count.max(1))).as_vec3(), work)
         };
-        (0..self.viewport.pixels()).into_par_iter().map(texel).collect()
+        let texels: Vec<_> = (0..self.viewport.pixels()).into_par_iter().map(texel).collect();
+        let mut total = RayWork::default();
+        texels.iter().for_each(|(_, work)| total += *work);
+        (texels.into_iter().map(|(colour, _)| colour).collect(), total)
     }
 
     /// Ray of a sample, from the lens; it meets the plane at parameter 1.

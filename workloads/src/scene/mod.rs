@@ -26,7 +26,6 @@ pub use info::{
     CameraInfo, ClipInfo, LensInfo, LightInfo, MaterialInfo, MeshInfo, SceneInfo, SettingsInfo, TextureInfo,
 };
 pub use mesh::{Influences, Instance, Mesh, Normals, Skin, Target};
-pub(crate) use rays::hit;
 pub use settings::{Overrides, Settings};
 pub use track::{Instant, Interpolation, Track};
 pub(crate) use track::{rotation, unit_quat};

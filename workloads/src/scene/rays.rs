@@ -2,14 +2,14 @@
 
 use glam::DVec3;
 
-/// Triangles of a leaf.
-const LEAF: usize = 4;
+use crate::bvh::{Bounds, Bvh, Query, Ray, RayWork, bounds_of, hit};
 
-/// Triangles sorted along a space-filling curve, and a binary tree of boxes over them: node `i` has the children `2 i + 1` and
-/// `2 i + 2`, each with half of its triangles.
+/// Triangles sorted along a space-filling curve, so that points spread over them are spread over space, and a tree over
+/// them.
 pub(super) struct Rays {
     triangles: Vec<[DVec3; 3]>,
-    boxes: Vec<[DVec3; 2]>,
+    tree: Bvh,
+    bounds: Bounds,
 }
 
 /// First hit of a ray.
@@ -26,7 +26,8 @@ pub(super) struct Hit {
 impl Rays {
     /// Prepares `triangles`, in O(n log n).
     pub fn new(mut triangles: Vec<[DVec3; 3]>) -> Self {
-        let [low, high] = bounds(&triangles);
+        let bounds = bounds_of(triangles.as_flattened());
+        let [low, high] = bounds;
         let size = (high - low).max(DVec3::splat(f64::MIN_POSITIVE));
         triangles.sort_by_cached_key(|[a, b, c]| {
             let middle = ((*a + *b + *c) / 3.0 - low) / size;
@@ -36,90 +37,57 @@ impl Rays {
                 .iter()
                 .fold(0, |code, part| code << 1 | part)
         });
-        let mut rays = Self { boxes: Vec::new(), triangles };
-        let leaves = rays.triangles.len().div_ceil(LEAF).next_power_of_two();
-        rays.boxes = vec![[DVec3::INFINITY, DVec3::NEG_INFINITY]; 2 * leaves - 1];
-        rays.fill(0, 0, rays.triangles.len());
-        rays
+        let boxes: Vec<[Bounds; 2]> = triangles.iter().map(|corners| [bounds_of(corners); 2]).collect();
+        Self { tree: Bvh::new(&boxes), triangles, bounds }
     }
 
-    fn fill(&mut self, node: usize, first: usize, end: usize) -> [DVec3; 2] {
-        let own = if 2 * node + 2 < self.boxes.len() {
-            let middle = first + (end - first) / 2;
-            let [low, high] = self.fill(2 * node + 1, first, middle);
-            let other = self.fill(2 * node + 2, middle, end);
-            [low.min(other[0]), high.max(other[1])]
-        } else {
-            bounds(&self.triangles[first..end])
-        };
-        self.boxes[node] = own;
-        own
-    }
-
-    /// The triangles, in the order of the tree.
+    /// The triangles, along the curve.
     pub fn triangles(&self) -> &[[DVec3; 3]] {
         &self.triangles
     }
 
     /// Bounds of all triangles.
-    pub fn bounds(&self) -> [DVec3; 2] {
-        self.boxes[0]
+    pub fn bounds(&self) -> Bounds {
+        self.bounds
     }
 
     /// The first triangle along a ray, farther than `beyond` lengths of `along`.
     pub fn first(&self, from: DVec3, along: DVec3, beyond: f64) -> Option<Hit> {
-        // A ray in the plane of a side needs a nonzero divisor, because 0 / 0 is NaN.
-        let inverse =
-            DVec3::from_array(along.to_array().map(|part| 1.0 / if part == 0.0 { 1e-300 } else { part }));
-        let (mut nearest, mut found) = (f64::INFINITY, None);
-        let mut open = vec![(0, 0, self.triangles.len())];
-        while let Some((node, first, end)) = open.pop() {
-            if !enters(&self.boxes[node], from, inverse, nearest) {
-                continue;
-            }
-            if 2 * node + 2 < self.boxes.len() {
-                let middle = first + (end - first) / 2;
-                let mut children = [(2 * node + 1, first, middle), (2 * node + 2, middle, end)];
-                // The child with the nearer box is pushed last, so that it is visited first.
-                let start = |node: usize| (self.boxes[node][0] + self.boxes[node][1]).dot(along);
-                if start(children[0].0) < start(children[1].0) {
-                    children.swap(0, 1);
-                }
-                open.extend(children);
-                continue;
-            }
-            for triangle in &self.triangles[first..end] {
-                if let Some(distance) =
-                    hit(from, along, triangle).map(|(at, _)| at).filter(|at| *at > beyond && *at < nearest)
-                {
-                    (nearest, found) = (distance, Some(triangle));
-                }
-            }
-        }
-        found.map(|triangle| {
-            let normal = normal(triangle).normalize_or_zero();
-            Hit { distance: nearest, normal, front: normal.dot(along) < 0.0 }
-        })
+        let ray = Ray { from, along, t: 0.0, beyond };
+        let (triangle, distance) = self.tree.first(&ray, |id| self.triangles[id], &mut RayWork::default())?;
+        let normal = normal(&self.triangles[triangle]).normalize_or_zero();
+        Some(Hit { distance, normal, front: normal.dot(along) < 0.0 })
+    }
+
+    /// Whether no triangle is nearer to `point` than `room`.
+    pub fn is_clear(&self, point: DVec3, room: f64) -> bool {
+        let mut query = Near { triangles: &self.triangles, point, room, found: false };
+        self.tree.visit(0.0, &mut query, &mut RayWork::default());
+        !query.found
     }
 }
 
-impl Rays {
-    /// Whether no triangle is nearer to `point` than `room`.
-    pub fn is_clear(&self, point: DVec3, room: f64) -> bool {
-        let mut open = vec![(0, 0, self.triangles.len())];
-        while let Some((node, first, end)) = open.pop() {
-            let [low, high] = self.boxes[node];
-            if point.distance_squared(point.clamp(low.min(high), high.max(low))) >= room * room {
-                continue;
-            }
-            if 2 * node + 2 < self.boxes.len() {
-                let middle = first + (end - first) / 2;
-                open.extend([(2 * node + 1, first, middle), (2 * node + 2, middle, end)]);
-            } else if self.triangles[first..end].iter().any(|triangle| nearest(point, triangle) < room) {
-                return false;
-            }
-        }
-        true
+/// A search for a triangle near a point.
+struct Near<'a> {
+    triangles: &'a [[DVec3; 3]],
+    point: DVec3,
+    room: f64,
+    found: bool,
+}
+
+impl Query for Near<'_> {
+    fn enters(&self, [low, high]: &Bounds) -> Option<f64> {
+        let distance = self.point.distance(self.point.clamp(low.min(*high), high.max(*low)));
+        (distance < self.room).then_some(distance)
+    }
+
+    fn wants(&self, distance: f64) -> bool {
+        distance < self.room
+    }
+
+    fn test(&mut self, triangle: usize) -> bool {
+        self.found = nearest(self.point, &self.triangles[triangle]) < self.room;
+        !self.found
     }
 }
 
@@ -152,34 +120,6 @@ fn spread(bits: u64) -> u64 {
         (2, 0x1249_2492_4924_9249),
     ];
     steps.into_iter().fold(bits & 0x1f_ffff, |bits, (by, mask)| (bits | bits << by) & mask)
-}
-
-fn bounds(triangles: &[[DVec3; 3]]) -> [DVec3; 2] {
-    let none = [DVec3::INFINITY, DVec3::NEG_INFINITY];
-    triangles.as_flattened().iter().fold(none, |[low, high], corner| [low.min(*corner), high.max(*corner)])
-}
-
-/// Whether a ray passes through a box nearer than `nearest`; `inverse` holds the inverses of its direction.
-fn enters([low, high]: &[DVec3; 2], from: DVec3, inverse: DVec3, nearest: f64) -> bool {
-    let (to_low, to_high) = ((*low - from) * inverse, (*high - from) * inverse);
-    let start = to_low.min(to_high).max_element();
-    let end = to_low.max(to_high).min_element();
-    start <= end && end >= 0.0 && start <= nearest
-}
-
-/// Where the line `from + s along` meets a triangle: `s` and two barycentric coordinates (Möller and Trumbore 1997).
-pub(crate) fn hit(from: DVec3, along: DVec3, [a, b, c]: &[DVec3; 3]) -> Option<(f64, [f64; 2])> {
-    let (ab, ac) = (*b - *a, *c - *a);
-    let across = along.cross(ac);
-    let det = ab.dot(across);
-    if det == 0.0 {
-        return None;
-    }
-    let to = from - *a;
-    let u = to.dot(across) / det;
-    let turned = to.cross(ab);
-    let v = along.dot(turned) / det;
-    (u >= 0.0 && v >= 0.0 && u + v <= 1.0).then(|| (ac.dot(turned) / det, [u, v]))
 }
 
 #[cfg(test)]

@@ -1,6 +1,8 @@
 //! The shading pass. Each sample is shaded alone, because its light depends on its time and its point of the
 //! light.
 
+use std::cell::Cell;
+
 use glam::{DVec3, Vec3};
 use pipeline::geometry::Projection;
 use pipeline::sample_test::exact::weights;
@@ -11,7 +13,7 @@ use rayon::prelude::*;
 
 use super::light::AreaLight;
 use super::map::{DEPTH_BYTES, ShadowMap, View};
-use crate::accumulation::Rays;
+use crate::accumulation::{RayWork, Rays};
 
 /// Ambient light, relative to the light on a surface that faces the light.
 const AMBIENT: f32 = 0.18;
@@ -72,12 +74,27 @@ impl<'a> World<'a> {
 
     /// Renders the image: the mean over each pixel's samples, in order.
     pub fn image(&self, samples: &dyn SampleSource, seen: &[(u32, u32)], shadows: Shadows<'_>) -> Vec<Vec3> {
+        self.image_counted(samples, seen, shadows).0
+    }
+
+    /// The same with the work of its rays.
+    pub fn image_counted(
+        &self,
+        samples: &dyn SampleSource,
+        seen: &[(u32, u32)],
+        shadows: Shadows<'_>,
+    ) -> (Vec<Vec3>, RayWork) {
         let (width, per_pixel) = (self.viewport.width(), samples.per_pixel() as usize);
         let pixel = |(place, seen): (usize, &[(u32, u32)])| {
             let place = [place as u32 % width, place as u32 / width];
-            self.pixel(place, (samples, seen), shadows, &Lanes::default())
+            let (lanes, rays) = (Lanes::default(), Cell::default());
+            let work = Work { lanes: &lanes, rays: &rays };
+            (self.pixel(place, (samples, seen), shadows, work), rays.get())
         };
-        seen.par_chunks_exact(per_pixel).enumerate().map(pixel).collect()
+        let pixels: Vec<_> = seen.par_chunks_exact(per_pixel).enumerate().map(pixel).collect();
+        let mut work = RayWork::default();
+        pixels.iter().for_each(|(_, rays)| work += *rays);
+        (pixels.into_iter().map(|(colour, _)| colour).collect(), work)
     }
 
     /// Mean of the samples of a pixel, whose visible triangles are in `seen`, each shaded on a lane of its own.
@@ -86,13 +103,13 @@ impl<'a> World<'a> {
         [px, py]: [u32; 2],
         (samples, seen): (&dyn SampleSource, &[(u32, u32)]),
         shadows: Shadows<'_>,
-        lanes: &Lanes,
+        work: Work<'_>,
     ) -> Vec3 {
         let mut at = vec![Sample::default(); seen.len()];
         samples.pixel_into(px, py, &mut at);
         let colours = at.iter().zip(seen).enumerate().map(|(index, (sample, (triangle, _)))| {
             let Some(point) = self.point([px, py], sample, *triangle) else { return self.background };
-            lanes.run(|lane| self.shade(lane, &point, (sample, index), shadows, lanes))
+            work.lanes.run(|lane| self.shade(lane, &point, (sample, index), shadows, work))
         });
         colours.sum::<Vec3>() / seen.len() as f32
     }
@@ -113,7 +130,9 @@ impl<'a> World<'a> {
                 let point = self.point([px, py], sample, *triangle)?;
                 let lane = Lane::default();
                 let toward = self.light.point(&lane, [sample.u, sample.v]) - point.place;
-                let is_lit = || self.is_lit(&lane, &point, (sample, index), shadows, &Lanes::default());
+                let (lanes, rays) = (Lanes::default(), Cell::default());
+                let work = Work { lanes: &lanes, rays: &rays };
+                let is_lit = || self.is_lit(&lane, &point, (sample, index), shadows, work);
                 (point.normal.dot(toward) > 0.0).then(is_lit)
             };
             at.iter().zip(seen).enumerate().map(of).collect::<Vec<_>>()
@@ -148,12 +167,12 @@ impl<'a> World<'a> {
         point: &Point,
         at: (&Sample, usize),
         shadows: Shadows<'_>,
-        lanes: &Lanes,
+        work: Work<'_>,
     ) -> Vec3 {
         let light = self.light.point(lane, [at.0.u, at.0.v]);
         let toward = lane.normalize(lane.sub(light, point.place));
         let facing = lane.max(lane.dot(point.normal, toward), 0.0) as f32;
-        let lit = lane.branch(facing > 0.0) && self.is_lit(lane, point, at, shadows, lanes);
+        let lit = lane.branch(facing > 0.0) && self.is_lit(lane, point, at, shadows, work);
         lane.scale(point.albedo, lane.add(AMBIENT, if lit { facing } else { 0.0 }))
     }
 
@@ -163,20 +182,33 @@ impl<'a> World<'a> {
         point: &Point,
         (sample, index): (&Sample, usize),
         shadows: Shadows<'_>,
-        lanes: &Lanes,
+        work: Work<'_>,
     ) -> bool {
         match shadows {
             Shadows::Map { map, bias } => {
                 let at = (point.place.as_vec3(), index);
-                map.is_lit(lane, self.light, at, bias, |place| lanes.fetch(map.address(place), DEPTH_BYTES))
+                map.is_lit(lane, self.light, at, bias, |place| {
+                    work.lanes.fetch(map.address(place), DEPTH_BYTES);
+                })
             }
             Shadows::Rays => {
                 let light = self.light.point(&Lane::default(), [sample.u, sample.v]);
-                !self.rays.is_blocked(point.place, light, sample.t, point.triangle)
+                let mut rays = work.rays.get();
+                let blocked =
+                    self.rays.is_blocked(point.place, light, sample.t, point.triangle, &mut rays);
+                work.rays.set(rays);
+                !blocked
             }
             Shadows::None => true,
         }
     }
+}
+
+/// Where the work of shading a pixel is counted.
+#[derive(Clone, Copy)]
+struct Work<'w> {
+    lanes: &'w Lanes,
+    rays: &'w Cell<RayWork>,
 }
 
 /// Shades the visible samples by the map in a pass of its own.
@@ -191,6 +223,7 @@ pub fn look_ups(
     gpu.shade_pixels("look-ups", world.viewport, |lanes, [x, y]| {
         let first = (y as usize * width + x as usize) * per_pixel;
         let shadows = Shadows::Map { map, bias };
-        world.pixel([x, y], (samples, &seen[first..first + per_pixel]), shadows, lanes)
+        let work = Work { lanes, rays: &Cell::default() };
+        world.pixel([x, y], (samples, &seen[first..first + per_pixel]), shadows, work)
     })
 }

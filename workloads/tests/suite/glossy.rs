@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 use pipeline::sampling::SampleSource;
 use pipeline::{Cull, Draw, Geometry, Gpu, LensShape, SampleSpec, SampleTable};
 use workloads::Overrides;
-use workloads::accumulation::{Rays, SharedSamples};
+use workloads::accumulation::{RayWork, Rays, SharedSamples};
 use workloads::glossy::{Effect, Glossy, Lobe, Map, Options, Receiver, default_scene, receiver};
 use workloads::job::Job;
 
@@ -90,7 +90,10 @@ fn one_pass_accumulation_and_rays_agree() {
         let rays = Rays::new(&draws);
         let samples = table(64, LensShape::Disk);
         let sky = scene.background();
-        let traced = map.by_rays((&rays, &colours), &[&samples as &dyn SampleSource], sky, Lobe::Lens);
+        let (traced, work) =
+            map.by_rays((&rays, &colours), &[&samples as &dyn SampleSource], sky, Lobe::Lens);
+        assert_eq!(work.rays, 64 * traced.len() as u64);
+        assert!(work.triangles < work.rays * rays.faces().len() as u64 / 4, "{work:?}");
         let drawn =
             map.one_pass(&draws, &samples, sky, &mut Gpu::quiet(&spec()).unwrap()).unwrap().into_image();
         // The samples are the same, so only samples on edges may differ, by rounding.
@@ -154,17 +157,17 @@ fn a_mirror_shows_what_is_mirrored() {
     let draws = frame.draws(&scene).unwrap();
     let (rays, camera) = (Rays::new(&draws), frame.camera);
     let world = camera.open().inverse();
-    let (mut right, mut all) = (0, 0);
+    let (mut right, mut all, work) = (0, 0, &mut RayWork::default());
     for (x, y) in (0..WIDE).flat_map(|x| (0..216).map(move |y| (x, y))) {
         let tan = camera.half_height();
         let at = Vec3::new((x as f32 - 191.5) / 108.0 * tan, -(y as f32 - 107.5) / 108.0 * tan, 1.0);
         let (from, along) = (world.translation.as_dvec3(), (world.matrix3 * at).as_dvec3());
         let met = from - along * (from.y / along.y);
-        let hidden = rays.first(from, along, 0.0, 0.0).is_some_and(|(_, s)| s < -from.y / along.y);
+        let hidden = rays.first((from, along), 0.0, 0.0, work).is_some_and(|(_, s)| s < -from.y / along.y);
         if along.y > -1e-3 || met.x.abs() > 1.7 || met.z.abs() > 1.1 || hidden {
             continue;
         }
-        let seen = rays.first(met, along * DVec3::new(1.0, -1.0, 1.0), 0.0, 1e-6);
+        let seen = rays.first((met, along * DVec3::new(1.0, -1.0, 1.0)), 0.0, 1e-6, work);
         let colour = |(face, _): (usize, f64)| {
             scene.materials()[frame.meshes[rays.faces()[face].draw].material].base_color
         };

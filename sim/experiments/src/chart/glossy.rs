@@ -1,7 +1,7 @@
 //! `quintile chart glossy`: glossy reflection and refraction on a planar receiver.
 //!
 //! Error is the root of the mean squared difference of the map to brute force by rays, over all texels and channels in linear light.
-//! Beside one pass stands accumulation, whose samples all texels share.
+//! Beside one pass stand accumulation, whose samples all texels share, and ray tracing with the samples of the one pass.
 
 use std::time::Instant;
 
@@ -14,7 +14,7 @@ use pipeline::sampling::SampleSource;
 use pipeline::{Cull, Draw, Geometry, Gpu, LensShape, SampleSpec, SampleTable};
 use run::GpuSpec;
 use serde::Serialize;
-use workloads::accumulation::{Rays, SharedSamples};
+use workloads::accumulation::{RayWork, Rays, SharedSamples};
 use workloads::glossy::{Effect, Lobe, Map, default_scene, receiver};
 use workloads::{Frame, Scene};
 
@@ -109,7 +109,11 @@ impl Study for GlossyChart {
             .data("samples_tested", |row| row.samples_tested)
             .data("accumulated_samples_tested", |row| row.accumulated_samples_tested)
             .column("host_s", "host s", |row| row.host_s, fixed(3))
-            .column("accumulated_host_s", "(accumulated)", |row| row.accumulated_host_s, fixed(3));
+            .column("accumulated_host_s", "(accumulated)", |row| row.accumulated_host_s, fixed(3))
+            .column("traced_rmse", "traced RMSE", |row| row.traced.rmse, fixed(5))
+            .column("traced_host_s", "(host s)", |row| row.traced.host_s, fixed(3))
+            .column("nodes_per_ray", "nodes a ray", |row| row.traced.nodes_per_ray, fixed(1))
+            .column("triangles_per_ray", "triangles a ray", |row| row.traced.triangles_per_ray, fixed(1));
         let blurs = Table::of(&self.blurs)
             .shown("height", |blur| blur.height, plain)
             .shown("blur", |blur| blur.width, fixed(4))
@@ -131,11 +135,15 @@ impl Study for GlossyChart {
             [
                 point("one pass", row.rmse, row.host_s),
                 point("accumulation", row.accumulated_rmse, row.accumulated_host_s),
+                point("ray tracing", row.traced.rmse, row.traced.host_s),
             ]
         };
         self.rows.iter().flat_map(both).collect()
     }
 }
+
+/// The methods.
+const METHODS: [&str; 3] = ["one pass", "accumulation", "ray tracing"];
 
 /// The radius, over half of the receiver's shorter side, from which on a run warns.
 const WARNED: f64 = 1.0;
@@ -143,27 +151,40 @@ const WARNED: f64 = 1.0;
 impl GlossyChart {
     /// For each effect the error over samples and over cost.
     fn errors(&self) -> Vec<ChartPanel> {
-        let both = |effect: &'static str, of: fn(&GlossyRow) -> [(f64, f64); 2]| {
+        let all = |effect: &'static str, of: fn(&GlossyRow) -> [(f64, f64); 3]| {
             let of_effect = move || self.rows.iter().filter(move |row| row.effect == effect);
-            vec![
-                Series::curve("one pass", of_effect().map(|row| of(row)[0])),
-                Series::curve("accumulation", of_effect().map(|row| of(row)[1])),
+            let curve =
+                |method: usize| Series::curve(METHODS[method], of_effect().map(|row| of(row)[method]));
+            (0..METHODS.len()).map(curve).collect::<Vec<_>>()
+        };
+        let samples: fn(&GlossyRow) -> [(f64, f64); 3] = |row| {
+            [row.rmse, row.accumulated_rmse, row.traced.rmse].map(|rmse| (f64::from(row.samples), rmse))
+        };
+        let seconds: fn(&GlossyRow) -> [(f64, f64); 3] = |row| {
+            [
+                (row.host_s, row.rmse),
+                (row.accumulated_host_s, row.accumulated_rmse),
+                (row.traced.host_s, row.traced.rmse),
             ]
         };
-        let samples: fn(&GlossyRow) -> [(f64, f64); 2] = |row| {
-            let n = f64::from(row.samples);
-            [(n, row.rmse), (n, row.accumulated_rmse)]
-        };
-        let tests: fn(&GlossyRow) -> [(f64, f64); 2] = |row| {
-            let [one, many] = [row.samples_tested, row.accumulated_samples_tested].map(|tests| tests as f64);
-            [(one, row.rmse), (many, row.accumulated_rmse)]
+        let tests: fn(&GlossyRow) -> [(f64, f64); 3] = |row| {
+            [
+                (row.samples_tested as f64, row.rmse),
+                (row.accumulated_samples_tested as f64, row.accumulated_rmse),
+                (row.traced.tests as f64, row.traced.rmse),
+            ]
         };
         let panels = EFFECTS.iter().flat_map(|&(effect, _)| {
-            let over_cost = format!("{effect}, over cost");
+            let [over_cost, over_time] = ["cost", "host time"].map(|what| format!("{effect}, over {what}"));
             [
-                ChartPanel::new(effect, ["samples a texel", "RMSE"], both(effect, samples))
+                ChartPanel::new(effect, ["samples a texel", "RMSE"], all(effect, samples))
                     .on(Scale::Doublings, Scale::Decades),
-                ChartPanel::new(&over_cost, ["samples tested", "RMSE"], both(effect, tests)),
+                ChartPanel::new(
+                    &over_cost,
+                    ["samples, or boxes and triangles, tested", "RMSE"],
+                    all(effect, tests),
+                ),
+                ChartPanel::new(&over_time, ["seconds of the host", "RMSE"], all(effect, seconds)),
             ]
         });
         panels.collect()
@@ -220,6 +241,37 @@ pub struct GlossyRow {
     pub host_s: f64,
     /// Those for accumulation.
     pub accumulated_host_s: f64,
+    /// Ray tracing with the samples of the one pass.
+    pub traced: Traced,
+}
+
+/// An image by ray tracing.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Traced {
+    /// Its error.
+    pub rmse: f64,
+    /// Boxes and triangles tested.
+    pub tests: u64,
+    /// Boxes of nodes tested per ray.
+    pub nodes_per_ray: f64,
+    /// Triangles tested per ray.
+    pub triangles_per_ray: f64,
+    /// Seconds of the host; those for the tree are part of them.
+    pub host_s: f64,
+}
+
+impl Traced {
+    /// The error, the work of all rays and the seconds.
+    pub fn new(rmse: f64, work: RayWork, host_s: f64) -> Self {
+        let per_ray = |count: u64| count as f64 / work.rays.max(1) as f64;
+        Self {
+            rmse,
+            tests: work.nodes + work.triangles,
+            nodes_per_ray: per_ray(work.nodes),
+            triangles_per_ray: per_ray(work.triangles),
+            host_s,
+        }
+    }
 }
 
 /// The blur of an edge at one height.
@@ -303,13 +355,23 @@ impl Bench {
         let tables = seeds.map(|seed| SampleTable::new(&SampleSpec::default(), 256, REFERENCE_SEED + seed));
         let tables = tables.collect::<Result<Vec<_>, _>>()?;
         let tables: Vec<&dyn SampleSource> = tables.iter().map(|table| table as &dyn SampleSource).collect();
+        Ok(self.traced(map, &tables, lobe)?.0)
+    }
+
+    /// Rays of all samples of `tables`, with their work.
+    fn traced(
+        &self,
+        map: &Map,
+        tables: &[&dyn SampleSource],
+        lobe: Lobe,
+    ) -> Result<(Vec<Vec3>, RayWork), StudyError> {
         let colour = |mesh: &workloads::FrameMesh| self.scene.materials()[mesh.material].base_color;
         let colours: Vec<Vec3> = self.frame.meshes.iter().map(colour).collect();
         let rays = Rays::new(&self.draws()?);
-        Ok(map.by_rays((&rays, &colours), &tables, self.scene.background(), lobe))
+        Ok(map.by_rays((&rays, &colours), tables, self.scene.background(), lobe))
     }
 
-    /// Both ways of making a map with so many samples.
+    /// All ways of making a map with so many samples.
     ///
     /// # Errors
     /// When the hardware cannot be built.
@@ -324,6 +386,10 @@ impl Bench {
         let set = SharedSamples::interleaved(&SampleSpec::default(), samples, 1)?;
         let started = Instant::now();
         let (many, many_counts) = map.accumulated(&draws, &set, background, &mut Gpu::quiet(spec)?)?;
+        let accumulated_host_s = started.elapsed().as_secs_f64();
+        let started = Instant::now();
+        let (traced, work) = self.traced(&map, &[&table], Lobe::Lens)?;
+        let traced_host_s = started.elapsed().as_secs_f64();
         let rmse = |image: &[Vec3]| mean_square(&errors(image, reference)).sqrt();
         Ok(GlossyRow {
             effect: self.effect.0,
@@ -335,7 +401,8 @@ impl Bench {
             samples_tested: counts[Event::SamplesTested],
             accumulated_samples_tested: many_counts[Event::SamplesTested],
             host_s,
-            accumulated_host_s: started.elapsed().as_secs_f64(),
+            accumulated_host_s,
+            traced: Traced::new(rmse(&traced), work, traced_host_s),
         })
     }
 
@@ -404,6 +471,10 @@ mod tests {
         for rows in chart.rows.chunks_exact(5) {
             assert!(rows[4].rmse < 0.6 * rows[0].rmse, "{rows:?}");
             assert!(rows[4].vertices < rows[4].accumulated_vertices);
+            // The same samples: they differ where rounding decides an edge.
+            let all = |row: &GlossyRow| (row.traced.rmse / row.rmse - 1.0).abs() < 0.02;
+            assert!(rows.iter().all(all), "{rows:?}");
+            assert!(rows.iter().all(|row| row.traced.nodes_per_ray >= 1.0));
         }
         assert!(chart.blurs.windows(2).all(|pair| pair[0].width < pair[1].width), "{:?}", chart.blurs);
         let (narrow, wide) = (&chart.wides[0], chart.wides.last().unwrap());

@@ -1,7 +1,8 @@
 //! `quintile chart soft-shadows`: soft shadows from a five-dimensional shadow map against accumulation buffering.
 //!
 //! Error is the root of the mean squared difference to an image in which every sample asks the light by rays, over all pixels and
-//! channels in linear light. Cost is that of making the map, in one pass and in as many passes as light samples.
+//! channels in linear light. Cost is that of making the map, in one pass and in as many passes as light samples. Ray tracing, with
+//! samples of each pixel's own, has no map; for it the seconds of shading count, and the trade-off adds them to the maps' too.
 
 use std::time::Instant;
 
@@ -14,12 +15,13 @@ use pipeline::sampling::SampleSource;
 use pipeline::{Cull, Draw, Gpu, PipelineSpec, RasterPass, SampleSpec, SampleTable, Settings, Viewport};
 use run::GpuSpec;
 use serde::Serialize;
-use workloads::accumulation::SharedSamples;
+use workloads::accumulation::{RayWork, SharedSamples};
 use workloads::soft_shadows::{
     AreaLight, LightSpec, Method, ShadowMap, Shadows, View, World, default_scene, depth_pass,
 };
 use workloads::{Frame, Overrides, Scene};
 
+use crate::chart::glossy::Traced;
 use crate::chart::statistics::{errors, mean_square, neighbours};
 use crate::study::table::{Sheet, Table, count, fixed, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
@@ -59,7 +61,8 @@ impl Study for SoftShadowsChart {
         "Soft shadows: error over light samples, one pass against accumulation, and the bias";
     const PICTURES: &'static [&'static str] =
         &["soft_shadows_error", "soft_shadows_cost", "soft_shadows_failures"];
-    const FILES: &'static [&'static str] = &["soft_shadows.csv", "soft_shadows.json"];
+    const FILES: &'static [&'static str] =
+        &["soft_shadows.csv", "soft_shadows_rays.csv", "soft_shadows.json"];
 
     type Effort = SoftShadowsEffort;
     const FULL: SoftShadowsEffort =
@@ -117,7 +120,16 @@ impl Study for SoftShadowsChart {
             .shown("madds", |row| row.one_pass.madds, count)
             .shown("(accumulated)", |row| row.accumulation.madds, count)
             .shown("host s", |row| row.one_pass.host_s, fixed(3))
-            .shown("(accumulated)", |row| row.accumulation.host_s, fixed(3));
+            .shown("(accumulated)", |row| row.accumulation.host_s, fixed(3))
+            .shown("shading s", |row| row.shade_s, fixed(3));
+        let traced = Table::of(&self.rows)
+            .column("points", "rays a pixel", |row| row.points, plain)
+            .column("rmse", "RMSE", |row| row.traced.rmse, fixed(5))
+            .column("neighbour_correlation", "neighbours", |row| row.traced_correlation, fixed(2))
+            .column("nodes_per_ray", "nodes a ray", |row| row.traced.nodes_per_ray, fixed(1))
+            .column("triangles_per_ray", "triangles a ray", |row| row.traced.triangles_per_ray, fixed(1))
+            .column("host_s", "host s", |row| row.traced.host_s, fixed(3))
+            .csv("soft_shadows_rays.csv");
         let biases = Table::of(&self.biases)
             .shown("bias, texels", |bias| bias.texels, plain)
             .shown("acne %", |bias| 100.0 * bias.acne, fixed(2))
@@ -136,16 +148,15 @@ impl Study for SoftShadowsChart {
             .data("dram_bytes", |(.., cost)| cost.dram_bytes)
             .data("host_s", |(.., cost)| cost.host_s)
             .csv("soft_shadows.csv");
-        vec![rows.sheet(), biases.sheet(), by_method.sheet()]
+        vec![rows.sheet(), traced.sheet(), biases.sheet(), by_method.sheet()]
     }
 
     fn tradeoff(&self) -> Vec<TradeoffPoint> {
         let point = |(row, method, cost): (&ShadowsRow, &str, &Cost)| {
-            let level = format!("{} light samples", row.points);
-            let host_s = Metric::host_s(cost.host_s).beside(row.accumulation.host_s);
-            TradeoffPoint::new("soft shadows", [method, &level], [Metric::rmse(row.rmse), host_s])
+            seconds(row, method, row.rmse, cost.host_s + row.shade_s)
         };
-        self.rows.iter().flat_map(methods).map(point).collect()
+        let traced = |row: &ShadowsRow| seconds(row, "ray tracing", row.traced.rmse, row.traced.host_s);
+        self.rows.iter().flat_map(methods).map(point).chain(self.rows.iter().map(traced)).collect()
     }
 
     fn fault(&self) -> Option<String> {
@@ -156,6 +167,13 @@ impl Study for SoftShadowsChart {
 /// Both ways to make a map, with what they cost.
 fn methods(row: &ShadowsRow) -> [(&ShadowsRow, &'static str, &Cost); 2] {
     [(row, "one pass", &row.one_pass), (row, "accumulation", &row.accumulation)]
+}
+
+/// A method with as many light samples as a row: the error over the seconds of all but the visibility from the camera.
+fn seconds(row: &ShadowsRow, method: &str, rmse: f64, host_s: f64) -> TradeoffPoint {
+    let level = format!("{} light samples", row.points);
+    let host_s = Metric::host_s(host_s).beside(row.accumulation.host_s + row.shade_s);
+    TradeoffPoint::new("soft shadows", [method, &level], [Metric::rmse(rmse), host_s])
 }
 
 /// Light samples from which on a run does not warn.
@@ -180,17 +198,30 @@ impl SoftShadowsChart {
         let over_cost = |method: fn(&ShadowsRow) -> &Cost, name: &str| {
             Series::curve(name, self.rows.iter().map(|row| (method(row).madds as f64, row.rmse)))
         };
-        let banding = vec![self.curve(name, |row| row.neighbour_correlation)];
+        let rays = "ray tracing";
+        let banding = vec![
+            self.curve(name, |row| row.neighbour_correlation),
+            self.curve(rays, |row| row.traced_correlation),
+        ];
+        let errors = vec![self.curve(name, |row| row.rmse), self.curve(rays, |row| row.traced.rmse)];
+        let time =
+            |name: &str, of: fn(&ShadowsRow) -> (f64, f64)| Series::curve(name, self.rows.iter().map(of));
+        let times = vec![
+            time("one pass", |row| (row.one_pass.host_s + row.shade_s, row.rmse)),
+            time("accumulation", |row| (row.accumulation.host_s + row.shade_s, row.rmse)),
+            time(rays, |row| (row.traced.host_s, row.traced.rmse)),
+        ];
         let costs = vec![
             over_cost(|row| &row.one_pass, "one pass"),
             over_cost(|row| &row.accumulation, "accumulation"),
         ];
         let bands = |panel: ChartPanel| panel.failing(Some(0.0..BANDS_BELOW), "a run warns: shadow-banding");
         vec![
-            bands(panel("error", "RMSE", vec![self.curve(name, |row| row.rmse)])),
+            bands(panel("error", "RMSE", errors)),
             bands(panel("banding", "correlation of neighbours' errors", banding))
                 .on(Scale::Doublings, Scale::Even),
             ChartPanel::new("error over cost of the map", ["multiply-adds of all tests", "RMSE"], costs),
+            ChartPanel::new("error over time", ["seconds of the host, map and shading", "RMSE"], times),
         ]
     }
 
@@ -257,6 +288,12 @@ pub struct ShadowsRow {
     pub one_pass: Cost,
     /// In a pass each.
     pub accumulation: Cost,
+    /// Seconds of the host for shading with a map.
+    pub shade_s: f64,
+    /// Ray tracing with as many samples of each pixel's own.
+    pub traced: Traced,
+    /// Correlation of its errors.
+    pub traced_correlation: f64,
 }
 
 /// One depth bias.
@@ -330,17 +367,20 @@ impl Bench<'_> {
         let mut sum = vec![Vec3::ZERO; self.viewport.pixels()];
         for seed in 0..u64::from(tables) {
             let table = SampleTable::new(&SampleSpec::default(), MOST, REFERENCE_SEED + seed)?;
-            let image = self.by_rays(&table)?;
+            let image = self.by_rays(&table)?.0;
             sum.iter_mut().zip(image).for_each(|(sum, pixel)| *sum += pixel / tables as f32);
         }
         Ok(sum)
     }
 
-    fn by_rays(&self, samples: &dyn SampleSource) -> Result<Vec<Vec3>, StudyError> {
+    /// The image, with the work of the rays to the light and the seconds of shading.
+    fn by_rays(&self, samples: &dyn SampleSource) -> Result<(Vec<Vec3>, RayWork, f64), StudyError> {
         let settings =
             Settings { spec: self.spec(), viewport: self.viewport, samples, background: Vec3::ZERO };
         let seen = RasterPass::new(&self.stage.frame.camera, self.draws, &settings).visibility()?;
-        Ok(self.world.image(samples, &seen, Shadows::Rays))
+        let started = Instant::now();
+        let (image, work) = self.world.image_counted(samples, &seen, Shadows::Rays);
+        Ok((image, work, started.elapsed().as_secs_f64()))
     }
 
     fn map(&self, set: &SharedSamples, method: Method) -> Result<(ShadowMap, Cost), StudyError> {
@@ -362,15 +402,23 @@ impl Bench<'_> {
         let bits = |map: &ShadowMap| map.depths().iter().map(|depth| depth.to_bits()).collect::<Vec<_>>();
         let seen = self.seen(&set)?;
         let shadows = Shadows::Map { map: &map, bias: self.stage.effort.bias };
+        let started = Instant::now();
         let image = self.world.image(&set, &seen, shadows);
-        let errors = errors(&image, reference);
+        let shade_s = started.elapsed().as_secs_f64();
+        let table = SampleTable::new(&SampleSpec::default(), points, 1)?;
+        let (traced, work, traced_s) = self.by_rays(&table)?;
+        let width = self.viewport.width() as usize;
+        let (traced, errors) = (errors(&traced, reference), errors(&image, reference));
         Ok(ShadowsRow {
             points,
             rmse: mean_square(&errors).sqrt(),
-            neighbour_correlation: neighbours(&errors, self.viewport.width() as usize),
+            neighbour_correlation: neighbours(&errors, width),
             equal: bits(&map) == bits(&other),
             one_pass,
             accumulation,
+            shade_s,
+            traced: Traced::new(mean_square(&traced).sqrt(), work, traced_s),
+            traced_correlation: neighbours(&traced, width),
         })
     }
 
@@ -426,6 +474,7 @@ mod tests {
             SoftShadowsEffort { size: [32, 18], map_px: 64, most_points: 16, reference_tables: 1, bias: 0.2 };
         let (_folder, chart, _) = written::<SoftShadowsChart>(least);
         assert!(chart.is_equal());
+        assert!(chart.rows.iter().all(|row| row.traced.nodes_per_ray >= 1.0 && row.traced.rmse > 0.0));
         let (first, last) = (&chart.rows[0], chart.rows.last().unwrap());
         assert!(last.rmse < 0.6 * first.rmse, "{} {}", first.rmse, last.rmse);
         assert!(last.one_pass.vertices * 16 == last.accumulation.vertices);

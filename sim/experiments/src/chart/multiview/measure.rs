@@ -2,10 +2,10 @@
 
 use std::time::Instant;
 
-use activity::Event;
+use activity::{Counts, Event};
 use glam::{Vec3, Vec4};
 use pipeline::{
-    CacheSpec, Draw, Gpu, Lane, PipelineSpec, Replacement, Shader, ShadingPoint, Texture, Viewport,
+    CacheSpec, Draw, Features, Gpu, Lane, PipelineSpec, Replacement, Shader, ShadingPoint, Texture, Viewport,
 };
 use serde::Serialize;
 use workloads::multiview::{Layout, Rig, Target, Views};
@@ -89,6 +89,34 @@ pub struct Angle {
     pub rmse_matt: f64,
     /// The same with a highlight.
     pub rmse_shiny: f64,
+}
+
+/// Tile tests of all views in one pass.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct TileTests {
+    /// Tiles culled by the tests of the sides and of the lens, coarse and fine ones.
+    pub tiles_culled: u64,
+    /// Multiply-adds of tile tests.
+    pub tile_madds: u64,
+    /// Samples that the tile tests leave.
+    pub samples: u64,
+    /// Multiply-adds of tile tests, screens and sample tests.
+    pub all_madds: u64,
+}
+
+/// Views with one test over the whole lens, and with one over each region.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct RegionTests {
+    /// Kind of views.
+    pub views: &'static str,
+    /// Length of the camera line over the distance of what is in focus.
+    pub baseline: f64,
+    /// One test over the whole lens.
+    pub whole: TileTests,
+    /// A test of `u` over each region.
+    pub each: TileTests,
+    /// Whether the images are equal to the bit.
+    pub equal: bool,
 }
 
 /// Exponent of that highlight.
@@ -226,6 +254,31 @@ impl Bench {
         Ok(Lanes { all: counts[Event::PixelInvocations], one, draws, samples_hit })
     }
 
+    /// Views of a kind on a camera line of a length, with and without separate tests of the regions of the lens.
+    pub(super) fn regions(&self, views: &'static str, baseline: f64) -> Result<RegionTests, StudyError> {
+        let length = baseline * self.focus();
+        let layout = match views {
+            "two eyes" => Layout::stereo(length, 0.4 * length),
+            "seven lenses" => {
+                Layout { views: 7, spacing: length / 6.0, aperture: 0.4 * length / 6.0, overlap: 0 }
+            }
+            _ => Layout::line(7, length, 0.1 * length),
+        };
+        let rig = self.rig(&layout, SAMPLES)?;
+        let draws = self.frame.draws(&self.scene)?;
+        let drawn = |lens_regions: bool| {
+            let features = Features { lens_regions, ..self.gpu.pipeline.features };
+            let spec = PipelineSpec { features, ..self.gpu.pipeline };
+            rig.one_pass(&draws, &self.target(&spec), &mut Gpu::quiet(&spec)?)
+        };
+        let (whole, each) = (drawn(false)?, drawn(true)?);
+        let bits = |views: &Views| -> Vec<_> {
+            views.images.concat().iter().map(|pixel| pixel.to_array().map(f32::to_bits)).collect()
+        };
+        let equal = bits(&whole) == bits(&each);
+        Ok(RegionTests { views, baseline, whole: tests(&whole.counts), each: tests(&each.counts), equal })
+    }
+
     /// The error of two views at the ends of a camera line, shaded for its middle.
     pub(super) fn angle(&self, baseline: f64) -> Result<Angle, StudyError> {
         let spacing = baseline * self.focus();
@@ -243,6 +296,20 @@ impl Bench {
         };
         let degrees = rig.degrees();
         Ok(Angle { baseline, degrees, rmse_matt: error(None)?, rmse_shiny: error(Some(EXPONENT))? })
+    }
+}
+
+fn tests(counts: &Counts) -> TileTests {
+    // With screens every sample that is left is screened.
+    let samples = counts[Event::SamplesScreened].max(counts[Event::SamplesTested]);
+    TileTests {
+        tiles_culled: counts[Event::TilesCulledSides] + counts[Event::TilesCulledLens],
+        tile_madds: counts[Event::TileMadds],
+        samples,
+        all_madds: [Event::TileMadds, Event::ScreenMadds, Event::SampleMadds]
+            .iter()
+            .map(|e| counts[*e])
+            .sum(),
     }
 }
 

@@ -16,7 +16,7 @@ use output::OutputError;
 use output::plot::{ChartPanel, Scale, Series};
 use output::progress::{Bar, Progress};
 
-pub use measure::{Angle, Bench, Cached, Lanes, Run, ViewsRow};
+pub use measure::{Angle, Bench, Cached, Lanes, RegionTests, Run, TileTests, ViewsRow};
 
 /// How much is measured.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -29,7 +29,8 @@ pub struct MultiviewEffort {
     pub views: &'static [u32],
     /// Entries of the shading cache.
     pub entries: &'static [u32],
-    /// Lengths of the camera line over the distance of what is in focus, for view-dependent shading.
+    /// Lengths of the camera line over the distance of what is in focus, for view-dependent shading and for separate tests of the
+    /// regions of the lens.
     pub baselines: &'static [f64],
 }
 
@@ -66,7 +67,12 @@ pub struct MultiviewChart {
     pub caches: Vec<Case>,
     /// Error of shading for the middle of the line, by its length.
     pub angles: Vec<Angle>,
+    /// Separate tests of the regions of the lens, by views and length of the camera line.
+    pub regions: Vec<RegionTests>,
 }
+
+/// Kinds of views whose regions of the lens are tested each on their own: apart, and with box filters on adjoining strips.
+const KINDS: [&str; 3] = ["two eyes", "seven lenses", "seven overlapping views"];
 
 /// Views for which caches are tried.
 #[derive(Clone, Debug, Serialize)]
@@ -88,10 +94,11 @@ fn layouts(focus: f64) -> [(&'static str, Layout); 3] {
 
 impl Study for MultiviewChart {
     const NAME: &'static str = "multiview";
-    const ABOUT: &'static str =
-        "Stereo and multi-view: shader runs over views and caches, one pass against its rivals";
-    const PICTURES: &'static [&'static str] = &["multiview_cost", "multiview_cache", "multiview_failures"];
-    const FILES: &'static [&'static str] = &["multiview.csv", "multiview_cache.csv", "multiview.json"];
+    const ABOUT: &'static str = "Stereo and multi-view: shader runs over views and caches, one pass against its rivals, tests by lens region";
+    const PICTURES: &'static [&'static str] =
+        &["multiview_cost", "multiview_cache", "multiview_failures", "multiview_regions"];
+    const FILES: &'static [&'static str] =
+        &["multiview.csv", "multiview_cache.csv", "multiview_regions.csv", "multiview.json"];
 
     type Effort = MultiviewEffort;
     const FULL: MultiviewEffort = MultiviewEffort {
@@ -110,7 +117,9 @@ impl Study for MultiviewChart {
     };
 
     fn measure(effort: MultiviewEffort, _scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
-        let steps = effort.views.len() + 3 * POLICIES.len() * effort.entries.len() + effort.baselines.len();
+        let lengths = effort.baselines.len();
+        let steps =
+            effort.views.len() + 3 * POLICIES.len() * effort.entries.len() + (1 + KINDS.len()) * lengths;
         let bar = progress.bar("multiview", steps as u64);
         let bench = Bench::new(effort.scene, effort.size)?;
         let rows = effort.views.iter().map(|&views| ticked(bench.row(views), &bar));
@@ -125,7 +134,10 @@ impl Study for MultiviewChart {
         }
         let angles = effort.baselines.iter().map(|&baseline| ticked(bench.angle(baseline), &bar));
         let angles = angles.collect::<Result<_, _>>()?;
-        Ok(Self { effort, rows, caches, angles })
+        let each = KINDS.into_iter().flat_map(|views| effort.baselines.iter().map(move |&at| (views, at)));
+        let regions = each.map(|(views, at)| ticked(bench.regions(views, at), &bar));
+        let regions = regions.collect::<Result<_, _>>()?;
+        Ok(Self { effort, rows, caches, angles, regions })
     }
 
     fn draw(&self, to: &Gallery<'_>) -> Result<(), OutputError> {
@@ -140,7 +152,14 @@ impl Study for MultiviewChart {
         let caches = self.caches.iter().map(Case::panel).collect();
         to.chart("multiview_cache", [title, &marked], caches)?;
         let title = "Where one pass fails: shading that depends on who looks";
-        to.chart("multiview_failures", [title, &subject], vec![self.failures()])
+        to.chart("multiview_failures", [title, &subject], vec![self.failures()])?;
+        let title = "Tile tests of each region of the lens, over those of the whole lens";
+        to.chart("multiview_regions", [title, &subject], self.region_panels())
+    }
+
+    fn fault(&self) -> Option<String> {
+        let differs = self.regions.iter().any(|row| !row.equal);
+        differs.then(|| "separate tests of the regions change an image; please report it".to_owned())
     }
 
     fn tables(&self) -> Vec<Sheet> {
@@ -173,7 +192,22 @@ impl Study for MultiviewChart {
             .shown("camera line over distance", |angle| angle.baseline, plain)
             .shown("RMSE matt", |angle| angle.rmse_matt, fixed(4))
             .shown("RMSE with a highlight", |angle| angle.rmse_shiny, fixed(4));
-        vec![runs.csv("multiview.csv").sheet(), caches.csv("multiview_cache.csv").sheet(), angles.sheet()]
+        let both = self
+            .regions
+            .iter()
+            .flat_map(|row| [(row, "whole lens", &row.whole), (row, "each region", &row.each)]);
+        let regions = Table::of(both)
+            .column("views", "views", |(row, ..)| row.views, plain)
+            .column("baseline", "line over distance", |(row, ..)| row.baseline, plain)
+            .column("test", "test", |(_, test, _)| *test, plain)
+            .column("tiles_culled", "tiles culled", |(.., tests)| tests.tiles_culled, count)
+            .column("tile_madds", "tile madds", |(.., tests)| tests.tile_madds, count)
+            .column("samples", "samples left", |(.., tests)| tests.samples, count)
+            .column("all_madds", "all madds", |(.., tests)| tests.all_madds, count)
+            .data("equal", |(row, ..)| row.equal)
+            .csv("multiview_regions.csv");
+        let runs = runs.csv("multiview.csv");
+        vec![runs.sheet(), caches.csv("multiview_cache.csv").sheet(), angles.sheet(), regions.sheet()]
     }
 
     /// No method has an error of its own besides that of shading for the middle of the line.
@@ -213,6 +247,24 @@ impl MultiviewChart {
             panel("vertex shader runs", "runs", |run| run.vertices as f64),
             panel("memory", "bytes", |run| run.dram_bytes as f64),
             panel("host", "seconds", |run| run.host_s),
+        ]
+    }
+
+    /// Work of the tests of each region over that of the test of the whole lens.
+    fn region_panels(&self) -> Vec<ChartPanel> {
+        let panel = |title: &str, of: fn(&TileTests) -> u64| {
+            let curve = |views: &'static str| {
+                let rows = self.regions.iter().filter(move |row| row.views == views);
+                let ratio = move |row: &RegionTests| of(&row.each) as f64 / of(&row.whole).max(1) as f64;
+                Series::curve(views, rows.map(move |row| (row.baseline, ratio(row))))
+            };
+            let axes = ["length of the camera line over the distance of what is in focus", "each over whole"];
+            ChartPanel::new(title, axes, KINDS.map(curve).into()).on(Scale::Doublings, Scale::Even)
+        };
+        vec![
+            panel("samples left", |tests| tests.samples),
+            panel("multiply-adds of tile tests", |tests| tests.tile_madds),
+            panel("multiply-adds of all tests", |tests| tests.all_madds),
         ]
     }
 
@@ -287,6 +339,9 @@ mod tests {
         for pair in chart.caches.iter().flat_map(|case| case.rows.chunks_exact(2)) {
             assert!(pair[0].invocations_per_pixel > pair[1].invocations_per_pixel, "{pair:?}");
         }
+        // The chart fails where an image differs; views apart leave no more samples, and fewer where they are far apart.
+        assert!(chart.regions.iter().all(|row| row.equal && row.each.samples <= row.whole.samples));
+        assert!(chart.regions[1].each.samples < chart.regions[1].whole.samples, "{:?}", chart.regions[1]);
         let (near, far) = (&chart.angles[0], &chart.angles[1]);
         // No highlight is in sight in `tiny`: what shininess adds is the chart's matter.
         assert!(far.rmse_matt > near.rmse_matt && far.rmse_shiny > near.rmse_shiny, "{near:?} {far:?}");
