@@ -531,7 +531,7 @@ fn fetches_are_counted_as_lanes_execute_them() {
         assert_eq!(counts[Event::TextureFetches], 256 + 128);
         assert_eq!(counts[Event::ShaderOps] - ops, 128 * 4);
         let expected = |x: usize| {
-            if x < 8 || x >= 12 {
+            if !(8..12).contains(&x) {
                 (x < 12) as u32 as f32
             } else if x == 11 {
                 1.5
