@@ -17,6 +17,7 @@
 //! - [`state`]: depth test, stencil test and blending of a draw,
 //! - [`shading`] and [`texture`]: the shading grid, shaders and textures,
 //! - [`memory`]: caches and addresses,
+//! - [`compute`]: groups of lanes with shared memory, buffers, atomics and barriers,
 //! - [`conservative`]: the tiles that a triangle may touch, without samples,
 //! - [`frame`]: all stages in order.
 //!
@@ -43,6 +44,7 @@
 //! - *Watertight*: the sample test is exact for the rounded points it sees, so a shared edge has one owner.
 //! - *Deterministic*: the same bytes for any number of threads and any vector width.
 
+pub mod compute;
 pub mod conservative;
 pub mod depth;
 pub mod frame;
@@ -60,6 +62,9 @@ pub mod texture;
 pub mod traversal;
 pub mod visibility;
 
+pub use compute::{
+    Atomic, Binding, Buffer, ComputeError, ComputePass, ComputeSpec, Fault, Group, GroupLane, GroupShader,
+};
 pub use frame::{
     Client, Draw, Features, FrameReport, Gpu, PassError, PassReport, PipelineSpec, RasterPass, Rendered,
     Settings, Shading, Target, TileWork, Touch, TriangleStream,

@@ -1,6 +1,7 @@
 //! Frame: passes through the whole pipeline, each from vertices, set-up, bins and tiles to the replay and the image.
 
 mod bin;
+mod dispatch;
 mod fragments;
 mod gpu;
 mod heat;

@@ -220,6 +220,7 @@ pub(crate) mod testing {
             },
             features: Features::ALL,
             depth: DepthSpec::default(),
+            compute: None,
         }
     }
 }
