@@ -37,6 +37,7 @@ fn hardware() -> PipelineSpec {
         },
         features: Features::ALL,
         depth: DepthSpec::default(),
+        compute: None,
     }
 }
 

@@ -18,6 +18,7 @@
 //! - [`shading`] and [`texture`]: the shading grid, shaders and textures,
 //! - [`surface`]: images that passes write and read, and their formats,
 //! - [`memory`]: caches and addresses,
+//! - [`compute`]: groups of lanes with shared memory, buffers, atomics and barriers,
 //! - [`conservative`]: the tiles that a triangle may touch, without samples,
 //! - [`frame`]: all stages in order.
 //!
@@ -44,6 +45,7 @@
 //! - *Watertight*: the sample test is exact for the rounded points it sees, so a shared edge has one owner.
 //! - *Deterministic*: the same bytes for any number of threads and any vector width.
 
+pub mod compute;
 pub mod conservative;
 pub mod depth;
 pub mod frame;
@@ -63,6 +65,9 @@ pub mod texture;
 pub mod traversal;
 pub mod visibility;
 
+pub use compute::{
+    Atomic, Binding, Buffer, ComputeError, ComputePass, ComputeSpec, Fault, Group, GroupLane, GroupShader,
+};
 pub use frame::{
     Attachment, Attachments, Binding, ConservativeDraw, ConservativePass, Draw, Features, FrameReport, Gpu,
     IntervalAnswer, IntervalQueries, Lanes, Load, MovingBox, PassError, PassReport, PipelineSpec, Primitive,

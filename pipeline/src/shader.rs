@@ -124,7 +124,7 @@ macro_rules! operands {
         })*
     };
 }
-operands!(f32: 1, f64: 1, Vec2: 2, Vec3: 3, Vec4: 4, DVec3: 3);
+operands!(u32: 1, f32: 1, f64: 1, Vec2: 2, Vec3: 3, Vec4: 4, DVec3: 3);
 
 /// A lane of a warp. It computes what a shader asks for and counts the operations: a multiply-add, or anything simpler, of
 /// one component is one operation; so are a comparison, a reciprocal and a square root, as in the shader cores of the GPU
@@ -202,7 +202,7 @@ impl<'a> Lane<'a> {
     }
 
     #[inline(always)]
-    fn count(&self, ops: u32) {
+    pub(crate) fn count(&self, ops: u32) {
         self.ops.set(self.ops.get() + ops);
     }
 

@@ -158,11 +158,11 @@ mod tests {
     }
 
     #[test]
-    fn levels_that_use_no_energy_are_not_reported() {
+    fn optional_units_that_use_no_energy_are_not_reported() {
         let mut energy = Energy::ZERO;
-        assert_eq!(energy.reported().count(), PARTS - 2);
+        assert_eq!(energy.reported().count(), PARTS - 3);
         energy[Part::Unit(Unit::Edram)] = 1.0;
-        assert_eq!(energy.reported().count(), PARTS - 1);
+        assert_eq!(energy.reported().count(), PARTS - 2);
     }
 
     #[test]

@@ -110,7 +110,8 @@ mod tests {
     #[test]
     fn units_that_a_gpu_lacks_are_not_reported() {
         let mut counts = Counts::default();
-        let optional: usize = [Unit::Llc, Unit::Edram].iter().map(|unit| unit.events().len()).sum();
+        let optional: usize =
+            [Unit::Compute, Unit::Llc, Unit::Edram].iter().map(|unit| unit.events().len()).sum();
         assert_eq!(counts.reported().count(), Event::COUNT - optional);
         counts[Event::LlcReads] = 3;
         assert_eq!(counts.reported().filter(|(event, _)| event.unit() == Unit::Llc).count(), 4);

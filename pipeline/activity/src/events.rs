@@ -59,7 +59,7 @@ macro_rules! activity {
 
 activity! {
     Command "command" "Reads draws and indices and fetches vertices." {
-        Draws "draws" "A draw taken from the command stream."
+        Draws "draws" "A draw or a dispatch of groups taken from the command stream."
         Indices "indices" "A vertex index read."
         VerticesFetched "vertices_fetched" "A vertex read after the reuse of recent ones."
         VertexBytes "vertex_bytes" "A byte of vertex data read, both ends of the shutter counted."
@@ -69,6 +69,21 @@ activity! {
         PixelInvocations "pixel_invocations" "A pixel shader lane run, helper lanes included."
         HelperInvocations "helper_invocations" "A lane run only to complete a quad."
         ShaderOps "shader_ops" "A multiply-add or simpler operation of one shader lane."
+    }
+    Compute "compute" "Starts groups of lanes on the shader cores; has their shared memory, buffers, atomics and barriers." {
+        Groups "groups" "A group started on a core."
+        GroupLanes "group_lanes" "A lane run in a group, helper lanes included."
+        GroupHelperLanes "group_helper_lanes" "Of these: a lane run only to complete a warp."
+        GroupSteps "group_steps" "An operation on the longest way through a group: between barriers, of its longest warp."
+        GroupBarriers "group_barriers" "A warp that waits at a barrier of its group."
+        SharedBytes "shared_bytes" "A byte of shared memory held by a group."
+        SharedAccesses "shared_accesses" "A word of shared memory read or written by a lane."
+        SharedCycles "shared_cycles" "A cycle of a shared memory: one for an access of a warp, and one for each bank conflict."
+        BankConflicts "bank_conflicts" "Of these: a cycle more because lanes of a warp ask one bank for several words."
+        Atomics "atomics" "An atomic operation of a lane on a word of a buffer."
+        AtomicConflicts "atomic_conflicts" "Of these: one that waits for another of its warp on the same word."
+        AtomicSteps "atomic_steps" "A step of an atomic unit: all words of a line once. Equal words take a step each."
+        BufferLines "buffer_lines" "A line of a buffer read, written or changed by a warp."
     }
     Setup "setup" "Prepares a triangle for traversal." {
         TrianglesIn "triangles_in" "A triangle that enters set-up."
@@ -169,7 +184,7 @@ impl Unit {
 
     /// Whether a GPU may lack it. Results leave it out if nothing happened in it.
     pub const fn is_optional(self) -> bool {
-        matches!(self, Self::Llc | Self::Edram)
+        matches!(self, Self::Compute | Self::Llc | Self::Edram)
     }
 
     /// Index range of its events in [`Event::ALL`].

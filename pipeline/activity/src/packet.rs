@@ -8,7 +8,7 @@ use crate::{Counts, Event, Unit};
 /// Kind of work, which decides the units a packet passes through.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum PacketKind {
-    /// Start of a draw: state is read.
+    /// Start of a draw or of a dispatch of groups: state is read.
     Draw,
     /// A batch of vertices is fetched and shaded, and its triangles are set up.
     Vertices,
@@ -16,6 +16,8 @@ pub enum PacketKind {
     Tile,
     /// The samples of a tile are resolved into pixels.
     Resolve,
+    /// A group of lanes that share memory and barriers.
+    Compute,
     /// A barrier between passes: all earlier work ends, written lines move to the L2 and textures are read anew. Later packets
     /// of these kinds wait for it.
     Barrier(Waits),

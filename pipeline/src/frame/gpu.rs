@@ -10,6 +10,7 @@ use super::heat::{FrameHeat, HeatMap};
 use super::pass::{AddressMap, Draw, Pass, RasterPass, Resident, Target, resident};
 use super::replay::Replay;
 use super::{Finished, PipelineSpec, rasterize, resolve};
+use crate::compute::{Buffers, ComputeError};
 use crate::geometry::Viewport;
 use crate::memory::{AddressSpace, CacheError, MemorySystem, Surface};
 use crate::surface::{SurfaceSpec, Texels};
@@ -35,6 +36,9 @@ pub struct Gpu<'e> {
     surfaces: Surfaces,
     /// Those read since the last barrier: the reads may still be going on.
     reading: Vec<SurfaceId>,
+    /// First addresses of what passes since the last barrier read.
+    reads: Vec<u64>,
+    pub(super) buffers: Buffers,
     heat: FrameHeat,
     /// Whether the tiles of the pass that was begun are those of the heat maps.
     is_on_map: bool,
@@ -75,7 +79,7 @@ pub struct PassReport {
     pub name: String,
     /// Triangles of its draws.
     pub triangles: usize,
-    /// Events of each draw.
+    /// Events of each draw; those of a dispatch of groups are one.
     pub draws: Vec<Counts>,
     /// Events of no single draw: resolving, and the barrier before the pass.
     pub others: Counts,
@@ -157,6 +161,14 @@ pub enum PassError {
         /// The draw.
         draw: usize,
     },
+    /// Groups cannot run.
+    #[error("pass `{pass}`: {error}")]
+    Compute {
+        /// The pass.
+        pass: String,
+        /// What is wrong.
+        error: ComputeError,
+    },
     /// The surfaces of a frame are too large.
     #[error(
         "pass `{pass}`: the surfaces of the frame take {bytes} bytes, more than the {} that can be addressed; draw fewer pixels, \
@@ -182,7 +194,7 @@ impl<'e> Gpu<'e> {
     ) -> Result<Self, PassError> {
         let emit = Box::new(emit);
         let memory = MemorySystem::new(&spec.memory)?;
-        let (passes, results, pending, reading, heat) = Default::default();
+        let (passes, results, pending, reading, reads, buffers, heat) = Default::default();
         Ok(Self {
             spec,
             memory,
@@ -194,6 +206,8 @@ impl<'e> Gpu<'e> {
             pending,
             surfaces: Surfaces::default(),
             reading,
+            reads,
+            buffers,
             heat,
             is_on_map: false,
         })
@@ -246,10 +260,40 @@ impl<'e> Gpu<'e> {
     /// Starts a pass whose packets are made outside of rasterization. Their tiles are those of an image of the size of
     /// `viewport`, if any.
     pub(super) fn open(&mut self, name: &str, viewport: Option<Viewport>) {
-        self.is_on_map = viewport.is_some_and(|viewport| self.heat.is_of(viewport));
         let (name, draws, others) = (name.to_owned(), Vec::new(), Counts::default());
-        self.passes.push(PassReport { name, triangles: 0, draws, others });
+        self.start(PassReport { name, triangles: 0, draws, others });
+        self.is_on_map = viewport.is_some_and(|viewport| self.heat.is_of(viewport));
+    }
+
+    /// Starts a pass whose packets have no place in an image.
+    pub(super) fn start(&mut self, report: PassReport) {
+        self.passes.push(report);
         self.last_batch = 0;
+        self.is_on_map = false;
+    }
+
+    /// Events of the last pass.
+    pub(super) fn counts_of_pass(&self) -> Counts {
+        self.passes.last().map(PassReport::counts).unwrap_or_default()
+    }
+
+    /// Whether a pass that reads or writes `surface` has to wait for earlier ones.
+    pub(super) fn conflicts(&self, surface: Surface, writes: bool) -> bool {
+        let is_written = self.pending.iter().any(|pending| pending.contains(surface.address()));
+        is_written || (writes && self.reads.iter().any(|&address| surface.contains(address)))
+    }
+
+    /// Records that the last pass reads what is at `address`.
+    pub(super) fn note_read(&mut self, address: u64) {
+        self.reads.push(address);
+    }
+
+    /// Checks that all surfaces have addresses.
+    pub(super) fn check_memory(&self, pass: &str) -> Result<(), PassError> {
+        if self.space.fits() {
+            return Ok(());
+        }
+        Err(PassError::Memory { pass: pass.to_owned(), bytes: self.space.bytes() })
     }
 
     /// Triangles of the last pass so far.
@@ -312,14 +356,9 @@ impl<'e> Gpu<'e> {
         if !prepared.is_attached {
             self.keep(drawn.surface);
         }
+        self.reads.extend(prepared.addresses.textures.iter().flatten());
+        self.reads.extend(prepared.addresses.vertices.iter().map(|buffer| buffer.address));
         Ok(drawn)
-    }
-
-    fn check_memory(&self, pass: &str) -> Result<(), PassError> {
-        if self.space.fits() {
-            return Ok(());
-        }
-        Err(PassError::Memory { pass: pass.to_owned(), bytes: self.space.bytes() })
     }
 
     fn pass(&mut self, prepared: &Pass<'_>, pass: &RasterPass<'_>) -> Result<Rendered, PassError> {
@@ -381,11 +420,12 @@ impl<'e> Gpu<'e> {
     }
 
     /// Lets packets wait for all earlier ones, and makes results readable.
-    fn barrier(&mut self, waits: Waits) {
+    pub(super) fn barrier(&mut self, waits: Waits) {
         let mut packet = Packet::new(PacketKind::Barrier(waits), self.last_pass());
         self.memory.flush(&mut packet.counts);
         self.pending.clear();
         self.reading.clear();
+        self.reads.clear();
         self.push(&packet, 0);
     }
 

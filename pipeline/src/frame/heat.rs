@@ -91,7 +91,7 @@ impl HeatMap {
     fn packet(&mut self, packet: &Packet) {
         let count = u64::from(packet.counts[self.event]);
         let placed = match packet.kind {
-            PacketKind::Draw | PacketKind::Vertices | PacketKind::Barrier(_) => false,
+            PacketKind::Draw | PacketKind::Vertices | PacketKind::Compute | PacketKind::Barrier(_) => false,
             PacketKind::Tile => true,
             PacketKind::Resolve => packet.counts[Event::PixelsResolved] > 0,
         };

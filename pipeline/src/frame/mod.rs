@@ -3,6 +3,7 @@
 mod attachments;
 mod bin;
 mod conservative_pass;
+mod dispatch;
 mod fragments;
 mod gpu;
 mod heat;

@@ -3,6 +3,7 @@
 use glam::Vec3;
 use serde::Deserialize;
 
+use crate::compute::ComputeSpec;
 use crate::depth::{BoxGrid, DepthSpec};
 use crate::geometry::Viewport;
 use crate::memory::{Cache, CacheError, CacheSpec, MemorySpec};
@@ -34,6 +35,9 @@ pub struct PipelineSpec {
     /// Depth bounds and Hi-Z.
     #[serde(default)]
     pub depth: DepthSpec,
+    /// Groups of lanes; a GPU without it runs none.
+    #[serde(default)]
+    pub compute: Option<ComputeSpec>,
 }
 
 /// Where visible samples are shaded. The choice changes the image.
@@ -191,6 +195,9 @@ impl PipelineSpec {
         let boxes = self.depth.boxes;
         let invalid = boxes.iter().copied().find(|count| !(1..=BoxGrid::MAX).contains(count));
         size("depth.boxes", invalid.unwrap_or(1), invalid.is_none(), "it has to be 1 to 16 along each axis")?;
+        if let Some((field, value, allowed)) = self.compute.as_ref().and_then(ComputeSpec::invalid) {
+            return Err(SpecError::Size { field, value, allowed });
+        }
         let caches = [
             ("shading_cache", self.shading_cache),
             ("memory.depth", self.memory.depth),

@@ -129,6 +129,12 @@ impl MemorySystem {
         (first..=last).for_each(|line| self.l2.access(Unit::Command, line, false, counts));
     }
 
+    /// Read or write the line at `address` for a group of lanes. Groups have no cache above the L2, which knows the bytes of a
+    /// line that are written: a line is not fetched to be written in part.
+    pub fn buffer(&mut self, address: u64, write: bool, counts: &mut PacketCounts) {
+        self.l2.access(Unit::Compute, self.compressed.moved_line(address / LINE_BYTES), write, counts);
+    }
+
     /// Move written lines to the L2, as later passes read them through other caches. Texture lines are dropped.
     pub fn flush(&mut self, counts: &mut PacketCounts) {
         self.texture.cache.flush();

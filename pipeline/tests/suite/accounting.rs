@@ -267,6 +267,7 @@ fn stays_in_its_units(packet: &Packet) {
             U::Dram,
         ],
         PacketKind::Resolve => &[U::Colour, U::L2, U::Dram],
+        PacketKind::Compute => &[U::Shader, U::Compute, U::L2, U::Dram],
         PacketKind::Barrier(_) => &[U::Depth, U::Colour, U::L2, U::Dram],
     };
     assert!(Unit::ALL.iter().all(|unit| !packet.counts.uses(*unit) || units.contains(unit)), "{packet:?}");

@@ -20,6 +20,7 @@ impl Stream {
             PacketKind::Vertices => 2,
             PacketKind::Tile => 3,
             PacketKind::Resolve => 4,
+            PacketKind::Compute => 6,
             PacketKind::Barrier(_) => 5,
         };
         let place = [packet.batch, packet.draw, packet.tile, packet.triangle].map(u64::from);

@@ -7,6 +7,7 @@ mod by_hand;
 mod clipping;
 mod closed;
 mod common;
+mod compute;
 mod conservative;
 mod conservative_by_hand;
 mod conservative_pass;

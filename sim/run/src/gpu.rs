@@ -173,6 +173,7 @@ impl GpuSpec {
         }
         self.units.validate().map_err(|(field, message)| (format!("units.{field}"), message))?;
         self.check_levels()?;
+        self.check_compute()?;
         self.pipeline
             .validate()
             .map_err(|error| (format!("pipeline.{}", error.field()), format!("`pipeline`: {error}")))
@@ -196,6 +197,51 @@ impl GpuSpec {
                  both out"
             );
             return Err((given, message));
+        }
+        Ok(())
+    }
+}
+
+impl GpuSpec {
+    /// Checks that groups have both sizes and rates, and that the largest group fits on a core.
+    fn check_compute(&self) -> Result<(), (String, String)> {
+        let wrong = |field: &str, message: String| Err((field.to_owned(), message));
+        let (sizes, unit) = match (&self.pipeline.compute, &self.units.compute) {
+            (None, None) => return Ok(()),
+            (Some(sizes), Some(unit)) => (sizes, unit),
+            (sizes, _) => {
+                let both = ["pipeline.compute", "units.compute"];
+                let [given, missing] = if sizes.is_some() { both } else { [both[1], both[0]] };
+                let message = format!(
+                    "`{given}` is given and `{missing}` is missing: groups need both; add it, or leave both out"
+                );
+                return wrong(given, message);
+            }
+        };
+        let shader = &self.units.shader;
+        if sizes.warp_lanes != shader.warp_lanes.get() {
+            let message = format!(
+                "`warp_lanes` of `pipeline.compute` is {}, and that of `units.shader` is {}; they have to be equal",
+                sizes.warp_lanes,
+                shader.warp_lanes.get()
+            );
+            return wrong("pipeline.compute.warp_lanes", message);
+        }
+        let most = u64::from(shader.warps) * u64::from(shader.warp_lanes);
+        if u64::from(sizes.group_lanes) > most {
+            let message = format!(
+                "`group_lanes` is {}, and a core holds {most} lanes (`warps` times `warp_lanes`)",
+                sizes.group_lanes
+            );
+            return wrong("pipeline.compute.group_lanes", message);
+        }
+        if sizes.shared_bytes > unit.shared_bytes.get() {
+            let message = format!(
+                "`shared_bytes` of a group is {}, and a core has {} (`units.compute.shared_bytes`)",
+                sizes.shared_bytes,
+                unit.shared_bytes.get()
+            );
+            return wrong("pipeline.compute.shared_bytes", message);
         }
         Ok(())
     }
@@ -270,7 +316,7 @@ mod tests {
         let text =
             message(&REFERENCE.replace("queue: 8, lines_per_cycle", "queue: 4294967295, lines_per_cycle"));
         assert!(
-            text.starts_with("gpu.ron:53:")
+            text.starts_with("gpu.ron:61:")
                 && text.contains("`queue`: 4294967295 is out of range; it has to be 1 to 65536"),
             "{text}"
         );
@@ -303,6 +349,39 @@ mod tests {
                 .replace("latency_cycles: 40, queue: 32, channels", "latency_cycles: 40, queue: 3, channels"),
         );
         assert!(text.contains("`queue` of `units.dram` is 3") && text.contains("at least 4"), "{text}");
+    }
+
+    #[test]
+    fn groups_have_to_fit_on_a_core() {
+        assert!(GpuSpec::load("mobile").unwrap().units.compute.is_none());
+        for (from, to, says) in [
+            (
+                "compute: (warp_lanes: 32",
+                "compute: (warp_lanes: 16",
+                "`units.shader` is 32; they have to be equal",
+            ),
+            ("group_lanes: 256", "group_lanes: 1024", "`group_lanes` is 1024, and a core holds 512 lanes"),
+            (
+                "shared_bytes: 16384",
+                "shared_bytes: 65536",
+                "`shared_bytes` of a group is 65536, and a core has 32768",
+            ),
+            ("banks: 32", "banks: 0", "`compute.banks` is 0; it has to be 1 to 128"),
+            (
+                "\"shared_cycles\": 2",
+                "\"groups\": 2",
+                "`units.compute.rates` has `groups`, which takes no time",
+            ),
+            ("shared_bytes: 32768,", "shared_bytes: 32768, bank: 1,", "unknown field `bank`"),
+        ] {
+            let text = message(&REFERENCE.replace(from, to));
+            assert!(text.starts_with("gpu.ron:") && text.contains(says), "{text}");
+        }
+        let alone = REFERENCE.replace(
+            "compute: (warp_lanes: 32, group_lanes: 256, shared_bytes: 16384, banks: 32, atomic_units: 1),",
+            "",
+        );
+        assert!(message(&alone).contains("`units.compute` is given and `pipeline.compute` is missing"));
     }
 
     #[test]

@@ -102,6 +102,7 @@ pub(super) fn picture(frame: &RunFrame, subject: &str, look: &Look) -> Option<Pi
 const TRACKS: [[&str; 2]; Unit::COUNT] = [
     ["command starved", "command blocked"],
     ["shader starved", "shader blocked"],
+    ["compute starved", "compute blocked"],
     ["setup starved", "setup blocked"],
     ["traversal starved", "traversal blocked"],
     ["z_cull starved", "z_cull blocked"],

@@ -480,13 +480,19 @@ mod tests {
 
     #[test]
     fn only_failure_streams_give_accuracy_warnings() {
-        let rows = ["discrete", "mobile", "reference"]
-            .map(|gpu| (format!("row after row on {gpu}"), Code::MemoryRows));
+        let rows = [
+            "groups that scatter on discrete",
+            "groups that scatter on reference",
+            "row after row on discrete",
+            "row after row on mobile",
+            "row after row on reference",
+        ]
+        .map(|case| (case.to_owned(), Code::MemoryRows));
         assert_eq!(codes(Level::Packet), rows);
         assert_eq!(codes(Level::Stepped), []);
         let tiny = ("tiny triangles on discrete".to_owned(), Code::ShortPackets);
         let bound = codes(Level::Bound);
         assert!(rows.iter().chain([&tiny]).all(|case| bound.contains(case)), "{bound:?}");
-        assert!(bound.len() <= 5, "{bound:?}");
+        assert!(bound.len() <= rows.len() + 3, "{bound:?}");
     }
 }

@@ -281,7 +281,7 @@ impl Totals {
         if let Some(waits) = demand.barrier {
             return self.barrier(waits, demand, alone);
         }
-        let full = self.uncontended.full(demand, program);
+        let full = self.uncontended.full(demand, program, counts);
         self.open[path].full.iter_mut().zip(full).for_each(|(sum, part)| *sum += part);
         let at = &mut self.phases[phase];
         at.fills[path] |= std::mem::take(&mut self.empty[path]);
@@ -355,8 +355,7 @@ struct Uncontended {
     /// Time of one operation of a warp.
     operation: Time,
     warp_lanes: u32,
-    /// Packets and warps that fit on the cores.
-    capacity: [f64; 2],
+    machine: MachineSpec,
     /// Latency of a line in the L2.
     line: Time,
     /// The extra latency of a line that is read from further below, with the event that counts such lines.
@@ -384,7 +383,7 @@ impl Uncontended {
             latency: std::array::from_fn(|at| period[at] * Time::from(common[at].latency_cycles)),
             operation: clocks.period(shader.clock) * Time::from(cycles),
             warp_lanes: shader.warp_lanes.get(),
-            capacity: [f64::from(shader.in_flight), f64::from(shader.cores) * f64::from(shader.warps)],
+            machine: machine.clone(),
             line: latency(Unit::L2),
             below: [
                 (Event::LlcReads, latency(Unit::Llc)),
@@ -396,13 +395,29 @@ impl Uncontended {
 
     /// Program time of a packet; all its warps run the same program.
     pub fn program(&self, demand: &ServiceDemand) -> Time {
-        Time::from(demand.ops) * self.operation
+        Time::from(demand.steps()) * self.operation
     }
 
-    /// Time for which the packet fills the cores, by packets and by warps.
-    pub fn full(&self, demand: &ServiceDemand, program: Time) -> [f64; 2] {
-        let [packets, warps] = self.capacity;
-        [program as f64 / packets, program as f64 * f64::from(demand.warps(self.warp_lanes)) / warps]
+    /// Time for which the packet fills the cores, by packets and by warps or, for a group, by groups. A group holds its
+    /// place while it waits for its lines, too.
+    pub fn full(&self, demand: &ServiceDemand, program: Time, counts: &PacketCounts) -> [f64; 2] {
+        let shader = &self.machine.shader;
+        let (packets, cores) = (f64::from(shader.in_flight), f64::from(shader.cores));
+        let warps = demand.warps(self.warp_lanes);
+        let Some(group) = demand.group else {
+            let places = cores * f64::from(shader.warps);
+            return [program as f64 / packets, program as f64 * f64::from(warps) / places];
+        };
+        let held = (program + self.answer(demand, counts)) as f64;
+        let groups = cores * f64::from(self.machine.groups_per_core(warps, group.shared_bytes).max(1));
+        [held / packets, held / groups]
+    }
+
+    /// Latency of the slowest kind of lines of a packet.
+    fn answer(&self, demand: &ServiceDemand, counts: &PacketCounts) -> Time {
+        let lines = if demand.lines == [0; CLIENTS.len()] { 0 } else { self.line };
+        let below = self.below.iter().filter(|(event, _)| counts[*event] > 0).map(|(_, latency)| latency);
+        lines + below.sum::<Time>()
     }
 
     /// Time that the clients of a packet take to request its lines beyond their service in the cycles of `work`, and
@@ -426,9 +441,7 @@ impl Uncontended {
             self.latency[station] + self.period[station] * Time::from(demand.service[station])
         };
         let units: Time = (first..=demand.last as usize).map(at).sum();
-        let lines = if demand.lines == [0; CLIENTS.len()] { 0 } else { self.line };
-        let below = self.below.iter().filter(|(event, _)| counts[*event] > 0).map(|(_, latency)| latency);
-        units + program + lines + below.sum::<Time>()
+        units + program + self.answer(demand, counts)
     }
 }
 

@@ -59,21 +59,63 @@ impl Station {
 }
 
 /// Clients of the L2, in the order of its ports.
-pub const CLIENTS: [Unit; 4] = [Unit::Command, Unit::Depth, Unit::Texture, Unit::Colour];
+pub const CLIENTS: [Unit; 5] = [Unit::Command, Unit::Depth, Unit::Texture, Unit::Colour, Unit::Compute];
 
-/// Port of the texture units.
-pub const TEXTURE_PORT: usize = 2;
+/// A unit that works for warps on the cores before their operations.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DataUnit {
+    /// The texture units, for pixels.
+    Texture,
+    /// Shared memory, atomic units and buffers, for groups.
+    Compute,
+}
+
+impl DataUnit {
+    /// Both, in the order of their numbers.
+    pub const ALL: [Self; 2] = [Self::Texture, Self::Compute];
+
+    /// The unit.
+    pub const fn unit(self) -> Unit {
+        match self {
+            Self::Texture => Unit::Texture,
+            Self::Compute => Unit::Compute,
+        }
+    }
+
+    /// Its port at the L2.
+    pub const fn port(self) -> usize {
+        match self {
+            Self::Texture => 2,
+            Self::Compute => 4,
+        }
+    }
+
+    /// Its events that may have a rate.
+    pub const fn events(self) -> [Event; DATA_EVENTS] {
+        match self {
+            Self::Texture => [Event::TextureFetches, Event::TextureLines, Event::TextureMisses],
+            Self::Compute => [Event::SharedCycles, Event::AtomicSteps, Event::BufferLines],
+        }
+    }
+}
 
 /// Port of a client of the L2; `None` for other units.
 pub fn port(unit: Unit) -> Option<usize> {
     CLIENTS.iter().position(|&client| client == unit)
 }
 
-/// Events of the texture units; each may have a rate.
-pub const TEXELS: usize = {
-    let events = Unit::Texture.events();
-    events.end - events.start
-};
+/// Events of a [`DataUnit`] that may have a rate.
+pub const DATA_EVENTS: usize = 3;
+
+/// What a group needs of the cores besides threads and operations.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct GroupDemand {
+    /// Operations one after another on its longest way: those of its longest warp between barriers. In all of them
+    /// together its warps do the operations of the group.
+    pub steps: u32,
+    /// Bytes of the shared memory of its core that it holds.
+    pub shared_bytes: u32,
+}
 
 /// Service demand of one packet.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -94,12 +136,14 @@ pub struct ServiceDemand {
     pub threads: u32,
     /// Operations per thread.
     pub ops: u32,
-    /// Events of the texture units, of all threads, in the order of their declaration.
-    pub texels: [u32; TEXELS],
+    /// Events of its data unit, of all threads, in the order of [`DataUnit::events`].
+    pub data: [u32; DATA_EVENTS],
+    /// For a group of lanes, which is on one core as a whole.
+    pub group: Option<GroupDemand>,
     /// Index of the first line in the store.
     pub first_line: usize,
     /// Lines requested by each client, in the order of [`CLIENTS`].
-    pub lines: [u32; 4],
+    pub lines: [u32; CLIENTS.len()],
 }
 
 impl ServiceDemand {
@@ -110,9 +154,19 @@ impl ServiceDemand {
         first..first + self.lines[port] as usize
     }
 
-    /// Whether the threads use the texture units.
-    pub fn is_textured(&self) -> bool {
-        self.texels != [0; TEXELS] || self.lines[TEXTURE_PORT] > 0
+    /// The unit that works for its warps.
+    pub fn data_unit(&self) -> DataUnit {
+        if self.group.is_some() { DataUnit::Compute } else { DataUnit::Texture }
+    }
+
+    /// Whether the threads use their data unit.
+    pub fn uses_data(&self) -> bool {
+        self.data != [0; DATA_EVENTS] || self.lines[self.data_unit().port()] > 0
+    }
+
+    /// Operations of a warp one after another.
+    pub fn steps(&self) -> u32 {
+        self.group.map_or(self.ops, |group| group.steps.max(self.ops))
     }
 
     /// First station of its path.
@@ -137,8 +191,8 @@ pub fn share(whole: u32, part: u32, parts: u32) -> Range<u32> {
 pub struct DemandBuilder {
     /// Cycles per event, by station.
     costs: [Vec<(Event, f64)>; Station::COUNT],
-    /// Cycles per event of the texture units.
-    texel_cycles: [f64; TEXELS],
+    /// Cycles per event of each data unit.
+    data_cycles: [[f64; DATA_EVENTS]; DataUnit::ALL.len()],
     /// Lines per cycle that each client of the L2 can request.
     lines_per_cycle: [u32; CLIENTS.len()],
     /// Pass of the last packet, number of its first batch in the frame, and number of the last batch.
@@ -154,12 +208,13 @@ impl DemandBuilder {
             let rates = machine.common(station.unit()).rates;
             rates.iter().flat_map(|rates| rates.iter()).map(|(event, rate)| (event, rate.recip())).collect()
         });
-        let cycles = |event| {
-            machine.texture.rates.iter().find(|(e, _)| *e == event).map_or(0.0, |(_, rate)| rate.recip())
+        let cycles = |event: Event| {
+            let mut rates = machine.common(event.unit()).rates.into_iter().flat_map(|rates| rates.iter());
+            rates.find(|(e, _)| *e == event).map_or(0.0, |(_, rate)| rate.recip())
         };
         Self {
             costs,
-            texel_cycles: texture_events().map(cycles),
+            data_cycles: DataUnit::ALL.map(|unit| unit.events().map(cycles)),
             lines_per_cycle: CLIENTS.map(|unit| machine.common(unit).lines_per_cycle),
             pass: 0,
             first_batch: 0,
@@ -182,6 +237,15 @@ impl DemandBuilder {
         };
         let batch = if barrier.is_some() { self.last_batch } else { self.batch_of(packet) };
         let stations = if front { Station::Command as usize..3 } else { 3..Station::COUNT };
+        let group = (packet.kind == PacketKind::Compute).then(|| GroupDemand {
+            steps: counts[Event::GroupSteps],
+            shared_bytes: counts[Event::SharedBytes],
+        });
+        let threads = match packet.kind {
+            PacketKind::Compute => Event::GroupLanes,
+            _ if front => Event::VertexInvocations,
+            _ => Event::PixelInvocations,
+        };
         let mut demand = ServiceDemand {
             front,
             pass: packet.pass,
@@ -189,15 +253,21 @@ impl DemandBuilder {
             barrier,
             last: if front { Station::Command } else { Station::Traversal },
             service: [0; Station::COUNT],
-            threads: counts[if front { Event::VertexInvocations } else { Event::PixelInvocations }],
+            threads: counts[threads],
             ops: 0,
-            texels: texture_events().map(|event| counts[event]),
+            data: [0; DATA_EVENTS],
+            group,
             first_line: store.len(),
-            lines: [0; 4],
+            lines: [0; CLIENTS.len()],
         };
+        demand.data = demand.data_unit().events().map(|event| counts[event]);
         demand.ops = counts[Event::ShaderOps].div_ceil(demand.threads.max(1));
         if !lines.is_empty() {
             demand.lines = sorted(lines, store);
+        }
+        if group.is_some() {
+            demand.last = Station::Pixel;
+            return demand;
         }
         for station in &Station::ALL[stations] {
             let used = counts.uses(station.unit())
@@ -210,10 +280,10 @@ impl DemandBuilder {
         demand
     }
 
-    /// Cycles of the texture units for `texels`, without line requests. The slowest of their events counts.
-    pub fn texture_cycles(&self, texels: [u32; TEXELS]) -> u32 {
-        let parts =
-            texels.into_iter().zip(self.texel_cycles).map(|(count, cycles)| f64::from(count) * cycles);
+    /// Cycles of a data unit for its events `data`, without line requests. The slowest of its events counts.
+    pub fn data_cycles(&self, unit: DataUnit, data: [u32; DATA_EVENTS]) -> u32 {
+        let cycles = self.data_cycles[unit as usize];
+        let parts = data.into_iter().zip(cycles).map(|(count, cycles)| f64::from(count) * cycles);
         whole(parts.fold(0.0, f64::max))
     }
 
@@ -221,9 +291,10 @@ impl DemandBuilder {
     pub(crate) fn add_work(&self, demand: &ServiceDemand, counts: &PacketCounts, work: &mut UnitWork) {
         let mut add = |unit: Unit, amount: u32| work[unit as usize] += u64::from(amount);
         let service = |station: Station| demand.service[station as usize];
-        let texture = if demand.is_textured() { self.texture_cycles(demand.texels) } else { 0 };
+        let unit = demand.data_unit();
+        let data = if demand.uses_data() { self.data_cycles(unit, demand.data) } else { 0 };
         Station::ALL.into_iter().for_each(|station| add(station.unit(), service(station)));
-        add(Unit::Texture, texture);
+        add(unit.unit(), data);
         add(Unit::Shader, counts[Event::ShaderOps]);
         add(Unit::Llc, counts[Event::LlcReads] + counts[Event::LlcWrites]);
         add(Unit::Edram, counts[Event::EdramReads] + counts[Event::EdramWrites]);
@@ -231,7 +302,8 @@ impl DemandBuilder {
         if demand.lines == [0; CLIENTS.len()] {
             return;
         }
-        let served = [service(Station::Command), service(Station::Depth), texture, service(Station::Colour)];
+        let served =
+            [service(Station::Command), service(Station::Depth), data, service(Station::Colour), data];
         for (port, served) in served.into_iter().enumerate() {
             let requests = demand.lines[port].div_ceil(self.lines_per_cycle[port]);
             add(CLIENTS[port], requests.saturating_sub(served));
@@ -258,13 +330,8 @@ impl DemandBuilder {
     }
 }
 
-fn texture_events() -> [Event; TEXELS] {
-    let first = Unit::Texture.events().start;
-    std::array::from_fn(|at| Event::ALL[first + at])
-}
-
 /// Append `lines` to `store`, grouped by client in the order of the ports. Returns the number per client.
-fn sorted(lines: &[LineAccess], store: &mut Vec<LineAccess>) -> [u32; 4] {
+fn sorted(lines: &[LineAccess], store: &mut Vec<LineAccess>) -> [u32; CLIENTS.len()] {
     CLIENTS.map(|client| {
         let before = store.len();
         store.extend(lines.iter().filter(|access| access.client == client));
@@ -292,8 +359,11 @@ mod tests {
     }
 
     #[test]
-    fn the_texture_port_belongs_to_the_texture_units() {
-        assert_eq!(port(Unit::Texture), Some(TEXTURE_PORT));
+    fn ports_and_events_belong_to_the_data_units() {
+        for (unit, number) in DataUnit::ALL.into_iter().zip(0..) {
+            assert_eq!((unit as usize, port(unit.unit())), (number, Some(unit.port())));
+            assert!(unit.events().iter().all(|event| event.unit() == unit.unit()));
+        }
     }
 
     #[test]

@@ -8,6 +8,8 @@ use activity::{Bounded, Event, LEVELS, Unit};
 use serde::de::{self, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer};
 
+use crate::demand::DataUnit;
+
 /// Cycles, at least 1. The maximum is 65 us at 1 GHz, a hundred times the latency of memory.
 pub type Cycles = Bounded<1, 65_536>;
 /// Cycles, possibly none.
@@ -96,6 +98,41 @@ pub struct ShaderSpec {
     pub alu_latency_cycles: Cycles,
 }
 
+/// What groups of lanes need besides the cores.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ComputeSpec {
+    /// Clock of its cycles.
+    #[serde(default)]
+    pub clock: Clock,
+    /// Cycles from the departure of a warp until its core has it again.
+    pub latency_cycles: Cycles,
+    /// Warps that may wait in front of it or be on their way to it, at least 1.
+    pub queue: Entries,
+    /// Warps that may wait for their lines after service, at least 1.
+    pub in_flight: Entries,
+    /// Lines it can request from the L2 per cycle.
+    #[serde(default = "one")]
+    pub lines_per_cycle: Width,
+    /// Bytes of shared memory in each core.
+    pub shared_bytes: Bounded<0, 1_048_576>,
+    /// Events per cycle, of all cores together.
+    pub rates: Rates,
+}
+
+impl ComputeSpec {
+    fn common(&self) -> Common<'_> {
+        Common {
+            clock: self.clock,
+            latency_cycles: self.latency_cycles.get(),
+            queue: self.queue.get(),
+            in_flight: self.in_flight.get(),
+            lines_per_cycle: self.lines_per_cycle.get(),
+            rates: Some(&self.rates),
+        }
+    }
+}
+
 /// A cache that all clients share: the L2 or a level below it.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -158,6 +195,8 @@ pub struct MachineSpec {
     pub shading_cache: UnitSpec,
     pub texture: ClientSpec,
     pub colour: ClientSpec,
+    #[serde(default)]
+    pub compute: Option<ComputeSpec>,
     pub l2: SharedCacheSpec,
     #[serde(default)]
     pub llc: Option<SharedCacheSpec>,
@@ -223,16 +262,24 @@ impl MachineSpec {
         [self.llc.as_ref(), self.edram.as_ref()]
     }
 
-    /// Whether it has `unit`; only a level below the L2 can be missing.
+    /// Groups of `warps` warps and `shared_bytes` bytes that fit on a core at once.
+    pub fn groups_per_core(&self, warps: u32, shared_bytes: u32) -> u32 {
+        let of_core = self.compute.as_ref().map_or(0, |compute| compute.shared_bytes.get());
+        let by_memory = of_core.checked_div(shared_bytes).unwrap_or(u32::MAX);
+        by_memory.min(self.shader.warps.get() / warps.max(1))
+    }
+
+    /// Whether it has `unit`; only the compute unit and the levels below the L2 can be missing.
     pub fn has(&self, unit: Unit) -> bool {
         match unit {
+            Unit::Compute => self.compute.is_some(),
             Unit::Llc => self.llc.is_some(),
             Unit::Edram => self.edram.is_some(),
             _ => true,
         }
     }
 
-    /// Shared properties of `unit`; those of the L2 for a level that is missing.
+    /// Shared properties of `unit`; for one that is missing, those of the L2, or of the texture units for compute.
     pub fn common(&self, unit: Unit) -> Common<'_> {
         let bare = |clock, latency_cycles: Cycles, queue, in_flight| Common {
             clock,
@@ -256,6 +303,7 @@ impl MachineSpec {
             Unit::ShadingCache => self.shading_cache.common(),
             Unit::Texture => self.texture.common(),
             Unit::Colour => self.colour.common(),
+            Unit::Compute => self.compute.as_ref().map_or_else(|| self.texture.common(), ComputeSpec::common),
             Unit::L2 => self.l2.common(),
             Unit::Llc => self.llc.as_ref().unwrap_or(&self.l2).common(),
             Unit::Edram => self.edram.as_ref().unwrap_or(&self.l2).common(),
@@ -269,7 +317,19 @@ impl MachineSpec {
     /// # Errors
     /// The first wrong value: its field, such as `depth.rates`, and the message.
     pub fn validate(&self) -> Result<(), (String, String)> {
-        for unit in Unit::ALL {
+        if let Some(compute) = &self.compute {
+            let timed = DataUnit::Compute.events();
+            let mut rates = compute.rates.iter().filter(|(event, _)| event.unit() == Unit::Compute);
+            if let Some((event, _)) = rates.find(|(event, _)| !timed.contains(event)) {
+                let [first, second, third] = timed.map(Event::name);
+                let message = format!(
+                    "`units.compute.rates` has `{}`, which takes no time; it may have `{first}`, `{second}` and `{third}`",
+                    event.name()
+                );
+                return Err(("compute.rates".to_owned(), message));
+            }
+        }
+        for unit in Unit::ALL.into_iter().filter(|&unit| self.has(unit)) {
             let foreign = |rates: &Rates| rates.iter().find(|(event, _)| event.unit() != unit);
             if let Some((event, _)) = self.common(unit).rates.and_then(foreign) {
                 let (unit, event, owner) = (unit.name(), event.name(), event.unit().name());

@@ -87,12 +87,14 @@ pub struct Failure {
     pub units: MachineSpec,
 }
 
-/// All challenging streams for `units`, in batches of `batch` triangles.
+/// All challenging streams for `units`, in batches of `batch` triangles; those of groups come last, for machines that have
+/// them.
 pub fn failures(units: &MachineSpec, batch: u32) -> Vec<Failure> {
     let on = |name, packets| Failure { name, packets, units: units.clone() };
     let mut narrow = on("queues of one", tiny(batch));
     shallow(&mut narrow.units);
-    vec![
+    let of_groups = units.compute.as_ref().map(|compute| groups::failures(units, compute.shared_bytes.get()));
+    let mut all = vec![
         on("one giant triangle", giant()),
         on("tiny triangles", tiny(batch)),
         on("work in turn", alternating(batch)),
@@ -103,7 +105,83 @@ pub fn failures(units: &MachineSpec, batch: u32) -> Vec<Failure> {
         on("64 passes of one triangle", single_triangles()),
         on("passes in a chain", chain()),
         on("passes side by side", side_by_side()),
-    ]
+    ];
+    all.extend(of_groups.into_iter().flatten().map(|(name, packets)| on(name, packets)));
+    all
+}
+
+/// Streams of groups.
+mod groups {
+    use super::*;
+
+    /// A group that fills four warps or, if they do not fit, a core.
+    struct Shape {
+        lanes: u32,
+        shared_bytes: u32,
+    }
+
+    /// The streams by name, for cores with `of_core` bytes of shared memory.
+    pub fn failures(units: &MachineSpec, of_core: u32) -> Vec<(&'static str, Packets)> {
+        let lanes = units.shader.warp_lanes.get() * units.shader.warps.get().min(4);
+        let small = Shape { lanes, shared_bytes: 0 };
+        let whole = Shape { lanes, shared_bytes: of_core };
+        let one_way = |n: u32| whole.group(n, (40, 200), &[(Event::SharedCycles, 64)], Vec::new());
+        let streams = |n: u32| {
+            small.group(n, (16, 16), &[], lines(Unit::Compute, n * 32, 32, 1, LineKind::Fetch, Some(1 << 20)))
+        };
+        let scattered = |n: u32| {
+            small.group(n, (16, 16), &[], lines(Unit::Compute, n * 131_072, 16, 4096, LineKind::Fetch, None))
+        };
+        let contended = |n: u32| {
+            let changed = lines(Unit::Compute, 7, 8, 0, LineKind::Hit, None);
+            small.group(n, (16, 16), &[(Event::Atomics, lanes), (Event::AtomicSteps, lanes)], changed)
+        };
+        let passes = |before: bool| {
+            in_passes((0..12).map(|n| {
+                let first = (before && n > 0).then(|| barrier(Waits::All, n << 16, 64));
+                let read = |at: u32| lines(Unit::Compute, (n << 16) + 8 * at, 8, 1, LineKind::Fetch, None);
+                let draws = std::iter::once(vertices(0, 32, 40))
+                    .chain((0..150).map(|at| tile(at, 32, 40, Vec::new())));
+                let groups =
+                    (0..60).map(|at| small.group(at, (60, 80), &[(Event::SharedCycles, 16)], read(at)));
+                (first, if n % 2 == 0 { draws.collect() } else { dispatch(groups.collect()) })
+            }))
+        };
+        vec![
+            ("groups that fill a core", dispatch((0..300).map(one_way).collect())),
+            ("groups that stream", dispatch((0..600).map(streams).collect())),
+            ("groups that scatter", dispatch((0..400).map(scattered).collect())),
+            ("atomics on one word", dispatch((0..400).map(contended).collect())),
+            ("groups and draws in a chain", passes(true)),
+            ("groups and draws side by side", passes(false)),
+        ]
+    }
+
+    /// Groups of one dispatch.
+    fn dispatch(groups: Packets) -> Packets {
+        std::iter::once(packet(PacketKind::Draw, 0, &[(Event::Draws, 1)], Vec::new())).chain(groups).collect()
+    }
+
+    impl Shape {
+        /// A group of so many operations a lane, and so many one after another.
+        fn group(
+            &self,
+            number: u32,
+            (ops, steps): (u32, u32),
+            more: &[(Event, u32)],
+            lines: Vec<LineAccess>,
+        ) -> (Packet, Vec<LineAccess>) {
+            let own = [
+                (Event::Groups, 1),
+                (Event::GroupLanes, self.lanes),
+                (Event::ShaderOps, ops * self.lanes),
+                (Event::GroupSteps, steps),
+                (Event::SharedBytes, self.shared_bytes),
+                (Event::BufferLines, lines.len() as u32),
+            ];
+            packet(PacketKind::Compute, number, &[&own, more].concat(), lines)
+        }
+    }
 }
 
 fn giant() -> Packets {

@@ -27,6 +27,7 @@ pub fn hardware() -> PipelineSpec {
         },
         features: Features::ALL,
         depth: DepthSpec::default(),
+        compute: None,
     }
 }
 

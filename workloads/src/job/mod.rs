@@ -325,6 +325,7 @@ pub(crate) mod testing {
             },
             features: Features::ALL,
             depth: DepthSpec::default(),
+            compute: None,
         }
     }
 }

@@ -188,6 +188,7 @@ pub fn spec(features: Features) -> PipelineSpec {
         },
         features,
         depth: DepthSpec::default(),
+        compute: None,
     }
 }
 

@@ -46,6 +46,7 @@ const fn unit_colour(unit: Unit) -> Colour {
     Colour::hex(match unit {
         Unit::Command => 0x8f_e7c0,
         Unit::Shader => 0xbe_6426,
+        Unit::Compute => 0x14_0028,
         Unit::Setup => 0x7f_ccff,
         Unit::Traversal => 0xe4_8e1b,
         Unit::ZCull => 0x97_464f,

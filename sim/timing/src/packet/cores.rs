@@ -1,12 +1,14 @@
-//! Shader cores and texture units of the level `packet`.
+//! Shader cores and data units of the level `packet`.
 
-use super::calendar::Calendar;
-use super::calendar::QueueTimes;
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use super::calendar::{Calendar, QueueTimes};
 use super::memory::Memory;
 use super::station::aligned;
 use super::{Span, Visit};
 use crate::clock::{Clocks, Time};
-use crate::demand::{DemandBuilder, Station, TEXTURE_PORT, share};
+use crate::demand::{DataUnit, DemandBuilder, ServiceDemand, Station, share};
 use crate::spec::MachineSpec;
 
 /// Cycles per slot of the calendars.
@@ -32,8 +34,8 @@ pub(super) struct Run {
     pub done: Time,
     /// When the packet leaves the cores.
     pub departed: Time,
-    /// When the texture units work on it.
-    pub texture: Span,
+    /// When its data unit works on it.
+    pub data: Span,
     /// When its lines pass the L2 and memory.
     pub memory: Span,
 }
@@ -49,7 +51,65 @@ struct PacketFifo {
     slots: QueueTimes,
 }
 
-/// All cores and texture units.
+/// A data unit, which serves warps in order.
+#[derive(Clone, Debug)]
+struct DataState {
+    unit: DataUnit,
+    period: Time,
+    latency: Time,
+    free: Time,
+    departed: Time,
+    next_request: Time,
+    queue: QueueTimes,
+    behind: QueueTimes,
+}
+
+impl DataState {
+    fn new(machine: &MachineSpec, clocks: &Clocks, unit: DataUnit) -> Self {
+        let common = machine.common(unit.unit());
+        let period = clocks.period(common.clock);
+        Self {
+            unit,
+            period,
+            latency: period * Time::from(common.latency_cycles),
+            free: 0,
+            departed: 0,
+            next_request: 0,
+            queue: QueueTimes::new(common.queue),
+            behind: QueueTimes::new(common.in_flight),
+        }
+    }
+}
+
+/// Room for groups on the cores, as if all groups under way needed as much as the next.
+#[derive(Clone, Debug)]
+struct GroupRoom {
+    machine: MachineSpec,
+    /// When the groups under way end.
+    ends: BinaryHeap<Reverse<Time>>,
+}
+
+impl GroupRoom {
+    fn new(machine: &MachineSpec) -> Self {
+        Self { machine: machine.clone(), ends: BinaryHeap::new() }
+    }
+
+    /// When there is room for the group of `demand`; 0 for other packets.
+    fn at(&mut self, demand: &ServiceDemand, warps: u32) -> Time {
+        let Some(group) = demand.group else { return 0 };
+        let per_core = self.machine.groups_per_core(warps, group.shared_bytes).max(1);
+        let most = self.machine.shader.cores.get() as usize * per_core as usize;
+        let mut room = 0;
+        while self.ends.len() >= most
+            && let Some(Reverse(end)) = self.ends.pop()
+        {
+            room = end;
+        }
+        room
+    }
+}
+
+/// All cores and data units.
 #[derive(Clone, Debug)]
 pub(super) struct Cores {
     fifos: [PacketFifo; 2],
@@ -60,20 +120,14 @@ pub(super) struct Cores {
     alu: Time,
     lanes_of_core: u32,
     warp_lanes: u32,
-    texture_period: Time,
-    texture_latency: Time,
-    texture_free: Time,
-    texture_departed: Time,
-    next_texture_request: Time,
-    texture_queue: QueueTimes,
-    texture_behind: QueueTimes,
+    groups: GroupRoom,
+    data: [DataState; DataUnit::ALL.len()],
 }
 
 impl Cores {
     pub fn new(machine: &MachineSpec, clocks: &Clocks) -> Self {
-        let (spec, texture) = (&machine.shader, &machine.texture);
+        let spec = &machine.shader;
         let period = clocks.period(spec.clock);
-        let texture_period = clocks.period(texture.clock);
         let slots = QueueTimes::new(spec.cores.get() * spec.warps.get());
         let fifo = PacketFifo { sent: 0, departed: 0, flights: QueueTimes::new(spec.in_flight.get()), slots };
         Self {
@@ -82,15 +136,10 @@ impl Cores {
             lanes: Calendar::new(Time::from(SLOT_CYCLES) * period, spec.cores.get() * spec.lanes.get()),
             period,
             alu: period * Time::from(spec.alu_latency_cycles),
+            groups: GroupRoom::new(machine),
             lanes_of_core: spec.lanes.get(),
             warp_lanes: spec.warp_lanes.get(),
-            texture_period,
-            texture_latency: texture_period * Time::from(texture.latency_cycles),
-            texture_free: 0,
-            texture_departed: 0,
-            next_texture_request: 0,
-            texture_queue: QueueTimes::new(texture.queue.get()),
-            texture_behind: QueueTimes::new(texture.in_flight.get()),
+            data: DataUnit::ALL.map(|unit| DataState::new(machine, clocks, unit)),
         }
     }
 
@@ -99,26 +148,31 @@ impl Cores {
         &self.lanes
     }
 
-    /// Simulate a packet of vertices or pixels.
+    /// Simulate a packet of vertices or pixels, or a group.
     pub fn run(&mut self, visit: &Visit<'_>, builder: &DemandBuilder, memory: &mut Memory) -> Run {
         let demand = visit.demand;
         let kind = usize::from(visit.station == Station::Pixel);
         let warps = demand.warps(self.warp_lanes);
         let fifo = &mut self.fifos[kind];
         let taken = visit.arrive.max(fifo.sent).max(fifo.flights.room_at());
-        let mut run = Run { taken, done: taken, departed: taken, texture: Span::NONE, memory: Span::NONE };
-        let textured = kind == 1 && demand.is_textured();
+        let room = taken.max(self.groups.at(demand, warps));
+        let mut run = Run { taken, done: taken, departed: taken, data: Span::NONE, memory: Span::NONE };
+        let uses_data = kind == 1 && demand.uses_data();
         for first in (0..warps).step_by(WARPS_PER_CHUNK as usize) {
             let chunk = Chunk { first, count: WARPS_PER_CHUNK.min(warps - first), of: warps };
-            let sent = self.send(kind, taken.max(self.fifos[kind].sent), chunk.count, textured);
+            let from = room.max(self.fifos[kind].sent);
+            let sent = self.send(kind, from, chunk.count, uses_data.then_some(demand.data_unit()));
             self.fifos[kind].sent = sent.to + self.period;
             let mut ready = Span { from: sent.from + self.period, to: sent.to + self.period };
-            if textured {
-                ready = self.texels(visit, &chunk, ready, builder, memory, &mut run);
+            if uses_data {
+                ready = self.data(visit, &chunk, ready, builder, memory, &mut run);
             }
             let done = self.operate(visit, &chunk, ready);
             self.fifos[kind].slots.note_all(chunk.count, done.from, done.to);
             run.done = run.done.max(done.to);
+        }
+        if demand.group.is_some() {
+            self.groups.ends.push(Reverse(run.done));
         }
         let fifo = &mut self.fifos[kind];
         run.departed = aligned(run.done.max(fifo.departed).max(visit.room), self.period);
@@ -127,20 +181,20 @@ impl Cores {
         run
     }
 
-    /// Send warps, one per cycle, as slots on the cores and in front of the texture units become free.
-    /// Returns when the first and the last warp are sent.
-    fn send(&mut self, kind: usize, from: Time, warps: u32, textured: bool) -> Span {
+    /// Send warps, one per cycle, as slots on the cores and in front of the data unit become free. Returns when the
+    /// first and the last warp are sent.
+    fn send(&mut self, kind: usize, from: Time, warps: u32, unit: Option<DataUnit>) -> Span {
         let room = |count| {
             let slots = self.fifos[kind].slots.room_for(count);
-            slots.max(if textured { self.texture_queue.room_for(count) } else { 0 })
+            unit.map_or(slots, |unit| slots.max(self.data[unit as usize].queue.room_for(count)))
         };
         let (first, last) = (room(1), room(warps));
         let (begin, sent) = self.sends.reserve(from.max(first), u64::from(warps) * self.period);
         Span { from: begin, to: sent.saturating_sub(self.period).max(begin).max(last) }
     }
 
-    /// Fetch the texels of some warps. Returns when the first and the last warp have their texels.
-    fn texels(
+    /// Fetch the data of some warps. Returns when the first and the last warp have them.
+    fn data(
         &mut self,
         visit: &Visit<'_>,
         chunk: &Chunk,
@@ -150,47 +204,41 @@ impl Cores {
         run: &mut Run,
     ) -> Span {
         let demand = visit.demand;
+        let state = &mut self.data[demand.data_unit() as usize];
+        let (unit, period) = (state.unit, state.period);
         let cycles = |part: u32| {
-            let texels = demand.texels.map(|whole| share(whole, part, chunk.of).len() as u32);
-            self.texture_period * Time::from(builder.texture_cycles(texels))
+            let data = demand.data.map(|whole| share(whole, part, chunk.of).len() as u32);
+            period * Time::from(builder.data_cycles(unit, data))
         };
         let service: Time = (chunk.first..chunk.first + chunk.count).map(cycles).sum();
         let each = service / Time::from(chunk.count);
-        let start = aligned(sent.from.max(self.texture_free), self.texture_period);
+        let start = aligned(sent.from.max(state.free), period);
         let mut served = (start + service).max(sent.to + each);
         let busy_to = start + service;
-        let all = demand.lines_of(TEXTURE_PORT);
+        let all = demand.lines_of(unit.port());
         let part = |part: u32| share(all.len() as u32, part, chunk.of).start as usize;
         let base = all.start - demand.first_line;
         let range = base + part(chunk.first)..base + part(chunk.first + chunk.count);
         let mut arrived = 0;
         if !range.is_empty() {
-            let fetched = memory.request(
-                TEXTURE_PORT,
-                &visit.lines[range],
-                visit.turn,
-                start.max(self.next_texture_request),
-                self.texture_period,
-            );
-            self.next_texture_request = fetched.last_request + self.texture_period;
+            let from = start.max(state.next_request);
+            let fetched = memory.request(unit.port(), &visit.lines[range], visit.turn, from, period);
+            state.next_request = fetched.last_request + period;
             served = served.max(fetched.last_request);
             arrived = fetched.arrived;
             run.memory = run.memory.with(fetched.first, fetched.moved);
         }
-        served = served.max(self.texture_behind.room_for(chunk.count));
-        let departed = served.max(arrived).max(self.texture_departed);
-        self.texture_free = served;
-        self.texture_departed = departed;
-        self.texture_queue.note_all(
-            chunk.count,
-            start + self.period,
-            served.saturating_sub(each).max(start) + self.period,
-        );
+        served = served.max(state.behind.room_for(chunk.count));
+        let departed = served.max(arrived).max(state.departed);
+        state.free = served;
+        state.departed = departed;
+        let (from, to) = (start + self.period, served.saturating_sub(each).max(start) + self.period);
+        state.queue.note_all(chunk.count, from, to);
         let first =
             (start + each).max(departed.saturating_sub(served.saturating_sub(start + each))).min(departed);
-        self.texture_behind.note_all(chunk.count, first, departed);
-        run.texture = run.texture.with(start, busy_to);
-        Span { from: first + self.texture_latency, to: departed + self.texture_latency }
+        state.behind.note_all(chunk.count, first, departed);
+        run.data = run.data.with(start, busy_to);
+        Span { from: first + state.latency, to: departed + state.latency }
     }
 
     /// Run the operations of some warps, ready between `ready.from` and `ready.to`. Returns when the first and
@@ -203,7 +251,7 @@ impl Cores {
         // A warp wider than a core takes several cycles per operation.
         let wide = Time::from(threads.div_ceil(chunk.count).div_ceil(self.lanes_of_core).saturating_sub(1))
             * self.period;
-        let alone = Time::from(demand.ops.max(1)) * (self.alu + wide);
+        let alone = Time::from(demand.steps().max(1)) * (self.alu + wide);
         let issued = match operations * self.period {
             0 => 0,
             work => self.lanes.reserve_as(visit.turn, ready.from, work).1,

@@ -287,8 +287,11 @@ impl PacketClock {
         self.stations[visit.station as usize].queue.note(run.taken + 1);
         self.tally.count(Unit::Shader, counts, run.taken, run.done);
         *memory = memory.with(run.memory.from, run.memory.to);
-        if run.texture.from <= run.texture.to {
-            self.tally.serve(Unit::Texture, counts, run.texture.from, run.texture.to);
+        let unit = visit.demand.data_unit().unit();
+        if run.data.from <= run.data.to {
+            self.tally.serve(unit, counts, run.data.from, run.data.to);
+        } else if visit.demand.group.is_some() {
+            self.tally.count(unit, counts, run.taken, run.done);
         }
         run.departed
     }

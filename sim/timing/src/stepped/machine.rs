@@ -12,7 +12,7 @@ use super::sources::Sources;
 use super::stage::{Stage, StageEnv};
 use super::{Stalled, StepOptions, Stream};
 use crate::clock::{Clocks, Time};
-use crate::demand::{DemandBuilder, Station, TEXTURE_PORT, port};
+use crate::demand::{DataUnit, DemandBuilder, Station, port};
 use crate::passes::Passes;
 use crate::spec::{Common, MachineSpec};
 use crate::stalls::Reason;
@@ -27,9 +27,7 @@ pub(super) struct Machine<'a> {
     /// Unit of each station, except for the shader cores.
     stages: [Option<Stage>; Station::COUNT],
     shader: Shader,
-    texture: Stage,
-    textures: Queue<u32>,
-    texture_latency: Time,
+    data: [DataStage; DataUnit::ALL.len()],
     l2: L2,
     levels: Levels,
     dram: Dram,
@@ -37,6 +35,25 @@ pub(super) struct Machine<'a> {
     meter: Meter,
     /// Cycles simulated, summed over units.
     visited: u64,
+}
+
+/// A data unit; its items are warps.
+struct DataStage {
+    stage: Stage,
+    queue: Queue<u32>,
+    latency: Time,
+}
+
+impl DataStage {
+    fn new(machine: &MachineSpec, clocks: &Clocks, unit: DataUnit) -> Self {
+        let common = machine.common(unit.unit());
+        let period = clocks.period(common.clock);
+        Self {
+            stage: Stage::new(period, common.in_flight, common.lines_per_cycle),
+            queue: Queue::new(common.queue),
+            latency: period * Time::from(common.latency_cycles),
+        }
+    }
 }
 
 impl<'a> Machine<'a> {
@@ -79,14 +96,7 @@ impl<'a> Machine<'a> {
             queues: Station::ALL.map(|station| Queue::new(common[station as usize].queue)),
             stages: Station::ALL.map(stage),
             shader: Shader::new(machine, &clocks),
-            texture: Stage::new(
-                clocks.period(machine.texture.clock),
-                machine.texture.in_flight.get(),
-                machine.texture.lines_per_cycle.get(),
-            ),
-            textures: Queue::new(machine.texture.queue.get()),
-            texture_latency: clocks.period(machine.texture.clock)
-                * Time::from(machine.texture.latency_cycles),
+            data: DataUnit::ALL.map(|unit| DataStage::new(machine, &clocks, unit)),
             l2: L2::new(machine, &clocks),
             levels: Levels::new(machine, &clocks),
             dram: Dram::new(machine, &clocks),
@@ -159,7 +169,8 @@ impl<'a> Machine<'a> {
     fn period(&self, unit: Unit) -> Time {
         match unit {
             Unit::Shader => self.shader.period(),
-            Unit::Texture => self.texture.period(),
+            Unit::Texture => self.data[DataUnit::Texture as usize].stage.period(),
+            Unit::Compute => self.data[DataUnit::Compute as usize].stage.period(),
             Unit::L2 => self.l2.period(),
             Unit::Llc | Unit::Edram => self.levels.period(unit).unwrap_or(1),
             Unit::Dram => self.dram.period(),
@@ -172,7 +183,8 @@ impl<'a> Machine<'a> {
         let (clocks, recorder) = (self.shared.clocks, &mut self.shared.recorder);
         match unit {
             Unit::Shader => self.tick_shader(now),
-            Unit::Texture => self.tick_texture(now),
+            Unit::Texture => self.tick_data(DataUnit::Texture, now),
+            Unit::Compute => self.tick_data(DataUnit::Compute, now),
             Unit::L2 => {
                 let below = (&mut self.levels, &mut self.dram);
                 self.l2.tick(now, below, &mut self.waits, &mut self.meter, recorder, &clocks)
@@ -204,25 +216,25 @@ impl<'a> Machine<'a> {
         let [_, vertex, setup, _, _, _, _, _, pixel, colour] = &mut self.queues;
         let mut cores = CoresEnv { shared: &mut self.shared, setup, colour };
         let demands = &cores.shared.stream.demands;
-        let (acted, busy, reason) =
-            self.shader.tick(now, demands, [vertex, pixel], &mut self.textures, &mut cores);
+        let data = self.data.each_mut().map(|data| &mut data.queue);
+        let (acted, busy, reason) = self.shader.tick(now, demands, [vertex, pixel], data, &mut cores);
         let reason = reason.unwrap_or_else(|| self.shared.sources.idle_reason(Station::Pixel, now));
         self.meter.set(Unit::Shader, now, busy, reason, &mut self.shared.recorder);
         acted
     }
 
-    fn tick_texture(&mut self, now: Time) -> bool {
-        let mut texels =
-            TextureEnv { shared: &self.shared, shader: &mut self.shader, latency: self.texture_latency };
-        let port = Some(&mut self.l2.ports[TEXTURE_PORT]);
-        let ticked = self.texture.tick(now, &mut self.textures, port, &mut self.waits, &mut texels);
-        let idle = self.texture.is_free() && self.shared.sources.remaining_at(Station::Pixel) == 0;
-        let reason = match (self.texture.is_free(), idle) {
+    fn tick_data(&mut self, unit: DataUnit, now: Time) -> bool {
+        let DataStage { stage, queue, latency } = &mut self.data[unit as usize];
+        let mut env = DataEnv { shared: &self.shared, shader: &mut self.shader, unit, latency: *latency };
+        let port = Some(&mut self.l2.ports[unit.port()]);
+        let ticked = stage.tick(now, queue, port, &mut self.waits, &mut env);
+        let idle = stage.is_free() && self.shared.sources.remaining_at(Station::Pixel) == 0;
+        let reason = match (stage.is_free(), idle) {
             (_, true) => Reason::Idle,
             (true, _) => Reason::Starved(Unit::Shader),
             _ => ticked.reason,
         };
-        self.meter.set(Unit::Texture, now, u32::from(ticked.busy), reason, &mut self.shared.recorder);
+        self.meter.set(unit.unit(), now, u32::from(ticked.busy), reason, &mut self.shared.recorder);
         ticked.acted
     }
 
@@ -233,13 +245,13 @@ impl<'a> Machine<'a> {
         let inputs = [&self.queues[Station::Vertex as usize], &self.queues[Station::Pixel as usize]];
         let others = [
             self.shader.wakes_at(now, inputs),
-            self.texture.wakes_at(now, &self.textures, &self.waits),
             self.l2.wakes_at(now),
             self.levels.wakes_at(now),
             self.dram.wakes_at(now),
             self.shared.sources.wakes_at(now),
         ];
-        stages.chain(others.into_iter().flatten()).min()
+        let data = self.data.iter().filter_map(|data| data.stage.wakes_at(now, &data.queue, &self.waits));
+        stages.chain(data).chain(others.into_iter().flatten()).min()
     }
 }
 
@@ -334,7 +346,8 @@ impl CoreEnv for CoresEnv<'_, '_> {
     fn served(&mut self, kind: usize, packet: u32, from: Time, to: Time) {
         self.shared.count(Unit::Shader, packet, from, to);
         if kind == 1 {
-            self.shared.count(Unit::Texture, packet, from, to);
+            let unit = self.shared.stream.demands[packet as usize].data_unit().unit();
+            self.shared.count(unit, packet, from, to);
         }
     }
 
@@ -345,22 +358,23 @@ impl CoreEnv for CoresEnv<'_, '_> {
     }
 }
 
-/// Environment of the texture units; their items are warps.
-pub(super) struct TextureEnv<'w, 'a> {
+/// Environment of a data unit; its items are warps.
+pub(super) struct DataEnv<'w, 'a> {
     pub shared: &'w SharedState<'a>,
     pub shader: &'w mut Shader,
+    pub unit: DataUnit,
     pub latency: Time,
 }
 
-impl StageEnv for TextureEnv<'_, '_> {
+impl StageEnv for DataEnv<'_, '_> {
     fn work(&self, id: u32) -> (u32, std::ops::Range<usize>) {
         let warp = self.shader.warp(id);
         let demand = &self.shared.stream.demands[warp.packet as usize];
-        let texels = warp.texels(demand);
-        let all = demand.lines_of(TEXTURE_PORT);
+        let data = warp.data(demand);
+        let all = demand.lines_of(self.unit.port());
         let part = crate::demand::share(all.len() as u32, warp.part, warp.parts);
         let range = all.start + part.start as usize..all.start + part.end as usize;
-        (self.shared.builder.texture_cycles(texels), range)
+        (self.shared.builder.data_cycles(self.unit, data), range)
     }
 
     fn line(&self, at: usize) -> LineAccess {
@@ -374,7 +388,7 @@ impl StageEnv for TextureEnv<'_, '_> {
     fn served(&mut self, _: u32, _: Time, _: Time) {}
 
     fn leave(&mut self, id: u32, now: Time) -> Result<(), Unit> {
-        self.shader.textured(id, now + self.latency);
+        self.shader.fetched(id, now + self.latency);
         Ok(())
     }
 }

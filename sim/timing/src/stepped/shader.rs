@@ -6,7 +6,7 @@ use activity::Unit;
 
 use super::queue::Queue;
 use crate::clock::{Clocks, Time};
-use crate::demand::{ServiceDemand, TEXELS, share};
+use crate::demand::{DATA_EVENTS, DataUnit, ServiceDemand, share};
 use crate::spec::MachineSpec;
 use crate::stalls::Reason;
 
@@ -16,6 +16,8 @@ struct Flight {
     packet: u32,
     /// Warps not done.
     remaining: u32,
+    /// Bytes of shared memory of its core that it holds.
+    shared_bytes: u32,
     from: Time,
     to: Time,
 }
@@ -36,6 +38,8 @@ struct Sending {
     packet: u32,
     sent: u32,
     warps: u32,
+    /// The core of a group; its warps have their slots.
+    core: Option<usize>,
 }
 
 /// State of all cores.
@@ -51,8 +55,8 @@ pub(super) struct Shader {
     in_flight: usize,
     period: Time,
     alu: Time,
-    /// Warps at the texture units or on their fifo back.
-    fetching: usize,
+    /// Warps at each data unit or on their fifo back.
+    fetching: [usize; DataUnit::ALL.len()],
 }
 
 /// Interface of the cores to their surroundings.
@@ -69,10 +73,11 @@ impl Shader {
         let period = clocks.period(spec.clock);
         let core = Core {
             slots: spec.warps.get(),
+            shared_bytes: machine.compute.as_ref().map_or(0, |compute| compute.shared_bytes.get()),
             lane: 0,
             ready: VecDeque::new(),
             fresh: VecDeque::new(),
-            textured: VecDeque::new(),
+            fetched: VecDeque::new(),
             cooling: VecDeque::new(),
         };
         Self {
@@ -86,7 +91,7 @@ impl Shader {
             in_flight: spec.in_flight.get() as usize,
             period,
             alu: period * Time::from(spec.alu_latency_cycles),
-            fetching: 0,
+            fetching: Default::default(),
         }
     }
 
@@ -105,7 +110,7 @@ impl Shader {
         now: Time,
         demands: &[ServiceDemand],
         inputs: [&mut Queue<u32>; 2],
-        textures: &mut Queue<u32>,
+        data: [&mut Queue<u32>; DataUnit::ALL.len()],
         env: &mut impl CoreEnv,
     ) -> (bool, u32, Option<Reason>) {
         let mut acted = false;
@@ -129,17 +134,19 @@ impl Shader {
                 }
             }
         }
-        acted |= self.send(now, demands, textures);
+        acted |= self.send(now, demands, data);
         let resident = self.fifos.iter().any(|fifo| !fifo.flights.is_empty());
-        let why =
-            if self.fetching > 0 { Reason::Starved(Unit::Texture) } else { Reason::Starved(Unit::Shader) };
+        let fetching = DataUnit::ALL.into_iter().find(|&unit| self.fetching[unit as usize] > 0);
+        let why = Reason::Starved(fetching.map_or(Unit::Shader, DataUnit::unit));
         (acted, busy, reason.or(resident.then_some(why)))
     }
 
-    /// Record that the texels of a warp arrive at `at`.
-    pub fn textured(&mut self, id: u32, at: Time) {
+    /// Record that the data of a warp arrive at `at`.
+    pub fn fetched(&mut self, id: u32, at: Time) {
         let core = self.warps[id as usize].core;
-        self.cores[core].textured.push_back((at, id));
+        let queue = &mut self.cores[core].fetched;
+        let after = queue.iter().rposition(|(before, _)| *before <= at).map_or(0, |last| last + 1);
+        queue.insert(after, (at, id));
     }
 
     /// Simulate a cycle of one core: due warps become ready, and ready warps fill the lanes.
@@ -151,9 +158,9 @@ impl Shader {
             core.ready.push_back(id);
             acted = true;
         }
-        while let Some(id) = due(&mut core.textured, now) {
+        while let Some(id) = due(&mut core.fetched, now) {
             core.ready.push_back(id);
-            self.fetching -= 1;
+            self.fetching[self.warps[id as usize].data_unit as usize] -= 1;
             acted = true;
         }
         while let Some(id) = due(&mut core.cooling, now) {
@@ -169,6 +176,7 @@ impl Shader {
             let flight = &mut fifo.flights[(warp.number - fifo.retired) as usize];
             flight.remaining -= 1;
             flight.to = now;
+            core.shared_bytes += if flight.remaining == 0 { flight.shared_bytes } else { 0 };
         }
         core.lane = core.lane.max(cycle * self.lanes);
         let end = (cycle + 1) * self.lanes;
@@ -177,7 +185,7 @@ impl Shader {
         {
             let warp = &mut self.warps[id as usize];
             // A warp without operations occupies no lane.
-            core.lane += if warp.remaining > 0 { u64::from(warp.threads) } else { 0 };
+            core.lane += if warp.remaining > 0 { u64::from(warp.lanes()) } else { 0 };
             warp.remaining = warp.remaining.saturating_sub(1);
             let last = core.lane.saturating_sub(1).max(cycle * self.lanes) / self.lanes;
             core.cooling.push_back((last * self.period + self.alu, id));
@@ -216,47 +224,60 @@ impl Shader {
         }
         let Some(id) = input.head(now) else { return false };
         input.pop(now);
-        let parts = demands[id as usize].warps(self.warp_lanes);
-        fifo.flights.push_back(Flight { packet: id, remaining: parts, from: now, to: now });
-        fifo.sending = (parts > 0).then_some(Sending { packet: id, sent: 0, warps: parts });
+        let demand = &demands[id as usize];
+        let parts = demand.warps(self.warp_lanes);
+        let shared_bytes = demand.group.map_or(0, |group| group.shared_bytes);
+        fifo.flights.push_back(Flight { packet: id, remaining: parts, shared_bytes, from: now, to: now });
+        fifo.sending = (parts > 0).then_some(Sending { packet: id, sent: 0, warps: parts, core: None });
         true
     }
 
-    /// Send one warp per cycle, alternately of vertices and pixels, to the core with most free slots.
-    fn send(&mut self, now: Time, demands: &[ServiceDemand], textures: &mut Queue<u32>) -> bool {
+    /// The core for the next warp of a packet: the one with most free slots, or that of its group. A group takes a core
+    /// with room for all of it.
+    fn place(&self, sending: &Sending, demand: &ServiceDemand) -> Option<usize> {
+        let (slots, bytes) = demand.group.map_or((1, 0), |group| (sending.warps, group.shared_bytes));
+        let fits = |core: &Core| core.slots >= slots && core.shared_bytes >= bytes;
+        let most = || self.cores.iter().filter(|core| fits(core)).map(|core| core.slots).max();
+        sending.core.or_else(|| {
+            most().and_then(|most| self.cores.iter().position(|core| core.slots == most && fits(core)))
+        })
+    }
+
+    /// Send one warp per cycle, alternately of vertices and of pixels or groups.
+    fn send(
+        &mut self,
+        now: Time,
+        demands: &[ServiceDemand],
+        data: [&mut Queue<u32>; DataUnit::ALL.len()],
+    ) -> bool {
         let turns = [self.next_kind, 1 - self.next_kind];
         let Some(kind) = turns.into_iter().find(|&kind| self.fifos[kind].sending.is_some()) else {
             return false;
         };
-        let Some(Sending { packet, sent: part, warps: parts }) = self.fifos[kind].sending else {
+        let Some(sending) = self.fifos[kind].sending else { return false };
+        let Sending { packet, sent: part, warps: parts, .. } = sending;
+        let demand = &demands[packet as usize];
+        let uses_data = kind == 1 && demand.uses_data();
+        let [texture, compute] = data;
+        let queue = if demand.group.is_some() { compute } else { texture };
+        let Some(core) = self.place(&sending, demand).filter(|_| !uses_data || queue.room(now) > 0) else {
             return false;
         };
-        let max_slots = self.cores.iter().map(|core| core.slots).max().unwrap_or(0);
-        let textured = kind == 1 && demands[packet as usize].is_textured();
-        if max_slots == 0 || (textured && textures.room(now) == 0) {
-            return false;
-        }
-        let core = self.cores.iter().position(|core| core.slots == max_slots).unwrap_or(0);
         let fifo = &mut self.fifos[kind];
         let number = fifo.retired + fifo.flights.len() as u64 - 1;
-        let threads = share(demands[packet as usize].threads, part, parts).len() as u32;
-        let warp = Warp {
-            packet,
-            part,
-            parts,
-            kind,
-            number,
-            threads,
-            remaining: demands[packet as usize].ops,
-            core,
-        };
-        let more = part + 1 < parts;
-        fifo.sending = more.then_some(Sending { packet, sent: part + 1, warps: parts });
-        self.cores[core].slots -= 1;
+        let warp = Warp::new(demand, &sending, (kind, number), core);
+        let is_group = demand.group.is_some();
+        let next = Sending { sent: part + 1, core: is_group.then_some(core), ..sending };
+        fifo.sending = (part + 1 < parts).then_some(next);
+        // All warps of a group get their slots at once.
+        if sending.core.is_none() {
+            self.cores[core].slots -= if is_group { parts } else { 1 };
+            self.cores[core].shared_bytes -= demand.group.map_or(0, |group| group.shared_bytes);
+        }
         let id = self.store(warp);
-        if textured {
-            textures.push(id, now + self.period);
-            self.fetching += 1;
+        if uses_data {
+            queue.push(id, now + self.period);
+            self.fetching[demand.data_unit() as usize] += 1;
         } else {
             self.cores[core].fresh.push_back((now + self.period, id));
         }
@@ -277,7 +298,7 @@ impl Shader {
     pub fn wakes_at(&self, now: Time, inputs: [&Queue<u32>; 2]) -> Option<Time> {
         let inputs = inputs.into_iter().filter_map(Queue::head_at);
         let cores = self.cores.iter().filter(|core| !core.is_empty()).flat_map(|core| {
-            let queues = [&core.fresh, &core.textured, &core.cooling];
+            let queues = [&core.fresh, &core.fetched, &core.cooling];
             let arrives = queues.into_iter().filter_map(|queue| queue.front()).map(|(at, _)| *at);
             // Lanes occupied beyond this cycle become free again, whether or not a warp is ready then.
             arrives
@@ -299,33 +320,67 @@ pub(super) struct Warp {
     /// Number of its packet among those of its kind.
     pub number: u64,
     pub threads: u32,
-    /// Operations not done.
+    /// Operations of all threads.
+    operations: u32,
+    /// Operations one after another, and those not done.
+    steps: u32,
     pub remaining: u32,
     pub core: usize,
+    data_unit: DataUnit,
 }
 
 impl Warp {
-    /// Its events of the texture units.
-    pub fn texels(&self, demand: &ServiceDemand) -> [u32; TEXELS] {
-        demand.texels.map(|whole| share(whole, self.part, self.parts).len() as u32)
+    fn new(demand: &ServiceDemand, sending: &Sending, (kind, number): (usize, u64), core: usize) -> Self {
+        let Sending { packet, sent: part, warps: parts, .. } = *sending;
+        let threads = share(demand.threads, part, parts).len() as u32;
+        let operations = threads.saturating_mul(demand.ops);
+        let (steps, data_unit) = (demand.steps(), demand.data_unit());
+        Self {
+            packet,
+            part,
+            parts,
+            kind,
+            number,
+            threads,
+            operations,
+            steps,
+            remaining: steps,
+            core,
+            data_unit,
+        }
+    }
+
+    /// Lanes of its next step. A warp that waits for others of its group has operations in some of its steps only.
+    fn lanes(&self) -> u32 {
+        match self.threads.saturating_mul(self.steps) == self.operations {
+            true => self.threads,
+            false => share(self.operations, self.steps - self.remaining, self.steps).len() as u32,
+        }
+    }
+
+    /// Its events of its data unit.
+    pub fn data(&self, demand: &ServiceDemand) -> [u32; DATA_EVENTS] {
+        demand.data.map(|whole| share(whole, self.part, self.parts).len() as u32)
     }
 }
 
 #[derive(Clone, Debug)]
 pub(super) struct Core {
     pub slots: u32,
+    /// Free bytes of its shared memory.
+    pub shared_bytes: u32,
     /// Next free lane, numbered over all cycles.
     pub lane: u64,
     pub ready: VecDeque<u32>,
-    /// Warps just sent, back from the texture units, and between two operations, each sorted by time.
+    /// Warps just sent, back from the data units, and between two operations, each sorted by time.
     pub fresh: VecDeque<(Time, u32)>,
-    pub textured: VecDeque<(Time, u32)>,
+    pub fetched: VecDeque<(Time, u32)>,
     pub cooling: VecDeque<(Time, u32)>,
 }
 
 impl Core {
     pub fn is_empty(&self) -> bool {
-        self.ready.is_empty() && self.fresh.is_empty() && self.textured.is_empty() && self.cooling.is_empty()
+        self.ready.is_empty() && self.fresh.is_empty() && self.fetched.is_empty() && self.cooling.is_empty()
     }
 }
 

@@ -4,6 +4,7 @@
 
 mod closed_forms;
 mod common;
+mod compute;
 mod conservation;
 mod ladder;
 mod passes;

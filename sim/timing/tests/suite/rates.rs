@@ -3,7 +3,9 @@
 use activity::{Event, LineAccess, LineKind, Packet, PacketKind, Unit};
 use timing::stepped::{self, StepOptions, Stream};
 use timing::streams::{Packets, failures, rates};
-use timing::{Clocks, DemandBuilder, MachineSpec, PacketClock, Recorder, Timed, Totals, bound};
+use timing::{
+    AccuracyWarning, Clocks, DemandBuilder, Level, MachineSpec, PacketClock, Recorder, Timed, Totals, bound,
+};
 
 const BATCH: u32 = 512;
 
@@ -95,8 +97,9 @@ fn challenging_streams_end() {
                 assert_eq!(found.packets, case.packets.len() as u64);
                 let rows = found.rows.unwrap();
                 match case.name {
-                    "row after row" => assert!(rows > 0.9, "{name}: {rows}"),
-                    "one giant triangle" => {}
+                    "row after row" | "groups that scatter" => assert!(rows > 0.9, "{name}: {rows}"),
+                    // Reads and lines written back, in different rows.
+                    "one giant triangle" | "groups that stream" => {}
                     _ => assert!(rows < 0.1, "{name}, {}: {rows}", case.name),
                 }
             }
@@ -118,6 +121,29 @@ fn passes_are_close_to_the_reference() {
             }
         }
     }
+}
+
+/// On streams of groups `packet` is within 8 % or warns, but for two on the reference: groups that stream from memory, and
+/// groups in a chain with draws. It is 9 % short of both and does not warn. The cause is not known.
+#[test]
+fn groups_are_close_to_the_reference() {
+    let mut far = Vec::new();
+    for name in ["reference", "discrete"] {
+        let gpu = Gpu::builtin(name);
+        let of_groups = ["groups", "atomics"];
+        let is_of_groups = |case: &str| of_groups.iter().any(|word| case.contains(word));
+        for case in failures(&gpu.units, BATCH).into_iter().filter(|case| is_of_groups(case.name)) {
+            let [truth, packet, bound] = gpu.run(&case.units, &case.packets);
+            let warns = !AccuracyWarning::all(Level::Packet, &packet).is_empty();
+            let percent =
+                [packet, bound].map(|found| 100.0 * (found.cycles as f64 / truth.cycles as f64 - 1.0));
+            println!("{} on {name}: {percent:.1?} %", case.name);
+            if percent[0].abs() > 8.0 && !warns {
+                far.push((case.name, name));
+            }
+        }
+    }
+    assert_eq!(far, [("groups that stream", "reference"), ("groups and draws in a chain", "reference")]);
 }
 
 /// Front ends that overlap the tiles of the pass before, with lines of both.

@@ -168,6 +168,7 @@ pub fn spec() -> PipelineSpec {
         },
         features: pipeline::Features::ALL,
         depth: Default::default(),
+        compute: None,
     }
 }
 

@@ -70,9 +70,9 @@ pub struct RateRow {
 pub(super) fn failures(gpus: &[GpuSpec]) -> Result<Vec<FailureRow>, RunError> {
     let cases: Vec<_> = gpus.iter().map(|gpu| streams::failures(&gpu.units, BATCH)).collect();
     let mut rows = Vec::new();
-    for stream in 0..cases.iter().map(Vec::len).min().unwrap_or(0) {
-        for (gpu, cases) in gpus.iter().zip(&cases) {
-            let case = &cases[stream];
+    for stream in 0..cases.iter().map(Vec::len).max().unwrap_or(0) {
+        for (gpu, case) in gpus.iter().zip(&cases).filter_map(|(gpu, cases)| Some((gpu, cases.get(stream)?)))
+        {
             let mut gpu = GpuSpec { units: case.units.clone(), ..gpu.clone() };
             gpu.pipeline.batch_triangles = BATCH;
             let packets = Packets::of(&case.packets);

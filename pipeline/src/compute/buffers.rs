@@ -1,0 +1,168 @@
+//! Buffers: typed data of a frame, in words of 32 bits.
+
+use std::marker::PhantomData;
+
+use super::group::Atomic;
+use crate::memory::Surface;
+
+/// A value of 32 bits, as it is in a buffer or in shared memory.
+pub trait Word: Copy + Send + Sync {
+    /// Its bits.
+    fn bits(self) -> u32;
+    /// The value with these bits.
+    fn of(bits: u32) -> Self;
+}
+
+impl Word for u32 {
+    fn bits(self) -> u32 {
+        self
+    }
+    fn of(bits: u32) -> Self {
+        bits
+    }
+}
+
+impl Word for f32 {
+    fn bits(self) -> u32 {
+        self.to_bits()
+    }
+    fn of(bits: u32) -> Self {
+        Self::from_bits(bits)
+    }
+}
+
+/// A buffer of a frame.
+#[derive(Debug)]
+pub struct Buffer<T> {
+    pub(super) number: u32,
+    words: u32,
+    surface: Surface,
+    of: PhantomData<fn() -> T>,
+}
+
+impl<T> Clone for Buffer<T> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<T> Copy for Buffer<T> {}
+
+impl<T> Buffer<T> {
+    /// Number of values.
+    pub fn len(&self) -> u32 {
+        self.words
+    }
+
+    /// Whether it has no values.
+    pub fn is_empty(&self) -> bool {
+        self.words == 0
+    }
+
+    /// Where it is in memory.
+    pub fn surface(&self) -> Surface {
+        self.surface
+    }
+
+    /// The buffer, for a pass that reads it.
+    pub fn reads(&self) -> Binding {
+        Binding { number: self.number, surface: self.surface, access: Access::Read }
+    }
+
+    /// The buffer, for a pass that writes it.
+    pub fn writes(&self) -> Binding {
+        Binding { access: Access::Write, ..self.reads() }
+    }
+}
+
+/// What a pass does with a buffer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Access {
+    /// Loads.
+    Read,
+    /// Loads, stores and atomics.
+    Write,
+}
+
+/// A buffer of a pass.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Binding {
+    pub(super) number: u32,
+    pub(crate) surface: Surface,
+    pub(crate) access: Access,
+}
+
+impl Binding {
+    /// Number of the buffer in the frame.
+    pub(crate) fn number(&self) -> u32 {
+        self.number
+    }
+}
+
+/// Name, place and words of a buffer.
+#[derive(Clone, Debug)]
+struct Data {
+    name: String,
+    surface: Surface,
+    words: Vec<u32>,
+}
+
+/// All buffers of a frame.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Buffers(Vec<Data>);
+
+/// A store or an atomic that takes effect later.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Stored {
+    pub buffer: u32,
+    pub index: u32,
+    /// `None` for a store.
+    pub atomic: Option<Atomic>,
+    pub bits: u32,
+}
+
+impl Buffers {
+    /// Adds a buffer of `data` in `surface`.
+    pub fn add<T: Word>(&mut self, name: &str, surface: Surface, data: &[T]) -> Buffer<T> {
+        let words = data.iter().map(|value| value.bits()).collect();
+        self.0.push(Data { name: name.to_owned(), surface, words });
+        let number = self.0.len() as u32 - 1;
+        Buffer { number, words: data.len() as u32, surface, of: PhantomData }
+    }
+
+    /// The values of a buffer.
+    pub fn values<T: Word>(&self, buffer: Buffer<T>) -> Vec<T> {
+        self.0[buffer.number as usize].words.iter().map(|&bits| T::of(bits)).collect()
+    }
+
+    /// Number of buffers.
+    pub fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    pub fn name(&self, buffer: u32) -> &str {
+        &self.0[buffer as usize].name
+    }
+
+    pub fn words(&self, buffer: u32) -> u32 {
+        self.0[buffer as usize].words.len() as u32
+    }
+
+    /// Address of a word.
+    pub fn address(&self, buffer: u32, index: u32) -> u64 {
+        self.0[buffer as usize].surface.address() + 4 * u64::from(index)
+    }
+
+    /// A word of a buffer that has it.
+    pub fn word(&self, buffer: u32, index: u32) -> u32 {
+        self.0[buffer as usize].words[index as usize]
+    }
+
+    /// Lets a store or an atomic take effect. Returns the word before.
+    pub fn apply(&mut self, stored: &Stored) -> u32 {
+        let word = &mut self.0[stored.buffer as usize].words[stored.index as usize];
+        let before = *word;
+        *word = stored.atomic.map_or(stored.bits, |atomic| atomic.of(before, stored.bits));
+        before
+    }
+}

@@ -1,0 +1,180 @@
+//! Accesses of a warp: bank conflicts in shared memory, lines of buffers, and contention of atomics.
+
+use activity::{Event, PacketCounts};
+
+use super::ComputeSpec;
+use crate::memory::LINE_BYTES;
+
+/// What an access of a warp does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Kind {
+    SharedLoad,
+    SharedStore,
+    SharedAtomic,
+    Load,
+    Store,
+    Atomic,
+}
+
+/// One access of one lane. Accesses with equal key are one access of the warp.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct LaneAccess {
+    /// How many of this kind and buffer the lane made before.
+    pub nth: u32,
+    pub kind: Kind,
+    /// Number of the buffer; 0 for shared memory.
+    pub buffer: u32,
+    /// Byte address; that of the word in shared memory.
+    pub address: u64,
+}
+
+impl LaneAccess {
+    fn key(&self) -> (u32, Kind, u32) {
+        (self.nth, self.kind, self.buffer)
+    }
+}
+
+/// How a warp accesses a line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Touched {
+    Read,
+    Written,
+    /// Read and written by an atomic unit.
+    Changed,
+}
+
+/// An access of a warp to a line of a buffer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct LineTouch {
+    /// Address of the line.
+    pub address: u64,
+    pub how: Touched,
+}
+
+/// Counts the accesses of a warp, and adds the lines they touch to `lines`. `accesses` is sorted and emptied.
+pub(super) fn account(
+    accesses: &mut Vec<LaneAccess>,
+    spec: &ComputeSpec,
+    counts: &mut PacketCounts,
+    lines: &mut Vec<LineTouch>,
+) {
+    accesses.sort_unstable();
+    for one in accesses.chunk_by(|a, b| a.key() == b.key()) {
+        match one[0].kind {
+            Kind::SharedLoad | Kind::SharedStore | Kind::SharedAtomic => shared(one, spec.banks, counts),
+            Kind::Load => touch(one, Touched::Read, lines),
+            Kind::Store => touch(one, Touched::Written, lines),
+            Kind::Atomic => {
+                atomic(one, spec.atomic_units, counts);
+                touch(one, Touched::Changed, lines);
+            }
+        }
+    }
+    accesses.clear();
+}
+
+/// A bank gives one word a cycle, to all lanes that ask for it. Atomics take a cycle each, and two accesses.
+fn shared(accesses: &[LaneAccess], banks: u32, counts: &mut PacketCounts) {
+    let is_atomic = accesses[0].kind == Kind::SharedAtomic;
+    let mut in_bank = vec![0_u32; banks as usize];
+    let mut words = 0;
+    for word in accesses.chunk_by(|a, b| a.address == b.address) {
+        in_bank[(word[0].address / 4 % u64::from(banks)) as usize] +=
+            if is_atomic { word.len() as u32 } else { 1 };
+        words += 1;
+    }
+    let cycles = in_bank.into_iter().max().unwrap_or(0);
+    counts[Event::SharedAccesses] += accesses.len() as u32 * if is_atomic { 2 } else { 1 };
+    counts[Event::SharedCycles] += cycles;
+    counts[Event::BankConflicts] += cycles - u32::div_ceil(words, banks);
+}
+
+/// Lines of a sorted access, each once.
+fn touch(accesses: &[LaneAccess], how: Touched, lines: &mut Vec<LineTouch>) {
+    let line = |access: &LaneAccess| access.address / LINE_BYTES;
+    let of_lines = accesses.chunk_by(|a, b| line(a) == line(b));
+    lines.extend(of_lines.map(|of_line| LineTouch { address: line(&of_line[0]) * LINE_BYTES, how }));
+}
+
+/// An atomic unit changes all words of a line in a step, but a word once. Units work side by side; the busiest counts.
+fn atomic(accesses: &[LaneAccess], units: u32, counts: &mut PacketCounts) {
+    let line = |access: &LaneAccess| access.address / LINE_BYTES;
+    let mut steps = vec![0_u32; units as usize];
+    for of_line in accesses.chunk_by(|a, b| line(a) == line(b)) {
+        let words = of_line.chunk_by(|a, b| a.address == b.address).map(|word| word.len() as u32);
+        steps[(line(&of_line[0]) % u64::from(units)) as usize] += words.clone().max().unwrap_or(0);
+        counts[Event::AtomicConflicts] += words.map(|lanes| lanes - 1).sum::<u32>();
+    }
+    counts[Event::Atomics] += accesses.len() as u32;
+    counts[Event::AtomicSteps] += steps.into_iter().max().unwrap_or(0);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SPEC: ComputeSpec =
+        ComputeSpec { warp_lanes: 32, group_lanes: 256, shared_bytes: 4096, banks: 32, atomic_units: 2 };
+
+    fn of(kind: Kind, addresses: impl IntoIterator<Item = u64>) -> (PacketCounts, Vec<LineTouch>) {
+        let one = |address| LaneAccess { nth: 0, kind, buffer: 0, address };
+        let mut accesses = addresses.into_iter().map(one).collect();
+        let (mut counts, mut lines) = (PacketCounts::default(), Vec::new());
+        account(&mut accesses, &SPEC, &mut counts, &mut lines);
+        (counts, lines)
+    }
+
+    #[test]
+    fn lanes_that_ask_a_bank_for_several_words_wait() {
+        let cycles = |stride: u64| {
+            let (counts, _) = of(Kind::SharedLoad, (0..32).map(|lane| 4 * stride * lane));
+            assert_eq!(counts[Event::SharedAccesses], 32);
+            [Event::SharedCycles, Event::BankConflicts].map(|event| counts[event])
+        };
+        // All banks once, half of them twice, one bank for all; odd strides never conflict.
+        assert_eq!([1, 2, 8, 32].map(cycles), [[1, 0], [2, 1], [8, 7], [32, 31]]);
+        assert_eq!([3, 33].map(cycles), [[1, 0]; 2]);
+        assert_eq!(cycles(0), [1, 0], "a word goes to all lanes at once");
+        // A warp twice as wide as the memory takes two cycles, none of them a conflict.
+        let (wide, _) = of(Kind::SharedStore, (0..64).map(|lane| 4 * lane));
+        assert_eq!([wide[Event::SharedCycles], wide[Event::BankConflicts]], [2, 0]);
+    }
+
+    #[test]
+    fn atomics_in_shared_memory_take_a_cycle_each_on_a_word() {
+        let (counts, _) = of(Kind::SharedAtomic, [0; 32]);
+        assert_eq!([counts[Event::SharedCycles], counts[Event::SharedAccesses]], [32, 64]);
+        let (counts, _) = of(Kind::SharedAtomic, (0..32).map(|lane| 4 * lane));
+        assert_eq!([counts[Event::SharedCycles], counts[Event::BankConflicts]], [1, 0]);
+    }
+
+    #[test]
+    fn a_warp_touches_every_line_once() {
+        let lines = |stride: u64| of(Kind::Load, (0..32).map(|lane| 4 * stride * lane)).1.len();
+        assert_eq!([0, 1, 4, 16, 64].map(lines), [1, 2, 8, 32, 32]);
+    }
+
+    #[test]
+    fn atomics_wait_for_equal_words_alone() {
+        let of = |addresses: &[u64]| {
+            let (counts, lines) = of(Kind::Atomic, addresses.iter().copied());
+            ([Event::AtomicSteps, Event::AtomicConflicts].map(|event| counts[event]), lines.len())
+        };
+        assert_eq!(of(&[8; 32]), ([32, 31], 1));
+        assert_eq!(of(&[0, 4, 8, 12]), ([1, 0], 1), "words of a line in a step");
+        // Two lines of one unit, and two of both units.
+        assert_eq!(of(&[0, 128]), ([2, 0], 2));
+        assert_eq!(of(&[0, 64]), ([1, 0], 2));
+        assert_eq!(of(&[0, 0, 4, 64, 64, 64]), ([3, 3], 2));
+    }
+
+    #[test]
+    fn the_nth_accesses_of_lanes_are_one_access() {
+        // Two loads of two lanes: the same two lines in a different order.
+        let one = |nth, address| LaneAccess { nth, kind: Kind::Load, buffer: 0, address };
+        let (mut counts, mut lines) = (PacketCounts::default(), Vec::new());
+        let mut accesses = vec![one(0, 0), one(1, 64), one(0, 4), one(1, 68)];
+        account(&mut accesses, &SPEC, &mut counts, &mut lines);
+        assert_eq!(lines.iter().map(|line| line.address).collect::<Vec<_>>(), [0, 64]);
+    }
+}

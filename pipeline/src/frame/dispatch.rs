@@ -1,0 +1,119 @@
+//! Dispatch of groups: they run in parallel, and their packets follow in the order of the groups.
+
+use activity::{Counts, Event, Packet, PacketCounts, PacketKind, Waits};
+use rayon::prelude::*;
+
+use super::gpu::{Gpu, PassError, PassReport};
+use crate::compute::{
+    self, Access, Buffer, ComputeError, ComputePass, ComputeSpec, GroupLog, GroupPlace, Stored, Touched,
+    View, Word,
+};
+use crate::memory::{MemorySystem, Surface};
+
+/// Groups that run before their packets are emitted.
+const CHUNK: u64 = 1024;
+
+impl Gpu<'_> {
+    /// A new buffer with `data`.
+    pub fn buffer<T: Word>(&mut self, name: &str, data: &[T]) -> Buffer<T> {
+        let surface = self.surface(4 * data.len() as u64);
+        self.buffers.add(name, surface, data)
+    }
+
+    /// What a pass wrote to `surface`, as a buffer of `data` in their order; `None` if they do not fit in it.
+    pub fn view<T: Word>(&mut self, name: &str, surface: Surface, data: &[T]) -> Option<Buffer<T>> {
+        let fits = 4 * data.len() as u64 <= surface.bytes();
+        fits.then(|| self.buffers.add(name, surface, data))
+    }
+
+    /// The values of a buffer after all passes so far.
+    pub fn values<T: Word>(&self, buffer: Buffer<T>) -> Vec<T> {
+        self.buffers.values(buffer)
+    }
+
+    /// Runs the groups of a pass. It waits for earlier passes that wrote what it uses, or that use what it writes.
+    ///
+    /// # Errors
+    /// [`PassError::Compute`] if the GPU has no compute unit, if groups are too large for it, or if the program does
+    /// what it may not; [`PassError::Memory`] if the buffers of the frame are too large.
+    pub fn dispatch(&mut self, pass: &ComputePass<'_>) -> Result<Counts, PassError> {
+        let failed = |error| PassError::Compute { pass: pass.name.to_owned(), error };
+        let spec = pass.check(self.spec().compute.as_ref()).map_err(failed)?;
+        self.check_memory(pass.name)?;
+        let (name, draws, others) = (pass.name.to_owned(), vec![Counts::default()], Counts::default());
+        self.start(PassReport { name, triangles: 0, draws, others });
+        if pass
+            .bindings
+            .iter()
+            .any(|binding| self.conflicts(binding.surface, binding.access == Access::Write))
+        {
+            self.barrier(Waits::Tiles);
+        }
+        let new = |kind| Packet { draw: 0, ..Packet::new(kind, self.last_pass()) };
+        let (mut start, group) = (new(PacketKind::Draw), new(PacketKind::Compute));
+        start.counts[Event::Draws] = 1;
+        self.push(&start, 0);
+        self.groups(pass, &spec, group).map_err(failed)?;
+        for binding in pass.bindings {
+            match binding.access {
+                Access::Read => self.note_read(binding.surface.address()),
+                Access::Write => self.keep(binding.surface),
+            }
+        }
+        Ok(self.counts_of_pass())
+    }
+
+    fn groups(
+        &mut self,
+        pass: &ComputePass<'_>,
+        spec: &ComputeSpec,
+        packet: Packet,
+    ) -> Result<(), ComputeError> {
+        let mut access = vec![None; self.buffers.len()];
+        for binding in pass.bindings {
+            let known = &mut access[binding.number() as usize];
+            *known = if *known == Some(Access::Write) { *known } else { Some(binding.access) };
+        }
+        let mut stored: Vec<Stored> = Vec::new();
+        for first in (0..pass.count()).step_by(CHUNK as usize) {
+            let numbers = first..pass.count().min(first + CHUNK);
+            let place = |number| GroupPlace::of(number, pass.groups);
+            let logs: Vec<GroupLog> = if pass.shader.is_serial() {
+                let live = |number| {
+                    compute::run((pass, spec), place(number), View::Live(&mut self.buffers), &access)
+                };
+                numbers.clone().map(live).collect()
+            } else {
+                let buffers = &self.buffers;
+                let before =
+                    |number| compute::run((pass, spec), place(number), View::Before(buffers), &access);
+                numbers.clone().into_par_iter().map(before).collect()
+            };
+            for (number, log) in numbers.zip(logs) {
+                if let Some((lane, fault)) = log.fault {
+                    return Err(ComputeError::Fault { group: place(number).id, lane, fault });
+                }
+                let mut packet = Packet { counts: log.counts, ..packet };
+                log.lines
+                    .iter()
+                    .for_each(|line| touch(self.memory(), line.address, line.how, &mut packet.counts));
+                self.push(&packet, 0);
+                stored.extend(log.stored);
+            }
+        }
+        stored.iter().for_each(|stored| {
+            self.buffers.apply(stored);
+        });
+        Ok(())
+    }
+}
+
+fn touch(memory: &mut MemorySystem, address: u64, how: Touched, counts: &mut PacketCounts) {
+    counts[Event::BufferLines] += 1;
+    if how != Touched::Written {
+        memory.buffer(address, false, counts);
+    }
+    if how != Touched::Read {
+        memory.buffer(address, true, counts);
+    }
+}
