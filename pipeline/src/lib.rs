@@ -66,7 +66,8 @@ pub mod traversal;
 pub mod visibility;
 
 pub use compute::{
-    Atomic, Binding, Buffer, ComputeError, ComputePass, ComputeSpec, Fault, Group, GroupLane, GroupShader,
+    Atomic, Buffer, BufferBinding, ComputeError, ComputePass, ComputeSpec, Fault, Group, GroupLane,
+    GroupShader,
 };
 pub use frame::{
     Attachment, Attachments, Binding, ConservativeDraw, ConservativePass, Draw, Features, FrameReport, Gpu,

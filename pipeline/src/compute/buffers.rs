@@ -65,13 +65,13 @@ impl<T> Buffer<T> {
     }
 
     /// The buffer, for a pass that reads it.
-    pub fn reads(&self) -> Binding {
-        Binding { number: self.number, surface: self.surface, access: Access::Read }
+    pub fn reads(&self) -> BufferBinding {
+        BufferBinding { number: self.number, surface: self.surface, access: Access::Read }
     }
 
     /// The buffer, for a pass that writes it.
-    pub fn writes(&self) -> Binding {
-        Binding { access: Access::Write, ..self.reads() }
+    pub fn writes(&self) -> BufferBinding {
+        BufferBinding { access: Access::Write, ..self.reads() }
     }
 }
 
@@ -86,13 +86,13 @@ pub enum Access {
 
 /// A buffer of a pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Binding {
+pub struct BufferBinding {
     pub(super) number: u32,
     pub(crate) surface: Surface,
     pub(crate) access: Access,
 }
 
-impl Binding {
+impl BufferBinding {
     /// Number of the buffer in the frame.
     pub(crate) fn number(&self) -> u32 {
         self.number

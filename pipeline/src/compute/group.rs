@@ -141,7 +141,7 @@ pub struct Group<'a> {
 
 /// A lane of a group. Operations and branches are those of its [`Lane`]; each access is an operation, too.
 pub struct GroupLane<'g, 'a> {
-    lane: Lane,
+    lane: Lane<'static>,
     index: u32,
     state: &'g RefCell<State<'a>>,
 }
@@ -224,8 +224,8 @@ impl<'a> Group<'a> {
 }
 
 impl Deref for GroupLane<'_, '_> {
-    type Target = Lane;
-    fn deref(&self) -> &Lane {
+    type Target = Lane<'static>;
+    fn deref(&self) -> &Lane<'static> {
         &self.lane
     }
 }

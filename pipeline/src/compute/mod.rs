@@ -22,7 +22,7 @@ mod warp;
 
 use serde::Deserialize;
 
-pub use buffers::{Access, Binding, Buffer, Word};
+pub use buffers::{Access, Buffer, BufferBinding, Word};
 pub(crate) use buffers::{Buffers, Stored};
 pub use group::{Atomic, Fault, Group, GroupLane};
 pub(crate) use group::{GroupLog, GroupPlace, View, run};
@@ -83,7 +83,7 @@ pub struct ComputePass<'a> {
     /// Bytes of shared memory of a group, a multiple of four.
     pub shared_bytes: u32,
     /// Buffers that it reads and writes.
-    pub bindings: &'a [Binding],
+    pub bindings: &'a [BufferBinding],
     /// Program.
     pub shader: &'a dyn GroupShader,
 }

@@ -272,11 +272,6 @@ impl<'e> Gpu<'e> {
         self.is_on_map = false;
     }
 
-    /// Events of the last pass.
-    pub(super) fn counts_of_pass(&self) -> Counts {
-        self.passes.last().map(PassReport::counts).unwrap_or_default()
-    }
-
     /// Whether a pass that reads or writes `surface` has to wait for earlier ones.
     pub(super) fn conflicts(&self, surface: Surface, writes: bool) -> bool {
         let is_written = self.pending.iter().any(|pending| pending.contains(surface.address()));

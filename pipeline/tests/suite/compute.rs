@@ -29,7 +29,12 @@ fn parallel<F: Fn(&mut Group<'_>) + Sync>(run: F) -> Program<F> {
     Program(run, false)
 }
 
-fn pass<'a>(groups: u32, size: u32, bindings: &'a [Binding], shader: &'a dyn GroupShader) -> ComputePass<'a> {
+fn pass<'a>(
+    groups: u32,
+    size: u32,
+    bindings: &'a [BufferBinding],
+    shader: &'a dyn GroupShader,
+) -> ComputePass<'a> {
     ComputePass {
         name: "groups",
         groups: [groups, 1, 1],
@@ -234,7 +239,7 @@ fn kinds(uses: &[&[(usize, bool)]]) -> Vec<PacketKind> {
         let binding = |&(at, writes): &(usize, bool)| {
             if writes { buffers[at].writes() } else { buffers[at].reads() }
         };
-        let bindings: Vec<Binding> = of_pass.iter().map(binding).collect();
+        let bindings: Vec<BufferBinding> = of_pass.iter().map(binding).collect();
         gpu.dispatch(&pass(1, 32, &bindings, &idle)).unwrap();
     }
     drop(gpu);
