@@ -102,6 +102,7 @@ fn pixels_hit(scene: &Scene) -> usize {
         },
         features: Features::ALL,
         depth: pipeline::depth::DepthSpec::default(),
+        compute: None,
     };
     let samples = SampleTable::low_discrepancy(4, 1, LensShape::Disk).unwrap();
     let background = Vec3::ZERO;
