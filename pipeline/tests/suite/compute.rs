@@ -181,7 +181,7 @@ fn groups_do_not_see_each_other_unless_they_are_serial() {
         let (id, size) = (group.id(), group.size());
         group.lanes(|lane| {
             let at = place(id, size, lane);
-            if lane.branch(at % 3 == 0) {
+            if lane.branch(at.is_multiple_of(3)) {
                 lane.store(list, lane.atomic_returning(next, 0, Atomic::Add, 1), at);
             }
         });
