@@ -43,8 +43,11 @@ impl TileShader for Merge {
     }
 }
 
-/// Tiles with their depths that a pass hands to its shader, its packets and its counts.
-fn drawn(primitives: &[Primitive], block: u32) -> (Vec<([u32; 2], [f64; 2])>, Vec<PacketKind>, Counts) {
+/// A tile and its depths.
+type Tile = ([u32; 2], [f64; 2]);
+
+/// Tiles that a pass hands to its shader, its packets and its counts.
+fn drawn(primitives: &[Primitive], block: u32) -> (Vec<Tile>, Vec<PacketKind>, Counts) {
     let spec = spec(Features::ALL);
     let (mut sum, mut kinds, mut found) = (Counts::default(), Vec::new(), Vec::new());
     let mut gpu = Gpu::new(&spec, |packet, _| {
