@@ -136,7 +136,7 @@ pub struct ServiceDemand {
     pub threads: u32,
     /// Operations per thread.
     pub ops: u32,
-    /// Events of its data unit, of all threads, in the order of [`DataUnit::events`].
+    /// Counts of those events of its data unit that may have a rate, of all threads.
     pub data: [u32; DATA_EVENTS],
     /// For a group of lanes, which is on one core as a whole.
     pub group: Option<GroupDemand>,
