@@ -16,6 +16,7 @@ impl Tally {
         self.0.get()
     }
 
+    #[inline(always)]
     fn add(&self, madds: u32) {
         self.0.set(self.0.get() + madds);
     }
@@ -32,35 +33,42 @@ pub struct Counting<'t> {
 
 impl<'t> Counting<'t> {
     /// A value in registers.
+    #[inline(always)]
     pub fn new(value: f64, tally: &'t Tally) -> Self {
         Self { value, tally: Some(tally), fresh: false }
     }
 
     /// A constant.
+    #[inline(always)]
     pub fn constant(value: f64) -> Self {
         Self { value, tally: None, fresh: false }
     }
 
     /// The value.
+    #[inline(always)]
     pub fn value(self) -> f64 {
         self.value
     }
 
     /// The same number with another value, without an operation.
+    #[inline(always)]
     pub(crate) fn with(self, value: f64) -> Self {
         Self { value, ..self }
     }
 
     /// Square root.
+    #[inline(always)]
     pub(crate) fn root(self) -> Self {
         self.result(self, self.value.sqrt(), [true, false])
     }
 
     /// `self b + c`, rounded after each operation.
+    #[inline(always)]
     pub(crate) fn multiply_add(self, b: Self, c: Self) -> Self {
         self * b + c
     }
 
+    #[inline(always)]
     fn result(self, other: Self, value: f64, [counts, fresh]: [bool; 2]) -> Self {
         let tally = self.tally.or(other.tally);
         if counts && let Some(tally) = tally {
@@ -69,18 +77,21 @@ impl<'t> Counting<'t> {
         Self { value, tally, fresh: fresh && tally.is_some() }
     }
 
+    #[inline(always)]
     fn sum(self, other: Self, value: f64) -> Self {
         self.result(other, value, [!self.fresh && !other.fresh, false])
     }
 }
 
 impl PartialEq for Counting<'_> {
+    #[inline(always)]
     fn eq(&self, other: &Self) -> bool {
         self.value == other.value
     }
 }
 
 impl PartialOrd for Counting<'_> {
+    #[inline(always)]
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         self.value.partial_cmp(&other.value)
     }
@@ -88,6 +99,7 @@ impl PartialOrd for Counting<'_> {
 
 impl Add for Counting<'_> {
     type Output = Self;
+    #[inline(always)]
     fn add(self, other: Self) -> Self {
         self.sum(other, self.value + other.value)
     }
@@ -95,6 +107,7 @@ impl Add for Counting<'_> {
 
 impl Sub for Counting<'_> {
     type Output = Self;
+    #[inline(always)]
     fn sub(self, other: Self) -> Self {
         self.sum(other, self.value - other.value)
     }
@@ -102,6 +115,7 @@ impl Sub for Counting<'_> {
 
 impl Mul for Counting<'_> {
     type Output = Self;
+    #[inline(always)]
     fn mul(self, other: Self) -> Self {
         self.result(other, self.value * other.value, [true, true])
     }
@@ -109,6 +123,7 @@ impl Mul for Counting<'_> {
 
 impl Div for Counting<'_> {
     type Output = Self;
+    #[inline(always)]
     fn div(self, other: Self) -> Self {
         self.result(other, self.value / other.value, [true, false])
     }
@@ -116,6 +131,7 @@ impl Div for Counting<'_> {
 
 impl Neg for Counting<'_> {
     type Output = Self;
+    #[inline(always)]
     fn neg(self) -> Self {
         self.with(-self.value)
     }

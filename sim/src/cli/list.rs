@@ -221,6 +221,7 @@ const OPTIONS: &[WorkloadOptions] = &[
             Doc("resolution", Numbers(1.0, 1024.0), "tiles across each image"),
             Doc("bins", Numbers(1.0, 256.0), "time bins of a tile"),
             Doc("method", Names(&["fragment_box", "box_box", "depth_only"]), "comparison in a tile"),
+            Doc("narrow", SWITCH, "pairs one by one within the space that their swept boxes share"),
         ],
         defaults: || serde_json::to_string(&collision::Options::default()),
     },
