@@ -63,6 +63,7 @@ pub mod surface;
 pub mod tally;
 pub mod texture;
 pub mod traversal;
+mod viewport;
 pub mod visibility;
 
 pub use compute::{

@@ -5,8 +5,7 @@ use std::ops::{Add, Mul, Sub};
 
 use glam::{Affine3A, DAffine3, DVec3, Mat4, Vec2, Vec3, Vec4};
 
-use crate::state::MAX_TARGETS;
-use crate::surface::Bound;
+use crate::surface::{Bound, MAX_TARGETS};
 use crate::tally::Tally;
 use crate::texture::Texture;
 

@@ -4,6 +4,7 @@
 use glam::{BVec4A, Vec4};
 
 use crate::geometry::Cull;
+use crate::surface::MAX_TARGETS;
 
 /// Comparison of a new value with a stored one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -240,9 +241,6 @@ impl Blend {
         }
     }
 }
-
-/// Largest number of colour targets of a pass.
-pub const MAX_TARGETS: usize = 4;
 
 /// How colours are stored in a target.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

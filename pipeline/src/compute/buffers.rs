@@ -2,8 +2,35 @@
 
 use std::marker::PhantomData;
 
-use super::group::Atomic;
 use crate::memory::Surface;
+
+/// An atomic operation on a word, an unsigned integer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Atomic {
+    /// Sum, modulo 2^32.
+    Add,
+    /// Smaller of both.
+    Min,
+    /// Larger of both.
+    Max,
+    /// Bits that both have.
+    And,
+    /// Bits that either has.
+    Or,
+}
+
+impl Atomic {
+    /// The word that replaces `before`.
+    pub fn of(self, before: u32, value: u32) -> u32 {
+        match self {
+            Self::Add => before.wrapping_add(value),
+            Self::Min => before.min(value),
+            Self::Max => before.max(value),
+            Self::And => before & value,
+            Self::Or => before | value,
+        }
+    }
+}
 
 /// A value of 32 bits, as it is in a buffer or in shared memory.
 pub trait Word: Copy + Send + Sync {

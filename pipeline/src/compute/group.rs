@@ -5,39 +5,11 @@ use std::ops::Deref;
 
 use activity::{Event, PacketCounts};
 
-use super::buffers::{Access, Buffer, Buffers, Stored, Word};
+use super::buffers::{Access, Atomic, Buffer, Buffers, Stored, Word};
 use super::shared::{SharedAccess, SharedMemory};
 use super::warp::{Kind, LaneAccess, LineTouch, account};
 use super::{ComputePass, ComputeSpec};
 use crate::shader::Lane;
-
-/// An atomic operation on a word, an unsigned integer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Atomic {
-    /// Sum, modulo 2^32.
-    Add,
-    /// Smaller of both.
-    Min,
-    /// Larger of both.
-    Max,
-    /// Bits that both have.
-    And,
-    /// Bits that either has.
-    Or,
-}
-
-impl Atomic {
-    /// The word that replaces `before`.
-    pub fn of(self, before: u32, value: u32) -> u32 {
-        match self {
-            Self::Add => before.wrapping_add(value),
-            Self::Min => before.min(value),
-            Self::Max => before.max(value),
-            Self::And => before & value,
-            Self::Or => before | value,
-        }
-    }
-}
 
 /// What a program may not do.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

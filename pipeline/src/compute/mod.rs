@@ -22,9 +22,9 @@ mod warp;
 
 use serde::Deserialize;
 
-pub use buffers::{Access, Buffer, BufferBinding, Word};
+pub use buffers::{Access, Atomic, Buffer, BufferBinding, Word};
 pub(crate) use buffers::{Buffers, Stored};
-pub use group::{Atomic, Fault, Group, GroupLane};
+pub use group::{Fault, Group, GroupLane};
 pub(crate) use group::{GroupLog, GroupPlace, View, run};
 pub(crate) use warp::Touched;
 

@@ -3,7 +3,8 @@
 use activity::{Counts, Event, Packet, PacketCounts, PacketKind, Waits};
 use rayon::prelude::*;
 
-use super::gpu::{Gpu, PassError, PassReport};
+use super::error::PassError;
+use super::gpu::{Gpu, PassReport};
 use crate::compute::{
     self, Access, Buffer, ComputeError, ComputePass, ComputeSpec, GroupLog, GroupPlace, Stored, Touched,
     View, Word,

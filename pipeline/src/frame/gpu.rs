@@ -5,14 +5,15 @@ use std::sync::Arc;
 use activity::{Counts, Event, LineAccess, Packet, PacketCounts, PacketKind, Waits};
 use glam::{Vec3, Vec4};
 
-use super::attachments::{Attachments, Store, SurfaceId, SurfaceProblem, Surfaces};
+use super::attachments::{Attachments, Store, SurfaceId, Surfaces};
+use super::error::PassError;
 use super::heat::{FrameHeat, HeatMap};
 use super::pass::{AddressMap, Draw, Pass, RasterPass, Resident, Target, resident};
 use super::replay::Replay;
 use super::{Finished, PipelineSpec, rasterize, resolve};
-use crate::compute::{Buffers, ComputeError};
+use crate::compute::Buffers;
 use crate::geometry::Viewport;
-use crate::memory::{AddressSpace, CacheError, MemorySystem, Surface};
+use crate::memory::{AddressSpace, MemorySystem, Surface};
 use crate::surface::{SurfaceSpec, Texels};
 
 /// Receiver of packets, each with the lines it requests from the L2.
@@ -132,55 +133,6 @@ impl FrameReport {
     pub fn triangles(&self) -> usize {
         self.passes.iter().map(|pass| pass.triangles).sum()
     }
-}
-
-/// Reason why a pass cannot be drawn.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum PassError {
-    /// A cache is invalid.
-    #[error(transparent)]
-    Cache(#[from] CacheError),
-    /// A surface cannot be used as it is.
-    #[error("pass `{pass}`, surface `{surface}`: {problem}")]
-    Surface {
-        /// The pass.
-        pass: String,
-        /// The surface.
-        surface: String,
-        /// What is wrong.
-        problem: SurfaceProblem,
-    },
-    /// A draw tests or stores depths or stencil values that the pass does not have.
-    #[error(
-        "pass `{pass}`: draw {draw} has a depth or stencil test, but the pass has no depths; give it a depth target, or the draw \
-         `DepthState::NONE`"
-    )]
-    NoDepths {
-        /// The pass.
-        pass: String,
-        /// The draw.
-        draw: usize,
-    },
-    /// Groups cannot run.
-    #[error("pass `{pass}`: {error}")]
-    Compute {
-        /// The pass.
-        pass: String,
-        /// What is wrong.
-        error: ComputeError,
-    },
-    /// The surfaces of a frame are too large.
-    #[error(
-        "pass `{pass}`: the surfaces of the frame take {bytes} bytes, more than the {} that can be addressed; draw fewer pixels, \
-         samples or passes",
-        AddressSpace::END
-    )]
-    Memory {
-        /// The pass that does not fit.
-        pass: String,
-        /// Bytes of all surfaces with those of the pass.
-        bytes: u64,
-    },
 }
 
 impl<'e> Gpu<'e> {

@@ -4,4 +4,6 @@ mod camera;
 mod vertex;
 
 pub use camera::{Camera, CameraError, Clip, Lens};
-pub use vertex::{Cull, DrawError, Geometry, MovingVertex, Projection, Shear, Viewport};
+pub use vertex::{Cull, DrawError, Geometry, MovingVertex, Projection, Shear};
+
+pub use crate::viewport::Viewport;

@@ -76,7 +76,7 @@ fn bilinear(texels: &Texels, layout: &Layout, uv: Vec2, mut line: impl FnMut(u64
 mod tests {
     use super::super::{Format, SurfaceSpec};
     use super::*;
-    use crate::geometry::Viewport;
+    use crate::viewport::Viewport;
 
     fn ramp(format: Format) -> Bound<'static> {
         let spec = SurfaceSpec::new("ramp", Viewport::new(16, 4).unwrap(), format);

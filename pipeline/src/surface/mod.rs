@@ -9,7 +9,10 @@ use glam::Vec4;
 pub use bound::Bound;
 pub use format::Format;
 
-use crate::geometry::Viewport;
+use crate::viewport::Viewport;
+
+/// Largest number of colour targets of a pass.
+pub const MAX_TARGETS: usize = 4;
 
 /// A surface before it has an address.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -5,6 +5,7 @@ use std::ops::Range;
 
 use activity::{Event, LineAccess, Packet, PacketCounts, PacketKind, Unit, Waits};
 
+use crate::data_unit::{DATA_EVENTS, DataUnit};
 use crate::work::UnitWork;
 use crate::{LINE_BYTES, MachineSpec};
 
@@ -61,51 +62,10 @@ impl Station {
 /// Clients of the L2, in the order of its ports.
 pub const CLIENTS: [Unit; 5] = [Unit::Command, Unit::Depth, Unit::Texture, Unit::Colour, Unit::Compute];
 
-/// A unit that works for warps on the cores before their operations.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum DataUnit {
-    /// The texture units, for pixels.
-    Texture,
-    /// Shared memory, atomic units and buffers, for groups.
-    Compute,
-}
-
-impl DataUnit {
-    /// Both, in the order of their numbers.
-    pub const ALL: [Self; 2] = [Self::Texture, Self::Compute];
-
-    /// The unit.
-    pub const fn unit(self) -> Unit {
-        match self {
-            Self::Texture => Unit::Texture,
-            Self::Compute => Unit::Compute,
-        }
-    }
-
-    /// Its port at the L2.
-    pub const fn port(self) -> usize {
-        match self {
-            Self::Texture => 2,
-            Self::Compute => 4,
-        }
-    }
-
-    /// Its events that may have a rate.
-    pub const fn events(self) -> [Event; DATA_EVENTS] {
-        match self {
-            Self::Texture => [Event::TextureFetches, Event::TextureLines, Event::TextureMisses],
-            Self::Compute => [Event::SharedCycles, Event::AtomicSteps, Event::BufferLines],
-        }
-    }
-}
-
 /// Port of a client of the L2; `None` for other units.
 pub fn port(unit: Unit) -> Option<usize> {
     CLIENTS.iter().position(|&client| client == unit)
 }
-
-/// Events of a [`DataUnit`] that may have a rate.
-pub const DATA_EVENTS: usize = 3;
 
 /// What a group needs of the cores besides threads and operations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

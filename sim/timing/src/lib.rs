@@ -32,6 +32,7 @@
 mod address;
 mod bound;
 mod clock;
+mod data_unit;
 mod demand;
 mod frame_clock;
 mod packet;

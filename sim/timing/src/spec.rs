@@ -8,7 +8,7 @@ use activity::{Bounded, Event, LEVELS, Unit};
 use serde::de::{self, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer};
 
-use crate::demand::DataUnit;
+use crate::data_unit::DataUnit;
 
 /// Cycles, at least 1. The maximum is 65 us at 1 GHz, a hundred times the latency of memory.
 pub type Cycles = Bounded<1, 65_536>;

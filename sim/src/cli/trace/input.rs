@@ -21,7 +21,7 @@ use traces::times::read_times;
 use traces::trace::RATE_LIMITS_HZ;
 use warnings::Code;
 
-use super::plot::PlotFormat;
+use super::picture_file::PlotFormat;
 use super::wrong;
 use crate::cli::Failure;
 use crate::cli::parse::{milliseconds, positive_voltage, rate, time};

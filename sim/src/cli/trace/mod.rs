@@ -6,6 +6,7 @@ mod energy;
 mod frames;
 mod input;
 mod pareto;
+mod picture_file;
 mod plot;
 
 use align::AlignArgs;

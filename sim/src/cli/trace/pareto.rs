@@ -13,7 +13,7 @@ use traces::pareto::{ParetoError, Point, RatedPoint, SettingColumns, frontiers, 
 use traces::table::{Table as Columns, TableReadError};
 
 use super::input::shown;
-use super::plot::{PlotFormat, write};
+use super::picture_file::{PlotFormat, write};
 use super::report;
 use crate::cli::Failure;
 use crate::cli::args::LookArgs;

@@ -8,7 +8,8 @@ use super::memory::Memory;
 use super::station::aligned;
 use super::{Span, Visit};
 use crate::clock::{Clocks, Time};
-use crate::demand::{DataUnit, DemandBuilder, ServiceDemand, Station, share};
+use crate::data_unit::DataUnit;
+use crate::demand::{DemandBuilder, ServiceDemand, Station, share};
 use crate::spec::MachineSpec;
 
 /// Cycles per slot of the calendars.

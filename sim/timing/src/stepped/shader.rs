@@ -6,7 +6,8 @@ use activity::Unit;
 
 use super::queue::Queue;
 use crate::clock::{Clocks, Time};
-use crate::demand::{DATA_EVENTS, DataUnit, ServiceDemand, share};
+use crate::data_unit::{DATA_EVENTS, DataUnit};
+use crate::demand::{ServiceDemand, share};
 use crate::spec::MachineSpec;
 use crate::stalls::Reason;
 
