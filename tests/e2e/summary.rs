@@ -242,7 +242,7 @@ fn the_work_of_passes_adds_up_to_that_of_the_run() {
     let small = ["--size", "64x36", "--frames", "0..1"];
     for (work, passes) in [
         ("tiny", &["scene", "write back"][..]),
-        ("occlusion", &["occluders", "queries", "image", "write back"]),
+        ("occlusion", &["occluders", "farthest depths", "queries", "image", "write back"]),
         ("glossy", &["map", "image", "write back"]),
         ("soft-shadows", &["depths", "look-ups", "write back"]),
     ] {
