@@ -153,7 +153,8 @@ impl DepthBoxes {
     pub fn compare(
         &self,
         within: &Box5,
-        (test, culls): (Compare, bool),
+        test: Compare,
+        culls: bool,
         mut depth: impl FnMut(&Box5) -> [f32; 2],
     ) -> Visible {
         let mut visible = Visible { within: None, in_front: true, compared: 0, behind: 0 };
@@ -349,7 +350,7 @@ mod tests {
         depths.write(&depth, &(0..samples.len as u16).collect::<Vec<_>>(), false);
         depths.update(&depth);
         let whole = Box5::whole(false);
-        let compare = |lo: f32, hi: f32| depths.compare(&whole, (Compare::Less, true), |_| [lo, hi]);
+        let compare = |lo: f32, hi: f32| depths.compare(&whole, Compare::Less, true, |_| [lo, hi]);
         assert_eq!(compare(4.5, 5.0), Visible { within: None, in_front: false, compared: 4, behind: 4 });
         assert_eq!(
             compare(0.2, 0.5),
@@ -362,9 +363,8 @@ mod tests {
         );
         assert_eq!(compare(2.5, 2.9), Visible { within: Some(late), in_front: true, compared: 4, behind: 2 });
         // Hidden in the second of three boxes.
-        let wavy = depths.compare(&whole, (Compare::Less, true), |part| {
-            if part.t[0] == 0.25 { [9.0; 2] } else { [0.1; 2] }
-        });
+        let wavy = depths
+            .compare(&whole, Compare::Less, true, |part| if part.t[0] == 0.25 { [9.0; 2] } else { [0.1; 2] });
         assert_eq!(wavy, Visible { within: Some(whole), in_front: false, compared: 4, behind: 1 });
     }
 

@@ -541,8 +541,7 @@ impl Worker<'_, '_> {
         let mut visible = Visible::in_cleared(within, state.depth.test, self.pass.clear.depth);
         if let (Some((_, bounder)), Some(tile)) = (&self.bounder, &mut self.bin.tiles[index]) {
             self.tests.z_updates += if features.z_max { tile.update() } else { 0 };
-            let test = (state.depth.test, culls);
-            visible = tile.boxes.compare(within, test, |part| {
+            visible = tile.boxes.compare(within, state.depth.test, culls, |part| {
                 bounder.over(rect, part).map(|depth| stored.round_depth(depth))
             });
         }

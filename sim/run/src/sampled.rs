@@ -124,7 +124,7 @@ fn all_frames(
     }
     let pilot = &simulated[&groups[previews.pilot]].frame;
     let preview_share = previews.frames[previews.pilot].cycles as f64 / pilot.cycles.max(1) as f64;
-    let sampled = summary(plan, frames, (previews, preview_share), forecast);
+    let sampled = summary(plan, frames, previews, preview_share, forecast);
     let pictures =
         simulated.iter_mut().filter_map(|(&group, done)| Some((numbers[group], done.picture.take()?)));
     let pictures = pictures.collect();
@@ -178,7 +178,8 @@ fn predict(
 fn summary(
     plan: &Plan,
     frames: &Distinct,
-    (previews, preview_share): (&Previews<'_>, f64),
+    previews: &Previews<'_>,
+    preview_share: f64,
     forecast: &Forecast,
 ) -> SampledSummary {
     let (numbers, groups) = (frames.numbers(), frames.groups());

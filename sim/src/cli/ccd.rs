@@ -257,7 +257,7 @@ impl<'a> Rows<'a> {
         let Some(path) = args.csv.as_deref() else { return Ok(Self::Unasked) };
         if !PRINTED.iter().any(|printed| path == Path::new(printed)) {
             let inputs = args.files.iter().map(PathBuf::as_path);
-            return outputs::may_hold_results(("--csv", Some(path)), inputs).map(|()| Self::File(path));
+            return outputs::may_hold_results("--csv", Some(path), inputs).map(|()| Self::File(path));
         }
         if args.json {
             let message = format!(

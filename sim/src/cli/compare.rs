@@ -46,7 +46,7 @@ impl From<CompareError> for Failure {
 
 pub(super) fn run(args: &CompareArgs) -> Result<(), Failure> {
     let inputs = [&args.a, &args.b].map(PathBuf::as_path);
-    may_hold_results(("--out", args.out.as_deref()), inputs)?;
+    may_hold_results("--out", args.out.as_deref(), inputs)?;
     let compared = compare(&args.a, &args.b, args.out.as_deref())?;
     if args.json {
         return print_json(&compared, true);

@@ -43,7 +43,7 @@ pub(super) fn run(args: &InfoArgs) -> Result<(), Failure> {
         catalog::find(name, &OptionSource::default(), &Request { overrides: &overrides, seed: 1 })
     {
         let what = catalog::names().find(|(known, _)| *known == name).map_or("", |(_, what)| what);
-        return print_workload((name, what), args.json, SettingsInfo::new(found?.settings()));
+        return print_workload(name, what, args.json, SettingsInfo::new(found?.settings()));
     }
     match ending(name).as_deref() {
         Some("m5d" | "mts") => {
@@ -72,7 +72,7 @@ struct WorkloadInfo<'a> {
     settings: SettingsInfo,
 }
 
-fn print_workload((workload, what): (&str, &str), json: bool, settings: SettingsInfo) -> Result<(), Failure> {
+fn print_workload(workload: &str, what: &str, json: bool, settings: SettingsInfo) -> Result<(), Failure> {
     if json {
         return print_json(&WorkloadInfo { workload, what, settings }, true);
     }

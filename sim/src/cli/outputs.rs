@@ -7,7 +7,8 @@ use super::Failure;
 
 /// Checks that an output file can be written and is not one of the inputs.
 pub(super) fn may_hold_results<'a>(
-    (flag, out): (&str, Option<&Path>),
+    flag: &str,
+    out: Option<&Path>,
     inputs: impl IntoIterator<Item = &'a Path>,
 ) -> Result<(), Failure> {
     let Some(out) = out else { return Ok(()) };
@@ -16,7 +17,7 @@ pub(super) fn may_hold_results<'a>(
             format!("{flag}: {:?} is not a file name; name a file in an existing folder", out.as_os_str());
         return Err(Failure { message, code: 2 });
     }
-    not_an_input((flag, out), inputs)?;
+    not_an_input(flag, out, inputs)?;
     let folder = match out.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),
@@ -33,7 +34,8 @@ pub(super) fn may_hold_results<'a>(
 }
 
 fn not_an_input<'a>(
-    (flag, out): (&str, &Path),
+    flag: &str,
+    out: &Path,
     inputs: impl IntoIterator<Item = &'a Path>,
 ) -> Result<(), Failure> {
     let place = |path: &Path| -> Option<PathBuf> { std::fs::canonicalize(path).ok() };
@@ -78,7 +80,7 @@ mod tests {
         let at = |name: &str| folder.path().join(name);
         ["old.csv", "in.csv"].iter().for_each(|name| std::fs::write(at(name), "old").unwrap());
         let refused = |name: &str| {
-            let checked = may_hold_results(("--out", Some(&at(name))), [at("in.csv").as_path()]);
+            let checked = may_hold_results("--out", Some(&at(name)), [at("in.csv").as_path()]);
             checked.err().map(|failure| (failure.code, failure.message))
         };
         assert_eq!([refused("new.csv"), refused("old.csv")], [None, None]);
@@ -93,9 +95,7 @@ mod tests {
             let (code, message) = refused(name).unwrap();
             assert!(code == expected && message.contains(says), "{message}");
         }
-        assert!(
-            may_hold_results(("--csv", Some(Path::new("/"))), []).is_err_and(|failure| failure.code == 2)
-        );
+        assert!(may_hold_results("--csv", Some(Path::new("/")), []).is_err_and(|failure| failure.code == 2));
         assert_eq!(std::fs::read(at("old.csv")).unwrap(), b"old");
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2);
     }

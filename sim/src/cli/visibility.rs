@@ -80,7 +80,7 @@ struct Found {
 pub(super) fn run(args: &VisibilityArgs, terminal: &Terminal) -> Result<(), Failure> {
     let named = args.camera.iter().chain([&args.samples]).map(Path::new);
     let inputs = args.files.iter().map(PathBuf::as_path).chain(named);
-    super::outputs::may_hold_results(("--out", args.out.as_deref()), inputs)?;
+    super::outputs::may_hold_results("--out", args.out.as_deref(), inputs)?;
     let scene = visibility::load(&args.files, args.camera.as_deref())?;
     if args.print_camera {
         return print_camera(args, &scene);
@@ -229,7 +229,7 @@ struct Written {
 }
 
 pub(super) fn write_table(args: &SamplesArgs) -> Result<(), Failure> {
-    super::outputs::may_hold_results(("--out", Some(&args.out)), [Path::new(&args.table)])?;
+    super::outputs::may_hold_results("--out", Some(&args.out), [Path::new(&args.table)])?;
     let (width, height) = args.size;
     let wrong = |message: String| Failure { message, code: 2 };
     let viewport = Viewport::new(width, height)

@@ -122,7 +122,7 @@ impl SignalWriter {
         let (first, count) = (self.first, samples.len() as i64);
         self.first += count;
         self.samples.clear();
-        self.index(chunks, 1, (at, first), entries)
+        self.index(chunks, 1, at, first, entries)
     }
 
     /// Adds a chunk to the index of a level, and full summaries to the levels above.
@@ -130,7 +130,8 @@ impl SignalWriter {
         &mut self,
         chunks: &mut ChunkWriter<W>,
         from: usize,
-        (mut at, mut first): (u64, i64),
+        mut at: u64,
+        mut first: i64,
         mut entries: Vec<Moments>,
     ) -> io::Result<()> {
         for level in from..LEVELS {
@@ -160,7 +161,7 @@ impl SignalWriter {
             };
             let first = this.first;
             let (at, entries) = this.flush(chunks, mark(self.number, level))?;
-            self.index(chunks, level + 1, (at, first), entries)?;
+            self.index(chunks, level + 1, at, first, entries)?;
         }
         let indices = self.levels.iter().map(|level| level.indices.first);
         Ok([self.data.first].into_iter().chain(indices).collect())
@@ -181,7 +182,8 @@ impl Times {
         &mut self,
         chunks: &mut ChunkWriter<W>,
         signal: u16,
-        (sample, time): (i64, i64),
+        sample: i64,
+        time: i64,
     ) -> io::Result<()> {
         let at = chunks.append(&mut self.data, UTC + DATA, signal, |bytes| {
             bytes.extend(front(sample, 1, 64));
@@ -302,7 +304,7 @@ impl<W: Write + Seek, const N: usize> Writer<W, N> {
     /// If the file cannot be written.
     pub fn stamp(&mut self, sample: u64, time: Timestamp) -> io::Result<()> {
         for (times, number) in self.times.iter_mut().zip(1..) {
-            times.push(&mut self.chunks, number, (sample as i64, time.0))?;
+            times.push(&mut self.chunks, number, sample as i64, time.0)?;
         }
         Ok(())
     }

@@ -109,7 +109,8 @@ impl SegmentEnergy {
     /// [`SegmentError`] if the segment is not within the trace, or samples cannot be read.
     pub fn of(
         trace: &dyn TraceReader,
-        (from_s, to_s): (f64, f64),
+        from_s: f64,
+        to_s: f64,
         idle: Option<&Idle<'_>>,
     ) -> Result<Self, SegmentError> {
         let header = trace.header();
@@ -165,11 +166,11 @@ mod tests {
     #[test]
     fn idle_energy_is_taken_off_and_wrong_segments_are_refused() {
         let trace = Trace::new(vec![2.0; 100], vec![1.5; 100], 100.0, 0.0, Metadata::default()).unwrap();
-        let segment = SegmentEnergy::of(&trace, (0.25, 0.75), Some(&Idle::Mean(1.0))).unwrap();
+        let segment = SegmentEnergy::of(&trace, 0.25, 0.75, Some(&Idle::Mean(1.0))).unwrap();
         let expected = [(segment.energy_j, 1.0), (segment.power_w, 2.0), (segment.idle_j, 0.5)];
         assert!(expected.iter().all(|(found, expected)| (found - expected).abs() < 1e-12), "{segment:?}");
         for (from_s, to_s) in [(0.75, 0.25), (0.5, 1.5), (-1.0, 0.5)] {
-            assert!(matches!(SegmentEnergy::of(&trace, (from_s, to_s), None), Err(SegmentError::Span(_))));
+            assert!(matches!(SegmentEnergy::of(&trace, from_s, to_s, None), Err(SegmentError::Span(_))));
         }
     }
 }

@@ -258,12 +258,13 @@ impl Pyramid {
     /// [`ReadError`] if samples cannot be read.
     pub fn columns_of_file(
         &self,
-        (path, options): (&Path, &ReadOptions),
-        (from_s, to_s): (f64, f64),
+        path: &Path,
+        options: &ReadOptions,
+        span_s: [f64; 2],
         columns: usize,
     ) -> Result<Option<Vec<Column>>, ReadError> {
-        let Some(range) = self.few(from_s, to_s, columns) else {
-            return Ok(self.columns(from_s, to_s, columns));
+        let Some(range) = self.few(span_s, columns) else {
+            return Ok(self.columns(span_s[0], span_s[1], columns));
         };
         let mut rows = Rows::open(path, options)?;
         rows.skip(range.start)?;
@@ -280,20 +281,17 @@ impl Pyramid {
     }
 
     /// As [`Pyramid::columns_of_file`], of a trace in memory.
-    pub fn columns_of_trace(
-        &self,
-        trace: &Trace,
-        (from_s, to_s): (f64, f64),
-        columns: usize,
-    ) -> Option<Vec<Column>> {
-        let Some(range) = self.few(from_s, to_s, columns) else { return self.columns(from_s, to_s, columns) };
+    pub fn columns_of_trace(&self, trace: &Trace, span_s: [f64; 2], columns: usize) -> Option<Vec<Column>> {
+        let Some(range) = self.few(span_s, columns) else {
+            return self.columns(span_s[0], span_s[1], columns);
+        };
         let within = range.start as usize..range.end as usize;
         let channels = [&trace.voltage_v()[within.clone()], &trace.current_a()[within]];
         Some(self.of_samples(range.start, channels, columns))
     }
 
     /// The samples of a segment, if they are fewer than as many blocks would hold as there are to be columns.
-    fn few(&self, from_s: f64, to_s: f64, columns: usize) -> Option<Range<u64>> {
+    fn few(&self, [from_s, to_s]: [f64; 2], columns: usize) -> Option<Range<u64>> {
         let (from, to) = self.places(from_s, to_s);
         (to > from && to - from < columns as u64 * BLOCK).then_some(from..to)
     }
@@ -454,14 +452,14 @@ mod tests {
             }
             let pyramid = Pyramid::of_file(&path, &options).unwrap();
             let look =
-                |columns| pyramid.columns_of_file((&path, &options), (3.0, 3.1), columns).unwrap().unwrap();
+                |columns| pyramid.columns_of_file(&path, &options, [3.0, 3.1], columns).unwrap().unwrap();
             let each: Vec<f32> = look(1000).iter().map(|column| column.mean_w).collect();
             let powers: Vec<f32> = amps[2000..2100].iter().map(|amps| 2.0 * amps).collect();
             assert_eq!(each, powers);
             let pairs = look(50);
             assert_eq!((pairs.len(), pairs[0].from_s, pairs[49].to_s), (50, 3.0, 3.1));
             assert_eq!((pairs[1].low_w, pairs[1].high_w), (powers[2], powers[3]));
-            assert_eq!(pyramid.columns_of_trace(&trace, (3.0, 3.1), 50).unwrap(), pairs);
+            assert_eq!(pyramid.columns_of_trace(&trace, [3.0, 3.1], 50).unwrap(), pairs);
         }
     }
 

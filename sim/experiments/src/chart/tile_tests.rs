@@ -170,7 +170,7 @@ fn of_family(
 ) -> Result<Vec<TileTestsRow>, RunError> {
     let label = format!("{name} at {value}");
     let family = family(name).ok_or_else(|| RunError::Setting(format!("{label}: unknown family")))?;
-    on_subject(family, value, (effort.families, 1), gpu, |subject| rows(&label, subject, effort.pairs))
+    on_subject(family, value, effort.families, 1, gpu, |subject| rows(&label, subject, effort.pairs))
 }
 
 fn of_scene(name: &str, effort: &TileTestsEffort, gpu: &GpuSpec) -> Result<Vec<TileTestsRow>, RunError> {

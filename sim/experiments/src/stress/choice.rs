@@ -53,7 +53,7 @@ pub fn trial(
     seed: u64,
     gpu: &GpuSpec,
 ) -> Result<Trial, RunError> {
-    on_subject(family, value, (size, seed), gpu, |subject| {
+    on_subject(family, value, size, seed, gpu, |subject| {
         let madds = |features| subject.counts(features).map(|counts| Work::new(&counts).madds());
         let auto = madds(Features { auto: true, ..Features::ALL })?;
         let fixed = fixed(subject.camera.lens().is_some(), madds)?;

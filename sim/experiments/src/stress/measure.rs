@@ -92,7 +92,7 @@ pub fn measure(
     gpu: &GpuSpec,
     methods: &[Method],
 ) -> Result<Vec<StressRow>, RunError> {
-    on_subject(family, value, (size, super::SEED), gpu, |subject| {
+    on_subject(family, value, size, super::SEED, gpu, |subject| {
         let pairs = Pairs::of(subject, PAIRS[usize::from(size != Size::FULL)]);
         let (reference, brute) = subject.reference()?;
         let row = |method: &Method| -> Result<_, PassError> {
@@ -413,7 +413,8 @@ pub struct Subject<'a> {
 pub fn on_subject<T>(
     family: &Family,
     value: f64,
-    (size, seed): (Size, u64),
+    size: Size,
+    seed: u64,
     gpu: &GpuSpec,
     run: impl FnOnce(&Subject<'_>) -> Result<T, PassError>,
 ) -> Result<T, RunError> {

@@ -53,9 +53,26 @@ impl Scale {
 
 /// Direction of an axis; labels need room along it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Way {
+enum Direction {
     Across,
     Up,
+}
+
+/// Direction and length of an axis on the page.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Along {
+    direction: Direction,
+    length_px: f64,
+}
+
+impl Along {
+    pub fn across(length_px: f64) -> Self {
+        Self { direction: Direction::Across, length_px }
+    }
+
+    pub fn up(length_px: f64) -> Self {
+        Self { direction: Direction::Up, length_px }
+    }
 }
 
 /// A tick: coordinate and label. Small ticks have no label. `10^5` is written with a raised 5.
@@ -167,12 +184,12 @@ impl AxisSpec {
         Some(Extent { low: low - room, high: high + room, zero_row })
     }
 
-    /// The axis over `extent` on `length` pixels.
-    pub(super) fn axis(&self, extent: Extent, (way, length): (Way, f64)) -> Axis {
+    /// The axis over `extent`.
+    pub(super) fn axis(&self, extent: Extent, along: Along) -> Axis {
         let Extent { low, high, zero_row } = extent;
         match &self.scale {
             Scale::Even | Scale::FromZero => {
-                return Axis::new(&self.name, &self.unit, (low, high), (way, length));
+                return Axis::new(&self.name, &self.unit, (low, high), along);
             }
             Scale::Listed(names) => {
                 let ticks = names.iter().enumerate();
@@ -187,13 +204,13 @@ impl AxisSpec {
                     all.iter().enumerate().map(label).collect::<Vec<_>>()
                 };
                 let sets = (1..=all.len().max(1)).map(some).collect();
-                let ticks = first_with_room(sets, |ticks| have_room(ticks, (low, high), (way, length)));
+                let ticks = first_with_room(sets, |ticks| have_room(ticks, (low, high), along));
                 let label = self.name.clone();
                 return Axis { scale: self.scale.clone(), low, high, ticks, label, broken_at: None };
             }
             Scale::Decades | Scale::Doublings => {}
         }
-        let fits = |ticks: &[Tick]| have_room(ticks, (low, high), (way, length));
+        let fits = |ticks: &[Tick]| have_room(ticks, (low, high), along);
         let mut ticks = match self.scale {
             Scale::Doublings => doublings(low, high, fits),
             _ => decades(low, high, fits),
@@ -224,22 +241,22 @@ impl AxisSpec {
 
 impl Axis {
     /// Axis of `name` in `unit` over `low..high`, which must be drawable ([`is_drawable`]). An empty range is widened.
-    pub fn new(name: &str, unit: &str, (low, high): (f64, f64), (way, length): (Way, f64)) -> Self {
+    pub fn new(name: &str, unit: &str, (low, high): (f64, f64), along: Along) -> Self {
         let (low, high) = widened(low, high);
         let prefix = if unit.is_empty() { Prefix::NONE } else { Prefix::of(low.abs().max(high.abs())) };
         let label = if unit.is_empty() { name.to_owned() } else { format!("{name} ({}{unit})", prefix.sign) };
         let sets = [9, 7, 5, 4, 3, 2].map(|most| round_ticks((low, high), prefix.factor, most));
-        let ticks = first_with_room(sets.into(), |ticks| have_room(ticks, (low, high), (way, length)));
+        let ticks = first_with_room(sets.into(), |ticks| have_room(ticks, (low, high), along));
         Self { scale: Scale::Even, low, high, ticks, label, broken_at: None }
     }
 
     /// An axis from 0 to a little above `high`.
-    pub fn from_zero(name: &str, unit: &str, high: f64, along: (Way, f64)) -> Self {
+    pub fn from_zero(name: &str, unit: &str, high: f64, along: Along) -> Self {
         Self::new(name, unit, (0.0, high * 1.06), along)
     }
 
     /// Whole numbers only, for counted things such as frames.
-    pub fn whole(name: &str, range: (f64, f64), along: (Way, f64)) -> Self {
+    pub fn whole(name: &str, range: (f64, f64), along: Along) -> Self {
         let mut axis = Self::new(name, "", range, along);
         axis.ticks.retain(|tick| libm::round(tick.at) == tick.at);
         for tick in &mut axis.ticks {
@@ -287,13 +304,13 @@ pub(super) fn label_width(label: &str) -> f64 {
 /// Size of raised letters over that of others.
 pub(super) const RAISED: f64 = 0.75;
 
-fn have_room(ticks: &[Tick], (low, high): (f64, f64), (way, length): (Way, f64)) -> bool {
+fn have_room(ticks: &[Tick], (low, high): (f64, f64), along: Along) -> bool {
     let written: Vec<&Tick> = ticks.iter().filter(|tick| !tick.label.is_empty()).collect();
-    let needs = |pair: &[&Tick]| match way {
-        Way::Across => 0.5 * (label_width(&pair[0].label) + label_width(&pair[1].label)) + 9.0,
-        Way::Up => 20.0,
+    let needs = |pair: &[&Tick]| match along.direction {
+        Direction::Across => 0.5 * (label_width(&pair[0].label) + label_width(&pair[1].label)) + 9.0,
+        Direction::Up => 20.0,
     };
-    written.windows(2).all(|pair| length * (pair[1].at - pair[0].at) / (high - low) >= needs(pair))
+    written.windows(2).all(|pair| along.length_px * (pair[1].at - pair[0].at) / (high - low) >= needs(pair))
 }
 
 /// First set with at least two labels and room for all of them; otherwise the last set.
@@ -440,14 +457,14 @@ fn step(wanted: f64) -> (f64, i32) {
 mod tests {
     use super::*;
 
-    const ACROSS: (Way, f64) = (Way::Across, 800.0);
+    const ACROSS: Along = Along { direction: Direction::Across, length_px: 800.0 };
     const MARKERS: MarkerRoom = MarkerRoom { reach: 5.0, length: 800.0 };
 
     fn labels(axis: &Axis) -> Vec<&str> {
         axis.ticks.iter().map(|tick| tick.label.as_str()).filter(|label| !label.is_empty()).collect()
     }
 
-    fn logarithmic(values: &[f64], along: (Way, f64)) -> Axis {
+    fn logarithmic(values: &[f64], along: Along) -> Axis {
         let spec = AxisSpec::default();
         spec.axis(spec.extent(values.iter().copied(), 0.04, MARKERS).unwrap(), along)
     }
@@ -457,12 +474,12 @@ mod tests {
         let axis = Axis::new("time", "s", (0.0, 0.016), ACROSS);
         assert_eq!(axis.label, "time (ms)");
         assert_eq!(labels(&axis), ["0", "2", "4", "6", "8", "10", "12", "14", "16"]);
-        let axis = Axis::new("power", "W", (10.05, 10.45), (Way::Up, 400.0));
+        let axis = Axis::new("power", "W", (10.05, 10.45), Along::up(400.0));
         assert_eq!(
             labels(&axis),
             ["10.05", "10.10", "10.15", "10.20", "10.25", "10.30", "10.35", "10.40", "10.45"]
         );
-        assert_eq!(labels(&Axis::new("pairs", "", (0.0, 2.5e7), (Way::Up, 200.0)))[1], "0.5×10^7");
+        assert_eq!(labels(&Axis::new("pairs", "", (0.0, 2.5e7), Along::up(200.0)))[1], "0.5×10^7");
     }
 
     #[test]
@@ -478,7 +495,7 @@ mod tests {
     fn decades_are_ticked_with_exponents_where_numbers_are_long() {
         assert_eq!(labels(&logarithmic(&[3.0, 2e3], ACROSS)), ["10", "100", "1000"]);
         assert_eq!(labels(&logarithmic(&[0.03, 0.4], ACROSS)), ["0.03", "0.05", "0.07", "0.1", "0.2", "0.3"]);
-        assert_eq!(labels(&logarithmic(&[0.03, 0.4], (Way::Up, 100.0))), ["0.05", "0.1", "0.2"]);
+        assert_eq!(labels(&logarithmic(&[0.03, 0.4], Along::up(100.0))), ["0.05", "0.1", "0.2"]);
         assert_eq!(labels(&logarithmic(&[3e4, 2e6], ACROSS)), ["10^5", "10^6"]);
         assert_eq!(labels(&logarithmic(&[1.2e5, 6e5], ACROSS)), ["2×10^5", "3×10^5", "5×10^5"]);
         let small =
@@ -490,7 +507,7 @@ mod tests {
     fn labels_have_room_and_are_more_than_one() {
         for values in [[7.2, 9.2], [15_000.0, 22_000.0], [1e-5, 1e9], [0.05, 0.4], [1.0, 1.0], [3e-30, 2e30]]
         {
-            for along in [(Way::Across, 324.0), (Way::Up, 324.0), (Way::Across, 130.0), (Way::Up, 90.0)] {
+            for along in [Along::across(324.0), Along::up(324.0), Along::across(130.0), Along::up(90.0)] {
                 let axis = logarithmic(&values, along);
                 assert!(have_room(&axis.ticks, (axis.low, axis.high), along), "{values:?} {axis:?}");
                 assert!(
@@ -500,14 +517,14 @@ mod tests {
             }
         }
         let spec = AxisSpec { scale: Scale::Doublings, ..AxisSpec::default() };
-        let axis = spec.axis(spec.extent([4.0, 16_384.0], 0.04, MARKERS).unwrap(), (Way::Across, 324.0));
+        let axis = spec.axis(spec.extent([4.0, 16_384.0], 0.04, MARKERS).unwrap(), Along::across(324.0));
         assert_eq!(labels(&axis), ["4", "16", "64", "256", "1024", "4096", "16384"]);
     }
 
     #[test]
     fn zero_has_a_row_of_its_own_below() {
         let spec = AxisSpec { zero: "exact".to_owned(), ..AxisSpec::default() };
-        let axis = spec.axis(spec.extent([0.0, 1.0, 100.0], 0.04, MARKERS).unwrap(), (Way::Up, 372.0));
+        let axis = spec.axis(spec.extent([0.0, 1.0, 100.0], 0.04, MARKERS).unwrap(), Along::up(372.0));
         assert_eq!(axis.ticks[0].label, "exact");
         let broken = axis.fraction_at(axis.broken_at.unwrap());
         let [zero, one] = [0.0, 1.0].map(|value| axis.place(value).unwrap());

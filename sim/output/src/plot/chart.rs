@@ -1,6 +1,6 @@
 //! Series over axes, in one panel or several.
 
-use super::axis::{Extent, MarkerRoom, Way};
+use super::axis::{Along, Extent, MarkerRoom};
 use super::chart_panel::{Cell, ChartPanel, RIGHT, SMALL_GAP, draw_row};
 use super::legend::{Key, LEGEND_PX, legend_lines};
 use super::panel::aside;
@@ -93,7 +93,7 @@ impl<'a> Chart<'a> {
     fn small_aside(&self, extents: &[Option<[Extent; 2]>]) -> f64 {
         let first = self.panels.iter().zip(extents).find_map(|(panel, extent)| Some((panel, (*extent)?[1])));
         let Some((panel, up)) = first.filter(|_| self.small.is_some()) else { return 0.0 };
-        aside(&panel.axes[1].axis(up, (Way::Up, 100.0)))
+        aside(&panel.axes[1].axis(up, Along::up(100.0)))
     }
 
     /// Draws the axis names of small panels, once for all.
@@ -159,7 +159,7 @@ impl<'a> Chart<'a> {
             }
             let labels = match self.small {
                 Some(_) => SMALL_GAP,
-                None => RIGHT + aside(&own.axes[1].axis(up, (Way::Up, height))),
+                None => RIGHT + aside(&own.axes[1].axis(up, Along::up(height))),
             };
             Some([extent(place, 0, width - labels)?, up])
         };

@@ -4,7 +4,7 @@
 
 use std::ops::Range;
 
-use super::axis::{Axis, AxisSpec, Extent, Scale, Way};
+use super::axis::{Along, Axis, AxisSpec, Extent, Scale};
 use super::legend::{Key, LEGEND_LINE, LEGEND_PX, legend_column, plate};
 use super::palette::{INK, MARK, MUTED};
 use super::panel::{self, BELOW, Label, Panel, aside};
@@ -161,7 +161,7 @@ impl ChartPanel {
         let corners = tops.into_iter().flat_map(|top| lefts.into_iter().map(move |left| (left, top)));
         let Some((left, top)) = corners.min_by_key(|&corner| hidden(corner)) else { return };
         plate(picture, (left - 4.0, top), (left + width + 4.0, top + height));
-        legend_column(picture, (left, top + 0.5 * LEGEND_LINE), (left + width, height), &entries);
+        legend_column(picture, (left, top + 0.5 * LEGEND_LINE), left + width, height, &entries);
     }
 }
 
@@ -254,17 +254,17 @@ impl Cell<'_> {
     /// Area of the panel with its axes; `None` without data.
     pub fn area(&self, top: f64) -> Option<Panel> {
         let [across, up] = self.extents?;
-        let y = self.panel.axes[1].axis(up, (Way::Up, self.height));
+        let y = self.panel.axes[1].axis(up, Along::up(self.height));
         let left = self.left + if self.small { 0.0 } else { aside(&y) };
         let right = self.left + self.width - if self.small { SMALL_GAP } else { RIGHT };
         if !self.panel.equal {
-            let x = self.panel.axes[0].axis(across, (Way::Across, right - left));
+            let x = self.panel.axes[0].axis(across, Along::across(right - left));
             return Some(Panel { left, top, right, bottom: top + self.height, x, y });
         }
         let (wide, high) = (across.high - across.low, up.high - up.low);
         let px = ((right - left) / wide).min(MOST_HIGH / high);
-        let [x, y]: [Axis; 2] = [(0, across, Way::Across, px * wide), (1, up, Way::Up, px * high)]
-            .map(|(axis, extent, way, length)| self.panel.axes[axis].axis(extent, (way, length)));
+        let [x, y]: [Axis; 2] = [(0, across, Along::across(px * wide)), (1, up, Along::up(px * high))]
+            .map(|(axis, extent, along)| self.panel.axes[axis].axis(extent, along));
         Some(Panel { left, top, right: left + px * wide, bottom: top + px * high, x, y })
     }
 
@@ -293,7 +293,7 @@ impl Cell<'_> {
             self.panel.named().map(|(key, series)| (key, series.name.clone(), String::new())).collect();
         let height = LEGEND_LINE * entries.len() as f64;
         let from = (area.left.min(self.left + 8.0), area.bottom + BELOW + 8.0);
-        legend_column(picture, from, (self.left + self.width, height), &entries);
+        legend_column(picture, from, self.left + self.width, height, &entries);
         height + 4.0
     }
 }

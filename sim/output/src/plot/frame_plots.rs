@@ -2,7 +2,7 @@
 
 use power_model::Part;
 
-use super::axis::{Axis, Way, is_drawable};
+use super::axis::{Along, Axis, is_drawable};
 use super::columns::means;
 use super::legend::{Key, LEGEND_LINE, legend_column, legend_lines};
 use super::palette::{BACKGROUND, INK, MEASURED, MUTED, TRUTH, part_colour};
@@ -118,10 +118,10 @@ impl FramePower<'_> {
         }
         let beside = if picture.width() >= BESIDE { LEGEND + 30.0 } else { 0.0 };
         let height = if picture.is_narrow() { 200.0 } else { 440.0 };
-        let y = Axis::from_zero("power", "W", high.max(0.0), (Way::Up, height));
+        let y = Axis::from_zero("power", "W", high.max(0.0), Along::up(height));
         let left = picture.margin() + aside(&y);
         let right = picture.width() - picture.margin() - beside - 6.0;
-        let x = Axis::new("time in the frame", "s", (0.0, duration_s), (Way::Across, right - left));
+        let x = Axis::new("time in the frame", "s", (0.0, duration_s), Along::across(right - left));
         let top = picture.height + 12.0;
         Some(Panel { left, top, right, bottom: top + height, x, y })
     }
@@ -163,7 +163,7 @@ impl FramePower<'_> {
         for (column, entries) in entries.chunks(rows).enumerate() {
             let from = (left + width * column as f64, top + 24.0);
             let right = from.0 + width - if column + 1 < columns { 8.0 } else { 0.0 };
-            legend_column(picture, from, (right, height), entries);
+            legend_column(picture, from, right, height, entries);
         }
         let pitch = (height / rows as f64).min(LEGEND_LINE);
         let mut y = top + 30.0 + pitch * rows as f64;
@@ -239,7 +239,7 @@ impl FrameEnergy<'_> {
         (panel.top, panel.bottom) = (top + legend, top + legend + height);
         let per_pixel = (self.pixels > 0).then(|| {
             let [low, high] = [panel.y.low, panel.y.high].map(|energy_j| energy_j / self.pixels as f64);
-            Axis::new("energy per pixel", "J", (low, high), (Way::Up, height))
+            Axis::new("energy per pixel", "J", (low, high), Along::up(height))
         });
         panel.right -= per_pixel.as_ref().map_or(0.0, aside);
         self.band(&panel, &mut picture);
@@ -277,9 +277,9 @@ impl FrameEnergy<'_> {
         // Differences of a percent are to be seen, so the axis need not start at 0; its labels say where it does.
         let margin = (0.12 * (high - low)).max(0.002 * high.abs());
         let height = if picture.is_narrow() { 210.0 } else { 430.0 };
-        let y = Axis::new("energy per frame", "J", (low - margin, high + margin), (Way::Up, height));
+        let y = Axis::new("energy per frame", "J", (low - margin, high + margin), Along::up(height));
         let (left, right) = (picture.margin() + aside(&y), picture.width() - picture.margin() - 4.0);
-        let x = Axis::whole("frame", (first - 0.5, last + 0.5), (Way::Across, right - left - 70.0));
+        let x = Axis::whole("frame", (first - 0.5, last + 0.5), Along::across(right - left - 70.0));
         Some(Panel { left, top: 0.0, right, bottom: height, x, y })
     }
 

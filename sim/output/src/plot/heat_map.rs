@@ -1,11 +1,10 @@
 //! Heat map of a value over the image.
 
-use super::axis::{Axis, Way, is_drawable};
+use super::axis::{Along, Axis, is_drawable};
 use super::legend::{Key, legend_lines};
 use super::palette::{AXIS, CLASSES, Colour, INK, heat};
 use super::panel::tick_label;
-use super::picture::Look;
-use super::picture::{Across, Picture, Text, text};
+use super::picture::{Across, Look, Picture, Point, Text, text};
 use crate::table::digits;
 
 /// A rectangle of the image with a value.
@@ -100,7 +99,7 @@ impl HeatMapPlot<'_> {
         picture.height = bottom + 16.0;
         if !self.is_classes() {
             let bottom = bottom.max(top + 150.0);
-            let axis = Axis::new(self.label, "", (0.0, high), (Way::Up, bottom - top));
+            let axis = Axis::new(self.label, "", (0.0, high), Along::up(bottom - top));
             bar(&mut picture, &axis, (left + width * scale + 34.0, top, bottom), high < most);
             picture.height = bottom + 16.0;
         }
@@ -132,7 +131,7 @@ impl HeatMapPlot<'_> {
         }
     }
 
-    fn draw_tiles(&self, picture: &mut Picture, (left, top): (f64, f64), scale: f64, high: f64) {
+    fn draw_tiles(&self, picture: &mut Picture, (left, top): Point, scale: f64, high: f64) {
         for tile in self.tiles {
             let at = |x: u32, y: u32| (left + f64::from(x) * scale, top + f64::from(y) * scale);
             let ([x, y], [w, h]) = (tile.origin, tile.size);
@@ -141,7 +140,7 @@ impl HeatMapPlot<'_> {
     }
 
     /// Draws outlines where neighbouring pixels differ in brightness. Equal pixels of a row are one rectangle.
-    fn draw_outlines(&self, picture: &mut Picture, (left, top): (f64, f64), scale: f64) {
+    fn draw_outlines(&self, picture: &mut Picture, (left, top): Point, scale: f64) {
         let width = self.size[0] as usize;
         if width == 0 || self.brightness.len() != width * self.size[1] as usize {
             return;

@@ -1,6 +1,6 @@
 //! Units of one frame over time, a lane for each: how busy they were, and what they waited for.
 
-use super::axis::{Axis, Way, is_drawable};
+use super::axis::{Along, Axis, is_drawable};
 use super::columns::means;
 use super::legend::{Key, legend_lines};
 use super::palette::{INK, MUTED, STATES, heat, named_unit_colour};
@@ -49,7 +49,7 @@ impl UnitPlot<'_, UnitLane<'_>> {
         let usual = if picture.is_narrow() { 22.0 } else { 34.0 };
         let pitch = f64::min(usual, 900.0 / self.units.len().max(1) as f64);
         let top = picture.height + 30.0;
-        let lanes = Lanes::new(&picture, self.units.iter().map(|unit| unit.name), (top, pitch));
+        let lanes = Lanes::new(&picture, self.units.iter().map(|unit| unit.name), top, pitch);
         let panel = lanes.panel(duration_s, self.units.len(), MEAN);
         for (index, unit) in self.units.iter().enumerate() {
             lane(unit, bins, &panel, &lanes, index, &mut picture);
@@ -74,11 +74,7 @@ pub(super) struct Lanes {
 
 impl Lanes {
     /// Lanes `pitch` pixels apart from `top` on, which leave room for the names.
-    pub fn new<'a>(
-        picture: &Picture,
-        names: impl Iterator<Item = &'a str>,
-        (top, pitch): (f64, f64),
-    ) -> Self {
+    pub fn new<'a>(picture: &Picture, names: impl Iterator<Item = &'a str>, top: f64, pitch: f64) -> Self {
         let widest = names.map(|name| text_width(name, 13.0, false)).fold(40.0, f64::max);
         let left = picture.margin() + widest.min(0.32 * picture.width()) + 20.0;
         Self { left, right: picture.width() - picture.margin() - 6.0, top, pitch }
@@ -87,8 +83,8 @@ impl Lanes {
     /// Area of `lanes` over a time, which leaves `aside` free on the right.
     pub fn panel(&self, duration_s: f64, lanes: usize, aside: f64) -> Panel {
         let right = self.right - aside;
-        let x = Axis::new("time in the frame", "s", (0.0, duration_s), (Way::Across, right - self.left));
-        let y = Axis::new("", "", (0.0, 1.0), (Way::Up, self.pitch));
+        let x = Axis::new("time in the frame", "s", (0.0, duration_s), Along::across(right - self.left));
+        let y = Axis::new("", "", (0.0, 1.0), Along::up(self.pitch));
         Panel { left: self.left, top: self.top, right, bottom: self.top + self.pitch * lanes as f64, x, y }
     }
 
@@ -176,7 +172,7 @@ impl UnitPlot<'_, StallLane<'_>> {
         let top = picture.height + 10.0;
         let top = top + legend_lines(&mut picture, top, &keys);
         let pitch = if picture.is_narrow() { 30.0 } else { 44.0 };
-        let lanes = Lanes::new(&picture, self.units.iter().map(|unit| unit.name), (top, pitch));
+        let lanes = Lanes::new(&picture, self.units.iter().map(|unit| unit.name), top, pitch);
         let panel = lanes.panel(duration_s, self.units.len(), 0.0);
         for (index, unit) in self.units.iter().enumerate() {
             stall_lane(unit, intervals, &panel, &lanes, index, &mut picture);

@@ -79,7 +79,8 @@ pub(super) fn legend_lines(picture: &mut Picture, top: f64, entries: &[(Key, Str
 pub(super) fn legend_column(
     picture: &mut Picture,
     from: Point,
-    (right, height): (f64, f64),
+    right: f64,
+    height: f64,
     entries: &[(Key, String, String)],
 ) {
     let pitch = (height / entries.len().max(1) as f64).min(LEGEND_LINE);

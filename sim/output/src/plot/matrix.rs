@@ -1,8 +1,7 @@
 //! Matrix of costs or errors: methods by test cases, as shaded cells.
 
 use super::palette::{BACKGROUND, INK, MUTED, heat};
-use super::picture::Look;
-use super::picture::{Across, Picture, Text, text};
+use super::picture::{Across, Look, Picture, Point, Text, text};
 use super::text::shortened;
 use super::text::text_width;
 
@@ -60,7 +59,7 @@ impl Matrix<'_> {
             picture.text(Text { bold: true, ..text(panel.name, (left, top + 0.5 * HEADING)) });
             top += HEADING;
             for (name, cells) in &panel.rows {
-                draw_cells(name, cells, (left, top, width), &mut picture);
+                draw_cells(name, cells, (left, top), width, &mut picture);
                 top += ROW;
             }
         }
@@ -74,7 +73,7 @@ impl Matrix<'_> {
     }
 }
 
-fn draw_cells(name: &str, cells: &[Option<f64>], (left, top, width): (f64, f64, f64), picture: &mut Picture) {
+fn draw_cells(name: &str, cells: &[Option<f64>], (left, top): Point, width: f64, picture: &mut Picture) {
     let middle = top + 0.5 * ROW;
     picture.text(Text { across: Across::Right, ..text(name, (left - 10.0, middle)) });
     for (index, value) in cells.iter().enumerate() {
@@ -107,7 +106,7 @@ fn number(value: f64) -> String {
 }
 
 /// Draws the scale of shades from `left` on.
-fn scale([least, most]: [&str; 2], (left, middle): (f64, f64), picture: &mut Picture) {
+fn scale([least, most]: [&str; 2], (left, middle): Point, picture: &mut Picture) {
     let note = |text: Text| Text { size: 12.0, colour: MUTED, ..text };
     picture.text(note(text(least, (left, middle))));
     let left = left + text_width(least, 12.0, false) + 8.0;

@@ -235,15 +235,15 @@ fn nearest(label: &Label<'_>, panel: &Panel, taken: &[Box4]) -> Option<(Box4, f6
 
 #[cfg(test)]
 mod tests {
-    use super::super::axis::{Axis, Way};
+    use super::super::axis::{Along, Axis};
     use super::super::palette::INK;
     use super::super::picture::Look;
     use super::super::picture::Shape;
     use super::*;
 
     fn panel() -> Panel {
-        let x = Axis::new("x", "", (0.0, 1.0), (Way::Across, 400.0));
-        let y = Axis::new("y", "", (0.0, 1.0), (Way::Up, 300.0));
+        let x = Axis::new("x", "", (0.0, 1.0), Along::across(400.0));
+        let y = Axis::new("y", "", (0.0, 1.0), Along::up(300.0));
         Panel { left: 0.0, top: 0.0, right: 400.0, bottom: 300.0, x, y }
     }
 

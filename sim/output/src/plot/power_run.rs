@@ -1,6 +1,6 @@
 //! Power over the whole run.
 
-use super::axis::{Axis, Way, is_drawable};
+use super::axis::{Along, Axis, is_drawable};
 use super::columns::{Extremes, extremes, moving_mean};
 use super::legend::{Key, legend_lines};
 use super::palette::{INK, MARK, MEASURED, MUTED, TRUTH};
@@ -114,7 +114,7 @@ impl PowerRun<'_> {
             return None;
         }
         let height = if picture.is_narrow() { 190.0 } else { 400.0 };
-        let along = (Way::Up, height);
+        let along = Along::up(height);
         let y = if low < 0.0 {
             Axis::new("power", "W", (low, high), along)
         } else {
@@ -122,7 +122,7 @@ impl PowerRun<'_> {
         };
         let (left, right) =
             (picture.margin() + aside(&y).max(46.0), picture.width() - picture.margin() - 6.0);
-        let x = Axis::new("time", "s", (self.start_s, self.end_s()), (Way::Across, right - left));
+        let x = Axis::new("time", "s", (self.start_s, self.end_s()), Along::across(right - left));
         Some(Panel { left, top: 0.0, right, bottom: height, x, y })
     }
 

@@ -319,12 +319,12 @@ fn width_px(band: &[(f64, f64, f64)], index: usize, panel: &Panel) -> (f64, f64)
 
 #[cfg(test)]
 mod tests {
-    use super::super::axis::{Axis, Way};
+    use super::super::axis::{Along, Axis};
     use super::*;
 
     fn panel(right: f64) -> Panel {
-        let x = Axis::new("time", "s", (0.0, 4.0), (Way::Across, right));
-        let y = Axis::new("power", "W", (0.0, 1.0), (Way::Up, 100.0));
+        let x = Axis::new("time", "s", (0.0, 4.0), Along::across(right));
+        let y = Axis::new("power", "W", (0.0, 1.0), Along::up(100.0));
         Panel { left: 0.0, top: 0.0, right, bottom: 100.0, x, y }
     }
 

@@ -100,7 +100,7 @@ impl Common {
     fn check(&self, input: Option<&Path>) -> Result<(), Failure> {
         let out = self.out.as_deref();
         out.map(Format::of).transpose()?;
-        super::outputs::may_hold_results(("--out", out), input)
+        super::outputs::may_hold_results("--out", out, input)
     }
 }
 

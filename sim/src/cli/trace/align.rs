@@ -68,7 +68,7 @@ fn check_anchor((stamp_s, time_s): (f64, f64), trace: &TraceHeader) -> Result<()
 }
 
 pub(super) fn run(args: &AlignArgs, terminal: &Terminal) -> Result<(), Failure> {
-    may_hold_results(("--out", args.out.as_deref()), [args.stamps.as_path(), &args.input.trace])?;
+    may_hold_results("--out", args.out.as_deref(), [args.stamps.as_path(), &args.input.trace])?;
     let mut stamps = read_times(&args.stamps)?;
     stamps.sort_by(f64::total_cmp);
     let alignment = match args.anchor[..] {

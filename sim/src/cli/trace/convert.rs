@@ -83,7 +83,7 @@ pub(super) fn may_be_saved<'a>(
     format: &TraceFormat,
     inputs: impl IntoIterator<Item = &'a Path>,
 ) -> Result<(), Failure> {
-    may_hold_results((flag, Some(out)), inputs)?;
+    may_hold_results(flag, Some(out), inputs)?;
     let beside = format.description_path(out).filter(|beside| beside.exists() && !out.exists());
     beside.map_or(Ok(()), |beside| {
         Err(wrong(format!(

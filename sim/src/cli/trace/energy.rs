@@ -121,7 +121,7 @@ pub(super) fn run(args: &EnergyArgs, terminal: &Terminal) -> Result<(), Failure>
     let recording = recording.as_ref().map(|(recording, _)| PowerIntegral::new(recording));
     if args.from.is_some() || args.to.is_some() {
         let (trace, repairs) = args.input.source(terminal)?;
-        return segment_energy(args, (&*trace, &repairs), recording.as_ref());
+        return segment_energy(args, &*trace, &repairs, recording.as_ref());
     }
     let (first, repairs, of_file) =
         one_run(args, &args.input.trace, (&passes, recording.as_ref()), terminal)?;
@@ -156,13 +156,14 @@ fn pooled_text(pool: &Pooled, pixels: Option<u64>) -> String {
 /// Energy between two times.
 fn segment_energy(
     args: &EnergyArgs,
-    (trace, repairs): (&dyn TraceReader, &[Repair]),
+    trace: &dyn TraceReader,
+    repairs: &[Repair],
     recording: Option<&PowerIntegral<'_>>,
 ) -> Result<(), Failure> {
     let header = trace.header();
     let idle = idle(args, trace, recording)?;
     let (from_s, to_s) = (args.from.unwrap_or(header.start_s), args.to.unwrap_or(header.end_s()));
-    let segment = SegmentEnergy::of(trace, (from_s, to_s), idle.as_ref());
+    let segment = SegmentEnergy::of(trace, from_s, to_s, idle.as_ref());
     let SegmentEnergy { energy_j, power_w, idle_j } = segment.map_err(segment_failure)?;
     if args.json {
         return print_json(

@@ -56,7 +56,7 @@ const SHOWN: usize = 12;
 
 pub(super) fn run(args: &FramesArgs, terminal: &Terminal) -> Result<(), Failure> {
     let inputs = args.find.mark_file.as_deref().into_iter().chain([args.input.trace.as_path()]);
-    may_hold_results(("--out", args.out.as_deref()), inputs)?;
+    may_hold_results("--out", args.out.as_deref(), inputs)?;
     args.out.as_deref().map_or(Ok(()), is_table)?;
     let (frames, table, summary, pixels) = args.threads.pool()?.install(|| {
         let mut frames = args.find.frames(&args.input, &args.input.trace, terminal)?;

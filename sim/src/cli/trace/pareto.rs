@@ -100,7 +100,7 @@ impl From<ParetoError> for Failure {
 type Groups = BTreeMap<String, Vec<RatedPoint>>;
 
 pub(super) fn run(args: &ParetoArgs, terminal: &Terminal) -> Result<(), Failure> {
-    may_hold_results(("--out", args.out.as_deref()), [args.table.as_path()])?;
+    may_hold_results("--out", args.out.as_deref(), [args.table.as_path()])?;
     let table = Columns::read(&args.table)?;
     let groups = frontiers(&table, &args.columns(), args.idle_w, args.seed)?;
     if let Some(out) = &args.out {

@@ -101,7 +101,7 @@ const OVERLAID: usize = 400;
 
 pub(super) fn run(args: &PlotArgs, terminal: &Terminal) -> Result<(), Failure> {
     let kind = PlotFormat::of(&args.out)?;
-    may_hold_results(("--out", Some(&args.out)), [args.input.trace.as_path()])?;
+    may_hold_results("--out", Some(&args.out), [args.input.trace.as_path()])?;
     let (picture, shown) = match args.kind {
         PlotKind::Curve => curve(args, terminal)?,
         _ => framed(args, terminal)?,
@@ -113,17 +113,17 @@ pub(super) fn run(args: &PlotArgs, terminal: &Terminal) -> Result<(), Failure> {
     report(&format!("{}: {shown}", args.out.display()), args.piped, terminal)
 }
 
-fn span(args: &PlotArgs, start_s: f64, end_s: f64) -> Result<(f64, f64), Failure> {
+fn span(args: &PlotArgs, start_s: f64, end_s: f64) -> Result<[f64; 2], Failure> {
     let (from_s, to_s) = (args.from.unwrap_or(start_s), args.to.unwrap_or(end_s));
     check_span([start_s, end_s], [from_s, to_s])
         .map_err(|error| wrong(format!("--from and --to: {error}")))?;
-    Ok((from_s.max(start_s), to_s.min(end_s)))
+    Ok([from_s.max(start_s), to_s.min(end_s)])
 }
 
 type Make = fn(&Path, &ReadOptions) -> Result<Pyramid, ReadError>;
 
 /// The shown time and its columns: from the pyramid beside the file, or from the samples where these are few.
-fn columns(args: &PlotArgs, terminal: &Terminal) -> Result<((f64, f64), Vec<Column>), Failure> {
+fn columns(args: &PlotArgs, terminal: &Terminal) -> Result<([f64; 2], Vec<Column>), Failure> {
     if args.input.repair {
         // Repairs are listed, so they are made anew each time.
         let trace = args.input.load(terminal)?.0;
@@ -142,17 +142,17 @@ fn columns(args: &PlotArgs, terminal: &Terminal) -> Result<((f64, f64), Vec<Colu
         note();
     }
     let shown = span(args, pyramid.start_s(), pyramid.end_s())?;
-    if let Some(columns) = pyramid.columns_of_file((path, &options), shown, COLUMNS)? {
+    if let Some(columns) = pyramid.columns_of_file(path, &options, shown, COLUMNS)? {
         return Ok((shown, columns));
     }
     note();
-    let columns = make(path, &options)?.columns_of_file((path, &options), shown, COLUMNS)?;
+    let columns = make(path, &options)?.columns_of_file(path, &options, shown, COLUMNS)?;
     Ok((shown, columns.unwrap_or_default()))
 }
 
 /// Lowest, highest and mean power of each column.
 fn curve(args: &PlotArgs, terminal: &Terminal) -> Result<(Picture, String), Failure> {
-    let ((from_s, to_s), columns) = columns(args, terminal)?;
+    let ([from_s, to_s], columns) = columns(args, terminal)?;
     let middle = |column: &Column| 0.5 * (column.from_s + column.to_s);
     let band = columns.iter().map(|c| (middle(c), f64::from(c.low_w), f64::from(c.high_w))).collect();
     let width_s = args.low_pass.unwrap_or((to_s - from_s) / 50.0);
@@ -251,11 +251,11 @@ const BESIDE: f64 = 0.08;
 
 /// Power within a frame, over the time since its start.
 fn within(trace: &Trace, frame: &FrameEnergy) -> Vec<(f64, f64)> {
-    between(trace, (frame.start_s, frame.end_s), frame.start_s)
+    between(trace, [frame.start_s, frame.end_s], frame.start_s)
 }
 
 /// Power between two times, over the time since a third.
-fn between(trace: &Trace, (from_s, to_s): (f64, f64), since_s: f64) -> Vec<(f64, f64)> {
+fn between(trace: &Trace, [from_s, to_s]: [f64; 2], since_s: f64) -> Vec<(f64, f64)> {
     trace.powers_between(from_s, to_s).map(|(time_s, power_w)| (time_s - since_s, power_w)).collect()
 }
 
@@ -269,8 +269,8 @@ fn one_frame(args: &PlotArgs, trace: &Trace, frames: &[FrameEnergy]) -> Result<D
     })?;
     let name = format!("frame {number}, {}", si(frame.energy_j, "J"));
     let margin_s = BESIDE * (frame.end_s - frame.start_s);
-    let beside = [(frame.start_s - margin_s, frame.start_s), (frame.end_s, frame.end_s + margin_s)];
-    let beside = beside.map(|(from_s, to_s)| between(trace, (from_s, to_s), frame.start_s));
+    let beside = [[frame.start_s - margin_s, frame.start_s], [frame.end_s, frame.end_s + margin_s]];
+    let beside = beside.map(|span_s| between(trace, span_s, frame.start_s));
     Ok((
         "Power of one frame",
         ("time since its start", "s"),
