@@ -54,7 +54,7 @@ pub struct Triangle {
 
 /// Result of set-up.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Outcome {
+pub enum SetupResult {
     /// The triangle goes on to traversal.
     Ready(Triangle),
     /// Two of its corners coincide at all times.
@@ -79,24 +79,24 @@ pub fn set_up(
     shear: &Shear,
     near: f32,
     half_px: [f32; 2],
-) -> Outcome {
+) -> SetupResult {
     if has_no_area(vertices) {
-        return Outcome::Degenerate;
+        return SetupResult::Degenerate;
     }
     let corners = vertices.map(Corner::new);
     // The depth of a sample is between those of the vertices, which are farthest at an end of the shutter.
     if corners.iter().all(|c| c.ends().iter().all(|p| p[2] <= near)) {
-        return Outcome::Outside;
+        return SetupResult::Outside;
     }
     let faces = [cull != Cull::Back, cull != Cull::Front];
     let moving = vertices.iter().any(|vertex| !vertex.is_still());
     let slack = slack(&corners, shear, half_px);
     let images = corners.map(|corner| shear.homogeneous(corner.open));
     if !moving && shear.is_none() && !(faces[0] && faces[1]) && shows_culled_face(&images, faces, slack) {
-        return Outcome::FaceCulled;
+        return SetupResult::FaceCulled;
     }
     let behind = corners.iter().any(|c| c.ends().iter().any(|p| shear.weight(p[2]) < 0.0));
-    Outcome::Ready(Triangle { id, corners, moving, behind, faces, slack })
+    SetupResult::Ready(Triangle { id, corners, moving, behind, faces, slack })
 }
 
 /// Whether two vertices coincide at both ends. No sample is on any side of such an edge. Three collinear
@@ -262,13 +262,13 @@ pub(crate) fn distribute(
 mod tests {
     use super::*;
     use crate::geometry::{Cull, MovingVertex};
-    use crate::setup::{Outcome, set_up};
+    use crate::setup::{SetupResult, set_up};
 
     fn still(p: [f32; 3]) -> MovingVertex {
         MovingVertex { open: p, close: p }
     }
 
-    fn outcome(points: [[f32; 3]; 3], cull: Cull) -> Outcome {
+    fn outcome(points: [[f32; 3]; 3], cull: Cull) -> SetupResult {
         let v = points.map(still);
         set_up(3, [&v[0], &v[1], &v[2]], cull, &Shear::default(), 0.1, [64.0, 64.0])
     }
@@ -284,9 +284,9 @@ mod tests {
     #[test]
     fn two_corners_in_one_are_dropped_and_a_line_is_kept() {
         let twice = [[0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [2.0, 1.0, 1.0]];
-        assert_eq!(outcome(twice, Cull::None), Outcome::Degenerate);
+        assert_eq!(outcome(twice, Cull::None), SetupResult::Degenerate);
         let line = [[0.0, 0.0, 1.0], [1.0, 1.0, 1.0], [2.0, 2.0, 1.0]];
-        assert!(matches!(outcome(line, Cull::None), Outcome::Ready(_)), "rounding may give it an area");
+        assert!(matches!(outcome(line, Cull::None), SetupResult::Ready(_)), "rounding may give it an area");
         assert!(is_flat([&still(line[0]), &still(line[1]), &still(line[2])]));
     }
 
@@ -298,28 +298,28 @@ mod tests {
             MovingVertex { open: [1.0, 1.0, 1.0], close: [1.0, -1.0, 1.0] },
         ];
         let outcome = set_up(0, [&v[0], &v[1], &v[2]], Cull::None, &Shear::default(), 0.1, [64.0; 2]);
-        assert!(matches!(outcome, Outcome::Ready(t) if t.moving), "{outcome:?}");
+        assert!(matches!(outcome, SetupResult::Ready(t) if t.moving), "{outcome:?}");
     }
 
     #[test]
     fn faces_are_culled_by_their_winding_on_the_screen() {
         // y points down, so this order is clockwise on the screen: a back face.
         let clockwise = [[0.0, 0.0, 1.0], [10.0, 0.0, 1.0], [0.0, 10.0, 1.0]];
-        assert_eq!(outcome(clockwise, Cull::Back), Outcome::FaceCulled);
-        assert!(matches!(outcome(clockwise, Cull::Front), Outcome::Ready(_)));
-        assert!(matches!(outcome(clockwise, Cull::None), Outcome::Ready(_)));
+        assert_eq!(outcome(clockwise, Cull::Back), SetupResult::FaceCulled);
+        assert!(matches!(outcome(clockwise, Cull::Front), SetupResult::Ready(_)));
+        assert!(matches!(outcome(clockwise, Cull::None), SetupResult::Ready(_)));
     }
 
     #[test]
     fn triangles_nearer_than_the_near_depth_are_outside() {
         let behind = [[0.0, 0.0, -1.0], [10.0, 0.0, -1.0], [0.0, 10.0, 0.05]];
-        assert_eq!(outcome(behind, Cull::None), Outcome::Outside);
+        assert_eq!(outcome(behind, Cull::None), SetupResult::Outside);
     }
 
     fn triangle(open: [[f32; 3]; 3], close: [[f32; 3]; 3]) -> Triangle {
         let v = [0, 1, 2].map(|i| MovingVertex { open: open[i], close: close[i] });
         match set_up(0, [&v[0], &v[1], &v[2]], Cull::None, &Shear::default(), 0.1, [64.0; 2]) {
-            Outcome::Ready(triangle) => triangle,
+            SetupResult::Ready(triangle) => triangle,
             other => panic!("{other:?}"),
         }
     }

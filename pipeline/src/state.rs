@@ -309,7 +309,7 @@ impl Default for Clear {
 
 /// What becomes of a sample inside a triangle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Outcome {
+pub(crate) struct DepthStencilResult {
     /// Whether depth and colour are stored.
     pub passes: bool,
     /// Stencil afterwards.
@@ -357,10 +357,10 @@ impl DrawState {
     }
 
     /// Result of the tests for a sample of a counter-clockwise or clockwise face.
-    pub(crate) fn test(&self, counter_clockwise: bool, depth: [f32; 2], stencil: u8) -> Outcome {
+    pub(crate) fn test(&self, counter_clockwise: bool, depth: [f32; 2], stencil: u8) -> DepthStencilResult {
         let [new, stored] = depth;
         let nearer = self.depth.test.holds(new, stored);
-        let Some(both) = &self.stencil else { return Outcome { passes: nearer, stencil } };
+        let Some(both) = &self.stencil else { return DepthStencilResult { passes: nearer, stencil } };
         let face = if counter_clockwise { &both.front } else { &both.back };
         let inside = face.holds(stencil);
         let op = match (inside, nearer) {
@@ -368,7 +368,7 @@ impl DrawState {
             (true, false) => face.depth_fail,
             (true, true) => face.pass,
         };
-        Outcome { passes: inside && nearer, stencil: face.changed(op, stencil) }
+        DepthStencilResult { passes: inside && nearer, stencil: face.changed(op, stencil) }
     }
 }
 
@@ -437,9 +437,9 @@ mod tests {
         let op = |depth_fail| StencilFace { depth_fail, ..StencilFace::default() };
         let stencil = Stencil { front: op(StencilOp::DecrementWrap), back: op(StencilOp::IncrementWrap) };
         let state = DrawState { stencil: Some(stencil), ..DrawState::default() };
-        assert_eq!(state.test(false, [2.0, 1.0], 0), Outcome { passes: false, stencil: 1 });
-        assert_eq!(state.test(true, [2.0, 1.0], 1), Outcome { passes: false, stencil: 0 });
-        assert_eq!(state.test(true, [0.5, 1.0], 1), Outcome { passes: true, stencil: 1 });
+        assert_eq!(state.test(false, [2.0, 1.0], 0), DepthStencilResult { passes: false, stencil: 1 });
+        assert_eq!(state.test(true, [2.0, 1.0], 1), DepthStencilResult { passes: false, stencil: 0 });
+        assert_eq!(state.test(true, [0.5, 1.0], 1), DepthStencilResult { passes: true, stencil: 1 });
         assert!(!state.fails_without_effect() && state.reads_depth());
     }
 }

@@ -273,7 +273,7 @@ mod tests {
     use super::*;
     use crate::geometry::{Cull, MovingVertex};
     use crate::random::{mix, unit};
-    use crate::setup::{Outcome, set_up};
+    use crate::setup::{SetupResult, set_up};
 
     fn triangle(moving: bool) -> Triangle {
         let open = [[-40.0, -40.0, 4.0], [40.0, -30.0, 5.0], [0.0, 50.0, 6.0]];
@@ -282,7 +282,7 @@ mod tests {
             close: if moving { [x + 3.0, y - 1.0, w + 0.5] } else { [x, y, w] },
         });
         match set_up(0, [&v[0], &v[1], &v[2]], Cull::None, &SHEAR, 0.1, [64.0; 2]) {
-            Outcome::Ready(triangle) => triangle,
+            SetupResult::Ready(triangle) => triangle,
             other => panic!("{other:?}"),
         }
     }

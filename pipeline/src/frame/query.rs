@@ -9,7 +9,7 @@ use super::{Draw, Gpu, PassError, RasterPass};
 use crate::depth::{Bounder, DepthBound, Pyramid, interval_madds, set_up_madds};
 use crate::geometry::{Cull, Geometry, MovingVertex, Projection};
 use crate::memory::{LINE_BYTES, Surface};
-use crate::setup::{Outcome, Triangle, bounds, madds, set_up};
+use crate::setup::{SetupResult, Triangle, bounds, madds, set_up};
 use crate::shader::{Lane, Shader, ShadingPoint};
 use crate::state::{Compare, DepthState, DrawState};
 use crate::traversal::{Box5, TileRect, narrow_counted};
@@ -127,7 +127,7 @@ impl<'a> IntervalQueries<'a> {
         let half_px = self.pyramid.viewport().half_px();
         answer.hidden = (0..).zip(FACES).all(|(id, corners)| {
             let three = corners.map(|corner| &vertices[corner as usize]);
-            let Outcome::Ready(triangle) = set_up(id, three, Cull::None, shear, near, half_px) else {
+            let SetupResult::Ready(triangle) = set_up(id, three, Cull::None, shear, near, half_px) else {
                 // A triangle without area is invisible.
                 return true;
             };

@@ -8,7 +8,7 @@ use crate::depth::{BoxGrid, DepthSpec};
 use crate::geometry::Viewport;
 use crate::memory::{Cache, CacheError, CacheSpec, MemorySpec};
 use crate::sampling::SampleSource;
-use crate::traversal::Timeline;
+use crate::traversal::TimePieces;
 
 /// Functional parameters of the hardware: sizes that decide *what* happens. Throughput belongs to the timing
 /// models.
@@ -185,7 +185,7 @@ impl PipelineSpec {
         let reuse = self.vertex_reuse;
         size("vertex_reuse", reuse, (1..=4096).contains(&reuse), "it has to be 1 to 4096")?;
         let Features { facing_splits, still_px, in_focus_px, .. } = self.features;
-        let max = Timeline::MAX_SPLITS;
+        let max = TimePieces::MAX_SPLITS;
         size("features.facing_splits", facing_splits, facing_splits <= max, "it has to be 0 to 3")?;
         for (field, value) in [("features.still_px", still_px), ("features.in_focus_px", in_focus_px)] {
             if !(0.0..=MAX_THRESHOLD_PX).contains(&value) {

@@ -21,9 +21,9 @@ struct TestRecord {
     nonempty: Mean,
 }
 
-/// Outcome of one test of one triangle in one tile.
+/// Result of one test of one triangle in one tile.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Outcome {
+pub(super) struct TestResult {
     /// Multiply-adds.
     pub madds: u32,
     /// Samples before the test.
@@ -151,7 +151,7 @@ impl TestSelector {
     }
 
     /// Record the outcome of the last test of a plan.
-    pub fn record(&mut self, workload: &Workload, plan: TestPlan, outcome: &Outcome) {
+    pub fn record(&mut self, workload: &Workload, plan: TestPlan, outcome: &TestResult) {
         let records = &mut self.plans[usize::from(workload.tiles.is_some())][usize::from(workload.moving)];
         let record = &mut records[plan.0 as usize];
         record.madds.add(f64::from(outcome.madds), 1.0);
@@ -386,7 +386,7 @@ mod tests {
                 selector.record(
                     &WORKLOAD,
                     plan,
-                    &Outcome { madds, samples: WORKLOAD.samples, kept: kept(plan) },
+                    &TestResult { madds, samples: WORKLOAD.samples, kept: kept(plan) },
                 );
             }
             selector.record_exploration(&WORKLOAD, 1_000_000_000);

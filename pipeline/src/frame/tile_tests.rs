@@ -2,13 +2,13 @@
 
 use super::bin::TileWork;
 use super::settings::Features;
-use super::test_selection::{Outcome, TestPlan, TestSelector, Workload};
+use super::test_selection::{TestResult, TestPlan, TestSelector, Workload};
 use crate::geometry::Shear;
 use crate::sample_test;
 use crate::setup::Triangle;
 use crate::traversal::{
     self, Box5, EdgeBounds, Edges, Facing, LensLines, LensSpan, LensSpans, Piece, SCREEN_GAIN_MADDS as GAIN,
-    Screen, TileRect, Timeline, View, narrow_counted,
+    Screen, TileRect, TimePieces, View, narrow_counted,
 };
 
 /// A triangle with the results of its set-up.
@@ -40,7 +40,7 @@ pub(super) struct TestContext<'a> {
 #[derive(Clone, Copy)]
 pub(super) struct Remaining {
     pub within: Box5,
-    pub times: Timeline,
+    pub times: TimePieces,
     /// Remaining regions of the lens, if they are tested each on their own.
     spans: Option<LensSpans>,
     edges: Option<Edges>,
@@ -55,7 +55,7 @@ impl Remaining {
     pub fn all(within: Box5) -> Self {
         Self {
             within,
-            times: Timeline::one(Piece { t: within.t, faces: [true; 2] }),
+            times: TimePieces::one(Piece { t: within.t, faces: [true; 2] }),
             spans: None,
             edges: None,
             facing: false,
@@ -74,7 +74,7 @@ impl Remaining {
             Some(spans) => spans.within(&within).map(|(spans, hull)| (Some(spans), hull))?,
             None => (None, within),
         };
-        let times = self.times.meet(&Timeline::one(Piece { t: within.t, faces: [true; 2] }));
+        let times = self.times.meet(&TimePieces::one(Piece { t: within.t, faces: [true; 2] }));
         Some(Self {
             within: Box5 { t: times.hull()?, ..within },
             times,
@@ -191,7 +191,7 @@ impl Subject<'_> {
         context.selector.record(
             workload,
             plan,
-            &Outcome { madds: context.work.tile_madds() - madds, samples, kept },
+            &TestResult { madds: context.work.tile_madds() - madds, samples, kept },
         );
         narrowed
     }

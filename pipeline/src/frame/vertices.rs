@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::Features;
 use super::pass::{Draw, Pass, Staged};
 use super::replay::Replay;
-use crate::setup::{Outcome, PixelRect, Triangle, bounds, is_flat, madds, set_up};
+use crate::setup::{SetupResult, PixelRect, Triangle, bounds, is_flat, madds, set_up};
 use crate::traversal::{self, Box5, LensLines, thresholds};
 
 /// A triangle for traversal, with the pixels it may touch.
@@ -60,7 +60,7 @@ pub(super) fn front_end(
     outcomes.into_iter().filter_map(|(_, ready)| ready).collect()
 }
 
-/// Outcome of a triangle as an event, and the triangle if it is kept.
+/// Result of a triangle as an event, and the triangle if it is kept.
 fn outcome(pass: &Pass<'_>, id: u32) -> (Event, Option<Ready>) {
     let viewport = pass.settings.viewport;
     let Draw { geometry, state, .. } = &pass.draws[pass.locate(id).0];
@@ -72,10 +72,10 @@ fn outcome(pass: &Pass<'_>, id: u32) -> (Event, Option<Ready>) {
         return (Event::TrianglesOutside, None);
     }
     match set_up(id, vertices.each_ref(), state.cull, &shear, near, viewport.half_px()) {
-        Outcome::Degenerate => (Event::TrianglesDegenerate, None),
-        Outcome::Outside => (Event::TrianglesOutside, None),
-        Outcome::FaceCulled => (Event::TrianglesFaceCulled, None),
-        Outcome::Ready(triangle) => {
+        SetupResult::Degenerate => (Event::TrianglesDegenerate, None),
+        SetupResult::Outside => (Event::TrianglesOutside, None),
+        SetupResult::FaceCulled => (Event::TrianglesFaceCulled, None),
+        SetupResult::Ready(triangle) => {
             let pixels = bounds(&triangle, &shear, viewport);
             let wanted = lens && pass.settings.spec.features.lens_lines;
             let lines = wanted.then(|| LensLines::new(&triangle, &shear, near));

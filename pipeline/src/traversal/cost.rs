@@ -57,7 +57,7 @@ mod tests {
     use super::super::*;
     use super::*;
     use crate::geometry::{Cull, MovingVertex, Shear};
-    use crate::setup::{Outcome, Triangle, set_up};
+    use crate::setup::{SetupResult, Triangle, set_up};
 
     const SHEAR: Shear = Shear::new([90.0, -90.0], [15.0, -15.0]);
 
@@ -69,7 +69,7 @@ mod tests {
         ]
         .map(|(open, close)| MovingVertex { open, close: if moving { close } else { open } });
         match set_up(0, [&v[0], &v[1], &v[2]], Cull::None, shear, 0.1, [64.0; 2]) {
-            Outcome::Ready(triangle) => triangle,
+            SetupResult::Ready(triangle) => triangle,
             other => panic!("{other:?}"),
         }
     }
@@ -94,7 +94,7 @@ mod tests {
             let (madds, bounds) = count(|| EdgeBounds::new(&edges));
             println!("bounds {moving} {lens} {madds}");
             assert_eq!(madds, edge_bound_madds(moving, lens), "bounds {moving} {lens}");
-            let times = Timeline::one(Piece { t: within.t, faces: [true; 2] });
+            let times = TimePieces::one(Piece { t: within.t, faces: [true; 2] });
             let (madds, (_, more)) = count(|| bounds.timeline(&edges, &times, [true; 2]));
             println!("narrow {moving} {lens} {madds} {more}");
             assert!(madds <= more, "{madds} > {more}");

@@ -21,7 +21,7 @@
 //! way; the form relative to the middle of the box is new here.)
 
 use super::number::{Number, Quadratic};
-use super::region::{Faces, Piece, Timeline};
+use super::region::{Faces, Piece, TimePieces};
 use super::{View, cost};
 
 /// Edges of a triangle over a box; edge `k` is opposite vertex `k`.
@@ -173,8 +173,8 @@ impl<N: Number> EdgeBounds<N> {
 
     /// The same for each piece of `times`, for the `drawn` faces; `edges` are those bounded. The second
     /// result is the cost in multiply-adds beyond those of the edges themselves.
-    pub fn timeline(&self, edges: &Edges<N>, times: &Timeline, drawn: Faces) -> (Timeline, u32) {
-        let (mut left, mut madds) = (Timeline::empty(), 0);
+    pub fn timeline(&self, edges: &Edges<N>, times: &TimePieces, drawn: Faces) -> (TimePieces, u32) {
+        let (mut left, mut madds) = (TimePieces::empty(), 0);
         for piece in times.pieces() {
             let part = if edges.spans(piece.t) {
                 [N::zero(), N::from(1.0)]
@@ -309,7 +309,7 @@ mod tests {
         let (mut r, mut culled, mut shrunk) = (Uniform::new(4), 0, 0);
         for (seed, case) in cases(400) {
             let edges = Edges::<f64>::new(View::new(&case.triangle, &case.shear, &case.tile, &case.within));
-            let whole = Timeline::one(Piece { t: case.within.t, faces: [true; 2] });
+            let whole = TimePieces::one(Piece { t: case.within.t, faces: [true; 2] });
             for drawn in [[true, true], [true, false], [false, true]] {
                 let (left, _) = EdgeBounds::new(&edges).timeline(&edges, &whole, drawn);
                 culled += u32::from(left.hull().is_none());

@@ -20,7 +20,7 @@
 
 use super::edges::Edges;
 use super::number::Number;
-use super::region::{Faces, Piece, Timeline};
+use super::region::{Faces, Piece, TimePieces};
 
 /// Bounds of the determinant over a box: its lowest and highest Bernstein coefficients.
 #[derive(Clone, Copy, Debug)]
@@ -71,9 +71,9 @@ impl<N: Number> Facing<N> {
 
     /// The parts of the times `t` in which one of the faces `drawn` may be visible. Undecided time is
     /// bisected up to `splits` times. The second result is the number of bisections.
-    pub fn timeline(&self, t: [f32; 2], drawn: Faces, splits: u32) -> (Timeline, u32) {
-        let (mut timeline, mut done) = (Timeline::empty(), 0);
-        let splits = if self.moving { splits.min(Timeline::MAX_SPLITS) } else { 0 };
+    pub fn timeline(&self, t: [f32; 2], drawn: Faces, splits: u32) -> (TimePieces, u32) {
+        let (mut timeline, mut done) = (TimePieces::empty(), 0);
+        let splits = if self.moving { splits.min(TimePieces::MAX_SPLITS) } else { 0 };
         self.bisect([t[0], t[1], t[1]], drawn, splits, &mut timeline, &mut done);
         (timeline, done)
     }
@@ -85,7 +85,7 @@ impl<N: Number> Facing<N> {
         [start, end, last]: [f32; 3],
         drawn: Faces,
         splits: u32,
-        out: &mut Timeline,
+        out: &mut TimePieces,
         done: &mut u32,
     ) {
         let piece = Piece { t: [start, last], faces: self.faces() };
@@ -204,7 +204,7 @@ mod tests {
     #[test]
     fn a_turn_in_the_middle_of_the_shutter_is_found_by_cutting_there() {
         use crate::geometry::{Cull, MovingVertex, Shear};
-        use crate::setup::{Outcome, set_up};
+        use crate::setup::{SetupResult, set_up};
         use crate::traversal::{Box5, TileRect};
         let still = |p| MovingVertex { open: p, close: p };
         let v = [
@@ -213,7 +213,7 @@ mod tests {
             MovingVertex { open: [8.0, 4.0, 1.0], close: [-8.0, 4.0, 1.0] },
         ];
         let shear = Shear::default();
-        let Outcome::Ready(triangle) = set_up(0, v.each_ref(), Cull::None, &shear, 0.1, [8.0; 2]) else {
+        let SetupResult::Ready(triangle) = set_up(0, v.each_ref(), Cull::None, &shear, 0.1, [8.0; 2]) else {
             panic!("the triangle is visible");
         };
         let tile = TileRect { x: [0.0, 8.0], y: [0.0, 8.0] };
@@ -235,7 +235,7 @@ mod tests {
     #[test]
     fn a_triangle_that_turns_and_turns_back_is_not_decided_by_its_ends() {
         use crate::geometry::{Cull, MovingVertex, Shear};
-        use crate::setup::{Outcome, set_up};
+        use crate::setup::{SetupResult, set_up};
         use crate::traversal::{Box5, TileRect};
         // Its area is proportional to (1 - 3 t) (2 - 3 t), negative in the middle third only.
         let v = [
@@ -247,7 +247,7 @@ mod tests {
         let shear = Shear::default();
         for order in [[0, 1, 2], [0, 2, 1]] {
             let corners = order.map(|k: usize| &v[k]);
-            let Outcome::Ready(triangle) = set_up(0, corners, Cull::None, &shear, 0.1, [8.0; 2]) else {
+            let SetupResult::Ready(triangle) = set_up(0, corners, Cull::None, &shear, 0.1, [8.0; 2]) else {
                 panic!("the triangle is visible");
             };
             let tile = TileRect { x: [0.0, 8.0], y: [0.0, 8.0] };

@@ -213,13 +213,13 @@ mod tests {
     #[test]
     fn a_point_at_one_depth_has_one_line() {
         use crate::geometry::{Cull, MovingVertex};
-        use crate::setup::{Outcome, set_up};
+        use crate::setup::{SetupResult, set_up};
         // At twice the focus depth of 6 the circle of confusion has the radius a - s / w = 15 - 90 / 12 =
         // 7.5.
         let shear = Shear::new([90.0, -90.0], [15.0, -15.0]);
         let v = [[0.0, 0.0, 12.0], [12.0, 0.0, 12.0], [0.0, 12.0, 12.0]]
             .map(|p| MovingVertex { open: p, close: p });
-        let Outcome::Ready(triangle) = set_up(0, v.each_ref(), Cull::None, &shear, 0.1, [64.0; 2]) else {
+        let SetupResult::Ready(triangle) = set_up(0, v.each_ref(), Cull::None, &shear, 0.1, [64.0; 2]) else {
             panic!("the triangle is visible");
         };
         let [[low, high], _] = LensLines::<f64>::new(&triangle, &shear, 0.1).axes;

@@ -96,12 +96,12 @@ impl Piece {
 
 /// Pieces of time in order.
 #[derive(Clone, Copy, Debug)]
-pub struct Timeline {
+pub struct TimePieces {
     pieces: [Piece; Self::MAX],
     len: usize,
 }
 
-impl Timeline {
+impl TimePieces {
     /// Largest number of pieces.
     pub const MAX: usize = 8;
     /// Largest number of time bisections.
@@ -330,13 +330,13 @@ mod tests {
 
     #[test]
     fn a_full_timeline_grows_rather_than_forgets() {
-        let mut timeline = Timeline::empty();
+        let mut timeline = TimePieces::empty();
         for k in 0..12_u8 {
             let t = f32::from(k);
             timeline.push(Piece { t: [t, t + 0.5], faces: [k % 2 == 0, k % 2 == 1] });
         }
-        assert_eq!(timeline.pieces().len(), Timeline::MAX);
+        assert_eq!(timeline.pieces().len(), TimePieces::MAX);
         assert_eq!(timeline.hull(), Some([0.0, 11.5]));
-        assert_eq!(timeline.pieces()[Timeline::MAX - 1].faces, [true; 2]);
+        assert_eq!(timeline.pieces()[TimePieces::MAX - 1].faces, [true; 2]);
     }
 }

@@ -3,7 +3,7 @@
 use super::{Box5, TileRect};
 use crate::geometry::{Cull, MovingVertex, Shear};
 use crate::random::mix;
-use crate::setup::{Outcome, Triangle, set_up};
+use crate::setup::{SetupResult, Triangle, set_up};
 
 pub const NEAR: f32 = 0.25;
 
@@ -75,7 +75,7 @@ pub fn case(seed: u64, moving: bool, lens: bool, parallel: bool) -> Case {
     };
     let within = Box5 { u: range(-1.0, 1.0), v: range(-1.0, 1.0), t: range(0.0, 1.0), lens };
     match set_up(0, [&v[0], &v[1], &v[2]], Cull::None, &shear, NEAR, [64.0; 2]) {
-        Outcome::Ready(triangle) => Case { triangle, shear, tile, within },
+        SetupResult::Ready(triangle) => Case { triangle, shear, tile, within },
         _ => case(seed + 1_000_003, moving, lens, parallel),
     }
 }

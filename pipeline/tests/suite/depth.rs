@@ -4,7 +4,7 @@
 use crate::common::case::{Case, Setting, setting};
 use crate::common::*;
 use pipeline::depth::{Bounder, DepthBound};
-use pipeline::setup::{Outcome, Triangle};
+use pipeline::setup::{SetupResult, Triangle};
 use pipeline::traversal::{Box5, TileRect};
 use pipeline::*;
 
@@ -63,7 +63,7 @@ fn no_depth_of_the_sample_test_is_outside() {
             let (moving, lens, parallel) = (on(0), on(1), on(5));
             let case = Case { moving, lens, parallel, behind: on(2), far: on(3), sliver: on(4), scale };
             let setting = setting(case, seed * 64 + u64::from(flags));
-            let Outcome::Ready(triangle) = setting.probe.set_up(setting.triangle, Cull::None) else {
+            let SetupResult::Ready(triangle) = setting.probe.set_up(setting.triangle, Cull::None) else {
                 continue;
             };
             let mut r = Uniform::new(seed);
@@ -118,7 +118,7 @@ fn no_depth_is_outside_the_interval_of_its_own_sample() {
                 1 => flattened(triangle),
                 _ => thinned(triangle, &mut r),
             };
-            let Outcome::Ready(triangle) = probe.set_up(triangle, Cull::None) else { continue };
+            let SetupResult::Ready(triangle) = probe.set_up(triangle, Cull::None) else { continue };
             let bounders = DepthBound::ALL.map(|bound| Bounder::new(&triangle, &probe.shear, bound));
             let (seen, _) = probe.test(&triangle, &probe.whole());
             for (slot, depth) in seen.into_iter().enumerate() {
@@ -166,7 +166,7 @@ fn no_depth_is_outside_where_the_triangle_turns_over() {
             for slot in 0..probe.samples.len {
                 let t = probe.samples.t[slot];
                 let turning = turning_over_at(t, [a, b], &mut r);
-                let Outcome::Ready(triangle) = probe.set_up(turning, Cull::None) else { continue };
+                let SetupResult::Ready(triangle) = probe.set_up(turning, Cull::None) else { continue };
                 let s = &probe.samples;
                 let point = |value: f32| [value; 2];
                 let tile = TileRect { x: point(s.x[slot]), y: point(s.y[slot]) };

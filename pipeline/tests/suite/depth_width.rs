@@ -5,7 +5,7 @@
 use crate::common::Uniform;
 use pipeline::conservative::{MovingTriangle, Rasterizer, Rect, Region, View};
 use pipeline::depth::{Bounder, DepthBound};
-use pipeline::setup::{Outcome, Triangle, set_up};
+use pipeline::setup::{SetupResult, Triangle, set_up};
 use pipeline::traversal::{Box5, TileRect, narrow};
 use pipeline::*;
 
@@ -90,7 +90,7 @@ fn mean_widths(motion: Motion, lens: bool, count: u32) -> [f64; 6] {
     let (mut sums, mut tiles) = ([0.0; 6], 0);
     while tiles < count {
         let v = random(motion, &mut r);
-        let Outcome::Ready(triangle) = set_up(0, [&v[0], &v[1], &v[2]], Cull::None, &shear, NEAR, [40.0; 2])
+        let SetupResult::Ready(triangle) = set_up(0, [&v[0], &v[1], &v[2]], Cull::None, &shear, NEAR, [40.0; 2])
         else {
             continue;
         };

@@ -3,7 +3,7 @@
 use crate::common::*;
 use glam::Vec3;
 use pipeline::sampling::Sample;
-use pipeline::setup::{Outcome, Triangle};
+use pipeline::setup::{SetupResult, Triangle};
 use pipeline::traversal::Box5;
 use pipeline::*;
 use proptest::prelude::*;
@@ -21,7 +21,7 @@ fn random_triangle(r: &mut Uniform, moving: bool) -> [MovingVertex; 3] {
 
 fn ready(probe: &Probe, vertices: [MovingVertex; 3]) -> Option<Triangle> {
     match probe.set_up(vertices, Cull::None) {
-        Outcome::Ready(triangle) => Some(triangle),
+        SetupResult::Ready(triangle) => Some(triangle),
         _ => None,
     }
 }

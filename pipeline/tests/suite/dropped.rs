@@ -2,7 +2,7 @@
 
 use crate::common::case::*;
 use crate::common::*;
-use pipeline::setup::Outcome;
+use pipeline::setup::SetupResult;
 use pipeline::*;
 
 /// Triangles dropped by set-up have no visible sample.
@@ -30,7 +30,7 @@ fn set_up_drops_nothing_that_a_sample_sees() {
             *vertex = MovingVertex { open, close: open };
         }
         for cull in [Cull::Back, Cull::Front] {
-            let (Outcome::FaceCulled | Outcome::Outside, Outcome::Ready(mut ready)) =
+            let (SetupResult::FaceCulled | SetupResult::Outside, SetupResult::Ready(mut ready)) =
                 (probe.set_up(triangle, cull), probe.set_up(triangle, Cull::None))
             else {
                 continue;
@@ -64,7 +64,7 @@ fn set_up_drops_nothing_seen_close_to_the_camera_plane() {
         };
         let triangle = [0, 1, 2].map(|k| MovingVertex { open: corner(k), close: corner(k) });
         for cull in [Cull::Back, Cull::Front] {
-            let (Outcome::FaceCulled, Outcome::Ready(mut ready)) =
+            let (SetupResult::FaceCulled, SetupResult::Ready(mut ready)) =
                 (probe.set_up(triangle, cull), probe.set_up(triangle, Cull::None))
             else {
                 continue;

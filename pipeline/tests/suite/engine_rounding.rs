@@ -7,7 +7,7 @@ use glam::Vec3;
 use pipeline::geometry::Projection;
 use pipeline::sample_test::{Hits, Target, test_run};
 use pipeline::sampling::{Sample, SampleSource, TileSamples};
-use pipeline::setup::{Outcome, Triangle, set_up};
+use pipeline::setup::{SetupResult, Triangle, set_up};
 use pipeline::traversal::Box5;
 use pipeline::visibility::{SampleLayout, Visibility, resolve};
 use pipeline::*;
@@ -172,7 +172,7 @@ impl Scene {
         let half_px = self.viewport.half_px();
         let ready = set_up(id, v.each_ref(), Cull::None, &self.projection.shear, NEAR, half_px);
         let faces = [self.case.cull != Cull::Back, self.case.cull != Cull::Front];
-        if let Outcome::Ready(ready) = ready { Some(Triangle { faces, ..ready }) } else { None }
+        if let SetupResult::Ready(ready) = ready { Some(Triangle { faces, ..ready }) } else { None }
     }
 
     /// Number of samples that see a face turned away from them, because of rounding.

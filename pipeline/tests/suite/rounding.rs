@@ -5,7 +5,7 @@
 use crate::common::case::{Case, NEAR, cases, setting};
 use crate::common::*;
 use pipeline::sample_test::{Hits, SampleTest, Target, Width};
-use pipeline::setup::{Outcome, Triangle};
+use pipeline::setup::{SetupResult, Triangle};
 use pipeline::traversal::*;
 use pipeline::*;
 use proptest::prelude::*;
@@ -20,7 +20,7 @@ fn hold(case: Case, seed: u64) -> Found {
     let setting = setting(case, seed);
     let probe = &setting.probe;
     let mut found = Found { hits: 0, beyond: 0 };
-    let Outcome::Ready(triangle) = probe.set_up(setting.triangle, Cull::None) else { return found };
+    let SetupResult::Ready(triangle) = probe.set_up(setting.triangle, Cull::None) else { return found };
     let near = NEAR * libm::exp2f(case.scale as f32);
     let lines = LensLines::<f64>::new(&triangle, &probe.shear, near);
     let (seen, _) = probe.test(&triangle, &probe.whole());
@@ -66,7 +66,7 @@ fn edges_keep(triangle: &Triangle, probe: &Probe, tile: &TileRect, within: &Box5
         }
         let (times, _) = Facing::new(&edges).timeline(within.t, drawn, 3);
         assert!(times.hull().is_some(), "facing {drawn:?}: {context}");
-        let whole = Timeline::one(Piece { t: within.t, faces: [true; 2] });
+        let whole = TimePieces::one(Piece { t: within.t, faces: [true; 2] });
         for faces in [drawn, [true; 2]] {
             let (left, _) = EdgeBounds::new(&edges).timeline(&edges, &whole, faces);
             assert!(left.hull().is_some(), "edge bounds {faces:?}: {context}");

@@ -4,7 +4,7 @@
 use crate::common::*;
 use pipeline::sample_test::exact::seen_in_tile;
 use pipeline::sampling::Sample;
-use pipeline::setup::Outcome;
+use pipeline::setup::SetupResult;
 use pipeline::*;
 
 /// Dominant term: vertex position, image position, lens at depth zero, lens per unit of depth.
@@ -58,7 +58,7 @@ fn worst(large: Large, moving: bool, parallel: bool) -> f64 {
     let mut worst = 0.0_f64;
     for seed in 0..400 {
         let Setting { probe, triangle } = setting(&mut Uniform::new(seed), large, moving, parallel, seed);
-        let Outcome::Ready(ready) = probe.set_up(triangle, Cull::None) else { continue };
+        let SetupResult::Ready(ready) = probe.set_up(triangle, Cull::None) else { continue };
         for slot in 0..probe.samples.len {
             let position = probe.at(slot);
             let seen = seen_in_tile(&ready.corners, &probe.samples, slot);

@@ -3,7 +3,7 @@
 use crate::common::*;
 use pipeline::sample_test::{Hits, SampleTest, Target, Width};
 use pipeline::sampling::TileSamples;
-use pipeline::setup::{Outcome, set_up};
+use pipeline::setup::{SetupResult, set_up};
 use pipeline::traversal::Box5;
 use pipeline::*;
 
@@ -21,7 +21,7 @@ fn hits_at(width: Width, kind: Kind, Optics { lens, parallel }: Optics) -> (Vec<
         let v = corners
             .map(|c| c as usize)
             .map(|c| MovingVertex { open: image(soup.open[c]), close: image(soup.close[c]) });
-        let Outcome::Ready(ready) =
+        let SetupResult::Ready(ready) =
             set_up(id as u32, [&v[0], &v[1], &v[2]], Cull::None, &shear, 0.25, [32.0; 2])
         else {
             continue;

@@ -6,7 +6,7 @@ use power_model::Part;
 use super::{Outcome, RunFrame, stalls};
 use output::MeanSd;
 use output::plot::{
-    FrameEnergy, FrameEnergyPoint, FramePower, Picture, PowerPart, PowerRun, UnitLane, UnitPlot,
+    FrameEnergyPlot, FrameEnergyPoint, FramePowerPlot, Picture, PowerPart, PowerRun, UnitLane, UnitPlot,
 };
 
 /// A plot with its file name and caption.
@@ -101,7 +101,7 @@ fn frame_power(outcome: &Outcome, subject: &str, (place, frame): (usize, &RunFra
         .collect();
     let watts = frame.power.watts();
     let parts = parts_in_use(outcome).into_iter().filter(|part| *part != Part::Idle);
-    FramePower {
+    FramePowerPlot {
         subject,
         frame: u64::from(frame.index),
         bin_s: frame.power.bin_s(),
@@ -140,7 +140,7 @@ fn frame_energy(outcome: &Outcome, subject: &str) -> Picture {
             true_j: Some(row.energy_j),
         })
         .collect();
-    FrameEnergy {
+    FrameEnergyPlot {
         subject,
         frames: &frames,
         measured_j: MeanSd::of(outcome.measurement.frames.iter().map(|frame| frame.energy_j)),

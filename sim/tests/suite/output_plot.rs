@@ -1,6 +1,6 @@
 //! Plots as files: real text in SVG, letters without any system font in PNG, the same bytes every time.
 
-use output::plot::{FrameEnergy, FrameEnergyPoint, Look, Picture, PowerRun};
+use output::plot::{FrameEnergyPlot, FrameEnergyPoint, Look, Picture, PowerRun};
 use output::{Claim, Destination};
 
 fn picture(subject: &str, power_w: &[f64]) -> Picture {
@@ -69,7 +69,7 @@ fn the_same_input_gives_the_same_bytes_on_any_thread() {
 
 #[test]
 fn an_empty_plot_says_so() {
-    let empty = FrameEnergy { subject: "tiny", frames: &[], measured_j: None, pixels: 1 };
+    let empty = FrameEnergyPlot { subject: "tiny", frames: &[], measured_j: None, pixels: 1 };
     assert!(empty.picture(&Look::default()).svg().unwrap().contains("no frames to show"));
     assert!(picture("tiny", &[]).svg().unwrap().contains("no samples to show"));
 }
@@ -78,7 +78,7 @@ fn an_empty_plot_says_so() {
 fn the_second_axis_is_energy_per_pixel() {
     let frames =
         [0.5, 0.6].map(|energy| FrameEnergyPoint { frame: 0, measured_j: Some(energy), true_j: None });
-    let plot = FrameEnergy { subject: "tiny", frames: &frames, measured_j: None, pixels: 1_000_000 };
+    let plot = FrameEnergyPlot { subject: "tiny", frames: &frames, measured_j: None, pixels: 1_000_000 };
     let svg = plot.picture(&Look::default()).svg().unwrap();
     assert!(svg.contains("energy per frame (mJ)") && svg.contains("energy per pixel (nJ)"));
 }

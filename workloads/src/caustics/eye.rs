@@ -4,7 +4,7 @@ use glam::{Affine3A, DAffine3, DMat3, DVec3};
 use pipeline::geometry::Projection;
 use pipeline::{Camera, Cull, MovingVertex, Shear, Viewport};
 
-use pipeline::setup::{Outcome, Triangle, set_up};
+use pipeline::setup::{SetupResult, Triangle, set_up};
 
 use super::Beam;
 
@@ -98,7 +98,7 @@ impl Eye {
             [0, 1, 2].map(|k| self.projection.vertex(beam.open[k].as_vec3(), beam.close[k].as_vec3()));
         let [a, b, c]: [&MovingVertex; 3] = vertices.each_ref();
         let half_px = self.viewport.half_px();
-        let Outcome::Ready(triangle) = set_up(0, [a, b, c], Cull::None, self.shear(), NEAR, half_px) else {
+        let SetupResult::Ready(triangle) = set_up(0, [a, b, c], Cull::None, self.shear(), NEAR, half_px) else {
             return None;
         };
         let ends = triangle.corners.map(|corner| {

@@ -12,7 +12,7 @@ pub use builder::Soup;
 use pipeline::geometry::Projection;
 use pipeline::sample_test::{Hits, Target, test_run};
 use pipeline::sampling::{SampleSource, TableError, TileSamples};
-use pipeline::setup::{Outcome, Triangle, set_up};
+use pipeline::setup::{SetupResult, Triangle, set_up};
 use pipeline::traversal::{Box5, TileRect};
 use pipeline::{
     Camera, CameraError, Cull, Draw, DrawError, Geometry, LensShape, SampleTable, Shader, Viewport,
@@ -156,7 +156,7 @@ pub fn set_up_all<'a>(
             projection.near,
             viewport.half_px(),
         ) {
-            Outcome::Ready(triangle) => Some(triangle),
+            SetupResult::Ready(triangle) => Some(triangle),
             _ => None,
         }
     })

@@ -10,7 +10,7 @@ use pipeline::depth::DepthSpec;
 use pipeline::random::mix;
 use pipeline::sample_test::{Hits, Target, test_run};
 use pipeline::sampling::{Sample, TileSamples};
-use pipeline::setup::{Outcome, Triangle, set_up};
+use pipeline::setup::{SetupResult, Triangle, set_up};
 use pipeline::traversal::Box5;
 use pipeline::*;
 pub use probe::{Probe, SamplePosition, repeated, sample_positions, weight};
@@ -259,7 +259,7 @@ pub fn every_tile(
         let v = soup.triangles[id].map(vertex);
         let half = [0.5 * viewport.width() as f32, 0.5 * viewport.height() as f32];
         match set_up(id as u32, [&v[0], &v[1], &v[2]], cull, &shear, 0.25, half) {
-            Outcome::Ready(ready) => Some(Triangle { moving: true, ..ready }),
+            SetupResult::Ready(ready) => Some(Triangle { moving: true, ..ready }),
             _ => None,
         }
     };

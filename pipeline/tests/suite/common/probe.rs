@@ -2,7 +2,7 @@
 
 use pipeline::sample_test::{Hits, Target, test_run};
 use pipeline::sampling::{Sample, TileSamples};
-use pipeline::setup::{Corner, Outcome, Triangle, set_up};
+use pipeline::setup::{Corner, SetupResult, Triangle, set_up};
 use pipeline::traversal::Box5;
 use pipeline::*;
 
@@ -37,7 +37,7 @@ impl Probe {
         }
     }
 
-    pub fn set_up(&self, v: [MovingVertex; 3], cull: Cull) -> Outcome {
+    pub fn set_up(&self, v: [MovingVertex; 3], cull: Cull) -> SetupResult {
         set_up(7, [&v[0], &v[1], &v[2]], cull, &self.shear, self.near, self.half_px)
     }
 
@@ -60,7 +60,7 @@ impl Probe {
     /// Depth of every sample that sees the triangle with these vertices.
     pub fn see(&self, v: [MovingVertex; 3], cull: Cull) -> Vec<Option<f32>> {
         match self.set_up(v, cull) {
-            Outcome::Ready(triangle) => self.test(&triangle, &self.whole()).0,
+            SetupResult::Ready(triangle) => self.test(&triangle, &self.whole()).0,
             _ => vec![None; self.samples.len],
         }
     }
@@ -70,7 +70,7 @@ impl Probe {
         let still = |open| MovingVertex { open, close: open };
         let any = [[0.0, 0.0, 64.0], [64.0, 0.0, 64.0], [0.0, 64.0, 64.0]].map(still);
         match (self.set_up(v, cull), self.set_up(any, Cull::None)) {
-            (Outcome::Degenerate, Outcome::Ready(ready)) => {
+            (SetupResult::Degenerate, SetupResult::Ready(ready)) => {
                 let triangle = Triangle {
                     corners: [0, 1, 2].map(|k| Corner::new(&v[k])),
                     moving: v.iter().any(|vertex| !vertex.is_still()),

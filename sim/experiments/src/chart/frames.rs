@@ -132,7 +132,7 @@ pub struct FramesRow {
     pub way: Way,
     /// Quality of the starts found.
     #[serde(flatten)]
-    pub outcome: Outcome,
+    pub outcome: FinderScore,
     /// Whether F1 is below [`FAILS_BELOW`].
     pub fails: bool,
 }
@@ -236,7 +236,7 @@ impl Study for FramesChart {
     /// Every method at each ratio of signal to noise, over all scenes.
     fn tradeoff(&self) -> Vec<TradeoffPoint> {
         let at = |snr_db: f64, way: Way| {
-            let mean = |of: fn(&Outcome) -> Option<f64>| self.mean(Axis::Noise, snr_db, way, of);
+            let mean = |of: fn(&FinderScore) -> Option<f64>| self.mean(Axis::Noise, snr_db, way, of);
             let cost = mean(|o| Some(o.host_s_per_1e6));
             let f1 =
                 mean(|o| Some(o.f1)).map(|f1| Metric::new("starts wrong or missed (1 - F1)", "", 1.0 - f1));
@@ -270,13 +270,13 @@ impl FramesChart {
     }
 
     /// The mean over scenes of what each has; `None` where none has it.
-    fn mean(&self, axis: Axis, value: f64, way: Way, of: fn(&Outcome) -> Option<f64>) -> Option<f64> {
+    fn mean(&self, axis: Axis, value: f64, way: Way, of: fn(&FinderScore) -> Option<f64>) -> Option<f64> {
         let values: Vec<f64> = self.at(axis, value, way).filter_map(|row| of(&row.outcome)).collect();
         (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
     }
 
     /// A curve over the places of the values, without those at which nothing is known.
-    fn along(&self, axis: Axis, way: Way, of: fn(&Outcome) -> Option<f64>) -> Series {
+    fn along(&self, axis: Axis, way: Way, of: fn(&FinderScore) -> Option<f64>) -> Series {
         let means = self.values(axis).into_iter().map(|value| self.mean(axis, value, way, of)).enumerate();
         Series::curve(way.name(), means.filter_map(|(place, mean)| Some((place as f64, mean?))))
     }
@@ -291,7 +291,7 @@ impl FramesChart {
     }
 
     fn energy(&self, axis: Axis) -> ChartPanel {
-        let percent: fn(&Outcome) -> Option<f64> = |o| o.energy_error.map(|error| 100.0 * error);
+        let percent: fn(&FinderScore) -> Option<f64> = |o| o.energy_error.map(|error| 100.0 * error);
         let curves = Way::ALL.into_iter().map(|way| self.along(axis, way, percent)).collect();
         ChartPanel::new("", ["", "median energy error (%)"], curves)
     }
@@ -336,8 +336,8 @@ impl FramesChart {
             table = table.shown(way.name(), |(axis, value)| self.cell(*axis, *value, way), plain);
         }
         let energy = |axis, value| self.mean(axis, value, Way::Auto, |o| o.energy_error);
-        let flagged = |axis, value, flagged: fn(&Outcome) -> usize, all: fn(&Outcome) -> usize| {
-            let sum = |of: fn(&Outcome) -> usize| -> usize {
+        let flagged = |axis, value, flagged: fn(&FinderScore) -> usize, all: fn(&FinderScore) -> usize| {
+            let sum = |of: fn(&FinderScore) -> usize| -> usize {
                 self.at(axis, value, Way::Auto).map(|row| of(&row.outcome)).sum()
             };
             format!("{} of {}", sum(flagged), sum(all))
@@ -385,7 +385,7 @@ const HAND_S: [f64; 5] = [0.05e-3, -0.1e-3, 0.1e-3, 0.0, -0.05e-3];
 
 /// Quality of the starts found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Outcome {
+pub struct FinderScore {
     /// Harmonic mean of precision and recall of starts; of several analyses the mean.
     pub f1: f64,
     /// Median energy error of frames whose two ends were found, as a share; `None` where there is none.
@@ -416,7 +416,7 @@ impl Subject {
     }
 
     /// By each method, the outcome with each seed.
-    pub fn analyse(&self, recording: &Recording) -> Result<Vec<(Way, Vec<Outcome>)>, StudyError> {
+    pub fn analyse(&self, recording: &Recording) -> Result<Vec<(Way, Vec<FinderScore>)>, StudyError> {
         let mut of = Way::ALL.map(|way| (way, Vec::new()));
         for (seed, scene) in &self.scenes {
             let trace = scene.record(&Recording { seed: *seed, ..*recording })?;
@@ -429,7 +429,7 @@ impl Subject {
 }
 
 /// Marks some frames, finds the others and holds them against the truth.
-fn analyse(trace: &Trace, scene: &Scene, way: Way) -> Result<Outcome, StudyError> {
+fn analyse(trace: &Trace, scene: &Scene, way: Way) -> Result<FinderScore, StudyError> {
     let (count, method) = match way {
         Way::Squares => (1, Method::SumOfSquares),
         Way::Normalized => (1, Method::Normalized),
@@ -449,7 +449,7 @@ fn analyse(trace: &Trace, scene: &Scene, way: Way) -> Result<Outcome, StudyError
     let host_s = clock.elapsed().as_secs_f64();
     let frames = PowerIntegral::new(trace).frames(&found);
     let score = score(&frames, &scene.truth, TOLERANCE_S);
-    Ok(Outcome {
+    Ok(FinderScore {
         f1: score.f1(),
         energy_error: score.median_energy_error(),
         host_s_per_1e6: host_s * 1e6 / trace.samples() as f64,
@@ -458,11 +458,11 @@ fn analyse(trace: &Trace, scene: &Scene, way: Way) -> Result<Outcome, StudyError
 }
 
 /// How many frames are wrong and right, and how many of each carry a flag. The last one ends at the end mark and is left out.
-fn flagged(frames: &[FrameEnergy], scene: &Scene) -> Outcome {
+fn flagged(frames: &[FrameEnergy], scene: &Scene) -> FinderScore {
     let found_s: Vec<f64> = frames.iter().map(|frame| frame.start_s).collect();
     let truth_s: Vec<f64> = scene.truth.iter().map(|frame| frame.start_s).collect();
     let partner = true_beside_found(&found_s, &truth_s, TOLERANCE_S);
-    let mut outcome = Outcome::default();
+    let mut outcome = FinderScore::default();
     for (two, frame) in partner.windows(2).zip(frames) {
         let right = matches!(two, [Some(a), Some(b)] if *b == a + 1);
         let flagged = usize::from(frame.flags.has_low_confidence());
@@ -476,12 +476,12 @@ fn flagged(frames: &[FrameEnergy], scene: &Scene) -> Outcome {
 }
 
 /// Several as one: means of rates and errors, sums of counts.
-fn joined(outcomes: &[Outcome]) -> Outcome {
+fn joined(outcomes: &[FinderScore]) -> FinderScore {
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
-    let all = |of: fn(&Outcome) -> f64| mean(&outcomes.iter().map(of).collect::<Vec<_>>());
-    let sum = |of: fn(&Outcome) -> usize| outcomes.iter().map(of).sum();
+    let all = |of: fn(&FinderScore) -> f64| mean(&outcomes.iter().map(of).collect::<Vec<_>>());
+    let sum = |of: fn(&FinderScore) -> usize| outcomes.iter().map(of).sum();
     let errors: Vec<f64> = outcomes.iter().filter_map(|outcome| outcome.energy_error).collect();
-    Outcome {
+    FinderScore {
         f1: all(|o| o.f1),
         energy_error: (!errors.is_empty()).then(|| mean(&errors)),
         wrong: sum(|o| o.wrong),
@@ -532,9 +532,9 @@ mod tests {
 
     #[test]
     fn outcomes_are_joined_by_means_and_sums() {
-        let a = Outcome { f1: 0.5, energy_error: None, wrong: 2, right: 3, ..Outcome::default() };
+        let a = FinderScore { f1: 0.5, energy_error: None, wrong: 2, right: 3, ..FinderScore::default() };
         let b =
-            Outcome { f1: 1.0, energy_error: Some(0.1), wrong: 1, right_flagged: 4, ..Outcome::default() };
+            FinderScore { f1: 1.0, energy_error: Some(0.1), wrong: 1, right_flagged: 4, ..FinderScore::default() };
         let both = joined(&[a, b]);
         assert_eq!(
             (both.f1, both.energy_error, both.wrong, both.right, both.right_flagged),

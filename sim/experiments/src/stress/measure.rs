@@ -8,7 +8,7 @@ use pipeline::random::mix;
 use pipeline::sampling::SampleSource;
 use pipeline::setup::{Triangle, bounds};
 use pipeline::traversal::{
-    Box5, EdgeBounds, Edges, Facing, LensLines, Piece, TileRect, Timeline, View, narrow,
+    Box5, EdgeBounds, Edges, Facing, LensLines, Piece, TileRect, TimePieces, View, narrow,
 };
 use pipeline::{Camera, Draw, Features, PassError, PipelineSpec, RasterPass, Settings, Shear, Viewport};
 use run::{GpuSpec, RunError};
@@ -378,9 +378,9 @@ impl Place {
     }
 
     /// The times at which facing and edges let the triangle be seen.
-    fn times(&self, features: &Features, triangle: &Triangle, within: &Box5) -> Timeline {
+    fn times(&self, features: &Features, triangle: &Triangle, within: &Box5) -> TimePieces {
         let edges = Edges::<f64>::new(View::new(triangle, &self.shear, &self.tile, within));
-        let mut times = Timeline::one(Piece { t: within.t, faces: [true; 2] });
+        let mut times = TimePieces::one(Piece { t: within.t, faces: [true; 2] });
         if features.facing {
             times = Facing::new(&edges).timeline(within.t, triangle.faces, features.facing_splits).0;
         }

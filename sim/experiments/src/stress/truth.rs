@@ -317,14 +317,14 @@ fn clipped(corners: &[DVec3; 3], near: f64) -> ([DVec2; 4], usize) {
 
 #[cfg(test)]
 mod tests {
-    use pipeline::setup::{Outcome, set_up};
+    use pipeline::setup::{SetupResult, set_up};
     use pipeline::{Cull, MovingVertex};
 
     use super::*;
 
     fn truth(open: [[f32; 3]; 3], close: [[f32; 3]; 3], shear: Shear, tile: TileRect) -> Truth {
         let v = [0, 1, 2].map(|k| MovingVertex { open: open[k], close: close[k] });
-        let Outcome::Ready(triangle) = set_up(0, [&v[0], &v[1], &v[2]], Cull::None, &shear, 0.1, [64.0; 2])
+        let SetupResult::Ready(triangle) = set_up(0, [&v[0], &v[1], &v[2]], Cull::None, &shear, 0.1, [64.0; 2])
         else {
             panic!("the triangle is visible");
         };

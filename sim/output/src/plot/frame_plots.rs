@@ -23,7 +23,7 @@ pub struct PowerPart {
 
 /// Power of one frame over time.
 #[derive(Clone, Debug)]
-pub struct FramePower<'a> {
+pub struct FramePowerPlot<'a> {
     /// Scene, GPU and platform, for the line below the title.
     pub subject: &'a str,
     /// The number of the frame.
@@ -46,7 +46,7 @@ const MOST_BINS_OUTLINED: usize = 160;
 const LEGEND: f64 = 240.0;
 const BESIDE: f64 = 760.0;
 
-impl FramePower<'_> {
+impl FramePowerPlot<'_> {
     /// Draws stacked areas in the order of parts, power without activity first, and the samples over them.
     pub fn picture(&self, look: &Look) -> Picture {
         let title = format!("Power of frame {} by part", self.frame);
@@ -217,7 +217,7 @@ pub struct FrameEnergyPoint {
 
 /// Energy of each frame of a run.
 #[derive(Clone, Copy, Debug)]
-pub struct FrameEnergy<'a> {
+pub struct FrameEnergyPlot<'a> {
     /// Scene, GPU and platform, for the line below the title.
     pub subject: &'a str,
     /// The frames in order.
@@ -228,7 +228,7 @@ pub struct FrameEnergy<'a> {
     pub pixels: u64,
 }
 
-impl FrameEnergy<'_> {
+impl FrameEnergyPlot<'_> {
     /// Draws points and lines over frame numbers, with the mean and its band.
     pub fn picture(&self, look: &Look) -> Picture {
         let mut picture = Picture::titled(look, (1200.0, 300.0), ["Energy per frame", self.subject]);

@@ -4,8 +4,8 @@
 //! Plots of a run:
 //!
 //! - [`PowerRun`]: power over the whole run, with every spike.
-//! - [`FramePower`]: power of one frame over time, stacked by part.
-//! - [`FrameEnergy`]: energy of each frame, measured and true.
+//! - [`FramePowerPlot`]: power of one frame over time, stacked by part.
+//! - [`FrameEnergyPlot`]: energy of each frame, measured and true.
 //! - [`UnitPlot`]: how busy each unit was over one frame, or what it waited for.
 //! - [`HeatMapPlot`]: a value over the image.
 //!
@@ -37,7 +37,7 @@ mod text;
 pub use axis::{AxisSpec, Scale};
 pub use chart::Chart;
 pub use chart_panel::ChartPanel;
-pub use frame_plots::{FrameEnergy, FrameEnergyPoint, FramePower, PowerPart};
+pub use frame_plots::{FrameEnergyPlot, FrameEnergyPoint, FramePowerPlot, PowerPart};
 pub use heat_map::{HeatMapPlot, HeatTile, Shading};
 pub use lanes::{StallLane, UnitLane, UnitPlot};
 pub use matrix::{Matrix, MatrixPanel};

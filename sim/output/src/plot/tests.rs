@@ -105,7 +105,7 @@ fn frame_power(parts: usize, bins: usize, power: f64, bin_s: f64, look: &Look) -
     let part = |part: &Part| PowerPart { part: *part, power_w: vec![power; bins] };
     let parts = Part::ALL.iter().cycle().take(parts).map(part).collect();
     let samples = &[(0.001, 4.0), (f64::NAN, 1.0)];
-    FramePower { subject: "scene", frame: 3, bin_s, parts, samples, frame_j: Some(0.0163) }.picture(look)
+    FramePowerPlot { subject: "scene", frame: 3, bin_s, parts, samples, frame_j: Some(0.0163) }.picture(look)
 }
 
 #[test]
@@ -141,7 +141,7 @@ fn frame_energy_takes_anything() {
     for frames in cases {
         let measured_j = crate::MeanSd::of(frames.iter().filter_map(|frame| frame.measured_j));
         for pixels in [0, 921_600] {
-            check(|look| FrameEnergy { subject: "scene", frames, measured_j, pixels }.picture(look));
+            check(|look| FrameEnergyPlot { subject: "scene", frames, measured_j, pixels }.picture(look));
         }
     }
 }
@@ -308,7 +308,7 @@ fn a_unit_has_one_colour_in_every_plot() {
     for units in [&Unit::ALL[..], &few[..]] {
         let parts = units.iter().map(|&unit| PowerPart { part: Part::Unit(unit), power_w: vec![1.0; 4] });
         let parts = parts.collect();
-        let power = FramePower { subject: "s", frame: 0, bin_s: 1e-6, parts, samples: &[], frame_j: None };
+        let power = FramePowerPlot { subject: "s", frame: 0, bin_s: 1e-6, parts, samples: &[], frame_j: None };
         let busy = units.iter().map(|unit| UnitLane { name: unit.name(), busy: vec![0.0; 4] }).collect();
         let busy = UnitPlot { subject: "s", frame: 0, bin_s: 1e-6, units: busy };
         let lane =
