@@ -217,9 +217,9 @@ fn errors_in_a_camera_name_their_place() {
             "shift: only `quintile visibility`",
             "leave it out",
         ),
-        ("upside", "camera: there is no camera `upside`: known: scene", "give `inside` or `outside`"),
-        ("scen", "camera: there is no camera `scen`", "did you mean `scene`?"),
-        ("7", "camera: there is no camera `7`", "give `inside` or `outside`"),
+        ("upside", "camera: unknown camera `upside`: known: scene", "give `inside` or `outside`"),
+        ("scen", "camera: unknown camera `scen`", "did you mean `scene`?"),
+        ("7", "camera: unknown camera `7`", "give `inside` or `outside`"),
     ] {
         refusals.call(&["tiny", "--camera", camera], 2, &[says], remedy);
     }

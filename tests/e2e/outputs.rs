@@ -34,9 +34,10 @@ fn a_missing_folder_is_reported_before_the_work() {
         let ended = quintile().call(call);
         assert_eq!(ended.code, Some(2), "{call:?}: {}", ended.stderr);
         let folder = inputs.path("no");
-        for says in
-            [&format!("there is no folder {folder};"), "create it, or name a file in an existing folder"]
-        {
+        for says in [
+            &format!("the folder {folder} does not exist;"),
+            "create it, or name a file in an existing folder",
+        ] {
             assert!(ended.stderr.contains(says), "{call:?}: {}", ended.stderr);
         }
         assert!(ended.stdout.is_empty() && ended.stderr.lines().count() == 1, "{call:?}");

@@ -157,7 +157,7 @@ fn a_refusal_names_the_place_and_leaves_no_file() {
         (&["convert", "nan.csv"], "out", 1, "nan.csv: row 4998: current_A"),
         (&["convert", "gap.csv"], "out", 1, "gap.csv: row 4001: time 4.03 s is 30.00 sample periods off"),
         (&["convert", "back.csv"], "out", 1, "back.csv: row 4501: time 4.4 s is not after"),
-        (&["convert", "good.csv"], "no/such/folder/out", 2, "there is no folder no/such/folder"),
+        (&["convert", "good.csv"], "no/such/folder/out", 2, "the folder no/such/folder does not exist"),
         (&["convert", "good.csv"], "/proc/self/out", 1, "cannot be written"),
     ];
     for (args, out, code, says) in cases {

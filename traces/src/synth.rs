@@ -36,7 +36,7 @@ pub struct Scenario {
     pub drift: bool,
 }
 
-const PLAIN: Scenario = Scenario {
+const ONE_PHASE: Scenario = Scenario {
     name: "v-sync",
     sync_hz: Some(60.0),
     phases: false,
@@ -49,13 +49,13 @@ const PLAIN: Scenario = Scenario {
 
 /// From easy to hard.
 pub const SCENARIOS: [Scenario; 8] = [
-    PLAIN,
-    Scenario { name: "free-running", sync_hz: None, content: 0.15, ..PLAIN },
-    Scenario { name: "three-phase", phases: true, sync_hz: Some(30.0), ..PLAIN },
-    Scenario { name: "launch", launch: true, drift: true, ..PLAIN },
-    Scenario { name: "disturbed", disturbed: true, ..PLAIN },
-    Scenario { name: "content", sync_hz: None, content: 0.35, ..PLAIN },
-    Scenario { name: "clock-steps", sync_hz: None, clocks: true, content: 0.15, ..PLAIN },
+    ONE_PHASE,
+    Scenario { name: "free-running", sync_hz: None, content: 0.15, ..ONE_PHASE },
+    Scenario { name: "three-phase", phases: true, sync_hz: Some(30.0), ..ONE_PHASE },
+    Scenario { name: "launch", launch: true, drift: true, ..ONE_PHASE },
+    Scenario { name: "disturbed", disturbed: true, ..ONE_PHASE },
+    Scenario { name: "content", sync_hz: None, content: 0.35, ..ONE_PHASE },
+    Scenario { name: "clock-steps", sync_hz: None, clocks: true, content: 0.15, ..ONE_PHASE },
     Scenario {
         name: "all",
         sync_hz: None,
@@ -64,7 +64,7 @@ pub const SCENARIOS: [Scenario; 8] = [
         launch: true,
         disturbed: true,
         drift: true,
-        ..PLAIN
+        ..ONE_PHASE
     },
 ];
 

@@ -192,7 +192,7 @@ fn message(code: &Error, field: Option<&str>, word: &str) -> String {
             not_whole()
         }
         Error::InvalidIdentifier(_) | Error::SuggestRawIdentifier(_) => {
-            of_field(format!("`{word}` is no name of a field; write fields as `name: value`"))
+            of_field(format!("`{word}` is not a field name; write fields as `name: value`"))
         }
         Error::IntegerOutOfBounds if word.starts_with('-') => {
             of_field(format!("`{word}` is below 0; write 0 or more"))

@@ -250,7 +250,6 @@ impl Modelled {
             Unit::ALL.into_iter().partition(|&unit| total.uses(unit));
         let predicted = simulated.distinct.iter().filter(|frame| frame.half_widths().is_some()).count();
         let mut limits = vec![
-            "one opaque pass; no blending",
             "one voltage and clock state; no governor, no temperature change",
             "caches are walked in the order of the stream, whenever it is timed",
         ];

@@ -13,8 +13,10 @@ pub(super) fn may_hold_results<'a>(
 ) -> Result<(), Failure> {
     let Some(out) = out else { return Ok(()) };
     if out.is_dir() || out.file_name().is_none() {
-        let message =
-            format!("{flag}: {:?} is not a file name; name a file in an existing folder", out.as_os_str());
+        let message = match out.to_str() {
+            Some("") => format!("{flag}: an empty file name; name a file in an existing folder"),
+            _ => format!("{flag}: {} is a folder; name a file in it", out.display()),
+        };
         return Err(Failure { message, code: 2 });
     }
     not_an_input(flag, out, inputs)?;
@@ -24,7 +26,7 @@ pub(super) fn may_hold_results<'a>(
     };
     if !folder.is_dir() {
         let message = format!(
-            "{flag}: {}: there is no folder {}; create it, or name a file in an existing folder",
+            "{flag}: {}: the folder {} does not exist; create it, or name a file in an existing folder",
             out.display(),
             folder.display()
         );
@@ -85,12 +87,12 @@ mod tests {
         };
         assert_eq!([refused("new.csv"), refused("old.csv")], [None, None]);
         for (name, expected, says) in [
-            ("no/new.csv", 2, "there is no folder"),
-            ("old.csv/new.csv", 2, "there is no folder"),
+            ("no/new.csv", 2, "does not exist; create it"),
+            ("old.csv/new.csv", 2, "does not exist; create it"),
             ("in.csv", 2, "is what is read"),
-            ("", 2, "is not a file name"),
-            (".", 2, "is not a file name"),
-            ("..", 2, "is not a file name"),
+            ("", 2, "is a folder; name a file in it"),
+            (".", 2, "is a folder; name a file in it"),
+            ("..", 2, "is a folder; name a file in it"),
         ] {
             let (code, message) = refused(name).unwrap();
             assert!(code == expected && message.contains(says), "{message}");

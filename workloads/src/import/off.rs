@@ -7,12 +7,10 @@ use std::path::Path;
 
 use glam::{DVec3, Vec2};
 
+use super::ignored;
+use super::reader::{self, MAX_ELEMENTS};
 use super::soup::{Soup, linear};
-use super::{ignored, reader};
 use crate::error::{LoadError, Source};
-
-/// Most vertices or faces: a header that asks for more is broken.
-const MOST: usize = 100_000_000;
 
 /// What to do about kinds of OFF files that are not read.
 const CONVERT: &str = "convert it to PLY or to an OFF file in ASCII with three coordinates";
@@ -164,12 +162,12 @@ impl Words<'_> {
         let counts = self.take("the number of vertices")?;
         let count = |index: usize| {
             let found = counts.get(index).and_then(|word| word.parse().ok());
-            found.filter(|count| *count <= MOST)
+            found.filter(|count| *count <= MAX_ELEMENTS)
         };
         match [count(0), count(1)] {
             [Some(vertices), Some(faces)] => Ok((layout, [vertices, faces])),
             _ => Err(self.broken(&format!(
-                "`{}` is not the numbers of vertices and faces, each up to {MOST}",
+                "`{}` is not the numbers of vertices and faces, each up to {MAX_ELEMENTS}",
                 counts.join(" ")
             ))),
         }

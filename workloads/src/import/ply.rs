@@ -10,15 +10,13 @@ use ply_rs_bw::ply::{
 };
 use warnings::{Code, Warning};
 
+use super::ignored;
+use super::reader::{self, MAX_ELEMENTS};
 use super::soup::{Soup, linear};
-use super::{ignored, reader};
 use crate::error::{LoadError, Source};
 
 /// What to do about a header that cannot be used.
 const REMEDY: &str = "export it again as a PLY file of vertices and faces";
-
-/// Most elements of one kind: a header that asks for more is broken.
-const MOST: usize = 100_000_000;
 
 #[derive(Default)]
 struct Vertex {
@@ -231,8 +229,11 @@ fn check(header: &Header) -> Result<(), String> {
         return Err(format!("its faces have no property `vertex_indices`; {REMEDY}"));
     }
     for element in header.elements.values() {
-        if element.count > MOST {
-            return Err(format!("{} {} elements; up to {MOST} are taken", element.count, element.name));
+        if element.count > MAX_ELEMENTS {
+            return Err(format!(
+                "{} {} elements; up to {MAX_ELEMENTS} are taken",
+                element.count, element.name
+            ));
         }
         if element.properties.values().next().is_none() && element.count > 0 {
             return Err(format!("element `{}` has no properties; {REMEDY}", element.name));

@@ -16,6 +16,9 @@ const GZIP: &[u8] = &[0x1f, 0x8b];
 /// Byte order mark at the start of some text files.
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
+/// Largest number of elements of one kind in a file.
+pub(super) const MAX_ELEMENTS: usize = 100_000_000;
+
 /// Most bytes of an unpacked file.
 const MOST_UNPACKED: u64 = 2 << 30;
 

@@ -81,7 +81,7 @@ impl Rig {
 
 /// Extent of the view.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum View {
+pub enum Frustum {
     /// Perspective.
     Perspective {
         /// Tangent of half the vertical field of view.
@@ -94,7 +94,7 @@ pub enum View {
     },
 }
 
-impl View {
+impl Frustum {
     /// The view with a vertical field of view in degrees (40 by default), or with a height in scene units.
     ///
     /// # Errors
@@ -121,7 +121,7 @@ impl View {
     }
 }
 
-impl Default for View {
+impl Default for Frustum {
     fn default() -> Self {
         Self::Perspective { tan_half_height: tan_half(DEFAULT_FOV_DEG) }
     }
@@ -133,7 +133,7 @@ pub struct SceneCamera {
     /// Placement.
     pub rig: Rig,
     /// View; `None` for a field of view of 40 degrees (60 for a camera that is placed inside).
-    pub view: Option<View>,
+    pub view: Option<Frustum>,
     /// Near depth in scene units. `None` for a thousandth of the depth of the target (a quarter of the
     /// nearest vertex's depth for a fitted camera), or less if something nearer is in view.
     pub near: Option<f64>,
@@ -254,7 +254,7 @@ pub(super) struct Standing {
 /// The pipeline's camera.
 pub(super) fn between(
     Standing { open, close, near, .. }: &Standing,
-    view: View,
+    view: Frustum,
     lens: Option<(f32, f64)>,
 ) -> Result<Camera, String> {
     let describe = |error: &dyn std::fmt::Display| error.to_string();

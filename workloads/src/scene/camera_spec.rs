@@ -7,7 +7,7 @@ use glam::DVec3;
 use pipeline::LensShape;
 use serde::{Deserialize, Serialize};
 
-use super::camera::{Aim, DEFAULT_FOV_DEG, LookAt, Place, Rig, SceneCamera, Side, View};
+use super::camera::{Aim, DEFAULT_FOV_DEG, Frustum, LookAt, Place, Rig, SceneCamera, Side};
 use super::settings::Settings;
 use super::track::{Interpolation, Track};
 use crate::bounded;
@@ -253,7 +253,7 @@ impl CameraSpec {
             "camera",
             "it moves but has no start: give `position` and `target`, too",
         )?;
-        View::given(self.fov_deg, self.view_height).map_err(|message| ("camera", message))?;
+        Frustum::given(self.fov_deg, self.view_height).map_err(|message| ("camera", message))?;
         ensure(
             self.view_height.is_none() || self.is_placed(),
             "camera",
@@ -279,9 +279,9 @@ impl CameraSpec {
     }
 
     /// The view, if given.
-    pub(crate) fn view(&self) -> Option<View> {
+    pub(crate) fn view(&self) -> Option<Frustum> {
         let given = self.fov_deg.is_some() || self.view_height.is_some();
-        given.then(|| View::given(self.fov_deg, self.view_height).unwrap_or_default())
+        given.then(|| Frustum::given(self.fov_deg, self.view_height).unwrap_or_default())
     }
 
     /// Vertical field of view in degrees.

@@ -4,7 +4,7 @@ use glam::DVec3;
 use serde::Serialize;
 
 use super::Scene;
-use super::camera::{Aim, LookAt, Rig, SceneCamera, Side, Standing, View, tan_half};
+use super::camera::{Aim, Frustum, LookAt, Rig, SceneCamera, Side, Standing, tan_half};
 use super::camera_spec::{CameraKey, CameraSpec, FORMS, InterpolationSpec};
 use super::frame::{FrameError, Interval};
 use super::graph::movers;
@@ -104,8 +104,8 @@ impl Scene {
             self.standing_before(&first, &self.frame_meshes(&first)?)?;
         let eye = stand.eye + self.origin;
         let (fov_deg, view_height) = match self.sees() {
-            View::Perspective { tan_half_height } => (Some(field_of_view(tan_half_height)), None),
-            View::Orthographic { half_height } => (None, Some(2.0 * half_height)),
+            Frustum::Perspective { tan_half_height } => (Some(field_of_view(tan_half_height)), None),
+            Frustum::Orthographic { half_height } => (None, Some(2.0 * half_height)),
         };
         let focus = self.focus(focus);
         let described = CameraSpec {
@@ -346,7 +346,7 @@ impl Scene {
             [] => "the scene has none of its own".to_owned(),
             _ => activity::spec::suggestion(wanted, &names),
         };
-        LoadError::Setting { setting, message: format!("there is no camera `{wanted}`: {own}; {FORMS}") }
+        LoadError::Setting { setting, message: format!("unknown camera `{wanted}`: {own}; {FORMS}") }
     }
 }
 

@@ -142,7 +142,7 @@ impl FrameMesh {
     fn draw<'a>(&'a self, scene: &'a Scene) -> Result<Draw<'a>, FrameError> {
         let refused = |message: String| FrameError::Draw { mesh: self.name.clone(), message };
         let shader = scene.shader(self.material, !self.colors.is_empty());
-        let shader = shader.ok_or_else(|| refused(format!("there is no material {}", self.material)))?;
+        let shader = shader.ok_or_else(|| refused(format!("unknown material {}", self.material)))?;
         let mut geometry =
             Geometry::new(&self.open, &self.close, &self.triangles).map_err(|e| refused(e.to_string()))?;
         if !self.normals.is_empty() {

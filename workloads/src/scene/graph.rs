@@ -336,7 +336,7 @@ impl Clip {
             } else {
                 activity::spec::suggestion(wanted, &names)
             };
-            LoadError::Setting { setting: "clip", message: format!("there is no clip `{wanted}`: {known}") }
+            LoadError::Setting { setting: "clip", message: format!("unknown clip `{wanted}`: {known}") }
         })
     }
 

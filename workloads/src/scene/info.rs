@@ -8,7 +8,7 @@ use serde::Serialize;
 use warnings::Warning;
 
 use super::Scene;
-use super::camera::{Rig, View};
+use super::camera::{Frustum, Rig};
 use super::camera_used::{CameraUsed, field_of_view};
 use super::frame::FrameError;
 use super::graph::movers;
@@ -268,8 +268,8 @@ impl Scene {
         let moving = movers(&self.graph.nodes);
         let of = |own: &super::OwnCamera| {
             let (fov_deg, view_height) = match own.camera.view.unwrap_or_default() {
-                View::Perspective { tan_half_height } => (Some(field_of_view(tan_half_height)), None),
-                View::Orthographic { half_height } => (None, Some(2.0 * half_height)),
+                Frustum::Perspective { tan_half_height } => (Some(field_of_view(tan_half_height)), None),
+                Frustum::Orthographic { half_height } => (None, Some(2.0 * half_height)),
             };
             let moves = match own.camera.rig {
                 Rig::Node(node) => moving.get(node).copied().unwrap_or(false),
@@ -292,8 +292,8 @@ impl Scene {
         let focus = f64::from(camera.focus);
         // Diameter of the blur in heights of the image, for a lens of radius 1.
         let blur = |depth: f64| match self.sees() {
-            View::Perspective { tan_half_height } => (1.0 / focus - 1.0 / depth).abs() / tan_half_height,
-            View::Orthographic { half_height } => (depth / focus - 1.0).abs() / half_height,
+            Frustum::Perspective { tan_half_height } => (1.0 / focus - 1.0 / depth).abs() / tan_half_height,
+            Frustum::Orthographic { half_height } => (depth / focus - 1.0).abs() / half_height,
         };
         // Points much nearer than the focus are blurred by any lens.
         let most = depths.map(|depth| blur(depth.max(0.2 * focus))).fold(0.0, f64::max);

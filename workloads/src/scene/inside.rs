@@ -12,7 +12,7 @@ use std::f64::consts::TAU;
 
 use glam::DVec3;
 
-use super::camera::{CameraFrame, View, tan_half};
+use super::camera::{CameraFrame, Frustum, tan_half};
 use super::fit::Fit;
 use super::rays::{Hit, Rays, normal};
 
@@ -80,8 +80,8 @@ const TURNS: usize = 32;
 const VIEW_CONE_COS: f64 = 0.85;
 
 /// How much a camera inside sees.
-pub(super) fn view() -> View {
-    View::Perspective { tan_half_height: tan_half(Inside::FOV_DEG) }
+pub(super) fn view() -> Frustum {
+    Frustum::Perspective { tan_half_height: tan_half(Inside::FOV_DEG) }
 }
 
 /// A place inside, and whether the scene is a room, so that a camera is placed there by default.

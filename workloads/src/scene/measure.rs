@@ -7,7 +7,7 @@ use glam::DVec3;
 use warnings::{Code, Warning};
 
 use super::Scene;
-use super::camera::{Rig, Side, View};
+use super::camera::{Frustum, Rig, Side};
 use super::fit::{Extent, Fit};
 use super::frame::FrameError;
 use super::inside::Inside;
@@ -32,7 +32,7 @@ fn camera_inside(room: &Inside) -> Warning {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Placed {
     pub fit: Fit,
-    pub view: View,
+    pub view: Frustum,
     /// Side from which the camera sees the scene.
     pub side: Side,
 }
@@ -122,7 +122,7 @@ impl Scene {
         let first = self.own_frames.start;
         let aspect = f64::from(self.settings.width) / f64::from(self.settings.height);
         let view = self.camera.view.unwrap_or_default();
-        let View::Perspective { tan_half_height: tan } = view else { return Ok(None) };
+        let Frustum::Perspective { tan_half_height: tan } = view else { return Ok(None) };
         let Some(mut extent) = Extent::new(tan * aspect, tan) else { return Ok(None) };
         let fitted = self.fitted_frames();
         for index in some_of(&fitted) {

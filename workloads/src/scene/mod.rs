@@ -16,7 +16,7 @@ mod rays;
 mod settings;
 mod track;
 
-pub use camera::{Aim, DEFAULT_FOV_DEG, LookAt, Place, Rig, SceneCamera, Side, View, tan_half};
+pub use camera::{Aim, DEFAULT_FOV_DEG, Frustum, LookAt, Place, Rig, SceneCamera, Side, tan_half};
 pub(crate) use camera_spec::Wrong;
 pub use camera_spec::{CameraKey, CameraSpec, InterpolationSpec};
 pub use camera_used::{CameraSource, CameraUsed, OwnCamera};
@@ -80,7 +80,7 @@ pub struct Scene {
 }
 
 /// Vertices and triangles of all instances together: a small file that asks for more is broken.
-const MOST: usize = 100_000_000;
+const MAX_ELEMENTS: usize = 100_000_000;
 
 /// The automatic near depth, in depths of the camera's target.
 const NEAR: f64 = 1e-3;
@@ -129,9 +129,10 @@ impl Scene {
         if triangles == 0 {
             return Err(self.broken("it has no triangles, so there is nothing to draw: name another file, or export it with its surfaces as triangles"));
         }
-        if vertices > MOST || triangles > MOST {
-            let message =
-                format!("{triangles} triangles over {vertices} vertices; up to {MOST} of each are taken");
+        if vertices > MAX_ELEMENTS || triangles > MAX_ELEMENTS {
+            let message = format!(
+                "{triangles} triangles over {vertices} vertices; up to {MAX_ELEMENTS} of each are taken"
+            );
             return Err(self.broken(message));
         }
         Ok(())
@@ -282,7 +283,7 @@ impl Scene {
     }
 
     /// View of the camera.
-    fn sees(&self) -> View {
+    fn sees(&self) -> Frustum {
         self.placed.as_ref().map_or_else(|| self.camera.view.unwrap_or_default(), |placed| placed.view)
     }
 

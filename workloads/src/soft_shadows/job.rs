@@ -5,14 +5,14 @@ use std::collections::HashSet;
 
 use activity::Event;
 use glam::{DVec3, Vec3};
-use pipeline::sampling::{Pattern, Sample, SampleSource, SampleSpec};
+use pipeline::sampling::{Pattern, Sample, SampleSpec};
 use pipeline::{Cull, Draw, Gpu, Viewport};
 use serde::{Deserialize, Serialize};
 use warnings::{Code, Warning};
 
 use super::light::{AreaLight, LightSpec};
-use super::map::{Method, ShadowMap, View, depth_pass};
-use super::shade::{World, look_ups};
+use super::map::{Method, SceneView, ShadowMap, depth_pass};
+use super::shade::{Shadows, World, look_ups};
 use crate::accumulation::SharedSamples;
 use crate::error::LoadError;
 use crate::job::{Drawn, DrawsScene, Fact, Flag, Flags, Job, JobError, OptionSource, Request};
@@ -164,12 +164,12 @@ impl DrawsScene for SoftShadows {
         let viewport = Viewport::new(settings.width, settings.height)
             .ok_or_else(|| JobError::Setting(crate::job::IMAGE_SIZE.to_owned()))?;
         let (camera, draws) = (frame.camera.with_lens(None), gpu.resident(&draws));
-        let view = View { camera: &camera, draws: &draws };
+        let view = SceneView { camera: &camera, draws: &draws };
         let map = ShadowMap::new(&self.light, &draws, self.options.map_px, &self.set, self.method(), gpu)?;
         let visible = depth_pass(&view, viewport, &self.set, self.method(), gpu)?;
         let world = World::new(&view, viewport, &self.light, &albedos, self.scene.background());
-        let lookups = (&self.set as &dyn SampleSource, &visible.samples[..]);
-        let shaded = look_ups(&world, lookups, (&map, self.options.bias), gpu);
+        let shadows = Shadows::Map { map: &map, bias: self.options.bias };
+        let shaded = look_ups(&world, &self.set, &visible.samples, shadows, gpu);
         let facts = self.facts(&map, shaded.counts[Event::TextureFetches]);
         let (moving, warnings) = (frame.is_moving(), self.regime_warnings());
         Ok(Drawn { image: shaded.into_image(), moving, lens: true, facts, warnings })
@@ -207,7 +207,7 @@ pub fn default_scene() -> Result<Scene, LoadError> {
     fill(&mut parts.graph);
     parts.camera = SceneCamera {
         rig: Rig::look_at(DVec3::new(-0.8, 3.4, 5.6), DVec3::new(0.0, 0.35, 0.0)),
-        view: Some(scene::View::Perspective { tan_half_height: tan_half(40.0) }),
+        view: Some(scene::Frustum::Perspective { tan_half_height: tan_half(40.0) }),
         near: None,
     };
     parts.background = Vec3::new(0.32, 0.40, 0.52);

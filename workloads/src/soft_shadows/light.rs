@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::LoadError;
 use crate::scene::camera::CameraFrame;
-use crate::scene::{View, tan_half};
+use crate::scene::{Frustum, tan_half};
 
 /// Position, target and size of an area light.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -90,7 +90,7 @@ impl AreaLight {
         })?;
         let distance = (DVec3::from_array(spec.target) - position).length();
         spec.check(distance).map_err(refused)?;
-        let view = View::Perspective { tan_half_height: tan_half(spec.fov_deg) };
+        let view = Frustum::Perspective { tan_half_height: tan_half(spec.fov_deg) };
         let camera = view.camera(stand.pose(), spec.near as f32).map_err(|e| refused(e.to_string()))?;
         let lens = Lens::new(spec.radius as f32, FAR_FOCUS).map_err(|e| refused(e.to_string()))?;
         let camera = camera.with_lens(Some(lens));

@@ -45,7 +45,7 @@ impl ShadowMap {
             || JobError::Setting(format!("map_px {side}: a shadow map has an even number of texels"));
         let viewport = viewport.ok_or_else(refused)?;
         let set = set.centred();
-        let seen = depth_pass(&View { camera: light.camera(), draws }, viewport, &set, method, gpu)?;
+        let seen = depth_pass(&SceneView { camera: light.camera(), draws }, viewport, &set, method, gpu)?;
         let depths = seen.samples.into_iter().map(|(_, depth)| f32::from_bits(depth)).collect();
         Ok(Self { side, set, depths, counts: seen.counts, surfaces: seen.surfaces })
     }
@@ -116,7 +116,7 @@ pub enum Method {
 
 /// Geometry in front of a camera.
 #[derive(Clone, Copy)]
-pub struct View<'a> {
+pub struct SceneView<'a> {
     /// The camera.
     pub camera: &'a Camera,
     /// The geometry.
@@ -139,13 +139,13 @@ pub struct DepthPass {
 /// # Errors
 /// [`JobError`] if the hardware cannot be built.
 pub fn depth_pass(
-    view: &View<'_>,
+    view: &SceneView<'_>,
     viewport: Viewport,
     set: &SharedSamples,
     method: Method,
     gpu: &mut Gpu<'_>,
 ) -> Result<DepthPass, JobError> {
-    let View { camera, draws } = *view;
+    let SceneView { camera, draws } = *view;
     let spec = gpu.spec();
     if method == Method::OnePass {
         let settings = Settings { spec, viewport, samples: set, background: Vec3::ZERO };

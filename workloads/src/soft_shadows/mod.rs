@@ -19,5 +19,5 @@ mod shade;
 pub(crate) use job::FLAGS;
 pub use job::{Options, SoftShadows, default_scene, job};
 pub use light::{AreaLight, LightSpec};
-pub use map::{DepthPass, Method, ShadowMap, View, depth_pass};
+pub use map::{DepthPass, Method, SceneView, ShadowMap, depth_pass};
 pub use shade::{Shadows, World, look_ups};

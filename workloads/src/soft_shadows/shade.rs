@@ -12,7 +12,7 @@ use pipeline::{Camera, Gpu, Lane, Lanes, Rendered, Viewport};
 use rayon::prelude::*;
 
 use super::light::AreaLight;
-use super::map::{DEPTH_BYTES, ShadowMap, View};
+use super::map::{DEPTH_BYTES, SceneView, ShadowMap};
 use crate::accumulation::{RayWork, Rays};
 
 /// Ambient light, relative to the light on a surface that faces the light.
@@ -58,16 +58,23 @@ struct Point {
     triangle: u32,
 }
 
+/// A sample and its index in the pixel.
+#[derive(Clone, Copy)]
+struct Place<'s> {
+    sample: &'s Sample,
+    index: usize,
+}
+
 impl<'a> World<'a> {
     /// Makes the world of a frame.
     pub fn new(
-        view: &View<'a>,
+        view: &SceneView<'a>,
         viewport: Viewport,
         light: &'a AreaLight,
         albedos: &'a [Vec3],
         background: Vec3,
     ) -> Self {
-        let View { camera, draws } = *view;
+        let SceneView { camera, draws } = *view;
         let projection = Projection::new(camera, viewport);
         Self { camera, viewport, light, albedos, background, rays: Rays::new(draws), projection }
     }
@@ -89,7 +96,7 @@ impl<'a> World<'a> {
             let place = [place as u32 % width, place as u32 / width];
             let (lanes, rays) = (Lanes::default(), Cell::default());
             let work = Work { lanes: &lanes, rays: &rays };
-            (self.pixel(place, (samples, seen), shadows, work), rays.get())
+            (self.pixel(place, samples, seen, shadows, work), rays.get())
         };
         let pixels: Vec<_> = seen.par_chunks_exact(per_pixel).enumerate().map(pixel).collect();
         let mut work = RayWork::default();
@@ -101,7 +108,8 @@ impl<'a> World<'a> {
     fn pixel(
         &self,
         [px, py]: [u32; 2],
-        (samples, seen): (&dyn SampleSource, &[(u32, u32)]),
+        samples: &dyn SampleSource,
+        seen: &[(u32, u32)],
         shadows: Shadows<'_>,
         work: Work<'_>,
     ) -> Vec3 {
@@ -109,7 +117,7 @@ impl<'a> World<'a> {
         samples.pixel_into(px, py, &mut at);
         let colours = at.iter().zip(seen).enumerate().map(|(index, (sample, (triangle, _)))| {
             let Some(point) = self.point([px, py], sample, *triangle) else { return self.background };
-            work.lanes.run(|lane| self.shade(lane, &point, (sample, index), shadows, work))
+            work.lanes.run(|lane| self.shade(lane, &point, Place { sample, index }, shadows, work))
         });
         colours.sum::<Vec3>() / seen.len() as f32
     }
@@ -132,7 +140,7 @@ impl<'a> World<'a> {
                 let toward = self.light.point(&lane, [sample.u, sample.v]) - point.place;
                 let (lanes, rays) = (Lanes::default(), Cell::default());
                 let work = Work { lanes: &lanes, rays: &rays };
-                let is_lit = || self.is_lit(&lane, &point, (sample, index), shadows, work);
+                let is_lit = || self.is_lit(&lane, &point, Place { sample, index }, shadows, work);
                 (point.normal.dot(toward) > 0.0).then(is_lit)
             };
             at.iter().zip(seen).enumerate().map(of).collect::<Vec<_>>()
@@ -161,15 +169,8 @@ impl<'a> World<'a> {
     }
 
     /// Lambert's law for one point of the light, plus ambient light.
-    fn shade(
-        &self,
-        lane: &Lane,
-        point: &Point,
-        at: (&Sample, usize),
-        shadows: Shadows<'_>,
-        work: Work<'_>,
-    ) -> Vec3 {
-        let light = self.light.point(lane, [at.0.u, at.0.v]);
+    fn shade(&self, lane: &Lane, point: &Point, at: Place<'_>, shadows: Shadows<'_>, work: Work<'_>) -> Vec3 {
+        let light = self.light.point(lane, [at.sample.u, at.sample.v]);
         let toward = lane.normalize(lane.sub(light, point.place));
         let facing = lane.max(lane.dot(point.normal, toward), 0.0) as f32;
         let lit = lane.branch(facing > 0.0) && self.is_lit(lane, point, at, shadows, work);
@@ -180,7 +181,7 @@ impl<'a> World<'a> {
         &self,
         lane: &Lane,
         point: &Point,
-        (sample, index): (&Sample, usize),
+        Place { sample, index }: Place<'_>,
         shadows: Shadows<'_>,
         work: Work<'_>,
     ) -> bool {
@@ -210,19 +211,19 @@ struct Work<'w> {
     rays: &'w Cell<RayWork>,
 }
 
-/// Shades the visible samples by the map in a pass of its own.
+/// Shades the visible samples in a pass of its own.
 pub fn look_ups(
     world: &World<'_>,
-    (samples, seen): (&dyn SampleSource, &[(u32, u32)]),
-    (map, bias): (&ShadowMap, f64),
+    samples: &dyn SampleSource,
+    seen: &[(u32, u32)],
+    shadows: Shadows<'_>,
     gpu: &mut Gpu<'_>,
 ) -> Rendered {
     gpu.wait();
     let (width, per_pixel) = (world.viewport.width() as usize, samples.per_pixel() as usize);
     gpu.shade_pixels("look-ups", world.viewport, |lanes, [x, y]| {
         let first = (y as usize * width + x as usize) * per_pixel;
-        let shadows = Shadows::Map { map, bias };
         let work = Work { lanes, rays: &Cell::default() };
-        world.pixel([x, y], (samples, &seen[first..first + per_pixel]), shadows, work)
+        world.pixel([x, y], samples, &seen[first..first + per_pixel], shadows, work)
     })
 }

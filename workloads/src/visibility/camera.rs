@@ -13,7 +13,7 @@ use crate::scene::{CameraSpec, Side, Wrong, tan_half};
 const NEAR: f64 = 1e-3;
 
 /// A camera with its poses and image.
-pub(super) struct View {
+pub(super) struct PosedCamera {
     /// Pose at shutter open and at shutter close.
     pub stands: [CameraFrame; 2],
     /// The camera in its own space.
@@ -88,14 +88,14 @@ impl CameraSpec {
     ///
     /// # Errors
     /// The first invalid field: a missing pose, a degenerate direction, or a value out of the range of `f32`.
-    pub(super) fn stands_and_image(&self) -> Result<View, Wrong> {
+    pub(super) fn stands_and_image(&self) -> Result<PosedCamera, Wrong> {
         let open = self.stand("target", self.position, self.target, self.up)?;
         let (position, target) = (self.end_position.or(self.position), self.end_target.or(self.target));
         let close = self.stand("end_target", position, target, self.end_up.or(self.up))?;
         let [width, height] = self.size();
         let wrong = || ("width", format!("{width}x{height}: each side has to be 1 to 16384 pixels"));
         let viewport = Viewport::new(width, height).ok_or_else(wrong)?;
-        Ok(View { stands: [open, close], camera: self.camera()?, viewport })
+        Ok(PosedCamera { stands: [open, close], camera: self.camera()?, viewport })
     }
 
     fn stand(
@@ -176,7 +176,7 @@ fn around(spec: &CameraSpec, mesh: &MovingMesh) -> Option<Fit> {
 mod tests {
     use super::*;
 
-    fn view(text: &str) -> View {
+    fn view(text: &str) -> PosedCamera {
         CameraSpec::parse(text, "c.ron").unwrap().completed().stands_and_image().unwrap()
     }
 

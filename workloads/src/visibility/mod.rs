@@ -21,7 +21,7 @@ use crate::error::{LoadError, Source};
 use crate::import::{Format, reader};
 use crate::scene::Wrong;
 use crate::scene::measure::lens_leaves_view;
-use camera::{View, fit};
+use camera::{PosedCamera, fit};
 
 pub use crate::scene::CameraSpec;
 pub use m5d::parse as parse_m5d;
@@ -236,7 +236,7 @@ fn joined(objects: Vec<MovingMesh>) -> Result<(MovingMesh, Vec<Range<u32>>), Str
 }
 
 /// Vertices in camera space at both ends, rounded once. A still vertex and a still camera stay exactly still.
-fn in_camera_space(view: &View, mesh: &MovingMesh) -> Result<[Vec<Vec3>; 2], String> {
+fn in_camera_space(view: &PosedCamera, mesh: &MovingMesh) -> Result<[Vec<Vec3>; 2], String> {
     let [open, close] = &view.stands;
     let see = |(stand, points): (&crate::scene::camera::CameraFrame, &[glam::DVec3])| {
         let seen = points.iter().enumerate().map(|(vertex, point)| {

@@ -69,7 +69,7 @@ fn a_clip_of_a_scene_without_any_is_to_be_left_out() {
     let overrides = Overrides { clip: Some("Run".to_owned()), ..Overrides::default() };
     let error = load("tiny").unwrap().with_overrides(&overrides).unwrap_err();
     assert!(error.is_usage());
-    expect(&error.to_string(), &["there is no clip `Run`", "no animation clips; leave it out"]);
+    expect(&error.to_string(), &["unknown clip `Run`", "no animation clips; leave it out"]);
 }
 
 #[test]

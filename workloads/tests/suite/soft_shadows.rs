@@ -9,7 +9,7 @@ use workloads::Overrides;
 use workloads::accumulation::SharedSamples;
 use workloads::job::Job;
 use workloads::soft_shadows::{
-    AreaLight, DepthPass, LightSpec, Method, Options, ShadowMap, Shadows, SoftShadows, View, World,
+    AreaLight, DepthPass, LightSpec, Method, Options, SceneView, ShadowMap, Shadows, SoftShadows, World,
     depth_pass,
 };
 use workloads::visibility::Unshaded;
@@ -168,7 +168,7 @@ fn motion_blurs_the_shadow_by_the_share_of_time() {
 }
 
 /// The visible samples of a view, in one pass.
-fn visible(view: &View<'_>, viewport: Viewport, set: &SharedSamples) -> DepthPass {
+fn visible(view: &SceneView<'_>, viewport: Viewport, set: &SharedSamples) -> DepthPass {
     depth_pass(view, viewport, set, Method::OnePass, &mut Gpu::quiet(&spec()).unwrap()).unwrap()
 }
 
@@ -188,7 +188,7 @@ fn a_floor_in_the_light_follows_the_cosine_while_it_tilts() {
         let sample = Sample { x: 0.5, y: 0.5, t, ..Sample::default() };
         let set = SharedSamples::new(vec![sample; 3]).unwrap();
         let draws = [draw(&open, &close, &triangles)];
-        let view = View { camera: &camera, draws: &draws };
+        let view = SceneView { camera: &camera, draws: &draws };
         let seen = visible(&view, viewport, &set);
         let world = World::new(&view, viewport, &light, std::slice::from_ref(&albedo), Vec3::ZERO);
         let image = world.image(&set, &seen.samples, Shadows::None);
@@ -210,7 +210,7 @@ fn rays_and_a_fine_map_agree() {
     let light = AreaLight::new(&LightSpec::default()).unwrap();
     let viewport = Viewport::new(48, 27).unwrap();
     let (camera, set) = (frame.camera.with_lens(None), set(16, 5));
-    let view = View { camera: &camera, draws: &draws };
+    let view = SceneView { camera: &camera, draws: &draws };
     let seen = visible(&view, viewport, &set);
     let world = World::new(&view, viewport, &light, &[], Vec3::ZERO);
     let map = map(&light, &draws, 512, &set, Method::OnePass);

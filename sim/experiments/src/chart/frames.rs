@@ -533,8 +533,13 @@ mod tests {
     #[test]
     fn outcomes_are_joined_by_means_and_sums() {
         let a = FinderScore { f1: 0.5, energy_error: None, wrong: 2, right: 3, ..FinderScore::default() };
-        let b =
-            FinderScore { f1: 1.0, energy_error: Some(0.1), wrong: 1, right_flagged: 4, ..FinderScore::default() };
+        let b = FinderScore {
+            f1: 1.0,
+            energy_error: Some(0.1),
+            wrong: 1,
+            right_flagged: 4,
+            ..FinderScore::default()
+        };
         let both = joined(&[a, b]);
         assert_eq!(
             (both.f1, both.energy_error, both.wrong, both.right, both.right_flagged),

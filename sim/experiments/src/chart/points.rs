@@ -252,11 +252,17 @@ pub struct PointsRow {
 /// The name of the method of [`workloads::points::poisson`].
 const UNCOVERED: &str = "uncovered";
 const BRIDSON: &str = "bridson";
-const PLAIN: &str = "plain";
+const PLAIN_DARTS: &str = "plain";
 
 /// Methods with their efforts.
-const METHODS: [(&str, u64); 6] =
-    [(UNCOVERED, 0), (BRIDSON, 10), (BRIDSON, 30), (PLAIN, 100), (PLAIN, 1000), (PLAIN, 10_000)];
+const METHODS: [(&str, u64); 6] = [
+    (UNCOVERED, 0),
+    (BRIDSON, 10),
+    (BRIDSON, 30),
+    (PLAIN_DARTS, 100),
+    (PLAIN_DARTS, 1000),
+    (PLAIN_DARTS, 10_000),
+];
 
 fn points<const D: usize>(
     (method, effort): (&str, u64),
@@ -264,7 +270,7 @@ fn points<const D: usize>(
 ) -> Result<Vec<[f64; D]>, PoissonError> {
     match method {
         BRIDSON => bridson(spec, effort as u32),
-        PLAIN => plain_darts(spec, effort),
+        PLAIN_DARTS => plain_darts(spec, effort),
         _ => poisson_disk(spec).map(|found| found.points),
     }
 }

@@ -17,7 +17,7 @@ use run::GpuSpec;
 use serde::Serialize;
 use workloads::accumulation::{RayWork, SharedSamples};
 use workloads::soft_shadows::{
-    AreaLight, LightSpec, Method, ShadowMap, Shadows, View, World, default_scene, depth_pass,
+    AreaLight, LightSpec, Method, SceneView, ShadowMap, Shadows, World, default_scene, depth_pass,
 };
 use workloads::{Frame, Overrides, Scene};
 
@@ -341,7 +341,7 @@ impl Stage {
         let [width, height] = self.effort.size;
         let viewport = Viewport::new(width, height)
             .ok_or_else(|| StudyError::Pipeline(workloads::job::IMAGE_SIZE.to_owned()))?;
-        let view = View { camera: &self.frame.camera, draws: &draws };
+        let view = SceneView { camera: &self.frame.camera, draws: &draws };
         let world = World::new(&view, viewport, &self.light, &albedos, self.scene.background());
         run(&Bench { stage: self, draws: &draws, world, viewport })
     }
@@ -350,7 +350,7 @@ impl Stage {
 /// Seeds of references start here.
 const REFERENCE_SEED: u64 = 1_000;
 /// Samples a pixel of each of their tables, and light samples when biases are compared.
-const MOST: u32 = 256;
+const MAX_SAMPLES: u32 = 256;
 /// Light samples when biases are compared.
 const BIAS_POINTS: u32 = 16;
 /// Biases in widths of a texel.
@@ -366,7 +366,7 @@ impl Bench<'_> {
         let tables = self.stage.effort.reference_tables;
         let mut sum = vec![Vec3::ZERO; self.viewport.pixels()];
         for seed in 0..u64::from(tables) {
-            let table = SampleTable::new(&SampleSpec::default(), MOST, REFERENCE_SEED + seed)?;
+            let table = SampleTable::new(&SampleSpec::default(), MAX_SAMPLES, REFERENCE_SEED + seed)?;
             let image = self.by_rays(&table)?.0;
             sum.iter_mut().zip(image).for_each(|(sum, pixel)| *sum += pixel / tables as f32);
         }
@@ -423,7 +423,7 @@ impl Bench<'_> {
     }
 
     fn seen(&self, set: &SharedSamples) -> Result<Vec<(u32, u32)>, StudyError> {
-        let view = View { camera: &self.stage.frame.camera, draws: self.draws };
+        let view = SceneView { camera: &self.stage.frame.camera, draws: self.draws };
         Ok(depth_pass(&view, self.viewport, set, Method::OnePass, &mut Gpu::quiet(self.spec())?)?.samples)
     }
 

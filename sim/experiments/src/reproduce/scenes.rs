@@ -6,7 +6,7 @@ use std::sync::Arc;
 use glam::{DQuat, DVec3, Mat4, Vec3, Vec4};
 use pipeline::{Lane, Shader, ShadingPoint, Texture, Wrap};
 use workloads::Material;
-use workloads::scene::{Graph, Local, Node, Parts, Rig, SceneCamera, Settings, Trs, View};
+use workloads::scene::{Graph, Local, Node, Parts, Rig, SceneCamera, Settings, Trs, Frustum};
 use workloads::{LoadError, Overrides, Scene, shapes};
 
 /// Frames in the phone's sequence (Paper III, section 4).
@@ -57,7 +57,7 @@ pub(super) fn phone(frame: u32, edge: f64) -> Result<Scene, LoadError> {
     }
     parts.camera = SceneCamera {
         rig: Rig::look_at(DVec3::new(0.0, 0.0, 10.0), DVec3::ZERO),
-        view: Some(View::Orthographic { half_height: 1.0 }),
+        view: Some(Frustum::Orthographic { half_height: 1.0 }),
         near: None,
     };
     parts.settings = Settings {

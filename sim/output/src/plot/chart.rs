@@ -23,7 +23,7 @@ pub struct Chart<'a> {
 /// Picture widths for one panel, two panels, and more.
 const WIDTHS: [f64; 3] = [820.0, 900.0, 1240.0];
 /// Smallest widths of a panel and of a small panel, with labels.
-const LEAST: [f64; 2] = [290.0, 120.0];
+const MIN_PANEL_PX: [f64; 2] = [290.0, 120.0];
 /// Room for the key of a series in a legend below a panel.
 const NAME_ASIDE: f64 = 44.0;
 /// Largest number of panels in a row, unless they are small.
@@ -115,8 +115,8 @@ impl<'a> Chart<'a> {
         let widest =
             names.map(|series| text_width(&series.name, LEGEND_PX, false) + NAME_ASIDE).fold(0.0, f64::max);
         let fitting = match self.small {
-            Some(_) => (room / LEAST[1]) as usize,
-            None => (room / LEAST[0].max(widest)) as usize,
+            Some(_) => (room / MIN_PANEL_PX[1]) as usize,
+            None => (room / MIN_PANEL_PX[0].max(widest)) as usize,
         };
         let most = self.small.unwrap_or(MOST_ACROSS).min(fitting.max(1)).min(self.panels.len());
         // As even rows as there are: four panels in two rows of two.

@@ -52,7 +52,7 @@ pub struct HeatMapPlot<'a> {
 }
 
 /// Largest size of the map.
-const ROOM: (f64, f64) = (960.0, 640.0);
+const MAX_IMAGE_PX: (f64, f64) = (960.0, 640.0);
 /// Width of the colour bar.
 const BAR: f64 = 110.0;
 /// Steps of the colour bar.
@@ -79,7 +79,7 @@ impl HeatMapPlot<'_> {
             }
             _ => self.subject.to_owned(),
         };
-        let usual = ROOM.0.min(ROOM.1 * width / height) + 48.0 + BAR;
+        let usual = MAX_IMAGE_PX.0.min(MAX_IMAGE_PX.1 * width / height) + 48.0 + BAR;
         let mut picture = Picture::titled(look, (usual.max(760.0), 300.0), [self.title, &subject]);
         if self.tiles.is_empty() || !is_drawable(0.0, high) {
             return picture.nothing("nothing was counted");
@@ -92,7 +92,7 @@ impl HeatMapPlot<'_> {
         }
         let (left, top) = (picture.margin(), picture.height + 8.0);
         let aside = if self.is_classes() { 0.0 } else { BAR };
-        let scale = ((picture.width() - 2.0 * left - aside) / width).min(ROOM.1 / height);
+        let scale = ((picture.width() - 2.0 * left - aside) / width).min(MAX_IMAGE_PX.1 / height);
         self.draw_tiles(&mut picture, (left, top), scale, high);
         self.draw_outlines(&mut picture, (left, top), scale);
         let bottom = top + height * scale;

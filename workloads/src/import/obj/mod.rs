@@ -12,7 +12,8 @@ use warnings::{Code, Warning};
 
 use super::soup::Soup;
 use crate::error::{LoadError, Source};
-use crate::import::{reader, soup};
+use crate::import::reader::{self, MAX_ELEMENTS};
+use crate::import::soup;
 
 /// Reads the OBJ file at `path`, gzipped or not, with the materials it names.
 pub(super) fn read(path: &Path) -> Result<Soup, LoadError> {
@@ -106,9 +107,6 @@ pub(crate) struct Statements {
     pub dropped: Vec<usize>,
 }
 
-/// Most elements of a kind in one file.
-const MOST: usize = 100_000_000;
-
 /// Reads the statements of the OBJ file at `path`, gzipped or not. Statements about other things than surfaces are skipped.
 pub(crate) fn statements(path: &Path) -> Result<Statements, LoadError> {
     let mut reading = Reading::default();
@@ -197,10 +195,10 @@ impl Reading {
             found.faces.len(),
             found.dropped.len(),
         ];
-        if counts.iter().all(|count| *count <= MOST) {
+        if counts.iter().all(|count| *count <= MAX_ELEMENTS) {
             Ok(())
         } else {
-            Err(format!("more than {MOST} of a kind"))
+            Err(format!("more than {MAX_ELEMENTS} of a kind"))
         }
     }
 
