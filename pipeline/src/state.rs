@@ -242,7 +242,7 @@ impl Blend {
     }
 }
 
-/// How colours are stored in a target.
+/// Blending and masks of a target.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ColourState {
     /// Combination with stored colours.
@@ -307,7 +307,7 @@ impl Default for Clear {
     }
 }
 
-/// What becomes of a sample inside a triangle.
+/// Result of the depth and stencil tests of a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct DepthStencilResult {
     /// Whether depth and colour are stored.
@@ -329,7 +329,7 @@ impl DrawState {
         plain && self.depth == DepthState::default() && self.stencil.is_none()
     }
 
-    /// How colours are stored in target `number`.
+    /// Blending and masks of target `number`.
     pub fn target(&self, number: usize) -> ColourState {
         let first = ColourState { blend: self.blend, mask: self.colour_mask };
         number.checked_sub(1).and_then(|other| *self.others.get(other)?).unwrap_or(first)

@@ -43,11 +43,11 @@ const NOT_PROVOKED: [(&str, &str); 21] = [
     ),
     (
         "wide-prediction-interval",
-        "it takes an animation whose previews mislead by more than a few percent; a unit test in `sim` makes it up",
+        "it takes an animation whose previews mislead by more than a few percent; a unit test in `run` makes it up",
     ),
     (
         "short-packets",
-        "it takes a larger GPU than those that come with the program; a unit test in `sim` has a stream of such packets",
+        "it takes a larger GPU than those that come with the program; a unit test in `timing` has a stream of such packets",
     ),
     (
         "start-error",

@@ -32,7 +32,7 @@ pub enum LoadError {
     Format {
         /// The path.
         file: String,
-        /// What is wrong, and what to do.
+        /// Error and remedy.
         message: String,
     },
     /// An invalid setting, from a command line or a scene file.
@@ -40,7 +40,7 @@ pub enum LoadError {
     Setting {
         /// The setting.
         setting: &'static str,
-        /// What is wrong, and what to do.
+        /// Error and remedy.
         message: String,
     },
     /// A RON scene that cannot be read or parsed.
@@ -53,7 +53,7 @@ pub enum LoadError {
         file: String,
         /// The invalid part.
         place: String,
-        /// What is wrong, and what to do.
+        /// Error and remedy.
         message: String,
     },
     /// A file that cannot be read.
@@ -71,7 +71,7 @@ pub enum LoadError {
         file: String,
         /// Place in the file: a chunk, a primitive, an accessor, a line.
         place: String,
-        /// What is wrong, and what to do.
+        /// Error and remedy.
         message: String,
     },
 }

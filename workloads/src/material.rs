@@ -7,7 +7,7 @@ use glam::{Vec3, Vec4};
 use pipeline::{Blend, Cull, DepthState, DrawState, Lane, Shader, ShadingPoint, Texture};
 use serde::{Deserialize, Serialize};
 
-/// What the opacity of a surface does (glTF 2.0, 3.9.4).
+/// Effect of the opacity of a surface (glTF 2.0, 3.9.4).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub enum Alpha {
@@ -32,7 +32,7 @@ pub struct Material {
     pub base_color: Vec3,
     /// Opacity from 0 to 1; a factor of that of the texture.
     pub opacity: f32,
-    /// What the opacity does.
+    /// Effect of the opacity.
     pub alpha: Alpha,
     /// Colour texture.
     pub texture: Option<Arc<Texture>>,

@@ -31,7 +31,7 @@ pub enum SpecError {
         line: usize,
         /// Column, from 1.
         column: usize,
-        /// What is wrong and how to fix it.
+        /// Error and remedy.
         message: String,
     },
 }

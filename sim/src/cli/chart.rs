@@ -45,7 +45,7 @@ pub struct StressArgs {
     /// Print summary.json to standard output and nothing else
     #[arg(long)]
     pub json: bool,
-    /// How pictures look.
+    /// Style of pictures.
     #[command(flatten)]
     pub look: LookArgs,
 }
@@ -76,7 +76,7 @@ pub struct ChartArgs {
     /// Print the numbers as JSON and nothing else
     #[arg(long)]
     pub json: bool,
-    /// How pictures look.
+    /// Style of pictures.
     #[command(flatten)]
     pub look: LookArgs,
 }

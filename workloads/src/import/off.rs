@@ -33,7 +33,7 @@ pub(super) fn read(path: &Path) -> Result<Soup, LoadError> {
     Ok(soup)
 }
 
-/// What each vertex has, in this order.
+/// Components of each vertex, in this order.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Layout {
     normals: bool,
@@ -142,7 +142,7 @@ impl Words<'_> {
         next.ok_or_else(|| self.broken(&format!("the file ends before {what}: it may be truncated")))
     }
 
-    /// What vertices have, and the numbers of vertices and faces.
+    /// Components of vertices, and the numbers of vertices and faces.
     fn header(&mut self) -> Result<(Layout, [usize; 2]), LoadError> {
         let mut words = self.take("its header")?;
         // Some files have no space between the name and the first number.

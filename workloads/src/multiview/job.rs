@@ -40,7 +40,7 @@ pub struct Options {
     pub overlap: u32,
     /// Depth of zero disparity, scene units; by default that of the scene's lens.
     pub focus: Option<f32>,
-    /// How the views are shown.
+    /// Display of the views.
     pub show: Show,
     /// Panel for interlaced views.
     pub panel: Panel,

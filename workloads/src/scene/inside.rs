@@ -93,7 +93,7 @@ pub(crate) struct Inside {
     pub is_room: bool,
 }
 
-/// What is around a point.
+/// Surroundings of a point.
 struct Around {
     eye: DVec3,
     hits: Vec<Option<Hit>>,

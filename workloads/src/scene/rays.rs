@@ -91,7 +91,7 @@ impl Query for Near<'_> {
     }
 }
 
-/// How far a point is from a triangle.
+/// Distance of a point from a triangle.
 fn nearest(point: DVec3, triangle: &[DVec3; 3]) -> f64 {
     let along = normal(triangle);
     if let Some((steps, _)) = hit(point, along, triangle) {

@@ -105,7 +105,7 @@ impl ShadowMap {
     }
 }
 
-/// How the samples of a set are rendered.
+/// Rendering of the samples of a set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
     /// All in one 5D pass.

@@ -12,7 +12,7 @@ use crate::study::table::{Sheet, Table, fixed, millis, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
 use crate::study::{Gallery, Study, StudyError};
 
-/// How much is measured.
+/// Effort of the measurement.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct CcdEffort {
     /// Cases of each family of two objects, and of each of many.
@@ -120,7 +120,7 @@ pub struct Slide {
 /// Everything the chart found.
 #[derive(Clone, Debug, Serialize)]
 pub struct CcdChart {
-    /// How much was measured.
+    /// Effort of the measurement.
     pub effort: CcdEffort,
     /// Pairs that collide and pairs that do not, of two objects and of many.
     pub pairs: [[usize; 2]; 2],

@@ -22,7 +22,7 @@ use crate::study::{Gallery, Study, StudyError};
 /// A method fails where its F1 is below this.
 pub const FAILS_BELOW: f64 = 0.9;
 
-/// How much is measured.
+/// Effort of the measurement.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct FramesEffort {
     /// Frames of each scene.
@@ -37,7 +37,7 @@ pub struct FramesEffort {
     pub seeds: &'static [u64],
 }
 
-/// How frames are looked for.
+/// Search for frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Way {
@@ -140,7 +140,7 @@ pub struct FramesRow {
 /// Everything the chart found.
 #[derive(Clone, Debug, Serialize)]
 pub struct FramesChart {
-    /// How much was measured.
+    /// Effort of the measurement.
     pub effort: FramesEffort,
     /// By axis, value, scene and method.
     pub rows: Vec<FramesRow>,
@@ -380,7 +380,7 @@ impl FramesChart {
 
 /// Places of the marks, as shares of the frames; where one is requested, it is the first.
 const MARKED: [f64; 5] = [0.4, 0.1, 0.25, 0.6, 0.85];
-/// How far off the marks are, s.
+/// Errors of the marks, s.
 const HAND_S: [f64; 5] = [0.05e-3, -0.1e-3, 0.1e-3, 0.0, -0.05e-3];
 
 /// Quality of the starts found.
@@ -392,11 +392,11 @@ pub struct FinderScore {
     pub energy_error: Option<f64>,
     /// Frames with an end that is not a true one, or a start missed within.
     pub wrong: usize,
-    /// How many of them carry a flag.
+    /// Number of them with a flag.
     pub wrong_flagged: usize,
     /// The other frames.
     pub right: usize,
-    /// How many of them carry a flag all the same.
+    /// Number of them with a flag all the same.
     pub right_flagged: usize,
     /// Host time, s for a million samples.
     pub host_s_per_1e6: f64,

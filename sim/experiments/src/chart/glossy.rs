@@ -23,7 +23,7 @@ use crate::study::table::{Sheet, Table, count, fixed, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
 use crate::study::{Gallery, Study, StudyError};
 
-/// How much is measured.
+/// Effort of the measurement.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct GlossyEffort {
     /// Rows of texels of the map.
@@ -43,13 +43,13 @@ pub const EFFECTS: [(&str, Effect); 2] =
 /// Everything the chart found.
 #[derive(Clone, Debug, Serialize)]
 pub struct GlossyChart {
-    /// How much was measured.
+    /// Effort of the measurement.
     pub effort: GlossyEffort,
     /// By effect and samples.
     pub rows: Vec<GlossyRow>,
     /// Contact hardening: blur by height.
     pub blurs: Vec<Blur>,
-    /// Where it does not work: a lens as wide as the receiver, and wider.
+    /// Failure cases: a lens as wide as the receiver, and wider.
     pub wides: Vec<Wide>,
 }
 

@@ -18,7 +18,7 @@ use super::statistics::{exponent, upper_half};
 use crate::study::table::{Sheet, Table, fixed, millis, optional, plain};
 use crate::study::{Gallery, Study, StudyError};
 
-/// How much is measured.
+/// Effort of the measurement.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct GrowthEffort {
     /// Side of the image in pixels, a power of two.
@@ -92,7 +92,7 @@ pub struct GrowthRow {
 /// Everything the chart found.
 #[derive(Clone, Debug, Serialize)]
 pub struct GrowthChart {
-    /// How much was measured.
+    /// Effort of the measurement.
     pub effort: GrowthEffort,
     /// Curve by curve.
     pub rows: Vec<GrowthRow>,
@@ -308,7 +308,7 @@ pub struct Point {
     pub hits: u64,
 }
 
-/// How often triangles cover the image.
+/// Depth complexity.
 const LAYERS: f64 = 4.0;
 /// Decides where triangles are and where samples look.
 const SEED: u64 = 1;

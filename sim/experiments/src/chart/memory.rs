@@ -14,7 +14,7 @@ use workloads::Overrides;
 use crate::study::table::{Sheet, Table, fixed, plain, share};
 use crate::study::{Gallery, Study, StudyError};
 
-/// What is drawn: a scene of one pass, and a workload whose passes read what earlier ones wrote.
+/// Drawn: a scene of one pass, and a workload whose passes read what earlier ones wrote.
 const WORK: [&str; 2] = ["default", "soft-shadows"];
 /// The GPU with both levels, and the platform nearest to it.
 const MACHINE: [&str; 2] = ["iris_pro", "hd_4000"];
@@ -26,7 +26,7 @@ const BYTES_PER_MB: f64 = 1_048_576.0;
 /// Saving of energy below which a larger level does not pay, as a share.
 const LEAST_SAVING: f64 = 0.01;
 
-/// How much is drawn.
+/// Effort.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct MemoryEffort {
     /// Width and height of the image in pixels.
@@ -59,7 +59,7 @@ pub struct MemoryRow {
 /// The whole chart.
 #[derive(Clone, Debug, Serialize)]
 pub struct MemoryChart {
-    /// How much was drawn.
+    /// Effort.
     pub effort: MemoryEffort,
     /// A row for each work, level and size.
     pub rows: Vec<MemoryRow>,

@@ -21,7 +21,7 @@ use crate::study::table::{Sheet, Table, fixed, optional, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
 use crate::study::{Gallery, Study, StudyError};
 
-/// How much is measured.
+/// Effort of the measurement.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct OcclusionEffort {
     /// Pixels of the image.
@@ -109,7 +109,7 @@ impl OcclusionRow {
 /// Everything the chart found.
 #[derive(Clone, Debug, Serialize)]
 pub struct OcclusionChart {
-    /// How much was measured.
+    /// Effort of the measurement.
     pub effort: OcclusionEffort,
     /// By intervals, over boxes and tiles.
     pub intervals: Vec<OcclusionRow>,

@@ -19,7 +19,7 @@ use crate::study::table::{Sheet, Table, count, fixed, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
 use crate::study::{Gallery, Study, StudyError};
 
-/// How much is measured.
+/// Effort of the measurement.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct PointsEffort {
     /// Least distance in the plane and in space.
@@ -37,7 +37,7 @@ pub struct PointsEffort {
 /// Everything the chart found.
 #[derive(Clone, Debug, Serialize)]
 pub struct PointsChart {
-    /// How much was measured.
+    /// Effort of the measurement.
     pub effort: PointsEffort,
     /// Dimension by dimension, method by method.
     pub rows: Vec<PointsRow>,
@@ -226,7 +226,7 @@ pub struct PointsRow {
     pub effort: u64,
     /// Least distance requested.
     pub radius: f64,
-    /// How many points there are.
+    /// Number of points.
     pub points: usize,
     /// Of one thread's CPU time.
     pub points_per_s: f64,
@@ -345,7 +345,7 @@ pub struct Coarse {
     pub bits: u32,
     /// The least distance in spacings of numbers.
     pub radius_ulp: f64,
-    /// How many points there are.
+    /// Number of points.
     pub points: usize,
     /// Uncovered regions left, without a number in them.
     pub thin_regions: u64,

@@ -20,7 +20,7 @@ use crate::study::table::{Sheet, Table, fixed, percent, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
 use crate::study::{Gallery, Study, StudyError};
 
-/// How much is done.
+/// Effort.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct SampledEffort {
     /// Frames of each animation.
@@ -90,7 +90,7 @@ pub struct Cost {
 pub struct Figures {
     /// The quantity, or `all`.
     pub quantity: &'static str,
-    /// How many trials.
+    /// Number of trials.
     pub trials: usize,
     /// The share of those in which the truth is inside the interval.
     pub inside_percent: f64,
@@ -107,7 +107,7 @@ pub struct Figures {
 /// The whole chart.
 #[derive(Clone, Debug, Serialize)]
 pub struct SampledChart {
-    /// How much was done.
+    /// Effort.
     pub effort: SampledEffort,
     /// Over all animations, by quantity and together.
     pub figures: Vec<Figures>,

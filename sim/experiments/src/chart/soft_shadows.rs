@@ -27,7 +27,7 @@ use crate::study::table::{Sheet, Table, count, fixed, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
 use crate::study::{Gallery, Study, StudyError};
 
-/// How much is measured.
+/// Effort of the measurement.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct SoftShadowsEffort {
     /// Pixels of the image, across and down.
@@ -45,13 +45,13 @@ pub struct SoftShadowsEffort {
 /// Everything the chart found.
 #[derive(Clone, Debug, Serialize)]
 pub struct SoftShadowsChart {
-    /// How much was measured.
+    /// Effort of the measurement.
     pub effort: SoftShadowsEffort,
     /// Samples per pixel of the reference.
     pub reference_samples_per_pixel: u32,
     /// By light samples, from few to many.
     pub rows: Vec<ShadowsRow>,
-    /// Where it does not work: too small and too large a bias, by its size.
+    /// Failure cases: too small and too large a bias, by its size.
     pub biases: Vec<Bias>,
 }
 

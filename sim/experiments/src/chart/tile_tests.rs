@@ -54,7 +54,7 @@ pub struct TileTestsRow {
     pub on_tightness_front: bool,
 }
 
-/// How much is measured.
+/// Effort of the measurement.
 #[derive(Clone, Copy, Debug)]
 pub struct TileTestsEffort {
     /// How large the scenes of families are.

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use glam::{DQuat, DVec3, Mat4, Vec3, Vec4};
 use pipeline::{Lane, Shader, ShadingPoint, Texture, Wrap};
 use workloads::Material;
-use workloads::scene::{Graph, Local, Node, Parts, Rig, SceneCamera, Settings, Trs, Frustum};
+use workloads::scene::{Frustum, Graph, Local, Node, Parts, Rig, SceneCamera, Settings, Trs};
 use workloads::{LoadError, Overrides, Scene, shapes};
 
 /// Frames in the phone's sequence (Paper III, section 4).

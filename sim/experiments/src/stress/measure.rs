@@ -37,9 +37,9 @@ pub struct StressRow {
     pub work: Work,
     /// Its multiply-adds over those of the best method at this value.
     pub over_best: f64,
-    /// Where the true intervals are from: `exact roots` or `dense sampling`.
+    /// Source of the true intervals: `exact roots` or `dense sampling`.
     pub truth: &'static str,
-    /// How wide its boxes are.
+    /// Width of its boxes.
     pub intervals: Intervals,
 }
 
@@ -197,7 +197,7 @@ impl Pairs {
         Self { pairs, shear: projection.shear, exact }
     }
 
-    /// Where the true intervals are from.
+    /// Source of the true intervals.
     pub fn source(&self) -> &'static str {
         if self.exact { "exact roots" } else { "dense sampling" }
     }

@@ -39,7 +39,7 @@ pub fn family_named(name: &str) -> Result<&'static Family, RunError> {
     family(name).ok_or_else(unknown)
 }
 
-/// How much is measured.
+/// Effort of the measurement.
 #[derive(Clone, Copy, Debug)]
 pub struct StressEffort {
     /// One family; all where there is none.
@@ -52,7 +52,7 @@ pub struct StressEffort {
 pub struct Report {
     /// The families swept.
     pub families: Vec<&'static Family>,
-    /// How large their scenes are.
+    /// Size of their scenes.
     pub size: Size,
     /// A row for each family, value and method, in this order.
     pub rows: Vec<StressRow>,

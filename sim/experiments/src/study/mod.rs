@@ -31,7 +31,7 @@ pub trait Study: Serialize + Sized {
     const TAKES_SCENES: bool = false;
     /// Whether the time it took is printed.
     const SHOWS_TIME: bool = false;
-    /// How much is measured.
+    /// Effort of the measurement.
     type Effort;
     /// The study of the book.
     const FULL: Self::Effort;
@@ -86,7 +86,7 @@ pub struct Gallery<'a> {
 }
 
 impl Gallery<'_> {
-    /// How pictures look.
+    /// Style of pictures.
     pub fn look(&self) -> &Look {
         self.look
     }
@@ -118,9 +118,9 @@ pub struct Request<'a> {
     pub scenes: &'a [String],
     /// The folder for its files.
     pub dir: &'a OutDir,
-    /// How pictures look.
+    /// Style of pictures.
     pub look: &'a Look,
-    /// Where progress is shown.
+    /// Display of progress.
     pub progress: &'a Progress,
 }
 

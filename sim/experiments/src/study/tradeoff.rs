@@ -66,7 +66,7 @@ pub struct TradeoffPoint {
     pub method: String,
     /// Its level, for example `16 samples a pixel`; empty where it has one alone.
     pub level: String,
-    /// How wrong it is.
+    /// Error.
     pub error: Metric,
     /// Its cost.
     pub cost: Metric,

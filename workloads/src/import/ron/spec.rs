@@ -99,15 +99,15 @@ pub(super) struct ObjectSpec {
     pub clip: Option<String>,
     /// Part of lens and shutter in which it is drawn (user clip planes).
     pub visible: Option<VisibleSpec>,
-    /// How it looks; glTF files bring their own materials, which this one replaces.
+    /// Material; glTF files bring their own materials, which this one replaces.
     pub material: Option<MaterialSpec>,
-    /// Where it is.
+    /// Position.
     #[serde(default, deserialize_with = "bounded::coordinates")]
     pub position: [f64; 3],
-    /// How it is turned: about x, then y, then z, right-handed.
+    /// Rotation: about x, then y, then z, right-handed.
     #[serde(default, deserialize_with = "bounded::angles")]
     pub rotation_deg: [f64; 3],
-    /// How large it is, as a factor along each axis; a negative one mirrors.
+    /// Scale, as a factor along each axis; a negative one mirrors.
     #[serde(default, deserialize_with = "bounded::vector")]
     pub scale: Option<[f64; 3]>,
     /// Steady motion, in units per second.
@@ -243,7 +243,7 @@ fn unit() -> f64 {
     1.0
 }
 
-/// How a surface looks.
+/// Material of a surface.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct MaterialSpec {
@@ -253,7 +253,7 @@ pub(super) struct MaterialSpec {
     /// Opacity; multiplies that of the texture. 1 by default.
     #[serde(default, deserialize_with = "bounded::share")]
     pub opacity: Option<f32>,
-    /// What the opacity does. By default surfaces with an opacity below 1 are blended.
+    /// Effect of the opacity. By default surfaces with an opacity below 1 are blended.
     pub alpha: Option<Alpha>,
     /// Colour texture; the object needs texture coordinates.
     pub texture: Option<TextureSpec>,
@@ -269,7 +269,7 @@ fn yes() -> bool {
     true
 }
 
-/// Where a texture comes from.
+/// Source of a texture.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) enum TextureSpec {

@@ -18,7 +18,7 @@ use output::progress::{Bar, Progress};
 
 pub use measure::{Angle, Bench, Cached, Lanes, RegionTests, Run, TileTests, ViewsRow};
 
-/// How much is measured.
+/// Effort of the measurement.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct MultiviewEffort {
     /// The built-in scene, and its frame.
@@ -59,7 +59,7 @@ pub const POLICIES: [(&str, Replacement); 3] =
 /// Everything the chart found.
 #[derive(Clone, Debug, Serialize)]
 pub struct MultiviewChart {
-    /// How much was measured.
+    /// Effort of the measurement.
     pub effort: MultiviewEffort,
     /// By number of views.
     pub rows: Vec<ViewsRow>,

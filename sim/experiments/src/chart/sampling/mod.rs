@@ -20,7 +20,7 @@ use output::progress::Progress;
 pub use measure::Point;
 pub use measure::{Failures, Shared};
 
-/// How much is measured.
+/// Effort of the measurement.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct SamplingEffort {
     /// The built-in scene, and its frame.
@@ -65,13 +65,13 @@ pub const FIT_FROM: u32 = 4;
 /// Everything the chart found.
 #[derive(Clone, Debug, Serialize)]
 pub struct SamplingChart {
-    /// How much was measured.
+    /// Effort of the measurement.
     pub effort: SamplingEffort,
     /// Samples per pixel of the references.
     pub reference_samples_per_pixel: u32,
     /// Scene by scene, table by table.
     pub rows: Vec<SamplingRow>,
-    /// Where it does not work.
+    /// Failure cases.
     pub failures: Failures,
 }
 

@@ -62,7 +62,7 @@ pub struct RateRow {
     pub unit: &'static str,
     /// Rate by each level.
     pub giga_per_s: BTreeMap<&'static str, f64>,
-    /// The card: listed or measured (`../shared/energy.md`, unit rates of 2012-class rasterizers).
+    /// Rate of a graphics card of 2012, listed by its maker or measured.
     pub card: &'static str,
 }
 

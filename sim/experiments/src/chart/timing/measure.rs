@@ -61,7 +61,7 @@ pub struct TimingRow {
     pub speedup_over_stepped: f64,
 }
 
-/// How fast the reference was.
+/// Speed of the reference.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Speed {
     unit_cycles: u64,

@@ -82,7 +82,7 @@ pub struct TimingChart {
     pub quick: bool,
     /// The levels by name.
     pub levels: BTreeMap<&'static str, Figures>,
-    /// How fast the reference is.
+    /// Speed of the reference.
     pub reference: Reference,
     /// Animations at every level, drawn and timed, on every GPU.
     pub animations: Vec<AnimationRow>,
