@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use crate::support::{Inputs, root};
 
 /// Refused words and phrases, each with its replacement. They are compared as whole words, in any case.
-const REFUSED: [(&str, &str); 62] = [
+const REFUSED: [(&str, &str); 66] = [
     ("a fault of the program", "internal error"),
     ("alike", "in the same way, likewise"),
     ("are told", "are reported; are distinguished"),
@@ -26,6 +26,8 @@ const REFUSED: [(&str, &str); 62] = [
     ("hold against", "compare with"),
     ("how sure", "confidence"),
     ("in vain", "false positive, wasted"),
+    ("is no file", "is not a file"),
+    ("is no name", "is not a name"),
     ("is no time", "is not a valid time"),
     ("is to be had", "is available"),
     ("is told", "is reported"),
@@ -59,6 +61,8 @@ const REFUSED: [(&str, &str); 62] = [
     ("telling", "reporting"),
     ("tells", "reports, prints, distinguishes"),
     ("there is no `", "unknown"),
+    ("there is no camera `", "unknown camera"),
+    ("there is no folder", "does not exist"),
     ("there is no such", "does not exist"),
     ("unrested", "without an idle gap"),
     ("voids", "uncovered regions"),
@@ -76,7 +80,7 @@ const REFUSED: [(&str, &str); 62] = [
 const EXEMPT: [&str; 3] = ["tests/e2e/words.rs", "CHANGELOG.md", "sim/experiments/papers"];
 
 /// Endings of files that are read.
-const ENDINGS: [&str; 4] = ["rs", "md", "ron", "html"];
+const ENDINGS: [&str; 7] = ["rs", "md", "ron", "html", "toml", "py", "sh"];
 
 /// Text files below `folder`, without build results and hidden folders.
 fn texts(folder: &Path) -> Vec<PathBuf> {

@@ -9,12 +9,11 @@ use pipeline::random::mix;
 use pipeline::sampling::SampleSource;
 use pipeline::{
     Camera, Cull, Draw, DrawError, Geometry, Gpu, IntervalAnswer, IntervalQueries, Lane, Lens, MovingBox,
-    RasterPass, Shader, ShadingPoint, Target, Viewport,
+    PassError, RasterPass, Shader, ShadingPoint, Target, Viewport,
 };
 use serde::{Deserialize, Serialize};
 use warnings::{Code, Warning};
 
-use super::query::depths_of;
 use crate::error::LoadError;
 use crate::job::{Drawn, Draws, Fact, Flag, Flags, Job, JobError, OptionSource, Request, must_hold};
 use crate::samples::SampleChoice;
@@ -320,4 +319,20 @@ impl WallSceneSpec {
         let about = |at: Vec3| [at - half, at + half];
         MovingBox { open: about(at - half_motion), close: about(at + half_motion) }
     }
+}
+/// Depth of every sample of `draws` in the order `(y width + x) per_pixel + index`, infinite for no hit.
+///
+/// # Errors
+/// [`PassError`] if the hardware cannot draw it.
+pub fn depths(
+    camera: &Camera,
+    draws: &[Draw<'_>],
+    settings: &pipeline::Settings<'_>,
+) -> Result<Vec<f32>, PassError> {
+    Ok(depths_of(&RasterPass::new(camera, draws, settings).visibility()?))
+}
+
+/// Depths of visible samples.
+fn depths_of(visible: &[(u32, u32)]) -> Vec<f32> {
+    visible.iter().map(|(_, bits)| f32::from_bits(*bits)).collect()
 }

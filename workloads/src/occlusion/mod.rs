@@ -13,8 +13,6 @@
 //! - [`WallScene`]: walls, solid or slatted, with boxes behind them.
 
 mod job;
-mod query;
 
 pub(crate) use job::FLAGS;
-pub use job::{MAX_HALF_COVERED_SHARE, Options, WallScene, WallSceneSpec, job};
-pub use query::depths;
+pub use job::{MAX_HALF_COVERED_SHARE, Options, WallScene, WallSceneSpec, depths, job};
