@@ -171,8 +171,8 @@ impl Schedule {
             Warning::new(
                 Code::MissedVsync,
                 format!(
-                    "{late} of {frames} frames took longer than the V-sync period of {period_ms:.3} ms and missed \
-                     {missed} ticks in all: the animation stutters, and its mean frame rate is below the display's"
+                    "{late} of {frames} frames took longer than the V-sync period of {period_ms:.3} ms \
+                     (ticks missed in all: {missed}): the animation stutters, and its mean frame rate is below the display's"
                 ),
             )
         })

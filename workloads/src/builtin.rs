@@ -8,7 +8,7 @@ use pipeline::{Texture, Wrap};
 use crate::error::LoadError;
 use crate::material::Material;
 use crate::scene::{
-    Graph, Local, Mesh, Motion, Node, Parts, Rig, Scene, SceneCamera, Settings, Spin, Trs, View, rotation,
+    Frustum, Graph, Local, Mesh, Motion, Node, Parts, Rig, Scene, SceneCamera, Settings, Spin, Trs, rotation,
     tan_half,
 };
 use crate::shapes;
@@ -58,7 +58,7 @@ fn tiny() -> Result<Scene, LoadError> {
     fill(&mut parts.graph);
     parts.camera = SceneCamera {
         rig: Rig::look_at(DVec3::new(0.0, 1.6, 4.0), DVec3::new(0.0, 0.6, 0.0)),
-        view: Some(View::Perspective { tan_half_height: tan_half(45.0) }),
+        view: Some(Frustum::Perspective { tan_half_height: tan_half(45.0) }),
         near: None,
     };
     parts.settings = Settings {
@@ -115,7 +115,7 @@ fn scene() -> Result<Scene, LoadError> {
     background(&mut parts.graph, &palette);
     parts.camera = SceneCamera {
         rig: Rig::look_at(DVec3::new(0.6, 2.3, 8.2), DVec3::new(0.0, 1.15, 0.0)),
-        view: Some(View::Perspective { tan_half_height: tan_half(38.0) }),
+        view: Some(Frustum::Perspective { tan_half_height: tan_half(38.0) }),
         near: None,
     };
     parts.background = Vec3::new(0.50, 0.62, 0.76);

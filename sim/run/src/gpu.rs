@@ -272,12 +272,15 @@ pub(super) fn check_pairing(
     Some(Warning::new(Code::PlatformMismatch, message))
 }
 
-/// Whether the GPU file names this platform and table, by name or by the path in the options.
+/// Whether the GPU file names this platform and table, by the path in the options or by a name. A changed copy of a supplied
+/// file has the same name and is another machine.
 fn belongs(own: &PowerFiles, options: &RunOptions, platform: &Platform, table: &EnergyTable) -> bool {
-    let is = |own: &str, given: &Option<PathBuf>, name: &str| {
-        own == name || given.as_ref().is_none_or(|given| given == Path::new(own))
-    };
-    is(&own.platform, &options.platform, &platform.name) && is(&own.energy, &options.energy, table.name())
+    let is_named =
+        |own: &str, given: &Option<PathBuf>| given.as_ref().is_none_or(|given| given == Path::new(own));
+    let same_platform = || Platform::builtin(&own.platform).is_ok_and(|supplied| supplied == *platform);
+    let same_table = || EnergyTable::builtin(&own.energy).is_ok_and(|supplied| supplied == *table);
+    (is_named(&own.platform, &options.platform) || same_platform())
+        && (is_named(&own.energy, &options.energy) || same_table())
 }
 
 #[cfg(test)]

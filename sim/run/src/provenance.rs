@@ -151,6 +151,7 @@ pub fn again(
     force: bool,
     revision: Option<&str>,
 ) -> Result<(RunOptions, Option<Choice>), RunError> {
+    let path = if path.is_dir() { &path.join("summary.json") } else { path };
     let name = path.display();
     let text = fs::read(path).map_err(|source| RunError::Input { path: name.to_string(), source })?;
     let refuse = |message: String| RunError::Setting(format!("{name}: {message}"));

@@ -101,7 +101,9 @@ fn degenerate(simulated: &Simulated) -> Option<Warning> {
 }
 
 fn empty_frames(simulated: &Simulated) -> Option<Warning> {
-    let empty = simulated.known().filter(|frame| frame.counts[Event::SamplesHit] == 0).count();
+    // Passes in conservative mode shade tiles and have no samples.
+    let shows = |counts: &Counts| counts[Event::SamplesHit] + counts[Event::PixelInvocations] > 0;
+    let empty = simulated.known().filter(|frame| !shows(&frame.counts)).count();
     (empty > 0).then(|| {
         Warning::new(
             Code::EmptyFrame,
@@ -162,7 +164,8 @@ fn costly_preview(simulated: &Simulated) -> Option<Warning> {
     let share = simulated.sampled.as_ref()?.preview_share;
     (share >= COSTLY_PREVIEW_SHARE).then(|| {
         let message = format!(
-            "the preview of a frame takes {:.0} % of its cycles, because its passes do not shrink with the image, or the image is small              already: predicting frames saves little; use --timing packet",
+            "the preview of a frame takes {:.0} % of its cycles, because its passes do not shrink with the image, or the image is small \
+             already: predicting frames saves little; use --timing packet",
             share * 100.0
         );
         Warning::new(Code::CostlyPreview, message)

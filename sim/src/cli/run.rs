@@ -8,7 +8,7 @@ use activity::spec::suggestion;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use output::progress::Progress;
-use output::table::{Table, count_or_digits, counted, si, si_mean_sd};
+use output::table::{Table, count_or_digits, counted, si, si_digits, si_mean_sd};
 use output::terminal::{Terminal, Verbosity};
 use output::{Destination, MeanSd};
 use power_model::Bound;
@@ -306,6 +306,9 @@ fn found(summary: &Summary) -> String {
     if summary.measured.is_none() {
         return "no frame but the marked one was found in the trace: nothing is measured by frame".to_owned();
     }
+    if detection.true_frames == 1 && detection.found_frames == 1 {
+        return "1 frame, whose start is marked in the trace".to_owned();
+    }
     format!(
         "{} of {} frame starts found in the trace ({} false), worst timing error {}",
         detection.matched_frames,
@@ -318,8 +321,12 @@ fn found(summary: &Summary) -> String {
 /// Table of measured and true values, one row per quantity.
 fn figures(outcome: &Outcome) -> Table {
     let mut table = Table::new(["", "measured in the trace", "simulator's truth"]);
+    let is_single = outcome.summary.settings.frames == 1;
     for row in outcome.summary.headline() {
-        let cell = |number: Option<MeanSd>| number.map_or("-".to_owned(), |n| si_mean_sd(n, &row.unit));
+        // A single frame has no deviation.
+        let text =
+            |n: MeanSd| if is_single { si_digits(n.mean, &row.unit, 4) } else { si_mean_sd(n, &row.unit) };
+        let cell = |number: Option<MeanSd>| number.map_or("-".to_owned(), text);
         table.row([row.label.clone(), cell(row.measured), cell(row.truth)]);
     }
     table

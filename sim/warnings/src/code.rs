@@ -128,6 +128,8 @@ codes! {
     ShadowBanding = "shadow-banding" in Workload,
     /// The bias is below half a texel of the map or above eight.
     ShadowBias = "shadow-bias" in Workload,
+    /// `soft-shadows` draws textured, cut-out, blended or vertex-coloured surfaces, as opaque ones of their base colour.
+    MaterialsSimplified = "materials-simplified" in Workload,
     /// The shader of `multiview` runs a quarter more often than with an unlimited cache.
     ShadingCacheSmall = "shading-cache-small" in Workload,
     /// The outermost views are more than 6 degrees apart and materials have highlights.

@@ -14,7 +14,7 @@ use crate::error::LoadError;
 use crate::job::{Drawn, DrawsScene, Fact, Flag, Flags, Job, JobError, OptionSource, Request};
 use crate::material::Material;
 use crate::scene::{
-    Frame, Graph, Local, Node, Overrides, Parts, Rig, Scene, SceneCamera, Settings, Trs, View, tan_half,
+    Frame, Frustum, Graph, Local, Node, Overrides, Parts, Rig, Scene, SceneCamera, Settings, Trs, tan_half,
 };
 use crate::shapes;
 
@@ -232,7 +232,7 @@ pub fn default_scene(below: bool) -> Result<Scene, LoadError> {
     fill(&mut parts.graph, if below { -1.0 } else { 1.0 });
     parts.camera = SceneCamera {
         rig: Rig::look_at(DVec3::new(0.4, 2.2, 4.6), DVec3::new(0.0, 0.0, 0.1)),
-        view: Some(View::Perspective { tan_half_height: tan_half(42.0) }),
+        view: Some(Frustum::Perspective { tan_half_height: tan_half(42.0) }),
         near: None,
     };
     parts.background = Vec3::new(0.45, 0.55, 0.70);

@@ -6,7 +6,7 @@ use std::collections::HashSet;
 use activity::Event;
 use glam::{DVec3, Vec3};
 use pipeline::sampling::{Pattern, Sample, SampleSpec};
-use pipeline::{Cull, Draw, Gpu, Viewport};
+use pipeline::{Cull, Draw, DrawState, Gpu, Viewport};
 use serde::{Deserialize, Serialize};
 use warnings::{Code, Warning};
 
@@ -16,10 +16,10 @@ use super::shade::{Shadows, World, look_ups};
 use crate::accumulation::SharedSamples;
 use crate::error::LoadError;
 use crate::job::{Drawn, DrawsScene, Fact, Flag, Flags, Job, JobError, OptionSource, Request};
-use crate::material::Material;
+use crate::material::{Alpha, Material};
 use crate::scene::{
-    self, Frame, Graph, Local, Motion, Node, Overrides, Parts, Rig, Scene, SceneCamera, Settings, Spin, Trs,
-    tan_half,
+    self, Frame, FrameMesh, Graph, Local, Motion, Node, Overrides, Parts, Rig, Scene, SceneCamera, Settings,
+    Spin, Trs, tan_half,
 };
 use crate::shapes;
 
@@ -131,6 +131,24 @@ impl SoftShadows {
         warnings
     }
 
+    /// Warns about surfaces that do not look as their materials say.
+    fn simplified(&self, frame: &Frame) -> Option<Warning> {
+        let is_plain = |mesh: &&FrameMesh| {
+            let material = &self.scene.materials()[mesh.material];
+            mesh.colors.is_empty() && material.texture.is_none() && material.alpha == Alpha::Opaque
+        };
+        let meshes = frame.drawn(&self.scene);
+        let others = meshes.len() - meshes.iter().copied().filter(is_plain).count();
+        (others > 0).then(|| {
+            let message = format!(
+                "{others} of {} meshes are textured, cut out, blended or vertex-coloured; they are drawn as opaque surfaces of \
+                 their base colour",
+                meshes.len()
+            );
+            Warning::new(Code::MaterialsSimplified, message)
+        })
+    }
+
     /// Warns about banding: equal samples give only one step of a penumbra.
     fn banding(&self) -> Option<Warning> {
         // Adding zero makes -0.0 equal to 0.0.
@@ -142,7 +160,7 @@ impl SoftShadows {
             None => format!("--samples {fewest} or more"),
         };
         (count < fewest).then(|| {
-            let message = format!("{count} light samples: penumbras show as {count} steps (bands); {remedy}");
+            let message = format!("distinct light samples: {count}, so penumbras show as bands; {remedy}");
             Warning::new(Code::ShadowBanding, message)
         })
     }
@@ -171,14 +189,17 @@ impl DrawsScene for SoftShadows {
         let shadows = Shadows::Map { map: &map, bias: self.options.bias };
         let shaded = look_ups(&world, &self.set, &visible.samples, shadows, gpu);
         let facts = self.facts(&map, shaded.counts[Event::TextureFetches]);
-        let (moving, warnings) = (frame.is_moving(), self.regime_warnings());
+        let mut warnings = self.regime_warnings();
+        warnings.extend(self.simplified(frame));
+        let moving = frame.is_moving();
         Ok(Drawn { image: shaded.into_image(), moving, lens: true, facts, warnings })
     }
 }
 
-/// The draws of a frame without culling, and the reflectance of each.
+/// The draws of a frame, opaque and without culling, and the reflectance of each.
 pub(crate) fn parts<'a>(scene: &'a Scene, frame: &'a Frame) -> Result<(Vec<Draw<'a>>, Vec<Vec3>), JobError> {
-    let draws = frame.draws(scene)?.into_iter().map(|draw| draw.culling(Cull::None)).collect();
+    let draws =
+        frame.draws(scene)?.into_iter().map(|draw| draw.with_state(DrawState::new(Cull::None))).collect();
     let drawn = frame.drawn(scene).into_iter();
     Ok((draws, drawn.map(|mesh| scene.materials()[mesh.material].base_color).collect()))
 }

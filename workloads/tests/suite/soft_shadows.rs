@@ -7,7 +7,7 @@ use pipeline::{Cull, Draw, Geometry, Gpu, Lane, Viewport};
 use proptest::prelude::*;
 use workloads::Overrides;
 use workloads::accumulation::SharedSamples;
-use workloads::job::Job;
+use workloads::job::{Drawn, Job};
 use workloads::soft_shadows::{
     AreaLight, DepthPass, LightSpec, Method, Options, SceneView, ShadowMap, Shadows, SoftShadows, World,
     depth_pass,
@@ -256,6 +256,27 @@ fn each_limitation_is_reported() {
     assert_eq!(warned(small.clone(), 4), ["shadow-banding"]);
     assert_eq!(warned(Options { bias: 0.0, ..small.clone() }, 16), ["shadow-bias"]);
     assert_eq!(warned(Options { bias: 3.0, ..small }, 16), ["shadow-bias"]);
+}
+
+/// Blended surfaces used to be drawn without depths, and so were not seen at all.
+#[test]
+fn blended_surfaces_are_drawn_as_opaque_ones_and_reported() {
+    let folder = tempfile::tempdir().unwrap();
+    let drawn = |opacity: &str| {
+        let path = folder.path().join(format!("{opacity}.ron"));
+        let ball = format!("(shape: Sphere(radius: 1), position: (0, 1, 0), material: (opacity: {opacity}))");
+        std::fs::write(&path, format!("(objects: [(shape: Plane(size: 9)), {ball}])")).unwrap();
+        let scene = Some(path.to_str().unwrap().to_owned());
+        let overrides = Overrides { size: Some((32, 24)), samples: Some(16), ..Overrides::default() };
+        let job =
+            SoftShadows::new(Options { scene, map_px: 64, bias: 0.2, ..Options::default() }, &overrides, 1);
+        job.unwrap().frame(0, &mut Gpu::quiet(&spec()).unwrap()).unwrap()
+    };
+    let [opaque, blended] = ["1", "0.5"].map(drawn);
+    assert_eq!(opaque.image, blended.image);
+    let codes = |drawn: &Drawn| drawn.warnings.iter().map(|warning| warning.code.name()).collect::<Vec<_>>();
+    assert!(!codes(&opaque).contains(&"materials-simplified"));
+    assert!(codes(&blended).contains(&"materials-simplified"));
 }
 
 #[test]

@@ -15,8 +15,8 @@ use super::Document;
 use crate::error::LoadError;
 use crate::material::Light;
 use crate::scene::{
-    Clip, Instant, Interpolation, Local, Node, OwnCamera, Property, Rig, SceneCamera, Skin, Track, Trs, View,
-    unit_quat, world_poses,
+    Clip, Frustum, Instant, Interpolation, Local, Node, OwnCamera, Property, Rig, SceneCamera, Skin, Track,
+    Trs, unit_quat, world_poses,
 };
 
 /// The file's nodes, reordered.
@@ -249,17 +249,17 @@ fn cameras(document: &Document, tree: &Tree, warnings: &mut Vec<Warning>) -> Vec
 
 /// How much the camera sees and its near depth. The image has its own width, so the file's aspect ratio or `xmag` does not count
 /// (glTF 2.0, 3.10.3); an orthographic near plane at zero, which it allows, is left to the scene.
-fn seen(camera: &Camera) -> Option<(View, Option<f64>)> {
+fn seen(camera: &Camera) -> Option<(Frustum, Option<f64>)> {
     match (&camera.type_, &camera.perspective, &camera.orthographic) {
         (Checked::Valid(CameraType::Perspective), Some(lens), _) => {
             let usable = lens.yfov > 0.0 && lens.yfov < 3.1 && lens.znear > 0.0;
             let tan_half_height = libm::tan(f64::from(lens.yfov) / 2.0);
-            usable.then_some((View::Perspective { tan_half_height }, Some(f64::from(lens.znear))))
+            usable.then_some((Frustum::Perspective { tan_half_height }, Some(f64::from(lens.znear))))
         }
         (Checked::Valid(CameraType::Orthographic), _, Some(lens)) => {
             let usable = lens.ymag > 0.0 && lens.ymag.is_finite() && lens.znear >= 0.0;
             let near = (lens.znear > 0.0).then_some(f64::from(lens.znear));
-            usable.then_some((View::Orthographic { half_height: f64::from(lens.ymag) }, near))
+            usable.then_some((Frustum::Orthographic { half_height: f64::from(lens.ymag) }, near))
         }
         _ => None,
     }
