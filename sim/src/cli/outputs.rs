@@ -3,10 +3,26 @@
 use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
+use traces::io::{ReadOptions, Rows};
+
 use super::Failure;
 
-/// Checks that an output file can be written and is not one of the inputs.
+/// Checks that an output file can be written, and is neither one of the inputs nor a recording.
 pub(super) fn may_hold_results<'a>(
+    flag: &str,
+    out: Option<&Path>,
+    inputs: impl IntoIterator<Item = &'a Path>,
+) -> Result<(), Failure> {
+    may_hold_trace(flag, out, inputs)?;
+    let is_recording = |out: &&Path| out.is_file() && Rows::open(out, &ReadOptions::default()).is_ok();
+    out.filter(is_recording).map_or(Ok(()), |out| {
+        let message = format!("{flag}: {} is a recording; name another file, or move it", out.display());
+        Err(Failure { message, code: 2 })
+    })
+}
+
+/// The same for a trace, which may replace another one.
+pub(super) fn may_hold_trace<'a>(
     flag: &str,
     out: Option<&Path>,
     inputs: impl IntoIterator<Item = &'a Path>,
@@ -98,7 +114,11 @@ mod tests {
             assert!(code == expected && message.contains(says), "{message}");
         }
         assert!(may_hold_results("--csv", Some(Path::new("/")), []).is_err_and(|failure| failure.code == 2));
+        std::fs::write(at("trace.csv"), "time_s,power_W\n0,1\n0.001,1\n0.002,1\n").unwrap();
+        let (code, message) = refused("trace.csv").unwrap();
+        assert!(code == 2 && message.contains("is a recording"), "{message}");
+        assert!(may_hold_trace("--out", Some(&at("trace.csv")), []).is_ok());
         assert_eq!(std::fs::read(at("old.csv")).unwrap(), b"old");
-        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2);
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 3);
     }
 }

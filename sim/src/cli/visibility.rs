@@ -232,6 +232,9 @@ pub(super) fn write_table(args: &SamplesArgs) -> Result<(), Failure> {
     super::outputs::may_hold_results("--out", Some(&args.out), [Path::new(&args.table)])?;
     let (width, height) = args.size;
     let wrong = |message: String| Failure { message, code: 2 };
+    if args.out.extension().is_none_or(|ending| ending != "smp") {
+        return Err(wrong(format!("--out: {}: samples are written to a .smp file", args.out.display())));
+    }
     let viewport = Viewport::new(width, height)
         .ok_or_else(|| wrong(format!("size: {width}x{height}: each side has to be 1 to 16384 pixels")))?;
     let source = SampleChoice::load(&args.table)?.source(args.samples, args.seed)?;

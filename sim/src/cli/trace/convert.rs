@@ -12,7 +12,7 @@ use warnings::Code;
 
 use super::{report, warn_with, wrong};
 use crate::cli::Failure;
-use crate::cli::outputs::{may_hold_results, print_json};
+use crate::cli::outputs::{may_hold_trace, print_json};
 use crate::cli::parse::{
     current, gain, length_of_time, positive_current, positive_voltage, rate, resistance, share_below_one,
     size_of_current, size_of_voltage, voltage,
@@ -83,7 +83,7 @@ pub(super) fn may_be_saved<'a>(
     format: &TraceFormat,
     inputs: impl IntoIterator<Item = &'a Path>,
 ) -> Result<(), Failure> {
-    may_hold_results(flag, Some(out), inputs)?;
+    may_hold_trace(flag, Some(out), inputs)?;
     let beside = format.description_path(out).filter(|beside| beside.exists() && !out.exists());
     beside.map_or(Ok(()), |beside| {
         Err(wrong(format!(
