@@ -15,11 +15,11 @@ use outcome::{Outcome, floor};
 use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use traces::frames::Method;
+use traces::frames::FinderMethod;
 
 /// The request.
 struct Options {
-    method: Method,
+    method: FinderMethod,
     several: bool,
     cases: Vec<String>,
     json: Option<PathBuf>,
@@ -37,8 +37,13 @@ fn main() -> ExitCode {
 }
 
 fn options() -> Result<Options, Box<dyn Error>> {
-    let mut options =
-        Options { method: Method::Auto, several: false, cases: Vec::new(), json: None, dirs: Vec::new() };
+    let mut options = Options {
+        method: FinderMethod::Auto,
+        several: false,
+        cases: Vec::new(),
+        json: None,
+        dirs: Vec::new(),
+    };
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
         let mut value = || arguments.next().ok_or_else(|| format!("{argument} needs a value"));

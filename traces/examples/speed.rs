@@ -45,7 +45,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     report("write", clock);
     println!("{:.2} bytes a sample", std::fs::metadata(&path)?.len() as f64 / 1e6 / millions);
     let clock = Instant::now();
-    let read = io::read_parquet(&path);
+    let read = io::parquet::read(&path);
     report("read", clock);
     std::fs::remove_file(&path)?;
     assert!(read? == trace);

@@ -13,8 +13,14 @@ fn svg() -> String {
     let samples = [(0.0, 1.0)];
     let part = plot::PowerPart { part: Part::Leakage, power_w: vec![1.0; 10] };
     let parts = vec![part];
-    let frame =
-        plot::FramePowerPlot { subject: EVIL, frame: 0, bin_s: 1e-3, parts, samples: &samples, frame_j: None };
+    let frame = plot::FramePowerPlot {
+        subject: EVIL,
+        frame: 0,
+        bin_s: 1e-3,
+        parts,
+        samples: &samples,
+        frame_j: None,
+    };
     frame.picture(&plot::Look::default()).svg().unwrap()
 }
 

@@ -308,7 +308,8 @@ fn a_unit_has_one_colour_in_every_plot() {
     for units in [&Unit::ALL[..], &few[..]] {
         let parts = units.iter().map(|&unit| PowerPart { part: Part::Unit(unit), power_w: vec![1.0; 4] });
         let parts = parts.collect();
-        let power = FramePowerPlot { subject: "s", frame: 0, bin_s: 1e-6, parts, samples: &[], frame_j: None };
+        let power =
+            FramePowerPlot { subject: "s", frame: 0, bin_s: 1e-6, parts, samples: &[], frame_j: None };
         let busy = units.iter().map(|unit| UnitLane { name: unit.name(), busy: vec![0.0; 4] }).collect();
         let busy = UnitPlot { subject: "s", frame: 0, bin_s: 1e-6, units: busy };
         let lane =
