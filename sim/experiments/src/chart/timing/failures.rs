@@ -62,7 +62,7 @@ pub struct RateRow {
     pub unit: &'static str,
     /// Rate by each level.
     pub giga_per_s: BTreeMap<&'static str, f64>,
-    /// The card: listed or measured (`../shared/energy.md`, unit rates of 2012-class rasterizers).
+    /// The card: listed or measured, of unit rates of 2012-class rasterizers.
     pub card: &'static str,
 }
 
