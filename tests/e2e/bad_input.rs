@@ -65,6 +65,7 @@ fn flags() {
     for (flags, says, remedy) in cases {
         refusals.call(&[&["tiny"], flags].concat(), 2, says, remedy);
     }
+    refusals.done();
 }
 
 #[test]
@@ -80,6 +81,7 @@ fn flags_without_effect_on_a_workload_are_refused() {
     for (args, says, remedy) in cases {
         refusals.call(args, 2, says, remedy);
     }
+    refusals.done();
 }
 
 #[test]
@@ -102,6 +104,7 @@ fn files_without_triangles_are_refused_by_ccd() {
             "use `quintile ccd`",
         );
     }
+    refusals.done();
 }
 
 #[test]
@@ -118,6 +121,7 @@ fn invalid_frame_rates() {
             "has to be 0.001 to 1000000 frames per second",
         );
     }
+    refusals.done();
 }
 
 #[test]
@@ -138,6 +142,7 @@ fn unknown_names() {
     refusals.call(&["tiny", "--platform", "referense"], 2, &["referense"], "did you mean `reference`?");
     refusals.call(&["tiny", "--energy", "28mm"], 2, &["28mm"], "did you mean `28nm`?");
     refusals.call(&["tiny", "--gpu", "nothing.like.it"], 2, &["nothing.like.it"], "known: reference, mobile");
+    refusals.done();
 }
 
 #[test]
@@ -162,6 +167,7 @@ fn missing_files() {
     );
     let cut = inputs.put("cut.ron", "(\n  objects: [\n    (shape: ");
     refusals.call(&[&cut], 2, &["cut.ron:3:12: the file ends early"], "add what is missing");
+    refusals.done();
 }
 
 #[cfg(unix)]
@@ -173,6 +179,7 @@ fn names_that_are_not_unicode() {
     let name = OsStr::from_bytes(b"sc\xffene.glb");
     let ended = quintile().call([OsStr::new("run"), name]);
     refusals.check(&ended, 1, &["ene.glb: cannot read it"], "check the path");
+    refusals.done();
 }
 
 #[test]
@@ -183,13 +190,16 @@ fn truncated_glb_files() {
         refusals.file("cut.glb", &whole[..length], 1, &["truncated"], "get the file again");
     }
     refusals.file("empty.glb", b"", 1, &["not a glTF 2.0 file"], "export it again");
+    refusals.done();
 }
 
 #[test]
 #[cfg_attr(not(real_scenes), ignore = "QUINTILE_SCENES is not set")]
 fn a_truncated_real_glb_file() {
     let bytes = fs::read(real_scene("Fox.glb")).expect("the fox is there");
-    Refusals::default().file("fox.glb", &bytes[..bytes.len() / 3], 1, &["truncated"], "get the file again");
+    let mut refusals = Refusals::default();
+    refusals.file("fox.glb", &bytes[..bytes.len() / 3], 1, &["truncated"], "get the file again");
+    refusals.done();
 }
 
 #[test]
@@ -228,6 +238,7 @@ fn indices_out_of_range() {
         &["triangle 0", "vertex 9"],
         "fix the file",
     );
+    refusals.done();
 }
 
 /// ASCII PLY file with one face and this number of vertices.
@@ -276,6 +287,7 @@ fn vertices_that_are_not_finite() {
             "fix the file",
         );
     }
+    refusals.done();
 }
 
 #[test]
@@ -294,6 +306,7 @@ fn geometry_files_of_another_format() {
     let mut glb = Glb::square();
     glb.json["extensionsRequired"] = json!(["KHR_draco_mesh_compression"]);
     refusals.file("draco.glb", glb.bytes(), 1, &["KHR_draco_mesh_compression"], "export it without");
+    refusals.done();
 }
 
 #[test]
@@ -304,6 +317,7 @@ fn empty_scenes() {
     let mut glb = Glb::square();
     glb.json["nodes"] = json!([{}]);
     refusals.file("a.glb", glb.bytes(), 1, &["it has no triangles"], "name another file");
+    refusals.done();
 }
 
 #[test]
@@ -337,6 +351,7 @@ fn invalid_scene_files() {
         &["did not contain valid UTF-8"],
         "check the path, and that it is a text file in UTF-8",
     );
+    refusals.done();
 }
 
 #[test]
@@ -384,6 +399,7 @@ fn invalid_gpu_and_platform_files() {
             refusals.call(&["tiny", flag, &file], 2, &[file.as_str(), ":", says], remedy);
         }
     }
+    refusals.done();
 }
 
 #[cfg(unix)]

@@ -21,6 +21,7 @@ fn results_that_cannot_be_written() {
         );
     }
     assert_eq!(fs::read_to_string(&file).ok().as_deref(), Some("not a folder"));
+    refusals.done();
 }
 
 /// Files that cannot be overwritten are reported before the work, and the previous results stay unchanged.
@@ -47,6 +48,7 @@ fn unwritable_files_leave_previous_results_unchanged() {
             assert!(before == results.files(), "{name}: something was changed");
         }
     }
+    refusals.done();
 }
 
 /// Replaces `path` with something that a run cannot overwrite.
@@ -73,6 +75,7 @@ fn a_usage_error_leaves_previous_results_unchanged() {
     let ended = quintile().call(["run", "tiny", "--samples", "0", "--out", &out]);
     refusals.check(&ended, 2, &["--samples"], "it has to be 1 to 256");
     assert!(before == results.files());
+    refusals.done();
 }
 
 /// Runs that exceed memory are refused at once, without an abort. The limits are those of a small machine: 4
@@ -97,4 +100,5 @@ fn runs_that_exceed_memory() {
             crate::support::Quintile::new("sh").call(limited.iter().chain(args).chain(&["--out", &out]));
         refusals.check(&ended, 2, &[says], remedy);
     }
+    refusals.done();
 }

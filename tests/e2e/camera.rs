@@ -194,6 +194,7 @@ fn workloads_with_a_scene_take_a_camera_and_others_refuse_it() {
         &["--camera: the workload `ccd` has no use for it"],
         "leave it out",
     );
+    refusals.done();
 }
 
 #[test]
@@ -234,6 +235,7 @@ fn errors_in_a_camera_name_their_place() {
     refusals.file("twice.ron", twice, 2, &["camera.lens_radius"], "remove one of them");
     let image = "(camera: (position: (0, 0, 3), target: (0, 0, 0), width: 64), objects: [(shape: Sphere(radius: 1))])";
     refusals.file("image.ron", image, 2, &["camera.width"], "put `width` there");
+    refusals.done();
 }
 
 #[test]

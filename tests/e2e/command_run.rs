@@ -72,7 +72,7 @@ fn a_shorter_run_leaves_no_images_of_a_longer_one() {
 fn both_trace_files_hold_the_same_samples() {
     let results = tiny(&[]);
     let parquet = results.trace();
-    let csv = traces::io::read_csv(&results.path("trace.csv")).expect("trace.csv is a trace");
+    let csv = traces::io::csv::read(&results.path("trace.csv")).expect("trace.csv is a trace");
     let parts = |trace: &Trace| (trace.samples(), trace.rate_hz(), trace.start_s());
     assert_eq!(parts(&parquet), parts(&csv));
     assert!(parquet.samples() > 1000);

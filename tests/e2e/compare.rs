@@ -184,4 +184,5 @@ fn results_of_different_kinds_are_refused() {
         &["d.tif"],
         "give a name that ends in .png or .exr",
     );
+    refusals.done();
 }

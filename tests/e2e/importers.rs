@@ -354,6 +354,7 @@ fn other_formats_are_refused_with_a_remedy() {
     let folder = inputs.path("folder");
     fs::create_dir(&folder).expect("a folder can be made");
     refusals.call(&[&folder], 2, &["folder: it is a folder"], "give a .ron, .gltf");
+    refusals.done();
 }
 
 /// A patch of 1 m with bumps, its middle at `x` and `z`; every coordinate is a multiple of 1/64.

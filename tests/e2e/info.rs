@@ -121,4 +121,5 @@ fn unreadable_files_are_refused() {
     ] {
         refusals.check(&quintile().call(["info", &scene]), code, &[says], remedy);
     }
+    refusals.done();
 }

@@ -82,17 +82,17 @@ const EXEMPT: [&str; 3] = ["tests/e2e/words.rs", "CHANGELOG.md", "sim/experiment
 /// Endings of files that are read.
 const ENDINGS: [&str; 7] = ["rs", "md", "ron", "html", "toml", "py", "sh"];
 
-/// Text files below `folder`, without build results and hidden folders.
-fn texts(folder: &Path) -> Vec<PathBuf> {
+/// Files below `folder` with one of these endings, without build results and hidden folders.
+pub(super) fn files_with(endings: &[&str], folder: &Path) -> Vec<PathBuf> {
     let mut files = Vec::new();
     for entry in fs::read_dir(folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display())) {
         let path = entry.unwrap().path();
         let name = path.file_name().unwrap().to_string_lossy().into_owned();
         if path.is_dir() {
             if !name.starts_with('.') && name != "target" {
-                files.extend(texts(&path));
+                files.extend(files_with(endings, &path));
             }
-        } else if path.extension().is_some_and(|ending| ENDINGS.iter().any(|known| ending == *known)) {
+        } else if path.extension().is_some_and(|ending| endings.iter().any(|known| ending == *known)) {
             files.push(path);
         }
     }
@@ -125,7 +125,7 @@ fn refused(name: &str, text: &str) -> Vec<String> {
 #[test]
 fn texts_use_the_words_of_the_glossary() {
     let root = root();
-    let files = texts(&root);
+    let files = files_with(&ENDINGS, &root);
     assert!(files.len() > 300, "only {} files were read", files.len());
     let mut found = Vec::new();
     for file in files {
@@ -143,7 +143,7 @@ fn refused_words_are_found_with_file_and_line() {
     let inputs = Inputs::new();
     inputs.put("page.md", "Fine.\nIt was Mended.\nfn kept_in_vain() {}\n");
     inputs.put("data.csv", "mend");
-    let files = texts(Path::new(&inputs.path("")));
+    let files = files_with(&ENDINGS, Path::new(&inputs.path("")));
     assert_eq!(files.len(), 1, "{files:?}");
     let found = refused("page.md", &fs::read_to_string(&files[0]).unwrap());
     assert_eq!(

@@ -3,7 +3,8 @@
 
     beside_peers.py PEERS QUINTILE [--n 100000000] [--stumpy-n 10000000] [--rounds 3] [--dir DIR]
 
-PEERS is shared/peers/traces, QUINTILE the program. Times are by the clock and of the CPU; ours with two threads, file to
+PEERS is a folder, not part of the repository, with `baseline.py` (both rivals: profile, spaced minima, threshold) and
+`bench_throughput.py` (the trace). QUINTILE is the program. Times are by the clock and of the CPU; ours with two threads, file to
 frames.csv. numpy starts from memory, and once more from the same file. stumpy is run on fewer samples: its time is linear.
 """
 import argparse

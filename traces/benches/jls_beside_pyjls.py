@@ -2,8 +2,8 @@
 """JLS of ours held against pyjls 0.17: samples to the bit, summaries against numpy, times, notes, lost samples; then speed.
 
     jls_beside_pyjls.py QUINTILE                            files that `quintile trace convert` and `trace sample` write
-    jls_beside_pyjls.py --golden FILE                       the golden file of tests/jls_write.rs (JLS_GOLDEN=FILE writes it)
-    jls_beside_pyjls.py --speed JLS_SPEED [--n 100000000]   by turns with pyjls in one run (cargo build --example jls_speed)
+    jls_beside_pyjls.py --golden FILE                       the golden file of traces/tests/suite/jls_write.rs (JLS_GOLDEN=FILE writes it)
+    jls_beside_pyjls.py --speed [--n 100000000]             by turns with pyjls in one run (cargo bench --bench jls_speed)
 
 Needs numpy, pyarrow and pyjls 0.17. Ends with an error at the first difference.
 """
@@ -236,19 +236,20 @@ def theirs(samples, path):
     return {"write": written, "read": read, "bytes_per_sample": size}
 
 
-def ours(program, samples, path):
-    done = subprocess.run([program, str(samples), path], capture_output=True, text=True)
+def ours(samples, path):
+    command = ["cargo", "bench", "-q", "-p", "traces", "--bench", "jls_speed", "--", str(samples), os.path.abspath(path)]
+    done = subprocess.run(command, cwd=os.path.dirname(__file__) or ".", capture_output=True, text=True)
     if done.returncode:
         sys.exit(done.stderr)
     return {name: float(value) for name, value in (line.split() for line in done.stdout.splitlines())}
 
 
-def speed(program, samples, folder, rounds):
+def speed(samples, folder, rounds):
     path = os.path.join(folder, "speed.jls")
     runs = {"ours": [], "pyjls": []}
     for _ in range(rounds):
         runs["pyjls"].append(theirs(samples, path))
-        runs["ours"].append(ours(program, samples, path))
+        runs["ours"].append(ours(samples, path))
     for name, of in runs.items():
         write, read, size = (statistics.median(run[key] for run in of) for key in ("write", "read", "bytes_per_sample"))
         print(f"{name:6} writes {write:6.1f}, reads {read:6.1f} million samples/s; {size:.3f} bytes a sample (medians of {rounds})")
@@ -258,7 +259,7 @@ def main():
     a = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     a.add_argument("program", nargs="?")
     a.add_argument("--golden")
-    a.add_argument("--speed")
+    a.add_argument("--speed", action="store_true")
     a.add_argument("--n", type=int, default=100_000_000)
     a.add_argument("--rounds", type=int, default=3)
     a.add_argument("--dir")
@@ -269,7 +270,7 @@ def main():
         if a.program:
             correctness(a.program, folder)
         if a.speed:
-            speed(a.speed, a.n, folder, a.rounds)
+            speed(a.n, folder, a.rounds)
 
 
 if __name__ == "__main__":

@@ -42,8 +42,8 @@ fn run() -> Result<(), Box<dyn Error>> {
 
 fn read(path: &Path) -> Result<Trace, io::ReadError> {
     if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv")) {
-        io::read_csv(path)
+        io::csv::read(path)
     } else {
-        io::read_parquet(path)
+        io::parquet::read(path)
     }
 }

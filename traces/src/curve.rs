@@ -125,11 +125,6 @@ impl Curve {
         self.energy_to(b_s).minus(self.energy_to(a_s))
     }
 
-    /// Mean power from `a_s` to `b_s`, W; the power at `a_s` if they are equal.
-    pub fn mean_power_w(&self, a_s: f64, b_s: f64) -> f64 {
-        if a_s == b_s { self.power_at(a_s) } else { self.energy_j(a_s, b_s) / (b_s - a_s) }
-    }
-
     /// Mean power of `count` successive periods of `1 / rate_hz` from `start_s`, W, in one sweep.
     ///
     /// The means times the period add up to the energy of the whole span: successive periods share their
@@ -259,7 +254,6 @@ mod tests {
         assert_eq!(curve.energy_j(1.5, 3.0), 1.5 + 5.0);
         assert_eq!(curve.energy_j(0.0, 9.0), 13.0);
         assert_eq!(curve.energy_j(3.0, 1.5), -6.5);
-        assert_eq!(curve.mean_power_w(1.5, 3.5), 4.5);
         assert_eq!([curve.power_at(0.5), curve.power_at(2.0), curve.power_at(4.0)], [0.0, 5.0, 0.0]);
     }
 

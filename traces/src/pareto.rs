@@ -1,6 +1,6 @@
 //! Frontiers of time and energy (Paper IV): the settings that no other dominates.
 
-use crate::table::{Table, TableReadError};
+use crate::table::{InputTable, TableReadError};
 use crate::units::{Quantity, UnitError, scale_with};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -158,7 +158,7 @@ pub enum ParetoError {
 /// # Errors
 /// [`ParetoError`] names the file and the row or column.
 pub fn frontiers(
-    table: &Table,
+    table: &InputTable,
     columns: &SettingColumns,
     idle_w: f64,
     seed: u64,
@@ -201,7 +201,7 @@ pub fn frontiers(
 
 /// Refuses rows that are not settings.
 fn check_settings(
-    table: &Table,
+    table: &InputTable,
     time: &str,
     times: &[f64],
     deviations: [&Vec<f64>; 2],

@@ -1,7 +1,7 @@
 //! Frames of a recording with their energies: in memory, or in pieces where the file is long.
 
 use crate::energy::{FrameEnergy, PowerIntegral};
-use crate::frames::{Found, MarkError, Marks, Method, Options, Proposal, Window, find_with, propose};
+use crate::frames::{FinderMethod, Found, MarkError, Marks, Options, Proposal, Window, find_with, propose};
 use crate::io::{ReadError, ReadOptions, Rows};
 use crate::stream::{self, StreamError};
 use crate::trace::{Metadata, Trace};
@@ -25,7 +25,7 @@ pub struct Search {
     /// Where the last frame ends, s; by default the end mark of the metadata, or the end of the trace.
     pub end_s: Option<f64>,
     /// The method.
-    pub method: Method,
+    pub method: FinderMethod,
     /// Whether to read in pieces what would fit into memory.
     pub in_pieces: bool,
 }
@@ -97,7 +97,7 @@ impl Search {
     /// # Errors
     /// [`SearchError::NotInPieces`] if it is requested but not possible; [`SearchError::Read`].
     pub fn reads_in_pieces(&self, path: &Path, options: &ReadOptions) -> Result<bool, SearchError> {
-        if matches!(self.method, Method::Tracking | Method::Normalized) || options.repair {
+        if matches!(self.method, FinderMethod::Tracking | FinderMethod::Normalized) || options.repair {
             return if self.in_pieces { Err(SearchError::NotInPieces) } else { Ok(false) };
         }
         let bytes = || std::fs::metadata(path).map_or(0, |metadata| metadata.len());
@@ -203,7 +203,7 @@ mod tests {
             propose: false,
             window: Window { pre_s: 1e-3, post_s: 4e-3 },
             end_s: None,
-            method: Method::SumOfSquares,
+            method: FinderMethod::SumOfSquares,
             in_pieces: false,
         }
     }
@@ -236,7 +236,7 @@ mod tests {
         assert_eq!(pieces.energies.len(), 20);
         assert!(marked.reads_in_pieces(&path, &options).unwrap());
         assert!(!search().reads_in_pieces(&path, &options).unwrap());
-        let tracking = Search { method: Method::Tracking, ..marked.clone() };
+        let tracking = Search { method: FinderMethod::Tracking, ..marked.clone() };
         assert!(matches!(tracking.reads_in_pieces(&path, &options), Err(SearchError::NotInPieces)));
         let proposing = Search { propose: true, ..marked };
         assert!(matches!(proposing.of_file(&path, &options), Err(SearchError::ProposalInPieces)));

@@ -393,7 +393,7 @@ impl Burst {
 mod tests {
     use super::*;
     use crate::Trace;
-    use crate::frames::{Marks, Method, default_window, find};
+    use crate::frames::{FinderMethod, Marks, default_window, find};
 
     /// Times from start to start, s.
     fn gaps(scenario: &Scenario, frames: usize, seed: u64) -> Vec<f64> {
@@ -494,7 +494,7 @@ mod tests {
             let window = default_window(0.0, rate_hz);
             find(&trace, &Marks::one(scene.truth[15].start_s, window, trace.end_s())).unwrap().method
         };
-        assert_eq!((method(50e3), method(2e3)), (Method::Tracking, Method::SumOfSquares));
+        assert_eq!((method(50e3), method(2e3)), (FinderMethod::Tracking, FinderMethod::SumOfSquares));
     }
 
     #[test]

@@ -50,7 +50,7 @@ pub enum TableReadError {
 
 /// A table in memory.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Table {
+pub struct InputTable {
     path: PathBuf,
     names: Vec<String>,
     rows: Vec<Vec<String>>,
@@ -58,7 +58,7 @@ pub struct Table {
     units: BTreeMap<String, String>,
 }
 
-impl Table {
+impl InputTable {
     /// Reads a table with a header: Parquet by its first bytes, else a text with commas, semicolons or tabs.
     ///
     /// # Errors
@@ -194,7 +194,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.csv");
         std::fs::write(&path, "Algorithm;time_ms\nVB;1.5\nTF;x\n").unwrap();
-        let table = Table::read(&path).unwrap();
+        let table = InputTable::read(&path).unwrap();
         assert_eq!(table.texts("algorithm").unwrap(), ["VB", "TF"]);
         assert!(table.numbers("time_ms").unwrap_err().to_string().contains("row 2: time_ms is \"x\""));
         assert!(
@@ -234,7 +234,7 @@ mod tests {
         }
         group.close().unwrap();
         writer.close().unwrap();
-        let table = Table::read(&path).unwrap();
+        let table = InputTable::read(&path).unwrap();
         assert_eq!(table.numbers("time_ms").unwrap(), [3.5]);
         assert_eq!(table.texts("name").unwrap(), ["\"VB\""]);
     }

@@ -1,9 +1,9 @@
-//! Units and what they measure: one table for the columns of traces, the signals of JLS and the columns of
-//! tables.
+//! Units and what they measure: one table for the columns of traces, the signals of JLS, the columns of tables and
+//! the arguments of a command.
 
 use thiserror::Error;
 
-/// Quantity of a column.
+/// Quantity of a column or an argument.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Quantity {
     /// Times, s.
@@ -16,6 +16,10 @@ pub enum Quantity {
     Power,
     /// Energies, J.
     Energy,
+    /// Rates, Hz.
+    Rate,
+    /// Resistances, ohm.
+    Resistance,
 }
 
 impl Quantity {
@@ -27,6 +31,8 @@ impl Quantity {
             Self::Current => "currents",
             Self::Power => "powers",
             Self::Energy => "energies",
+            Self::Rate => "rates",
+            Self::Resistance => "resistances",
         }
     }
 }
@@ -35,7 +41,7 @@ impl Quantity {
 struct Unit {
     name: &'static str,
     quantity: Quantity,
-    /// Factor to s, V, A, W or J.
+    /// Factor to s, V, A, W, J, Hz or ohm.
     scale: f64,
     places: u8,
 }
@@ -48,41 +54,44 @@ const METADATA: u8 = 2;
 const JLS: u8 = 4;
 /// In the names of columns of other tables; case counts where it makes a difference.
 const TABLE: u8 = 8;
+/// Behind a number in an argument of a command; case counts.
+const ARGUMENT: u8 = 16;
 
 const fn unit(name: &'static str, quantity: Quantity, scale: f64, places: u8) -> Unit {
     Unit { name, quantity, scale, places }
 }
 
 /// All units. Of two that differ in case alone, the first is meant where case does not decide.
-const UNITS: [Unit; 39] = [
-    unit("s", Quantity::Time, 1.0, TRACE | TABLE),
+const UNITS: [Unit; 50] = [
+    unit("s", Quantity::Time, 1.0, TRACE | TABLE | ARGUMENT),
     unit("sec", Quantity::Time, 1.0, METADATA | TABLE),
     unit("second", Quantity::Time, 1.0, METADATA),
     unit("seconds", Quantity::Time, 1.0, METADATA),
-    unit("ms", Quantity::Time, 1e-3, TRACE | TABLE),
+    unit("ms", Quantity::Time, 1e-3, TRACE | TABLE | ARGUMENT),
     unit("msec", Quantity::Time, 1e-3, METADATA | TABLE),
-    unit("us", Quantity::Time, 1e-6, TRACE | TABLE),
+    unit("us", Quantity::Time, 1e-6, TRACE | TABLE | ARGUMENT),
     unit("usec", Quantity::Time, 1e-6, METADATA | TABLE),
-    unit("ns", Quantity::Time, 1e-9, TRACE | TABLE),
-    unit("h", Quantity::Time, 3600.0, TABLE),
-    unit("kV", Quantity::Voltage, 1e3, TRACE),
-    unit("V", Quantity::Voltage, 1.0, TRACE | JLS),
-    unit("mV", Quantity::Voltage, 1e-3, TRACE | JLS),
-    unit("uV", Quantity::Voltage, 1e-6, TRACE | JLS),
+    unit("ns", Quantity::Time, 1e-9, TRACE | TABLE | ARGUMENT),
+    unit("min", Quantity::Time, 60.0, ARGUMENT),
+    unit("h", Quantity::Time, 3600.0, TABLE | ARGUMENT),
+    unit("kV", Quantity::Voltage, 1e3, TRACE | ARGUMENT),
+    unit("V", Quantity::Voltage, 1.0, TRACE | JLS | ARGUMENT),
+    unit("mV", Quantity::Voltage, 1e-3, TRACE | JLS | ARGUMENT),
+    unit("uV", Quantity::Voltage, 1e-6, TRACE | JLS | ARGUMENT),
     unit("volt", Quantity::Voltage, 1.0, METADATA),
     unit("volts", Quantity::Voltage, 1.0, METADATA),
-    unit("kA", Quantity::Current, 1e3, TRACE),
-    unit("A", Quantity::Current, 1.0, TRACE | JLS),
-    unit("mA", Quantity::Current, 1e-3, TRACE | JLS),
-    unit("uA", Quantity::Current, 1e-6, TRACE | JLS),
+    unit("kA", Quantity::Current, 1e3, TRACE | ARGUMENT),
+    unit("A", Quantity::Current, 1.0, TRACE | JLS | ARGUMENT),
+    unit("mA", Quantity::Current, 1e-3, TRACE | JLS | ARGUMENT),
+    unit("uA", Quantity::Current, 1e-6, TRACE | JLS | ARGUMENT),
     unit("nA", Quantity::Current, 1e-9, TRACE | JLS),
     unit("amp", Quantity::Current, 1.0, METADATA),
     unit("amps", Quantity::Current, 1.0, METADATA),
     unit("ampere", Quantity::Current, 1.0, METADATA),
-    unit("kW", Quantity::Power, 1e3, TRACE),
-    unit("W", Quantity::Power, 1.0, TRACE | JLS),
-    unit("mW", Quantity::Power, 1e-3, TRACE | JLS),
-    unit("uW", Quantity::Power, 1e-6, TRACE | JLS),
+    unit("kW", Quantity::Power, 1e3, TRACE | ARGUMENT),
+    unit("W", Quantity::Power, 1.0, TRACE | JLS | ARGUMENT),
+    unit("mW", Quantity::Power, 1e-3, TRACE | JLS | ARGUMENT),
+    unit("uW", Quantity::Power, 1e-6, TRACE | JLS | ARGUMENT),
     unit("watt", Quantity::Power, 1.0, METADATA),
     unit("watts", Quantity::Power, 1.0, METADATA),
     unit("J", Quantity::Energy, 1.0, TABLE),
@@ -94,6 +103,16 @@ const UNITS: [Unit; 39] = [
     unit("Wh", Quantity::Energy, 3600.0, TABLE),
     unit("mWh", Quantity::Energy, 3.6, TABLE),
     unit("kWh", Quantity::Energy, 3.6e6, TABLE),
+    unit("Hz", Quantity::Rate, 1.0, ARGUMENT),
+    unit("kHz", Quantity::Rate, 1e3, ARGUMENT),
+    unit("MHz", Quantity::Rate, 1e6, ARGUMENT),
+    unit("GHz", Quantity::Rate, 1e9, ARGUMENT),
+    unit("Ohm", Quantity::Resistance, 1.0, ARGUMENT),
+    unit("mOhm", Quantity::Resistance, 1e-3, ARGUMENT),
+    unit("kOhm", Quantity::Resistance, 1e3, ARGUMENT),
+    unit("\u{3a9}", Quantity::Resistance, 1.0, ARGUMENT),
+    unit("m\u{3a9}", Quantity::Resistance, 1e-3, ARGUMENT),
+    unit("\u{2126}", Quantity::Resistance, 1.0, ARGUMENT),
 ];
 
 /// The signs for micro, U+00B5 and the Greek letter U+03BC, that names and units may have in place of `u`.
@@ -136,6 +155,25 @@ pub(crate) fn written_out_unit(text: &str) -> Option<(Quantity, f64)> {
 pub(crate) fn jls_unit(text: &str) -> Option<f64> {
     let name = text.replace(MICRO, "u");
     units(JLS).find(|unit| unit.name.eq_ignore_ascii_case(&name)).map(|unit| unit.scale)
+}
+
+/// The value of an argument in s, V, A, W, Hz or ohm: a finite number with a unit of the quantity behind it, or in the
+/// unit `bare` if there is none.
+///
+/// ```
+/// use traces::units::{Quantity, parse};
+///
+/// assert_eq!(parse("2 min", Quantity::Time, "s"), Some(120.0));
+/// assert_eq!(parse("2", Quantity::Time, "ms"), Some(2e-3));
+/// assert_eq!(parse("2 V", Quantity::Time, "s"), None);
+/// ```
+pub fn parse(text: &str, of: Quantity, bare: &str) -> Option<f64> {
+    let text = text.trim().replace(MICRO, "u");
+    let known = || units(ARGUMENT).filter(|unit| unit.quantity == of);
+    let number = |unit: &Unit, text: &str| Some(text.trim_end().parse::<f64>().ok()? * unit.scale);
+    let of_bare = known().find(|unit| unit.name == bare).and_then(|unit| number(unit, &text));
+    let value = of_bare.or_else(|| known().find_map(|unit| number(unit, text.strip_suffix(unit.name)?)));
+    value.filter(|value| value.is_finite())
 }
 
 /// A unit in the name of a table's column: exactly as it is written, or else without regard to case, when `M`
@@ -287,5 +325,7 @@ mod tests {
         );
         assert_eq!(trace_unit("MV", Some(Quantity::Voltage)), Some((Quantity::Voltage, 1e-3)));
         assert_eq!(trace_unit("V", Some(Quantity::Time)), None);
+        assert_eq!((table_unit("min"), parse("1min", Quantity::Time, "s")), (None, Some(60.0)));
+        assert_eq!((jls_unit("nA"), parse("1nA", Quantity::Current, "A")), (Some(1e-9), None));
     }
 }

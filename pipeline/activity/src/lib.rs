@@ -28,10 +28,8 @@ mod events;
 pub mod inputs;
 mod packet;
 pub mod spec;
-mod timeline;
 
 pub use bounded::{Bounded, OutOfBounds};
-pub use counts::Counts;
+pub use counts::{Bin, Counts, Timeline};
 pub use events::{Event, Unit};
 pub use packet::{LEVELS, LevelRequests, LineAccess, LineKind, Packet, PacketCounts, PacketKind, Waits};
-pub use timeline::{Bin, Timeline};

@@ -80,8 +80,8 @@ fn a_blocking_finish_costs_its_power_until_it_returns_and_leaves_idle_alone() {
         let expected_j = waiting_w * (0.020 + return_s);
         assert!((frame.extra_j / expected_j - 1.0).abs() < 1e-9);
         assert!((frame.energy_j - plain.energy.total_j() - expected_j).abs() < 1e-12);
-        let idle = |curve: &Curve| curve.mean_power_w(frame.finish_s + 1e-9, frame.end_s);
-        assert_eq!(idle(&blocked.curve), idle(&run.curve));
+        let idle_j = |curve: &Curve| curve.energy_j(frame.finish_s + 1e-9, frame.end_s);
+        assert_eq!(idle_j(&blocked.curve), idle_j(&run.curve));
     }
     // Begin to finish gives more than start to start if work fills most of the frame, and less otherwise.
     let period_s: f64 = 1.0 / 30.0;

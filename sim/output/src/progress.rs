@@ -29,11 +29,6 @@ impl Progress {
         Self { bars: MultiProgress::with_draw_target(target), terminal: terminal.clone() }
     }
 
-    #[cfg(test)]
-    fn is_silent(&self) -> bool {
-        self.bars.is_hidden()
-    }
-
     /// Adds a bar below the others, for `length` steps of the work `label`.
     pub fn bar(&self, label: &str, length: u64) -> Bar {
         let bar = self.bars.add(ProgressBar::new(length));
@@ -98,7 +93,7 @@ mod tests {
     #[test]
     fn quiet_hides_bars() {
         let progress = Progress::new(true);
-        assert!(progress.is_silent() && Progress::on(&Terminal::default(), true).is_silent());
+        assert!(progress.bars.is_hidden() && Progress::on(&Terminal::default(), true).bars.is_hidden());
         progress.note("unseen");
     }
 

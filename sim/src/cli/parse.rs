@@ -5,6 +5,7 @@ use std::str::FromStr;
 
 use experiments::stress::measure::SWITCHES;
 use pipeline::Features;
+use traces::units::{self, Quantity};
 
 /// Range of frames, the end not included; at least one frame.
 pub(super) fn frames(text: &str) -> Result<Range<u32>, String> {
@@ -131,80 +132,38 @@ fn number<T: FromStr + Into<f64> + Copy>(
     value.ok_or_else(|| format!("`{text}` is not {expected}"))
 }
 
-/// Kind of quantity, with its units and the unit of a bare number.
-struct Quantity {
+/// A quantity as an argument: how it is called, and how it is written.
+struct Expected {
+    quantity: Quantity,
     /// Name with article, for messages.
     what: &'static str,
     /// The unit of a bare number.
     bare: &'static str,
-    /// Units, each with its value in SI.
-    units: &'static [(&'static str, f64)],
     /// Examples for messages.
     examples: &'static str,
 }
 
-const RATE: Quantity = Quantity {
-    what: "a rate",
-    bare: "Hz",
-    units: &[("Hz", 1.0), ("kHz", 1e3), ("MHz", 1e6), ("GHz", 1e9)],
-    examples: "50kHz or 1MHz",
-};
-const TIMES: &[(&str, f64)] = &[
-    ("s", 1.0),
-    ("ms", 1e-3),
-    ("us", 1e-6),
-    ("\u{b5}s", 1e-6),
-    ("\u{3bc}s", 1e-6),
-    ("ns", 1e-9),
-    ("min", 60.0),
-    ("h", 3600.0),
-];
-const TIME: Quantity = Quantity { what: "a time", bare: "s", units: TIMES, examples: "2.5s, 20us or 1min" };
-const SHORT_TIME: Quantity = Quantity { bare: "ms", examples: "4ms or 20us", ..TIME };
-const VOLTAGE: Quantity = Quantity {
-    what: "a voltage",
-    bare: "V",
-    units: &[("V", 1.0), ("kV", 1e3), ("mV", 1e-3), ("uV", 1e-6), ("\u{b5}V", 1e-6), ("\u{3bc}V", 1e-6)],
-    examples: "12V or 5mV",
-};
-const CURRENT: Quantity = Quantity {
-    what: "a current",
-    bare: "A",
-    units: &[("A", 1.0), ("kA", 1e3), ("mA", 1e-3), ("uA", 1e-6), ("\u{b5}A", 1e-6), ("\u{3bc}A", 1e-6)],
-    examples: "2A or 5mA",
-};
-const POWER: Quantity = Quantity {
-    what: "a power",
-    bare: "W",
-    units: &[("W", 1.0), ("kW", 1e3), ("mW", 1e-3), ("uW", 1e-6), ("\u{b5}W", 1e-6), ("\u{3bc}W", 1e-6)],
-    examples: "14W or 250mW",
-};
-const RESISTANCE: Quantity = Quantity {
-    what: "a resistance",
-    bare: "Ohm",
-    units: &[
-        ("Ohm", 1.0),
-        ("mOhm", 1e-3),
-        ("kOhm", 1e3),
-        ("\u{3a9}", 1.0),
-        ("m\u{3a9}", 1e-3),
-        ("\u{2126}", 1.0),
-    ],
-    examples: "0.1Ohm or 4mOhm",
-};
+const fn expected(
+    quantity: Quantity,
+    what: &'static str,
+    bare: &'static str,
+    examples: &'static str,
+) -> Expected {
+    Expected { quantity, what, bare, examples }
+}
 
-impl Quantity {
+const RATE: Expected = expected(Quantity::Rate, "a rate", "Hz", "50kHz or 1MHz");
+const TIME: Expected = expected(Quantity::Time, "a time", "s", "2.5s, 20us or 1min");
+const SHORT_TIME: Expected = expected(Quantity::Time, "a time", "ms", "4ms or 20us");
+const VOLTAGE: Expected = expected(Quantity::Voltage, "a voltage", "V", "12V or 5mV");
+const CURRENT: Expected = expected(Quantity::Current, "a current", "A", "2A or 5mA");
+const POWER: Expected = expected(Quantity::Power, "a power", "W", "14W or 250mW");
+const RESISTANCE: Expected = expected(Quantity::Resistance, "a resistance", "Ohm", "0.1Ohm or 4mOhm");
+
+impl Expected {
     /// Parses a finite value; the result is in SI.
     fn parse(&self, text: &str) -> Result<f64, String> {
-        let text = text.trim();
-        let with_unit = |(unit, si): &(&str, f64)| {
-            let number = text.strip_suffix(unit)?.trim_end();
-            Some(number.parse::<f64>().ok()? * si)
-        };
-        let bare_si = self.units.iter().find(|(unit, _)| *unit == self.bare).map_or(1.0, |(_, si)| *si);
-        let bare = text.parse::<f64>().ok().map(|number| number * bare_si);
-        let value = bare.or_else(|| self.units.iter().find_map(with_unit));
-        value.filter(|value| value.is_finite()).ok_or_else(|| self.wrong(text, ""))
+        units::parse(text, self.quantity, self.bare).ok_or_else(|| self.wrong(text.trim(), ""))
     }
 
     /// Parses a value for which `fits` holds; `range` describes it in errors.

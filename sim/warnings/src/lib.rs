@@ -16,7 +16,5 @@
 //! ```
 
 mod code;
-mod warning;
 
-pub use code::{Code, Section};
-pub use warning::Warning;
+pub use code::{Code, Section, Warning};

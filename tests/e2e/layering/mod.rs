@@ -116,7 +116,7 @@ fn modules_have_no_circular_dependencies() {
 }
 
 #[test]
-fn circles_are_found_through_imports_paths_and_parents() {
+fn circles_are_found_through_imports_paths_parents_macros_and_attributes() {
     let crate_of = |files: &[(&str, &str)]| {
         let inputs = Inputs::new();
         for (name, text) in files {
@@ -129,8 +129,12 @@ fn circles_are_found_through_imports_paths_and_parents() {
     assert!(crate_of(&[root, ("a.rs", "use crate::c::three;"), two, three]).is_empty());
     let tests = "#[cfg(test)]\nmod tests { use crate::c::three; }\npub struct Two;";
     assert!(crate_of(&[root, ("a.rs", ""), ("b.rs", tests), three]).is_empty());
-    for back in ["use crate::c::three;\npub struct Two;", "pub struct Two;\nfn f() { super::c::three(Two) }"]
-    {
+    for back in [
+        "use crate::c::three;\npub struct Two;",
+        "pub struct Two;\nfn f() { super::c::three(Two) }",
+        "pub struct Two;\nfn f() { println!(\"{:?}\", [super::c::three(Two)]) }",
+        "#[error(\"{three}\", three = super::c::three(Two))]\npub struct Two;",
+    ] {
         assert_eq!(crate_of(&[root, ("a.rs", ""), ("b.rs", back), three]), ["::{b, c}"]);
     }
 }

@@ -1,14 +1,17 @@
 //! Dependencies between the modules of a crate, from its sources.
 //!
-//! Modules of one folder must not use each other in a circle. An item used through a re-export of the parent
-//! counts as used from its definition. Test modules are skipped.
+//! Siblings, the modules of one folder, are compared: they must not use each other in a circle, themselves or by
+//! modules below them. Between a module and its parent nothing is tested: children may use the types of their parent.
+//! An item used through a re-export of the parent counts as used from its definition. Paths in macros and attributes
+//! count, those in strings do not. Test modules are skipped.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
 
+use syn::buffer::{Cursor, TokenBuffer};
 use syn::visit::{self, Visit};
-use syn::{Attribute, Item, ItemMod, ItemUse, UseTree};
+use syn::{Attribute, Item, ItemMod, ItemUse, Macro, MetaList, UseTree};
 
 /// The path of a module from the root of its crate.
 type Module = Vec<String>;
@@ -143,6 +146,35 @@ impl Content {
     }
 }
 
+/// Paths of more than one name among the tokens of a macro or an attribute, also in their brackets.
+fn paths_of_tokens(mut at: Cursor) -> Vec<Vec<String>> {
+    let (mut paths, mut path) = (Vec::new(), Vec::<String>::new());
+    while !at.eof() {
+        if let Some((name, after)) = at.ident() {
+            path.push(name.to_string());
+            at = after;
+            if let Some(behind) = double_colon(at).filter(|behind| behind.ident().is_some()) {
+                at = behind;
+                continue;
+            }
+        } else if let Some((inside, _, _, after)) = at.any_group() {
+            paths.extend(paths_of_tokens(inside));
+            at = after;
+        } else if let Some((_, after)) = at.token_tree() {
+            at = after;
+        }
+        paths.extend(Some(std::mem::take(&mut path)).filter(|path| path.len() > 1));
+    }
+    paths
+}
+
+/// The place behind `::`, if it is next.
+fn double_colon(at: Cursor) -> Option<Cursor> {
+    let (first, at) = at.punct()?;
+    let (second, at) = at.punct()?;
+    (first.as_char() == ':' && second.as_char() == ':').then_some(at)
+}
+
 fn is_test(attributes: &[Attribute]) -> bool {
     attributes.iter().any(|attribute| {
         attribute.path().is_ident("cfg")
@@ -187,5 +219,15 @@ impl Visit<'_> for Content {
             self.paths.push(path.segments.iter().map(|segment| segment.ident.to_string()).collect());
         }
         visit::visit_path(self, path);
+    }
+
+    fn visit_macro(&mut self, called: &Macro) {
+        self.paths.extend(paths_of_tokens(TokenBuffer::new2(called.tokens.clone()).begin()));
+        visit::visit_macro(self, called);
+    }
+
+    fn visit_meta_list(&mut self, list: &MetaList) {
+        self.paths.extend(paths_of_tokens(TokenBuffer::new2(list.tokens.clone()).begin()));
+        visit::visit_meta_list(self, list);
     }
 }

@@ -4,10 +4,11 @@ use std::fs;
 
 use super::{Ended, Inputs, quintile};
 
-/// Collects the problems of all checked messages and panics with the list when dropped.
+/// Collects the problems of all checked messages; [`Refusals::done`] asserts that there are none.
 #[derive(Default)]
 pub struct Refusals {
     complaints: Vec<String>,
+    done: bool,
 }
 
 impl Refusals {
@@ -37,6 +38,12 @@ impl Refusals {
         complain(stderr.contains(remedy), &format!("it does not give the remedy `{remedy}`"));
     }
 
+    /// Asserts that all messages were as they should be.
+    pub fn done(mut self) {
+        self.done = true;
+        assert!(self.complaints.is_empty(), "{}", self.complaints.join("\n"));
+    }
+
     /// Checks `quintile run ARGS` with a new folder, which has to stay empty.
     pub fn call(&mut self, args: &[&str], code: i32, says: &[&str], remedy: &str) {
         let inputs = Inputs::new();
@@ -57,8 +64,8 @@ impl Refusals {
 }
 
 impl Drop for Refusals {
+    /// Fails a test that has forgotten [`Refusals::done`].
     fn drop(&mut self) {
-        let complaints = self.complaints.join("\n");
-        assert!(complaints.is_empty() || std::thread::panicking(), "{complaints}");
+        assert!(self.done || std::thread::panicking(), "the test has to end with `done`");
     }
 }

@@ -89,7 +89,7 @@ impl Results {
     /// If it is not a trace.
     pub fn trace(&self) -> Trace {
         let path = self.path("trace.parquet");
-        traces::io::read_parquet(&path).unwrap_or_else(|error| panic!("{error}"))
+        traces::io::parquet::read(&path).unwrap_or_else(|error| panic!("{error}"))
     }
 
     /// The rows of `frames.csv`.

@@ -6,6 +6,6 @@ use quintile_fuzz::on_disk;
 
 fuzz_target!(|data: &[u8]| {
     on_disk("a.csv", data, |path| {
-        let _ = traces::io::read_csv(path);
+        let _ = traces::io::csv::read(path);
     });
 });

@@ -10,7 +10,7 @@ fuzz_target!(
     init: std::panic::set_hook(Box::new(|_| ())),
     |data: &[u8]| {
         on_disk("a.parquet", data, |path| {
-            let _ = traces::io::read_parquet(path);
+            let _ = traces::io::parquet::read(path);
         });
     }
 );

@@ -8,7 +8,7 @@ fuzz_target!(
     init: std::panic::set_hook(Box::new(|_| ())),
     |data: &[u8]| {
         on_disk("a.table", data, |path| {
-            if let Ok(table) = traces::table::Table::read(path) {
+            if let Ok(table) = traces::table::InputTable::read(path) {
                 let _ = table.numbers("time_ms");
             }
         });

@@ -35,13 +35,11 @@
 
 mod chunk;
 mod definitions;
-mod error;
 mod format;
 mod read;
 mod write;
 
 pub use definitions::{Signal, SignalName, Source};
-pub use error::ReadError;
-pub use format::{MAX_PAYLOAD_BYTES, SAMPLE_TYPES, Timestamp};
+pub use format::{MAX_PAYLOAD_BYTES, ReadError, SAMPLE_TYPES, Timestamp};
 pub use read::{Reader, SampleReader};
 pub use write::Writer;

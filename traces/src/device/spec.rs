@@ -69,8 +69,8 @@ pub struct DeviceSpec {
 }
 
 impl Default for DeviceSpec {
-    /// A 12 V rail through 4 mOhm into a 14-bit, 50 kHz recorder of +-30 A and +-20 V. Assumed, not any one
-    /// product: the desktop device of `shared/peers/traces`, with 5 mA and 2 mV of noise.
+    /// A 12 V rail through 4 mOhm into a 14-bit, 50 kHz recorder of +-30 A and +-20 V, with 5 mA and 2 mV of
+    /// noise: assumed for a graphics card in a desktop computer, not any one product.
     fn default() -> Self {
         Self {
             name: "daq-50khz-14bit".to_owned(),

@@ -10,7 +10,10 @@ pub use crate::stats::Spread;
 pub use idle::{Idle, IdleTooShort, SegmentEnergy, SegmentError};
 pub(crate) use integral::Sums;
 pub use integral::{FrameEnergy, PowerIntegral, TrueFrame, energies_j, finishes_s, levels_w};
-pub use run::{InverseUnits, Pass, PassError, RunEnergy, RunError, RunOptions, check_passes, passes_j};
+pub use run::{
+    FramePart, FramePartError, InverseUnits, RunEnergy, RunEnergyError, RunEnergyOptions, check_parts,
+    parts_j,
+};
 pub use statistics::{
     FrameSummary, Histogram, Pooled, Repeats, WarmUp, mean_over_discarded, outliers, pooled, warm_up, whole,
 };

@@ -13,7 +13,7 @@ type Span = (f64, f64);
 
 /// How to evaluate a run.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct RunOptions {
+pub struct RunEnergyOptions {
     /// How many frames to discard at the beginning; by default as many as [`warm_up`] finds.
     pub discard: Option<usize>,
     /// Whether to leave out [`outliers`].
@@ -40,7 +40,7 @@ pub struct RunEnergy {
 
 /// A part of every frame, from its begin to that of the next pass, or to the end of the frame.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Pass {
+pub struct FramePart {
     /// Its name.
     pub name: String,
     /// When it begins, s after the start of the frame.
@@ -49,7 +49,7 @@ pub struct Pass {
 
 /// A pass that cannot be one of these frames.
 #[derive(Clone, Debug, Error, PartialEq)]
-pub enum PassError {
+pub enum FramePartError {
     /// Two passes of one name.
     #[error("pass {name} is given twice: name each pass differently")]
     Twice {
@@ -74,26 +74,27 @@ pub enum PassError {
 /// Refuses two passes of one name.
 ///
 /// # Errors
-/// [`PassError::Twice`].
-pub fn check_passes(passes: &[Pass]) -> Result<(), PassError> {
-    let twice = |(index, pass): &(usize, &Pass)| passes[..*index].iter().any(|other| other.name == pass.name);
+/// [`FramePartError::Twice`].
+pub fn check_parts(passes: &[FramePart]) -> Result<(), FramePartError> {
+    let twice =
+        |(index, pass): &(usize, &FramePart)| passes[..*index].iter().any(|other| other.name == pass.name);
     match passes.iter().enumerate().find(twice) {
-        Some((_, pass)) => Err(PassError::Twice { name: pass.name.clone() }),
+        Some((_, pass)) => Err(FramePartError::Twice { name: pass.name.clone() }),
         None => Ok(()),
     }
 }
 
-impl Pass {
+impl FramePart {
     /// Warning if the pass begins in some of the frames only.
     ///
     /// # Errors
-    /// [`PassError::Beyond`] if it begins in none.
-    pub fn check(&self, frames: &[FrameEnergy]) -> Result<Option<Warning>, PassError> {
+    /// [`FramePartError::Beyond`] if it begins in none.
+    pub fn check(&self, frames: &[FrameEnergy]) -> Result<Option<Warning>, FramePartError> {
         let (name, begin_ms) = (&self.name, self.begin_s * 1e3);
         let beyond = frames.iter().filter(|frame| frame.duration_s() <= self.begin_s).count();
         if beyond == frames.len() {
             let longest_ms = frames.iter().map(FrameEnergy::duration_s).fold(0.0, f64::max) * 1e3;
-            return Err(PassError::Beyond { name: name.clone(), begin_ms, longest_ms });
+            return Err(FramePartError::Beyond { name: name.clone(), begin_ms, longest_ms });
         }
         let message = || {
             let all = frames.len();
@@ -107,7 +108,7 @@ impl Pass {
 
 /// Why a run could not be evaluated.
 #[derive(Debug, Error)]
-pub enum RunError {
+pub enum RunEnergyError {
     /// The samples could not be read.
     #[error(transparent)]
     Read(#[from] WriteError),
@@ -125,13 +126,13 @@ impl RunEnergy {
     /// Evaluates the frames of a trace.
     ///
     /// # Errors
-    /// [`RunError`] if the samples cannot be read, or no frame is left.
+    /// [`RunEnergyError`] if the samples cannot be read, or no frame is left.
     pub fn of(
         trace: &dyn TraceReader,
         mut frames: Vec<FrameEnergy>,
         idle: Option<&Idle<'_>>,
-        options: &RunOptions,
-    ) -> Result<Self, RunError> {
+        options: &RunEnergyOptions,
+    ) -> Result<Self, RunEnergyError> {
         let start_s = trace.header().start_s;
         let all: Vec<f64> = frames.iter().map(|frame| frame.energy_j).collect();
         let warm = warm_up(&all);
@@ -147,7 +148,7 @@ impl RunEnergy {
             frames.iter().enumerate().filter(|(index, _)| keep(*index)).map(|(_, frame)| *frame).collect();
         let older: Vec<f64> =
             older.into_iter().enumerate().filter(|(index, _)| keep(*index)).map(|(_, j)| j).collect();
-        let none = RunError::NoFrames { frames: frames.len(), discarded };
+        let none = RunEnergyError::NoFrames { frames: frames.len(), discarded };
         Ok(Self {
             frames: kept,
             discarded,
@@ -204,10 +205,10 @@ fn without_idle_j(
 ///
 /// # Errors
 /// [`WriteError::Read`] if the samples cannot be read.
-pub fn passes_j(
+pub fn parts_j(
     trace: &dyn TraceReader,
     frames: &[FrameEnergy],
-    passes: &[Pass],
+    passes: &[FramePart],
     idle: Option<&Idle<'_>>,
 ) -> Result<Vec<(String, Spread)>, WriteError> {
     let mut passes = passes.to_vec();
@@ -216,10 +217,10 @@ pub fn passes_j(
     }
     passes.sort_by(|a, b| a.begin_s.total_cmp(&b.begin_s));
     if passes[0].begin_s > 0.0 {
-        passes.insert(0, Pass { name: "before".to_owned(), begin_s: 0.0 });
+        passes.insert(0, FramePart { name: "before".to_owned(), begin_s: 0.0 });
     }
     let span = &|index: usize, frame: &FrameEnergy| {
-        let at = |pass: &Pass| (frame.start_s + pass.begin_s).min(frame.end_s);
+        let at = |pass: &FramePart| (frame.start_s + pass.begin_s).min(frame.end_s);
         (at(&passes[index]), passes.get(index + 1).map_or(frame.end_s, at))
     };
     // Pass by pass, and all at once: the samples may have to be read again for each question.
@@ -284,26 +285,27 @@ mod tests {
 
     #[test]
     fn both_rules_passes_and_idle_of_frames_known_in_closed_form() {
-        let (trace, options) = (trace(), RunOptions { discard: Some(2), ..RunOptions::default() });
+        let (trace, options) =
+            (trace(), RunEnergyOptions { discard: Some(2), ..RunEnergyOptions::default() });
         let run = RunEnergy::of(&trace, frames(), None, &options).unwrap();
         assert_eq!((run.frames.len(), run.discarded), (8, 2));
         assert!((run.begin_to_finish_j.mean - 0.2).abs() < 1e-9, "{run:?}");
-        let passes = [Pass { name: "draws".to_owned(), begin_s: 0.02 }];
-        let of = |idle: Option<&Idle<'_>>| passes_j(&trace, &run.frames, &passes, idle).unwrap();
+        let passes = [FramePart { name: "draws".to_owned(), begin_s: 0.02 }];
+        let of = |idle: Option<&Idle<'_>>| parts_j(&trace, &run.frames, &passes, idle).unwrap();
         let [before, draws] = &of(None)[..] else { panic!("two passes") };
         assert_eq!((before.0.as_str(), draws.0.as_str()), ("before", "draws"));
         assert!((before.1.mean - 0.1).abs() < 1e-9 && (draws.1.mean - 0.16).abs() < 1e-9);
         assert!((of(Some(&Idle::Mean(1.0)))[1].1.mean - 0.08).abs() < 1e-9);
         assert!((PowerIntegral::new(&trace).total_j() - 2.6).abs() < 1e-9);
-        assert!(passes_j(&trace, &run.frames, &[], None).unwrap().is_empty());
+        assert!(parts_j(&trace, &run.frames, &[], None).unwrap().is_empty());
     }
 
     #[test]
     fn passes_have_names_of_their_own_and_begin_within_frames() {
-        let pass = |name: &str, begin_s| Pass { name: name.to_owned(), begin_s };
-        assert_eq!(check_passes(&[pass("a", 0.0), pass("b", 0.1)]), Ok(()));
-        let twice = check_passes(&[pass("a", 0.0), pass("b", 0.1), pass("a", 0.2)]).unwrap_err();
-        assert_eq!(twice, PassError::Twice { name: "a".to_owned() });
+        let pass = |name: &str, begin_s| FramePart { name: name.to_owned(), begin_s };
+        assert_eq!(check_parts(&[pass("a", 0.0), pass("b", 0.1)]), Ok(()));
+        let twice = check_parts(&[pass("a", 0.0), pass("b", 0.1), pass("a", 0.2)]).unwrap_err();
+        assert_eq!(twice, FramePartError::Twice { name: "a".to_owned() });
         let mut frames = frames();
         frames[3].end_s = frames[3].start_s + 0.01;
         assert_eq!(pass("a", 0.005).check(&frames), Ok(None));
@@ -315,7 +317,7 @@ mod tests {
 
     #[test]
     fn a_run_whose_frames_are_all_discarded_is_refused() {
-        let options = RunOptions { discard: Some(10), ..RunOptions::default() };
+        let options = RunEnergyOptions { discard: Some(10), ..RunEnergyOptions::default() };
         let error = RunEnergy::of(&trace(), frames(), None, &options).unwrap_err();
         assert!(error.to_string().contains("of 10 frames none is left after 10"), "{error}");
     }

@@ -1,10 +1,10 @@
 //! Confidence of each start, and warnings about the result as a whole: also about work before the first start
 //! and after the last frame.
 
-use super::found::{Flag, Found, FrameStart};
 use super::marks::{Marks, Placement, Window};
 use super::spans::{Sampling, median_duration_s, spans};
 use super::threshold::{MIN_SEPARATION, Rule, Threshold};
+use super::{Flag, Found, FrameStart};
 use crate::trace::Trace;
 use warnings::{Code, Warning};
 
@@ -58,7 +58,7 @@ pub(crate) fn conclude_at(
         starts,
         frames,
         end_s: marks.end_s,
-        method: crate::frames::Method::SumOfSquares,
+        method: crate::frames::FinderMethod::SumOfSquares,
         window,
         threshold,
         warnings: Vec::new(),

@@ -9,7 +9,7 @@
 //! - A missing gap: a start amidst work, where others nearby have an idle gap, may lie within a frame. Where a frame takes
 //!   two ticks of the display at a slow clock, its middle is on a tick, too.
 
-use super::found::SUSPECT_CONFIDENCE;
+use super::SUSPECT_CONFIDENCE;
 use crate::stats::{mean, nth_smallest, upper_median};
 use rayon::prelude::*;
 

@@ -5,12 +5,12 @@
 
 use super::assess;
 use super::assess::confidence;
-use super::found::{Found, FrameStart, Method, marked_starts, spacing};
 use super::marks::{MarkError, Marks, Placement, flat_mark_of};
 use super::periodicity::regularity;
 use super::profile::{normalized, spaced_minima, squares, summed_squared_difference};
-use super::refine::align;
+use super::subsample::align;
 use super::threshold::{Threshold, choose};
+use super::{FinderMethod, Found, FrameStart, marked_starts, spacing};
 use crate::stats::upper_median;
 use crate::trace::Trace;
 
@@ -27,14 +27,14 @@ struct Candidate {
 }
 
 /// Everything about a trace that single starts are found with.
-pub(super) struct View<'a> {
+pub(super) struct Matcher<'a> {
     pub trace: &'a Trace,
     pub power: &'a [f64],
     pub placement: &'a Placement,
     pub threshold: &'a Threshold,
 }
 
-impl View<'_> {
+impl Matcher<'_> {
     /// The start at a candidate, finer than a sample.
     fn start_near(&self, candidate: &Candidate, mark: usize, confidence: impl Fn(f64) -> f64) -> FrameStart {
         let mark = &self.placement.marks[mark];
@@ -49,7 +49,7 @@ impl View<'_> {
     }
 }
 
-/// [`View::start_after_idle`] for samples that are not all of a trace.
+/// [`Matcher::start_after_idle`] for samples that are not all of a trace.
 pub(crate) fn start_after_idle(
     trace: &Trace,
     power: &[f64],
@@ -58,12 +58,12 @@ pub(crate) fn start_after_idle(
     starts: &[FrameStart],
     spacing: usize,
 ) -> Option<FrameStart> {
-    View { trace, power, placement, threshold }.start_after_idle(starts, spacing)
+    Matcher { trace, power, placement, threshold }.start_after_idle(starts, spacing)
 }
 
 /// `method` says by which distance: that of squares, or the normalized one.
-pub(super) fn find_matched(trace: &Trace, marks: &Marks, method: Method) -> Result<Found, MarkError> {
-    let measure = if method == Method::Normalized { normalized } else { squares };
+pub(super) fn find_matched(trace: &Trace, marks: &Marks, method: FinderMethod) -> Result<Found, MarkError> {
+    let measure = if method == FinderMethod::Normalized { normalized } else { squares };
     let placement = marks.place(trace)?;
     let power: Vec<f64> = trace.powers_w().collect();
     let (profile, nearest) = nearest_profile(&power, &placement, measure);
@@ -79,15 +79,15 @@ pub(super) fn find_matched(trace: &Trace, marks: &Marks, method: Method) -> Resu
         });
 
     let mut starts = marked_starts(&placement, &profile);
-    let view = View { trace, power: &power, placement: &placement, threshold: &threshold };
+    let matcher = Matcher { trace, power: &power, placement: &placement, threshold: &threshold };
     let confidence = confidence(&threshold);
     for candidate in candidates.iter().filter(|candidate| candidate.distance_w2 < threshold.value_w2) {
         let mark = nearest.get(candidate.offset).copied().unwrap_or(0);
-        starts.push(view.start_near(candidate, mark, &confidence));
+        starts.push(matcher.start_near(candidate, mark, &confidence));
     }
     starts.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
     starts.dedup_by(|later, earlier| later.time_s <= earlier.time_s);
-    if let Some(first) = view.start_after_idle(&starts, spacing) {
+    if let Some(first) = matcher.start_after_idle(&starts, spacing) {
         starts.insert(0, first);
     }
     let end_tolerance_s = 0.5 * spacing as f64 * trace.period_s();
@@ -175,7 +175,7 @@ const MAX_LEAD_GAPS: f64 = 1.6;
 /// A match leaves less than this share of the contrast between the template and steady power.
 const MAX_MATCH_SHARE: f64 = 0.5;
 
-impl View<'_> {
+impl Matcher<'_> {
     /// One more start before the first one found, matched only by what follows the mark, with the threshold
     /// (and the reported distance) in proportion to the compared part. `None` if nothing there is near
     /// enough.

@@ -8,7 +8,7 @@
 //! sweeps. An edge just at the end of the compared window enters some shifts only and pulls the result by up to a quarter of
 //! a sample (a test shows it).
 
-use super::refine::{ScaledPair, nearest, vertex};
+use super::subsample::{ScaledPair, nearest, vertex};
 use rayon::prelude::*;
 
 /// Distances, in frames, of the frames that each is aligned with. Near ones are most similar; far ones keep

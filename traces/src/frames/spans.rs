@@ -1,7 +1,7 @@
 //! The frames between starts, and their flags.
 
-use super::found::{Flag, Flags, FrameSpan, FrameStart, MIN_CONFIDENCE, SUSPECT_CONFIDENCE};
 use super::periodicity;
+use super::{Flag, Flags, FrameSpan, FrameStart, MIN_CONFIDENCE, SUSPECT_CONFIDENCE};
 use crate::stats::upper_median;
 
 /// A frame longer than this many usual lengths may be two; one shorter than the inverse, part of one.

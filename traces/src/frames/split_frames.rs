@@ -6,7 +6,7 @@
 //! map drawn every other time) do so at the mark, too. A frame begins in an idle gap: of alternating starts,
 //! those with a clearly smaller dip are false.
 
-use super::found::SUSPECT_CONFIDENCE;
+use super::SUSPECT_CONFIDENCE;
 use super::idle_gap::{lowest_w, neighbours, window_around};
 use crate::stats::{mean, mean_and_error, upper_median};
 use core::ops::Range;

@@ -9,7 +9,7 @@
 //! most of the work in the window, as a frame that is busy for a few samples differs from its neighbours
 //! while it works, and agrees with them in the idle gap after it.
 
-use super::refine::between;
+use super::subsample::between;
 use crate::stats::{mean, moments, upper_median};
 use rayon::prelude::*;
 

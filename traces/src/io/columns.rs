@@ -211,7 +211,8 @@ fn native_name(quantity: Quantity) -> &'static str {
         Quantity::Voltage => VOLTAGE_V,
         Quantity::Current => CURRENT_A,
         Quantity::Power => POWER_W,
-        Quantity::Energy => "energy_J",
+        // Traces have no columns of these.
+        Quantity::Energy | Quantity::Rate | Quantity::Resistance => quantity.name(),
     }
 }
 

@@ -12,9 +12,12 @@ use flate2::write::GzEncoder;
 use rayon::prelude::*;
 
 use super::columns::{Layout, Opened, Picked, RowBatch, RowSource, layout};
+use super::recording;
+use super::rows::Rows;
 use super::samples::{Description, TraceChunk, TraceHeader, TraceReader, TraceWriter, to_json};
 use super::time_base::Stamps;
 use super::{CURRENT_A, ReadError, ReadOptions, Repair, RepairKind, TIME_S, VOLTAGE_V, WriteError, atomic};
+use crate::trace::Trace;
 
 /// Another place of the description of a CSV file: the same name ending in `.json`.
 pub fn sidecar_path(path: &Path) -> PathBuf {
@@ -204,6 +207,17 @@ fn description(path: &Path) -> Result<Description, ReadError> {
         }
     }
     Ok(Description::default())
+}
+
+/// Reads a CSV file, and its description if there is one at [`description_path`] or [`sidecar_path`].
+///
+/// Columns are found by name without regard to case, in any order among others; `time_s` may be missing if
+/// the description states the rate. Without a description the rate is that of the time stamps.
+///
+/// # Errors
+/// [`ReadError`] names the file, the row and what to do.
+pub fn read(path: &Path) -> Result<Trace, ReadError> {
+    Ok(recording::load(Rows::open_as(open_rows, path, &ReadOptions::default())?)?.trace)
 }
 
 /// Opens a text.

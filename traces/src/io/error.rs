@@ -301,10 +301,12 @@ pub enum WriteError {
         path: PathBuf,
     },
     /// A name that stands for no format.
-    #[error("{path}: its ending is not {endings}", path = path.display(), endings = super::endings())]
+    #[error("{path}: its ending is not {endings}", path = path.display())]
     Ending {
         /// The path.
         path: PathBuf,
+        /// The endings of the formats that are written.
+        endings: String,
     },
     /// Encoding or writing failed.
     #[error("cannot write the trace: {0}")]

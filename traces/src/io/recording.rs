@@ -177,29 +177,7 @@ pub fn open(path: &Path, options: &ReadOptions) -> Result<(Box<dyn TraceReader>,
     }
 }
 
-/// Reads a CSV file, and its description if there is one at
-/// [`csv::description_path`](super::csv::description_path) or
-/// [`csv::sidecar_path`](super::csv::sidecar_path).
-///
-/// Columns are found by name without regard to case, in any order among others; `time_s` may be missing if
-/// the description states the rate. Without a description the rate is that of the time stamps.
-///
-/// # Errors
-/// [`ReadError`] names the file, the row and what to do.
-pub fn read_csv(path: &Path) -> Result<Trace, ReadError> {
-    Ok(load(Rows::open_as(super::csv::open_rows, path, &ReadOptions::default())?)?.trace)
-}
-
-/// Reads a trace from columns found by name without regard to case: `voltage_V` and `current_A` (f32 or f64)
-/// and `time_ns` (i64) or `time_s` (f32 or f64); the times may be missing if the description states the rate.
-///
-/// # Errors
-/// [`ReadError`] names the file, the row and what to do.
-pub fn read_parquet(path: &Path) -> Result<Trace, ReadError> {
-    Ok(load(Rows::open_as(super::parquet::open_rows, path, &ReadOptions::default())?)?.trace)
-}
-
-fn load(mut rows: Rows) -> Result<Loaded, ReadError> {
+pub(super) fn load(mut rows: Rows) -> Result<Loaded, ReadError> {
     let path = rows.path().to_owned();
     let mut columns = gather(&mut rows)?;
     let read = columns.voltage_v.len();

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Makes cases for `cargo run --release -p traces --example score_frames`.
+"""Makes cases for `cargo bench -p traces --bench score_frames`.
 
     cases.py peers  GENERATOR_DIR OUT SEED...   the cases of gen_traces.py (kept outside the repository), one folder a seed
     cases.py shapes OUT SEED...                 other shapes, of our own: ramps, combs, blobs, half-rate frames, random walks

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 use traces::io::{self, ReadOptions};
-use traces::table::Table;
+use traces::table::InputTable;
 
 fn corpus(target: &str) -> Vec<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/fuzz/seeds").join(target);
@@ -24,12 +24,12 @@ fn read<T, E: ToString>(target: &str, read: impl Fn(&Path) -> Result<T, E>) -> u
 
 #[test]
 fn failure_modes_of_the_fuzzed_csv_are_errors() {
-    assert!(read("trace_csv", io::read_csv) > 0);
+    assert!(read("trace_csv", io::csv::read) > 0);
 }
 
 #[test]
 fn failure_modes_of_the_fuzzed_parquet_are_errors() {
-    assert!(read("trace_parquet", io::read_parquet) > 0);
+    assert!(read("trace_parquet", io::parquet::read) > 0);
 }
 
 #[test]
@@ -52,5 +52,5 @@ fn failure_modes_of_traces_to_be_repaired_are_errors() {
 
 #[test]
 fn failure_modes_of_the_fuzzed_tables_are_errors() {
-    assert!(read("trace_table", Table::read) > 0);
+    assert!(read("trace_table", InputTable::read) > 0);
 }

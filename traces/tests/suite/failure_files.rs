@@ -8,7 +8,7 @@ use ::parquet::schema::types::Type;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tempfile::TempDir;
-use traces::io::{self, ReadError, ReadOptions, RepairKind, csv, parquet, read_csv, read_parquet};
+use traces::io::{self, ReadError, ReadOptions, RepairKind, csv, parquet};
 use traces::{Mark, MarkKind, Metadata, Trace};
 
 fn in_folder(name: &str, content: &[u8]) -> (TempDir, PathBuf) {
@@ -20,7 +20,7 @@ fn in_folder(name: &str, content: &[u8]) -> (TempDir, PathBuf) {
 
 fn csv_error(content: &str) -> ReadError {
     let (_folder, path) = in_folder("bad.csv", content.as_bytes());
-    read_csv(&path).unwrap_err()
+    csv::read(&path).unwrap_err()
 }
 
 #[track_caller]
@@ -125,14 +125,14 @@ fn a_row_of_units_is_refused_and_not_dropped_by_repair() {
 
 #[test]
 fn a_file_that_is_not_there_or_not_text() {
-    let error = read_csv(Path::new("/no/such/trace.csv")).unwrap_err();
+    let error = csv::read(Path::new("/no/such/trace.csv")).unwrap_err();
     says(&error, &["/no/such/trace.csv: cannot read it"]);
-    assert!(matches!(read_parquet(Path::new("/no/such/trace.parquet")), Err(ReadError::Io { .. })));
+    assert!(matches!(parquet::read(Path::new("/no/such/trace.parquet")), Err(ReadError::Io { .. })));
     let (_folder, path) = in_folder("bad.csv", b"time_s,voltage_V,current_A\n0,\xff\xfe,1\n");
-    says(&read_csv(&path).unwrap_err(), &["row 1: voltage_V"]);
+    says(&csv::read(&path).unwrap_err(), &["row 1: voltage_V"]);
     // A folder where a file should be: the CSV reader fails while reading.
     let folder = tempfile::tempdir().unwrap();
-    assert!(matches!(read_csv(folder.path()), Err(ReadError::Damaged { .. } | ReadError::Io { .. })));
+    assert!(matches!(csv::read(folder.path()), Err(ReadError::Damaged { .. } | ReadError::Io { .. })));
 }
 
 #[test]
@@ -140,7 +140,7 @@ fn descriptions_are_compared_with_the_rows() {
     let (_folder, path) = in_folder("a.csv", b"time_s,voltage_V,current_A\n0,1,2\n1,1,2\n");
     let describe = |json: &str| {
         std::fs::write(csv::sidecar_path(&path), json).unwrap();
-        read_csv(&path).unwrap_err()
+        csv::read(&path).unwrap_err()
     };
     says(&describe("{"), &["a.json: the JSON description"]);
     says(&describe(r#"{"rate_hz": -1}"#), &["a.json", "rate_hz is -1"]);
@@ -196,7 +196,7 @@ fn parquet_bytes(columns: Vec<(&str, Values)>) -> Vec<u8> {
 
 fn parquet_error(columns: Vec<(&str, Values)>) -> ReadError {
     let (_folder, path) = parquet_file(columns);
-    read_parquet(&path).unwrap_err()
+    parquet::read(&path).unwrap_err()
 }
 
 #[test]
@@ -286,7 +286,7 @@ fn a_compression_that_is_not_read_is_named_with_the_remedy() {
     let codec = find(&bytes, chunk, &[0x15, 0x00]);
     bytes[codec + 1] = 0x08;
     let (_folder, path) = in_folder("brotli.parquet", &bytes);
-    let error = read_parquet(&path).unwrap_err();
+    let error = parquet::read(&path).unwrap_err();
     says(
         &error,
         &["brotli.parquet: column voltage_V is compressed with BROTLI", "write it with Zstandard or Snappy"],
@@ -338,7 +338,7 @@ fn optional_doubles_and_any_letter_case_are_read() {
         ("TIME_S", column([0.5, 0.75, 1.0])),
         ("voltage_v", column([4.0; 3])),
     ]);
-    let trace = read_parquet(&path).unwrap();
+    let trace = parquet::read(&path).unwrap();
     assert_eq!((trace.rate_hz(), trace.start_s(), trace.current_a()), (4.0, 0.5, &[1.0, 2.0, 3.0][..]));
 }
 
@@ -356,7 +356,7 @@ fn a_truncated_parquet_file_is_an_error_wherever_it_is_cut() {
     for length in (0..whole.len()).step_by(7).chain([whole.len() - 1]) {
         let (_folder, path) = in_folder("cut.parquet", &whole[..length]);
         says(
-            &read_parquet(&path).unwrap_err(),
+            &parquet::read(&path).unwrap_err(),
             &["cut.parquet", "cut off or damaged", "copy or export it again"],
         );
     }
@@ -371,7 +371,7 @@ fn a_parquet_file_with_any_byte_changed_gives_a_trace_or_an_error_but_no_panic()
         let mut bytes = whole.clone();
         bytes[position] ^= [0x01, 0x80, 0xff][position / 3 % 3];
         std::fs::write(&path, &bytes).unwrap();
-        errors += usize::from(read_parquet(&path).is_err());
+        errors += usize::from(parquet::read(&path).is_err());
     }
     assert!(errors > whole.len() / 30, "{errors} of {}", whole.len() / 3);
 }

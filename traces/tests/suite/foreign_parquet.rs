@@ -4,7 +4,7 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use std::path::Path;
 use traces::io::{ReadOptions, read};
-use traces::table::Table;
+use traces::table::InputTable;
 
 fn foreign(name: &str) -> std::path::PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/foreign").join(name)
@@ -25,11 +25,11 @@ fn packed_pages_hold_the_same_samples_as_the_text_beside_them() {
 #[test]
 fn packed_tables_are_read_and_others_named_with_the_remedy() {
     for packing in ["zstd", "gzip", "lz4"] {
-        let table = Table::read(&foreign(&format!("table_{packing}.parquet"))).unwrap();
+        let table = InputTable::read(&foreign(&format!("table_{packing}.parquet"))).unwrap();
         assert_eq!(table.texts("algorithm").unwrap(), ["VB", "TF", ""], "{packing}");
         assert_eq!(table.numbers("time_ms").unwrap(), [1.5, 2.0, 3.0], "{packing}");
     }
-    let message = Table::read(&foreign("table_brotli.parquet")).unwrap_err().to_string();
+    let message = InputTable::read(&foreign("table_brotli.parquet")).unwrap_err().to_string();
     assert!(message.contains("column algorithm is compressed with BROTLI"), "{message}");
     assert!(message.contains("write it with Zstandard or Snappy"), "{message}");
 }
@@ -73,7 +73,7 @@ fn keys_of_units_are_read_in_any_case_and_units_that_are_not_known_refused() {
     let (_folder, path) = changed("unit", "UNIT");
     let trace = read(&path, &ReadOptions::default()).unwrap().trace;
     assert_eq!((trace.voltage_v(), trace.rate_hz()), (whole.voltage_v(), whole.rate_hz()));
-    assert_eq!(Table::read(&path).unwrap().unit("Voltage"), Some("mV"));
+    assert_eq!(InputTable::read(&path).unwrap().unit("Voltage"), Some("mV"));
     let (_folder, path) = changed("mV", "zV");
     let message = read(&path, &ReadOptions::default()).unwrap_err().to_string();
     assert!(

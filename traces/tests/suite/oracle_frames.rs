@@ -7,7 +7,8 @@ use traces::frames::{Found, Marks, default_window, find};
 use traces::score::{Score, TOLERANCE_S, score};
 use traces::{Curve, CurveBuilder, Trace};
 
-/// The mobile device of `shared/peers/traces`, with noise for a ratio of power variance to noise variance.
+/// The battery rail of a phone in a recorder of +-4 A and +-6 V (assumed), with noise for a ratio of power variance to noise
+/// variance.
 fn device(case: &Case, snr_db: f64) -> Device {
     let spec = DeviceSpec {
         rail_v: 3.85,

@@ -2,9 +2,7 @@
 
 use proptest::prelude::*;
 use std::collections::BTreeMap;
-use traces::io::{
-    TraceChunk, TraceHeader, TraceReader, TraceWriter, WriteError, csv, parquet, read_csv, read_parquet,
-};
+use traces::io::{TraceChunk, TraceHeader, TraceReader, TraceWriter, WriteError, csv, parquet};
 use traces::{Mark, MarkKind, Metadata, Trace};
 
 fn metadata() -> Metadata {
@@ -33,7 +31,7 @@ fn both_ways(trace: &Trace) -> [Trace; 2] {
     let (p, c) = (folder.path().join("t.parquet"), folder.path().join("t.csv"));
     parquet::save(trace, &p).unwrap();
     csv::save(trace, &c).unwrap();
-    [read_parquet(&p).unwrap(), read_csv(&c).unwrap()]
+    [parquet::read(&p).unwrap(), csv::read(&c).unwrap()]
 }
 
 proptest! {
@@ -156,7 +154,7 @@ fn several_row_groups_come_back_whole() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("t.parquet");
     parquet::save(&trace, &path).unwrap();
-    assert!(read_parquet(&path).unwrap() == trace);
+    assert!(parquet::read(&path).unwrap() == trace);
     let bytes_per_sample = std::fs::metadata(&path).unwrap().len() as f64 / trace.samples() as f64;
     assert!(bytes_per_sample < 4.0, "{bytes_per_sample}");
 }
@@ -198,7 +196,7 @@ fn without_a_description_csv_takes_rate_and_start_from_its_times() {
         "note, CURRENT_a ,Time_S,voltage_v\nx,1,10.00002,5\ny,2,10.00004,5\nz,3,10.00006,5\n",
     )
     .unwrap();
-    let trace = read_csv(&path).unwrap();
+    let trace = csv::read(&path).unwrap();
     assert_eq!(
         (trace.rate_hz(), trace.start_s(), trace.current_a()),
         (50e3, 10.000_02, &[1.0, 2.0, 3.0][..])
@@ -212,7 +210,7 @@ fn a_stated_rate_stands_in_for_missing_times() {
     std::fs::write(&path, "voltage_V,current_A\n5,1\n5,2\n").unwrap();
     std::fs::write(csv::sidecar_path(&path), r#"{"sample_rate_hz": 1000.0, "start_s": 2.5, "case": "v30"}"#)
         .unwrap();
-    let trace = read_csv(&path).unwrap();
+    let trace = csv::read(&path).unwrap();
     assert_eq!((trace.rate_hz(), trace.start_s()), (1000.0, 2.5));
     assert_eq!(trace.metadata.other["case"], "v30");
 }

@@ -11,7 +11,7 @@ use output::progress::Progress;
 use serde::Serialize;
 use traces::Trace;
 use traces::energy::{FrameEnergy, PowerIntegral};
-use traces::frames::{Marks, Method, Options, default_window, find_with};
+use traces::frames::{FinderMethod, Marks, Options, default_window, find_with};
 use traces::score::{TOLERANCE_S, score, true_beside_found};
 use traces::synth::{Recording, SCENARIOS, Scenario, Scene};
 
@@ -431,11 +431,11 @@ impl Subject {
 /// Marks some frames, finds the others and holds them against the truth.
 fn analyse(trace: &Trace, scene: &Scene, way: Way) -> Result<FinderScore, StudyError> {
     let (count, method) = match way {
-        Way::Squares => (1, Method::SumOfSquares),
-        Way::Normalized => (1, Method::Normalized),
-        Way::Templates => (MARKED.len(), Method::SumOfSquares),
-        Way::Tracking => (1, Method::Tracking),
-        Way::Auto => (1, Method::Auto),
+        Way::Squares => (1, FinderMethod::SumOfSquares),
+        Way::Normalized => (1, FinderMethod::Normalized),
+        Way::Templates => (MARKED.len(), FinderMethod::SumOfSquares),
+        Way::Tracking => (1, FinderMethod::Tracking),
+        Way::Auto => (1, FinderMethod::Auto),
     };
     let frame = |share: f64| &scene.truth[(share * scene.truth.len() as f64) as usize];
     let marks_s = MARKED.iter().zip(HAND_S).map(|(&share, hand_s)| frame(share).start_s + hand_s);

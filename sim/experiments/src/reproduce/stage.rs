@@ -12,7 +12,7 @@ use timing::{FrameClock, Level, Recorder};
 use traces::Trace;
 use traces::device::{Device, DeviceSpec};
 use traces::energy::{FrameEnergy, PowerIntegral, TrueFrame};
-use traces::frames::{Flag, Marks, Method, Options, Window, default_window, find_with};
+use traces::frames::{FinderMethod, Flag, Marks, Options, Window, default_window, find_with};
 use traces::score::{self, Score, TOLERANCE_S};
 use workloads::{SampleChoice, Scene};
 
@@ -195,7 +195,7 @@ const RATE_HZ: f64 = 40e3;
 
 /// Tracking, not `auto`: if frames are equal except for a timer that disturbs every fifteenth, the sum of squares finds only the
 /// disturbed ones, and `Auto` accepts this.
-const METHOD: Method = Method::Tracking;
+const METHOD: FinderMethod = FinderMethod::Tracking;
 
 /// Number of marked starts on the PC, unless the row is about a single mark. From a single one the finder sometimes takes 15
 /// frames for one, because the timer of 64 Hz disturbs every fifteenth frame of 30 Hz at the same position. On the phone one mark
@@ -246,7 +246,7 @@ impl Recording {
     }
 
     /// The same by another method.
-    pub fn find_by(&self, method: Method, marked: usize) -> Result<Frames, RunError> {
+    pub fn find_by(&self, method: FinderMethod, marked: usize) -> Result<Frames, RunError> {
         let found = find_with(&self.trace, &self.marks(marked), &Options { method })?;
         Ok(Frames { end_s: found.end_s, found: PowerIntegral::new(&self.trace).frames(&found) })
     }

@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use serde::Serialize;
+use traces::energy::Spread;
 
 pub use images::{FolderComparison, ImageComparison, Named};
 pub use runs::{RunComparison, Setting, shown};
@@ -212,22 +213,13 @@ fn compare_tables(a: &Path, b: &Path) -> Result<TableComparison, CompareError> {
         if numbers.iter().all(Option::is_none) {
             continue;
         }
-        let means = numbers.map(|numbers| numbers.map(|numbers| mean(numbers)));
+        let spreads = numbers.map(|numbers| numbers.and_then(|numbers| Spread::of(numbers)));
+        let means = spreads.map(|spread| spread.map(|spread| spread.mean));
         values.push(Change::new("mean over frames", column, unit, means));
-        let deviations = numbers.map(|numbers| numbers.map(|numbers| deviation(numbers)));
+        let deviations = spreads.map(|spread| spread.map(|spread| spread.deviation));
         values.push(Change::new("standard deviation", column, unit, deviations));
     }
     Ok(TableComparison { files: [a, b].map(|path| path.display().to_string()), values })
-}
-
-fn mean(numbers: &[f64]) -> f64 {
-    numbers.iter().sum::<f64>() / numbers.len() as f64
-}
-
-fn deviation(numbers: &[f64]) -> f64 {
-    let mean = mean(numbers);
-    let sum: f64 = numbers.iter().map(|number| (number - mean) * (number - mean)).sum();
-    (sum / (numbers.len().max(2) - 1) as f64).sqrt()
 }
 
 /// Reads the known columns; empty cells are skipped.

@@ -7,8 +7,8 @@ use output::table::counted;
 use output::terminal::Terminal;
 use serde_json::json;
 use traces::energy::{
-    Idle, IdleTooShort, Pass, Pooled, PowerIntegral, RunEnergy, RunError, RunOptions, SegmentEnergy,
-    SegmentError, Spread, check_passes, passes_j, pooled, whole,
+    FramePart, Idle, IdleTooShort, Pooled, PowerIntegral, RunEnergy, RunEnergyError, RunEnergyOptions,
+    SegmentEnergy, SegmentError, Spread, check_parts, parts_j, pooled, whole,
 };
 use traces::io::{Repair, TraceReader};
 use traces::trace::check_span;
@@ -116,7 +116,7 @@ fn discard(text: &str) -> Result<Discard, String> {
 
 pub(super) fn run(args: &EnergyArgs, terminal: &Terminal) -> Result<(), Failure> {
     let passes = args.passes();
-    check_passes(&passes).map_err(|error| wrong(format!("--{error}")))?;
+    check_parts(&passes).map_err(|error| wrong(format!("--{error}")))?;
     let recording = args.idle_trace.as_ref().map(|path| args.input.load_other(path, terminal)).transpose()?;
     let recording = recording.as_ref().map(|(recording, _)| PowerIntegral::new(recording));
     if args.from.is_some() || args.to.is_some() {
@@ -216,14 +216,14 @@ struct Run {
 fn one_run(
     args: &EnergyArgs,
     path: &Path,
-    (passes, recording): (&[Pass], Option<&PowerIntegral<'_>>),
+    (passes, recording): (&[FramePart], Option<&PowerIntegral<'_>>),
     terminal: &Terminal,
 ) -> Result<(Run, Vec<Repair>, Option<u64>), Failure> {
     let (Frames { set, repairs }, trace) = args.find.frames_and_samples(&args.input, path, terminal)?;
     warn_of_frames(&set, terminal);
     let (trace, frames) = (&*trace, whole(&set.energies).to_vec());
     let idle = idle(args, trace, recording)?;
-    let options = RunOptions {
+    let options = RunEnergyOptions {
         discard: match args.discard {
             Discard::Count(count) => Some(count),
             Discard::Auto => None,
@@ -236,14 +236,14 @@ fn one_run(
         let warning = pass.check(&run.frames).map_err(|error| wrong(format!("--{error}")))?;
         warning.iter().for_each(|warning| terminal.warn_of(warning.code, &warning.message));
     }
-    let passes = passes_j(trace, &run.frames, passes, idle.as_ref())?;
+    let passes = parts_j(trace, &run.frames, passes, idle.as_ref())?;
     Ok((Run { run, passes }, repairs, set.metadata.pixels))
 }
 
-fn run_failure(error: RunError) -> Failure {
+fn run_failure(error: RunEnergyError) -> Failure {
     match error {
-        RunError::Read(error) => error.into(),
-        RunError::NoFrames { frames, discarded } => wrong(format!(
+        RunEnergyError::Read(error) => error.into(),
+        RunEnergyError::NoFrames { frames, discarded } => wrong(format!(
             "of {} none is left after {discarded} are discarded; discard fewer",
             counted(frames, "frame")
         )),
@@ -251,8 +251,8 @@ fn run_failure(error: RunError) -> Failure {
 }
 
 impl EnergyArgs {
-    fn passes(&self) -> Vec<Pass> {
-        let pass = |(name, begin_s): &(String, f64)| Pass { name: name.clone(), begin_s: *begin_s };
+    fn passes(&self) -> Vec<FramePart> {
+        let pass = |(name, begin_s): &(String, f64)| FramePart { name: name.clone(), begin_s: *begin_s };
         self.pass.iter().map(pass).collect()
     }
 }

@@ -12,7 +12,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use output::terminal::Terminal;
 use tempfile::TempDir;
 use traces::Trace;
-use traces::frames::{Method, Window};
+use traces::frames::{FinderMethod, Window};
 use traces::io::{
     FORMATS, ReadOptions, Recording, Repair, TraceFormat, TraceReader, open, rail_of_sums, read, readable,
 };
@@ -21,7 +21,7 @@ use traces::times::read_times;
 use traces::trace::RATE_LIMITS_HZ;
 use warnings::Code;
 
-use super::picture_file::PlotFormat;
+use super::PlotFormat;
 use super::wrong;
 use crate::cli::Failure;
 use crate::cli::parse::{milliseconds, positive_voltage, rate, time};
@@ -93,7 +93,7 @@ pub struct FindArgs {
     /// How starts are found: `squares` (sum of squared differences to the marked window), `normalized` (the same, regardless of level
     /// and scale), `tracking` (the most likely sequence of starts), or `auto` (chosen by the length and the clarity of the trace)
     #[arg(long, value_name = "METHOD", default_value_t)]
-    pub method: Method,
+    pub method: FinderMethod,
     /// Read in pieces even if the trace would fit into memory (sum of squares)
     #[arg(long)]
     pub stream: bool,

@@ -10,11 +10,10 @@ use output::terminal::Terminal;
 use serde_json::json;
 use traces::io::atomic::write_file;
 use traces::pareto::{ParetoError, Point, RatedPoint, SettingColumns, frontiers, write_csv};
-use traces::table::{Table as Columns, TableReadError};
+use traces::table::{InputTable, TableReadError};
 
 use super::input::shown;
-use super::picture_file::{PlotFormat, write};
-use super::report;
+use super::{PlotFormat, report, write_picture};
 use crate::cli::Failure;
 use crate::cli::args::LookArgs;
 use crate::cli::outputs::{may_hold_results, print_json};
@@ -101,13 +100,13 @@ type Groups = BTreeMap<String, Vec<RatedPoint>>;
 
 pub(super) fn run(args: &ParetoArgs, terminal: &Terminal) -> Result<(), Failure> {
     may_hold_results("--out", args.out.as_deref(), [args.table.as_path()])?;
-    let table = Columns::read(&args.table)?;
+    let table = InputTable::read(&args.table)?;
     let groups = frontiers(&table, &args.columns(), args.idle_w, args.seed)?;
     if let Some(out) = &args.out {
         if out.extension().is_some_and(|end| end.eq_ignore_ascii_case("csv")) {
             write_file(out, |file| write_csv(&groups, file))?;
         } else {
-            write(&picture(args, &groups), out, PlotFormat::of(out)?)?;
+            write_picture(&picture(args, &groups), out, PlotFormat::of(out)?)?;
         }
     }
     if args.json {

@@ -14,8 +14,7 @@ use traces::pyramid::{Column, Pyramid, moving_means_w, pyramid_path};
 use traces::trace::check_span;
 
 use super::input::shown as name_of;
-use super::picture_file::{PlotFormat, write};
-use super::{report, wrong};
+use super::{PlotFormat, report, write_picture, wrong};
 use crate::cli::Failure;
 use crate::cli::args::LookArgs;
 use crate::cli::outputs::{may_hold_results, print_json};
@@ -106,7 +105,7 @@ pub(super) fn run(args: &PlotArgs, terminal: &Terminal) -> Result<(), Failure> {
         PlotKind::Curve => curve(args, terminal)?,
         _ => framed(args, terminal)?,
     };
-    write(&picture, &args.out, kind)?;
+    write_picture(&picture, &args.out, kind)?;
     if args.json {
         return print_json(&json!({ "out": args.out.display().to_string(), "shown": shown }), true);
     }

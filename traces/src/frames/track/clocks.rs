@@ -2,11 +2,11 @@
 //!
 //! Templates follow content that changes slowly. At a clock step everything changes at once, and the sequence
 //! may go on at the same period in another phase of the frame. So where neighbours differ, frames of both
-//! sides are aligned over a whole period, the earlier ones [scaled in time](crate::frames::refine). Outwards
+//! sides are aligned over a whole period, the earlier ones [scaled in time](crate::frames::subsample). Outwards
 //! from the mark, each segment between two such changes is compared with the last one known to be right. If
 //! it lies elsewhere, one of its frames is corrected and used like a mark.
 
-use crate::frames::refine::{ScaledFit, ScaledPair};
+use crate::frames::subsample::{ScaledFit, ScaledPair};
 use crate::stats::upper_median;
 
 /// Neighbours differ if they leave at least this many times the usual unexplained variance, and at least this
@@ -73,13 +73,13 @@ pub(super) fn misplaced(
     anchor: usize,
     width: usize,
 ) -> Vec<usize> {
-    let view = View { power, starts, anchor, width };
-    let steps = view.steps();
+    let window = ClockWindow { power, starts, anchor, width };
+    let steps = window.steps();
     let mut found = Vec::new();
     for mark in marks.iter().filter_map(|mark| starts.binary_search(mark).ok()) {
         let (before, after) = steps.split_at(steps.partition_point(|step| *step < mark));
-        view.walk(after.iter().map(|step| [*step, *step + 1]), 1, &mut found);
-        view.walk(before.iter().rev().map(|step| [*step + 1, *step]), -1, &mut found);
+        window.walk(after.iter().map(|step| [*step, *step + 1]), 1, &mut found);
+        window.walk(before.iter().rev().map(|step| [*step + 1, *step]), -1, &mut found);
     }
     found.retain(|offset| marks.iter().all(|mark| mark.abs_diff(*offset) > width / 2));
     found.sort_unstable();
@@ -88,14 +88,14 @@ pub(super) fn misplaced(
 }
 
 /// A sequence of starts in a trace.
-struct View<'a> {
+struct ClockWindow<'a> {
     power: &'a [f64],
     starts: &'a [usize],
     anchor: usize,
     width: usize,
 }
 
-impl View<'_> {
+impl ClockWindow<'_> {
     /// Starts whose next one is unlike them, in order.
     fn steps(&self) -> Vec<usize> {
         let reach = self.share(0.12);

@@ -1,7 +1,7 @@
 //! Phase slips: past a place where the sequence may have slipped to another phase of the frame, confidence is
 //! lower.
 
-use crate::frames::found::SLIPPED_CONFIDENCE;
+use crate::frames::SLIPPED_CONFIDENCE;
 
 /// Ratios of gaps of the same period.
 const SAME_RATIOS: [f64; 2] = [0.92, 1.085];

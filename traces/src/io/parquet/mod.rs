@@ -23,8 +23,11 @@ use parquet::schema::types::{ColumnPath, Type};
 use rayon::prelude::*;
 
 use super::columns::{Layout, Opened, RowBatch, RowSource, layout};
+use super::recording;
+use super::rows::Rows;
 use super::samples::{Description, KEYS, TraceChunk, TraceHeader, TraceReader, TraceWriter, to_json};
 use super::{CURRENT_A, ReadError, ReadOptions, TIME_NS, VOLTAGE_V, WriteError, atomic};
+use crate::trace::Trace;
 use column::Column;
 use pages::first_page;
 
@@ -46,6 +49,15 @@ fn damaged(path: &Path, reason: String) -> ReadError {
 fn open(path: &Path) -> Result<PagedFile, ReadError> {
     let file = File::open(path).map_err(|error| ReadError::io(path, error))?;
     PagedFile::new(path, file).map_err(|error| damaged(path, error.to_string()))
+}
+
+/// Reads a trace from columns found by name without regard to case: `voltage_V` and `current_A` (f32 or f64)
+/// and `time_ns` (i64) or `time_s` (f32 or f64); the times may be missing if the description states the rate.
+///
+/// # Errors
+/// [`ReadError`] names the file, the row and what to do.
+pub fn read(path: &Path) -> Result<Trace, ReadError> {
+    Ok(recording::load(Rows::open_as(open_rows, path, &ReadOptions::default())?)?.trace)
 }
 
 /// Opens a file.

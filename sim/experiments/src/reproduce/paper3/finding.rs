@@ -2,7 +2,7 @@
 
 use power_model::Pacing;
 use traces::energy::PowerIntegral;
-use traces::frames::Method;
+use traces::frames::FinderMethod;
 use traces::score::Score;
 
 use super::super::figure::{POWER, TIME, dots, line};
@@ -131,7 +131,7 @@ fn scored(bench: &Bench<'_>, pacing: Pacing, first_seed: u64) -> Result<(Searche
     for seed in first_seed..first_seed + bench.repeats() {
         let recording = bench.on_pc(pacing, settled(seed))?;
         let tracked = recording.find(marked)?;
-        squares.push(recording.score(&recording.find_by(Method::SumOfSquares, marked)?, within_s));
+        squares.push(recording.score(&recording.find_by(FinderMethod::SumOfSquares, marked)?, within_s));
         tracking.push(recording.score(&tracked, within_s));
         first.get_or_insert((recording, tracked));
     }

@@ -39,9 +39,9 @@ impl Case {
         marks_s.extend(reported["other_marks_s"].as_array().into_iter().flatten().filter_map(|m| m.as_f64()));
         let parquet = description.with_extension("parquet");
         let trace = if parquet.exists() {
-            io::read_parquet(&parquet)?
+            io::parquet::read(&parquet)?
         } else {
-            io::read_csv(&description.with_extension("csv"))?
+            io::csv::read(&description.with_extension("csv"))?
         };
         let (truth, end_s) = truth(&description.with_extension("truth.csv"))?;
         let text = |part: Option<&std::ffi::OsStr>| part.and_then(|s| s.to_str()).unwrap_or("?").to_owned();

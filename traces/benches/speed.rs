@@ -1,4 +1,5 @@
-//! Times the steps of an analysis on a synthetic V-sync trace: `speed [SAMPLES]`, a million by default.
+//! Times the steps of an analysis on a synthetic V-sync trace: `cargo bench -p traces --bench speed [-- SAMPLES]`, a
+//! million by default.
 
 use std::error::Error;
 use std::time::Instant;
@@ -8,7 +9,8 @@ use traces::frames::{Marks, default_window, find, profile};
 use traces::{CurveBuilder, io};
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let samples: u32 = std::env::args().nth(1).map_or(Ok(1_000_000), |text| text.parse())?;
+    let samples: u32 =
+        std::env::args().skip(1).find(|arg| arg != "--bench").map_or(Ok(1_000_000), |text| text.parse())?;
     let mut builder = CurveBuilder::new(0.0)?;
     let frames = samples / 1667;
     for _ in 0..frames {
@@ -45,7 +47,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     report("write", clock);
     println!("{:.2} bytes a sample", std::fs::metadata(&path)?.len() as f64 / 1e6 / millions);
     let clock = Instant::now();
-    let read = io::read_parquet(&path);
+    let read = io::parquet::read(&path);
     report("read", clock);
     std::fs::remove_file(&path)?;
     assert!(read? == trace);

@@ -1,8 +1,10 @@
-//! Scores the frame finder on directories of cases with known frames: `score_frames [--method M] [--several] [--json FILE] DIR...`.
+//! Scores the frame finder on directories of cases with known frames:
+//! `cargo bench -p traces --bench score_frames -- [--method M] [--cases A,B] [--several] [--json FILE] DIR...`, with absolute
+//! paths, as it runs in the folder of the package.
 //!
 //! A case is `NAME.parquet` (or `.csv`), `NAME.json` (`mark_s`, `other_marks_s`, `window_pre_s`, `window_post_s`) and
-//! `NAME.truth.csv` (`start_s`, `energy_J`), as `shared/peers/traces/gen_traces.py` and `tests/peers/cases.py` make them. One line
-//! a case: F1 within 0.5 ms (median over the marks, worst mark), the mean energy error of frames whose two ends were found
+//! `NAME.truth.csv` (`start_s`, `energy_J`), as `traces/tests/peers/cases.py` makes them with an independent generator, which
+//! is not part of the repository. One line a case: F1 within 0.5 ms (median over the marks, worst mark), the mean energy error of frames whose two ends were found
 //! beside that of the true starts (the noise floor), and how many of the wrong frames are flagged.
 
 #[path = "score_frames/case.rs"]
@@ -15,11 +17,11 @@ use outcome::{Outcome, floor};
 use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use traces::frames::Method;
+use traces::frames::FinderMethod;
 
 /// The request.
 struct Options {
-    method: Method,
+    method: FinderMethod,
     several: bool,
     cases: Vec<String>,
     json: Option<PathBuf>,
@@ -37,9 +39,14 @@ fn main() -> ExitCode {
 }
 
 fn options() -> Result<Options, Box<dyn Error>> {
-    let mut options =
-        Options { method: Method::Auto, several: false, cases: Vec::new(), json: None, dirs: Vec::new() };
-    let mut arguments = std::env::args().skip(1);
+    let mut options = Options {
+        method: FinderMethod::Auto,
+        several: false,
+        cases: Vec::new(),
+        json: None,
+        dirs: Vec::new(),
+    };
+    let mut arguments = std::env::args().skip(1).filter(|argument| argument != "--bench");
     while let Some(argument) = arguments.next() {
         let mut value = || arguments.next().ok_or_else(|| format!("{argument} needs a value"));
         match argument.as_str() {
@@ -50,13 +57,16 @@ fn options() -> Result<Options, Box<dyn Error>> {
             dir => options.dirs.push(dir.into()),
         }
     }
-    if options.dirs.is_empty() {
-        return Err("usage: score_frames [--method M] [--cases A,B] [--several] [--json FILE] DIR...".into());
-    }
     Ok(options)
 }
 
 fn run(options: &Options) -> Result<(), Box<dyn Error>> {
+    if options.dirs.is_empty() {
+        println!(
+            "nothing to score: score_frames [--method M] [--cases A,B] [--several] [--json FILE] DIR..."
+        );
+        return Ok(());
+    }
     println!(
         "{:<24} {:>6} {:>6} {:>6} {:>9} {:>9} {:>7} {:>7} {:>9}  chosen",
         "case", "F1", "worst", "conf", "clean %", "floor %", "ratio", "median", "flagged"

@@ -3,7 +3,7 @@
 use crate::case::Case;
 use std::error::Error;
 use traces::energy::{FrameEnergy, PowerIntegral};
-use traces::frames::{Flags, Marks, Method, Options, find_with};
+use traces::frames::{FinderMethod, Flags, Marks, Options, find_with};
 use traces::score::{TOLERANCE_S, pairs, score};
 
 /// Relative errors of energy.
@@ -27,7 +27,7 @@ pub struct Outcome {
 }
 
 impl Outcome {
-    pub fn new(case: &Case, starts_s: Vec<f64>, method: Method) -> Result<Self, Box<dyn Error>> {
+    pub fn new(case: &Case, starts_s: Vec<f64>, method: FinderMethod) -> Result<Self, Box<dyn Error>> {
         let marks = Marks { starts_s, window: case.window, end_s: case.trace.end_s() };
         let found = find_with(&case.trace, &marks, &Options { method })?;
         let frames = PowerIntegral::new(&case.trace).frames(&found);

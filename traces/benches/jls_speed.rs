@@ -1,8 +1,8 @@
-//! Times writing and reading of JLS: `jls_speed SAMPLES FILE`; prints million samples/s of both. With `--write` the
-//! file is written, and kept.
+//! Times writing and reading of JLS: `cargo bench -p traces --bench jls_speed [-- SAMPLES FILE]`, ten million samples in
+//! a temporary file by default; prints million samples/s of both. With `--write` the file is written, and kept.
 
 use std::error::Error;
-use std::path::Path;
+use std::path::PathBuf;
 use std::time::Instant;
 use traces::Metadata;
 use traces::io::{ReadOptions, atomic, jls, read};
@@ -11,11 +11,16 @@ use traces::io::{ReadOptions, atomic, jls, read};
 const PIECE: usize = 1 << 16;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let words: Vec<String> = std::env::args().skip(1).collect();
-    let [samples, path, rest @ ..] = &words[..] else {
-        return Err("jls_speed SAMPLES FILE [--write]".into());
+    let words: Vec<String> = std::env::args().skip(1).filter(|arg| arg != "--bench").collect();
+    let (samples, path): (u64, PathBuf) = match &words[..] {
+        [] => {
+            let name = format!("traces-jls-{}.jls", std::process::id());
+            (10_000_000, std::env::temp_dir().join(name))
+        }
+        [samples, path, ..] => (samples.parse()?, path.into()),
+        _ => return Err("jls_speed SAMPLES FILE [--write]".into()),
     };
-    let (samples, path): (u64, _) = (samples.parse()?, Path::new(path));
+    let path = path.as_path();
     let noise: Vec<f32> =
         (0..PIECE as u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 12) as f32 * 1e-6).collect();
     let report = |what: &str, clock: Instant| {
@@ -32,7 +37,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     })?;
     report("write", clock);
     println!("bytes_per_sample {:.3}", std::fs::metadata(path)?.len() as f64 / samples as f64);
-    if !rest.is_empty() {
+    if words.len() > 2 {
         return Ok(());
     }
     let clock = Instant::now();

@@ -1,0 +1,29 @@
+//! Previews of charts: `cargo run --release -p experiments --example preview [-- STUDY FOLDER]`; without arguments the studies
+//! are listed.
+
+use std::error::Error;
+use std::path::Path;
+
+use experiments::catalog;
+use experiments::study::Request;
+use output::OutDir;
+use output::plot::Look;
+use output::progress::Progress;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let words: Vec<String> = std::env::args().skip(1).collect();
+    let [name, folder] = &words[..] else {
+        for study in catalog::all() {
+            println!("{:16} {}", study.name, study.about);
+        }
+        return Ok(());
+    };
+    let study = catalog::all().find(|study| study.name == name).ok_or("unknown study")?;
+    let (look, progress) = (Look::default(), Progress::new(true));
+    let done = OutDir::with(Path::new(folder), study.claim(), |dir| {
+        study.run(&Request { quick: true, scenes: &[], dir, look: &look, progress: &progress })
+    })??;
+    print!("{}", done.text);
+    println!("{} points between speed and accuracy", done.tradeoff.len());
+    Ok(())
+}
