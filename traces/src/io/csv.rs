@@ -40,9 +40,13 @@ pub(crate) fn description_paths(path: &Path) -> impl Iterator<Item = PathBuf> {
     [description_path(path), sidecar_path(path)].into_iter().chain(unpacked)
 }
 
-/// The delimiter of a text, by its first line: a tab or a semicolon if it has any, else a comma.
+/// Begins a line that is skipped.
+const COMMENT: u8 = b'#';
+
+/// The delimiter of a text, by its first line that is no comment: a tab or a semicolon if it has any, else a comma.
 pub(crate) fn delimiter(text: &[u8]) -> u8 {
-    let line = text.split(|&byte| byte == b'\n').next().unwrap_or_default();
+    let mut lines = text.split(|&byte| byte == b'\n');
+    let line = lines.find(|line| line.first() != Some(&COMMENT)).unwrap_or_default();
     [b'\t', b';'].into_iter().find(|byte| line.contains(byte)).unwrap_or(b',')
 }
 
@@ -247,6 +251,7 @@ impl CsvRows {
             .has_headers(false)
             .delimiter(options.delimiter.unwrap_or(guessed))
             .trim(::csv::Trim::All)
+            .comment(Some(COMMENT))
             .buffer_capacity(1 << 16)
             .from_reader(Box::new(text) as Text);
         let mut record = ByteRecord::new();

@@ -56,6 +56,15 @@ fn csv_errors_name_file_row_and_column() {
     assert!(matches!(with("0,1,2\n1e-12,1,2\n"), ReadError::Trace { .. }));
 }
 
+/// Loggers write what they are at the top of a file.
+#[test]
+fn comment_lines_of_a_csv_file_are_skipped() {
+    let (_folder, path) =
+        in_folder("a.csv", b"# logger 3; 1 kHz\ntime_s,voltage_V,current_A\n0,1,2\n# paused\n0.5,1,3\n1,1,4\n");
+    let trace = csv::read(&path).unwrap();
+    assert_eq!((trace.samples(), trace.current_a()), (3, &[2.0, 3.0, 4.0][..]));
+}
+
 #[test]
 fn what_contradicts_a_file_or_may_mean_another_number_is_refused() {
     let (_folder, path) = in_folder("a.csv", b"time_s;voltage_V;current_A\n0,0;1,5;2,5\n0,1;1,5;2,5\n");
