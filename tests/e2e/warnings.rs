@@ -62,7 +62,7 @@ const NOT_PROVOKED: [(&str, &str); 22] = [
 ];
 
 /// Codes that the tests below produce, and `orthographic-view`, which `visibility_inputs` tests.
-const PROVOKED: [&str; 54] = [
+const PROVOKED: [&str; 55] = [
     "accuracy-missed",
     "alpha-ignored",
     "behind-camera",
@@ -87,6 +87,7 @@ const PROVOKED: [&str; 54] = [
     "few-samples",
     "focus-of-fitted-camera",
     "frames-missed",
+    "heat-outside-image",
     "idle-above-busy",
     "irregular-spacing",
     "leaves-fitted-view",
@@ -223,6 +224,17 @@ fn promise(line: &str) -> Option<(&str, &str)> {
     let (command, rest) = line.strip_prefix("- `")?.split_once("` warns of ")?;
     let code = if rest.starts_with("nothing") { "" } else { rest.strip_prefix('`')?.split('`').next()? };
     Some((command, code))
+}
+
+#[test]
+fn a_heat_map_of_work_outside_the_image() {
+    let heat = ["--set", "resolution=8", "--heat", "samples_tested"];
+    let results = quintile().run("ccd", &heat);
+    assert_warns(&results, "heat-outside-image");
+    assert!(
+        !results.warning_codes().contains(&"empty-frame".to_owned()),
+        "conservative passes are no empty frames"
+    );
 }
 
 #[test]

@@ -17,6 +17,8 @@ pub struct HeatPicture {
     pub of: HeatQuantity,
     /// Number of the frame.
     pub frame: u32,
+    /// Share of the quantity that has a place in the image; 0 where there is none at all.
+    pub placed: f64,
     /// Contents of a PNG file.
     pub png: Vec<u8>,
 }
@@ -139,7 +141,8 @@ impl Heat {
         LinearImage::new(plan.viewport.width(), plan.viewport.height(), &pixels)?
             .write_exr(dir, &format!("{name}.exr"))?;
         dir.write_file(&format!("{name}.csv"), |out| self.table(out))?;
-        Ok(HeatPicture { of: self.of, frame, png })
+        let placed = if self.total > 0.0 { 1.0 - self.elsewhere / self.total } else { 0.0 };
+        Ok(HeatPicture { of: self.of, frame, placed, png })
     }
 
     fn picture(&self, plan: &Plan, frame: u32, brightness: &[f32]) -> Picture {

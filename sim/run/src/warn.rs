@@ -33,6 +33,7 @@ pub(crate) fn gather(plan: &Plan, simulated: &Simulated, measurement: &Measureme
     all.extend(accuracy(plan, simulated));
     all.extend(degenerate(simulated));
     all.extend(empty_frames(simulated));
+    all.extend(heat_outside_image(simulated));
     all.extend(start_errors(measurement).filter(|_| short.is_none()));
     all.extend(short);
     all.extend(detection(measurement).filter(|_| !unseen));
@@ -109,6 +110,24 @@ fn empty_frames(simulated: &Simulated) -> Option<Warning> {
             Code::EmptyFrame,
             format!("{empty} of {} frames show nothing: check the camera", simulated.known().count()),
         )
+    })
+}
+
+/// Share of a heat map's quantity below which a warning is given.
+const MIN_PLACED: f64 = 0.1;
+
+/// Warning about a heat map that shows next to nothing of its quantity.
+fn heat_outside_image(simulated: &Simulated) -> Option<Warning> {
+    let worst = simulated.heat.iter().min_by(|a, b| a.placed.total_cmp(&b.placed))?;
+    (worst.placed < MIN_PLACED).then(|| {
+        let message = format!(
+            "the heat map of {} shows {:.1} % of it (frame {}): the rest has no place in the image, because its passes are of \
+             another size or in conservative mode; choose another quantity",
+            worst.of.name(),
+            1e2 * worst.placed,
+            worst.frame
+        );
+        Warning::new(Code::HeatOutsideImage, message)
     })
 }
 

@@ -67,6 +67,8 @@ codes! {
     DegenerateTriangle = "degenerate-triangle" in Simulator,
     /// No sample of a frame hits anything.
     EmptyFrame = "empty-frame" in Simulator,
+    /// Less than a tenth of the quantity of a heat map has a place in the image.
+    HeatOutsideImage = "heat-outside-image" in Simulator,
     /// A frame is busy for less than two samples of the trace.
     ShortFrame = "short-frame" in Simulator,
     /// A true frame start was not found, or a false one was.

@@ -59,8 +59,10 @@ fn csv_errors_name_file_row_and_column() {
 /// Loggers write what they are at the top of a file.
 #[test]
 fn comment_lines_of_a_csv_file_are_skipped() {
-    let (_folder, path) =
-        in_folder("a.csv", b"# logger 3; 1 kHz\ntime_s,voltage_V,current_A\n0,1,2\n# paused\n0.5,1,3\n1,1,4\n");
+    let (_folder, path) = in_folder(
+        "a.csv",
+        b"# logger 3; 1 kHz\ntime_s,voltage_V,current_A\n0,1,2\n# paused\n0.5,1,3\n1,1,4\n",
+    );
     let trace = csv::read(&path).unwrap();
     assert_eq!((trace.samples(), trace.current_a()), (3, &[2.0, 3.0, 4.0][..]));
 }

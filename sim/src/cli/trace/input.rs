@@ -14,7 +14,8 @@ use tempfile::TempDir;
 use traces::Trace;
 use traces::frames::{FinderMethod, Window};
 use traces::io::{
-    FORMATS, ReadOptions, Recording, Repair, TraceFormat, TraceReader, open, rail_of_sums, read, readable,
+    FORMATS, ReadOptions, Recording, Repair, Rows, TraceFormat, TraceReader, open, rail_of_sums, read,
+    readable,
 };
 use traces::search::{FrameSet, Search};
 use traces::times::read_times;
@@ -209,6 +210,20 @@ impl InputArgs {
             let others: Vec<String> = sum.others.iter().map(|rail| format!("--rail {rail}")).collect();
             let alone = if sum.rail.is_empty() { String::new() } else { format!("--rail {}, or ", sum.rail) };
             terminal.warn_of(Code::RailCountedTwice, &format!("{sum}: give {alone}{}", others.join(" ")));
+            return Ok(());
+        }
+        let rows = Rows::open(path, &self.options()?)?;
+        if rows.rails().len() > 1 {
+            let name = |rail: &String| {
+                if rail.is_empty() { "the one without a name".to_owned() } else { rail.clone() }
+            };
+            let rails: Vec<String> = rows.rails().iter().map(name).collect();
+            terminal.note(&format!(
+                "{}: {} rails are added up: {}; --rail chooses",
+                shown(path),
+                rails.len(),
+                rails.join(", ")
+            ));
         }
         Ok(())
     }
