@@ -99,7 +99,17 @@ pub(super) fn find_auto(trace: &Trace, marks: &Marks) -> Result<Found, MarkError
         ));
     }
     let long_and_clear = trace.samples() > MAX_TRACKED_SAMPLES && squares.threshold.clarity() >= 1.0;
-    if long_and_clear { Ok(squares) } else { find_tracked(trace, marks) }
+    if long_and_clear {
+        return Ok(squares);
+    }
+    let tracked = find_tracked(trace, marks)?;
+    let is_clear = squares.threshold.clarity() >= 1.0 && !is_unsure(&squares);
+    Ok(if is_clear && is_unsure(&tracked) { squares } else { tracked })
+}
+
+/// Whether every start but the marks has a confidence below one half.
+fn is_unsure(found: &Found) -> bool {
+    found.starts.iter().all(|start| start.marked || start.confidence < 0.5)
 }
 
 /// Whether tracking found enough starts for a test: many, or fewer than the sum of squares where that gives a
