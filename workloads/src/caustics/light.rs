@@ -60,7 +60,7 @@ fn fluence_along(
         lane.mul(speed(lane, seen, at, middle), over_area(lane, areas, from, to))
     };
     let sets = times.unwrap_or_else(|| {
-        lane.tallied(|tally| time_interval_counted(&seen.triangle, eye.shear(), at, tally))
+        lane.tallied(|costs| time_interval_counted(&seen.triangle, eye.shear(), at, costs))
     });
     let sum = sets.iter().flat_map(|set| set.as_slice()).fold(0.0, |sum, times| lane.add(sum, piece(times)));
     // The factor is the same for all pixels of a beam.
