@@ -216,6 +216,23 @@ mod tests {
         assert!(found[0] > 10_000 && found[1] > 10_000 && several > 20, "{found:?} {several}");
     }
 
+    /// A path seen before has the multiply-adds of a run that is counted; times on a coarse grid reach all branches.
+    #[test]
+    fn operations_found_by_path_are_those_of_counting() {
+        let (known, none, mut r) = (Costs::remembered(), Costs::default(), Uniform::new(14));
+        let mut costs = std::collections::BTreeSet::new();
+        for _ in 0..20_000 {
+            let triangle = whole_number_triangle(&mut r);
+            let at = [0; 2].map(|_| f64::from(r.within(-4.0, 4.0).round()));
+            let shear = Shear { parallel: r.within(0.0, 1.0) < 0.5, ..Shear::default() };
+            let (times, madds) = time_interval_counted(&triangle, &shear, at, &known);
+            assert_eq!((times, madds), time_interval_counted(&triangle, &shear, at, &none), "{at:?}");
+            assert_eq!(times, time_interval(&triangle, &shear, at[0], at[1]));
+            costs.insert(madds);
+        }
+        assert!(costs.len() > 20, "{costs:?}");
+    }
+
     #[test]
     fn dense_sampling_finds_no_other_time_and_the_intervals_are_no_wider() {
         let mut r = Uniform::new(10);

@@ -17,4 +17,4 @@ mod query;
 
 pub(crate) use job::FLAGS;
 pub use job::{MAX_HALF_COVERED_SHARE, Options, WallScene, WallSceneSpec, job};
-pub use query::depths;
+pub use query::{depths, depths_of};
