@@ -79,12 +79,13 @@ impl Branches for &Path {
     }
 }
 
-/// Kernels whose multiply-adds are counted by path.
+/// Kernels whose multiply-adds are counted by path. Their numbers have five bits each, so that no path through one is that
+/// through another.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub(crate) enum Kernel {
     /// Preparing a triangle.
-    Prepare = 1,
+    Prepare = 16,
     /// Bringing a triangle to a tile.
     Place,
     /// Bringing it to another time.
