@@ -6,7 +6,7 @@ use std::ops::{Add, Mul, Sub};
 use glam::{Affine3A, DAffine3, DVec3, Mat4, Vec2, Vec3, Vec4};
 
 use crate::surface::{Bound, MAX_TARGETS};
-use crate::tally::Tally;
+use crate::tally::Costs;
 use crate::texture::Texture;
 
 /// Shader input, interpolated over the triangle at the reference lens position and time. Interpolators and the
@@ -138,12 +138,19 @@ pub struct Lane<'a> {
     fetches: Cell<u32>,
     /// Lines that were read, if they are of interest.
     lines: Option<&'a RefCell<Vec<u64>>>,
+    /// Costs of kernels, if they are known from other lanes.
+    costs: Option<&'a Costs>,
 }
 
 impl<'a> Lane<'a> {
     /// A lane that reads what a draw binds.
     pub(crate) fn reading(bound: &'a [Bound<'a>]) -> Self {
         Self { bound, ..Self::default() }
+    }
+
+    /// A lane that knows the costs of kernels.
+    pub(crate) fn knowing(costs: &'a Costs) -> Self {
+        Self { costs: Some(costs), ..Self::default() }
     }
 
     /// A lane that reads what a draw binds, and notes the lines it reads.
@@ -317,11 +324,13 @@ impl<'a> Lane<'a> {
         a.cross(b)
     }
 
-    /// Runs a kernel on numbers that count on a tally, as operations of the lane.
-    pub fn tallied<T>(&self, kernel: impl FnOnce(&Tally) -> T) -> T {
-        let tally = Tally::default();
-        let result = kernel(&tally);
-        self.count(tally.madds());
+    /// Runs a kernel that returns its multiply-adds with its result, as operations of the lane.
+    pub fn tallied<T>(&self, kernel: impl FnOnce(&Costs) -> (T, u32)) -> T {
+        let (result, madds) = match self.costs {
+            Some(costs) => kernel(costs),
+            None => kernel(&Costs::default()),
+        };
+        self.count(madds);
         result
     }
 

@@ -1,5 +1,8 @@
 //! Numbers that count the operations they take part in. A kernel that is generic over its number reports what it did
 //! on this input, without a cost written beside it.
+//!
+//! The count depends on the branches alone. So a kernel runs on plain numbers and records its [`Path`]; only a path
+//! that [`Costs`] does not know yet runs again on numbers that count.
 
 use std::cell::Cell;
 use std::cmp::Ordering;
@@ -19,6 +22,140 @@ impl Tally {
     #[inline(always)]
     fn add(&self, madds: u32) {
         self.0.set(self.0.get() + madds);
+    }
+}
+
+/// Recorder of the branches of a kernel. Every choice that decides which operations follow goes through it; a choice
+/// between two values does not.
+pub trait Branches: Copy {
+    /// Records a condition, and returns it.
+    fn branch(self, condition: bool) -> bool;
+}
+
+/// Records nothing.
+impl Branches for () {
+    #[inline(always)]
+    fn branch(self, condition: bool) -> bool {
+        condition
+    }
+}
+
+/// Numbers that count need no record.
+impl Branches for &Tally {
+    #[inline(always)]
+    fn branch(self, condition: bool) -> bool {
+        condition
+    }
+}
+
+/// Branches of one run of a kernel, in order, as bits behind a number that is the kernel's.
+#[derive(Debug)]
+pub struct Path(Cell<u64>);
+
+impl Path {
+    /// Bit that is set if there were too many branches.
+    const FULL: u64 = 1 << 63;
+
+    /// The start of the path through a kernel.
+    pub(crate) fn new(kernel: Kernel) -> Self {
+        Self(Cell::new(kernel as u64))
+    }
+
+    /// The branches so far, if there is room for all of them.
+    fn bits(&self) -> Option<u64> {
+        let bits = self.0.get();
+        (bits & Self::FULL == 0).then_some(bits)
+    }
+}
+
+impl Branches for &Path {
+    #[inline(always)]
+    fn branch(self, condition: bool) -> bool {
+        let bits = self.0.get();
+        if bits & Path::FULL == 0 {
+            self.0.set(bits << 1 | u64::from(condition));
+        }
+        condition
+    }
+}
+
+/// Kernels whose multiply-adds are counted by path. Their numbers have five bits each, so that no path through one is that
+/// through another.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub(crate) enum Kernel {
+    /// Preparing a triangle.
+    Prepare = 16,
+    /// Bringing a triangle to a tile.
+    Place,
+    /// Bringing it to another time.
+    Within,
+    /// All sides of a tile, through a pinhole.
+    Sides,
+    /// A side of a tile, through a lens.
+    Side,
+    /// The near depth.
+    Near,
+    /// The edges of a triangle.
+    Edges,
+    /// Depths in a tile.
+    Depths,
+    /// The face that a triangle shows.
+    Facing,
+    /// A point in a still triangle.
+    Inside,
+    /// The times of a point in a moving triangle.
+    Times,
+}
+
+/// Multiply-adds of the paths that were taken so far, each with its branches. By default none is remembered, and every
+/// run is counted.
+#[derive(Debug, Default)]
+pub struct Costs(Box<[Cell<(u64, u32)>]>);
+
+impl Costs {
+    /// Room for 4096 paths; of two in one place the later stays.
+    pub fn remembered() -> Self {
+        Self(vec![Cell::default(); 4096].into())
+    }
+
+    /// Runs a kernel: `follow` on plain numbers, and `count` if the path is new. Returns the result with its multiply-adds.
+    #[inline(always)]
+    pub(crate) fn run<T>(
+        &self,
+        kernel: Kernel,
+        follow: impl FnOnce(&Path) -> T,
+        count: impl FnOnce(&Tally),
+    ) -> (T, u32) {
+        let path = Path::new(kernel);
+        let result = follow(&path);
+        let slot = path.bits().and_then(|bits| Some((bits, self.slot(bits)?)));
+        if let Some((bits, slot)) = slot
+            && let (known, madds) = slot.get()
+            && known == bits
+            && cfg!(not(debug_assertions))
+        {
+            return (result, madds);
+        }
+        (result, self.counted(slot, count))
+    }
+
+    #[cold]
+    fn counted(&self, slot: Option<(u64, &Cell<(u64, u32)>)>, count: impl FnOnce(&Tally)) -> u32 {
+        let tally = Tally::default();
+        count(&tally);
+        let madds = tally.madds();
+        if let Some((bits, slot)) = slot {
+            let (known, before) = slot.replace((bits, madds));
+            debug_assert!(known != bits || before == madds, "{bits:b}: {before} and {madds}");
+        }
+        madds
+    }
+
+    fn slot(&self, bits: u64) -> Option<&Cell<(u64, u32)>> {
+        // Multiplicative hashing (Knuth 1973).
+        let hash = bits.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 32;
+        self.0.get(hash as usize & self.0.len().saturating_sub(1))
     }
 }
 
@@ -66,6 +203,13 @@ impl<'t> Counting<'t> {
     #[inline(always)]
     pub(crate) fn multiply_add(self, b: Self, c: Self) -> Self {
         self * b + c
+    }
+
+    /// One of two values, whichever it is: a choice does not decide what counts.
+    #[inline(always)]
+    pub(crate) fn choice(self, other: Self, takes_other: bool) -> Self {
+        let (tally, fresh) = (self.tally.or(other.tally), self.fresh && other.fresh);
+        Self { value: if takes_other { other.value } else { self.value }, tally, fresh }
     }
 
     #[inline(always)]

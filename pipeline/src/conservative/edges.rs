@@ -17,25 +17,23 @@ use crate::depth::{Numbers, Real, cross};
 type Points<R> = [[[R; 3]; 3]; 2];
 
 /// Whether two edges show that the triangle cannot touch the tile.
-pub(super) fn miss<N: Numbers>(seen: &Seen<N>, region: &Region) -> bool {
-    if !seen.view.has_lens() {
+pub(super) fn miss<N: Numbers>(numbers: N, seen: &Seen<N::Number>, region: &Region) -> bool {
+    numbers.branch(seen.view.is_perspective());
+    if !numbers.branch(seen.view.has_lens()) {
         return apart(seen, &[seen.homogeneous()]);
     }
-    let [u, v] = [region.u, region.v].map(|side| side.map(|position| seen.numbers.number(position)));
+    let [u, v] = [region.u, region.v].map(|side| side.map(|position| numbers.number(position)));
     let lens_positions = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(i, j)| [u[i], v[j]]);
-    apart(seen, &lens_positions.map(|lens| seen.homogeneous_from(lens)))
+    apart(seen, &lens_positions.map(|lens| seen.homogeneous_from(numbers, lens)))
 }
 
 /// The same test by the vertices as seen from each of the given lens positions.
-fn apart<N: Numbers, const POSITIONS: usize>(
-    seen: &Seen<N>,
-    lens_positions: &[Points<N::Number>; POSITIONS],
-) -> bool {
+fn apart<R: Real, const POSITIONS: usize>(seen: &Seen<R>, lens_positions: &[Points<R>; POSITIONS]) -> bool {
     let half = seen.tile.map(|[low, high]| high.larger(-low));
     let noise = noise(seen, lens_positions, half);
     let (mut below, mut above) = (false, false);
     for (i, j) in [(1, 2), (2, 0), (0, 1)] {
-        let mut range = [f64::INFINITY, f64::NEG_INFINITY].map(N::Number::new);
+        let mut range = [f64::INFINITY, f64::NEG_INFINITY].map(R::new);
         for points in lens_positions {
             for [x, y, z] in normals(points, i, j) {
                 let reach = half[0] * x.magnitude() + half[1] * y.magnitude();
@@ -57,17 +55,17 @@ fn apart<N: Numbers, const POSITIONS: usize>(
 /// the magnitude of the middle is that of the farther side. So the unused half is at least `4 ROUNDING across
 /// down`. The magnitudes in an edge add up to at most twice `across down`, and none passes more than six
 /// operations of 2^-53 each: 12 / 32 of `ROUNDING across down`.
-fn noise<N: Numbers, const POSITIONS: usize>(
-    seen: &Seen<N>,
-    lens_positions: &[Points<N::Number>; POSITIONS],
-    half: [N::Number; 2],
-) -> N::Number {
+fn noise<R: Real, const POSITIONS: usize>(
+    seen: &Seen<R>,
+    lens_positions: &[Points<R>; POSITIONS],
+    half: [R; 2],
+) -> R {
     let all = || lens_positions.as_flattened().as_flattened().iter();
     let [across, down] = [0, 1].map(|axis| {
-        let far = |p: &[N::Number; 3]| p[axis].magnitude() + half[axis] * p[2].magnitude();
-        all().fold(N::Number::new(0.0), |most, p| most.larger(far(p)))
+        let far = |p: &[R; 3]| p[axis].magnitude() + half[axis] * p[2].magnitude();
+        all().fold(R::new(0.0), |most, p| most.larger(far(p)))
     });
-    let four = N::Number::new(4.0);
+    let four = R::new(4.0);
     four * (seen.noise[0] * down + seen.noise[1] * across) + four * seen.noise[0] * seen.noise[1]
 }
 

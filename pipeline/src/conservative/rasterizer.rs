@@ -3,12 +3,12 @@
 use std::ops::Range;
 
 use super::edges::miss;
-use super::sides::narrow;
+use super::sides::{beyond_near, through_lens, through_pinhole};
 use super::triangle::{ROUNDING, Seen};
 use super::{MIN_UNCERTAINTY, MovingTriangle, Prepared, Rect, Region, Touch, View};
 use crate::depth::plane::{Beam, MovingPlane, normal, tightest};
 use crate::depth::{Numbers, Real};
-use crate::tally::Tally;
+use crate::tally::{Costs, Kernel, Path, Tally};
 
 /// A grid of equal tiles.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -97,43 +97,43 @@ impl Rasterizer {
         mut each: impl FnMut([u32; 2], &Touch),
     ) {
         let mut each = |tile, touch: &Touch, _: &mut TileLoop| each(tile, touch);
-        self.tests(prepared, ()).descend(grid, part, &self.clip, &mut each);
+        self.tests(prepared, None).descend(grid, part, &self.clip, &mut each);
     }
 
-    /// The same with the work of the tile loop. `each` is given the work since its last call and may take it; the
-    /// rest is returned.
+    /// The same with the work of the tile loop, counted with `costs`. `each` is given the work since its last call and may
+    /// take it; the rest is returned.
     pub fn rasterize_counted(
         &self,
         prepared: &Prepared,
         grid: &Grid,
         part: [Range<u32>; 2],
+        costs: &Costs,
         mut each: impl FnMut([u32; 2], &Touch, &mut TileLoop),
     ) -> TileLoop {
-        let tally = Tally::default();
-        let mut tests = self.tests(prepared, &tally);
+        let mut tests = self.tests(prepared, Some(costs));
         tests.descend(grid, part, &self.clip, &mut each);
         tests.work
     }
 
     /// Prepare a triangle for the tests of all tiles.
     pub fn prepare(&self, triangle: &MovingTriangle) -> Prepared {
-        Prepared::new((), triangle, &self.view)
+        Prepared::new(&Path::new(Kernel::Prepare), triangle, &self.view)
     }
 
     /// The same with its multiply-adds.
-    pub fn prepare_counted(&self, triangle: &MovingTriangle) -> (Prepared, u32) {
-        let tally = Tally::default();
-        (Prepared::new(&tally, triangle, &self.view), tally.madds())
+    pub fn prepare_counted(&self, triangle: &MovingTriangle, costs: &Costs) -> (Prepared, u32) {
+        let prepared = |path: &Path| Prepared::new(path, triangle, &self.view);
+        costs.run(Kernel::Prepare, prepared, |tally| _ = Prepared::new(tally, triangle, &self.view))
     }
 
     /// Intervals in which a prepared triangle may touch `rect` within `region`, or `None` if it cannot. For
     /// callers with their own tile hierarchy: intervals of a tile are valid for the tiles inside.
     pub fn touch(&self, prepared: &Prepared, rect: &Rect, region: &Region) -> Option<Touch> {
-        self.tests(prepared, ()).touch(rect, region).ok()
+        self.tests(prepared, None).touch(rect, region).ok()
     }
 
-    fn tests<'a, N: Numbers>(&'a self, prepared: &'a Prepared, numbers: N) -> Tests<'a, N> {
-        Tests { rasterizer: self, prepared, numbers, work: TileLoop::default() }
+    fn tests<'a>(&'a self, prepared: &'a Prepared, costs: Option<&'a Costs>) -> Tests<'a> {
+        Tests { rasterizer: self, prepared, costs, work: TileLoop::default() }
     }
 }
 
@@ -145,14 +145,15 @@ enum Culled {
 }
 
 /// The tests of one triangle, and their work.
-struct Tests<'a, N> {
+struct Tests<'a> {
     rasterizer: &'a Rasterizer,
     prepared: &'a Prepared,
-    numbers: N,
+    /// Without costs nothing is counted.
+    costs: Option<&'a Costs>,
     work: TileLoop,
 }
 
-impl<N: Numbers> Tests<'_, N> {
+impl Tests<'_> {
     fn descend(
         &mut self,
         grid: &Grid,
@@ -200,81 +201,156 @@ impl<N: Numbers> Tests<'_, N> {
         self.halved(seen, region, self.rasterizer.halvings)
     }
 
-    fn seen(&mut self, rect: &Rect, region: &Region) -> Seen<N> {
-        let before = self.numbers.madds();
-        let seen = Seen::new(self.numbers, &self.rasterizer.view, self.prepared, rect, region);
-        self.work.place_madds += self.numbers.madds() - before;
+    /// Runs a kernel and returns its multiply-adds with the result.
+    #[inline(always)]
+    fn run<T>(
+        &self,
+        kernel: Kernel,
+        follow: impl FnOnce(&Path) -> T,
+        count: impl FnOnce(&Tally),
+    ) -> (T, u32) {
+        match self.costs {
+            Some(costs) => costs.run(kernel, follow, count),
+            None => (follow(&Path::new(kernel)), 0),
+        }
+    }
+
+    fn seen(&mut self, rect: &Rect, region: &Region) -> Seen<f64> {
+        let (view, prepared) = (&self.rasterizer.view, self.prepared);
+        let (seen, madds) = self.run(
+            Kernel::Place,
+            |path| Seen::new(path, view, prepared, rect, region),
+            |tally| _ = Seen::new(tally, view, prepared, rect, region),
+        );
+        self.work.place_madds += madds;
         seen
+    }
+
+    /// Brings the triangle to the times of `region`, and returns the multiply-adds.
+    fn bring(&self, seen: &mut Seen<f64>, region: &Region) -> u32 {
+        let (before, prepared) = (&*seen, self.prepared);
+        let (points, madds) = self.run(
+            Kernel::Within,
+            |path| before.points_within(path, prepared, region),
+            |tally| _ = before.on(tally).points_within(tally, prepared, region),
+        );
+        seen.points = points;
+        madds
     }
 
     /// The part of `region` in which the triangle may touch the tile. `seen` is first given for `region`, then
     /// for that part.
-    fn part(&mut self, seen: &mut Seen<N>, region: &Region) -> Result<Region, Culled> {
-        let before = self.numbers.madds();
-        let region = narrow(seen, self.prepared, region);
-        let between = self.numbers.madds();
-        self.work.side_madds += between - before;
-        let region = region.ok_or(Culled::BySides)?;
-        let missed = miss(seen, &region);
-        self.work.edge_madds += self.numbers.madds() - between;
+    fn part(&mut self, seen: &mut Seen<f64>, region: &Region) -> Result<Region, Culled> {
+        let region = self.narrow(seen, region).ok_or(Culled::BySides)?;
+        let seen = &*seen;
+        let (missed, madds) = self.run(
+            Kernel::Edges,
+            |path| miss(path, seen, &region),
+            |tally| _ = miss(tally, &seen.on(tally), &region),
+        );
+        self.work.edge_madds += madds;
         if missed { Err(Culled::ByEdges) } else { Ok(region) }
     }
 
-    fn halved(&mut self, mut seen: Seen<N>, region: &Region, halvings: u32) -> Result<Touch, Culled> {
+    /// The part of `region` in which the triangle may be inside the sides of the tile and beyond the near depth, or
+    /// `None`. Through a lens one side is tested after another: each test uses the part left by the previous ones.
+    fn narrow(&mut self, seen: &mut Seen<f64>, region: &Region) -> Option<Region> {
+        let (view, prepared) = (&self.rasterizer.view, self.prepared);
+        let mut part = *region;
+        if view.has_lens() {
+            for side in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+                let (known, from) = (&*seen, &part);
+                let (left, madds) = self.run(
+                    Kernel::Side,
+                    |path| through_lens(path, known, side, from),
+                    |tally| _ = through_lens(tally, &known.on(tally), side, from),
+                );
+                self.work.side_madds += madds;
+                part = left?;
+                self.work.side_madds += self.bring(seen, &part);
+            }
+        } else {
+            let (known, t) = (&*seen, part.t);
+            let (left, madds) = self.run(
+                Kernel::Sides,
+                |path| through_pinhole(path, known, t),
+                |tally| _ = through_pinhole(tally, &known.on(tally), t),
+            );
+            self.work.side_madds += madds;
+            part.t = left?;
+        }
+        if view.near() != f64::NEG_INFINITY {
+            let (left, madds) = self.run(
+                Kernel::Near,
+                |path| beyond_near(path, view, prepared, &part),
+                |tally| _ = beyond_near(tally, view, prepared, &part),
+            );
+            self.work.side_madds += madds;
+            part = left?;
+        }
+        if part != *region {
+            self.work.side_madds += self.bring(seen, &part);
+        }
+        Some(part)
+    }
+
+    fn halved(&mut self, mut seen: Seen<f64>, region: &Region, halvings: u32) -> Result<Touch, Culled> {
         let region = self.part(&mut seen, region)?;
         if halvings == 0 || !self.prepared.moving || region.t[0] == region.t[1] {
-            let before = self.numbers.madds();
-            let depths = self.depths(&seen, &region);
-            self.work.depth_madds += self.numbers.madds() - before;
+            let view = &self.rasterizer.view;
+            let (depths, madds) = self.run(
+                Kernel::Depths,
+                |path| depths(path, view, &seen, &region),
+                |tally| _ = depths(tally, view, &seen.on(tally), &region),
+            );
+            self.work.depth_madds += madds;
             return depths.map(|z| Touch::new(&region, z)).ok_or(Culled::ByEdges);
         }
         let halves = region.halves().map(|half| {
-            let before = self.numbers.madds();
-            let seen = seen.within(self.prepared, &half);
-            self.work.place_madds += self.numbers.madds() - before;
+            let mut seen = seen;
+            self.work.place_madds += self.bring(&mut seen, &half);
             self.halved(seen, &half, halvings - 1).ok()
         });
         halves.into_iter().flatten().reduce(|a, b| a.hull(&b)).ok_or(Culled::ByEdges)
     }
+}
 
-    /// Depth range in which the triangle may touch the tile (thesis, Paper VI, Appendix A, both tests), or
-    /// `None` if it cannot.
-    fn depths(&self, seen: &Seen<N>, region: &Region) -> Option<[f64; 2]> {
-        let vertices = seen.points.iter().flatten().map(|p| p[2]);
-        let nothing = [f64::INFINITY, f64::NEG_INFINITY].map(N::Number::new);
-        let vertices = vertices.fold(nothing, |[lo, hi], z| [lo.smaller(z), hi.larger(z)]);
-        let beam = self.beam(seen, region);
-        let planes = seen.points.iter().map(|points| {
-            let normal = normal(points);
-            // A shorter normal may consist of underflowed products.
-            let shortest = N::Number::new(MIN_UNCERTAINTY * MIN_UNCERTAINTY);
-            if normal.iter().all(|n| n.magnitude() < shortest) {
-                return None;
-            }
-            let plane = MovingPlane::new(normal, [&seen.points[0], &seen.points[1]], seen.size);
-            plane.depths(plane.whole(), &beam, [0.0; 2].map(N::Number::new))
-        });
-        let [lo, hi] = tightest(planes.chain([Some(vertices)]))?;
-        let allowance = N::Number::new(2.0) * seen.depth_noise;
-        let widened = |z: N::Number| N::Number::new(ROUNDING) * z.magnitude() + allowance;
-        let near = N::Number::new(self.rasterizer.view.near());
-        let (lo, hi) = ((lo - widened(lo)).larger(near), hi + widened(hi));
-        (lo <= hi).then_some([lo.value(), hi.value()])
-    }
-
-    /// The rays of a tile from a part of the lens.
-    fn beam(&self, seen: &Seen<N>, region: &Region) -> Beam<N::Number> {
-        let numbers = |range: [f64; 2]| range.map(|value| self.numbers.number(value));
-        let view = &self.rasterizer.view;
-        let lens = view.has_lens().then(|| {
-            let (s, a) = view.shear();
-            ([numbers(region.u), numbers(region.v)], numbers(s), numbers(a))
-        });
-        match (lens, view.is_perspective()) {
-            (None, true) => Beam::pinhole(seen.tile),
-            (None, false) => Beam::orthographic(seen.tile),
-            (Some((lens, s, a)), true) => Beam::lens(seen.tile, lens, s, a),
-            (Some((lens, s, a)), false) => Beam::oblique(seen.tile, lens, s, a),
+/// Depth range in which the triangle may touch the tile (thesis, Paper VI, Appendix A, both tests), or
+/// `None` if it cannot.
+fn depths<N: Numbers>(numbers: N, view: &View, seen: &Seen<N::Number>, region: &Region) -> Option<[f64; 2]> {
+    let vertices = seen.points.iter().flatten().map(|p| p[2]);
+    let nothing = [f64::INFINITY, f64::NEG_INFINITY].map(N::Number::new);
+    let vertices = vertices.fold(nothing, |[lo, hi], z| [lo.smaller(z), hi.larger(z)]);
+    let beam = beam(numbers, view, seen, region);
+    let planes = seen.points.iter().map(|points| {
+        let normal = normal(points);
+        // A shorter normal may consist of underflowed products.
+        let shortest = N::Number::new(MIN_UNCERTAINTY * MIN_UNCERTAINTY);
+        if numbers.branch(normal.iter().all(|n| n.magnitude() < shortest)) {
+            return None;
         }
+        let plane = MovingPlane::new(normal, [&seen.points[0], &seen.points[1]], seen.size);
+        plane.depths(plane.whole(), &beam, [0.0; 2].map(N::Number::new), numbers)
+    });
+    let [lo, hi] = tightest(planes.chain([Some(vertices)]))?;
+    let allowance = N::Number::new(2.0) * seen.depth_noise;
+    let widened = |z: N::Number| N::Number::new(ROUNDING) * z.magnitude() + allowance;
+    let near = N::Number::new(view.near());
+    let (lo, hi) = ((lo - widened(lo)).larger(near), hi + widened(hi));
+    (lo <= hi).then_some([lo.value(), hi.value()])
+}
+
+/// The rays of a tile from a part of the lens.
+fn beam<N: Numbers>(numbers: N, view: &View, seen: &Seen<N::Number>, region: &Region) -> Beam<N::Number> {
+    let of = |range: [f64; 2]| range.map(|value| numbers.number(value));
+    let lens = numbers.branch(view.has_lens()).then(|| {
+        let (s, a) = view.shear();
+        ([of(region.u), of(region.v)], of(s), of(a))
+    });
+    match (lens, numbers.branch(view.is_perspective())) {
+        (None, true) => Beam::pinhole(seen.tile),
+        (None, false) => Beam::orthographic(seen.tile),
+        (Some((lens, s, a)), true) => Beam::lens(seen.tile, lens, s, a),
+        (Some((lens, s, a)), false) => Beam::oblique(seen.tile, lens, s, a),
     }
 }

@@ -6,65 +6,57 @@
 //! negative at one end of `u`; likewise for `u`.
 
 use super::triangle::{ROUNDING, Seen};
-use super::{Prepared, Region};
+use super::{Prepared, Region, View};
 use crate::depth::{Numbers, Real};
+use crate::tally::Branches;
 
-/// The part of `region` in which the triangle may be inside the sides of the tile and beyond the near depth,
-/// or `None`. `seen` is first given for `region`, then for that part.
-pub(super) fn narrow<N: Numbers>(seen: &mut Seen<N>, prepared: &Prepared, region: &Region) -> Option<Region> {
-    let part = if seen.view.has_lens() {
-        through_lens(seen, prepared, region)?
-    } else {
-        Region { t: through_pinhole(seen, region.t)?, ..*region }
-    };
-    let part = beyond_near(seen, prepared, &part)?;
-    if part != *region {
-        *seen = seen.within(prepared, &part);
-    }
-    Some(part)
-}
-
-/// Test all sides together: each bound is linear in t alone.
-fn through_pinhole<N: Numbers>(seen: &Seen<N>, t: [f64; 2]) -> Option<[f64; 2]> {
-    let t = t.map(|t| seen.numbers.number(t));
+/// Test all sides together: each bound is linear in t alone. The times left.
+pub(super) fn through_pinhole<N: Numbers>(
+    numbers: N,
+    seen: &Seen<N::Number>,
+    t: [f64; 2],
+) -> Option<[f64; 2]> {
+    numbers.branch(seen.view.is_perspective());
+    let t = t.map(|t| numbers.number(t));
     let mut part = t;
     for axis in [0, 1] {
         for (side, border) in seen.tile[axis].into_iter().enumerate() {
             let inward = |d: N::Number| if side == 0 { d } else { -d };
             let d = [0, 1, 2].map(|k| [0, 1].map(|end| inward(seen.through_pinhole(axis, k, end, border))));
             let zero = N::Number::new(0.0);
-            if d.iter().any(|&[opening, closing]| opening >= zero && closing >= zero) {
+            let is_inside = d.iter().any(|&[opening, closing]| opening >= zero && closing >= zero);
+            if numbers.branch(is_inside) {
                 continue;
             }
-            let times = d.map(|[opening, closing]| above(t, opening, closing, seen.noise[axis]));
-            part = meet(part, times.into_iter().fold(None, union)?)?;
+            let times = d.map(|[opening, closing]| above(numbers, t, [opening, closing], seen.noise[axis]));
+            let met = times.into_iter().fold(None, union).and_then(|times| meet(part, times));
+            numbers.branch(met.is_some());
+            part = met?;
         }
     }
     Some(part.map(Real::value))
 }
 
-/// Test one side after another: each test uses the part of lens and time left by the previous ones.
-fn through_lens<N: Numbers>(seen: &mut Seen<N>, prepared: &Prepared, region: &Region) -> Option<Region> {
-    let mut region = *region;
-    for (axis, side) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-        region = narrow_side(seen, axis, side, &region)?;
-        *seen = seen.within(prepared, &region);
-    }
-    Some(region)
-}
-
-fn narrow_side<N: Numbers>(seen: &Seen<N>, axis: usize, side: usize, region: &Region) -> Option<Region> {
+/// Test one side: the part of lens and time left.
+pub(super) fn through_lens<N: Numbers>(
+    numbers: N,
+    seen: &Seen<N::Number>,
+    (axis, side): (usize, usize),
+    region: &Region,
+) -> Option<Region> {
+    numbers.branch(seen.view.is_perspective());
     let lens = if axis == 0 { region.u } else { region.v };
-    let [lens, t] = [lens, region.t].map(|range| range.map(|end| seen.numbers.number(end)));
+    let [lens, t] = [lens, region.t].map(|range| range.map(|end| numbers.number(end)));
     let (inward, border) = (|d: N::Number| if side == 0 { d } else { -d }, seen.tile[axis][side]);
     let (mut times, mut positions) = (None, None);
     for k in 0..3 {
-        let d = lens.map(|position| [0, 1].map(|end| inward(seen.from(axis, [k, end], position, border))));
+        let d = lens
+            .map(|position| [0, 1].map(|end| inward(seen.from(numbers, axis, [k, end], [position, border]))));
         for [opening, closing] in d {
-            times = union(times, above(t, opening, closing, seen.noise[axis]));
+            times = union(times, above(numbers, t, [opening, closing], seen.noise[axis]));
         }
         for [at_low, at_high] in [0, 1].map(|end| [d[0][end], d[1][end]]) {
-            positions = union(positions, above(lens, at_low, at_high, seen.noise[axis]));
+            positions = union(positions, above(numbers, lens, [at_low, at_high], seen.noise[axis]));
         }
     }
     let mut next = Region { t: times?.map(Real::value), ..*region };
@@ -73,32 +65,31 @@ fn narrow_side<N: Numbers>(seen: &Seen<N>, axis: usize, side: usize, region: &Re
 }
 
 /// The part of `region` in which some vertex is beyond the near depth.
-fn beyond_near<N: Numbers>(seen: &Seen<N>, prepared: &Prepared, region: &Region) -> Option<Region> {
-    let (near, numbers) = (seen.view.near(), seen.numbers);
-    if near == f64::NEG_INFINITY {
-        return Some(*region);
-    }
-    let near = numbers.number(near);
+pub(super) fn beyond_near<N: Numbers>(
+    numbers: N,
+    view: &View,
+    prepared: &Prepared,
+    region: &Region,
+) -> Option<Region> {
+    let near = numbers.number(view.near());
     let (size, unsure) = (numbers.number(prepared.size[2]), numbers.number(prepared.uncertainty()[2]));
     let noise = N::Number::new(ROUNDING) * (size + near.magnitude()) + unsure;
     let t = region.t.map(|t| numbers.number(t));
-    let times = (0..3).map(|k| {
-        let [open, close] = region.t.map(|t| prepared.coordinate(numbers, [k, 2], t) - near);
-        above(t, open, close, noise)
-    });
+    let depths = region.t.map(|t| prepared.at(numbers, [2], t).map(|[depth]| depth - near));
+    let times = (0..3).map(|k| above(numbers, t, depths.map(|end| end[k]), noise));
     Some(Region { t: times.fold(None, union)?.map(Real::value), ..*region })
 }
 
 /// The part of `range` in which a linear function may be non-negative. It has the values `lo` and `hi` at the
 /// ends, each with an error of at most `noise`.
-fn above<R: Real>(range: [R; 2], lo: R, hi: R, noise: R) -> Option<[R; 2]> {
+fn above<R: Real>(path: impl Branches, range: [R; 2], [lo, hi]: [R; 2], noise: R) -> Option<[R; 2]> {
     let zero = R::new(0.0);
     // Twice the noise also covers the rounding of the quotient; the nudge covers the mapping to the range.
     let allowance = R::new(2.0) * noise;
     let (lo, hi) = (lo + allowance, hi + allowance);
     let nudge = || R::new(4.0 * f64::EPSILON) * range[0].magnitude().larger(range[1].magnitude());
     let root = || range[0] + (range[1] - range[0]) * (lo / (lo - hi));
-    match (lo >= zero, hi >= zero) {
+    match (path.branch(lo >= zero), path.branch(hi >= zero)) {
         (true, true) => Some(range),
         (false, false) => None,
         (true, false) => Some([range[0], (root() + nudge()).smaller(range[1])]),
@@ -141,17 +132,17 @@ mod tests {
             let (low, high) = (exact(range[0]), exact(range[1]));
             // Times (p + q), where the function is zero.
             let root = low * i128::from(p + q) + (high - low) * i128::from(p);
-            let [from, _] = above(range, -(p as f64), q as f64, 0.0).unwrap();
+            let [from, _] = above((), range, [-(p as f64), q as f64], 0.0).unwrap();
             assert!(exact(from) * i128::from(p + q) <= root, "{range:?} {p} {q}");
-            let [_, to] = above(range, p as f64, -(q as f64), 0.0).unwrap();
+            let [_, to] = above((), range, [p as f64, -(q as f64)], 0.0).unwrap();
             assert!(exact(to) * i128::from(p + q) >= root, "{range:?} {p} {q}");
         }
     }
 
     #[test]
     fn the_part_that_may_not_be_negative() {
-        assert_eq!(above([0.0, 1.0], 0.0, -1.0, 0.0).unwrap()[0], 0.0);
-        assert_eq!(above([0.0, 1.0], -1.0, -2.0, 0.25), None);
-        assert_eq!(above([0.0, 1.0], -0.5, -0.5, 0.25), Some([0.0, 1.0]));
+        assert_eq!(above((), [0.0, 1.0], [0.0, -1.0], 0.0).unwrap()[0], 0.0);
+        assert_eq!(above((), [0.0, 1.0], [-1.0, -2.0], 0.25), None);
+        assert_eq!(above((), [0.0, 1.0], [-0.5, -0.5], 0.25), Some([0.0, 1.0]));
     }
 }

@@ -63,7 +63,7 @@ impl Prepared {
         let size = [0, 1, 2].map(|axis| all().map(|p| p[axis].abs()).fold(0.0, f64::max));
         let perspective = view.is_perspective();
         let uncertainty = triangle.uncertainty.map(|off| off.max(MIN_UNCERTAINTY));
-        let moving = triangle.open != triangle.close;
+        let moving = numbers.branch(triangle.open != triangle.close);
         let difference = |k: usize, axis: usize| {
             let [open, close] = [triangle.open, triangle.close].map(|end| numbers.number(end[k][axis]));
             (close - open).value()
@@ -87,21 +87,23 @@ impl Prepared {
         &self.triangle.uncertainty
     }
 
-    /// Vertices at time `t`; at the ends of the shutter exactly as given.
-    fn at<N: Numbers>(&self, numbers: N, t: f64) -> [[N::Number; 3]; 3] {
-        [0, 1, 2].map(|k| [0, 1, 2].map(|axis| self.coordinate(numbers, [k, axis], t)))
-    }
-
-    /// Coordinate of vertex `k` along `axis` at time `t`.
-    pub(super) fn coordinate<N: Numbers>(&self, numbers: N, [k, axis]: [usize; 2], t: f64) -> N::Number {
-        let open = numbers.number(self.triangle.open[k][axis]);
-        if t == 0.0 || !self.moving {
+    /// Coordinates of the vertices along `axes` at time `t`; at the ends of the shutter exactly as given.
+    pub(super) fn at<N: Numbers, const AXES: usize>(
+        &self,
+        numbers: N,
+        axes: [usize; AXES],
+        t: f64,
+    ) -> [[N::Number; AXES]; 3] {
+        let of = |end: &[[f64; 3]; 3]| end.map(|p| axes.map(|axis| numbers.number(p[axis])));
+        let open = of(&self.triangle.open);
+        if numbers.branch(t == 0.0 || !self.moving) {
             return open;
         }
-        if t == 1.0 {
-            return numbers.number(self.triangle.close[k][axis]);
+        if numbers.branch(t == 1.0) {
+            return of(&self.triangle.close);
         }
-        open + numbers.number(t) * numbers.number(self.delta[k][axis])
+        let (t, delta) = (numbers.number(t), of(&self.delta));
+        [0, 1, 2].map(|k| std::array::from_fn(|axis| open[k][axis] + t * delta[k][axis]))
     }
 }
 
@@ -112,35 +114,57 @@ pub(super) const ROUNDING: f64 = 1.0 / (1_u64 << 48) as f64;
 /// Vertices at both ends of a time interval, relative to the middle of a tile, so that large coordinates lose
 /// little precision.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Seen<N: Numbers> {
-    pub numbers: N,
+pub(super) struct Seen<R> {
     pub view: View,
     /// `[x - X w, y - Y w, depth]` by end and vertex; `(X, Y)` is the middle of the tile.
-    pub points: [[[N::Number; 3]; 3]; 2],
-    middle: [N::Number; 2],
+    pub points: [[[R; 3]; 3]; 2],
+    middle: [R; 2],
     /// Distances of the tile's sides from its middle.
-    pub tile: [[N::Number; 2]; 2],
+    pub tile: [[R; 2]; 2],
     /// Error bound in x and y of a vertex seen from a point of the tile and a lens position.
-    pub noise: [N::Number; 2],
+    pub noise: [R; 2],
     /// Error bound of a depth.
-    pub depth_noise: N::Number,
+    pub depth_noise: R,
     /// Largest magnitudes of the terms of `points`, uncertainty included.
-    pub size: [N::Number; 3],
+    pub size: [R; 3],
 }
 
-impl<N: Numbers> Seen<N> {
-    pub fn new(numbers: N, view: &View, prepared: &Prepared, rect: &Rect, region: &Region) -> Self {
+impl Seen<f64> {
+    /// The same in the numbers of a kernel.
+    pub fn on<N: Numbers>(&self, numbers: N) -> Seen<N::Number> {
         let number = |value: f64| numbers.number(value);
-        let rounding = N::Number::new(ROUNDING);
+        Seen {
+            view: self.view,
+            points: self.points.map(|end| end.map(|p| p.map(number))),
+            middle: self.middle.map(number),
+            tile: self.tile.map(|side| side.map(number)),
+            noise: self.noise.map(number),
+            depth_noise: number(self.depth_noise),
+            size: self.size.map(number),
+        }
+    }
+}
+
+impl<R: Real> Seen<R> {
+    pub fn new<N: Numbers<Number = R>>(
+        numbers: N,
+        view: &View,
+        prepared: &Prepared,
+        rect: &Rect,
+        region: &Region,
+    ) -> Self {
+        let number = |value: f64| numbers.number(value);
+        let rounding = R::new(ROUNDING);
         let sides = [rect.x, rect.y].map(|side| side.map(number));
-        let middle = sides.map(|[lo, hi]| N::Number::new(0.5) * (lo + hi));
+        let middle = sides.map(|[lo, hi]| R::new(0.5) * (lo + hi));
         let largest = prepared.size.map(number);
         let (weight, unsure) = (number(prepared.weight), prepared.uncertainty().map(number));
         let off = number(prepared.weight_off);
-        let is_perspective = view.is_perspective();
+        let is_perspective = numbers.branch(view.is_perspective());
+        let has_lens = numbers.branch(view.has_lens());
         let noise = [0, 1].map(|axis| {
             let side = sides[axis][0].magnitude().larger(sides[axis][1].magnitude());
-            let lens = view.has_lens().then(|| {
+            let lens = has_lens.then(|| {
                 let (s, a) = view.shear();
                 [s, a].map(|of| number(of[axis]).magnitude())
             });
@@ -161,7 +185,6 @@ impl<N: Numbers> Seen<N> {
             size + unsure / rounding
         });
         Self {
-            numbers,
             view: *view,
             points: points(numbers, view, prepared, middle, region),
             middle,
@@ -172,46 +195,57 @@ impl<N: Numbers> Seen<N> {
         }
     }
 
-    /// The same triangle within another region.
-    pub fn within(self, prepared: &Prepared, region: &Region) -> Self {
-        Self { points: points(self.numbers, &self.view, prepared, self.middle, region), ..self }
+    /// [`Self::points`] within another region.
+    pub fn points_within<N: Numbers<Number = R>>(
+        &self,
+        numbers: N,
+        prepared: &Prepared,
+        region: &Region,
+    ) -> [[[R; 3]; 3]; 2] {
+        points(numbers, &self.view, prepared, self.middle, region)
     }
 
     /// Weight of a point on the homogeneous image plane.
-    fn weight(&self, depth: N::Number) -> N::Number {
+    fn weight(&self, depth: R) -> R {
         weight(&self.view, depth)
     }
 
     /// Vertex `k` at `end` of the time along `axis`, seen through a pinhole from `side`, relative to the
     /// middle of the tile.
-    pub fn through_pinhole(&self, axis: usize, k: usize, end: usize, side: N::Number) -> N::Number {
+    pub fn through_pinhole(&self, axis: usize, k: usize, end: usize, side: R) -> R {
         let p = &self.points[end][k];
         p[axis] - side * self.weight(p[2])
     }
 
     /// The same vertex seen from `lens` on the lens.
-    pub fn from(&self, axis: usize, [k, end]: [usize; 2], lens: N::Number, side: N::Number) -> N::Number {
+    pub fn from<N: Numbers<Number = R>>(
+        &self,
+        numbers: N,
+        axis: usize,
+        [k, end]: [usize; 2],
+        [lens, side]: [R; 2],
+    ) -> R {
         let depth = self.points[end][k][2];
-        self.through_pinhole(axis, k, end, side) + lens * self.shift(axis, depth)
+        self.through_pinhole(axis, k, end, side) + lens * self.shift(numbers, axis, depth)
     }
 
     /// Shift of a point at this depth from the middle of the lens to its rim.
-    fn shift(&self, axis: usize, depth: N::Number) -> N::Number {
+    fn shift<N: Numbers<Number = R>>(&self, numbers: N, axis: usize, depth: R) -> R {
         let (s, a) = self.view.shear();
-        self.numbers.number(a[axis]) * depth - self.numbers.number(s[axis])
+        numbers.number(a[axis]) * depth - numbers.number(s[axis])
     }
 
     /// Vertices at both ends as homogeneous points of the image, seen through a pinhole from the middle of
     /// the tile.
-    pub fn homogeneous(&self) -> [[[N::Number; 3]; 3]; 2] {
+    pub fn homogeneous(&self) -> [[[R; 3]; 3]; 2] {
         self.points.map(|end| end.map(|[x, y, depth]| [x, y, self.weight(depth)]))
     }
 
     /// The same vertices seen from `lens` on the lens.
-    pub fn homogeneous_from(&self, lens: [N::Number; 2]) -> [[[N::Number; 3]; 3]; 2] {
+    pub fn homogeneous_from<N: Numbers<Number = R>>(&self, numbers: N, lens: [R; 2]) -> [[[R; 3]; 3]; 2] {
         self.points.map(|end| {
             end.map(|[x, y, depth]| {
-                let at = |axis: usize, x: N::Number| x + lens[axis] * self.shift(axis, depth);
+                let at = |axis: usize, x: R| x + lens[axis] * self.shift(numbers, axis, depth);
                 [at(0, x), at(1, y), self.weight(depth)]
             })
         })
@@ -231,7 +265,7 @@ fn points<N: Numbers>(
     region: &Region,
 ) -> [[[N::Number; 3]; 3]; 2] {
     region.t.map(|t| {
-        prepared.at(numbers, t).map(|[x, y, depth]| {
+        prepared.at(numbers, [0, 1, 2], t).map(|[x, y, depth]| {
             let w = weight(view, depth);
             [x - middle[0] * w, y - middle[1] * w, depth]
         })

@@ -2,7 +2,7 @@
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-use crate::tally::{Counting, Tally};
+use crate::tally::{Branches, Counting, Path, Tally};
 
 /// A real number.
 pub trait Real:
@@ -23,14 +23,19 @@ pub trait Real:
     /// `self b + c`, rounded after each operation; one multiply-add.
     fn madd(self, b: Self, c: Self) -> Self;
 
+    /// The other one if `takes_other`; a choice is free.
+    fn or(self, other: Self, takes_other: bool) -> Self {
+        if takes_other { other } else { self }
+    }
+
     /// Minimum; comparisons are free.
     fn smaller(self, other: Self) -> Self {
-        if other < self { other } else { self }
+        self.or(other, other < self)
     }
 
     /// Maximum.
     fn larger(self, other: Self) -> Self {
-        if other > self { other } else { self }
+        self.or(other, other > self)
     }
 
     /// Magnitude.
@@ -65,42 +70,37 @@ impl Real for Counting<'_> {
     fn madd(self, b: Self, c: Self) -> Self {
         self.multiply_add(b, c)
     }
+
+    fn or(self, other: Self, takes_other: bool) -> Self {
+        self.choice(other, takes_other)
+    }
 }
 
-/// Source of the numbers that a kernel computes with.
-pub(crate) trait Numbers: Copy {
+/// Source of the numbers that a kernel computes with, and recorder of its branches.
+pub(crate) trait Numbers: Branches {
     /// Type of the numbers.
     type Number: Real;
 
     /// An input of the kernel.
     fn number(self, value: f64) -> Self::Number;
-
-    /// Multiply-adds of the numbers so far, if they count.
-    fn madds(self) -> u32;
 }
 
 /// Plain numbers.
-impl Numbers for () {
+impl Numbers for &Path {
     type Number = f64;
 
+    #[inline(always)]
     fn number(self, value: f64) -> f64 {
         value
-    }
-
-    fn madds(self) -> u32 {
-        0
     }
 }
 
 impl<'t> Numbers for &'t Tally {
     type Number = Counting<'t>;
 
+    #[inline(always)]
     fn number(self, value: f64) -> Counting<'t> {
         Counting::new(value, self)
-    }
-
-    fn madds(self) -> u32 {
-        Tally::madds(self)
     }
 }
 

@@ -4,6 +4,7 @@
 
 use std::collections::HashSet;
 use std::ops::Range;
+use std::sync::Mutex;
 
 use activity::{Event, Packet, PacketCounts, PacketKind};
 use rayon::prelude::*;
@@ -11,9 +12,10 @@ use rayon::prelude::*;
 use super::Gpu;
 use super::lanes::{LaneWork, Lanes};
 use crate::conservative::{Grid, MovingTriangle, Rasterizer, TileLoop, Touch};
+use crate::depth::{Numbers, Real};
 use crate::geometry::{Projection, Viewport};
 use crate::memory::Surface;
-use crate::tally::{Counting, Tally};
+use crate::tally::{Costs, Kernel};
 
 /// Triangles of a packet of vertices.
 const BATCH: usize = 32;
@@ -40,16 +42,20 @@ pub struct Primitive {
 
 impl Primitive {
     /// Whether set-up drops the triangle because of the face it shows, and its multiply-adds.
-    fn is_culled(&self) -> (bool, u32) {
+    fn is_culled(&self, costs: &Costs) -> (bool, u32) {
         if !self.back_only {
             return (false, 0);
         }
-        let tally = Tally::default();
-        let [a, b, c] = self.triangle.open().map(|p| p.map(|at| Counting::new(at, &tally)));
-        let [along, across] = [b, c].map(|p| [p[0] - a[0], p[1] - a[1]]);
-        let area = along[0] * across[1] - across[0] * along[1];
-        (area.value() <= 0.0, tally.madds())
+        let corners = self.triangle.open();
+        costs.run(Kernel::Facing, |path| shows_front(path, corners), |tally| _ = shows_front(tally, corners))
     }
+}
+
+fn shows_front<N: Numbers>(numbers: N, corners: &[[f64; 3]; 3]) -> bool {
+    let [a, b, c] = corners.map(|p| p.map(|at| numbers.number(at)));
+    let [along, across] = [b, c].map(|p| [p[0] - a[0], p[1] - a[1]]);
+    let area = along[0] * across[1] - across[0] * along[1];
+    area.value() <= 0.0
 }
 
 /// Triangles drawn in conservative mode.
@@ -97,6 +103,32 @@ pub trait TileShader: Sync {
 pub struct ConservativePass {
     /// Lines that hold more than the clear value.
     written: HashSet<u64>,
+    workers: Workers,
+}
+
+/// Lanes of the workers that are not running, with the costs they know.
+#[derive(Debug, Default)]
+struct Workers(Mutex<Vec<Lanes>>);
+
+/// Lanes of a worker that is running.
+struct Worker<'a> {
+    lanes: Lanes,
+    others: &'a Workers,
+}
+
+impl Workers {
+    fn worker(&self) -> Worker<'_> {
+        let known = self.0.lock().ok().and_then(|mut lanes| lanes.pop());
+        Worker { lanes: known.unwrap_or_else(Lanes::remembering), others: self }
+    }
+}
+
+impl Drop for Worker<'_> {
+    fn drop(&mut self) {
+        if let Ok(mut lanes) = self.others.0.lock() {
+            lanes.push(std::mem::take(&mut self.lanes));
+        }
+    }
 }
 
 /// Tiles of one body, in order.
@@ -133,7 +165,7 @@ impl ConservativePass {
     ) {
         let first = gpu.triangles_of_pass() as u32;
         let numbers = numbered(draw.primitives, first);
-        vertices(gpu, draw);
+        vertices(gpu, draw, self.workers.worker().lanes.costs());
         for (chunk, from) in chunks(draw.primitives) {
             let bodies: Vec<&[Primitive]> = chunk.chunk_by(|a, b| a.body == b.body).collect();
             let starts = bodies.iter().scan(from, |next, body| {
@@ -142,8 +174,12 @@ impl ConservativePass {
                 Some(start)
             });
             let starts: Vec<usize> = starts.collect();
+            let log = |worker: &mut Worker<'_>, (body, start): (&&[Primitive], &usize)| {
+                log(body, *start, draw, shader, &worker.lanes)
+            };
+            let workers = || self.workers.worker();
             let logs: Vec<BodyLog<S::Output>> =
-                bodies.par_iter().zip(&starts).map(|(body, start)| log(body, *start, draw, shader)).collect();
+                bodies.par_iter().zip(&starts).map_init(workers, log).collect();
             for log in logs {
                 self.body(gpu, draw, &numbers, log, &mut store);
             }
@@ -217,17 +253,18 @@ fn log<S: TileShader>(
     start: usize,
     draw: &ConservativeDraw<'_>,
     shader: &S,
+    lanes: &Lanes,
 ) -> BodyLog<S::Output> {
     let (mut tiles, mut rest, mut state) = (Vec::new(), Vec::new(), S::Body::default());
-    for (item, primitive) in body.iter().zip(start..).filter(|(item, _)| !item.is_culled().0) {
+    for (item, primitive) in body.iter().zip(start..).filter(|(item, _)| !item.is_culled(lanes.costs()).0) {
         let prepared = item.rasterizer.prepare(&item.triangle);
         let after = item.rasterizer.rasterize_counted(
             &prepared,
             draw.grid,
             item.part.clone(),
+            lanes.costs(),
             |tile, touch, work: &mut TileLoop| {
-                let lanes = Lanes::default();
-                let output = shader.run(&mut state, &lanes, &TileIntervals { primitive, tile, touch });
+                let output = shader.run(&mut state, lanes, &TileIntervals { primitive, tile, touch });
                 let tests = std::mem::take(work);
                 tiles.push(TileLog { primitive, tile, tests, lanes: lanes.finish(), output });
             },
@@ -240,7 +277,7 @@ fn log<S: TileShader>(
 }
 
 /// Emits the packets of the vertices and of set-up.
-fn vertices(gpu: &mut Gpu<'_>, draw: &ConservativeDraw<'_>) {
+fn vertices(gpu: &mut Gpu<'_>, draw: &ConservativeDraw<'_>, costs: &Costs) {
     let mut start = gpu.packet(PacketKind::Draw, Packet::NONE, None);
     start.counts[Event::Draws] = 1;
     gpu.push(&start, 0);
@@ -258,12 +295,13 @@ fn vertices(gpu: &mut Gpu<'_>, draw: &ConservativeDraw<'_>) {
         counts[Event::ShaderOps] = vertices * vertex_ops;
         counts[Event::TrianglesIn] = triangles;
         for primitive in batch {
-            let (is_culled, madds) = primitive.is_culled();
+            let (is_culled, madds) = primitive.is_culled(costs);
             let outcome = if is_culled { Event::TrianglesFaceCulled } else { Event::TrianglesSetUp };
             counts[outcome] += 1;
             counts[Event::SetupMadds] += madds;
             if !is_culled {
-                counts[Event::SetupMadds] += primitive.rasterizer.prepare_counted(&primitive.triangle).1;
+                counts[Event::SetupMadds] +=
+                    primitive.rasterizer.prepare_counted(&primitive.triangle, costs).1;
             }
         }
         let from = draw.vertices.address() + 3 * BATCH as u64 * number * bytes;

@@ -35,14 +35,20 @@ pub struct Gpu<'e> {
     pending: Vec<Surface>,
     /// Surfaces that passes may write and read.
     surfaces: Surfaces,
-    /// Those read since the last barrier: the reads may still be going on.
-    reading: Vec<SurfaceId>,
-    /// First addresses of what passes since the last barrier read.
+    /// First addresses of what passes since the last barrier read: the reads may still be going on.
     reads: Vec<u64>,
     pub(super) buffers: Buffers,
     heat: FrameHeat,
     /// Whether the tiles of the pass that was begun are those of the heat maps.
     is_on_map: bool,
+}
+
+/// First addresses of what a pass of triangles reads.
+struct Reads {
+    /// Vertices of its draws.
+    vertices: Vec<u64>,
+    /// Textures and surfaces.
+    tiles: Vec<u64>,
 }
 
 /// Result of a pass.
@@ -146,7 +152,7 @@ impl<'e> Gpu<'e> {
     ) -> Result<Self, PassError> {
         let emit = Box::new(emit);
         let memory = MemorySystem::new(&spec.memory)?;
-        let (passes, results, pending, reading, reads, buffers, heat) = Default::default();
+        let (passes, results, pending, reads, buffers, heat) = Default::default();
         Ok(Self {
             spec,
             memory,
@@ -157,7 +163,6 @@ impl<'e> Gpu<'e> {
             results,
             pending,
             surfaces: Surfaces::default(),
-            reading,
             reads,
             buffers,
             heat,
@@ -226,8 +231,17 @@ impl<'e> Gpu<'e> {
 
     /// Whether a pass that reads or writes `surface` has to wait for earlier ones.
     pub(super) fn conflicts(&self, surface: Surface, writes: bool) -> bool {
-        let is_written = self.pending.iter().any(|pending| pending.contains(surface.address()));
-        is_written || (writes && self.reads.iter().any(|&address| surface.contains(address)))
+        self.is_pending(surface.address()) || (writes && self.is_read(surface))
+    }
+
+    /// Whether what is at `address` was written since the last barrier.
+    fn is_pending(&self, address: u64) -> bool {
+        self.pending.iter().any(|surface| surface.contains(address))
+    }
+
+    /// Whether a pass since the last barrier reads `surface`.
+    fn is_read(&self, surface: Surface) -> bool {
+        self.reads.iter().any(|&address| surface.contains(address))
     }
 
     /// Records that the last pass reads what is at `address`.
@@ -294,17 +308,16 @@ impl<'e> Gpu<'e> {
         let prepared = Pass::new(pass, (number, has_heat), &self.surfaces, &mut self.space);
         self.check_memory(pass.name)?;
         self.passes.push(PassReport::new(pass));
-        if let Some(waits) = self.waits(&prepared.addresses, pass) {
+        let reads = self.reads_of(&prepared.addresses, pass);
+        if let Some(waits) = self.waits(&reads, pass) {
             self.barrier(waits);
         }
-        self.reading.extend(pass.read_surfaces());
         let drawn = self.pass(&prepared, pass)?;
         self.last_batch = prepared.batches().len().max(1) as u32 - 1;
         if !prepared.is_attached {
             self.keep(drawn.surface);
         }
-        self.reads.extend(prepared.addresses.textures.iter().flatten());
-        self.reads.extend(prepared.addresses.vertices.iter().map(|buffer| buffer.address));
+        self.reads.extend(reads.vertices.iter().chain(&reads.tiles));
         Ok(drawn)
     }
 
@@ -353,17 +366,23 @@ impl<'e> Gpu<'e> {
 
     /// Packets that have to wait for earlier passes, if any: those that read their results, or write what they read. A target
     /// of several passes needs no wait, as the units of depth and colour work in order.
-    fn waits(&self, at: &AddressMap, pass: &RasterPass<'_>) -> Option<Waits> {
-        let is_pending = |address: u64| self.pending.iter().any(|surface| surface.contains(address));
-        if at.vertices.iter().any(|buffer| is_pending(buffer.address)) {
+    fn waits(&self, reads: &Reads, pass: &RasterPass<'_>) -> Option<Waits> {
+        let is_pending = |address: &u64| self.is_pending(*address);
+        if reads.vertices.iter().any(is_pending) {
             return Some(Waits::All);
         }
-        let read = pass.read_surfaces().filter_map(|id| Some(self.surfaces.get(id)?.region.address()));
-        let reads = at.textures.iter().flatten().copied().chain(read).any(is_pending);
-        let is_read = |id: SurfaceId| self.reading.contains(&id);
+        let is_read = |id: SurfaceId| self.surfaces.get(id).is_some_and(|state| self.is_read(state.region));
         let overwrites =
             matches!(pass.target, Target::Surfaces(targets) if targets.all().any(|(id, ..)| is_read(id)));
-        (reads || overwrites).then_some(Waits::Tiles)
+        (reads.tiles.iter().any(is_pending) || overwrites).then_some(Waits::Tiles)
+    }
+
+    fn reads_of(&self, at: &AddressMap, pass: &RasterPass<'_>) -> Reads {
+        let surfaces = pass.read_surfaces().filter_map(|id| Some(self.surfaces.get(id)?.region.address()));
+        Reads {
+            vertices: at.vertices.iter().map(|buffer| buffer.address).collect(),
+            tiles: at.textures.iter().flatten().copied().chain(surfaces).collect(),
+        }
     }
 
     /// Lets packets wait for all earlier ones, and makes results readable.
@@ -371,7 +390,6 @@ impl<'e> Gpu<'e> {
         let mut packet = Packet::new(PacketKind::Barrier(waits), self.last_pass());
         self.memory.flush(&mut packet.counts);
         self.pending.clear();
-        self.reading.clear();
         self.reads.clear();
         self.push(&packet, 0);
     }

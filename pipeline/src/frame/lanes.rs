@@ -5,11 +5,12 @@ use std::cell::RefCell;
 
 use activity::{Event, PacketCounts};
 
+use crate::depth::{Numbers, Real};
 use crate::geometry::Shear;
 use crate::memory::{LINE_BYTES, MemorySystem, Surface};
 use crate::setup::Triangle;
 use crate::shader::Lane;
-use crate::tally::{Counting, Tally};
+use crate::tally::{Costs, Kernel};
 use crate::traversal::{TimeIntervals, time_interval_counted};
 
 /// Bytes of a word of depth.
@@ -46,12 +47,23 @@ impl Touch {
 pub struct Lanes {
     counts: RefCell<PacketCounts>,
     touches: RefCell<Vec<Touch>>,
+    costs: Costs,
 }
 
 impl Lanes {
+    /// Lanes that remember the costs of kernels.
+    pub(super) fn remembering() -> Self {
+        Self { costs: Costs::remembered(), ..Self::default() }
+    }
+
+    /// Costs of kernels that ran before.
+    pub(super) fn costs(&self) -> &Costs {
+        &self.costs
+    }
+
     /// Runs a program on a lane.
     pub fn run<T>(&self, program: impl FnOnce(&Lane) -> T) -> T {
-        let lane = Lane::default();
+        let lane = Lane::knowing(&self.costs);
         let result = program(&lane);
         self.count(Event::PixelInvocations, 1);
         self.count(Event::ShaderOps, lane.ops());
@@ -97,27 +109,20 @@ impl Lanes {
 
     /// Times at which a point of the image is inside a moving triangle, by face: the sample test of all times at once.
     pub fn times_at(&self, triangle: &Triangle, shear: &Shear, at: [f64; 2]) -> [TimeIntervals; 2] {
-        let tally = Tally::default();
-        let times = time_interval_counted(triangle, shear, at, &tally);
-        self.tested(tally.madds(), times.iter().any(|face| !face.as_slice().is_empty()));
+        let (times, madds) = time_interval_counted(triangle, shear, at, &self.costs);
+        self.tested(madds, times.iter().any(|face| !face.as_slice().is_empty()));
         times
     }
 
     /// Whether a point of the image is inside a still triangle whose edges are not negative there, or off by `slack`
     /// at most.
     pub fn is_inside(&self, corners: &[[f64; 2]; 3], at: [f64; 2], slack: f64) -> bool {
-        let tally = Tally::default();
-        let number = |value: f64| Counting::new(value, &tally);
-        let [x, y] = at.map(number);
-        let seen = corners.map(|corner| {
-            let [a, b] = corner.map(number);
-            [a - x, b - y]
-        });
-        let is_inside = [(0, 1), (1, 2), (2, 0)].iter().all(|&(i, j): &(usize, usize)| {
-            let edge = seen[i][0] * seen[j][1] - seen[j][0] * seen[i][1];
-            edge.value() >= -slack
-        });
-        self.tested(tally.madds(), is_inside);
+        let (is_inside, madds) = self.costs.run(
+            Kernel::Inside,
+            |path| is_inside(path, corners, at, slack),
+            |tally| _ = is_inside(tally, corners, at, slack),
+        );
+        self.tested(madds, is_inside);
         is_inside
     }
 
@@ -135,10 +140,23 @@ impl Lanes {
         self.touches.borrow_mut().push(touch);
     }
 
-    /// Ends the lanes of the tile.
-    pub(super) fn finish(self) -> LaneWork {
-        LaneWork { counts: self.counts.into_inner(), touches: self.touches.into_inner() }
+    /// Ends the lanes of the tile; those of another one may follow.
+    pub(super) fn finish(&self) -> LaneWork {
+        LaneWork { counts: self.counts.take(), touches: self.touches.take() }
     }
+}
+
+/// Whether a point is on the inner side of each edge of a triangle, or off by `slack` at most.
+fn is_inside<N: Numbers>(numbers: N, corners: &[[f64; 2]; 3], at: [f64; 2], slack: f64) -> bool {
+    let [x, y] = at.map(|value| numbers.number(value));
+    let seen = corners.map(|corner| {
+        let [a, b] = corner.map(|value| numbers.number(value));
+        [a - x, b - y]
+    });
+    [(0, 1), (1, 2), (2, 0)].iter().all(|&(i, j): &(usize, usize)| {
+        let edge = seen[i][0] * seen[j][1] - seen[j][0] * seen[i][1];
+        numbers.branch(edge.value() >= -slack)
+    })
 }
 
 /// What the lanes of a tile did.

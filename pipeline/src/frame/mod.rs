@@ -37,7 +37,7 @@ pub use heat::{HeatMap, TileHeat};
 pub use lanes::Lanes;
 use pass::Pass;
 pub use pass::{Draw, RasterPass, Resident, Target};
-pub use query::{IntervalAnswer, IntervalQueries, MovingBox, SampledAnswer, SampledQueries};
+pub use query::{IntervalAnswer, IntervalQueries, MovingBox, SampledAnswer, SampledAnswers, SampledQueries};
 use replay::Replay;
 pub use settings::{Features, PipelineSpec, Settings, Shading, SpecError};
 use worker::Worker;

@@ -5,7 +5,7 @@ use std::ops::Range;
 use activity::{Counts, Event, Packet, PacketKind};
 use glam::{Vec3, Vec4};
 
-use super::{Draw, Gpu, PassError, RasterPass};
+use super::{Draw, FrameReport, Gpu, PassError, RasterPass};
 use crate::depth::{Bounder, DepthBound, Pyramid, interval_madds, set_up_madds};
 use crate::geometry::{Cull, Geometry, MovingVertex, Projection};
 use crate::memory::{LINE_BYTES, Surface};
@@ -205,11 +205,12 @@ impl<'a> IntervalQueries<'a> {
 }
 
 impl Gpu<'_> {
-    /// Gathers the farthest depths of `stored`, the result of a pass over depth, in a pass of its own: every stored depth is
-    /// read and compared once, and the farthest of each box of a tile are compared for the next level. They are kept in fast
+    /// Gathers the farthest depths of `stored`, the result of a pass over depth, in a pass of its own. It needs no wait, as the
+    /// unit of depth works in order: every stored depth is read and compared once, and the farthest of each box of a tile are compared for the next level. They are kept in fast
     /// memory.
     pub fn gather(&mut self, name: &str, pyramid: &Pyramid, stored: Surface) {
         self.open(name, None);
+        self.note_read(stored.address());
         let first = pyramid.size(0);
         let tiles = u64::from(first[0] * first[1]);
         for level in 0..pyramid.levels() {
@@ -333,6 +334,15 @@ impl SampledAnswer {
     }
 }
 
+/// Answers of sampled queries.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SampledAnswers {
+    /// By object.
+    pub answers: Vec<SampledAnswer>,
+    /// Work of the pass that drew the occluders and the boxes.
+    pub report: FrameReport,
+}
+
 /// Sampled queries: bounding boxes drawn over stored depths, with the depth test and without storing any.
 #[derive(Clone, Copy)]
 pub struct SampledQueries<'a> {
@@ -357,7 +367,7 @@ impl SampledQueries<'_> {
     ///
     /// # Errors
     /// [`PassError`] if the hardware cannot draw it.
-    pub fn ask(&self, objects: &[MovingBox]) -> Result<Vec<SampledAnswer>, PassError> {
+    pub fn ask(&self, objects: &[MovingBox]) -> Result<SampledAnswers, PassError> {
         let corners: Vec<[[Vec3; 8]; 2]> = objects.iter().map(MovingBox::corners).collect();
         let state = DrawState {
             depth: DepthState { test: Compare::LessEqual, write: false },
@@ -375,7 +385,7 @@ impl SampledQueries<'_> {
         let range: Range<usize> = self.occluders.draws.len()..draws.len();
         let mut found = vec![SampledAnswer::default(); draws.len()];
         let pass = RasterPass { draws: &draws, ..self.occluders.without_image() };
-        pass.render(|packet, _| {
+        let mut gpu = Gpu::new(pass.settings.spec, |packet: &Packet, _| {
             let draw = packet.draw as usize;
             let ended = range.contains(&draw) && self.any && found[draw].passed > 0;
             if range.contains(&draw) && !ended {
@@ -384,9 +394,9 @@ impl SampledQueries<'_> {
                 found[draw].add(&counts);
             }
         })?;
-        Ok(asked
-            .into_iter()
-            .map(|draw| draw.map_or_else(SampledAnswer::default, |draw| found[draw]))
-            .collect())
+        gpu.draw(&pass)?;
+        let report = gpu.finish();
+        let answer = |draw: Option<usize>| draw.map_or_else(SampledAnswer::default, |draw| found[draw]);
+        Ok(SampledAnswers { answers: asked.into_iter().map(answer).collect(), report })
     }
 }

@@ -3,7 +3,7 @@
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-use crate::tally::Counting;
+use crate::tally::{Branches, Counting};
 
 /// Number type of the kernels of the tile tests. A generic kernel can be run with counting numbers to measure
 /// its cost.
@@ -23,14 +23,19 @@ pub trait Number:
     /// Square root.
     fn sqrt(self) -> Self;
 
+    /// The other one if `takes_other`; a choice is free.
+    fn or(self, other: Self, takes_other: bool) -> Self {
+        if takes_other { other } else { self }
+    }
+
     /// Maximum; the other one if one is NaN.
     fn max(self, other: Self) -> Self {
-        if other > self || self.partial_cmp(&self).is_none() { other } else { self }
+        self.or(other, other > self || self.partial_cmp(&self).is_none())
     }
 
     /// Minimum; the other one if one is NaN.
     fn min(self, other: Self) -> Self {
-        if other < self || self.partial_cmp(&self).is_none() { other } else { self }
+        self.or(other, other < self || self.partial_cmp(&self).is_none())
     }
 
     /// A constant.
@@ -79,6 +84,10 @@ impl Number for Counting<'_> {
 
     fn sqrt(self) -> Self {
         self.root()
+    }
+
+    fn or(self, other: Self, takes_other: bool) -> Self {
+        self.choice(other, takes_other)
     }
 }
 
@@ -153,12 +162,17 @@ impl<N: Number> Quadratic<N> {
     /// is no cancellation (Kahan). Mapped back to [0, 1] they are `q / (q + b2)` and `b0 / (b0 + q)`, both
     /// sums of equal signs for roots inside.
     pub fn above(&self) -> Pieces<N> {
+        self.pieces(())
+    }
+
+    /// The same with its branches.
+    pub(super) fn pieces(&self, path: impl Branches) -> Pieces<N> {
         let [b0, b1, b2] = self.0;
         let (zero, one) = (N::zero(), N::from(1.0));
         let discriminant = b1 * b1 - b0 * b2;
-        let (starts_below, ends_below) = (b0 < zero, b2 < zero);
+        let (starts_below, ends_below) = (path.branch(b0 < zero), path.branch(b2 < zero));
         let bends_over = if starts_below { b1 > zero } else { b1 < zero };
-        if starts_below == ends_below && (discriminant < zero || !bends_over) {
+        if path.branch(starts_below == ends_below && (discriminant < zero || !bends_over)) {
             // No root inside.
             return if starts_below { Pieces::None } else { Pieces::One([zero, one]) };
         }

@@ -14,7 +14,7 @@ use super::number::{Number, Pieces, Quadratic};
 use super::{EdgeBounds, Edges, Faces, TileRect, View};
 use crate::geometry::Shear;
 use crate::setup::Triangle;
-use crate::tally::{Counting, Tally};
+use crate::tally::{Branches, Costs, Counting, Kernel};
 
 use super::Box5;
 
@@ -46,13 +46,15 @@ impl TimeIntervals {
         self.as_slice().iter().map(|[lo, hi]| hi - lo).sum()
     }
 
-    fn intersect<N: Number>(&self, pieces: Pieces<N>) -> Self {
+    fn intersect<N: Number>(&self, pieces: Pieces<N>, path: impl Branches) -> Self {
         let mut both = Self { len: 0, ..*self };
         let (error, none) = (N::constant(ROOT_ERROR), [N::zero(); 2]);
         let (count, parts) = match pieces {
             Pieces::None => (0, [none; 2]),
             Pieces::One(piece) => (1, [piece; 2]),
-            Pieces::Two(first, last) if last[0] - first[1] <= error + error => (1, [[first[0], last[1]]; 2]),
+            Pieces::Two(first, last) if path.branch(last[0] - first[1] <= error + error) => {
+                (1, [[first[0], last[1]]; 2])
+            }
             Pieces::Two(first, last) => (2, [first, last]),
         };
         let widened = |[lo, hi]: [N; 2]| [(lo - error).into(), (hi + error).into()];
@@ -81,18 +83,24 @@ const RAISED: f64 = 64.0 * f64::EPSILON;
 /// its clockwise face, and those at which it sees the other face. `shear` only says whether the view is
 /// orthographic. The intervals are widened by the rounding of `f64`.
 pub fn time_interval(triangle: &Triangle, shear: &Shear, x: f64, y: f64) -> [TimeIntervals; 2] {
-    times(f64::from, [x, y], triangle, shear)
+    times(f64::from, [x, y], triangle, shear, ())
 }
 
-/// The same, with its multiply-adds on a tally.
+/// The same with its multiply-adds, counted with `costs`.
 pub fn time_interval_counted(
     triangle: &Triangle,
     shear: &Shear,
     at: [f64; 2],
-    tally: &Tally,
-) -> [TimeIntervals; 2] {
-    let number = |value: f64| Counting::new(value, tally);
-    times(|value| number(f64::from(value)), at.map(number), triangle, shear)
+    costs: &Costs,
+) -> ([TimeIntervals; 2], u32) {
+    costs.run(
+        Kernel::Times,
+        |path| times(f64::from, at, triangle, shear, path),
+        |tally| {
+            let number = |value: f64| Counting::new(value, tally);
+            times(|value| number(f64::from(value)), at.map(number), triangle, shear, tally);
+        },
+    )
 }
 
 fn times<N: Number>(
@@ -100,7 +108,9 @@ fn times<N: Number>(
     at: [N; 2],
     triangle: &Triangle,
     shear: &Shear,
+    path: impl Branches,
 ) -> [TimeIntervals; 2] {
+    path.branch(shear.parallel);
     let (one, half) = (N::from(1.0), N::from(0.5));
     let ends = [false, true].map(|closes| {
         triangle.corners.map(|corner| {
@@ -124,7 +134,7 @@ fn times<N: Number>(
     // The second term is the error of an edge by the rounding of positions.
     let error = raised * (size[0] * size[1]) + raised * (largest[0] * size[1] + largest[1] * size[0]);
     [false, true].map(|flips| {
-        inside(edges.map(|edge| Quadratic(edge.0.map(|b| if flips { error - b } else { b + error }))))
+        inside(edges.map(|edge| Quadratic(edge.0.map(|b| if flips { error - b } else { b + error }))), path)
     })
 }
 
@@ -148,11 +158,11 @@ fn largest<N: Number>(
 pub fn time_interval_over(triangle: &Triangle, shear: &Shear, rect: &TileRect) -> [TimeIntervals; 2] {
     let moving = Triangle { moving: true, ..*triangle };
     let edges = Edges::<f64>::new(View::new(&moving, &shear.sharp(), rect, &Box5::whole(false)));
-    [[true, false], [false, true]].map(|face: Faces| inside(EdgeBounds::new(&edges).tallest(face)))
+    [[true, false], [false, true]].map(|face: Faces| inside(EdgeBounds::new(&edges).tallest(face), ()))
 }
 
-fn inside<N: Number>(edges: [Quadratic<N>; 3]) -> TimeIntervals {
-    edges.iter().fold(TimeIntervals::WHOLE, |left, edge| left.intersect(edge.above()))
+fn inside<N: Number>(edges: [Quadratic<N>; 3], path: impl Branches) -> TimeIntervals {
+    edges.iter().fold(TimeIntervals::WHOLE, |left, edge| left.intersect(edge.pieces(path), path))
 }
 
 #[cfg(test)]
@@ -204,6 +214,23 @@ mod tests {
             }
         }
         assert!(found[0] > 10_000 && found[1] > 10_000 && several > 20, "{found:?} {several}");
+    }
+
+    /// A path seen before has the multiply-adds of a run that is counted; times on a coarse grid reach all branches.
+    #[test]
+    fn operations_found_by_path_are_those_of_counting() {
+        let (known, none, mut r) = (Costs::remembered(), Costs::default(), Uniform::new(14));
+        let mut costs = std::collections::BTreeSet::new();
+        for _ in 0..20_000 {
+            let triangle = whole_number_triangle(&mut r);
+            let at = [0; 2].map(|_| f64::from(r.within(-4.0, 4.0).round()));
+            let shear = Shear { parallel: r.within(0.0, 1.0) < 0.5, ..Shear::default() };
+            let (times, madds) = time_interval_counted(&triangle, &shear, at, &known);
+            assert_eq!((times, madds), time_interval_counted(&triangle, &shear, at, &none), "{at:?}");
+            assert_eq!(times, time_interval(&triangle, &shear, at[0], at[1]));
+            costs.insert(madds);
+        }
+        assert!(costs.len() > 20, "{costs:?}");
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use crate::common::*;
 use activity::{Counts, Event, LineAccess, Packet, PacketKind, Unit, Waits};
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 use pipeline::*;
 
 const SPEC: ComputeSpec =
@@ -303,6 +303,39 @@ fn groups_read_the_depths_that_a_pass_drew() {
     });
     assert_eq!(all, report.counts());
     assert_eq!(report.passes[1].draws.len(), 1);
+}
+
+#[test]
+fn a_pass_waits_for_the_groups_that_read_what_it_overwrites() {
+    let spec = hardware();
+    let table = SampleTable::low_discrepancy(1, 3, LensShape::Disk).unwrap();
+    let viewport = Viewport::new(64, 32).unwrap();
+    let settings = Settings { spec: &spec, viewport, samples: &table, background: Vec3::ZERO };
+    let corners = rectangle([-40.0, 0.0], [-20.0, 20.0], 2.0);
+    let geometry = Geometry::new(&corners, &corners, &QUAD).unwrap();
+    let draws = [Draw::new(geometry, &Plain, Cull::None)
+        .with_state(DrawState { depth: DepthState::NONE, ..DrawState::new(Cull::None) })];
+    let camera = pixel_camera(viewport, 0.5);
+    let idle = parallel(|_: &mut Group<'_>| {});
+    let barriers = |is_read: bool| {
+        let mut packets = Vec::new();
+        let mut gpu = Gpu::new(&spec, |packet, _| packets.push(*packet)).unwrap();
+        let target = gpu.create(&SurfaceSpec::new("target", viewport, Format::R32f));
+        let colours = vec![Attachment::cleared(target, Vec4::ZERO)];
+        let targets = Attachments { colours, depth: None };
+        let pass_onto = RasterPass::new(&camera, &draws, &settings).onto(Target::Surfaces(&targets));
+        let drawn = gpu.draw(&pass_onto).unwrap();
+        gpu.wait();
+        let values = gpu.view("values", drawn.surface, &[0.0_f32; 64 * 32]).unwrap();
+        let other = gpu.buffer("other", &[0_u32]);
+        let bindings = if is_read { vec![values.reads()] } else { vec![other.reads()] };
+        gpu.dispatch(&pass(1, 32, &bindings, &idle)).unwrap();
+        gpu.draw(&pass_onto).unwrap();
+        drop(gpu);
+        let is_barrier = |packet: &&Packet| packet.kind == PacketKind::Barrier(Waits::Tiles);
+        packets.iter().filter(is_barrier).map(|packet| packet.pass).collect::<Vec<u32>>()
+    };
+    assert_eq!((barriers(true), barriers(false)), (vec![2], vec![]));
 }
 
 #[test]

@@ -267,7 +267,7 @@ impl Probe<'_> {
         let mut clock = FrameClock::new(level, plan.gpu.machine()?, recorder);
         let emit = |packet: &_, lines: &_| clock.push(packet, lines);
         let mut gpu = Gpu::new(&plan.gpu.pipeline, emit).map_err(RunError::setting)?;
-        ready.draw(&mut gpu)?;
+        ready.draw(&mut gpu).map_err(RunError::on(&plan.gpu))?;
         let triangles = gpu.finish().triangles();
         clock.finish()?;
         let all = plan.job.scene().filter(|_| is_rendering(plan)).map_or(triangles, Scene::triangle_count);

@@ -1,10 +1,12 @@
 //! Errors of a run.
 
-use crate::gpu::GpuError;
+use crate::gpu::{GpuError, GpuSpec};
 use output::OutputError;
 use output::image::ImageError;
 use output::plot::PlotError;
+use pipeline::PassError;
 use timing::TimingError;
+use workloads::job::JobError;
 
 /// Error of a run.
 #[derive(Debug, thiserror::Error)]
@@ -15,7 +17,10 @@ pub enum RunError {
     #[error(transparent)]
     Frame(#[from] workloads::FrameError),
     #[error(transparent)]
-    Job(#[from] workloads::job::JobError),
+    Job(#[from] JobError),
+    /// Groups of lanes do not run on the GPU.
+    #[error("GPU `{gpu}`: {source}")]
+    Groups { gpu: String, source: JobError },
     #[error(transparent)]
     Gpu(#[from] GpuError),
     #[error(transparent)]
@@ -64,6 +69,14 @@ impl RunError {
         Self::Setting(why.to_string())
     }
 
+    /// Error of a frame on `gpu`, with its name where it is the GPU that cannot run groups.
+    pub(crate) fn on(gpu: &GpuSpec) -> impl FnOnce(JobError) -> Self {
+        |source| match source {
+            JobError::Pass(PassError::Compute { .. }) => Self::Groups { gpu: gpu.name.clone(), source },
+            other => Self::Job(other),
+        }
+    }
+
     /// Whether this is a usage error (exit code 2) rather than a failure (exit code 1).
     pub fn is_usage(&self) -> bool {
         match self {
@@ -81,7 +94,8 @@ impl RunError {
             | Self::Samples(_)
             | Self::Device(_)
             | Self::Model(_)
-            | Self::Job(workloads::job::JobError::Setting(_) | workloads::job::JobError::Pass(_))
+            | Self::Job(JobError::Setting(_) | JobError::Pass(_))
+            | Self::Groups { .. }
             | Self::Setting(_) => true,
             _ => false,
         }
@@ -98,4 +112,25 @@ fn is_unreadable(error: &(dyn std::error::Error + 'static)) -> bool {
         cause = error.source();
     }
     false
+}
+
+#[cfg(test)]
+mod tests {
+    use pipeline::ComputeError;
+
+    use super::*;
+
+    #[test]
+    fn a_missing_compute_unit_names_the_gpu() {
+        let gpu = GpuSpec::load("mobile").unwrap();
+        let pass = || "culling".to_owned();
+        let missing = PassError::Compute { pass: pass(), error: ComputeError::Missing };
+        let error = RunError::on(&gpu)(missing.into());
+        assert!(
+            error.is_usage() && error.to_string().starts_with("GPU `mobile`: pass `culling`:"),
+            "{error}"
+        );
+        let large = PassError::Memory { pass: pass(), bytes: 0 };
+        assert!(RunError::on(&gpu)(large.into()).to_string().starts_with("pass `culling`"));
+    }
 }

@@ -110,7 +110,7 @@ fn simulate_frame(
     let gpu = Gpu::new(&plan.gpu.pipeline, emit).map_err(RunError::setting)?;
     let mut gpu = gpu.with_heat(&heat::events(&plan.options.heat), plan.viewport);
     let ready = plan.job.prepare(number)?;
-    let drawn = ready.draw(&mut gpu)?;
+    let drawn = ready.draw(&mut gpu).map_err(RunError::on(&plan.gpu))?;
     let mut report = gpu.finish();
     let heat = std::mem::take(&mut report.heat);
     passes::limit_draws(&mut report);

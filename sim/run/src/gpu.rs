@@ -206,9 +206,9 @@ impl GpuSpec {
     /// Checks that groups have both sizes and rates, and that the largest group fits on a core.
     fn check_compute(&self) -> Result<(), (String, String)> {
         let wrong = |field: &str, message: String| Err((field.to_owned(), message));
-        let (sizes, unit) = match (&self.pipeline.compute, &self.units.compute) {
+        let sizes = match (&self.pipeline.compute, &self.units.compute) {
             (None, None) => return Ok(()),
-            (Some(sizes), Some(unit)) => (sizes, unit),
+            (Some(sizes), Some(_)) => sizes,
             (sizes, _) => {
                 let both = ["pipeline.compute", "units.compute"];
                 let [given, missing] = if sizes.is_some() { both } else { [both[1], both[0]] };
@@ -235,11 +235,11 @@ impl GpuSpec {
             );
             return wrong("pipeline.compute.group_lanes", message);
         }
-        if sizes.shared_bytes > unit.shared_bytes.get() {
+        if sizes.shared_bytes > shader.shared_bytes.get() {
             let message = format!(
-                "`shared_bytes` of a group is {}, and a core has {} (`units.compute.shared_bytes`)",
+                "`shared_bytes` of a group is {}, and a core has {} (`units.shader.shared_bytes`)",
                 sizes.shared_bytes,
-                unit.shared_bytes.get()
+                shader.shared_bytes.get()
             );
             return wrong("pipeline.compute.shared_bytes", message);
         }

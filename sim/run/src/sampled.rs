@@ -311,7 +311,7 @@ impl<'a> Previewer<'a> {
         let mut clock = FrameClock::new(self.level, self.plan.gpu.machine()?, recorder);
         let emit = |packet: &_, lines: &_| clock.push(packet, lines);
         let mut gpu = Gpu::new(&self.plan.gpu.pipeline, emit).map_err(RunError::setting)?;
-        let drawn = self.job.frame(number, &mut gpu)?;
+        let drawn = self.job.frame(number, &mut gpu).map_err(RunError::on(&self.plan.gpu))?;
         let report = gpu.finish();
         let timed = clock.finish()?;
         Ok(FramePreview {

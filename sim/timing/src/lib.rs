@@ -54,8 +54,8 @@ pub use packet::{MAX_CYCLES, PacketClock};
 pub use passes::PassTime;
 pub use recorder::Recorder;
 pub use spec::{
-    Chips, ClientSpec, Clock, Common, ComputeSpec, Cycles, DramSpec, Entries, MachineSpec, Rates, RowBytes,
-    ShaderSpec, SharedCacheSpec, UnitSpec, WaitCycles, Width,
+    Chips, ClientSpec, Clock, Common, Cycles, DramSpec, Entries, MachineSpec, Rates, RowBytes, ShaderSpec,
+    SharedCacheSpec, UnitSpec, WaitCycles, Width,
 };
 pub use stalls::{Reason, Stalls, UnitTime};
 

@@ -73,6 +73,10 @@ fn one() -> Width {
     Width::MIN
 }
 
+fn nothing() -> Bounded<0, 1_048_576> {
+    Bounded::MIN
+}
+
 /// Shader cores.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -96,41 +100,9 @@ pub struct ShaderSpec {
     pub warps: Width,
     /// Cycles between consecutive operations of a warp.
     pub alu_latency_cycles: Cycles,
-}
-
-/// What groups of lanes need besides the cores.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ComputeSpec {
-    /// Clock of its cycles.
-    #[serde(default)]
-    pub clock: Clock,
-    /// Cycles from the departure of a warp until its core has it again.
-    pub latency_cycles: Cycles,
-    /// Warps that may wait in front of it or be on their way to it, at least 1.
-    pub queue: Entries,
-    /// Warps that may wait for their lines after service, at least 1.
-    pub in_flight: Entries,
-    /// Lines it can request from the L2 per cycle.
-    #[serde(default = "one")]
-    pub lines_per_cycle: Width,
-    /// Bytes of shared memory in each core.
+    /// Bytes of memory in each core that the lanes of a group share.
+    #[serde(default = "nothing")]
     pub shared_bytes: Bounded<0, 1_048_576>,
-    /// Events per cycle, of all cores together.
-    pub rates: Rates,
-}
-
-impl ComputeSpec {
-    fn common(&self) -> Common<'_> {
-        Common {
-            clock: self.clock,
-            latency_cycles: self.latency_cycles.get(),
-            queue: self.queue.get(),
-            in_flight: self.in_flight.get(),
-            lines_per_cycle: self.lines_per_cycle.get(),
-            rates: Some(&self.rates),
-        }
-    }
 }
 
 /// A cache that all clients share: the L2 or a level below it.
@@ -196,7 +168,7 @@ pub struct MachineSpec {
     pub texture: ClientSpec,
     pub colour: ClientSpec,
     #[serde(default)]
-    pub compute: Option<ComputeSpec>,
+    pub compute: Option<ClientSpec>,
     pub l2: SharedCacheSpec,
     #[serde(default)]
     pub llc: Option<SharedCacheSpec>,
@@ -264,8 +236,7 @@ impl MachineSpec {
 
     /// Groups of `warps` warps and `shared_bytes` bytes that fit on a core at once.
     pub fn groups_per_core(&self, warps: u32, shared_bytes: u32) -> u32 {
-        let of_core = self.compute.as_ref().map_or(0, |compute| compute.shared_bytes.get());
-        let by_memory = of_core.checked_div(shared_bytes).unwrap_or(u32::MAX);
+        let by_memory = self.shader.shared_bytes.get().checked_div(shared_bytes).unwrap_or(u32::MAX);
         by_memory.min(self.shader.warps.get() / warps.max(1))
     }
 
@@ -303,7 +274,7 @@ impl MachineSpec {
             Unit::ShadingCache => self.shading_cache.common(),
             Unit::Texture => self.texture.common(),
             Unit::Colour => self.colour.common(),
-            Unit::Compute => self.compute.as_ref().map_or_else(|| self.texture.common(), ComputeSpec::common),
+            Unit::Compute => self.compute.as_ref().unwrap_or(&self.texture).common(),
             Unit::L2 => self.l2.common(),
             Unit::Llc => self.llc.as_ref().unwrap_or(&self.l2).common(),
             Unit::Edram => self.edram.as_ref().unwrap_or(&self.l2).common(),

@@ -93,7 +93,7 @@ pub fn failures(units: &MachineSpec, batch: u32) -> Vec<Failure> {
     let on = |name, packets| Failure { name, packets, units: units.clone() };
     let mut narrow = on("queues of one", tiny(batch));
     shallow(&mut narrow.units);
-    let of_groups = units.compute.as_ref().map(|compute| groups::failures(units, compute.shared_bytes.get()));
+    let of_groups = units.compute.is_some().then(|| groups::failures(units, units.shader.shared_bytes.get()));
     let mut all = vec![
         on("one giant triangle", giant()),
         on("tiny triangles", tiny(batch)),

@@ -19,6 +19,10 @@ pub struct Coverage {
     pub missed: u64,
     /// Pairs by number of hits: one, two, three. A folded beam hits a point more than once.
     pub by_hits: [u64; 3],
+    /// Pictures drawn to find the covered pixels.
+    pub draws: u64,
+    /// Covered pixels of all beams.
+    pub fragments: u64,
 }
 
 impl Coverage {
@@ -26,13 +30,19 @@ impl Coverage {
     #[must_use]
     pub fn and(self, other: &Self) -> Self {
         let by_hits = [0, 1, 2].map(|n| self.by_hits[n] + other.by_hits[n]);
-        Self { lit: self.lit + other.lit, missed: self.missed + other.missed, by_hits }
+        Self {
+            lit: self.lit + other.lit,
+            missed: self.missed + other.missed,
+            by_hits,
+            draws: self.draws + other.draws,
+            fragments: self.fragments + other.fragments,
+        }
     }
 }
 
 /// Tests every beam at the floor point of every pixel, and counts the pairs that a method misses.
 pub fn receivers(beams: &[Beam], eye: &Eye, method: Method, floor: &Floor) -> Coverage {
-    let (_, mut work) = draw_with_work(beams, eye, method, None, true);
+    let (picture, mut work) = draw_with_work(beams, eye, method, None, true);
     work.sort_by_key(|work| (work.beam, work.tile));
     let (width, height) = (eye.viewport().width(), eye.viewport().height());
     let columns = width.div_ceil(8);
@@ -60,7 +70,8 @@ pub fn receivers(beams: &[Beam], eye: &Eye, method: Method, floor: &Floor) -> Co
         }
         found
     };
-    (0..height).into_par_iter().map(row).reduce(Coverage::default, |a, b| a.and(&b))
+    let drawn = Coverage { draws: 1, fragments: picture.total_runs(), ..Coverage::default() };
+    (0..height).into_par_iter().map(row).reduce(Coverage::default, |a, b| a.and(&b)).and(&drawn)
 }
 
 /// Bounding box of a beam's corners, with a margin for rounding. Points outside are outside the beam.

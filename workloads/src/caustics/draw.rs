@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use super::cover::{Cover, TILE_PX, times};
 use super::eye::Seen;
+use super::light::PixelInBeam;
 use super::{Beam, Eye, Light, Method};
 
 /// An image of light with its work; pixels row by row from the top left.
@@ -140,7 +141,7 @@ impl Band {
             if let Some(light) = light {
                 let at = eye.pixel_centre(pixel);
                 let times = Some(times(eye, seen, at));
-                let found = light.shade(&Lane::default(), eye, seen, at, times);
+                let found = light.shade(&Lane::default(), &PixelInBeam { eye, seen, at, times });
                 self.light[place] += found;
                 self.useful += u64::from(found > 0.0);
             }

@@ -24,20 +24,22 @@ pub enum Light {
     Floor(Floor),
 }
 
+/// Input of the pixel shader: a pixel that a beam covers.
+pub(super) struct PixelInBeam<'a> {
+    pub eye: &'a Eye,
+    pub seen: &'a Seen,
+    /// Centre of the pixel.
+    pub at: [f64; 2],
+    /// Times at which it is in the beam, by face, if the test of the pixel found them.
+    pub times: Option<[TimeIntervals; 2]>,
+}
+
 impl Light {
-    /// Light of a beam at a pixel centre. `times` are those at which it is in the beam, by face, if the test of the pixel
-    /// found them.
-    pub(super) fn shade(
-        &self,
-        lane: &Lane,
-        eye: &Eye,
-        seen: &Seen,
-        at: [f64; 2],
-        times: Option<[TimeIntervals; 2]>,
-    ) -> f64 {
+    /// Light of a beam at a pixel centre.
+    pub(super) fn shade(&self, lane: &Lane, pixel: &PixelInBeam<'_>) -> f64 {
         match self {
-            Self::Volume => fluence_along(lane, eye, seen, at, times),
-            Self::Floor(floor) => floor.irradiance(lane, eye, seen, at),
+            Self::Volume => fluence_along(lane, pixel),
+            Self::Floor(floor) => floor.irradiance(lane, pixel),
         }
     }
 }
@@ -45,13 +47,8 @@ impl Light {
 /// Integral of the fluence along a ray. Fluence is `2 flux |dx/dt| / |det(dx/db1, dx/db2, dx/dt)|`. Along a
 /// ray, `dz / |det(dx/db1, dx/db2, dx/dt)|` is `dt` over twice the area of the triangle in the image. So the
 /// integral runs over the times at which the pixel is inside.
-fn fluence_along(
-    lane: &Lane,
-    eye: &Eye,
-    seen: &Seen,
-    at: [f64; 2],
-    times: Option<[TimeIntervals; 2]>,
-) -> f64 {
+fn fluence_along(lane: &Lane, pixel: &PixelInBeam<'_>) -> f64 {
+    let PixelInBeam { eye, seen, at, times } = *pixel;
     let scale = eye.scale_px();
     let areas = seen.image.areas(lane).map(|area| area.z);
     let piece = |&[from, to]: &[f64; 2]| {
@@ -60,7 +57,7 @@ fn fluence_along(
         lane.mul(speed(lane, seen, at, middle), over_area(lane, areas, from, to))
     };
     let sets = times.unwrap_or_else(|| {
-        lane.tallied(|tally| time_interval_counted(&seen.triangle, eye.shear(), at, tally))
+        lane.tallied(|costs| time_interval_counted(&seen.triangle, eye.shear(), at, costs))
     });
     let sum = sets.iter().flat_map(|set| set.as_slice()).fold(0.0, |sum, times| lane.add(sum, piece(times)));
     // The factor is the same for all pixels of a beam.
@@ -121,7 +118,8 @@ fn over_area(lane: &Lane, area: [f64; 3], from: f64, to: f64) -> f64 {
 
 impl Floor {
     /// Irradiance of all hits: `2 flux |dx/dt . n| / |det(dx/db1, dx/db2, dx/dt)|`.
-    fn irradiance(&self, lane: &Lane, eye: &Eye, seen: &Seen, at: [f64; 2]) -> f64 {
+    fn irradiance(&self, lane: &Lane, pixel: &PixelInBeam<'_>) -> f64 {
+        let PixelInBeam { eye, seen, at, .. } = *pixel;
         // The position on the floor is that of the pixel in every beam: an input.
         let Some(point) = self.point(eye, at) else { return 0.0 };
         let scale = eye.scale_px();

@@ -10,6 +10,7 @@ use super::bound::BoundingVolume;
 use super::cover::{EVERYWHERE, MAX_HALVINGS, TILE_PX, reach, slack};
 use super::draw::Picture;
 use super::eye::Seen;
+use super::light::PixelInBeam;
 use super::{Beam, Eye, Light, Method};
 
 /// Bytes of a vertex at both ends of a beam.
@@ -156,7 +157,7 @@ impl TileShader for LightShader<'_> {
             };
             let Some(times) = times else { continue };
             *mask |= 1 << bit;
-            let light = lanes.run(|lane| self.light.shade(lane, eye, seen, at, times));
+            let light = lanes.run(|lane| self.light.shade(lane, &PixelInBeam { eye, seen, at, times }));
             let tile = u64::from(tile.tile[1] * self.columns + tile.tile[0]);
             lanes.blend(self.target, (tile * TILE_PIXELS + u64::from(bit)) * LIGHT_BYTES, LIGHT_BYTES);
             shaded.lit.push(((y * viewport.width() + x) as usize, light));

@@ -332,7 +332,7 @@ pub fn depths(
     Ok(depths_of(&RasterPass::new(camera, draws, settings).visibility()?))
 }
 
-/// Depths of visible samples.
-fn depths_of(visible: &[(u32, u32)]) -> Vec<f32> {
+/// Depths of visible samples, as [`pipeline::Rendered::visible`] has them.
+pub fn depths_of(visible: &[(u32, u32)]) -> Vec<f32> {
     visible.iter().map(|(_, bits)| f32::from_bits(*bits)).collect()
 }

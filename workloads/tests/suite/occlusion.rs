@@ -27,8 +27,8 @@ fn query(wall_scene: &WallScene, size: [u32; 2], per_pixel: u32, grids: &[([u32;
     let depths = depths(&wall_scene.camera, &walls, &settings).unwrap();
     let sampled =
         SampledQueries { occluders: RasterPass::new(&wall_scene.camera, &walls, &settings), any: false };
-    let all = sampled.ask(&wall_scene.boxes).unwrap();
-    let any = SampledQueries { any: true, ..sampled }.ask(&wall_scene.boxes).unwrap();
+    let all = sampled.ask(&wall_scene.boxes).unwrap().answers;
+    let any = SampledQueries { any: true, ..sampled }.ask(&wall_scene.boxes).unwrap().answers;
     for (all, any) in all.iter().zip(&any) {
         assert_eq!(all.passed == 0, any.passed == 0, "both kinds agree");
         assert!(any.tests() <= all.tests() && any.madds <= all.madds);

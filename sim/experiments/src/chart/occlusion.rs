@@ -1,6 +1,7 @@
 //! `quintile chart occlusion`: hidden boxes found by occlusion queries, and their cost, over boxes of lens and time, tiles and
 //! samples.
 
+use activity::Event;
 use glam::Vec3;
 use output::OutputError;
 use output::plot::{ChartPanel, Scale, Series};
@@ -8,18 +9,17 @@ use output::progress::{Bar, Progress};
 use pipeline::depth::{BoxGrid, Pyramid};
 use pipeline::geometry::Projection;
 use pipeline::{
-    IntervalAnswer, IntervalQueries, LensShape, RasterPass, SampleTable, SampledAnswer, SampledQueries,
-    Settings, Viewport,
+    Gpu, IntervalAnswer, IntervalQueries, LensShape, PipelineSpec, RasterPass, SampleTable, SampledAnswer,
+    SampledQueries, Settings, Target, Viewport,
 };
-use rayon::prelude::*;
 use run::GpuSpec;
 use serde::Serialize;
-use workloads::occlusion::{MAX_HALF_COVERED_SHARE, WallScene, WallSceneSpec, depths};
+use workloads::occlusion::{MAX_HALF_COVERED_SHARE, WallScene, WallSceneSpec, depths_of};
 use workloads::visibility::Unshaded;
 
 use crate::study::table::{Sheet, Table, fixed, optional, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
-use crate::study::{Gallery, Study, StudyError};
+use crate::study::{Gallery, Ran, Study, StudyError};
 
 /// Effort of the measurement.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -317,16 +317,22 @@ impl Kind {
     }
 }
 
+/// Bytes of a stored depth.
+const DEPTH_BYTES: u64 = 4;
+
 /// A scene whose walls are drawn and whose boxes were tested by samples.
 pub(crate) struct Drawn {
     scene: WallScene,
     viewport: Viewport,
     table: SampleTable,
+    spec: PipelineSpec,
     depths: Vec<f32>,
     /// Answers of sampled queries that end at the first sample that sees the box, by box.
     pub seen: Vec<SampledAnswer>,
     /// Answers of sampled queries that count all samples.
     pub counted: Vec<SampledAnswer>,
+    /// Work of the walls and of both kinds of sampled queries.
+    pub ran: Ran,
 }
 
 /// Answers of interval queries, and the farthest depths that they were asked against.
@@ -339,6 +345,8 @@ pub(crate) struct Asked {
     pub gathered: u64,
     /// Bytes of stored depth read for that.
     pub gathered_bytes: u64,
+    /// Work of gathering and of the queries.
+    pub ran: Ran,
 }
 
 impl Drawn {
@@ -353,33 +361,38 @@ impl Drawn {
             .ok_or_else(|| StudyError::Pipeline("an image without area".to_owned()))?;
         let table = SampleTable::low_discrepancy(samples, SEED, LensShape::Disk)?;
         let settings = Settings { spec: &gpu.pipeline, viewport, samples: &table, background: Vec3::ZERO };
-        let walls = scene.walls(&Unshaded).map_err(|error| StudyError::Pipeline(error.to_string()))?;
-        let depths = depths(&scene.camera, std::slice::from_ref(&walls), &settings)?;
-        let walls = [walls];
+        let walls = [scene.walls(&Unshaded).map_err(|error| StudyError::Pipeline(error.to_string()))?];
         let occluders = RasterPass::new(&scene.camera, &walls, &settings);
+        let mut alone = Gpu::quiet(&gpu.pipeline)?;
+        let depths = depths_of(&alone.draw(&occluders.onto(Target::Depth).with_visible())?.visible);
         let ask = |any: bool| SampledQueries { occluders, any }.ask(&scene.boxes);
         let (seen, counted) = (ask(true)?, ask(false)?);
-        Ok(Self { scene, viewport, table, depths, seen, counted })
+        let ran = [&alone.finish(), &seen.report, &counted.report].map(Ran::of).into_iter().sum();
+        let [seen, counted] = [seen, counted].map(|asked| asked.answers);
+        Ok(Self { scene, viewport, table, spec: gpu.pipeline, depths, seen, counted, ran })
     }
 
     /// By intervals, with so many boxes of lens and time and tiles of this side.
-    pub fn ask(&self, boxes: [u32; 3], tile_px: u32) -> Asked {
+    ///
+    /// # Errors
+    /// When the caches of the GPU cannot be built.
+    pub fn ask(&self, boxes: [u32; 3], tile_px: u32) -> Result<Asked, StudyError> {
         let grid = BoxGrid::new(boxes, self.scene.camera.lens().is_some()).unwrap_or_default();
         let pyramid = Pyramid::new(self.viewport, &self.table, &self.depths, tile_px, grid);
         let projection = Projection::new(&self.scene.camera, self.viewport);
         let queries = IntervalQueries::new(&pyramid, &projection);
-        let answers = self.scene.boxes.par_iter().map(|object| queries.ask(object)).collect();
-        let compared = |level: usize| {
-            let [columns, rows] = pyramid.size(level);
-            (0..columns * rows).map(|n| u64::from(pyramid.compared(level, [n % columns, n / columns]))).sum()
-        };
-        let gathered: Vec<u64> = (0..pyramid.levels()).map(compared).collect();
-        Asked {
+        let mut gpu = Gpu::quiet(&self.spec)?;
+        let stored = gpu.surface(DEPTH_BYTES * self.depths.len() as u64);
+        gpu.gather("farthest depths", &pyramid, stored);
+        let gathering = gpu.counts_of_pass();
+        let answers = gpu.ask("queries", &queries, &self.scene.boxes);
+        Ok(Asked {
             answers,
             half_covered: pyramid.half_covered(),
-            gathered: gathered.iter().sum(),
-            gathered_bytes: 4 * gathered[0],
-        }
+            gathered: gathering[Event::ZCullTests],
+            gathered_bytes: DEPTH_BYTES * gathering[Event::DepthReads],
+            ran: Ran::of(&gpu.finish()),
+        })
     }
 }
 
@@ -424,17 +437,22 @@ fn blank(kind: Kind, slats: u32, samples: u32) -> OcclusionRow {
     }
 }
 
-fn by_intervals(scenes: &[Drawn], like: OcclusionRow, boxes: [u32; 3], tile_px: u32) -> OcclusionRow {
+fn by_intervals(
+    scenes: &[Drawn],
+    like: OcclusionRow,
+    boxes: [u32; 3],
+    tile_px: u32,
+) -> Result<OcclusionRow, StudyError> {
     let (mut answered, mut half_covered) = (Vec::new(), 0.0);
     for drawn in scenes {
-        let asked = drawn.ask(boxes, tile_px);
+        let asked = drawn.ask(boxes, tile_px)?;
         half_covered += asked.half_covered / scenes.len() as f64;
         let all = asked.answers.iter().zip(&drawn.seen).map(|(answer, seen)| {
             ((answer.hidden, [answer.tests(), answer.bytes(), answer.all_madds()]), seen.passed == 0)
         });
         answered.extend(all);
     }
-    row(OcclusionRow { tile_px: Some(tile_px), boxes: Some(boxes), half_covered, ..like }, &answered)
+    Ok(row(OcclusionRow { tile_px: Some(tile_px), boxes: Some(boxes), half_covered, ..like }, &answered))
 }
 
 fn by_samples(scenes: &[Drawn], like: OcclusionRow) -> OcclusionRow {
@@ -454,13 +472,15 @@ fn measure(effort: OcclusionEffort, progress: &Progress) -> Result<OcclusionChar
             let scenes = drawn(&effort, kind, 1, samples, &bar)?;
             let like = blank(kind, 1, samples);
             chart.samples.push(by_samples(&scenes, like));
-            chart.samples.push(by_intervals(&scenes, like, kind.typical(), TILE_PX));
+            chart.samples.push(by_intervals(&scenes, like, kind.typical(), TILE_PX)?);
             if samples == effort.samples[0] {
                 let each = kind
                     .boxes()
                     .iter()
                     .flat_map(|boxes| effort.tiles.iter().map(move |tile| (*boxes, *tile)));
-                chart.intervals.extend(each.map(|(boxes, tile)| by_intervals(&scenes, like, boxes, tile)));
+                for (boxes, tile) in each {
+                    chart.intervals.push(by_intervals(&scenes, like, boxes, tile)?);
+                }
             }
         }
     }
@@ -468,7 +488,9 @@ fn measure(effort: OcclusionEffort, progress: &Progress) -> Result<OcclusionChar
         let scenes = drawn(&effort, Kind::Motion, slats, SAMPLES, &bar)?;
         let like = blank(Kind::Motion, slats, SAMPLES);
         chart.failing.push(by_samples(&scenes, like));
-        chart.failing.extend(FAILING_TILES.map(|tile_px| by_intervals(&scenes, like, [1, 1, 8], tile_px)));
+        for tile_px in FAILING_TILES {
+            chart.failing.push(by_intervals(&scenes, like, [1, 1, 8], tile_px)?);
+        }
     }
     Ok(chart)
 }

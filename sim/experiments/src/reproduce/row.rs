@@ -5,6 +5,7 @@ use serde::Serialize;
 use super::band::Band;
 use super::settings::{About, Form, Listed, listed, reduced};
 use super::verdict::{Kind, Verdict};
+use crate::study::Ran;
 
 /// A row of the list of claims.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -59,6 +60,12 @@ impl Number {
 /// Numbers from names and values.
 pub(super) fn numbers<const N: usize>(pairs: [(&'static str, f64); N]) -> Vec<Number> {
     pairs.into_iter().map(|(name, value)| Number { name, value }).collect()
+}
+
+/// Passes, draws and fragments that ran.
+pub(super) fn ran(of: &Ran) -> Vec<Number> {
+    let Ran { passes, draws, fragments } = *of;
+    numbers([("passes", passes as f64), ("draws", draws as f64), ("fragments", fragments as f64)])
 }
 
 /// Settings and form of a row.

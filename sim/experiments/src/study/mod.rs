@@ -4,6 +4,7 @@
 //! - [`table`]: tables whose columns are declared once.
 //! - [`tradeoff`]: speed against accuracy, the same few numbers for every method; one page of all studies.
 
+mod ran;
 pub mod table;
 pub mod tradeoff;
 
@@ -12,6 +13,7 @@ use std::time::Instant;
 use output::plot::{Chart, ChartPanel, Look, Picture};
 use output::progress::Progress;
 use output::{Claim, OutDir, OutputError};
+pub use ran::Ran;
 use run::{GpuError, RunError};
 use serde::Serialize;
 use table::Sheet;

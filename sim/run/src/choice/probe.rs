@@ -116,7 +116,7 @@ fn simulate_frame(
         packets.push((*packet, lines.len()));
     };
     let mut gpu = Gpu::new(spec, emit).map_err(RunError::setting)?;
-    job.frame(number, &mut gpu)?;
+    job.frame(number, &mut gpu).map_err(RunError::on(&plan.gpu))?;
     let counts = gpu.finish().counts();
     let pipeline_s = started.elapsed().as_secs_f64();
     let started = ThreadTime::now();

@@ -74,7 +74,7 @@ impl Shader {
         let period = clocks.period(spec.clock);
         let core = Core {
             slots: spec.warps.get(),
-            shared_bytes: machine.compute.as_ref().map_or(0, |compute| compute.shared_bytes.get()),
+            shared_bytes: spec.shared_bytes.get(),
             lane: 0,
             ready: VecDeque::new(),
             fresh: VecDeque::new(),

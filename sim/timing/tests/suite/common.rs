@@ -3,8 +3,8 @@
 use activity::{Bounded, Event, LineAccess, LineKind, Packet, PacketKind, Unit};
 use timing::stepped::{self, StepOptions, Stream};
 use timing::{
-    ClientSpec, Clock, Clocks, ComputeSpec, DemandBuilder, DramSpec, MachineSpec, Rates, Recorder,
-    ShaderSpec, SharedCacheSpec, Timed, UnitSpec,
+    ClientSpec, Clock, Clocks, DemandBuilder, DramSpec, MachineSpec, Rates, Recorder, ShaderSpec,
+    SharedCacheSpec, Timed, UnitSpec,
 };
 
 pub fn rates(text: &str) -> Rates {
@@ -46,6 +46,7 @@ pub fn plain() -> MachineSpec {
             warp_lanes: size(4),
             warps: size(8),
             alu_latency_cycles: size(1),
+            shared_bytes: size(1024),
         },
         setup: unit("{\"triangles_in\": 1}"),
         traversal: unit("{\"tiles_visited\": 1}"),
@@ -55,15 +56,7 @@ pub fn plain() -> MachineSpec {
         shading_cache: unit("{\"shading_lookups\": 1}"),
         texture: client("{\"texture_fetches\": 1}"),
         colour: client("{\"colour_writes\": 1}"),
-        compute: Some(ComputeSpec {
-            clock: Clock::Core,
-            latency_cycles: size(1),
-            queue: size(64),
-            in_flight: size(64),
-            lines_per_cycle: size(1),
-            shared_bytes: size(1024),
-            rates: rates("{\"shared_cycles\": 1, \"atomic_steps\": 1}"),
-        }),
+        compute: Some(client("{\"shared_cycles\": 1, \"atomic_steps\": 1}")),
         l2: SharedCacheSpec {
             clock: Clock::Core,
             latency_cycles: size(1),

@@ -1,19 +1,23 @@
 //! Caustics of an ocean by every method, and of crossed light volumes: the same light through the same number of triangles, on
 //! increasingly crossed sides.
 
+use activity::Event;
 use cpu_time::ThreadTime;
 use glam::DVec3;
 use output::progress::{Bar, Progress};
 use rayon::{ThreadPool, ThreadPoolBuilder};
+use run::{Plan, RunOptions, frames_of};
 use serde::Serialize;
 use workloads::caustics::generator::Ocean as Water;
 use workloads::caustics::{
     Beam, Eye, Floor, Light, MIN_SQUARES_PER_WAVE, Method, Picture, Squares, accuracy_warnings, crossing,
     draw, error,
 };
+use workloads::job::OptionSource;
+use workloads::scene::Overrides;
 
 use super::view::{DEPTH_M, SIDE_M, SLOPE, SQUARE_PX, above, aside, aside_of, from_the_side, water};
-use super::{CausticsChart, CausticsEffort, CausticsRow, Coarse};
+use super::{CausticsChart, CausticsEffort, CausticsRow, Coarse, KEYS};
 use crate::study::StudyError;
 
 /// Slopes of the oceans that get coarser.
@@ -28,6 +32,8 @@ pub struct Ocean {
     pub size: [u32; 2],
     /// Shader executions by method, in the order of [`Method::ALL`].
     pub executions: [u64; 4],
+    /// Pictures drawn.
+    pub draws: u64,
     /// The most executions of a pixel, likewise.
     pub most: [u32; 4],
     /// Executions of every pixel.
@@ -57,6 +63,7 @@ pub fn ocean(
         volumes: beams.len(),
         size,
         executions: pictures.each_ref().map(Picture::total_runs),
+        draws: pictures.len() as u64,
         most: pictures.each_ref().map(|picture| picture.runs.iter().copied().max().unwrap_or(0)),
         runs: pictures.map(|picture| picture.runs).into(),
     })
@@ -64,7 +71,7 @@ pub fn ocean(
 
 pub(super) fn measure(effort: CausticsEffort, progress: &Progress) -> Result<CausticsChart, StudyError> {
     let ocean = ocean(effort.ocean_cells, [SLOPE, DEPTH_M], effort.ocean_px, progress)?;
-    let steps = effort.slopes.len() * 4
+    let steps = (effort.slopes.len() + effort.frame_slopes.len()) * 4
         + COARSE_SLOPES.len() * effort.coarse_cells.len()
         + effort.pleated_cells.len() * effort.pleats.len();
     let bar = progress.bar("caustics", steps as u64);
@@ -78,7 +85,59 @@ pub(super) fn measure(effort: CausticsEffort, progress: &Progress) -> Result<Cau
         coarse.extend(by_cells(&effort, slope, &bar)?);
     }
     let crossed = crossed(&effort, &bar)?;
-    Ok(CausticsChart { effort, ocean, resolved_cells: resolved_cells(), rows, coarse, crossed })
+    let mut frames = Vec::new();
+    for &slope in effort.frame_slopes {
+        for place in 0..Method::ALL.len() {
+            frames.push(frame(&effort, slope, place)?);
+            bar.inc();
+        }
+    }
+    Ok(CausticsChart { effort, ocean, resolved_cells: resolved_cells(), rows, coarse, crossed, frames })
+}
+
+/// A frame of `quintile run caustics` on the reference GPU.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct MethodFrame {
+    /// Root mean square of the slope of the surface.
+    pub slope: f64,
+    /// How beams are bounded.
+    pub method: Method,
+    /// Triangles drawn.
+    pub triangles: usize,
+    /// Pixels tested.
+    pub tests: u64,
+    /// Executions of the pixel shader.
+    pub executions: u64,
+    /// Operations of the shader.
+    pub shader_ops: u64,
+    /// Seconds.
+    pub frame_s: f64,
+    /// Joules while busy.
+    pub frame_j: f64,
+}
+
+/// The first frame by the method at `place`, with what its packets count.
+fn frame(effort: &CausticsEffort, slope: f64, place: usize) -> Result<MethodFrame, StudyError> {
+    let cells = effort.frame_cells.to_string();
+    let set = [("cells", cells), ("slope", slope.to_string()), ("method", KEYS[place].to_owned())];
+    let options = OptionSource { file: None, set: set.map(|(name, value)| (name.to_owned(), value)).into() };
+    let size = Some((effort.frame_px[0], effort.frame_px[1]));
+    let overrides = Overrides { size, frames: Some(0..1), ..Overrides::default() };
+    let plan =
+        Plan::resolve(RunOptions { scene: "caustics".into(), options, overrides, ..RunOptions::default() })?;
+    let frames = frames_of(&plan, &[0], &Progress::new(true))?;
+    let counts = frames[0].observed().map(|observed| observed.counts).unwrap_or_default();
+    let cost = frames[0].cost();
+    Ok(MethodFrame {
+        slope,
+        method: Method::ALL[place],
+        triangles: frames[0].triangles,
+        tests: counts[Event::SamplesTested],
+        executions: counts[Event::PixelInvocations],
+        shader_ops: counts[Event::ShaderOps],
+        frame_s: cost.cycles / plan.gpu.core_hz,
+        frame_j: cost.energy_j,
+    })
 }
 
 /// Every method on one surface: the light in the volume.

@@ -13,7 +13,7 @@ use workloads::caustics::{MAX_CROSSED_SHARE, Method};
 use crate::study::table::{Sheet, Table, count, fixed, millis, plain};
 use crate::study::{Gallery, Study, StudyError};
 
-pub use measure::{Crossed, Ocean, ocean};
+pub use measure::{Crossed, MethodFrame, Ocean, ocean};
 
 /// How much is measured.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -40,6 +40,12 @@ pub struct CausticsEffort {
     pub floor_px: u32,
     /// Times are medians of so many.
     pub repeats: usize,
+    /// Squares along a side of the ocean that is timed on the reference GPU.
+    pub frame_cells: u32,
+    /// Pixels of its image.
+    pub frame_px: [u32; 2],
+    /// Slopes of its waves.
+    pub frame_slopes: &'static [f64],
 }
 
 /// One method on one surface.
@@ -93,6 +99,8 @@ pub struct CausticsChart {
     pub coarse: Vec<Coarse>,
     /// By number of triangles and pleat.
     pub crossed: Vec<Crossed>,
+    /// On the reference GPU, by slope and method.
+    pub frames: Vec<MethodFrame>,
 }
 
 /// Short names of the methods, in the order of [`Method::ALL`].
@@ -106,8 +114,8 @@ impl Study for CausticsChart {
     const ABOUT: &'static str =
         "Shader executions and images of caustics, by how beams are bounded, and where beams fail";
     const PICTURES: &'static [&'static str] =
-        &["caustics", "caustics_failures", MAPS[0], MAPS[1], MAPS[2], MAPS[3]];
-    const FILES: &'static [&'static str] = &["caustics.csv", "caustics.json"];
+        &["caustics", "caustics_frames", "caustics_failures", MAPS[0], MAPS[1], MAPS[2], MAPS[3]];
+    const FILES: &'static [&'static str] = &["caustics.csv", "caustics_frames.csv", "caustics.json"];
 
     type Effort = CausticsEffort;
     const FULL: CausticsEffort = CausticsEffort {
@@ -122,6 +130,9 @@ impl Study for CausticsChart {
         rays: 2400,
         floor_px: 512,
         repeats: 3,
+        frame_cells: 64,
+        frame_px: [512, 288],
+        frame_slopes: &[0.05, 0.15, 0.4, 1.0],
     };
     const QUICK: CausticsEffort = CausticsEffort {
         ocean_cells: 48,
@@ -135,6 +146,9 @@ impl Study for CausticsChart {
         rays: 1000,
         floor_px: 192,
         repeats: 1,
+        frame_cells: 16,
+        frame_px: [128, 72],
+        frame_slopes: &[0.15, 1.0],
     };
 
     fn measure(effort: CausticsEffort, _scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
@@ -147,6 +161,12 @@ impl Study for CausticsChart {
             2 * self.effort.sweep_cells * self.effort.sweep_cells
         );
         to.chart("caustics", ["Caustics: light volumes and their bounding volumes", &subject], self.costs())?;
+        let [width, height] = self.effort.frame_px;
+        let subject = format!(
+            "first frame of `quintile run caustics`, {} generator triangles, {width}x{height} pixels, GPU reference",
+            2 * self.effort.frame_cells * self.effort.frame_cells
+        );
+        to.chart("caustics_frames", ["Caustics on the modelled hardware", &subject], self.on_hardware())?;
         let title = "Where caustics fail: coarse surfaces and crossed sides";
         let subject = format!(
             "light on the floor in squares of 8x8 pixels against {} photons, refracted at the waves themselves; for crossed sides the light and the number of \
@@ -194,7 +214,17 @@ impl Study for CausticsChart {
             crossed = crossed.shown(method, |row| row.useful[place], fixed(3));
         }
         let crossed = crossed.shown("warns", |row| row.warned, yes_no).after("\n");
-        vec![methods.sheet(), sweep.sheet(), coarse.sheet(), crossed.sheet(), self.lines()]
+        let frames = Table::of(&self.frames)
+            .column("slope", "slope", |row| row.slope, plain)
+            .column("method", "method", |row| row.method.name(), plain)
+            .column("triangles", "triangles", |row| row.triangles as u64, count)
+            .column("tests", "pixels tested", |row| row.tests, count)
+            .column("executions", "executions", |row| row.executions, count)
+            .column("shader_ops", "operations", |row| row.shader_ops, count)
+            .column("frame_s", "frame (ms)", |row| row.frame_s, millis(2))
+            .column("frame_j", "frame (mJ)", |row| row.frame_j, millis(2))
+            .csv("caustics_frames.csv");
+        vec![methods.sheet(), frames.sheet(), sweep.sheet(), coarse.sheet(), crossed.sheet(), self.lines()]
     }
 
     /// The first promise that was found broken.
@@ -279,6 +309,28 @@ impl CausticsChart {
             .data("error", |line| line.error)
             .csv("caustics.csv")
             .sheet()
+    }
+
+    /// Work, time and energy of a frame over the slope of the waves, by method.
+    fn on_hardware(&self) -> Vec<ChartPanel> {
+        let panel = |title: &str, up: &str, of: fn(&MethodFrame) -> f64| {
+            let curve = |method: Method| {
+                let rows = self.frames.iter().filter(move |row| row.method == method);
+                Series::curve(method.name(), rows.map(|row| (row.slope, of(row))))
+            };
+            ChartPanel::new(
+                title,
+                ["slope of the waves (root mean square)", up],
+                Method::ALL.map(curve).into(),
+            )
+            .on(Scale::Decades, Scale::Even)
+        };
+        vec![
+            panel("tests", "pixels tested", |row| row.tests as f64),
+            panel("shading", "shader executions", |row| row.executions as f64),
+            panel("time", "frame (ms)", |row| 1e3 * row.frame_s),
+            panel("energy", "frame (mJ)", |row| 1e3 * row.frame_j),
+        ]
     }
 
     fn costs(&self) -> Vec<ChartPanel> {
@@ -437,6 +489,9 @@ mod tests {
             rays: 300,
             floor_px: 48,
             repeats: 1,
+            frame_cells: 8,
+            frame_px: [48, 27],
+            frame_slopes: &[0.4],
         };
         let (folder, chart, done) = written::<CausticsChart>(least);
         let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
@@ -461,5 +516,9 @@ mod tests {
             let of = |method: usize| chart.rows[4 * slope + method].executions;
             assert!(of(0) <= of(1) && of(0) <= of(2) && of(2) <= of(3));
         }
+        let [moving, refined, hull, prism] = [0, 1, 2, 3].map(|place| chart.frames[place]);
+        assert!(moving.executions <= refined.executions.min(hull.executions).min(prism.executions));
+        assert!(moving.triangles < prism.triangles && moving.tests > moving.executions);
+        assert!(chart.frames.iter().all(|frame| frame.frame_s > 0.0 && frame.frame_j > 0.0));
     }
 }

@@ -13,7 +13,7 @@ use workloads::{Frame, Overrides, Scene};
 
 use super::{SAMPLES, line, stereo};
 use crate::chart::statistics::{errors, mean_square};
-use crate::study::StudyError;
+use crate::study::{Ran, StudyError};
 use run::GpuSpec;
 
 /// Cost of one way to render all views.
@@ -72,10 +72,8 @@ pub struct Lanes {
     pub all: u64,
     /// Of one view alone.
     pub one: u64,
-    /// Draws of the one pass.
-    pub draws: u64,
-    /// Samples of it that saw something.
-    pub samples_hit: u64,
+    /// Work of the one pass and of the view alone.
+    pub ran: Ran,
 }
 
 /// One length of the camera line.
@@ -179,7 +177,7 @@ impl Bench {
         let layout = if views == 2 { stereo() } else { line(views) };
         let (rig, to) = (self.rig(&layout, SAMPLES)?, self.target(&self.gpu.pipeline));
         let draws = self.frame.draws(&self.scene)?;
-        let one = self.one_view(&rig, &layout, &draws, &to)?;
+        let (one, _) = self.one_view(&rig, &layout, &draws, &to)?;
         let run = |render: &dyn Fn() -> Result<Views, workloads::job::JobError>| {
             let started = Instant::now();
             let views = render()?;
@@ -204,17 +202,18 @@ impl Bench {
         })
     }
 
-    /// Lanes that the view nearest to the middle takes alone.
+    /// Lanes that the view nearest to the middle takes alone, and its work.
     fn one_view(
         &self,
         rig: &Rig,
         layout: &Layout,
         draws: &[Draw<'_>],
         to: &Target<'_>,
-    ) -> Result<u64, StudyError> {
+    ) -> Result<(u64, Ran), StudyError> {
         let middle = (layout.views as usize - 1) / 2;
-        let counts = rig.view(middle, draws, to, &mut Gpu::quiet(to.spec)?)?.counts;
-        Ok(counts[Event::PixelInvocations].max(1))
+        let mut gpu = Gpu::quiet(to.spec)?;
+        let counts = rig.view(middle, draws, to, &mut gpu)?.counts;
+        Ok((counts[Event::PixelInvocations].max(1), Ran::of(&gpu.finish())))
     }
 
     /// Shader runs with another cache.
@@ -248,10 +247,12 @@ impl Bench {
         let spec = PipelineSpec { shading_cache, ..self.gpu.pipeline };
         let (rig, to) = (self.rig(&layout, samples)?, self.target(&spec));
         let draws = self.frame.draws(&self.scene)?;
-        let counts = rig.one_pass(&draws, &to, &mut Gpu::quiet(to.spec)?)?.counts;
-        let one = self.one_view(&rig, &layout, &draws, &to)?;
-        let [draws, samples_hit] = [Event::Draws, Event::SamplesHit].map(|event| counts[event]);
-        Ok(Lanes { all: counts[Event::PixelInvocations], one, draws, samples_hit })
+        let mut gpu = Gpu::quiet(to.spec)?;
+        let counts = rig.one_pass(&draws, &to, &mut gpu)?.counts;
+        let mut ran = Ran::of(&gpu.finish());
+        let (one, of_one) = self.one_view(&rig, &layout, &draws, &to)?;
+        ran += of_one;
+        Ok(Lanes { all: counts[Event::PixelInvocations], one, ran })
     }
 
     /// Views of a kind on a camera line of a length, with and without separate tests of the regions of the lens.

@@ -6,7 +6,7 @@ use workloads::caustics::{Coverage, Eye, Floor, Method, receivers};
 
 use super::super::band::{Cases, one_at_a_time};
 use super::super::figure::line;
-use super::super::row::{Row, numbers};
+use super::super::row::{Row, numbers, ran};
 use super::super::{Done, Figure};
 use super::Task;
 use super::caustics_figures::{light, warped};
@@ -14,6 +14,7 @@ use super::settings::{Lost, Size};
 use crate::chart::caustics::view::{DEPTH_M, SIDE_M, WAVE_M};
 use crate::chart::caustics::{Ocean as Counted, ocean};
 use crate::reproduce::settings::Form;
+use crate::study::Ran;
 use output::plot::{Look, Series};
 use run::RunError;
 
@@ -73,12 +74,13 @@ pub(super) fn executions(task: &Task<'_>) -> Result<Done, RunError> {
         ("most_of_a_pixel_moving", f64::from(base.most[0])),
         ("most_of_a_pixel_prism", f64::from(base.most[3])),
     ]);
-    let executions: u64 = slopes.iter().chain(&depths).flat_map(|(_, counted)| counted.executions).sum();
-    let ran = numbers([
-        ("volumes", base.volumes as f64),
-        ("oceans", (slopes.len() + depths.len() - 1) as f64),
-        ("shader_executions", executions as f64),
-    ]);
+    // The ocean of the values given is in both sweeps and was drawn once.
+    let others = depths.iter().filter(|(at, _)| *at != depth_m).chain(&slopes).map(|(_, counted)| counted);
+    let drawn: Vec<&Counted> = others.collect();
+    let draws = drawn.iter().map(|counted| counted.draws).sum();
+    let fragments = drawn.iter().flat_map(|counted| counted.executions).sum();
+    let mut ran = ran(&Ran { passes: draws, draws, fragments });
+    ran.extend(numbers([("volumes", base.volumes as f64), ("oceans", drawn.len() as f64)]));
     let row = Row { numbers: facts, ran, ..with.banded(&row.about, ours, band) };
     Ok(Done { row, figures: figures(&base, &slopes, form)? })
 }
@@ -151,11 +153,13 @@ pub(super) fn no_light_is_lost(task: &Task<'_>) -> Result<Done, RunError> {
         ("pairs_hit_once", once as f64),
     ]);
     // Without beams that fold the claim would not be put to the test.
-    let ran = numbers([
+    let pairs = [
         ("pairs", all.lit as f64),
         ("pairs_hit_twice", twice as f64),
         ("pairs_hit_three_times", thrice as f64),
-    ]);
+    ];
+    let mut ran = ran(&Ran { passes: all.draws, draws: all.draws, fragments: all.fragments });
+    ran.extend(numbers(pairs));
     Ok(Done::bare(Row { numbers: facts, ran, ..with.banded(&row.about, ours, band) }))
 }
 

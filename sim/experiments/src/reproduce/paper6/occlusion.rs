@@ -6,10 +6,11 @@ use workloads::occlusion::WallSceneSpec;
 use super::super::Done;
 use super::super::band::{Cases, one_at_a_time, short};
 use super::super::figure::over_doublings;
-use super::super::row::{Row, numbers};
+use super::super::row::{Row, numbers, ran};
 use super::Task;
 use super::settings::Asked;
 use crate::chart::occlusion::{Asked as Answered, Drawn, Kind};
+use crate::study::Ran;
 use output::plot::Series;
 use run::RunError;
 
@@ -33,20 +34,17 @@ struct Share {
     found: u64,
     wrong: u64,
     tiles: u64,
-    /// Passes of sampled and interval queries, their draws, and fragments that the sampled ones pass.
-    passes: u64,
-    draws: u64,
-    fragments: u64,
+    /// Work of the interval queries.
+    ran: Ran,
 }
 
 impl Share {
-    fn of(scenes: &[Drawn], boxes: [u32; 3], tile_px: u32) -> Self {
+    fn of(scenes: &[Drawn], boxes: [u32; 3], tile_px: u32) -> Result<Self, RunError> {
         let mut share = Self::default();
         for scene in scenes {
-            share.passes += 2;
-            share.draws += 2 * scene.seen.len() as u64;
-            share.fragments += scene.counted.iter().map(|answer| answer.passed).sum::<u64>();
-            for (answer, seen) in scene.ask(boxes, tile_px).answers.iter().zip(&scene.seen) {
+            let asked = scene.ask(boxes, tile_px).map_err(RunError::setting)?;
+            share.ran += asked.ran;
+            for (answer, seen) in asked.answers.iter().zip(&scene.seen) {
                 let hidden = seen.passed == 0;
                 share.hidden += u64::from(hidden);
                 share.found += u64::from(hidden && answer.hidden);
@@ -54,7 +52,7 @@ impl Share {
                 share.tiles += answer.tiles;
             }
         }
-        share
+        Ok(share)
     }
 
     fn rate(&self) -> f64 {
@@ -71,17 +69,16 @@ pub(super) fn rate(task: &Task<'_>) -> Result<Done, RunError> {
     let mut measure = |motion: f32, tile_px: u32| -> Result<Vec<(f64, f64)>, RunError> {
         let change = |spec| WallSceneSpec { motion, ..spec };
         let scenes = drawn(Kind::Motion, *row.yards.get(form), change, size, *row.samples.get(form), asked)?;
+        total.ran += scenes.iter().map(|scene| scene.ran).sum();
         let at = |&boxes: &u32| {
-            let share = Share::of(&scenes, [1, 1, boxes], tile_px);
+            let share = Share::of(&scenes, [1, 1, boxes], tile_px)?;
             total.hidden += share.hidden;
             total.tiles += share.tiles;
             total.wrong += share.wrong;
-            total.passes += share.passes;
-            total.draws += share.draws;
-            total.fragments += share.fragments;
-            (f64::from(boxes), share.rate())
+            total.ran += share.ran;
+            Ok((f64::from(boxes), share.rate()))
         };
-        Ok(row.boxes_in_t.get(form).iter().map(at).collect())
+        row.boxes_in_t.get(form).iter().map(at).collect()
     };
     let (motion, tile_px) = (*row.motion_m.get(form), *row.tile_px.get(form));
     let mut curves = Vec::new();
@@ -122,13 +119,9 @@ pub(super) fn rate(task: &Task<'_>) -> Result<Done, RunError> {
         ("share_most_boxes", ends.map_or(f64::NAN, |(_, last)| last.1)),
         ("wrong", wrong as f64),
     ]);
-    let ran = numbers([
-        ("passes", total.passes as f64),
-        ("draws", total.draws as f64),
-        ("fragments", total.fragments as f64),
-        ("hidden_objects_queried", total.hidden as f64),
-        ("tiles", total.tiles as f64),
-    ]);
+    let mut ran = ran(&total.ran);
+    let queried = [("hidden_objects_queried", total.hidden as f64), ("tiles", total.tiles as f64)];
+    ran.extend(numbers(queried));
     let figure = over_doublings(
         "VI_occlusion",
         [
@@ -207,10 +200,10 @@ pub(super) fn cost(task: &Task<'_>) -> Result<Done, RunError> {
         for &samples in row.samples.get(form) {
             let scenes = drawn(kind, *row.yards.get(form), |spec| spec, size, samples, asked)?;
             let answered = |scene: Drawn| {
-                let answered = scene.ask(kind.typical(), tile_px);
-                (scene, answered)
+                let answered = scene.ask(kind.typical(), tile_px).map_err(RunError::setting)?;
+                Ok((scene, answered))
             };
-            queried.push(scenes.into_iter().map(answered).collect::<Vec<_>>());
+            queried.push(scenes.into_iter().map(answered).collect::<Result<Vec<_>, RunError>>()?);
         }
     }
     let costs = |objects, charged| {
@@ -251,17 +244,13 @@ pub(super) fn cost(task: &Task<'_>) -> Result<Done, RunError> {
     ]);
     let scenes = || queried.iter().flatten();
     let counted: u64 = scenes().flat_map(|(scene, _)| &scene.counted).map(SampledAnswer::tests).sum::<u64>();
-    let passed: u64 = scenes().flat_map(|(scene, _)| &scene.counted).map(|answer| answer.passed).sum();
-    let asked: usize = scenes().map(|(scene, _)| scene.seen.len()).sum();
-    let ran = numbers([
-        ("passes", 3.0 * scenes().count() as f64),
-        ("draws", 3.0 * asked as f64),
-        ("fragments", passed as f64),
+    let mut ran = ran(&scenes().flat_map(|(scene, answered)| [scene.ran, answered.ran]).sum());
+    ran.extend(numbers([
         ("gathered_depths", scenes().map(|(_, answered)| answered.gathered as f64).sum()),
         ("sampled_tests_counting_all", counted as f64),
         ("objects_queried", base.iter().map(|costs| costs.objects).sum()),
         ("sampled_tests", base.iter().map(|costs| costs.sampled[0]).sum()),
         ("interval_tests", base.iter().map(|costs| costs.interval[0]).sum()),
-    ]);
+    ]));
     Ok(Done::bare(Row { numbers: facts, ran, ..with.banded(&row.about, ours, band) }))
 }

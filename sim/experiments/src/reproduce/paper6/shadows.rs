@@ -1,8 +1,8 @@
 //! VI-12: motion-blurred soft shadows.
 
-use activity::{Counts, Event};
+use activity::Event;
 use glam::Vec3;
-use pipeline::Gpu;
+use pipeline::{FrameReport, Gpu};
 use workloads::Overrides;
 use workloads::job::{Drawn, Job};
 use workloads::soft_shadows::{Options, SoftShadows};
@@ -17,18 +17,19 @@ use run::RunError;
 pub(super) fn row(task: &Task<'_>) -> Result<Done, RunError> {
     let with = task.with(|settings| &settings.vi_12);
     let (row, form) = (with.settings, with.form);
-    let draw = |accumulate| -> Result<(Drawn, Counts), RunError> {
+    let draw = |accumulate| -> Result<(Drawn, FrameReport), RunError> {
         let (size, samples) = (Some(*row.size_px.get(form)), Some(*row.places.get(form)));
         let overrides = Overrides { size, samples, ..Overrides::default() };
         let job = SoftShadows::new(Options { accumulate, ..Options::default() }, &overrides, 1)?;
         let hardware = GpuSpec::load("reference")?.pipeline;
         let mut gpu = Gpu::quiet(&hardware).map_err(RunError::setting)?;
-        Ok((job.frame(*row.frame.get(form), &mut gpu)?, gpu.finish().counts()))
+        Ok((job.frame(*row.frame.get(form), &mut gpu)?, gpu.finish()))
     };
-    let [(one, one_counts), (many, many_counts)] = [draw(false)?, draw(true)?];
+    let [(one, one_report), (many, many_report)] = [draw(false)?, draw(true)?];
+    let counts = [&one_report, &many_report].map(FrameReport::counts);
     let bits = |pixel: &Vec3| pixel.to_array().map(f32::to_bits);
     let differ = one.image.iter().zip(&many.image).filter(|(a, b)| bits(a) != bits(b)).count();
-    let count = |event: Event| [&one_counts, &many_counts].map(|counts| counts[event] as f64);
+    let count = |event: Event| counts.each_ref().map(|counts| counts[event] as f64);
     let (vertices, tested) = (count(Event::VertexInvocations), count(Event::SamplesTested));
     let same = differ == 0 && one.image.len() == many.image.len();
     let ours = format!(
@@ -48,7 +49,10 @@ pub(super) fn row(task: &Task<'_>) -> Result<Done, RunError> {
         ("samples_tested_accumulation", tested[1]),
     ]);
     let (draws, hit) = (count(Event::Draws), count(Event::SamplesHit));
+    let passes = [&one_report, &many_report].map(|report| report.passes.len() as f64);
     let ran = numbers([
+        ("passes_one_pass", passes[0]),
+        ("passes_accumulation", passes[1]),
         ("draws_one_pass", draws[0]),
         ("draws_accumulation", draws[1]),
         ("samples_hit_one_pass", hit[0]),

@@ -8,10 +8,10 @@ use super::settings::{Policy, Size, Views};
 use crate::chart::multiview::{Bench, Lanes};
 use crate::reproduce::band::{Cases, one_at_a_time};
 use crate::reproduce::figure::{level, line, over_doublings};
-use crate::reproduce::row::{Row, With, numbers};
+use crate::reproduce::row::{Row, With, numbers, ran};
 use crate::reproduce::settings::Form;
 use crate::reproduce::{Done, Figure};
-use crate::study::StudyError;
+use crate::study::{Ran, StudyError};
 use output::plot::Series;
 use run::RunError;
 
@@ -93,9 +93,7 @@ struct Tried<'a> {
     cases: Cases,
     /// Every point of the sweeps, with its increase in %.
     found: Vec<(Point, f64)>,
-    draws: u64,
-    samples_hit: u64,
-    passes: u64,
+    ran: Ran,
 }
 
 impl Tried<'_> {
@@ -103,10 +101,7 @@ impl Tried<'_> {
     fn increase(&mut self, point: &Point) -> Result<f64, RunError> {
         let shape = [*self.row.views.get(self.form), *self.row.overlap.get(self.form)];
         let lanes = point.lanes(shape).map_err(RunError::setting)?;
-        self.draws += lanes.draws;
-        self.samples_hit += lanes.samples_hit;
-        // That of all views, and the one view alone.
-        self.passes += 2;
+        self.ran += lanes.ran;
         Ok(100.0 * (lanes.all as f64 / lanes.one as f64 - 1.0))
     }
 
@@ -215,13 +210,13 @@ fn done(with: &With<'_, Views>, figures: [&'static str; 2]) -> Result<Done, RunE
     let base = Point::base(row, form);
     let cases = Cases::new("increase of shader invocations in %", VARIED);
     let found = Vec::new();
-    let mut tried = Tried { row, form, cases, found, draws: 0, samples_hit: 0, passes: 0 };
+    let mut tried = Tried { row, form, cases, found, ran: Ran::default() };
     let curves = over_eyes(&mut tried, &base)?;
     over_the_rest(&mut tried, &base)?;
     let corners = over_corners(&mut tried, &base)?;
     let ours = tried.increase(&base)?;
     let entries = entries(row, form, &base)?;
-    let Tried { cases, draws, samples_hit, passes, .. } = tried;
+    let Tried { cases, ran: work, .. } = tried;
     let band = cases.band(full(row)).ok_or_else(|| RunError::setting("no setting of the views is varied"))?;
     let at = |quads: u32| {
         entries.iter().find(|(count, ..)| *count == quads).map(|(_, all, one)| 100.0 * (all / one - 1.0))
@@ -236,8 +231,7 @@ fn done(with: &With<'_, Views>, figures: [&'static str; 2]) -> Result<Done, RunE
         ("increase_at_64_entries_percent", at(64).unwrap_or(f64::NAN)),
         ("increase_at_16384_entries_percent", at(16_384).unwrap_or(f64::NAN)),
     ]);
-    let ran =
-        numbers([("passes", passes as f64), ("draws", draws as f64), ("samples_hit", samples_hit as f64)]);
+    let ran = ran(&work);
     let figures = vec![over_entries(figures[0], row, &entries), banded(figures[1], row, form, &curves)];
     let judged = Row { numbers: facts, ran, ..with.banded(&row.about, text, band) };
     Ok(Done { row: judged.limited(&cache_sizes(row, form, &entries)), figures })
