@@ -161,7 +161,7 @@ impl Memory {
     /// are accepted.
     fn take(&mut self, run: &Run, seen: Time, fetched: &mut Fetched) -> (Time, Time) {
         let Run { head, count, turn, last: later } = *run;
-        let (first, end) = self.l2.reserve_as(turn, seen, u64::from(count) * self.period);
+        let (mut first, end) = self.l2.reserve_as(turn, seen, u64::from(count) * self.period);
         let mut last = end.saturating_sub(self.period).max(first + later);
         if head.kind == LineKind::Hit {
             fetched.arrived = fetched.arrived.max(last + self.latency);
@@ -171,18 +171,20 @@ impl Memory {
         if let Some(arrived) = found {
             fetched.arrived = fetched.arrived.max(arrived + self.latency);
         }
-        fetched.moved = fetched.moved.max(accepted.to + period);
+        // What the queues of the channels do not hold waits in front of the level above.
+        let seen = Span { from: accepted.from + period, to: accepted.to + period };
+        let seen = self.dram.admits(&head, count, seen);
+        accepted = Span { from: seen.from - period, to: seen.to - period };
+        fetched.moved = fetched.moved.max(seen.to);
         for line in head.moved() {
-            let seen = Span { from: accepted.from + period, to: accepted.to + period };
             let moved = self.dram.transfer(line, count, turn, seen);
-            // What the channel's queue does not hold waits in front of the level above.
-            accepted.to = accepted.to.max(moved.queued);
-            fetched.moved = fetched.moved.max(moved.data);
+            fetched.moved = fetched.moved.max(moved);
             if head.fetched() == Some(line) {
                 let latency = self.dram.latency() + latency + self.latency;
-                fetched.arrived = fetched.arrived.max(moved.data + latency);
+                fetched.arrived = fetched.arrived.max(moved + latency);
             }
         }
+        first = first.max(accepted.from.saturating_sub(backlog));
         last = last.max(accepted.to.saturating_sub(backlog));
         fetched.moved = fetched.moved.max(last + self.period);
         self.end = self.end.max(last + self.period);
@@ -279,34 +281,44 @@ struct Channel {
     oldest: usize,
     /// Scratch memory of [`Self::room_at`].
     leaving: Vec<(Time, u64)>,
+    /// When the last line so far is issued.
+    last_issued: Time,
 }
 
 /// Lines in the queue of a channel.
 #[derive(Clone, Copy, Debug, Default)]
 struct Waiting {
-    /// When they come, and when the last is issued.
+    /// When they enter it, and when the last is issued.
     seen: Time,
     issued: Time,
     count: u64,
 }
 
 impl Channel {
-    /// When a queue of `queue` lines has room for another, if that comes at `seen`: lines leave in any order.
-    fn room_at(&mut self, seen: Time, queue: u64) -> Time {
+    /// When a queue of `queue` lines has room for `count` more, which come at `seen`: lines leave in any order, one every
+    /// `burst`.
+    fn room_for(&mut self, count: u64, seen: Time, queue: u64, burst: Time) -> Time {
+        let most = queue.saturating_sub(count);
+        if self.last_issued <= seen + most * burst {
+            return seen;
+        }
         let waits = |line: &&Waiting| line.seen <= seen && line.issued > seen;
         self.leaving.clear();
         self.leaving.extend(self.recent.iter().filter(waits).map(|line| (line.issued, line.count)));
         self.leaving.sort_unstable();
-        // The last to leave stay in the queue.
+        // The last to leave may stay in the queue.
         let mut held = 0;
-        let last = self.leaving.iter().rev().find(|(_, count)| {
+        for &(issued, count) in self.leaving.iter().rev() {
+            if held + count > most {
+                return issued.saturating_sub((most - held) * burst).max(seen);
+            }
             held += count;
-            held >= queue
-        });
-        last.map_or(seen, |&(issued, _)| issued)
+        }
+        seen
     }
 
     fn note(&mut self, lines: Waiting) {
+        self.last_issued = self.last_issued.max(lines.issued);
         self.recent[self.oldest] = lines;
         self.oldest = (self.oldest + 1) % self.recent.len();
     }
@@ -324,15 +336,6 @@ struct RowUse {
     lines: u64,
     /// Their number.
     count: u64,
-}
-
-/// Times of a transfer over the bus.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Moved {
-    /// When the queue of the channel has room for the last line.
-    pub queued: Time,
-    /// When its data has been transferred.
-    pub data: Time,
 }
 
 /// All channels.
@@ -367,6 +370,7 @@ impl Dram {
             recent: vec![Waiting::default(); remembered].into(),
             oldest: 0,
             leaving: Vec::new(),
+            last_issued: 0,
         };
         Self {
             map: AddressMap::new(spec),
@@ -392,9 +396,25 @@ impl Dram {
         self.latency
     }
 
-    /// Transfer `count` lines of one group over the bus of their channel. The first arrives at `seen.from`, the
-    /// last at `seen.to`.
-    pub fn transfer(&mut self, line: u32, count: u32, turn: Turn, seen: Span) -> Moved {
+    /// When the first and the last of `count` requests like `head` enter the queues of their channels, which have room for all
+    /// lines of a request at once. They come at `seen`.
+    pub fn admits(&mut self, head: &LineAccess, count: u32, seen: Span) -> Span {
+        let channel_of = |line| self.map.locate(line).channel;
+        let mut enters = seen;
+        for line in head.moved() {
+            let at = channel_of(line);
+            let lines = head.moved().filter(|&other| channel_of(other) == at).count() as u64;
+            let channel = &mut self.channels[at];
+            let mut room = |count, seen| channel.room_for(count, seen, self.queue, self.burst);
+            enters.from = enters.from.max(room(lines, seen.from));
+            enters.to = enters.to.max(room(lines * u64::from(count), seen.to));
+        }
+        Span { from: enters.from, to: enters.to.max(enters.from) }
+    }
+
+    /// Transfer `count` lines of one group over the bus of their channel. The first enters its queue at `seen.from`, the
+    /// last at `seen.to`. Returns when the last is transferred.
+    pub fn transfer(&mut self, line: u32, count: u32, turn: Turn, seen: Span) -> Time {
         let address = self.map.locate(line);
         let channel = &mut self.channels[address.channel];
         let bank = &mut channel.banks[address.bank];
@@ -432,14 +452,10 @@ impl Dram {
             count: count.into(),
         };
         bank.note(used, open);
-        // A queue in order would hold `backlog`. Lines of other banks leave before, and make room.
-        let in_order = used.issued.saturating_sub(self.backlog);
-        let is_full = in_order > seen.to;
-        let queued = if is_full { channel.room_at(seen.to, self.queue).min(in_order) } else { in_order };
         channel.lines += u64::from(count);
         channel.note(Waiting { seen: seen.from, issued: used.issued, count: used.count });
         self.end = self.end.max(end);
-        Moved { queued, data: end + self.cas }
+        end + self.cas
     }
 
     /// End of the last transfer.

@@ -6,6 +6,7 @@ mod closed_forms;
 mod common;
 mod compute;
 mod conservation;
+mod draws;
 mod ladder;
 mod passes;
 mod rates;
