@@ -54,7 +54,11 @@ const MAX_DRAWS: usize = 256;
 /// that take turns are for stalls alone.
 pub(crate) fn limit_draws(report: &mut FrameReport, timed: &mut Timed) {
     report.passes.iter_mut().filter(|pass| pass.draws.len() > MAX_DRAWS).for_each(|pass| pass.forget_draws());
-    timed.passes.iter_mut().filter(|pass| pass.draws_ps.len() > MAX_DRAWS).for_each(|pass| pass.draws_ps.clear());
+    timed
+        .passes
+        .iter_mut()
+        .filter(|pass| pass.draws_ps.len() > MAX_DRAWS)
+        .for_each(|pass| pass.draws_ps.clear());
     if timed.stalls.is_none() && take_turns(&timed.spans) {
         timed.spans = Vec::new();
     }
@@ -252,7 +256,9 @@ mod tests {
         let model = PowerModel::new(&table, &Platform::builtin("reference").unwrap()).unwrap();
         let image = groups.remove(1).summary(&model);
         let parts: Vec<_> = image.draws.iter().chain(&image.others).collect();
-        let sum = |of: fn(&WorkSummary) -> f64| parts.iter().map(|part| of(part)).sum::<f64>() / of(&image.all) - 1.0;
+        let sum = |of: fn(&WorkSummary) -> f64| {
+            parts.iter().map(|part| of(part)).sum::<f64>() / of(&image.all) - 1.0
+        };
         assert!(sum(|work| work.time_s).abs() < 1e-9 && sum(|work| work.energy_j).abs() < 1e-9);
     }
 

@@ -177,7 +177,12 @@ fn draws(
         let ends_ps = [std::mem::replace(&mut before_ps, span.end_ps), span.end_ps];
         let [start_ns, end_ns] = ends_ps.map(|ps| at(ps).clamp(start_ns, end_ns));
         let is_shown = span.pass == pass && span.draw != Packet::NONE && start_ns < end_ns;
-        is_shown.then(|| PassSpan { name: format!("draw {}", span.draw), start_ns, end_ns, parts: Vec::new() })
+        is_shown.then(|| PassSpan {
+            name: format!("draw {}", span.draw),
+            start_ns,
+            end_ns,
+            parts: Vec::new(),
+        })
     };
     observed.spans.iter().filter_map(span).collect()
 }

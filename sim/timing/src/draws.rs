@@ -9,7 +9,7 @@ use std::collections::VecDeque;
 
 use activity::Packet;
 
-use crate::clock::Time;
+use crate::clock::{Clocks, Time};
 use crate::demand::ServiceDemand;
 
 /// Something of each draw of a pass, and of all that is of no single draw.
@@ -88,7 +88,7 @@ pub(crate) struct DrawTimes {
     /// Packets of the front end that left after it, in order.
     ahead: VecDeque<Left>,
     passes: Vec<PassParts>,
-    last_pass: u32,
+    last_pass: Option<u32>,
     spans: Vec<Left>,
     most_spans: usize,
 }
@@ -97,12 +97,12 @@ impl DrawTimes {
     /// Remembers at most so many spans, else none.
     pub fn new(most_spans: usize) -> Self {
         let (passes, spans) = Default::default();
-        Self { now: 0, ahead: VecDeque::new(), passes, last_pass: 0, spans, most_spans }
+        Self { now: 0, ahead: VecDeque::new(), passes, last_pass: None, spans, most_spans }
     }
 
     /// Record that the next packet of the stream left the machine at `at`.
     pub fn left(&mut self, demand: &ServiceDemand, at: Time) {
-        self.last_pass = demand.pass;
+        self.last_pass = Some(demand.pass);
         let left = Left { pass: demand.pass, draw: demand.draw, batch: demand.batch, at };
         if demand.front {
             if at > self.now {
@@ -137,13 +137,19 @@ impl DrawTimes {
         }
     }
 
-    /// The parts of every pass of a frame that ends at `end`, and its spans in order of time; none if there are too many.
-    pub fn finish(mut self, end: Time, ps: impl Fn(Time) -> u64) -> (Vec<PassParts>, Vec<DrawSpan>) {
+    /// The parts of every pass of a frame that ends at `end_ps`, and its spans in order of time; none if there are too many.
+    pub fn finish(mut self, clocks: &Clocks, end_ps: u64) -> (Vec<PassParts>, Vec<DrawSpan>) {
         while let Some(front) = self.ahead.pop_front() {
             self.advance(front);
         }
-        self.advance(Left { pass: self.last_pass, draw: Packet::NONE, batch: 0, at: end });
-        let span = |left: &Left| DrawSpan { pass: left.pass, draw: left.draw, end_ps: ps(left.at) };
+        if let Some(pass) = self.last_pass {
+            self.advance(Left { pass, draw: Packet::NONE, batch: 0, at: clocks.grain_from(end_ps) });
+        }
+        let span = |left: &Left| DrawSpan {
+            pass: left.pass,
+            draw: left.draw,
+            end_ps: clocks.ps(left.at).min(end_ps),
+        };
         let is_whole = self.spans.len() <= self.most_spans;
         (self.passes, if is_whole { self.spans.iter().map(span).collect() } else { Vec::new() })
     }

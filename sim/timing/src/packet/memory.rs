@@ -257,10 +257,12 @@ struct OpenRow {
     closes: Time,
     /// Lines of the channel before it was opened, plus its own lines.
     own: u64,
+    /// Time on the bus of lines that joined it.
+    joined: Time,
 }
 
 impl OpenRow {
-    const NONE: Self = Self { row: u32::MAX, since: 0, opened: 0, until: 0, closes: 0, own: 0 };
+    const NONE: Self = Self { row: u32::MAX, since: 0, opened: 0, until: 0, closes: 0, own: 0, joined: 0 };
 }
 
 /// A bank: calendar of its row activations, and its latest rows, the newest first.
@@ -279,6 +281,10 @@ struct Channel {
     /// The latest groups of lines, a ring, and where the oldest is.
     recent: Box<[Waiting]>,
     oldest: usize,
+    /// The bank of the last line.
+    last_bank: usize,
+    /// Lines up to the last that are of its bank.
+    of_last_bank: u64,
     /// Scratch memory of [`Self::room_at`].
     leaving: Vec<(Time, u64)>,
     /// When the last line so far is issued.
@@ -317,7 +323,14 @@ impl Channel {
         seen
     }
 
-    fn note(&mut self, lines: Waiting) {
+    /// Whether the last `queue` lines are all of `bank`.
+    fn is_of(&self, bank: usize, queue: u64) -> bool {
+        self.last_bank == bank && self.of_last_bank >= queue
+    }
+
+    fn note(&mut self, bank: usize, lines: Waiting) {
+        self.of_last_bank = lines.count + if self.last_bank == bank { self.of_last_bank } else { 0 };
+        self.last_bank = bank;
         self.last_issued = self.last_issued.max(lines.issued);
         self.recent[self.oldest] = lines;
         self.oldest = (self.oldest + 1) % self.recent.len();
@@ -334,8 +347,9 @@ struct RowUse {
     issued: Time,
     /// Lines of the channel before them.
     lines: u64,
-    /// Their number.
+    /// Their number, and their time on the bus.
     count: u64,
+    work: Time,
 }
 
 /// All channels.
@@ -348,7 +362,6 @@ pub(super) struct Dram {
     activate: Time,
     precharge: Time,
     latency: Time,
-    backlog: Time,
     queue: u64,
     end: Time,
 }
@@ -369,6 +382,8 @@ impl Dram {
             lines: 0,
             recent: vec![Waiting::default(); remembered].into(),
             oldest: 0,
+            last_bank: 0,
+            of_last_bank: 0,
             leaving: Vec::new(),
             last_issued: 0,
         };
@@ -380,7 +395,6 @@ impl Dram {
             activate: cycles(spec.activate_cycles.get()),
             precharge: cycles(spec.precharge_cycles.get()),
             latency: cycles(spec.latency_cycles.get()),
-            backlog: burst * Time::from(spec.queue),
             queue: spec.queue.into(),
             end: 0,
         }
@@ -417,6 +431,7 @@ impl Dram {
     pub fn transfer(&mut self, line: u32, count: u32, turn: Turn, seen: Span) -> Time {
         let address = self.map.locate(line);
         let channel = &mut self.channels[address.channel];
+        let is_alone = channel.is_of(address.bank, self.queue);
         let bank = &mut channel.banks[address.bank];
         let work = self.burst * Time::from(count);
         let open = bank.joins(address.row, seen.from, channel.lines, self.queue);
@@ -435,9 +450,16 @@ impl Dram {
                 let opens = self.activate + if *before == OpenRow::NONE { 0 } else { self.precharge };
                 // The next row can open once the last line is issued.
                 let held = work - self.burst;
-                let closes = before.until.max(seen.from).min(seen.from + self.backlog);
+                let closes = before.until.max(seen.from);
                 let begin = bank.time.reserve_as(turn, closes, opens + held).0;
                 before.closes = begin;
+                // The bus idles from the end of the last transfer on if the queue has lines of this bank alone. Those that joined
+                // their row would fill the gap.
+                if is_alone {
+                    channel
+                        .bus
+                        .block(begin + self.burst, opens.saturating_sub(self.burst).min(before.joined));
+                }
                 begin + opens
             }
         };
@@ -450,10 +472,14 @@ impl Dram {
             issued: end - self.burst,
             lines: channel.lines,
             count: count.into(),
+            work,
         };
+        if let Some(at) = open.filter(|&at| used.issued >= bank.rows[at].closes) {
+            bank.delay(at, work);
+        }
         bank.note(used, open);
         channel.lines += u64::from(count);
-        channel.note(Waiting { seen: seen.from, issued: used.issued, count: used.count });
+        channel.note(address.bank, Waiting { seen: seen.from, issued: used.issued, count: used.count });
         self.end = self.end.max(end);
         end + self.cas
     }
@@ -477,6 +503,15 @@ impl Dram {
 }
 
 impl Bank {
+    /// The rows that open after that at place `at` do so later, as more lines of it go first.
+    fn delay(&mut self, at: usize, by: Time) {
+        for open in &mut self.rows[..at] {
+            open.opened += by;
+            open.closes = open.closes.saturating_add(by);
+        }
+        self.rows[at].closes += by;
+    }
+
     /// Place of the latest row that was requested by `seen`, in time. Rows before it come later, though earlier in the stream.
     fn place(&self, seen: Time) -> usize {
         self.rows.iter().position(|open| open.since <= seen).unwrap_or(self.rows.len() - 1)
@@ -496,10 +531,11 @@ impl Bank {
 
     /// Record lines of a row: those that joined the row at `joined`, or opened theirs.
     fn note(&mut self, used: RowUse, joined: Option<usize>) {
-        let RowUse { row, seen, opened, issued, lines, count } = used;
+        let RowUse { row, seen, opened, issued, lines, count, work } = used;
         if let Some(open) = joined.map(|at| &mut self.rows[at]) {
             open.until = open.until.max(issued);
             open.own += count;
+            open.joined += work;
             return;
         }
         let at = self.place(seen);
@@ -507,7 +543,7 @@ impl Bank {
         let known = self.rows.iter().skip(at).position(|open| open.row == row).map(|after| at + after);
         let until = known.map_or(issued, |known| self.rows[known].until.max(issued));
         self.rows.copy_within(at..known.unwrap_or(self.rows.len() - 1), at + 1);
-        self.rows[at] = OpenRow { row, since: seen, opened, until, closes, own: lines + count };
+        self.rows[at] = OpenRow { row, since: seen, opened, until, closes, own: lines + count, joined: 0 };
     }
 }
 
@@ -524,6 +560,7 @@ mod tests {
             issued,
             lines,
             count,
+            work: count,
         };
         let mut bank = Bank { time: Calendar::new(16, 1), rows: vec![OpenRow::NONE; 4].into() };
         let joins =

@@ -322,7 +322,7 @@ impl PacketClock {
         }
         let timeline = recorder.finish();
         let rows = crate::ratio_to_busiest(clocks.ps(memory.rows()), &timeline);
-        let (parts, spans) = draws.finish(end, |at| clocks.ps(at));
+        let (parts, spans) = draws.finish(&clocks, timeline.duration_ps);
         Timed {
             passes: passes.finish(&machine, &clocks, timeline.duration_ps, &parts),
             spans,

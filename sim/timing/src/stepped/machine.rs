@@ -160,7 +160,7 @@ impl<'a> Machine<'a> {
         }
         let mut draws = DrawTimes::new(usize::MAX);
         stream.demands.iter().zip(left).for_each(|(demand, at)| draws.left(demand, at));
-        let (parts, spans) = draws.finish(end, |at| clocks.ps(at));
+        let (parts, spans) = draws.finish(&clocks, timeline.duration_ps);
         Ok(Timed {
             passes: passes.finish(self.spec, &clocks, timeline.duration_ps, &parts),
             spans,

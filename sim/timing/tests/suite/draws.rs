@@ -88,7 +88,8 @@ proptest! {
             if level == 2 {
                 continue;
             }
-            prop_assert_eq!(timed.spans.last().map_or(0, |span| span.end_ps), times.iter().sum::<u64>());
+            let ends = timed.spans.last().map(|span| span.end_ps);
+            prop_assert_eq!(ends.unwrap_or(0), times.iter().sum::<u64>(), "{} {:?} {}", level, timed.passes, timed.cycles);
             for (number, pass) in timed.passes.iter().enumerate() {
                 let of_pass = |span: &DrawSpan| span.pass as usize == number;
                 prop_assert_eq!(spent(&timed.spans, of_pass), times[number]);
