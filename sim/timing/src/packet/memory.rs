@@ -363,6 +363,8 @@ pub(super) struct Dram {
     precharge: Time,
     latency: Time,
     queue: u64,
+    /// Time of a full queue of lines of one bank, each of another row.
+    longest_wait: Time,
     end: Time,
 }
 
@@ -396,6 +398,8 @@ impl Dram {
             precharge: cycles(spec.precharge_cycles.get()),
             latency: cycles(spec.latency_cycles.get()),
             queue: spec.queue.into(),
+            longest_wait: burst.max(cycles(spec.activate_cycles.get() + spec.precharge_cycles.get()))
+                * Time::from(spec.queue),
             end: 0,
         }
     }
@@ -448,9 +452,9 @@ impl Dram {
             None => {
                 let before = &mut bank.rows[bank.place(seen.from)];
                 let opens = self.activate + if *before == OpenRow::NONE { 0 } else { self.precharge };
-                // The next row can open once the last line is issued.
+                // The next row can open once the last line is issued, at the latest when a full queue has left.
                 let held = work - self.burst;
-                let closes = before.until.max(seen.from);
+                let closes = before.until.max(seen.from).min(seen.from + self.longest_wait);
                 let begin = bank.time.reserve_as(turn, closes, opens + held).0;
                 before.closes = begin;
                 // The bus idles from the end of the last transfer on if the queue has lines of this bank alone. Those that joined
