@@ -9,6 +9,7 @@ mod conservation;
 mod draws;
 mod ladder;
 mod passes;
+mod random_gpus;
 mod rates;
 mod sampled;
 mod waiting;

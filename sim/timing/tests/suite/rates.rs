@@ -11,20 +11,20 @@ const BATCH: u32 = 512;
 
 /// The timing part of a GPU file.
 #[derive(serde::Deserialize)]
-struct Gpu {
-    core_hz: f64,
-    memory_hz: f64,
-    units: MachineSpec,
+pub struct Gpu {
+    pub core_hz: f64,
+    pub memory_hz: f64,
+    pub units: MachineSpec,
 }
 
 impl Gpu {
-    fn builtin(name: &str) -> Self {
+    pub fn builtin(name: &str) -> Self {
         let path = format!("{}/../run/gpus/{name}.ron", env!("CARGO_MANIFEST_DIR"));
         activity::spec::load(path.as_ref()).unwrap()
     }
 
     /// A frame at the levels `stepped`, `packet` and `bound`.
-    fn run(&self, units: &MachineSpec, packets: &Packets) -> [Timed; 3] {
+    pub fn run(&self, units: &MachineSpec, packets: &Packets) -> [Timed; 3] {
         let clocks = Clocks::new(self.core_hz, self.memory_hz).unwrap();
         let recorder = || Recorder::new(1_000_000, 1 << 16);
         let mut builder = DemandBuilder::new(units);
