@@ -237,6 +237,34 @@ fn a_crash_reports_its_place_and_a_command_to_repeat_it() {
     }
 }
 
+/// Draws and what is of no single draw are the pass: time, energy and counts at every level, busy time where stalls are recorded.
+#[test]
+fn the_draws_of_a_pass_add_up_to_it() {
+    for level in ["stepped", "packet", "bound"] {
+        let summary = run("default", &["--size", "64x36", "--frames", "0..1", "--timing", level]).summary();
+        let pass = &summary["passes"][0];
+        let mut parts: Vec<&Value> = pass["draws"].as_array().expect("draws").iter().collect();
+        assert!(parts.len() > 1, "{level}");
+        parts.push(&pass["others"]);
+        for key in ["time_s", "energy_j", "events_j"] {
+            let sum: f64 = parts.iter().filter_map(|part| part[key].as_f64()).sum();
+            let whole = pass[key].as_f64().expect("a number");
+            assert!((sum / whole - 1.0).abs() < 1e-9, "{level}: {key} {sum} of {whole}");
+        }
+        for (event, count) in pass["counts"].as_object().expect("counts") {
+            let sum: u64 = parts.iter().filter_map(|part| part["counts"][event].as_u64()).sum();
+            assert_eq!(count.as_u64(), Some(sum), "{level}: {event}");
+        }
+        let busy = |part: &Value| {
+            let share = part["stalls"]["sample_test"]["busy"].as_f64();
+            share.map_or(0.0, |share| share * part["time_s"].as_f64().unwrap_or(0.0))
+        };
+        let (sum, whole) = (parts.iter().map(|part| busy(part)).sum::<f64>(), busy(pass));
+        assert_eq!(whole > 0.0, level == "stepped");
+        assert!((sum - whole).abs() <= 1e-3 * whole, "{level}: busy for {sum} s of {whole} s");
+    }
+}
+
 #[test]
 fn the_work_of_passes_adds_up_to_that_of_the_run() {
     let small = ["--size", "64x36", "--frames", "0..1"];

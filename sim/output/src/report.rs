@@ -244,13 +244,25 @@ pub struct PassRow {
     pub name: String,
     /// Number of passes.
     pub passes: u64,
-    /// Seconds, and the share of the time of all rows.
+    /// All of them together.
+    #[serde(flatten)]
+    pub all: WorkRow,
+    /// Each draw, by its place in the pass; empty if they are not shown.
+    pub draws: Vec<WorkRow>,
+    /// What is of no single draw.
+    pub others: Option<WorkRow>,
+}
+
+/// Time, energy and memory traffic of passes or draws.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct WorkRow {
+    /// Seconds.
     pub time_s: f64,
-    /// Share of the time of all rows, 0 to 1.
+    /// Share of the time of all passes, 0 to 1.
     pub time_share: f64,
     /// Joules.
     pub energy_j: f64,
-    /// Share of the energy of all rows, 0 to 1.
+    /// Share of the energy of all passes, 0 to 1.
     pub energy_share: f64,
     /// Bytes to and from memory.
     pub dram_bytes: u64,

@@ -113,8 +113,8 @@ fn simulate_frame(
     let drawn = ready.draw(&mut gpu).map_err(RunError::on(&plan.gpu))?;
     let mut report = gpu.finish();
     let heat = std::mem::take(&mut report.heat);
-    passes::limit_draws(&mut report);
-    let timed = clock.finish()?;
+    let mut timed = clock.finish()?;
+    passes::limit_draws(&mut report, &mut timed);
     let accuracy = AccuracyWarning::all(plan.options.timing, &timed);
     let timeline = timed.timeline;
     let power = plan.model.frame(&timeline).map_err(|source| RunError::Timeline { frame: number, source })?;
@@ -131,6 +131,7 @@ fn simulate_frame(
             counts: report.counts(),
             report,
             times: timed.passes,
+            spans: timed.spans,
             facts: drawn.facts,
             warnings: drawn.warnings,
             regime: ready.regime()?,

@@ -1,12 +1,12 @@
 //! Work and energy by pass and by draw, over the simulated frames of a run.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 
-use activity::{Counts, Event};
-use pipeline::FrameReport;
+use activity::{Counts, Event, Packet};
+use pipeline::{FrameReport, PassReport};
 use power_model::PowerModel;
 use serde::Serialize;
-use timing::{PassTime, Stalls};
+use timing::{DrawSpan, PassTime, Stalls, Timed};
 
 use crate::stalls::{self, StalledSpan};
 use crate::{Observed, Plan, Simulated, StallShares};
@@ -18,28 +18,31 @@ pub struct PassSummary {
     pub name: String,
     /// Number of passes of this name.
     pub passes: u64,
-    /// Seconds from the end of the pass before to its own end. Those of all passes add up to the busy time of the frames.
-    pub time_s: f64,
-    /// Energy in joules: that of the events, and the other energy of frames by time.
-    pub energy_j: f64,
-    /// Work of all of them.
+    /// All of them. Their time is from the end of the pass before to their own end; that of all passes adds up to the busy time of
+    /// the frames.
     #[serde(flatten)]
-    pub work: WorkSummary,
-    /// Busy, idle and stalled shares of each unit's time in these passes, if the timing level records stalls.
-    pub stalls: BTreeMap<&'static str, StallShares>,
+    pub all: WorkSummary,
     /// Draws of a pass, by their place in it. Empty if there is one draw only, or too many.
     pub draws: Vec<WorkSummary>,
+    /// What is of no single draw; with the draws it adds up to `all`. `None` without draws.
+    pub others: Option<WorkSummary>,
 }
 
 /// Work of passes or draws.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct WorkSummary {
+    /// Time in seconds.
+    pub time_s: f64,
+    /// Energy in joules: that of the events, and the other energy of frames by time.
+    pub energy_j: f64,
     /// Energy of the events in joules; parts that depend on time are not in it.
     pub events_j: f64,
     /// Bytes to and from memory.
     pub dram_bytes: u64,
     /// Event counts.
     pub counts: Counts,
+    /// Busy, idle and stalled shares of each unit's time, if the timing level records stalls.
+    pub stalls: BTreeMap<&'static str, StallShares>,
 }
 
 /// Name of the last row: results that are written to memory when a frame ends.
@@ -47,95 +50,164 @@ pub const WRITE_BACK: &str = "write back";
 /// Largest number of draws of a pass that are listed.
 const MAX_DRAWS: usize = 256;
 
-/// Drops the numbers of single draws where there are too many to list.
-pub(crate) fn limit_draws(report: &mut FrameReport) {
+/// Drops the numbers of single draws where there are too many to list, and their spans where nobody reads them: those of draws
+/// that take turns are for stalls alone.
+pub(crate) fn limit_draws(report: &mut FrameReport, timed: &mut Timed) {
     report.passes.iter_mut().filter(|pass| pass.draws.len() > MAX_DRAWS).for_each(|pass| pass.forget_draws());
+    timed
+        .passes
+        .iter_mut()
+        .filter(|pass| pass.draws_ps.len() > MAX_DRAWS)
+        .for_each(|pass| pass.draws_ps.clear());
+    if timed.stalls.is_none() && take_turns(&timed.spans) {
+        timed.spans = Vec::new();
+    }
 }
 
-impl WorkSummary {
-    fn new(counts: Counts, model: &PowerModel) -> Self {
-        Self {
-            events_j: model.counts_energy(&counts).total_j(),
-            dram_bytes: counts[Event::DramReadBytes] + counts[Event::DramWriteBytes],
-            counts,
-        }
-    }
+/// Whether any draw has more than one of the spans.
+pub(crate) fn take_turns(spans: &[DrawSpan]) -> bool {
+    let mut seen = HashSet::new();
+    let of_draws = spans.iter().filter(|span| span.draw != Packet::NONE);
+    of_draws.into_iter().any(|span| !seen.insert((span.pass, span.draw)))
 }
 
 /// Passes of all simulated frames of a run, in the order of their first use.
 pub(crate) fn summaries(plan: &Plan, simulated: &Simulated) -> Vec<PassSummary> {
     let mut groups: Vec<Group<'_>> = Vec::new();
-    let mut write_back = Counts::default();
+    let mut write_back = Spent::default();
     for frame in simulated.in_order() {
-        let Some(Observed { report, times, counts, stalls, .. }) = frame.observed() else { continue };
-        write_back += &report.write_back;
-        let events_j = plan.model.counts_energy(counts).total_j();
+        let Some(observed) = frame.observed() else { continue };
+        write_back.counts += &observed.report.write_back;
+        let events_j = plan.model.counts_energy(&observed.counts).total_j();
         let others_j = frame.power.energy().total_j() - events_j;
         let others_w = others_j / frame.power.duration_s();
-        add(&mut groups, report, (times, stalls.as_ref()), others_w);
+        add(&mut groups, &FrameWork::new(observed), others_w);
     }
     let mut rows: Vec<_> = groups.into_iter().map(|group| group.summary(&plan.model)).collect();
-    let (name, work) = (WRITE_BACK.to_owned(), WorkSummary::new(write_back, &plan.model));
-    let (stalls, draws) = Default::default();
-    rows.push(PassSummary { name, passes: 0, time_s: 0.0, energy_j: work.events_j, work, stalls, draws });
+    let all = write_back.summary(&plan.model);
+    rows.push(PassSummary { name: WRITE_BACK.to_owned(), passes: 0, all, draws: Vec::new(), others: None });
     rows
 }
 
-/// Passes of one name, so far.
-struct Group<'a> {
-    name: String,
-    passes: u64,
+/// What is known of the passes of a frame.
+struct FrameWork<'a> {
+    report: &'a FrameReport,
+    times: &'a [PassTime],
+    spans: &'a [DrawSpan],
+    stalls: Option<&'a Stalls>,
+}
+
+impl<'a> FrameWork<'a> {
+    fn new(observed: &'a Observed) -> Self {
+        let Observed { report, times, spans, stalls, .. } = observed;
+        Self { report, times, spans, stalls: stalls.as_ref() }
+    }
+
+    /// Spans of a pass with their draws, if stalls are recorded.
+    fn stalled(&self, pass: usize) -> impl Iterator<Item = (usize, StalledSpan<'a>)> {
+        let mut before_ps = 0;
+        let span = move |span: &DrawSpan| {
+            let ends = [std::mem::replace(&mut before_ps, span.end_ps), span.end_ps];
+            (span.pass as usize, span.draw as usize, ends)
+        };
+        let stalls = self.stalls;
+        let of_pass = self.spans.iter().map(span).filter(move |(of, ..)| *of == pass);
+        of_pass.filter_map(move |(_, draw, ends)| Some((draw, (stalls?, ends))))
+    }
+}
+
+/// Time, energy and work, so far.
+#[derive(Clone, Default)]
+struct Spent<'a> {
     time_s: f64,
     /// Energy that depends on time, in joules.
     others_j: f64,
     counts: Counts,
-    draws: Vec<Counts>,
     stalled: Vec<StalledSpan<'a>>,
 }
 
-/// Adds the passes of a frame. `others_w` is its power besides the events.
-fn add<'a>(
-    groups: &mut Vec<Group<'a>>,
-    report: &FrameReport,
-    (times, stalls): (&[PassTime], Option<&'a Stalls>),
-    others_w: f64,
-) {
-    let mut before_ps = 0;
-    for (number, pass) in report.passes.iter().enumerate() {
-        let place = groups.iter().position(|group| group.name == pass.name).unwrap_or_else(|| {
-            let (counts, draws, stalled) = Default::default();
-            let name = pass.name.clone();
-            groups.push(Group { name, passes: 0, time_s: 0.0, others_j: 0.0, counts, draws, stalled });
-            groups.len() - 1
-        });
-        let end_ps = times.get(number).map_or(before_ps, |time| time.end_ps);
-        let time_s = (end_ps - before_ps) as f64 * 1e-12;
-        let span = [std::mem::replace(&mut before_ps, end_ps), end_ps];
-        let group = &mut groups[place];
-        group.stalled.extend(stalls.map(|stalls| (stalls, span)));
-        group.passes += 1;
-        group.time_s += time_s;
-        group.others_j += time_s * others_w;
-        group.counts += &pass.counts();
-        if pass.draws.len() > group.draws.len() {
-            group.draws.resize(pass.draws.len(), Counts::default());
+impl Spent<'_> {
+    fn add(&mut self, counts: &Counts, time_ps: u64, others_w: f64) {
+        let time_s = time_ps as f64 * 1e-12;
+        self.time_s += time_s;
+        self.others_j += time_s * others_w;
+        self.counts += counts;
+    }
+
+    fn summary(self, model: &PowerModel) -> WorkSummary {
+        let Self { time_s, others_j, counts, stalled } = self;
+        let events_j = model.counts_energy(&counts).total_j();
+        WorkSummary {
+            time_s,
+            energy_j: events_j + others_j,
+            events_j,
+            dram_bytes: counts[Event::DramReadBytes] + counts[Event::DramWriteBytes],
+            stalls: stalls::shares_of(&stalled, &counts),
+            counts,
         }
-        group.draws.iter_mut().zip(&pass.draws).for_each(|(sum, draw)| *sum += draw);
     }
 }
 
-impl Group<'_> {
+/// Passes of one name, so far.
+#[derive(Default)]
+struct Group<'a> {
+    name: String,
+    passes: u64,
+    all: Spent<'a>,
+    draws: Vec<Spent<'a>>,
+    others: Spent<'a>,
+}
+
+/// Adds the passes of a frame. `others_w` is its power besides the events.
+fn add<'a>(groups: &mut Vec<Group<'a>>, frame: &FrameWork<'a>, others_w: f64) {
+    let mut before_ps = 0;
+    for (number, pass) in frame.report.passes.iter().enumerate() {
+        let place = groups.iter().position(|group| group.name == pass.name).unwrap_or_else(|| {
+            groups.push(Group { name: pass.name.clone(), ..Group::default() });
+            groups.len() - 1
+        });
+        let time = frame.times.get(number);
+        let end_ps = time.map_or(before_ps, |time| time.end_ps);
+        let span = [std::mem::replace(&mut before_ps, end_ps), end_ps];
+        let group = &mut groups[place];
+        group.passes += 1;
+        group.all.stalled.extend(frame.stalls.map(|stalls| (stalls, span)));
+        group.all.add(&pass.counts(), end_ps - span[0], others_w);
+        if pass.draws.len() > 1 {
+            let draws_ps = time.map_or(&[][..], |time| &time.draws_ps);
+            group.add_draws(pass, (draws_ps, end_ps - span[0]), others_w);
+            frame.stalled(number).for_each(|(draw, span)| group.of_draw(draw).stalled.push(span));
+        }
+    }
+}
+
+impl<'a> Group<'a> {
+    /// Adds the draws of a pass, by the time of each of them and of the pass.
+    fn add_draws(&mut self, pass: &PassReport, (draws_ps, pass_ps): (&[u64], u64), others_w: f64) {
+        if pass.draws.len() > self.draws.len() {
+            self.draws.resize(pass.draws.len(), Spent::default());
+        }
+        let times = draws_ps.iter().copied().chain(std::iter::repeat(0));
+        for ((spent, draw), time_ps) in self.draws.iter_mut().zip(&pass.draws).zip(times) {
+            spent.add(draw, time_ps, others_w);
+        }
+        let all_ps: u64 = draws_ps.iter().take(pass.draws.len()).sum();
+        self.others.add(&pass.others, pass_ps - all_ps, others_w);
+    }
+
+    fn of_draw(&mut self, draw: usize) -> &mut Spent<'a> {
+        self.draws.get_mut(draw).unwrap_or(&mut self.others)
+    }
+
     fn summary(self, model: &PowerModel) -> PassSummary {
-        let listed = if (2..=MAX_DRAWS).contains(&self.draws.len()) { self.draws } else { Vec::new() };
-        let work = WorkSummary::new(self.counts, model);
+        let is_listed = (2..=MAX_DRAWS).contains(&self.draws.len());
+        let draws = if is_listed { self.draws } else { Vec::new() };
         PassSummary {
             name: self.name,
             passes: self.passes,
-            time_s: self.time_s,
-            energy_j: work.events_j + self.others_j,
-            stalls: stalls::shares_of(&self.stalled, &work.counts),
-            work,
-            draws: listed.into_iter().map(|draw| WorkSummary::new(draw, model)).collect(),
+            all: self.all.summary(model),
+            draws: draws.into_iter().map(|draw| draw.summary(model)).collect(),
+            others: is_listed.then(|| self.others.summary(model)),
         }
     }
 }
@@ -143,7 +215,8 @@ impl Group<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use pipeline::PassReport;
+    use activity::{Timeline, Unit};
+    use power_model::{EnergyTable, Platform};
 
     fn counts(event: Event, count: u64) -> Counts {
         let mut counts = Counts::default();
@@ -159,18 +232,43 @@ mod tests {
     fn passes_of_a_name_are_one_row_with_their_draws() {
         let mut groups = Vec::new();
         let hits = |count| counts(Event::SamplesHit, count);
-        for _ in 0..2 {
-            let passes = vec![pass("map", vec![hits(5)]), pass("image", vec![hits(1), hits(2)])];
-            let time = |begin_ps, end_ps| PassTime { begin_ps, end_ps, busy_ps: [0; activity::Unit::COUNT] };
-            let times = [time(0, 3_000_000), time(2_000_000, 5_000_000)];
-            add(&mut groups, &FrameReport { passes, ..FrameReport::default() }, (&times, None), 2.0);
-        }
+        let time = |begin_ps, end_ps, draws_ps: &[u64]| PassTime {
+            begin_ps,
+            end_ps,
+            busy_ps: [0; Unit::COUNT],
+            draws_ps: draws_ps.to_vec(),
+        };
+        let times = [time(0, 3_000_000, &[]), time(2_000_000, 5_000_000, &[500_000, 900_000])];
+        let passes = vec![pass("map", vec![hits(5)]), pass("image", vec![hits(1), hits(2)])];
+        let report = FrameReport { passes, ..FrameReport::default() };
+        let frame = FrameWork { report: &report, times: &times, spans: &[], stalls: None };
+        (0..2).for_each(|_| add(&mut groups, &frame, 2.0));
         let found: Vec<_> = groups.iter().map(|group| (group.name.as_str(), group.passes)).collect();
         assert_eq!(found, [("map", 2), ("image", 2)]);
-        assert_eq!(groups[1].draws, [hits(2), hits(4)]);
-        let spent: Vec<_> = groups.iter().map(|group| (group.time_s, group.others_j)).collect();
+        let spent: Vec<_> = groups.iter().map(|group| (group.all.time_s, group.all.others_j)).collect();
         assert_eq!(spent, [(6e-6, 12e-6), (4e-6, 8e-6)], "from end to end");
-        assert_eq!((groups[1].counts[Event::SamplesHit], groups[1].counts[Event::PixelsResolved]), (6, 6));
+        let image = &groups[1];
+        assert_eq!((image.all.counts[Event::SamplesHit], image.all.counts[Event::PixelsResolved]), (6, 6));
+        assert_eq!([0, 1].map(|draw| image.draws[draw].counts), [hits(2), hits(4)]);
+        assert_eq!([0, 1].map(|draw| image.draws[draw].time_s), [1e-6, 1.8e-6]);
+
+        let table = EnergyTable::builtin("28nm").unwrap();
+        let model = PowerModel::new(&table, &Platform::builtin("reference").unwrap()).unwrap();
+        let image = groups.remove(1).summary(&model);
+        let parts: Vec<_> = image.draws.iter().chain(&image.others).collect();
+        let sum = |of: fn(&WorkSummary) -> f64| {
+            parts.iter().map(|part| of(part)).sum::<f64>() / of(&image.all) - 1.0
+        };
+        assert!(sum(|work| work.time_s).abs() < 1e-9 && sum(|work| work.energy_j).abs() < 1e-9);
+    }
+
+    #[test]
+    fn draws_that_come_back_take_turns() {
+        let spans = |draws: &[u32]| -> Vec<DrawSpan> {
+            let span = |(&draw, end_ps)| DrawSpan { pass: 0, draw, end_ps };
+            draws.iter().zip(1..).map(span).collect()
+        };
+        assert!(!take_turns(&spans(&[0, Packet::NONE, 1, Packet::NONE])) && take_turns(&spans(&[0, 1, 0])));
     }
 
     #[test]
@@ -178,7 +276,14 @@ mod tests {
         let draws = vec![counts(Event::SamplesHit, 1); MAX_DRAWS + 1];
         let mut report = FrameReport { passes: vec![pass("scene", draws)], ..FrameReport::default() };
         let before = report.counts();
-        limit_draws(&mut report);
+        let mut timed = untimed();
+        limit_draws(&mut report, &mut timed);
         assert!(report.passes[0].draws.is_empty() && report.counts() == before);
+    }
+
+    fn untimed() -> Timed {
+        let timeline = Timeline { bin_ps: 1, duration_ps: 1, bins: Vec::new() };
+        let (passes, spans) = Default::default();
+        Timed { timeline, cycles: 0, stalls: None, unit_cycles: 0, packets: 0, rows: None, passes, spans }
     }
 }

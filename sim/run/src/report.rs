@@ -6,7 +6,7 @@ use output::image::LinearImage;
 use output::plot::part_colour;
 use output::report::{
     CounterRow, FactRow, FileLink, FrameNumbers, FrameRow, PartRow, PassRow, Report, ReportImage, ReportPlot,
-    UnitRow, WarningRow,
+    UnitRow, WarningRow, WorkRow,
 };
 use output::table::{count_or_digits, grouped, shell_line, si};
 use power_model::{Bound, Part};
@@ -15,7 +15,10 @@ use crate::frame::image_name;
 use crate::heat::heat_name;
 use crate::pictures::{Plot, parts_in_use};
 use crate::stalls;
-use crate::{HeatQuantity, Host, Input, Outcome, PassSummary, RunError};
+use crate::{HeatQuantity, Host, Input, Outcome, PassSummary, RunError, WorkSummary};
+
+/// Largest number of draws of a pass in the report; all are in the summary.
+const MAX_DRAWS: usize = 48;
 
 /// Collects the contents of the report.
 pub(super) fn report<'a>(outcome: &'a Outcome, plots: &[Plot]) -> Result<Report<'a>, RunError> {
@@ -132,21 +135,26 @@ fn frame_flags(predicted: bool, flags: String) -> String {
 
 fn passes(outcome: &Outcome) -> Vec<PassRow> {
     let rows = &outcome.summary.passes;
-    let time_s: f64 = rows.iter().map(|pass| pass.time_s).sum();
-    let energy_j: f64 = rows.iter().map(|pass| pass.energy_j).sum();
-    let row = |pass: &PassSummary| PassRow {
-        name: pass.name.clone(),
-        passes: pass.passes,
-        time_s: pass.time_s,
-        time_share: pass.time_s / time_s,
-        energy_j: pass.energy_j,
-        energy_share: pass.energy_j / energy_j,
-        dram_bytes: pass.work.dram_bytes,
-        waits: stalls::waited_for(&pass.stalls)
+    let time_s: f64 = rows.iter().map(|pass| pass.all.time_s).sum();
+    let energy_j: f64 = rows.iter().map(|pass| pass.all.energy_j).sum();
+    let work = |work: &WorkSummary| WorkRow {
+        time_s: work.time_s,
+        time_share: work.time_s / time_s,
+        energy_j: work.energy_j,
+        energy_share: work.energy_j / energy_j,
+        dram_bytes: work.dram_bytes,
+        waits: stalls::waited_for(&work.stalls)
             .into_iter()
             .map(|(unit, share)| format!("{unit} {:.0} %", 100.0 * share))
             .collect::<Vec<_>>()
             .join(", "),
+    };
+    let row = |pass: &PassSummary| PassRow {
+        name: pass.name.clone(),
+        passes: pass.passes,
+        all: work(&pass.all),
+        draws: if pass.draws.len() <= MAX_DRAWS { pass.draws.iter().map(work).collect() } else { Vec::new() },
+        others: pass.others.as_ref().map(work),
     };
     rows.iter().map(row).collect()
 }

@@ -6,7 +6,7 @@ use pipeline::FrameReport;
 use power_model::FramePower;
 use serde::Serialize;
 use timing::sampled::Interval;
-use timing::{AccuracyWarning, PassTime, Stalls};
+use timing::{AccuracyWarning, DrawSpan, PassTime, Stalls};
 use warnings::Warning;
 use workloads::Regime;
 use workloads::job::Fact;
@@ -52,6 +52,8 @@ pub struct Observed {
     pub report: FrameReport,
     /// Time of each pass.
     pub times: Vec<PassTime>,
+    /// When the frame spent its time on which draw; empty if draws take turns and no stalls are recorded.
+    pub spans: Vec<DrawSpan>,
     /// Results of a workload, by name.
     pub facts: Vec<Fact>,
     /// Warnings of a workload.

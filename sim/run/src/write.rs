@@ -1,11 +1,11 @@
 //! Files of a run.
 
-use activity::Unit;
+use activity::{Packet, Unit};
 use output::dir::{Claim, OutDir, SUMMARY};
 use output::progress::Progress;
 use pipeline::PassReport;
 use power_model::Part;
-use timing::PassTime;
+use timing::{DrawSpan, PassTime};
 use traces::energy::{ExtraColumn, FrameEnergy, FrameTable};
 use traces::io::perfetto::{
     self, CounterTrack, FrameSpan, MAX_SLICES, PassSpan, Timeline, UnitTrack, slices_of_bins,
@@ -14,6 +14,7 @@ use traces::score::{TOLERANCE_S, truth_beside};
 
 use crate::frame::image_name;
 use crate::heat::heat_name;
+use crate::passes::take_turns;
 use crate::{FIGURES, FrameRow, Observed, Outcome, Plan, RunError, pictures, report, stalls};
 
 /// Files that a run may write.
@@ -137,19 +138,53 @@ fn frames(outcome: &Outcome) -> Vec<FrameSpan> {
         .collect()
 }
 
-/// Passes of a frame that starts at `start_s`, each from the end of the one before; none if there are more than `most`.
+/// Passes of a frame that starts at `start_s`, each from the end of the one before, with their draws; no passes or draws if there are
+/// more than `most`.
 fn passes(observed: &Observed, start_s: f64, most: usize) -> Vec<PassSpan> {
     if observed.times.len() > most {
         return Vec::new();
     }
     let at = |ps: u64| ns(start_s + ps as f64 * 1e-12);
     let mut before_ps = 0;
-    let span = |(pass, time): (&PassReport, &PassTime)| {
+    let span = |((pass, time), number): ((&PassReport, &PassTime), u32)| {
         let start_ps = std::mem::replace(&mut before_ps, time.end_ps).max(time.begin_ps);
-        PassSpan { name: pass.name.clone(), start_ns: at(start_ps), end_ns: at(time.end_ps) }
+        let ends_ns = [start_ps, time.end_ps].map(at);
+        let name = pass.name.clone();
+        let parts = draws(observed, number, ends_ns, (at, most));
+        PassSpan { name, start_ns: ends_ns[0], end_ns: ends_ns[1], parts }
     };
-    let spans = observed.report.passes.iter().zip(&observed.times).map(span);
+    let spans = observed.report.passes.iter().zip(&observed.times).zip(0..).map(span);
     spans.filter(|span| span.start_ns < span.end_ns).collect()
+}
+
+/// Draws of pass number `pass`, which lasts so long. If they take turns they are one slice, which says so.
+fn draws(
+    observed: &Observed,
+    pass: u32,
+    [start_ns, end_ns]: [u64; 2],
+    (at, most): (impl Fn(u64) -> u64, usize),
+) -> Vec<PassSpan> {
+    let count = observed.report.passes[pass as usize].draws.len();
+    if count < 2 || observed.times.iter().all(|time| time.draws_ps.is_empty()) {
+        return Vec::new();
+    }
+    if observed.spans.is_empty() || observed.spans.len() > most || take_turns(&observed.spans) {
+        let name = format!("{count} draws, in no order of time");
+        return vec![PassSpan { name, start_ns, end_ns, parts: Vec::new() }];
+    }
+    let mut before_ps = 0;
+    let span = |span: &DrawSpan| {
+        let ends_ps = [std::mem::replace(&mut before_ps, span.end_ps), span.end_ps];
+        let [start_ns, end_ns] = ends_ps.map(|ps| at(ps).clamp(start_ns, end_ns));
+        let is_shown = span.pass == pass && span.draw != Packet::NONE && start_ns < end_ns;
+        is_shown.then(|| PassSpan {
+            name: format!("draw {}", span.draw),
+            start_ns,
+            end_ns,
+            parts: Vec::new(),
+        })
+    };
+    observed.spans.iter().filter_map(span).collect()
 }
 
 fn unit_track(outcome: &Outcome, unit: Unit) -> UnitTrack<'static> {

@@ -2,7 +2,7 @@
 
 use output::report::{
     CounterRow, FactRow, FileLink, FrameNumbers, FrameRow, Headline, PartRow, PassRow, Report, ReportImage,
-    ReportPlot, UnitRow, WarningRow,
+    ReportPlot, UnitRow, WarningRow, WorkRow,
 };
 use output::{Claim, Destination, MeanSd, plot};
 use power_model::Part;
@@ -48,6 +48,14 @@ fn report(text: &str, number: f64) -> Report<'static> {
     let stats = Some(MeanSd { mean: number, sd: number });
     let fact = FactRow { name: owned(), value: owned(), note: owned() };
     let image = ReportImage { caption: owned(), png: b"\x89PNG?".to_vec(), link: Some(owned()) };
+    let work = WorkRow {
+        time_s: number,
+        time_share: 1.0,
+        energy_j: number,
+        energy_share: 1.0,
+        dram_bytes: 64,
+        waits: owned(),
+    };
     Report {
         title: owned().into(),
         facts: vec![fact.clone()],
@@ -61,12 +69,9 @@ fn report(text: &str, number: f64) -> Report<'static> {
         passes: vec![PassRow {
             name: owned(),
             passes: 1,
-            time_s: number,
-            time_share: 1.0,
-            energy_j: number,
-            energy_share: 1.0,
-            dram_bytes: 64,
-            waits: owned(),
+            all: work.clone(),
+            draws: vec![work.clone(), work.clone()],
+            others: Some(work),
         }],
         units: vec![UnitRow {
             name: owned(),

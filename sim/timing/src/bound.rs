@@ -23,6 +23,7 @@ use activity::{Counts, Event, LineAccess, Packet, PacketCounts, Unit, Waits};
 use crate::address::AddressMap;
 use crate::clock::{Clocks, Time};
 use crate::demand::{CLIENTS, DemandBuilder, ServiceDemand, Station, port};
+use crate::draws::{ByDraw, PassParts};
 use crate::passes::Passes;
 use crate::spec::MachineSpec;
 use crate::work::{UnitSpeeds, UnitWork};
@@ -35,8 +36,7 @@ pub fn bound(machine: &MachineSpec, clocks: Clocks, totals: &Totals, mut recorde
     let mut passes = Passes::default();
     for segment in totals.segments().filter(|segment| segment.packets > 0) {
         lengths[segment.phase].add(segment, speeds);
-        let work = passes.work(segment.pass);
-        work.iter_mut().zip(segment.work).for_each(|(sum, part)| *sum += part);
+        add(passes.work(segment.pass), &segment.work);
     }
     let rows = totals.rows();
     let mut times = Vec::with_capacity(lengths.len());
@@ -65,9 +65,14 @@ pub fn bound(machine: &MachineSpec, clocks: Clocks, totals: &Totals, mut recorde
         unit_cycles: 0,
         packets: totals.segments().map(|segment| u64::from(segment.packets)).sum(),
         rows: Some(share),
-        passes: passes.finish(machine, &clocks, timeline.duration_ps),
+        passes: passes.finish(machine, &clocks, timeline.duration_ps, &totals.parts()),
+        spans: Vec::new(),
         timeline,
     }
+}
+
+fn add(to: &mut UnitWork, work: &UnitWork) {
+    to.iter_mut().zip(work).for_each(|(sum, part)| *sum += part);
 }
 
 /// Parts of the length of a phase, in grains.
@@ -92,7 +97,7 @@ impl PhaseLength {
                 self.stages[segment.path] += stage;
             }
         }
-        self.work.iter_mut().zip(segment.work).for_each(|(sum, part)| *sum += part);
+        add(&mut self.work, &segment.work);
     }
 
     /// Length of `phase`, with the busy time of its units and its row time.
@@ -219,6 +224,8 @@ pub struct Totals {
     /// Row time of the busiest bank, for each phase before the last.
     rows: Vec<Time>,
     phases: Vec<Phase>,
+    /// Work of every draw, by pass.
+    draws: Vec<ByDraw<UnitWork>>,
     /// Whether each path is empty.
     empty: [bool; 2],
     /// Barriers so far that vertices wait for.
@@ -252,6 +259,7 @@ impl Totals {
             banks: Banks::new(machine, clocks),
             rows: Vec::new(),
             phases: Vec::new(),
+            draws: Vec::new(),
             empty: [true; 2],
             full_barriers: 0,
         }
@@ -274,9 +282,12 @@ impl Totals {
         let program = self.uncontended.program(demand);
         let alone = self.uncontended.packet(demand, program, counts);
         let segment = self.segment(path, phase, demand);
-        builder.add_work(demand, counts, &mut segment.work);
+        let mut own = UnitWork::default();
+        builder.add_work(demand, counts, &mut own);
+        add(&mut segment.work, &own);
         segment.packets += 1;
         self.phases[phase].counts += counts;
+        add(ByDraw::of(&mut self.draws, demand.pass, demand.draw), &own);
         self.banks.add(lines);
         if let Some(waits) = demand.barrier {
             return self.barrier(waits, demand, alone);
@@ -286,8 +297,6 @@ impl Totals {
         let at = &mut self.phases[phase];
         at.fills[path] |= std::mem::take(&mut self.empty[path]);
         if alone > at.longest[path].alone {
-            let mut own = UnitWork::default();
-            builder.add_work(demand, counts, &mut own);
             let [busiest, stage] = self.speeds.busiest(&own);
             let hidden = full.into_iter().fold(busiest.max(program), |most, full| most.max(full as Time));
             let [beyond, beyond_stage] = [hidden, stage].map(|part| alone.saturating_sub(part));
@@ -340,6 +349,11 @@ impl Totals {
             *last += self.banks.clone().take_longest();
         }
         rows
+    }
+
+    /// Parts of the time of each pass: the time of each draw's work in its busiest unit.
+    fn parts(&self) -> Vec<PassParts> {
+        self.draws.iter().map(|pass| pass.map(|work| self.speeds.busiest(work)[0])).collect()
     }
 
     fn segments(&self) -> impl Iterator<Item = &Segment> {

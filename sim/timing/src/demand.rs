@@ -84,6 +84,8 @@ pub struct ServiceDemand {
     pub front: bool,
     /// Pass number in the frame.
     pub pass: u32,
+    /// Draw number in the pass; [`Packet::NONE`] for work of no single draw.
+    pub draw: u32,
     /// Batch number in the frame, all passes counted. Barriers are in no batch.
     pub batch: u32,
     /// For a barrier: which later packets wait for it.
@@ -209,6 +211,7 @@ impl DemandBuilder {
         let mut demand = ServiceDemand {
             front,
             pass: packet.pass,
+            draw: packet.draw,
             batch,
             barrier,
             last: if front { Station::Command } else { Station::Traversal },

@@ -11,7 +11,7 @@
 //! - [`BoundClock`]: a roofline over segments of the stream, from [`Totals`] gathered while packets arrive.
 //! - [`sampled`]: which frames of an animation to simulate, and estimates of the others.
 //! - [`streams`]: streams that challenge the levels, and microbenchmarks of single rates.
-//! - [`PassTime`]: when a pass began and ended, and the time of its work in every unit.
+//! - [`PassTime`]: when a pass began and ended, the time of its work in every unit, and that of its draws.
 //! - [`Recorder`]: events and busy time over time; [`Stalls`]: why units did not work.
 //!
 //! The crate contains no geometry and no energy. The activity is fixed before its timing: cache hits and
@@ -34,6 +34,7 @@ mod bound;
 mod clock;
 mod data_unit;
 mod demand;
+mod draws;
 mod frame_clock;
 mod packet;
 mod passes;
@@ -48,6 +49,7 @@ mod work;
 pub use bound::{BoundClock, Totals, bound};
 pub use clock::{Clocks, Time};
 pub use demand::{CLIENTS, DemandBuilder, ServiceDemand, Station};
+pub use draws::DrawSpan;
 pub use frame_clock::AccuracyWarning;
 pub use frame_clock::{FrameClock, Level, Machine, TimingError};
 pub use packet::{MAX_CYCLES, PacketClock};
@@ -80,6 +82,9 @@ pub struct Timed {
     pub rows: Option<f64>,
     /// The passes of the frame, by number.
     pub passes: Vec<PassTime>,
+    /// When the frame spent its time on which draw, in order; empty at the level `bound`, and at `packet` if draws take turns
+    /// very often.
+    pub spans: Vec<DrawSpan>,
 }
 
 /// `length_ps` over the busy time of the busiest unit.

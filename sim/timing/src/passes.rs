@@ -3,11 +3,12 @@
 use activity::Unit;
 
 use crate::clock::{Clocks, Time};
+use crate::draws::PassParts;
 use crate::spec::MachineSpec;
 use crate::work::{UnitSpeeds, UnitWork};
 
 /// Time of a pass. Passes may overlap.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PassTime {
     /// When its first packet starts.
     pub begin_ps: u64,
@@ -16,6 +17,9 @@ pub struct PassTime {
     pub end_ps: u64,
     /// Time that its work takes each unit at its rates, all servers together. It is the same at all levels.
     pub busy_ps: [u64; Unit::COUNT],
+    /// Time of each draw, by number: its part of the time from the end of the pass before to the end of this one. What is
+    /// missing is that of the resolve, the barrier and the last lines to memory.
+    pub draws_ps: Vec<u64>,
 }
 
 /// A pass, as far as known.
@@ -56,8 +60,14 @@ impl Passes {
         &mut self.0[pass]
     }
 
-    /// Times of the passes of a frame that ends at `end_ps`. A pass without packets takes none.
-    pub fn finish(&self, machine: &MachineSpec, clocks: &Clocks, end_ps: u64) -> Vec<PassTime> {
+    /// Times of the passes of a frame that ends at `end_ps`, with their `parts`. A pass without packets takes none.
+    pub fn finish(
+        &self,
+        machine: &MachineSpec,
+        clocks: &Clocks,
+        end_ps: u64,
+        parts: &[PassParts],
+    ) -> Vec<PassTime> {
         let speeds = UnitSpeeds::new(machine, clocks);
         let mut ended_ps = 0;
         let time = |(pass, number): (&Pass, usize)| {
@@ -67,6 +77,7 @@ impl Passes {
             PassTime {
                 begin_ps: if pass.begin == Time::MAX { before_ps } else { clocks.ps(pass.begin) },
                 end_ps: ended_ps,
+                draws_ps: parts.get(number).map_or(Vec::new(), |parts| parts.scaled(ended_ps - before_ps)),
                 busy_ps: speeds.times(&pass.work).map(|time| clocks.ps(time)),
             }
         };

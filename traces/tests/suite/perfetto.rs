@@ -143,14 +143,25 @@ fn read(bytes: &[u8]) -> Decoded {
 }
 
 fn timeline(points: Vec<(u64, f64)>) -> Timeline<'static> {
+    let draw = |start_ns| PassSpan {
+        name: "draw 1".to_owned(),
+        start_ns: start_ns + 30,
+        end_ns: start_ns + 60,
+        parts: Vec::new(),
+    };
     let span = |frame, start_ns| FrameSpan {
         frame,
         start_ns,
         busy_end_ns: start_ns + 60,
         end_ns: start_ns + 100,
         passes: vec![
-            PassSpan { name: "map".to_owned(), start_ns, end_ns: start_ns + 20 },
-            PassSpan { name: "image".to_owned(), start_ns: start_ns + 20, end_ns: start_ns + 60 },
+            PassSpan { name: "map".to_owned(), start_ns, end_ns: start_ns + 20, parts: Vec::new() },
+            PassSpan {
+                name: "image".to_owned(),
+                start_ns: start_ns + 20,
+                end_ns: start_ns + 60,
+                parts: vec![draw(start_ns)],
+            },
         ],
         numbers: vec![("energy_mJ", 1.5)],
     };

@@ -26,8 +26,9 @@ pub(super) struct Calendar {
     /// Capacity of a slot.
     capacity: u64,
     used: Vec<u64>,
-    /// The part of it that came late.
+    /// The part of it that came late, and the part that is no work.
     shared: Vec<u64>,
+    blocked: Vec<u64>,
     yielded: Time,
     /// For each slot, a lower bound of the first slot from it on with free capacity (union-find with path
     /// compression).
@@ -46,6 +47,7 @@ impl Calendar {
             capacity: length * servers,
             used: Vec::new(),
             shared: Vec::new(),
+            blocked: Vec::new(),
             yielded: 0,
             next_free: Vec::new(),
         }
@@ -68,6 +70,23 @@ impl Calendar {
                 return (begin, self.end_of_slot_work(slot, at).max(on_all_servers));
             }
             slot = self.find_free(slot + 1);
+        }
+    }
+
+    /// Take so much capacity from `at` on, in which nothing works.
+    pub fn block(&mut self, at: Time, capacity: u64) {
+        let mut slot = self.find_free((at >> self.shift) as usize);
+        let mut remaining = capacity;
+        while remaining > 0 {
+            let here = remaining.min(self.capacity - self.used[slot]);
+            self.blocked.resize(self.blocked.len().max(slot + 1), 0);
+            self.blocked[slot] += here;
+            self.used[slot] += here;
+            remaining -= here;
+            if self.used[slot] == self.capacity {
+                self.next_free[slot] = slot as u32 + 1;
+                slot = self.find_free(slot + 1);
+            }
         }
     }
 
@@ -164,8 +183,10 @@ impl Calendar {
 
     /// Every slot with reserved work: start, end, work and capacity.
     pub fn slots(&self) -> impl Iterator<Item = (Time, Time, u64, u64)> {
-        let used = self.used.iter().zip(0..).filter(|(used, _)| **used > 0);
-        used.map(|(&used, at): (&u64, Time)| (at << self.shift, (at + 1) << self.shift, used, self.capacity))
+        let blocked = self.blocked.iter().chain(std::iter::repeat(&0));
+        let worked = self.used.iter().zip(blocked).map(|(used, blocked)| used - blocked).zip(0..);
+        let worked = worked.filter(|(work, _)| *work > 0);
+        worked.map(|(work, at): (u64, Time)| (at << self.shift, (at + 1) << self.shift, work, self.capacity))
     }
 }
 
@@ -240,6 +261,17 @@ mod tests {
         assert_eq!(calendar.reserve_as(Turn::Late, 32, 4), (32, 40));
         assert_eq!(calendar.reserve_as(Turn::Late, 90, 30), (90, 120));
         assert_eq!(calendar.slots().map(|(_, _, used, _)| used).sum::<u64>(), 64 + 16 + 4 + 30);
+    }
+
+    #[test]
+    fn blocked_time_is_no_work() {
+        let mut calendar = Calendar::new(16, 1);
+        calendar.reserve(0, 10);
+        calendar.block(4, 14);
+        // Six of the first slot and eight of the second are blocked.
+        assert_eq!(calendar.reserve(0, 20), (24, 44));
+        let slots: Vec<_> = calendar.slots().map(|(from, _, work, _)| (from, work)).collect();
+        assert_eq!(slots, [(0, 10), (16, 8), (32, 12)]);
     }
 
     #[test]

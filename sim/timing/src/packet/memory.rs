@@ -161,7 +161,7 @@ impl Memory {
     /// are accepted.
     fn take(&mut self, run: &Run, seen: Time, fetched: &mut Fetched) -> (Time, Time) {
         let Run { head, count, turn, last: later } = *run;
-        let (first, end) = self.l2.reserve_as(turn, seen, u64::from(count) * self.period);
+        let (mut first, end) = self.l2.reserve_as(turn, seen, u64::from(count) * self.period);
         let mut last = end.saturating_sub(self.period).max(first + later);
         if head.kind == LineKind::Hit {
             fetched.arrived = fetched.arrived.max(last + self.latency);
@@ -171,18 +171,20 @@ impl Memory {
         if let Some(arrived) = found {
             fetched.arrived = fetched.arrived.max(arrived + self.latency);
         }
-        fetched.moved = fetched.moved.max(accepted.to + period);
+        // What the queues of the channels do not hold waits in front of the level above.
+        let seen = Span { from: accepted.from + period, to: accepted.to + period };
+        let seen = self.dram.admits(&head, count, seen);
+        accepted = Span { from: seen.from - period, to: seen.to - period };
+        fetched.moved = fetched.moved.max(seen.to);
         for line in head.moved() {
-            let seen = Span { from: accepted.from + period, to: accepted.to + period };
             let moved = self.dram.transfer(line, count, turn, seen);
-            // What the channel's queue does not hold waits in front of the level above.
-            accepted.to = accepted.to.max(moved.queued);
-            fetched.moved = fetched.moved.max(moved.data);
+            fetched.moved = fetched.moved.max(moved);
             if head.fetched() == Some(line) {
                 let latency = self.dram.latency() + latency + self.latency;
-                fetched.arrived = fetched.arrived.max(moved.data + latency);
+                fetched.arrived = fetched.arrived.max(moved + latency);
             }
         }
+        first = first.max(accepted.from.saturating_sub(backlog));
         last = last.max(accepted.to.saturating_sub(backlog));
         fetched.moved = fetched.moved.max(last + self.period);
         self.end = self.end.max(last + self.period);
@@ -255,10 +257,12 @@ struct OpenRow {
     closes: Time,
     /// Lines of the channel before it was opened, plus its own lines.
     own: u64,
+    /// Time on the bus of lines that joined it.
+    joined: Time,
 }
 
 impl OpenRow {
-    const NONE: Self = Self { row: u32::MAX, since: 0, opened: 0, until: 0, closes: 0, own: 0 };
+    const NONE: Self = Self { row: u32::MAX, since: 0, opened: 0, until: 0, closes: 0, own: 0, joined: 0 };
 }
 
 /// A bank: calendar of its row activations, and its latest rows, the newest first.
@@ -277,36 +281,57 @@ struct Channel {
     /// The latest groups of lines, a ring, and where the oldest is.
     recent: Box<[Waiting]>,
     oldest: usize,
+    /// The bank of the last line.
+    last_bank: usize,
+    /// Lines up to the last that are of its bank.
+    of_last_bank: u64,
     /// Scratch memory of [`Self::room_at`].
     leaving: Vec<(Time, u64)>,
+    /// When the last line so far is issued.
+    last_issued: Time,
 }
 
 /// Lines in the queue of a channel.
 #[derive(Clone, Copy, Debug, Default)]
 struct Waiting {
-    /// When they come, and when the last is issued.
+    /// When they enter it, and when the last is issued.
     seen: Time,
     issued: Time,
     count: u64,
 }
 
 impl Channel {
-    /// When a queue of `queue` lines has room for another, if that comes at `seen`: lines leave in any order.
-    fn room_at(&mut self, seen: Time, queue: u64) -> Time {
+    /// When a queue of `queue` lines has room for `count` more, which come at `seen`: lines leave in any order, one every
+    /// `burst`.
+    fn room_for(&mut self, count: u64, seen: Time, queue: u64, burst: Time) -> Time {
+        let most = queue.saturating_sub(count);
+        if self.last_issued <= seen + most * burst {
+            return seen;
+        }
         let waits = |line: &&Waiting| line.seen <= seen && line.issued > seen;
         self.leaving.clear();
         self.leaving.extend(self.recent.iter().filter(waits).map(|line| (line.issued, line.count)));
         self.leaving.sort_unstable();
-        // The last to leave stay in the queue.
+        // The last to leave may stay in the queue.
         let mut held = 0;
-        let last = self.leaving.iter().rev().find(|(_, count)| {
+        for &(issued, count) in self.leaving.iter().rev() {
+            if held + count > most {
+                return issued.saturating_sub((most - held) * burst).max(seen);
+            }
             held += count;
-            held >= queue
-        });
-        last.map_or(seen, |&(issued, _)| issued)
+        }
+        seen
     }
 
-    fn note(&mut self, lines: Waiting) {
+    /// Whether the last `queue` lines are all of `bank`.
+    fn is_of(&self, bank: usize, queue: u64) -> bool {
+        self.last_bank == bank && self.of_last_bank >= queue
+    }
+
+    fn note(&mut self, bank: usize, lines: Waiting) {
+        self.of_last_bank = lines.count + if self.last_bank == bank { self.of_last_bank } else { 0 };
+        self.last_bank = bank;
+        self.last_issued = self.last_issued.max(lines.issued);
         self.recent[self.oldest] = lines;
         self.oldest = (self.oldest + 1) % self.recent.len();
     }
@@ -322,17 +347,9 @@ struct RowUse {
     issued: Time,
     /// Lines of the channel before them.
     lines: u64,
-    /// Their number.
+    /// Their number, and their time on the bus.
     count: u64,
-}
-
-/// Times of a transfer over the bus.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Moved {
-    /// When the queue of the channel has room for the last line.
-    pub queued: Time,
-    /// When its data has been transferred.
-    pub data: Time,
+    work: Time,
 }
 
 /// All channels.
@@ -345,8 +362,9 @@ pub(super) struct Dram {
     activate: Time,
     precharge: Time,
     latency: Time,
-    backlog: Time,
     queue: u64,
+    /// Time of a full queue of lines of one bank, each of another row.
+    longest_wait: Time,
     end: Time,
 }
 
@@ -366,7 +384,10 @@ impl Dram {
             lines: 0,
             recent: vec![Waiting::default(); remembered].into(),
             oldest: 0,
+            last_bank: 0,
+            of_last_bank: 0,
             leaving: Vec::new(),
+            last_issued: 0,
         };
         Self {
             map: AddressMap::new(spec),
@@ -376,8 +397,9 @@ impl Dram {
             activate: cycles(spec.activate_cycles.get()),
             precharge: cycles(spec.precharge_cycles.get()),
             latency: cycles(spec.latency_cycles.get()),
-            backlog: burst * Time::from(spec.queue),
             queue: spec.queue.into(),
+            longest_wait: burst.max(cycles(spec.activate_cycles.get() + spec.precharge_cycles.get()))
+                * Time::from(spec.queue),
             end: 0,
         }
     }
@@ -392,11 +414,28 @@ impl Dram {
         self.latency
     }
 
-    /// Transfer `count` lines of one group over the bus of their channel. The first arrives at `seen.from`, the
-    /// last at `seen.to`.
-    pub fn transfer(&mut self, line: u32, count: u32, turn: Turn, seen: Span) -> Moved {
+    /// When the first and the last of `count` requests like `head` enter the queues of their channels, which have room for all
+    /// lines of a request at once. They come at `seen`.
+    pub fn admits(&mut self, head: &LineAccess, count: u32, seen: Span) -> Span {
+        let channel_of = |line| self.map.locate(line).channel;
+        let mut enters = seen;
+        for line in head.moved() {
+            let at = channel_of(line);
+            let lines = head.moved().filter(|&other| channel_of(other) == at).count() as u64;
+            let channel = &mut self.channels[at];
+            let mut room = |count, seen| channel.room_for(count, seen, self.queue, self.burst);
+            enters.from = enters.from.max(room(lines, seen.from));
+            enters.to = enters.to.max(room(lines * u64::from(count), seen.to));
+        }
+        Span { from: enters.from, to: enters.to.max(enters.from) }
+    }
+
+    /// Transfer `count` lines of one group over the bus of their channel. The first enters its queue at `seen.from`, the
+    /// last at `seen.to`. Returns when the last is transferred.
+    pub fn transfer(&mut self, line: u32, count: u32, turn: Turn, seen: Span) -> Time {
         let address = self.map.locate(line);
         let channel = &mut self.channels[address.channel];
+        let is_alone = channel.is_of(address.bank, self.queue);
         let bank = &mut channel.banks[address.bank];
         let work = self.burst * Time::from(count);
         let open = bank.joins(address.row, seen.from, channel.lines, self.queue);
@@ -413,11 +452,18 @@ impl Dram {
             None => {
                 let before = &mut bank.rows[bank.place(seen.from)];
                 let opens = self.activate + if *before == OpenRow::NONE { 0 } else { self.precharge };
-                // The next row can open once the last line is issued.
+                // The next row can open once the last line is issued, at the latest when a full queue has left.
                 let held = work - self.burst;
-                let closes = before.until.max(seen.from).min(seen.from + self.backlog);
+                let closes = before.until.max(seen.from).min(seen.from + self.longest_wait);
                 let begin = bank.time.reserve_as(turn, closes, opens + held).0;
                 before.closes = begin;
+                // The bus idles from the end of the last transfer on if the queue has lines of this bank alone. Those that joined
+                // their row would fill the gap.
+                if is_alone {
+                    channel
+                        .bus
+                        .block(begin + self.burst, opens.saturating_sub(self.burst).min(before.joined));
+                }
                 begin + opens
             }
         };
@@ -430,16 +476,16 @@ impl Dram {
             issued: end - self.burst,
             lines: channel.lines,
             count: count.into(),
+            work,
         };
+        if let Some(at) = open.filter(|&at| used.issued >= bank.rows[at].closes) {
+            bank.delay(at, work);
+        }
         bank.note(used, open);
-        // A queue in order would hold `backlog`. Lines of other banks leave before, and make room.
-        let in_order = used.issued.saturating_sub(self.backlog);
-        let is_full = in_order > seen.to;
-        let queued = if is_full { channel.room_at(seen.to, self.queue).min(in_order) } else { in_order };
         channel.lines += u64::from(count);
-        channel.note(Waiting { seen: seen.from, issued: used.issued, count: used.count });
+        channel.note(address.bank, Waiting { seen: seen.from, issued: used.issued, count: used.count });
         self.end = self.end.max(end);
-        Moved { queued, data: end + self.cas }
+        end + self.cas
     }
 
     /// End of the last transfer.
@@ -461,6 +507,15 @@ impl Dram {
 }
 
 impl Bank {
+    /// The rows that open after that at place `at` do so later, as more lines of it go first.
+    fn delay(&mut self, at: usize, by: Time) {
+        for open in &mut self.rows[..at] {
+            open.opened += by;
+            open.closes = open.closes.saturating_add(by);
+        }
+        self.rows[at].closes += by;
+    }
+
     /// Place of the latest row that was requested by `seen`, in time. Rows before it come later, though earlier in the stream.
     fn place(&self, seen: Time) -> usize {
         self.rows.iter().position(|open| open.since <= seen).unwrap_or(self.rows.len() - 1)
@@ -480,10 +535,11 @@ impl Bank {
 
     /// Record lines of a row: those that joined the row at `joined`, or opened theirs.
     fn note(&mut self, used: RowUse, joined: Option<usize>) {
-        let RowUse { row, seen, opened, issued, lines, count } = used;
+        let RowUse { row, seen, opened, issued, lines, count, work } = used;
         if let Some(open) = joined.map(|at| &mut self.rows[at]) {
             open.until = open.until.max(issued);
             open.own += count;
+            open.joined += work;
             return;
         }
         let at = self.place(seen);
@@ -491,7 +547,7 @@ impl Bank {
         let known = self.rows.iter().skip(at).position(|open| open.row == row).map(|after| at + after);
         let until = known.map_or(issued, |known| self.rows[known].until.max(issued));
         self.rows.copy_within(at..known.unwrap_or(self.rows.len() - 1), at + 1);
-        self.rows[at] = OpenRow { row, since: seen, opened, until, closes, own: lines + count };
+        self.rows[at] = OpenRow { row, since: seen, opened, until, closes, own: lines + count, joined: 0 };
     }
 }
 
@@ -508,6 +564,7 @@ mod tests {
             issued,
             lines,
             count,
+            work: count,
         };
         let mut bank = Bank { time: Calendar::new(16, 1), rows: vec![OpenRow::NONE; 4].into() };
         let joins =

@@ -41,6 +41,7 @@ use station::StationState;
 
 use crate::clock::{Clocks, Time};
 use crate::demand::{DemandBuilder, ServiceDemand, Station};
+use crate::draws::DrawTimes;
 use crate::passes::Passes;
 use crate::spec::MachineSpec;
 use crate::stepped::Stream;
@@ -88,6 +89,7 @@ pub struct PacketClock {
     tally: Tally,
     gates: Gates,
     passes: Passes,
+    draws: DrawTimes,
     /// Front-end packets not yet simulated; the tiles have not reached them.
     ahead: VecDeque<(ServiceDemand, PacketCounts, Vec<LineAccess>)>,
     lines: Vec<LineAccess>,
@@ -102,6 +104,9 @@ pub struct PacketClock {
 /// Longest frame in core cycles, half a second to some seconds of hardware time. Calendars of shared
 /// resources take about three bytes per cycle.
 pub const MAX_CYCLES: u64 = 1 << 30;
+
+/// Most changes between draws that are remembered; they are for slices of draws that do not take turns.
+const MAX_SPANS: usize = 1 << 12;
 
 /// When each batch was set up and traversed, as far as known.
 #[derive(Clone, Debug, Default)]
@@ -168,6 +173,7 @@ impl PacketClock {
             tally: Tally::new(recorder, clocks),
             gates: Gates::default(),
             passes: Passes::default(),
+            draws: DrawTimes::new(MAX_SPANS),
             ahead: VecDeque::new(),
             lines: Vec::new(),
             packets: 0,
@@ -258,6 +264,7 @@ impl PacketClock {
         self.end = self.end.max(arrive);
         self.gates.note(demand, arrive);
         self.passes.note(demand.pass, begin, arrive);
+        self.draws.left(demand, arrive);
         self.builder.add_work(demand, counts, self.passes.work(demand.pass));
         if memory.from <= memory.to {
             let units = [Unit::L2, Unit::Llc, Unit::Edram, Unit::Dram];
@@ -302,7 +309,7 @@ impl PacketClock {
         let end = self.end.max(self.memory.ends_at());
         let end_ps = self.clocks.ps(end);
         let channels = self.memory.buses().count() as u64;
-        let Self { machine, tally, clocks, cores, memory, passes, packets, .. } = self;
+        let Self { machine, tally, clocks, cores, memory, passes, draws, packets, .. } = self;
         let mut recorder = tally.finish();
         recorder.lasts(end_ps);
         write(&mut recorder, &clocks, Unit::Shader, cores.lanes(), 1, end_ps);
@@ -315,8 +322,10 @@ impl PacketClock {
         }
         let timeline = recorder.finish();
         let rows = crate::ratio_to_busiest(clocks.ps(memory.rows()), &timeline);
+        let (parts, spans) = draws.finish(&clocks, timeline.duration_ps);
         Timed {
-            passes: passes.finish(&machine, &clocks, timeline.duration_ps),
+            passes: passes.finish(&machine, &clocks, timeline.duration_ps, &parts),
+            spans,
             timeline,
             cycles: clocks.cycles(Clock::Core, end),
             stalls: None,

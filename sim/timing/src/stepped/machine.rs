@@ -14,6 +14,7 @@ use super::{Stalled, StepOptions, Stream};
 use crate::clock::{Clocks, Time};
 use crate::data_unit::DataUnit;
 use crate::demand::{DemandBuilder, Station, port};
+use crate::draws::DrawTimes;
 use crate::passes::Passes;
 use crate::spec::{Common, MachineSpec};
 use crate::stalls::Reason;
@@ -88,6 +89,7 @@ impl<'a> Machine<'a> {
                 .map(|station| period(station) * Time::from(common[station as usize].latency_cycles)),
             sources: Sources::new(&stream.demands),
             passes: Passes::default(),
+            left: vec![0; stream.demands.len()],
             recorder,
             end: 0,
         };
@@ -149,15 +151,19 @@ impl<'a> Machine<'a> {
         let memory_end = self.l2.ends_at().max(self.levels.ends_at()).max(self.dram.ends_at());
         let end = self.shared.end.max(memory_end);
         self.meter.finish(end, &mut self.shared.recorder);
-        let SharedState { mut recorder, mut passes, stream, builder, .. } = self.shared;
+        let SharedState { mut recorder, mut passes, left, stream, builder, .. } = self.shared;
         recorder.lasts(clocks.ps(end));
         let timeline = recorder.finish();
         let cycles = clocks.cycles(crate::Clock::Core, end);
         for (demand, counts) in stream.demands.iter().zip(&stream.counts) {
             builder.add_work(demand, counts, passes.work(demand.pass));
         }
+        let mut draws = DrawTimes::new(usize::MAX);
+        stream.demands.iter().zip(left).for_each(|(demand, at)| draws.left(demand, at));
+        let (parts, spans) = draws.finish(&clocks, timeline.duration_ps);
         Ok(Timed {
-            passes: passes.finish(self.spec, &clocks, timeline.duration_ps),
+            passes: passes.finish(self.spec, &clocks, timeline.duration_ps, &parts),
+            spans,
             timeline,
             cycles,
             stalls: Some(self.meter.stalls),
@@ -269,6 +275,8 @@ pub(super) struct SharedState<'a> {
     pub latency: [Time; Station::COUNT],
     pub sources: Sources,
     pub passes: Passes,
+    /// When each packet left the machine.
+    pub left: Vec<Time>,
     pub recorder: Recorder,
     pub end: Time,
 }
@@ -324,6 +332,7 @@ impl SharedState<'_> {
         if demand.last == station {
             self.sources.done(id, demand, at);
             self.passes.note(demand.pass, at, at);
+            self.left[id as usize] = at;
             self.end = self.end.max(at);
             return Ok(());
         }

@@ -104,10 +104,11 @@ fn disputed_rows_are_near_the_reference() {
         for rows in [0, 4, 8, 16, 64] {
             let (machine, packets) = random_rows(rows, size);
             let error = error(&machine, &packets);
-            assert!(error.abs() < 20.0, "{rows} rows, {size:?}: {error:.1} %");
+            println!("{rows} rows, {size:?}: {error:.1} %");
             errors.push(error.abs());
         }
     }
+    assert!(errors.iter().all(|error| *error < 20.0), "{errors:.1?}");
     let mean = errors.iter().sum::<f64>() / errors.len() as f64;
     assert!(mean < 6.0, "{mean:.1} %");
 }

@@ -226,7 +226,7 @@ proptest! {
             }
             for (packet, _) in &packets {
                 if packet.kind == PacketKind::Barrier(Waits::All) && packet.pass > 0 {
-                    let [before, after] = [packet.pass - 1, packet.pass].map(|pass| timed.passes[pass as usize]);
+                    let [before, after] = [packet.pass - 1, packet.pass].map(|pass| &timed.passes[pass as usize]);
                     prop_assert!(after.begin_ps >= before.end_ps);
                 }
             }

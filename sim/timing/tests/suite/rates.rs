@@ -11,20 +11,20 @@ const BATCH: u32 = 512;
 
 /// The timing part of a GPU file.
 #[derive(serde::Deserialize)]
-struct Gpu {
-    core_hz: f64,
-    memory_hz: f64,
-    units: MachineSpec,
+pub struct Gpu {
+    pub core_hz: f64,
+    pub memory_hz: f64,
+    pub units: MachineSpec,
 }
 
 impl Gpu {
-    fn builtin(name: &str) -> Self {
+    pub fn builtin(name: &str) -> Self {
         let path = format!("{}/../run/gpus/{name}.ron", env!("CARGO_MANIFEST_DIR"));
         activity::spec::load(path.as_ref()).unwrap()
     }
 
     /// A frame at the levels `stepped`, `packet` and `bound`.
-    fn run(&self, units: &MachineSpec, packets: &Packets) -> [Timed; 3] {
+    pub fn run(&self, units: &MachineSpec, packets: &Packets) -> [Timed; 3] {
         let clocks = Clocks::new(self.core_hz, self.memory_hz).unwrap();
         let recorder = || Recorder::new(1_000_000, 1 << 16);
         let mut builder = DemandBuilder::new(units);
@@ -123,8 +123,8 @@ fn passes_are_close_to_the_reference() {
     }
 }
 
-/// On streams of groups `packet` is within 8 % or warns, but for two on the reference: groups that stream from memory, and
-/// groups in a chain with draws. It is 9 % short of both and does not warn. The cause is not known.
+/// On streams of groups `packet` is within 8 % or warns, but for one on the reference: groups in a chain with draws. It is 9 %
+/// short of it and does not warn: at each barrier the cores run empty.
 #[test]
 fn groups_are_close_to_the_reference() {
     let mut far = Vec::new();
@@ -143,7 +143,7 @@ fn groups_are_close_to_the_reference() {
             }
         }
     }
-    assert_eq!(far, [("groups that stream", "reference"), ("groups and draws in a chain", "reference")]);
+    assert_eq!(far, [("groups and draws in a chain", "reference")]);
 }
 
 /// Front ends that overlap the tiles of the pass before, with lines of both.

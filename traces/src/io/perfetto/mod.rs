@@ -1,6 +1,6 @@
 //! A timeline for the Perfetto viewer (<https://ui.perfetto.dev>).
 //!
-//! One process; below it a track of frames and their passes, a track per unit with slices of busy time, and counter tracks of
+//! One process; below it a track of frames, their passes and draws, a track per unit with slices of busy time, and counter tracks of
 //! power. Field numbers are those of Perfetto v59's `trace_packet.proto`, `track_descriptor.proto`,
 //! `track_event.proto`, `counter_descriptor.proto`, `process_descriptor.proto` and `debug_annotation.proto`
 //! (Apache-2.0, google/perfetto).
@@ -52,7 +52,7 @@ pub struct FrameSpan {
     pub numbers: Vec<(&'static str, f64)>,
 }
 
-/// A pass of a frame.
+/// A pass of a frame, or a part of a pass.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PassSpan {
     /// Its name.
@@ -61,6 +61,8 @@ pub struct PassSpan {
     pub start_ns: u64,
     /// End of its work, not after that of the frame.
     pub end_ns: u64,
+    /// Its parts in order, without overlap, such as draws.
+    pub parts: Vec<PassSpan>,
 }
 
 /// Track of a unit's busy time.
@@ -205,7 +207,7 @@ impl Trace<'_> {
             self.begin(FRAMES_UUID, &format!("frame {}", frame.frame), frame.start_ns, &frame.numbers)?;
             self.begin(FRAMES_UUID, "busy", frame.start_ns, &[])?;
             for pass in &frame.passes {
-                self.slice(FRAMES_UUID, &pass.name, (pass.start_ns, pass.end_ns), &[])?;
+                self.pass(pass)?;
             }
             self.end(FRAMES_UUID, frame.busy_end_ns)?;
             if frame.end_ns > frame.busy_end_ns {
@@ -214,6 +216,13 @@ impl Trace<'_> {
             self.end(FRAMES_UUID, frame.end_ns)?;
         }
         Ok(())
+    }
+
+    /// A pass, and its parts below it.
+    fn pass(&mut self, pass: &PassSpan) -> io::Result<()> {
+        self.begin(FRAMES_UUID, &pass.name, pass.start_ns, &[])?;
+        pass.parts.iter().try_for_each(|part| self.pass(part))?;
+        self.end(FRAMES_UUID, pass.end_ns)
     }
 
     /// `TrackDescriptor.description` = 14. Slices are named by tenths of utilisation, which gives them their colour.

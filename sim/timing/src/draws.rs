@@ -1,0 +1,156 @@
+//! Time of the draws of a frame.
+//!
+//! Packets count in the order of the stream, as instructions do that commit in order (Gottschall, Eeckhout and Jahre 2021,
+//! time-proportional instruction profiling): each takes the time from the latest end before it to its own end. So a draw gets the
+//! time by which it delays the frame, and the times of all draws add up to it. Work of the front end takes time only where no tile
+//! leaves after it that does not wait for it.
+
+use std::collections::VecDeque;
+
+use activity::Packet;
+
+use crate::clock::{Clocks, Time};
+use crate::demand::ServiceDemand;
+
+/// Something of each draw of a pass, and of all that is of no single draw.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct ByDraw<T> {
+    draws: Vec<T>,
+    others: T,
+}
+
+impl<T: Clone + Default> ByDraw<T> {
+    /// That of draw number `draw` of pass number `pass`.
+    pub fn of(passes: &mut Vec<Self>, pass: u32, draw: u32) -> &mut T {
+        let (pass, at) = (pass as usize, draw as usize);
+        if passes.len() <= pass {
+            passes.resize(pass + 1, Self::default());
+        }
+        let pass = &mut passes[pass];
+        if draw == Packet::NONE {
+            return &mut pass.others;
+        }
+        if pass.draws.len() <= at {
+            pass.draws.resize(at + 1, T::default());
+        }
+        &mut pass.draws[at]
+    }
+
+    /// Another thing of each.
+    pub fn map<U>(&self, to: impl Fn(&T) -> U) -> ByDraw<U> {
+        ByDraw { draws: self.draws.iter().map(&to).collect(), others: to(&self.others) }
+    }
+}
+
+/// Parts of the time of a pass. Only their ratios count.
+pub(crate) type PassParts = ByDraw<Time>;
+
+impl PassParts {
+    /// The parts of the draws if all parts together are `whole`; what is missing is that of the others.
+    pub fn scaled(&self, whole: u64) -> Vec<u64> {
+        let total = self.draws.iter().sum::<Time>() + self.others;
+        let up_to = |part: Time| (u128::from(whole) * u128::from(part) / u128::from(total.max(1))) as u64;
+        let mut sum = 0;
+        let part = |&part: &Time| {
+            let before = up_to(sum);
+            sum += part;
+            up_to(sum) - before
+        };
+        self.draws.iter().map(part).collect()
+    }
+}
+
+/// Time that one draw has at a stretch, from the end of the span before.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct DrawSpan {
+    /// Pass number in the frame.
+    pub pass: u32,
+    /// Draw number in the pass; [`Packet::NONE`] for work of no single draw.
+    pub draw: u32,
+    /// End in picoseconds.
+    pub end_ps: u64,
+}
+
+/// A packet that has left the machine.
+#[derive(Clone, Copy, Debug)]
+struct Left {
+    pass: u32,
+    draw: u32,
+    batch: u32,
+    at: Time,
+}
+
+/// The draws of a frame, from its packets in the order of the stream.
+#[derive(Clone, Debug)]
+pub(crate) struct DrawTimes {
+    /// The latest end so far.
+    now: Time,
+    /// Packets of the front end that left after it, in order.
+    ahead: VecDeque<Left>,
+    passes: Vec<PassParts>,
+    last_pass: Option<u32>,
+    spans: Vec<Left>,
+    most_spans: usize,
+}
+
+impl DrawTimes {
+    /// Remembers at most so many spans, else none.
+    pub fn new(most_spans: usize) -> Self {
+        let (passes, spans) = Default::default();
+        Self { now: 0, ahead: VecDeque::new(), passes, last_pass: None, spans, most_spans }
+    }
+
+    /// Record that the next packet of the stream left the machine at `at`.
+    pub fn left(&mut self, demand: &ServiceDemand, at: Time) {
+        self.last_pass = Some(demand.pass);
+        let left = Left { pass: demand.pass, draw: demand.draw, batch: demand.batch, at };
+        if demand.front {
+            if at > self.now {
+                self.ahead.push_back(left);
+            }
+            return;
+        }
+        while let Some(&front) = self.ahead.front() {
+            let waits = demand.barrier.is_some() || front.batch <= demand.batch;
+            if !waits && front.at > at {
+                break;
+            }
+            if waits {
+                self.advance(front);
+            }
+            self.ahead.pop_front();
+        }
+        self.advance(left);
+    }
+
+    fn advance(&mut self, left: Left) {
+        if left.at <= self.now {
+            return;
+        }
+        *PassParts::of(&mut self.passes, left.pass, left.draw) += left.at - self.now;
+        self.now = left.at;
+        let is_full = self.spans.len() > self.most_spans;
+        match self.spans.last_mut() {
+            Some(last) if (last.pass, last.draw) == (left.pass, left.draw) => last.at = left.at,
+            _ if is_full => {}
+            _ => self.spans.push(left),
+        }
+    }
+
+    /// The parts of every pass of a frame that ends at `end_ps`, and its spans in order of time; none if there are too many.
+    pub fn finish(mut self, clocks: &Clocks, end_ps: u64) -> (Vec<PassParts>, Vec<DrawSpan>) {
+        while let Some(front) = self.ahead.pop_front() {
+            self.advance(front);
+        }
+        if let Some(pass) = self.last_pass {
+            self.advance(Left { pass, draw: Packet::NONE, batch: 0, at: clocks.grain_from(end_ps) });
+        }
+        let span = |left: &Left| DrawSpan {
+            pass: left.pass,
+            draw: left.draw,
+            end_ps: clocks.ps(left.at).min(end_ps),
+        };
+        let is_whole = self.spans.len() <= self.most_spans;
+        (self.passes, if is_whole { self.spans.iter().map(span).collect() } else { Vec::new() })
+    }
+}
