@@ -132,14 +132,14 @@ impl Deferred {
             ..overrides.clone()
         };
         let scene = scene.with_overrides(&overrides)?;
-        let multisample = || SampleSpec { pattern: Pattern::Multisample, ..SampleSpec::default() };
+        let wrong = |setting, message: String| LoadError::Setting { setting, message };
+        let multisample = SampleSpec { pattern: Pattern::Multisample, ..SampleSpec::default() };
+        let middle = SampleTable::new(&multisample, 1, seed);
+        let middle = middle.map_err(|error| wrong("samples", error.to_string()))?;
         let table = match &overrides.table {
             Some(table) => SampleChoice::load(table)?,
-            None => SampleChoice::Described(multisample()),
+            None => SampleChoice::Described(multisample),
         };
-        let wrong = |setting, message: String| LoadError::Setting { setting, message };
-        let middle = SampleTable::new(&multisample(), 1, seed);
-        let middle = middle.map_err(|error| wrong("samples", error.to_string()))?;
         let first = scene.frame(0).map_err(|error| wrong("frames", error.to_string()))?;
         let lights = point_lights(bounds(&first), options.lights, options.range);
         let samples = table.source(scene.settings().samples, seed)?;

@@ -227,6 +227,20 @@ fn moving_objects_have_a_surface_for_every_sample() {
 }
 
 #[test]
+fn a_camera_that_moves_while_the_shutter_is_open_is_reported() {
+    let camera = "position: (-4, 1, 5), target: (0, 0, 0), end_position: (4, 1, 5)";
+    let moving = Overrides { shutter: Some(1.0), camera: Some(camera.to_owned()), ..overrides(1) };
+    let codes = |overrides: &Overrides, method| {
+        let (drawn, _) =
+            of(pane(DVec3::ZERO), Options { method, lights: 0, ..Options::default() }, overrides);
+        drawn.warnings.iter().map(|warning| warning.code.name()).collect::<Vec<_>>()
+    };
+    assert_eq!(codes(&moving, Method::Deferred), ["deferred-moving-camera"]);
+    assert!(codes(&moving, Method::Forward).is_empty());
+    assert!(codes(&Overrides { shutter: None, ..moving }, Method::Deferred).is_empty());
+}
+
+#[test]
 fn invalid_options_are_reported() {
     for bad in [
         Options { lights: 5000, ..Options::default() },
