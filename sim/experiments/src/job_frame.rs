@@ -113,7 +113,7 @@ mod tests {
     use super::*;
     use power_model::{EnergyTable, Platform};
     use workloads::Overrides;
-    use workloads::deferred::{Deferred, Lighting, Options};
+    use workloads::deferred::{Deferred, LightPass, Options};
 
     #[test]
     fn energies_of_passes_add_up_to_that_of_the_power_over_time() {
@@ -121,7 +121,7 @@ mod tests {
         let platform = Platform::builtin("hd_4000").unwrap();
         let model = PowerModel::new(&EnergyTable::builtin("28nm").unwrap(), &platform).unwrap();
         let overrides = Overrides { size: Some((160, 90)), ..Overrides::default() };
-        for lighting in [Lighting::Screen, Lighting::Volumes] {
+        for lighting in [LightPass::Screen, LightPass::Volumes] {
             let options = Options { lights: 8, lighting, ..Options::default() };
             let job = Deferred::new(options, &overrides, 1).unwrap();
             let frame = JobFrame::new(&job, 0, &gpu, &model).unwrap();

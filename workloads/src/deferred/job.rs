@@ -38,7 +38,7 @@ pub enum Method {
 /// How a G-buffer is lit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum Lighting {
+pub enum LightPass {
     /// By a quad over the screen that goes through all lights.
     #[default]
     Screen,
@@ -70,7 +70,7 @@ pub struct Options {
     /// Range of a point light, scene units.
     pub range: f32,
     /// How the G-buffer is lit.
-    pub lighting: Lighting,
+    pub lighting: LightPass,
     /// Format of its normals.
     pub normals: NormalFormat,
     /// How often it is lit.
@@ -325,7 +325,7 @@ impl<'a> Stage<'a> {
         let (reader, rays) = (buffer.reader(rate), CameraRays::new(self.camera()));
         let Some(first) = surfaces.first() else { return Ok(0) };
         let (all, bindings) = (&self.job.lights[..], buffer.bindings());
-        let in_loop = if lighting == Lighting::Screen { all } else { &[] };
+        let in_loop = if lighting == LightPass::Screen { all } else { &[] };
         let screen = Screen { reader, rays, scene: *first.shader.lighting(), lights: in_loop };
         let volumes: Vec<Lit> =
             all[in_loop.len()..].iter().map(|&light| Lit::new(Volume { reader, rays, light })).collect();

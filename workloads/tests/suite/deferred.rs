@@ -3,7 +3,7 @@
 use activity::Event;
 use glam::{DVec3, Vec3};
 use pipeline::{FrameReport, Gpu};
-use workloads::deferred::{Deferred, Lighting, Method, NormalFormat, Options, Rate};
+use workloads::deferred::{Deferred, LightPass, Method, NormalFormat, Options, Rate};
 use workloads::job::{Drawn, Job};
 use workloads::scene::{Local, Node, Parts, Rig, Scene, SceneCamera, Settings, Trs};
 use workloads::{Alpha, Material, Overrides, shapes};
@@ -101,7 +101,7 @@ fn the_background_stays() {
 fn light_volumes_add_up_to_the_loop_over_lights() {
     let options = Options { lights: 24, range: 3.0, ..Options::default() };
     let (screen, _) = with(options.clone(), 1);
-    let (volumes, report) = with(Options { lighting: Lighting::Volumes, ..options.clone() }, 1);
+    let (volumes, report) = with(Options { lighting: LightPass::Volumes, ..options.clone() }, 1);
     let most = screen.image.iter().map(|pixel| pixel.max_element()).fold(0.0, f32::max);
     // Each of the sums is rounded to a half.
     let error = largest(&screen.image, &volumes.image);
@@ -139,7 +139,7 @@ fn counts_are_those_of_the_code_that_ran() {
 
 #[test]
 fn threads_do_not_change_a_byte() {
-    let options = Options { lights: 6, lighting: Lighting::Volumes, ..Options::default() };
+    let options = Options { lights: 6, lighting: LightPass::Volumes, ..Options::default() };
     let all = [1, 2, 3].map(|threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| with(options.clone(), 2))

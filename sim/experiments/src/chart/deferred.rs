@@ -12,7 +12,7 @@ use power_model::{EnergyTable, Platform, PowerModel};
 use rayon::prelude::*;
 use run::{GpuSpec, RunError};
 use serde::Serialize;
-use workloads::deferred::{Deferred, Lighting, Method, NormalFormat, Options, Rate};
+use workloads::deferred::{Deferred, LightPass, Method, NormalFormat, Options, Rate};
 use workloads::scene::{Local, Node, Parts, Rig, Scene, SceneCamera, Trs};
 use workloads::{Alpha, Material, Overrides, shapes};
 
@@ -79,7 +79,7 @@ impl Sweep {
 struct Way {
     name: &'static str,
     method: Method,
-    lighting: Lighting,
+    lighting: LightPass,
     normals: NormalFormat,
     rate: Rate,
 }
@@ -89,14 +89,14 @@ const WAYS: [Way; 5] = {
     let deferred = Way {
         name: "deferred",
         method: Method::Deferred,
-        lighting: Lighting::Screen,
+        lighting: LightPass::Screen,
         normals: NormalFormat::Rgba16f,
         rate: Rate::Sample,
     };
     [
         Way { name: "forward", method: Method::Forward, ..deferred },
         deferred,
-        Way { name: "light volumes", lighting: Lighting::Volumes, ..deferred },
+        Way { name: "light volumes", lighting: LightPass::Volumes, ..deferred },
         Way { name: "normals in bytes", normals: NormalFormat::Rgba8, ..deferred },
         Way { name: "lit once a pixel", rate: Rate::Pixel, ..deferred },
     ]

@@ -6,7 +6,7 @@ use output::progress::Progress;
 use power_model::Circumstances;
 use run::RunError;
 use traces::energy::PowerIntegral;
-use workloads::deferred::{Lighting, NormalFormat};
+use workloads::deferred::{LightPass, NormalFormat};
 
 use super::row::{Number, Row, With, numbers};
 use super::settings::{About, Origin, Setting, load, paper_settings, reduced, row_settings, settings_group};
@@ -105,7 +105,7 @@ row_settings! {
         g_buffer_nj: f64, within(0.0..=1e9);
         lighting_nj: f64, within(0.0..=1e9);
         lights: u32, within(0..=4096);
-        lighting: Lighting, must(|_| true, "screen or volumes");
+        lighting: LightPass, must(|_| true, "screen or volumes");
         range: f32, within(1e-3..=1e3);
         normals: NormalFormat, must(|_| true, "rgba16f or rgba8");
         size_px: (u32, u32), must(

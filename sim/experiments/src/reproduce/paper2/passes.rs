@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use run::RunError;
 use traces::energy::PowerIntegral;
 use workloads::Overrides;
-use workloads::deferred::{Deferred, Lighting, NormalFormat, Options};
+use workloads::deferred::{Deferred, LightPass, NormalFormat, Options};
 
 use super::Passes;
 use crate::job_frame::JobFrame;
@@ -30,7 +30,7 @@ pub(super) struct Bench<'a> {
 #[derive(Clone, Debug, PartialEq)]
 struct Point {
     lights: u32,
-    lighting: Lighting,
+    lighting: LightPass,
     range: f32,
     normals: NormalFormat,
     size_px: (u32, u32),
