@@ -99,7 +99,8 @@ fn timed_j(power: &FramePower, from_s: f64, to_s: f64) -> f64 {
     let is_timed = |part: &Part| !matches!(part, Part::Unit(_));
     let mut at_s = 0.0;
     let energy = |(length_s, watts): (f64, &[f64; Part::ALL.len()])| {
-        let begin_s = std::mem::replace(&mut at_s, at_s + length_s);
+        let begin_s = at_s;
+        at_s += length_s;
         let inside_s = (at_s.min(to_s) - begin_s.max(from_s)).max(0.0);
         let watts: f64 =
             Part::ALL.iter().zip(watts).filter(|(part, _)| is_timed(part)).map(|(_, watts)| watts).sum();

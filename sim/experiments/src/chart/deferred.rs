@@ -58,7 +58,7 @@ impl Sweep {
     const fn name(self) -> &'static str {
         match self {
             Self::Lights => "point lights",
-            Self::Layers => "opaque layers, back to front",
+            Self::Layers => "opaque layers",
             Self::Blended => "blended layers",
             Self::Samples => "samples per pixel",
         }
