@@ -178,7 +178,7 @@ impl Study for DeferredChart {
         let failures = vec![
             self.panel(Sweep::Samples, "memory (MB)", megabytes),
             self.panel(Sweep::Samples, "RMSE", |row| row.rmse)
-                .failing(several(), "lit once a pixel, a run warns: deferred-one-surface"),
+                .failing(several(), "a run warns: deferred-one-surface"),
             self.panel(Sweep::Blended, "frame (ms)", milliseconds),
         ];
         to.chart("deferred_failures", ["Where deferred rendering fails", &subject], failures)
