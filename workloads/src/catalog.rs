@@ -34,6 +34,12 @@ const JOBS: &[Entry] = &[
         make: crate::collision::job,
     },
     Entry {
+        name: "deferred",
+        what: "deferred rendering: a G-buffer, lit by many point lights, beside forward rendering",
+        flags: crate::deferred::FLAGS,
+        make: crate::deferred::job,
+    },
+    Entry {
         name: "glossy",
         what: "glossy reflection or refraction on a planar receiver, pre-filtered by the lens of one pass",
         flags: crate::glossy::FLAGS,

@@ -13,7 +13,8 @@
 //!   comparison.
 //! - [`collision`] finds the pairs of moving objects that may collide.
 //! - [`occlusion`] finds objects that are hidden at all times and from all of the lens.
-//! - [`Material`] is the look of a surface, and [`material::SurfaceShader`] its cost.
+//! - [`deferred`] draws a G-buffer and lights it, beside forward rendering with the same lights.
+//! - [`Material`] is the look of a surface, [`material::SurfaceShader`] its cost, and [`lighting`] its light.
 //!
 //! ```
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -37,11 +38,13 @@ mod bvh;
 pub mod catalog;
 pub mod caustics;
 pub mod collision;
+pub mod deferred;
 mod error;
 mod fingerprint;
 pub mod glossy;
 mod import;
 pub mod job;
+pub mod lighting;
 mod load;
 pub mod material;
 pub mod multiview;
@@ -60,8 +63,9 @@ pub use builtin::builtin_names;
 pub use error::LoadError;
 pub use fingerprint::{Fingerprint, FingerprintError};
 pub use job::Job;
+pub use lighting::Light;
 pub use load::load;
-pub use material::{Alpha, Light, Material};
+pub use material::{Alpha, Material};
 pub use regime::Regime;
 pub use rendering::Rendering;
 pub use samples::{FixedSamples, SampleChoice, write_hits, write_samples};

@@ -1,11 +1,12 @@
-//! Materials, the light of a scene, and the surface shader: Lambert under one lamp and a sky, with a
-//! Blinn-Phong highlight.
+//! Materials, and the surface shader: what light meets at a point, under the light of the scene.
 
 use std::sync::Arc;
 
 use glam::{Vec3, Vec4};
 use pipeline::{Blend, Cull, DepthState, DrawState, Lane, Shader, ShadingPoint, Texture};
 use serde::{Deserialize, Serialize};
+
+use crate::lighting::{HIGHLIGHT, Light, Lighting, LitPoint};
 
 /// Effect of the opacity of a surface (glTF 2.0, 3.9.4).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -88,35 +89,9 @@ impl Material {
     }
 }
 
-/// One directional light, and an ambient term that depends on the normal of the surface.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Light {
-    /// Unit vector from the scene towards the lamp; `None` for a lamp over the camera's shoulder, placed with
-    /// the camera.
-    pub toward: Option<Vec3>,
-    /// Linear RGB radiance of a white surface that faces the lamp, by the lamp alone.
-    pub color: Vec3,
-    /// Linear RGB radiance of a white surface with its normal upwards, by the sky alone.
-    pub sky: Vec3,
-    /// The same with the normal downwards.
-    pub ground: Vec3,
-}
-
-impl Default for Light {
-    fn default() -> Self {
-        Self {
-            toward: None,
-            color: Vec3::new(0.74, 0.71, 0.66),
-            sky: Vec3::new(0.26, 0.29, 0.34),
-            ground: Vec3::new(0.12, 0.11, 0.10),
-        }
-    }
-}
-
 /// Colours a material under a scene's light.
 ///
-/// `texel * base * vertex colour * (lamp * max(0, n.l) + mix(ground, sky, n.y)) + highlight * lamp * max(0, n.h)^32`, with the
-/// half vector `h` of Blinn (Models of light reflection, SIGGRAPH 1977). The vertex colour is left out unless
+/// The base colour is `texel * base * vertex colour`, the light that of [`Lighting::radiance`]. The vertex colour is left out unless
 /// [`SurfaceShader::with_vertex_colors`] asks for it. Opacity is computed for materials that are not opaque.
 #[derive(Clone, Debug)]
 pub struct SurfaceShader {
@@ -126,14 +101,8 @@ pub struct SurfaceShader {
     texture: Option<Arc<Texture>>,
     unlit: bool,
     vertex_colors: bool,
-    toward: Vec3,
-    lamp: Vec3,
-    ground: Vec3,
-    sky_over_ground: Vec3,
+    lighting: Lighting,
 }
-
-/// Largest share of the lamp's light in the highlight.
-const HIGHLIGHT: f32 = 0.12;
 
 impl SurfaceShader {
     /// The shader of `material` under `light`, whose direction has to be known.
@@ -145,10 +114,7 @@ impl SurfaceShader {
             texture: material.texture.clone(),
             unlit: material.unlit,
             vertex_colors: false,
-            toward: light.toward.unwrap_or(Vec3::Y),
-            lamp: light.color,
-            ground: light.ground,
-            sky_over_ground: light.sky - light.ground,
+            lighting: Lighting::new(light),
         }
     }
 
@@ -158,22 +124,25 @@ impl SurfaceShader {
         Self { vertex_colors: true, ..self }
     }
 
-    fn lit(&self, lane: &Lane, at: &ShadingPoint, base: Vec3) -> Vec3 {
-        let half = lane.add(self.toward, at.to_camera);
-        let length = lane.max(lane.sqrt(lane.dot(half, half)), f32::MIN_POSITIVE);
-        let half = lane.scale(half, lane.recip(length));
-        let facing = lane.max(lane.dot(at.normal, self.toward), 0.0);
-        let glint = pow32(lane, lane.max(lane.dot(at.normal, half), 0.0));
-        let up = lane.madd(0.5, at.normal.y, 0.5);
-        let ambient = lane.madd(Vec3::splat(up), self.sky_over_ground, self.ground);
-        let diffuse = lane.mul(base, lane.madd(Vec3::splat(facing), self.lamp, ambient));
-        // No highlight on the side turned away from the lamp.
-        let glint = lane.select_greater([facing, 0.0], lane.mul(HIGHLIGHT, glint), 0.0);
-        lane.madd(Vec3::splat(glint), self.lamp, diffuse)
+    /// The light that it is seen under.
+    pub fn lighting(&self) -> &Lighting {
+        &self.lighting
     }
-}
 
-impl SurfaceShader {
+    /// What light meets at a point, and the opacity there. An unlit surface has no gloss.
+    pub fn surface(&self, lane: &Lane, at: &ShadingPoint, texel: Vec4) -> (LitPoint, f32) {
+        let base = lane.mul(self.base_color, texel.truncate());
+        let base = if self.vertex_colors { lane.mul(base, at.color) } else { base };
+        let gloss = if self.unlit { 0.0 } else { HIGHLIGHT };
+        let point = LitPoint { base, normal: at.normal, to_camera: at.to_camera, gloss };
+        (point, self.opacity(lane, texel))
+    }
+
+    /// Whether light changes its colour.
+    pub fn is_lit(&self) -> bool {
+        !self.unlit
+    }
+
     fn opacity(&self, lane: &Lane, texel: Vec4) -> f32 {
         match self.alpha {
             Alpha::Opaque => 1.0,
@@ -186,20 +155,15 @@ impl SurfaceShader {
     }
 }
 
-fn pow32(lane: &Lane, x: f32) -> f32 {
-    (0..5).fold(x, |power, _| lane.mul(power, power))
-}
-
 impl Shader for SurfaceShader {
     fn texture(&self) -> Option<&Texture> {
         self.texture.as_deref()
     }
 
     fn shade(&self, lane: &Lane, at: &ShadingPoint, texel: Vec4) -> Vec4 {
-        let base = lane.mul(self.base_color, texel.truncate());
-        let base = if self.vertex_colors { lane.mul(base, at.color) } else { base };
-        let opacity = self.opacity(lane, texel);
-        if self.unlit { base } else { self.lit(lane, at, base) }.extend(opacity)
+        let (point, opacity) = self.surface(lane, at, texel);
+        let seen = if self.unlit { point.base } else { self.lighting.radiance(lane, &point) };
+        seen.extend(opacity)
     }
 
     fn may_discard(&self) -> bool {

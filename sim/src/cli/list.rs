@@ -8,7 +8,7 @@ use output::table::Table;
 use run::GpuSpec;
 use serde::Serialize;
 use serde_json::{Map, Value};
-use workloads::{caustics, collision, glossy, multiview, occlusion, points, soft_shadows};
+use workloads::{caustics, collision, deferred, glossy, multiview, occlusion, points, soft_shadows};
 
 use super::outputs::{print, print_json};
 use super::{Failure, ListArgs};
@@ -224,6 +224,27 @@ const OPTIONS: &[WorkloadOptions] = &[
             Doc("narrow", SWITCH, "pairs one by one within the space that their swept boxes share"),
         ],
         defaults: || serde_json::to_string(&collision::Options::default()),
+    },
+    WorkloadOptions {
+        workload: "deferred",
+        options: &[
+            Doc("scene", SCENE, "the scene"),
+            Doc("method", Names(&["deferred", "forward"]), "from a G-buffer, or as surfaces are drawn"),
+            Doc("lights", Numbers(0.0, 4096.0), "point lights besides the light of the scene"),
+            Doc("range", Numbers(1e-15, 1e15), "range of a point light; scene units"),
+            Doc(
+                "lighting",
+                Names(&["screen", "volumes"]),
+                "a loop over all lights for the whole image, or the volume of each light",
+            ),
+            Doc("normals", Names(&["rgba16f", "rgba8"]), "format of normals in the G-buffer"),
+            Doc(
+                "rate",
+                Names(&["sample", "pixel"]),
+                "lighting for every sample, or for the first of a pixel",
+            ),
+        ],
+        defaults: || serde_json::to_string(&deferred::Options::default()),
     },
     WorkloadOptions {
         workload: "glossy",

@@ -138,6 +138,10 @@ codes! {
     ViewDependentShading = "view-dependent-shading" in Workload,
     /// The lens of `glossy` is wider than half the receiver's shorter side.
     LensWiderThanReceiver = "lens-wider-than-receiver" in Workload,
+    /// A deferred renderer lights one sample of a pixel for all of them.
+    DeferredOneSurface = "deferred-one-surface" in Workload,
+    /// The camera of a deferred renderer moves while the shutter is open.
+    DeferredMovingCamera = "deferred-moving-camera" in Workload,
     /// The marked window reaches beyond the trace.
     WindowCut = "window-cut" in Trace,
     /// Power around a mark varies no more than noise.

@@ -37,7 +37,8 @@ use glam::{DVec3, Vec3};
 use warnings::Warning;
 
 use crate::error::LoadError;
-use crate::material::{Light, Material, SurfaceShader};
+use crate::lighting::Light;
+use crate::material::{Material, SurfaceShader};
 use camera::{Standing, between};
 use deform::Pose;
 use frame::Interval;
@@ -178,7 +179,7 @@ impl Scene {
     }
 
     /// The shader of a material, with or without vertex colours.
-    fn shader(&self, material: usize, vertex_colors: bool) -> Option<&SurfaceShader> {
+    pub(crate) fn shader(&self, material: usize, vertex_colors: bool) -> Option<&SurfaceShader> {
         self.shaders.get(material).map(|shaders| &shaders[usize::from(vertex_colors)])
     }
 

@@ -14,9 +14,10 @@ use traces::device::{Device, DeviceSpec};
 use traces::energy::{FrameEnergy, PowerIntegral, TrueFrame};
 use traces::frames::{FinderMethod, Flag, Marks, Options, Window, default_window, find_with};
 use traces::score::{self, Score, TOLERANCE_S};
-use workloads::{SampleChoice, Scene};
+use workloads::{Job, SampleChoice, Scene};
 
 use super::scenes;
+use crate::job_frame::JobFrame;
 
 /// GPU, platform and energies.
 #[derive(Clone)]
@@ -148,6 +149,11 @@ impl Stage {
             .map_err(RunError::setting)?;
         let timeline = clock.finish()?.timeline;
         self.model.frame(&timeline).map_err(|source| RunError::Timeline { frame: number, source })
+    }
+
+    /// Frame `number` of a job, with the energies of its passes.
+    pub fn job_frame(&self, job: &dyn Job, number: u32) -> Result<JobFrame, RunError> {
+        JobFrame::new(job, number, &self.gpu, &self.model)
     }
 
     /// The phone's sequence with objects of this edge, every `step`-th of its frames simulated and each shown until the next one.

@@ -12,7 +12,8 @@ use warnings::{Code, Warning};
 use crate::builtin::checker;
 use crate::error::{LoadError, Source};
 use crate::import::{self, Format, bare, gltf, ignored, reader, soup};
-use crate::material::{Alpha, Light, Material};
+use crate::lighting::Light;
+use crate::material::{Alpha, Material};
 use crate::scene::{
     CameraSpec, Interpolation, Local, Mesh, Node, Parts, Rig, SceneCamera, Settings, Spin, Target, Track,
     Trs, rotation,

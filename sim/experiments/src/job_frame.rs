@@ -1,0 +1,140 @@
+//! A frame of a job on a machine, with the energy of each of its passes.
+
+use activity::{Counts, Event};
+use pipeline::{FrameReport, Gpu};
+use power_model::{FramePower, Part, PowerModel};
+use run::{BIN_PS, GpuSpec, RunError};
+use timing::{FrameClock, Level, Recorder};
+use workloads::Job;
+use workloads::job::Drawn;
+
+/// A drawn and timed frame.
+pub struct JobFrame {
+    /// Image and facts.
+    pub drawn: Drawn,
+    /// Work by pass.
+    pub report: FrameReport,
+    /// Power over time.
+    pub power: FramePower,
+    /// Its passes, in order.
+    pub passes: Vec<PassEnergy>,
+    /// Energy of writing results to memory when the frame ends, J.
+    pub write_back_j: f64,
+}
+
+/// Energy of a pass.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PassEnergy {
+    /// Its name.
+    pub name: String,
+    /// When its last packet leaves, s from the start of the frame.
+    pub end_s: f64,
+    /// From the end of the pass before, s.
+    pub time_s: f64,
+    /// Energy of its events, as the pipeline counted them, J.
+    pub events_j: f64,
+    /// Energy of clocks, leakage and what is constant in that time, J.
+    pub timed_j: f64,
+}
+
+impl PassEnergy {
+    /// All of it, J.
+    pub fn total_j(&self) -> f64 {
+        self.events_j + self.timed_j
+    }
+}
+
+/// Largest number of bins of a frame.
+const MAX_BINS: usize = 4096;
+
+impl JobFrame {
+    /// Draws frame `number` of a job.
+    ///
+    /// # Errors
+    /// [`RunError`] if the frame cannot be drawn or timed.
+    pub fn new(job: &dyn Job, number: u32, gpu: &GpuSpec, model: &PowerModel) -> Result<Self, RunError> {
+        let mut clock = FrameClock::new(Level::default(), gpu.machine()?, Recorder::new(BIN_PS, MAX_BINS));
+        let emit = |packet: &_, lines: &_| clock.push(packet, lines);
+        let mut passes = Gpu::new(&gpu.pipeline, emit).map_err(RunError::setting)?;
+        let drawn = job.frame(number, &mut passes)?;
+        let report = passes.finish();
+        let timed = clock.finish()?;
+        let power = model.frame(&timed.timeline);
+        let power = power.map_err(|source| RunError::Timeline { frame: number, source })?;
+        let mut before_s = 0.0;
+        let pass = |(pass, time): (&pipeline::PassReport, &timing::PassTime)| {
+            let end_s = time.end_ps as f64 * 1e-12;
+            let from_s = std::mem::replace(&mut before_s, end_s);
+            PassEnergy {
+                name: pass.name.clone(),
+                end_s,
+                time_s: end_s - from_s,
+                events_j: events_j(model, &pass.counts()),
+                timed_j: timed_j(&power, from_s, end_s),
+            }
+        };
+        let passes = report.passes.iter().zip(&timed.passes).map(pass).collect();
+        let write_back_j = events_j(model, &report.write_back);
+        Ok(Self { drawn, report, power, passes, write_back_j })
+    }
+
+    /// Energy of all passes and of the write-back, J: to compare with that of the power over time.
+    pub fn sum_j(&self) -> f64 {
+        self.passes.iter().map(PassEnergy::total_j).sum::<f64>() + self.write_back_j
+    }
+
+    /// Bytes to and from memory.
+    pub fn dram_bytes(&self) -> u64 {
+        let counts = self.report.counts();
+        counts[Event::DramReadBytes] + counts[Event::DramWriteBytes]
+    }
+}
+
+fn events_j(model: &PowerModel, counts: &Counts) -> f64 {
+    model.counts_energy(counts).total_j()
+}
+
+/// Energy between two times of the parts of a power that depend on time.
+fn timed_j(power: &FramePower, from_s: f64, to_s: f64) -> f64 {
+    let is_timed = |part: &Part| !matches!(part, Part::Unit(_));
+    let mut at_s = 0.0;
+    let energy = |(length_s, watts): (f64, &[f64; Part::ALL.len()])| {
+        let begin_s = at_s;
+        at_s += length_s;
+        let inside_s = (at_s.min(to_s) - begin_s.max(from_s)).max(0.0);
+        let watts: f64 =
+            Part::ALL.iter().zip(watts).filter(|(part, _)| is_timed(part)).map(|(_, watts)| watts).sum();
+        watts * inside_s
+    };
+    power.bins().map(energy).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use power_model::{EnergyTable, Platform};
+    use workloads::Overrides;
+    use workloads::deferred::{Deferred, LightPass, Options};
+
+    #[test]
+    fn energies_of_passes_add_up_to_that_of_the_power_over_time() {
+        let gpu = GpuSpec::load("hd_4000").unwrap();
+        let platform = Platform::builtin("hd_4000").unwrap();
+        let model = PowerModel::new(&EnergyTable::builtin("28nm").unwrap(), &platform).unwrap();
+        let overrides = Overrides { size: Some((160, 90)), ..Overrides::default() };
+        for lighting in [LightPass::Screen, LightPass::Volumes] {
+            let options = Options { lights: 8, lighting, ..Options::default() };
+            let job = Deferred::new(options, &overrides, 1).unwrap();
+            let frame = JobFrame::new(&job, 0, &gpu, &model).unwrap();
+            let names: Vec<&str> = frame.passes.iter().map(|pass| pass.name.as_str()).collect();
+            assert_eq!(names, ["g-buffer", "lighting", "resolve"]);
+            let whole_j: f64 =
+                frame.power.bins().map(|(length_s, watts)| length_s * watts.iter().sum::<f64>()).sum();
+            let error = (frame.sum_j() / whole_j - 1.0).abs();
+            assert!(error < 1e-9, "{error:e}");
+            // Each part is far above what would be missed.
+            let parts = frame.passes.iter().flat_map(|pass| [pass.events_j, pass.timed_j]);
+            assert!(parts.chain([frame.write_back_j]).all(|part_j| part_j > 1e-6 * whole_j));
+        }
+    }
+}

@@ -1,0 +1,389 @@
+//! The job `deferred`: the passes of a frame, deferred or forward.
+
+use activity::Event;
+use glam::{Vec2, Vec3, Vec4};
+use pipeline::sampling::{Pattern, SampleSource};
+use pipeline::{
+    Attachment, Attachments, Binding, Blend, Camera, Clear, Cull, DepthState, Draw, DrawState, Format,
+    Geometry, Gpu, RasterPass, Rendered, SampleSpec, SampleTable, Shader, SurfaceId, SurfaceSpec, Target,
+    Viewport,
+};
+use serde::{Deserialize, Serialize};
+use warnings::{Code, Warning};
+
+use super::buffer::{GBuffer, NormalFormat, Writer};
+use super::lights::{bounds, point_lights};
+use super::shaders::{CameraRays, Forward, Resolve, Screen, Volume};
+use crate::error::LoadError;
+use crate::job::{
+    Drawn, DrawsScene, Fact, Flag, Flags, IMAGE_SIZE, Job, JobError, OptionSource, Request, must_hold,
+};
+use crate::lighting::PointLight;
+use crate::material::SurfaceShader;
+use crate::samples::SampleChoice;
+use crate::scene::{Frame, Overrides, Scene};
+use crate::shapes;
+
+/// How surfaces are lit.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Method {
+    /// From a G-buffer.
+    #[default]
+    Deferred,
+    /// As they are drawn.
+    Forward,
+}
+
+/// How a G-buffer is lit.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum LightPass {
+    /// By a quad over the screen that goes through all lights.
+    #[default]
+    Screen,
+    /// By the volume of each light, whose light is added.
+    Volumes,
+}
+
+/// How often a G-buffer is lit.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Rate {
+    /// For every sample.
+    #[default]
+    Sample,
+    /// For the first sample of a pixel, whose light all of them get.
+    Pixel,
+}
+
+/// Options of the job.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Options {
+    /// A built-in scene or a file.
+    pub scene: String,
+    /// How surfaces are lit.
+    pub method: Method,
+    /// Point lights besides the light of the scene.
+    pub lights: u32,
+    /// Range of a point light, scene units.
+    pub range: f32,
+    /// How the G-buffer is lit.
+    pub lighting: LightPass,
+    /// Format of its normals.
+    pub normals: NormalFormat,
+    /// How often it is lit.
+    pub rate: Rate,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        let (method, lighting, normals, rate) = Default::default();
+        Self { scene: "default".to_owned(), method, lights: 32, range: 4.0, lighting, normals, rate }
+    }
+}
+
+impl Options {
+    fn check(&self) -> Result<(), LoadError> {
+        must_hold([
+            ("lights", self.lights <= 4096, "0 to 4096"),
+            ("range", (1e-15..=1e15).contains(&self.range), "1e-15 to 1e15 scene units"),
+        ])
+    }
+}
+
+/// Radiance of lit samples.
+const LIT: Format = Format::Rgba16f;
+/// State of what is drawn over the image, without depths.
+fn overlay(cull: Cull, blend: Blend) -> DrawState {
+    DrawState { depth: DepthState::NONE, blend, ..DrawState::new(cull) }
+}
+
+/// The job with its scene and lights.
+pub struct Deferred {
+    scene: Scene,
+    options: Options,
+    lights: Vec<PointLight>,
+    samples: Box<dyn SampleSource>,
+    /// One sample in the middle of each pixel.
+    middle: SampleTable,
+}
+
+impl Deferred {
+    /// Makes the job in the scene of `options`, with settings changed by `overrides`.
+    ///
+    /// # Errors
+    /// [`LoadError`] for a scene that cannot be loaded, or an invalid option.
+    pub fn new(options: Options, overrides: &Overrides, seed: u64) -> Result<Self, LoadError> {
+        Self::of(crate::load(&options.scene)?, options, overrides, seed)
+    }
+
+    /// The same in a given scene. Unless `overrides` change them, pixels have one sample in the middle, and the shutter has no length.
+    ///
+    /// # Errors
+    /// [`LoadError`] for an invalid option.
+    pub fn of(scene: Scene, options: Options, overrides: &Overrides, seed: u64) -> Result<Self, LoadError> {
+        options.check()?;
+        let overrides = Overrides {
+            samples: overrides.samples.or(Some(1)),
+            shutter: overrides.shutter.or(Some(0.0)),
+            lens_radius: Some(0.0),
+            ..overrides.clone()
+        };
+        let scene = scene.with_overrides(&overrides)?;
+        let wrong = |setting, message: String| LoadError::Setting { setting, message };
+        let multisample = SampleSpec { pattern: Pattern::Multisample, ..SampleSpec::default() };
+        let middle = SampleTable::new(&multisample, 1, seed);
+        let middle = middle.map_err(|error| wrong("samples", error.to_string()))?;
+        let table = match &overrides.table {
+            Some(table) => SampleChoice::load(table)?,
+            None => SampleChoice::Described(multisample),
+        };
+        let first = scene.frame(0).map_err(|error| wrong("frames", error.to_string()))?;
+        let lights = point_lights(bounds(&first), options.lights, options.range);
+        let samples = table.source(scene.settings().samples, seed)?;
+        Ok(Self { scene, options, lights, samples, middle })
+    }
+
+    fn regime_warnings(&self, frame: &Frame) -> Vec<Warning> {
+        let mut warnings = Vec::new();
+        if self.options.method == Method::Forward {
+            return warnings;
+        }
+        if self.options.rate == Rate::Pixel && self.samples.per_pixel() > 1 {
+            let message = format!(
+                "one of {} samples of a pixel is lit, and the others get its light: edges are not smooth; --set rate=sample",
+                self.samples.per_pixel()
+            );
+            warnings.push(Warning::new(Code::DeferredOneSurface, message));
+        }
+        if frame.camera.open() != frame.camera.close() {
+            let message = "the camera moves while the shutter is open, but positions are reconstructed with the camera of its opening: \
+                           point lights are off for later samples; --shutter 0";
+            warnings.push(Warning::new(Code::DeferredMovingCamera, message));
+        }
+        warnings
+    }
+}
+
+impl DrawsScene for Deferred {
+    fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    fn draw_frame(&self, frame: &Frame, gpu: &mut Gpu<'_>) -> Result<Drawn, JobError> {
+        let settings = self.scene.settings();
+        let viewport = Viewport::new(settings.width, settings.height)
+            .ok_or_else(|| JobError::Setting(IMAGE_SIZE.to_owned()))?;
+        let samples = self.samples.per_pixel();
+        let lit = gpu.create(&SurfaceSpec::new("lit samples", viewport, LIT).sampled(samples));
+        let stage = Stage { job: self, frame, viewport, lit, screen: Corners::of(frame, viewport) };
+        let surfaces = stage.surfaces(gpu)?;
+        let lit_runs = match self.options.method {
+            Method::Forward => stage.forward(&surfaces, gpu)?,
+            Method::Deferred => stage.deferred(&surfaces, gpu)?,
+        };
+        let image = stage.resolve(gpu)?.into_image();
+        let bytes = match self.options.method {
+            Method::Forward => 0,
+            Method::Deferred => GBuffer::bytes(self.options.normals) * u64::from(samples),
+        };
+        let facts = vec![
+            Fact { name: "point_lights", value: self.lights.len() as f64 },
+            Fact { name: "g_buffer_bytes_per_pixel", value: bytes as f64 },
+            Fact { name: "lighting_invocations", value: lit_runs as f64 },
+        ];
+        let warnings = self.regime_warnings(frame);
+        Ok(Drawn { image, moving: frame.is_moving(), lens: false, facts, warnings })
+    }
+}
+
+/// A triangle over the whole image.
+struct Corners([Vec3; 3]);
+
+/// Its vertices.
+const TRIANGLE: [[u32; 3]; 1] = [[0, 1, 2]];
+
+impl Corners {
+    /// As far away as the farthest vertex, so that reconstructed positions are between it and the camera.
+    fn of(frame: &Frame, viewport: Viewport) -> Self {
+        let (camera, aspect) = (&frame.camera, viewport.width() as f32 / viewport.height() as f32);
+        let depth = |point: &Vec3| camera.open().transform_point3(*point).z;
+        let depths = frame.meshes.iter().flat_map(|mesh| mesh.open.iter()).map(depth);
+        let depth = depths.fold(2.0 * camera.near(), f32::max);
+        let half = camera.half_height() * if camera.is_orthographic() { 1.0 } else { depth };
+        let reach = half * (Vec2::new(aspect, 1.0) + 2.0 * camera.shift().abs()) * 1.01;
+        let world = camera.open().inverse();
+        Self(
+            [[-1.0, -1.0], [3.0, -1.0], [-1.0, 3.0]]
+                .map(|[x, y]| world.transform_point3(Vec3::new(x * reach.x, y * reach.y, depth))),
+        )
+    }
+
+    fn draw<'a>(&'a self, shader: &'a dyn Shader, bindings: &'a [Binding<'a>]) -> Result<Draw<'a>, JobError> {
+        let geometry = Geometry::new(&self.0, &self.0, &TRIANGLE).map_err(JobError::setting)?;
+        Ok(Draw::new(geometry, shader, Cull::None)
+            .with_state(overlay(Cull::None, Blend::Replace))
+            .binding(bindings))
+    }
+}
+
+/// A mesh with its material's shader.
+struct Surfaced<'a> {
+    draw: Draw<'a>,
+    shader: &'a SurfaceShader,
+}
+
+/// A frame that is drawn.
+struct Stage<'a> {
+    job: &'a Deferred,
+    frame: &'a Frame,
+    viewport: Viewport,
+    /// Radiance of samples, with the covered share in the last channel.
+    lit: SurfaceId,
+    screen: Corners,
+}
+
+impl<'a> Stage<'a> {
+    fn camera(&self) -> &'a Camera {
+        &self.frame.camera
+    }
+
+    fn surfaces(&self, gpu: &mut Gpu<'_>) -> Result<Vec<Surfaced<'a>>, JobError> {
+        let (scene, frame) = (&self.job.scene, self.frame);
+        let draws = gpu.resident(&frame.draws(scene)?);
+        let shaders = frame.drawn(scene).into_iter().map(|mesh| {
+            let shader = scene.shader(mesh.material, !mesh.colors.is_empty());
+            shader.ok_or_else(|| JobError::Setting(format!("there is no material {}", mesh.material)))
+        });
+        draws.into_iter().zip(shaders).map(|(draw, shader)| Ok(Surfaced { draw, shader: shader? })).collect()
+    }
+
+    /// Draws a pass onto surfaces with all samples; returns its shader runs.
+    fn pass(
+        &self,
+        name: &str,
+        draws: &[Draw<'_>],
+        targets: &Attachments,
+        gpu: &mut Gpu<'_>,
+        per_sample: bool,
+    ) -> Result<u64, JobError> {
+        let (spec, samples) = (gpu.spec(), &*self.job.samples);
+        let background = self.job.scene.background();
+        let settings = pipeline::Settings { spec, viewport: self.viewport, samples, background };
+        let pass = RasterPass::new(self.camera(), draws, &settings).named(name).without_image();
+        let pass = pass.onto(Target::Surfaces(targets));
+        let pass = if per_sample { pass.shaded_per_sample() } else { pass };
+        Ok(gpu.draw(&pass)?.counts[Event::PixelInvocations])
+    }
+
+    /// Surfaces lit as they are drawn, onto cleared samples.
+    fn forward(&self, surfaces: &[Surfaced<'a>], gpu: &mut Gpu<'_>) -> Result<u64, JobError> {
+        let spec = SurfaceSpec::new("depths", self.viewport, Format::D32);
+        let depth = gpu.create(&spec.sampled(self.job.samples.per_pixel()));
+        let colours = vec![Attachment::cleared(self.lit, Vec4::ZERO)];
+        let depth = Some(Attachment::cleared(depth, Clear::default()).dropped());
+        self.lit_forward("forward", surfaces.iter().collect(), &Attachments { colours, depth }, gpu)
+    }
+
+    fn lit_forward(
+        &self,
+        name: &str,
+        surfaces: Vec<&Surfaced<'a>>,
+        targets: &Attachments,
+        gpu: &mut Gpu<'_>,
+    ) -> Result<u64, JobError> {
+        let forward = |of: &&Surfaced<'a>| Forward { surface: of.shader, lights: &self.job.lights };
+        let shaders: Vec<Forward<'_>> = surfaces.iter().map(forward).collect();
+        let draws = surfaces.iter().zip(&shaders).map(|(of, shader)| Draw { shader, ..of.draw });
+        self.pass(name, &draws.collect::<Vec<_>>(), targets, gpu, false)
+    }
+
+    /// The G-buffer of opaque surfaces, their light, and blended surfaces over them.
+    fn deferred(&self, surfaces: &[Surfaced<'a>], gpu: &mut Gpu<'_>) -> Result<u64, JobError> {
+        let (samples, normals) = (self.job.samples.per_pixel(), self.job.options.normals);
+        let buffer = GBuffer::new(gpu, self.viewport, samples, normals);
+        let (opaque, blended): (Vec<_>, Vec<_>) =
+            surfaces.iter().partition(|of| of.draw.state.blend == Blend::Replace);
+        let writers: Vec<Writer<'_>> =
+            opaque.iter().map(|of| Writer { surface: of.shader, normals }).collect();
+        let draws = opaque.iter().zip(&writers).map(|(of, shader)| Draw { shader, ..of.draw });
+        self.pass("g-buffer", &draws.collect::<Vec<_>>(), &buffer.targets(), gpu, false)?;
+        let runs = self.light(&buffer, surfaces, gpu)?;
+        if !blended.is_empty() {
+            let colours = vec![Attachment::loaded(self.lit)];
+            let depth = Some(Attachment::loaded(buffer.depth).dropped());
+            self.lit_forward("blended", blended, &Attachments { colours, depth }, gpu)?;
+        }
+        Ok(runs)
+    }
+
+    /// Lights the G-buffer.
+    fn light(&self, buffer: &GBuffer, surfaces: &[Surfaced<'a>], gpu: &mut Gpu<'_>) -> Result<u64, JobError> {
+        let Options { lighting, rate, .. } = self.job.options;
+        let (reader, rays) = (buffer.reader(rate), CameraRays::new(self.camera()));
+        let Some(first) = surfaces.first() else { return Ok(0) };
+        let (all, bindings) = (&self.job.lights[..], buffer.bindings());
+        let in_loop = if lighting == LightPass::Screen { all } else { &[] };
+        let screen = Screen { reader, rays, scene: *first.shader.lighting(), lights: in_loop };
+        let volumes: Vec<Lit> =
+            all[in_loop.len()..].iter().map(|&light| Lit::new(Volume { reader, rays, light })).collect();
+        let mut draws = vec![self.screen.draw(&screen, &bindings)?];
+        for volume in &volumes {
+            draws.push(volume.draw(&bindings)?);
+        }
+        let colours = vec![Attachment::cleared(self.lit, Vec4::ZERO)];
+        let targets = Attachments { colours, depth: None };
+        self.pass("lighting", &draws, &targets, gpu, rate == Rate::Sample)
+    }
+
+    /// The image of the lit samples.
+    fn resolve(&self, gpu: &mut Gpu<'_>) -> Result<Rendered, JobError> {
+        let sky = self.job.scene.background();
+        let shader = Resolve { samples: self.job.samples.per_pixel(), sky };
+        let bindings = [Binding::Surface(self.lit)];
+        let draws = [self.screen.draw(&shader, &bindings)?];
+        let (spec, samples, background) = (gpu.spec(), &self.job.middle, sky);
+        let settings = pipeline::Settings { spec, viewport: self.viewport, samples, background };
+        Ok(gpu.draw(&RasterPass::new(self.camera(), &draws, &settings).named("resolve"))?)
+    }
+}
+
+/// A light with the box around its range.
+struct Lit {
+    shader: Volume,
+    corners: Vec<Vec3>,
+    triangles: std::sync::Arc<[[u32; 3]]>,
+}
+
+impl Lit {
+    /// The box is a little larger than the range, so that rounding takes nothing away.
+    fn new(shader: Volume) -> Self {
+        let PointLight { position, range, .. } = shader.light;
+        let mesh = shapes::cuboid(Vec3::splat(2.0 * range * 1.001), 0);
+        let corners = mesh.positions.iter().map(|corner| *corner + position).collect();
+        Self { shader, corners, triangles: mesh.triangles }
+    }
+
+    /// Back faces, which are in view from inside, too.
+    fn draw<'a>(&'a self, bindings: &'a [Binding<'a>]) -> Result<Draw<'a>, JobError> {
+        let geometry = Geometry::new(&self.corners, &self.corners, &self.triangles);
+        let draw = Draw::new(geometry.map_err(JobError::setting)?, &self.shader, Cull::Front);
+        Ok(draw.with_state(overlay(Cull::Front, Blend::Add)).binding(bindings))
+    }
+}
+
+/// Run options in use.
+pub(crate) const FLAGS: Flags = Flags {
+    uses: &[Flag::Size, Flag::Samples, Flag::Shutter, Flag::Table, Flag::Clip, Flag::Camera],
+    instead: &[],
+};
+
+/// Makes the job from its options.
+///
+/// # Errors
+/// As [`Deferred::new`].
+pub fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<dyn Job>, LoadError> {
+    Ok(Box::new(Deferred::new(options.read()?, request.overrides, request.seed)?))
+}
