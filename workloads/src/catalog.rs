@@ -34,6 +34,12 @@ const JOBS: &[Entry] = &[
         make: crate::collision::job,
     },
     Entry {
+        name: "compute",
+        what: "groups of lanes on what a frame drew: mean luminance, histogram, lights of tiles",
+        flags: crate::compute::FLAGS,
+        make: crate::compute::job,
+    },
+    Entry {
         name: "glossy",
         what: "glossy reflection or refraction on a planar receiver, pre-filtered by the lens of one pass",
         flags: crate::glossy::FLAGS,

@@ -37,6 +37,7 @@ mod bvh;
 pub mod catalog;
 pub mod caustics;
 pub mod collision;
+pub mod compute;
 mod error;
 mod fingerprint;
 pub mod glossy;

@@ -34,7 +34,7 @@ pub struct Gpu<'e> {
     /// Results since the last barrier: other units cannot read them yet.
     pending: Vec<Surface>,
     /// Surfaces that passes may write and read.
-    surfaces: Surfaces,
+    pub(super) surfaces: Surfaces,
     /// Those read since the last barrier: the reads may still be going on.
     reading: Vec<SurfaceId>,
     /// First addresses of what passes since the last barrier read.
@@ -360,7 +360,11 @@ impl<'e> Gpu<'e> {
         }
         let read = pass.read_surfaces().filter_map(|id| Some(self.surfaces.get(id)?.region.address()));
         let reads = at.textures.iter().flatten().copied().chain(read).any(is_pending);
-        let is_read = |id: SurfaceId| self.reading.contains(&id);
+        let by_groups = |id: SurfaceId| {
+            let place = self.surfaces.get(id).map(|state| state.region);
+            place.is_some_and(|place| self.reads.contains(&place.address()))
+        };
+        let is_read = |id: SurfaceId| self.reading.contains(&id) || by_groups(id);
         let overwrites =
             matches!(pass.target, Target::Surfaces(targets) if targets.all().any(|(id, ..)| is_read(id)));
         (reads || overwrites).then_some(Waits::Tiles)
