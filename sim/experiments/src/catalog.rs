@@ -2,6 +2,7 @@
 
 use crate::chart::caustics::CausticsChart;
 use crate::chart::ccd::CcdChart;
+use crate::chart::compute::ComputeChart;
 use crate::chart::frames::FramesChart;
 use crate::chart::glossy::GlossyChart;
 use crate::chart::growth::GrowthChart;
@@ -18,9 +19,10 @@ use crate::stress::Report;
 use crate::study::Entry;
 
 /// The charts of the book.
-pub static CHARTS: [Entry; 14] = [
+pub static CHARTS: [Entry; 15] = [
     Entry::of::<CausticsChart>(),
     Entry::of::<CcdChart>(),
+    Entry::of::<ComputeChart>(),
     Entry::of::<FramesChart>(),
     Entry::of::<GlossyChart>(),
     Entry::of::<GrowthChart>(),

@@ -76,6 +76,11 @@ impl Compute {
         Viewport::new(settings.width, settings.height).ok_or_else(|| JobError::Setting(IMAGE_SIZE.to_owned()))
     }
 
+    /// Samples of the pixels.
+    pub fn samples(&self) -> &SampleTable {
+        &self.samples
+    }
+
     /// Draws the depths of a frame.
     ///
     /// # Errors

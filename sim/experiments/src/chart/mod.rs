@@ -2,6 +2,7 @@
 //!
 //! - [`caustics`]: shader executions of caustics, by how beams are bounded.
 //! - [`ccd`]: false positives of collision detection.
+//! - [`compute`]: cost of programs of groups, by group size, layout and contention.
 //! - [`frames`]: how well frame starts are found, by method, over rate, noise, resolution and host time.
 //! - [`glossy`]: glossy reflection and refraction against brute force and accumulation.
 //! - [`growth`]: time of the visibility engine over triangles, samples and blur.
@@ -18,6 +19,7 @@
 
 pub mod caustics;
 pub mod ccd;
+pub mod compute;
 pub mod frames;
 pub mod glossy;
 pub mod growth;

@@ -3,9 +3,11 @@
 mod caustics;
 mod caustics_figures;
 mod collision;
+mod collision_figure;
 mod culling;
 mod depths;
 mod glossy;
+mod image_figures;
 mod occlusion;
 mod public;
 mod sampling;
