@@ -57,17 +57,6 @@ impl<'a> LinearImage<'a> {
         Ok(Self { width, height, pixels })
     }
 
-    /// Width and height in pixels.
-    pub(crate) fn size(&self) -> [u32; 2] {
-        [self.width, self.height]
-    }
-
-    /// Rows of pixels in 8-bit sRGB.
-    pub(crate) fn codes(&self) -> impl Iterator<Item = Vec<[u8; 3]>> {
-        let rows = self.pixels.chunks(self.width as usize);
-        rows.map(|row| row.iter().map(|pixel| pixel.map(linear_to_srgb8)).collect())
-    }
-
     /// Encodes a PNG file, 8-bit sRGB.
     ///
     /// # Errors

@@ -1,8 +1,20 @@
 //! Images in colour beside each other, each with a caption.
 
+use pipeline::texture::linear_to_srgb8;
+
 use super::palette::Colour;
 use super::picture::{Across, Look, Picture, Text, text};
-use crate::image::LinearImage;
+
+/// An image with a caption.
+#[derive(Clone, Debug)]
+pub struct CaptionedImage {
+    /// Width and height in pixels.
+    pub size: [u32; 2],
+    /// Linear RGB radiance of each pixel, row by row from the top left.
+    pub pixels: Vec<[f32; 3]>,
+    /// Caption.
+    pub caption: String,
+}
 
 /// Images in rows.
 #[derive(Clone, Copy, Debug)]
@@ -13,8 +25,8 @@ pub struct Images<'a> {
     pub subject: &'a str,
     /// Images in a row.
     pub across: usize,
-    /// Each image, row by row, with the caption below it.
-    pub images: &'a [(LinearImage<'a>, String)],
+    /// The images, row by row, with captions below them.
+    pub images: &'a [CaptionedImage],
 }
 
 /// Width of the whole picture, unless a [`Look`] sets it.
@@ -36,13 +48,13 @@ impl Images<'_> {
         for row in self.images.chunks(across) {
             let top = picture.height + 8.0;
             let mut bottom = top;
-            for (place, (image, caption)) in row.iter().enumerate() {
+            for (place, image) in row.iter().enumerate() {
                 let left = left + place as f64 * (width + GAP);
-                let scale = width / f64::from(image.size()[0]);
+                let scale = width / f64::from(image.size[0]);
                 draw(&mut picture, image, (left, top), scale);
-                let below = top + f64::from(image.size()[1]) * scale;
+                let below = top + f64::from(image.size[1]) * scale;
                 let at = (left + 0.5 * width, below + 0.5 * CAPTION);
-                picture.text(Text { across: Across::Centre, ..text(caption, at) });
+                picture.text(Text { across: Across::Centre, ..text(&image.caption, at) });
                 bottom = bottom.max(below + CAPTION);
             }
             picture.height = bottom;
@@ -53,8 +65,9 @@ impl Images<'_> {
 }
 
 /// Draws the pixels, equal ones of a row as one rectangle.
-fn draw(picture: &mut Picture, image: &LinearImage<'_>, (left, top): (f64, f64), scale: f64) {
-    for (y, row) in image.codes().enumerate() {
+fn draw(picture: &mut Picture, image: &CaptionedImage, (left, top): (f64, f64), scale: f64) {
+    for (y, row) in image.pixels.chunks(image.size[0].max(1) as usize).enumerate() {
+        let row: Vec<[u8; 3]> = row.iter().map(|pixel| pixel.map(linear_to_srgb8)).collect();
         let mut x = 0;
         for equal in row.chunk_by(|a, b| a == b) {
             let at = |x: usize, y: usize| (left + x as f64 * scale, top + y as f64 * scale);
@@ -72,8 +85,12 @@ mod tests {
     #[test]
     fn pixels_are_rectangles_in_their_place() {
         let pixels = [[1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0; 3], [0.0, 0.0, 1.0], [0.0; 3], [0.0; 3]];
-        let image = LinearImage::new(3, 2, &pixels).unwrap();
-        let images = [(image, "one".to_owned()), (image, "two".to_owned())];
+        let image = |caption: &str| CaptionedImage {
+            size: [3, 2],
+            pixels: pixels.into(),
+            caption: caption.to_owned(),
+        };
+        let images = ["one", "two"].map(image);
         let images = Images { title: "t", subject: "s", across: 2, images: &images };
         let picture = images.picture(&Look::default());
         let rects = picture.shapes.iter().filter_map(|shape| match shape {

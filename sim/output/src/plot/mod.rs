@@ -41,7 +41,7 @@ pub use chart::Chart;
 pub use chart_panel::ChartPanel;
 pub use frame_plots::{FrameEnergy, FrameEnergyPoint, FramePower, PowerPart};
 pub use heat_map::{HeatMapPlot, HeatTile, Shading};
-pub use images::Images;
+pub use images::{CaptionedImage, Images};
 pub use lanes::{StallLane, UnitLane, UnitPlot};
 pub use matrix::{Matrix, MatrixPanel};
 pub use palette::{Colour, part_colour};

@@ -115,6 +115,7 @@ impl Bench {
         let mut on = Gpu::quiet(&gpu.pipeline).map_err(RunError::setting)?;
         let depth = job.depths(&frame, &mut on).map_err(RunError::setting)?;
         let depths = on.contents(depth).unwrap_or_default();
+        drop(on);
         let lights = job.lights(&frame).map_err(RunError::setting)?;
         let table = job.samples();
         let mut samples = vec![Sample::default(); (size.0 * size.1) as usize];

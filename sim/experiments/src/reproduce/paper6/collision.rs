@@ -309,7 +309,7 @@ pub(super) fn dodged(task: &Task<'_>) -> Result<Done, RunError> {
         let [first, second] = [&case.first, &case.second].map(triangles);
         overlaps(&case.name, [&first, &second], *row.resolution_px.get(form))
     };
-    let figures = shown.map(figure).transpose()?.into_iter().collect();
+    let figures = shown.map(figure).into_iter().collect();
     Ok(Done { row: Row { ran: ran(&drawn), ..made }, figures })
 }
 

@@ -1,9 +1,7 @@
 //! Figure 6: pixels in which two moving objects overlap in time and in depth, seen along each axis.
 
-use output::image::LinearImage;
-use output::plot::{Images, Look};
+use output::plot::{CaptionedImage, Images, Look};
 use pipeline::conservative::{Grid, MovingTriangle, Rasterizer, View};
-use run::RunError;
 
 use crate::reproduce::Figure;
 
@@ -17,27 +15,23 @@ type Boxes = Vec<Option<[[f64; 2]; 2]>>;
 const VIEWS: [(usize, &str); 3] = [(2, "x and y"), (1, "z and x"), (0, "y and z")];
 
 /// Red where the times of both overlap, blue where their depths do, dark grey where one of them is.
-pub(super) fn overlaps(name: &str, objects: [&[Ends]; 2], pixels: u32) -> Result<Figure, RunError> {
-    let mut drawn = Vec::new();
-    for (axis, axes) in VIEWS {
+pub(super) fn overlaps(name: &str, objects: [&[Ends]; 2], pixels: u32) -> Figure {
+    let image = |(axis, axes): (usize, &str)| {
         let grid = grid(&objects, axis, pixels);
         let boxes = objects.map(|object| boxes(object, axis, &grid));
         let colors: Vec<[f32; 3]> = boxes[0].iter().zip(&boxes[1]).map(|(a, b)| color([*a, *b])).collect();
         let both = colors.iter().filter(|color| color[0] == 1.0 && color[2] == 1.0).count();
-        drawn.push((colors, grid, format!("{axes}: {both} pixels in time and depth")));
-    }
-    let image = |(colors, grid, caption): &(Vec<[f32; 3]>, Grid, String)| {
-        let image = LinearImage::new(grid.columns, grid.rows, colors).map_err(RunError::setting)?;
-        Ok((image, caption.clone()))
+        let caption = format!("{axes}: {both} pixels in time and depth");
+        CaptionedImage { size: [pixels; 2], pixels: colors, caption }
     };
-    let images = drawn.iter().map(image).collect::<Result<Vec<_>, RunError>>()?;
+    let images = VIEWS.map(image);
     let subject = format!(
         "{name}, {pixels} pixels across; red where their times overlap, blue where their depths do, purple both; a pixel has a box of time and \
          depth for each object"
     );
     let title = "Overlap in time and depth (Paper VI, Figure 6)";
     let picture = Images { title, subject: &subject, across: 3, images: &images }.picture(&Look::default());
-    Ok(Figure { name: "VI_fig6", picture })
+    Figure { name: "VI_fig6", picture }
 }
 
 /// Square pixels over all that both sweep.

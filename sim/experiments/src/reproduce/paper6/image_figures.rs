@@ -3,8 +3,7 @@
 use std::path::Path;
 
 use glam::{Affine3A, Vec3};
-use output::image::LinearImage;
-use output::plot::{Images, Look};
+use output::plot::{CaptionedImage, Images, Look};
 use pipeline::{Camera, Cull, Draw, Geometry, Gpu, LensShape, RasterPass, SampleTable, Viewport};
 use run::{GpuSpec, RunError};
 use workloads::Overrides;
@@ -14,27 +13,14 @@ use workloads::{catalog, shapes};
 
 use crate::reproduce::Figure;
 
-/// An image with its caption.
-struct Shown {
-    size: [u32; 2],
-    pixels: Vec<[f32; 3]>,
-    caption: String,
-}
-
 fn figure(
     name: &'static str,
     [title, subject]: [&str; 2],
     across: usize,
-    shown: &[Shown],
-) -> Result<Figure, RunError> {
-    let image = |shown: &Shown| {
-        let [width, height] = shown.size;
-        let image = LinearImage::new(width, height, &shown.pixels).map_err(RunError::setting)?;
-        Ok((image, shown.caption.clone()))
-    };
-    let images = shown.iter().map(image).collect::<Result<Vec<_>, RunError>>()?;
-    let picture = Images { title, subject, across, images: &images }.picture(&Look::default());
-    Ok(Figure { name, picture })
+    images: &[CaptionedImage],
+) -> Figure {
+    let picture = Images { title, subject, across, images }.picture(&Look::default());
+    Figure { name, picture }
 }
 
 /// The first frame of a workload.
@@ -43,7 +29,7 @@ fn drawn(
     set: &[(&str, String)],
     overrides: &Overrides,
     caption: &str,
-) -> Result<Shown, RunError> {
+) -> Result<CaptionedImage, RunError> {
     let set = set.iter().map(|(option, value)| ((*option).to_owned(), value.clone())).collect();
     let (options, request) = (OptionSource { file: None, set }, Request { overrides, seed: 1 });
     let (_, job) = catalog::load(Path::new(name), &options, &request)?;
@@ -53,7 +39,7 @@ fn drawn(
     let image = job.frame(first, &mut on).map_err(RunError::setting)?.image;
     let size = [job.settings().width, job.settings().height];
     let pixels = image.iter().map(|color| color.to_array()).collect();
-    Ok(Shown { size, pixels, caption: caption.to_owned() })
+    Ok(CaptionedImage { size, pixels, caption: caption.to_owned() })
 }
 
 /// Size of the images of Figure 14, and samples of a pixel.
@@ -83,7 +69,7 @@ pub(super) fn glossy(
     }
     let subject =
         format!("maps of {texels} rows, lens of radius {roughness}; right: the most samples of a texel");
-    figure("VI_fig14", ["Glossy reflection and refraction (Paper VI, Figure 14)", &subject], 3, &shown)
+    Ok(figure("VI_fig14", ["Glossy reflection and refraction (Paper VI, Figure 14)", &subject], 3, &shown))
 }
 
 /// Views in one pass: how many, the scene, and the lenses.
@@ -127,19 +113,15 @@ pub(super) fn views(name: &'static str, line: &Line<'_>) -> Result<Figure, RunEr
     let view = |number: usize| {
         let rows = all.pixels.chunks(whole);
         let pixels = rows.flat_map(|row| row[number * width..][..width].iter().copied()).collect();
-        Shown { size: [VIEW.0, VIEW.1], pixels, caption: format!("view {}", number + 1) }
+        CaptionedImage { size: [VIEW.0, VIEW.1], pixels, caption: format!("view {}", number + 1) }
     };
-    let shown: Vec<Shown> = (0..*views as usize).map(view).collect();
+    let shown: Vec<CaptionedImage> = (0..*views as usize).map(view).collect();
     let subject = format!(
         "{views} views of one pass, {spacing:.4} scene units apart, lenses of radius {aperture:.4}, {samples} samples a view, shutter {shutter}; \
          frame {frame} of scene {scene}"
     );
-    figure(
-        name,
-        ["Views with motion and defocus blur (Paper VI, Figure 17)", &subject],
-        shown.len().min(4),
-        &shown,
-    )
+    let titles = ["Views with motion and defocus blur (Paper VI, Figure 17)", &subject];
+    Ok(figure(name, titles, shown.len().min(4), &shown))
 }
 
 /// Width and height of the image of points in space.
@@ -180,11 +162,11 @@ pub(super) fn balls(points: &[[f64; 3]], radius: f64) -> Result<Figure, RunError
     let pixels = image.into_image().iter().map(|color| color.to_array()).collect();
     let caption =
         format!("{} points of a corner of the cube, {:.1} r along each side", centres.len(), side / radius);
-    let shown = [Shown { size: [SPACE_PX; 2], pixels, caption }];
+    let shown = [CaptionedImage { size: [SPACE_PX; 2], pixels, caption }];
     let subject = format!(
         "balls of radius r/2 around the points do not overlap; red, green and blue along x, y and z; r = {radius}"
     );
-    figure("VI_fig11_3d", ["Maximal points in space (Paper VI, Figure 11)", &subject], 1, &shown)
+    Ok(figure("VI_fig11_3d", ["Maximal points in space (Paper VI, Figure 11)", &subject], 1, &shown))
 }
 
 /// A camera that sees three sides of the unit cube about the origin.
