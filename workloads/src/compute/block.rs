@@ -45,15 +45,16 @@ impl Blocks {
         u64::from(self.grid[0]) * u64::from(self.grid[1])
     }
 
-    /// Runs `work` on each pixel of a lane that is in the image. The position of a pixel takes four operations, as the sizes of
-    /// blocks are constants; whether it is inside takes a branch.
+    /// Runs `work` on each pixel of a lane that is in the image. The position of a pixel takes two operations, as the sizes of
+    /// blocks are constants, and two more where pixels are left out; whether it is inside takes a branch.
     pub fn pixels(&self, lane: &GroupLane<'_, '_>, id: [u32; 3], size: u32, mut work: impl FnMut([u32; 2])) {
         let [columns, rows] = self.block;
         for number in (lane.index()..columns * rows).step_by(size as usize) {
             let within = [number % columns, number / columns];
             let at = [0, 1].map(|axis| lane.madd(id[axis], self.block[axis], within[axis]));
             if lane.branch(at[0] < self.grid[0] && at[1] < self.grid[1]) {
-                work([0, 1].map(|axis| lane.madd(at[axis], self.step, self.offset[axis])));
+                let left_out = |axis: usize| lane.madd(at[axis], self.step, self.offset[axis]);
+                work(if self.step == 1 { at } else { [0, 1].map(left_out) });
             }
         }
     }

@@ -159,7 +159,7 @@ impl<'a, 'e> Kernels<'a, 'e> {
         let bindings = [&[image.reads(), out.writes()], reads].concat();
         let before = self.counts;
         let shader = Display { image: *image, blocks, show, out };
-        self.dispatch("image", (blocks.groups(), group, 0), &bindings, &shader)?;
+        self.dispatch("display", (blocks.groups(), group, 0), &bindings, &shader)?;
         self.counts = before;
         Ok(decoded(&self.gpu.values(out)))
     }

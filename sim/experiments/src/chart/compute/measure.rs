@@ -31,6 +31,8 @@ const TILES: [u32; 3] = [8, 16, 32];
 const LIST: u32 = 512;
 /// The GPU of all cases.
 const GPU: &str = "reference";
+/// The pass that writes the image.
+const DISPLAY: &str = "display";
 /// Seed of samples and lights.
 const SEED: u64 = 1;
 
@@ -222,7 +224,7 @@ fn cost(plan: &Plan, observed: &Observed) -> [f64; 3] {
     let (mut all, mut before_ps) = ([0.0; 3], 0);
     for (pass, time) in observed.report.passes.iter().zip(&observed.times) {
         let counts = pass.counts();
-        if counts[Event::Groups] > 0 && pass.name != "image" {
+        if counts[Event::Groups] > 0 && pass.name != DISPLAY {
             all[0] += (time.end_ps - before_ps) as f64 * 1e-12 * plan.gpu.core_hz;
             all[1] += plan.model.counts_energy(&counts).total_j();
             all[2] += (counts[Event::BankConflicts] + counts[Event::AtomicConflicts]) as f64;
