@@ -68,7 +68,7 @@ pub mod visibility;
 
 pub use compute::{
     Atomic, Buffer, BufferBinding, ComputeError, ComputePass, ComputeSpec, Fault, Group, GroupLane,
-    GroupShader,
+    GroupShader, SurfaceView,
 };
 pub use frame::{
     Attachment, Attachments, Binding, ConservativeDraw, ConservativePass, Draw, Features, FrameReport, Gpu,

@@ -268,6 +268,20 @@ impl<'a> Lane<'a> {
         a.clamp(0.0, 1.0)
     }
 
+    /// `a` without its lowest `bits`, divided by two to their power.
+    #[inline(always)]
+    pub fn shift_right(&self, a: u32, bits: u32) -> u32 {
+        self.count(1);
+        a >> bits
+    }
+
+    /// `a` rounded toward zero, as an integer; the nearest integer of 32 bits beyond their range, and 0 for NaN.
+    #[inline(always)]
+    pub fn truncate(&self, a: f32) -> u32 {
+        self.count(1);
+        a as u32
+    }
+
     /// `a . b`: three multiply-adds.
     #[inline(always)]
     pub fn dot<T: Vector>(&self, a: T, b: T) -> T::Part {

@@ -271,6 +271,7 @@ fn the_work_of_passes_adds_up_to_that_of_the_run() {
     for (work, passes) in [
         ("tiny", &["scene", "write back"][..]),
         ("occlusion", &["occluders", "farthest depths", "queries", "image", "write back"]),
+        ("compute", &["depth pre-pass", "light culling", "image", "display", "write back"]),
         ("deferred", &["g-buffer", "lighting", "resolve", "write back"]),
         ("glossy", &["map", "image", "write back"]),
         ("soft-shadows", &["depths", "look-ups", "write back"]),

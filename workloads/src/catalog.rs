@@ -34,6 +34,12 @@ const JOBS: &[Entry] = &[
         make: crate::collision::job,
     },
     Entry {
+        name: "compute",
+        what: "groups of lanes on what a frame drew: mean luminance, histogram, lights of tiles",
+        flags: crate::compute::FLAGS,
+        make: crate::compute::job,
+    },
+    Entry {
         name: "deferred",
         what: "deferred rendering: a G-buffer, lit by many point lights, beside forward rendering",
         flags: crate::deferred::FLAGS,

@@ -7,6 +7,7 @@
 //! - [`points`] makes random points: Poisson disk points, points in volumes, white noise.
 //! - [`job`] is work beyond one rendering of a scene; [`catalog`] finds a job by name.
 //! - [`caustics`] draws refracted and reflected light, with light volumes as moving triangles.
+//! - [`compute`] runs groups of lanes on what raster passes drew.
 //! - [`glossy`] draws glossy reflections and refractions on planar receivers.
 //! - [`multiview`] draws stereo and multi-view images in one pass.
 //! - [`soft_shadows`] draws motion-blurred shadows of area lights; [`accumulation`] is the method for
@@ -38,6 +39,7 @@ mod bvh;
 pub mod catalog;
 pub mod caustics;
 pub mod collision;
+pub mod compute;
 pub mod deferred;
 mod error;
 mod fingerprint;

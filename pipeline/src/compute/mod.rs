@@ -18,6 +18,7 @@
 mod buffers;
 mod group;
 mod shared;
+mod view;
 mod warp;
 
 use serde::Deserialize;
@@ -26,6 +27,7 @@ pub use buffers::{Access, Atomic, Buffer, BufferBinding, Word};
 pub(crate) use buffers::{Buffers, Stored};
 pub use group::{Fault, Group, GroupLane};
 pub(crate) use group::{GroupLog, GroupPlace, View, run};
+pub use view::SurfaceView;
 pub(crate) use warp::Touched;
 
 /// Sizes of the hardware for groups.

@@ -3,11 +3,12 @@
 use activity::{Counts, Event, Packet, PacketCounts, PacketKind, Waits};
 use rayon::prelude::*;
 
+use super::attachments::SurfaceId;
 use super::error::PassError;
 use super::gpu::{Gpu, PassReport};
 use crate::compute::{
-    self, Access, Buffer, ComputeError, ComputePass, ComputeSpec, GroupLog, GroupPlace, Stored, Touched,
-    View, Word,
+    self, Access, Buffer, ComputeError, ComputePass, ComputeSpec, GroupLog, GroupPlace, Stored, SurfaceView,
+    Touched, View, Word,
 };
 use crate::memory::{MemorySystem, Surface};
 
@@ -25,6 +26,14 @@ impl Gpu<'_> {
     pub fn view<T: Word>(&mut self, name: &str, surface: Surface, data: &[T]) -> Option<Buffer<T>> {
         let fits = 4 * data.len() as u64 <= surface.bytes();
         fits.then(|| self.buffers.add(name, surface, data))
+    }
+
+    /// What a pass stored in a surface; `None` while nothing is stored in it.
+    pub fn surface_view(&mut self, id: SurfaceId) -> Option<SurfaceView> {
+        let state = self.surfaces.get(id)?;
+        let words = state.texels.as_ref()?.words(&state.layout, state.region.bytes() as usize / 4);
+        let words = self.buffers.add(state.spec().name, state.region, &words);
+        Some(SurfaceView::new(words, state.layout, &state.spec()))
     }
 
     /// The values of a buffer after all passes so far.

@@ -34,7 +34,7 @@ pub struct Gpu<'e> {
     /// Results since the last barrier: other units cannot read them yet.
     pending: Vec<Surface>,
     /// Surfaces that passes may write and read.
-    surfaces: Surfaces,
+    pub(super) surfaces: Surfaces,
     /// First addresses of what passes since the last barrier read: the reads may still be going on.
     reads: Vec<u64>,
     pub(super) buffers: Buffers,

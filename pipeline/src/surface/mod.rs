@@ -75,6 +75,22 @@ impl Texels {
         self.bytes.chunks_exact(self.format.bytes() as usize).map(|bytes| self.format.decode(bytes)).collect()
     }
 
+    /// The words of all samples where `layout` has them; 0 in between.
+    pub fn words(&self, layout: &Layout, count: usize) -> Vec<u32> {
+        let (mut words, per_sample) = (vec![0; count], self.format.words() as usize);
+        for (number, sample) in self.bytes.chunks_exact(4 * per_sample).enumerate() {
+            let [pixel, index] = [number / self.samples as usize, number % self.samples as usize];
+            let [width, pixel] = [self.viewport.width(), pixel as u32];
+            let first = layout.word([pixel % width, pixel / width], index as u32) as usize;
+            let of_sample = sample.chunks_exact(4).map(|word| std::array::from_fn(|byte| word[byte]));
+            words[first..][..per_sample]
+                .iter_mut()
+                .zip(of_sample)
+                .for_each(|(to, bytes)| *to = u32::from_le_bytes(bytes));
+        }
+        words
+    }
+
     /// Value of a sample of a pixel; `None` outside.
     pub fn at(&self, [x, y]: [i32; 2], sample: u32) -> Option<Vec4> {
         let [x, y] = [u32::try_from(x).ok()?, u32::try_from(y).ok()?];
@@ -128,6 +144,11 @@ impl Layout {
         let pixel = tile * u64::from(side * side) + u64::from(y % side * side + x % side);
         self.address + (pixel * u64::from(self.samples) + u64::from(sample)) * self.bytes
     }
+
+    /// Number of the first word of 32 bits of a sample of a pixel inside.
+    pub fn word(&self, pixel: [u32; 2], sample: u32) -> u32 {
+        ((self.at(pixel, sample) - self.address) / 4) as u32
+    }
 }
 
 #[cfg(test)]
@@ -155,5 +176,10 @@ mod tests {
         assert_eq!(texels.at([2, 1], 0), Some(Vec4::new(0.25, 0.0, 0.0, 1.0)));
         assert_eq!([texels.at([3, 1], 0), texels.at([-1, 0], 0), texels.at([0, 0], 2)], [None; 3]);
         assert_eq!(texels.values().len(), 12);
+        let (layout, bytes) = Layout::new(&spec, 2, 64);
+        let words = texels.words(&layout, bytes as usize / 4);
+        assert_eq!(words.iter().filter(|word| **word == 0.25_f32.to_bits()).count(), 11);
+        // The third pixel of the second row is the third of the second tile.
+        assert_eq!((words.len(), words[2 * (4 + 2) + 1]), (16, 7.0_f32.to_bits()));
     }
 }

@@ -415,3 +415,55 @@ fn faults_of_programs_name_group_lane_and_buffer() {
         );
     }
 }
+
+/// Groups see the words of a surface in their places, and a pass that draws on it again waits for them.
+#[test]
+fn groups_read_a_surface_as_a_pass_stored_it() {
+    let spec = hardware();
+    let table = SampleTable::low_discrepancy(2, 3, LensShape::Disk).unwrap();
+    let viewport = Viewport::new(30, 20).unwrap();
+    let settings = Settings { spec: &spec, viewport, samples: &table, background: Vec3::ZERO };
+    let mut kinds = Vec::new();
+    let mut gpu = Gpu::new(&spec, |packet, _| kinds.push((packet.kind, packet.pass))).unwrap();
+    let surfaces = [Format::Rgba16f, Format::D32]
+        .map(|format| gpu.create(&SurfaceSpec::new("surface", viewport, format).sampled(2)));
+    let corners = rectangle([-9.0, -5.0], [11.0, 6.0], 2.0);
+    let geometry = Geometry::new(&corners, &corners, &QUAD).unwrap();
+    let draws = [Draw::new(geometry, &Plain, Cull::None)];
+    let camera = pixel_camera(viewport, 0.5);
+    let colours = vec![Attachment::cleared(surfaces[0], Vec4::new(0.1, 0.2, 0.3, 1.0))];
+    let to = Attachments { colours, depth: Some(Attachment::cleared(surfaces[1], Clear::default())) };
+    let raster = RasterPass::new(&camera, &draws, &settings).onto(Target::Surfaces(&to));
+    assert!(gpu.surface_view(surfaces[0]).is_none(), "nothing is stored yet");
+    gpu.draw(&raster).unwrap();
+    for surface in surfaces {
+        let (view, stored) = (gpu.surface_view(surface).unwrap(), gpu.contents(surface).unwrap());
+        assert_eq!((view.size(), view.samples()), ([30, 20], 2));
+        let out = gpu.buffer("out", &[0.0_f32; 4 * 30 * 20 * 2]);
+        let copy = parallel(|group: &mut Group<'_>| {
+            let (id, size) = (group.id(), group.size());
+            group.lanes(|lane| {
+                let at = place(id, size, lane);
+                let texel = lane.texel(&view, [at / 2 % 30, at / 2 / 30], at % 2);
+                (0..4).for_each(|part| lane.store(out, 4 * at + part, texel[part as usize]));
+            });
+        });
+        gpu.dispatch(&pass(30 * 20 * 2 / 60, 60, &[view.reads(), out.writes()], &copy)).unwrap();
+        let read: Vec<f32> = stored.iter().flat_map(|value| value.to_array()).collect();
+        assert_eq!(gpu.values(out), read);
+        assert!(read.iter().any(|value| *value != read[0]));
+    }
+    gpu.draw(&raster).unwrap();
+    let view = gpu.surface_view(surfaces[0]).unwrap();
+    let outside = parallel(|group: &mut Group<'_>| {
+        group.lanes(|lane| {
+            lane.texel(&view, [30, 0], 0);
+        });
+    });
+    assert!(gpu.dispatch(&pass(1, 1, &[view.reads()], &outside)).is_err());
+    drop(gpu);
+    let waits = kinds.iter().filter(|(kind, _)| *kind == PacketKind::Barrier(Waits::Tiles));
+    let waits: Vec<u32> = waits.map(|(_, pass)| *pass).collect();
+    // The first copy waits for the pass, the second pass for both copies, and the last dispatch for that.
+    assert_eq!(waits, [1, 3, 4]);
+}

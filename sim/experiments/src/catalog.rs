@@ -2,6 +2,7 @@
 
 use crate::chart::caustics::CausticsChart;
 use crate::chart::ccd::CcdChart;
+use crate::chart::compute::ComputeChart;
 use crate::chart::deferred::DeferredChart;
 use crate::chart::frames::FramesChart;
 use crate::chart::glossy::GlossyChart;
@@ -19,9 +20,10 @@ use crate::stress::Report;
 use crate::study::Entry;
 
 /// The charts of the book.
-pub static CHARTS: [Entry; 15] = [
+pub static CHARTS: [Entry; 16] = [
     Entry::of::<CausticsChart>(),
     Entry::of::<CcdChart>(),
+    Entry::of::<ComputeChart>(),
     Entry::of::<DeferredChart>(),
     Entry::of::<FramesChart>(),
     Entry::of::<GlossyChart>(),

@@ -8,7 +8,7 @@ use output::table::Table;
 use run::GpuSpec;
 use serde::Serialize;
 use serde_json::{Map, Value};
-use workloads::{caustics, collision, deferred, glossy, multiview, occlusion, points, soft_shadows};
+use workloads::{caustics, collision, compute, deferred, glossy, multiview, occlusion, points, soft_shadows};
 
 use super::outputs::{print, print_json};
 use super::{Failure, ListArgs};
@@ -224,6 +224,29 @@ const OPTIONS: &[WorkloadOptions] = &[
             Doc("narrow", SWITCH, "pairs one by one within the space that their swept boxes share"),
         ],
         defaults: || serde_json::to_string(&collision::Options::default()),
+    },
+    WorkloadOptions {
+        workload: "compute",
+        options: &[
+            Doc("kernel", Names(&["reduction", "histogram", "light_culling"]), "what groups compute"),
+            Doc("scene", SCENE, "the scene, drawn without motion and without a lens"),
+            Doc("group", Words("a power of two, 16 to 1024"), "lanes of a group"),
+            Doc("per_lane", Numbers(1.0, 64.0), "pixels of a lane, of reduction and histogram"),
+            Doc("step", Numbers(1.0, 16.0), "one pixel in so many is read along both axes"),
+            Doc("order", Names(&["sequential", "interleaved"]), "which sums a step of the reduction adds"),
+            Doc("stride", Numbers(1.0, 64.0), "words of shared memory between the sums of lanes"),
+            Doc("padded", SWITCH, "an empty word of shared memory after each row of banks"),
+            Doc("atomics", Names(&["shared", "global"]), "where lanes count: shared memory or a buffer"),
+            Doc("bins", Words("a power of two, 16 to 256"), "bins of the histogram"),
+            Doc("copies", Numbers(1.0, 32.0), "histograms in the shared memory of a group"),
+            Doc("contrast", Numbers(0.0, 1.0), "contrast of the image; 0 is one grey"),
+            Doc("lights", Numbers(1.0, 65536.0), "number of lights"),
+            Doc("light_radius", Numbers(0.0, 1.0), "reach of a light, as a share of the scene's diagonal"),
+            Doc("tile_px", Words("a power of two, 4 to 64"), "side of a tile in pixels"),
+            Doc("depth_bounds", SWITCH, "the depths of a tile bound its lights"),
+            Doc("list", Numbers(1.0, 65536.0), "most lights of a tile"),
+        ],
+        defaults: || serde_json::to_string(&compute::Options::default()),
     },
     WorkloadOptions {
         workload: "deferred",

@@ -123,6 +123,12 @@ codes! {
     CollisionNearEverywhere = "collision-near-everywhere" in Workload,
     /// A quarter or more of the tiles are covered for most of their samples, but not all.
     OcclusionSmallOccluders = "occlusion-small-occluders" in Workload,
+    /// An access of a reduction of `compute` to shared memory takes two cycles or more on average.
+    BankConflicts = "bank-conflicts" in Workload,
+    /// An atomic of a histogram of `compute` waits for seven others or more on average.
+    AtomicContention = "atomic-contention" in Workload,
+    /// A tile of `compute` has more lights than its list takes.
+    LightListsFull = "light-lists-full" in Workload,
     /// `quintile sample poisson`: more than one uncovered region per 100 points is thinner than the float
     /// spacing.
     PointsThinRegions = "points-thin-regions" in Workload,

@@ -7,6 +7,7 @@ mod cameras;
 mod caustics;
 mod collision;
 mod common;
+mod compute;
 mod deferred;
 mod failure;
 mod flags;

@@ -2,6 +2,7 @@
 //!
 //! - [`caustics`]: shader executions of caustics, by how beams are bounded.
 //! - [`ccd`]: false positives of collision detection.
+//! - [`compute`]: cost of programs of groups, by group size, layout and contention.
 //! - [`deferred`]: deferred against forward rendering over lights, overdraw, formats and samples.
 //! - [`frames`]: how well frame starts are found, by method, over rate, noise, resolution and host time.
 //! - [`glossy`]: glossy reflection and refraction against brute force and accumulation.
@@ -19,6 +20,7 @@
 
 pub mod caustics;
 pub mod ccd;
+pub mod compute;
 pub mod deferred;
 pub mod frames;
 pub mod glossy;

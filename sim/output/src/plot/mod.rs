@@ -12,6 +12,7 @@
 //! Other plots:
 //!
 //! - [`Chart`]: panels of [`Series`] over axes of any [`Scale`].
+//! - [`Images`]: images in colour beside each other.
 //! - [`Matrix`]: costs of methods by test case.
 //!
 //! A unit has the same colour in all plots ([`part_colour`]). Without anything to draw (no samples, no frames, no finite value) the
@@ -23,6 +24,7 @@ mod chart_panel;
 mod columns;
 mod frame_plots;
 mod heat_map;
+mod images;
 mod lanes;
 mod legend;
 mod palette;
@@ -38,6 +40,7 @@ pub use chart::Chart;
 pub use chart_panel::ChartPanel;
 pub use frame_plots::{FrameEnergyPlot, FrameEnergyPoint, FramePowerPlot, PowerPart};
 pub use heat_map::{HeatMapPlot, HeatTile, Matrix, MatrixPanel, Shading};
+pub use images::{CaptionedImage, Images};
 pub use lanes::{StallLane, UnitLane, UnitPlot};
 pub use palette::{Colour, part_colour};
 pub use picture::{COLUMN_MM, Look, Picture};

@@ -287,6 +287,11 @@ impl Subject {
         Ok(stream)
     }
 
+    /// Whether the GPU has the units that the frame needs.
+    pub fn runs_on(&self, gpu: &GpuSpec) -> bool {
+        self.name != "compute" || gpu.pipeline.compute.is_some()
+    }
+
     /// Renders the frame, every packet to `emit`.
     pub fn render(&self, gpu: &GpuSpec, emit: impl FnMut(&Packet, &[LineAccess])) -> Result<(), RunError> {
         let failed = |error: String| RunError::Setting(format!("{}: {error}", self.name));

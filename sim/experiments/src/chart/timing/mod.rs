@@ -117,6 +117,10 @@ impl Study for TimingChart {
         let (mut rows, mut added, mut reference) = (Vec::new(), Vec::new(), measure::Speed::default());
         for subject in &subjects {
             for gpu in &gpus {
+                if !subject.runs_on(gpu) {
+                    bar.inc();
+                    continue;
+                }
                 let stream = subject.stream(gpu)?;
                 let named = (subject.name(), Some(subject.kind));
                 rows.extend(measure::rows(named, gpu, &stream, &mut reference)?);

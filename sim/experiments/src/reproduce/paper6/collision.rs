@@ -11,6 +11,7 @@ use super::super::figure::over_doublings;
 use super::super::row::{Number, Row, numbers};
 use super::super::{Done, Figure};
 use super::Task;
+use super::collision_figure::{Ends, overlaps};
 use super::public::{Pair, Public};
 use super::settings::{Moving, Shape, TwoObjects};
 use crate::reproduce::settings::Form;
@@ -232,8 +233,13 @@ fn missed_closer(case: &Case) -> usize {
     case.collide.iter().filter(|pair| !kept.contains(pair)).count()
 }
 
-/// A shape on its way, as triangles.
+/// A shape on its way.
 fn object(moving: &Moving) -> Option<Object> {
+    Object::from_ends(triangles(moving), 0.0)
+}
+
+/// Triangles of a shape on its way.
+fn triangles(moving: &Moving) -> Vec<Ends> {
     let mesh = match moving.shape {
         Shape::Cuboid(x, y, z) => shapes::cuboid(DVec3::new(x, y, z).as_vec3(), 0),
         Shape::Ball { radius, segments } => shapes::sphere(radius, segments, 0),
@@ -245,7 +251,7 @@ fn object(moving: &Moving) -> Option<Object> {
     };
     let ends =
         |triangle: &[u32; 3]| [moving.from, moving.to].map(|place| triangle.map(|vertex| at(vertex, place)));
-    Object::from_ends(mesh.triangles.iter().map(ends).collect(), 0.0)
+    mesh.triangles.iter().map(ends).collect()
 }
 
 /// Two objects of a case, and what each way of drawing them leaves.
@@ -298,7 +304,13 @@ pub(super) fn dodged(task: &Task<'_>) -> Result<Done, RunError> {
     let full = row.cases.values() * row.methods.get(Form::Full).len() * row.resolution_px.values();
     let band = tried.band(full).ok_or_else(|| RunError::setting("VI-2 has no case to try"))?;
     let made = with.banded(&row.about, said.join("; "), band);
-    Ok(Done::bare(Row { ran: ran(&drawn), ..made }))
+    let shown = row.objects.get(form).iter().find(|case| case.name == *row.cases.get(form));
+    let figure = |case: &TwoObjects| {
+        let [first, second] = [&case.first, &case.second].map(triangles);
+        overlaps(&case.name, [&first, &second], *row.resolution_px.get(form))
+    };
+    let figures = shown.map(figure).into_iter().collect();
+    Ok(Done { row: Row { ran: ran(&drawn), ..made }, figures })
 }
 
 /// Result of the passes for a case, in words.

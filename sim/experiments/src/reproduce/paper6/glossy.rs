@@ -3,6 +3,7 @@
 use workloads::glossy::Effect;
 
 use super::Task;
+use super::image_figures;
 use super::settings::Glossy;
 use crate::chart::glossy::{Bench, Blur, GlossyEffort as Size, GlossyRow as Measured};
 use crate::reproduce::band::{Cases, one_at_a_time};
@@ -115,10 +116,10 @@ pub(super) fn row(task: &Task<'_>) -> Result<Done, RunError> {
         ("vertices", measured().map(|row| row.vertices as f64).sum()),
         ("samples_tested", measured().map(|row| row.samples_tested as f64).sum()),
     ]);
-    let figure = contact(&base.blurs);
+    let pictures = image_figures::glossy(*row.texels.get(form), radius, index, *row.samples.get(form))?;
     Ok(Done {
         row: Row { numbers: facts, ran, ..with.banded(&row.about, ours, band) },
-        figures: vec![figure],
+        figures: vec![contact(&base.blurs), pictures],
     })
 }
 

@@ -17,6 +17,7 @@ use super::super::row::{Row, numbers};
 use super::super::verdict::Verdict;
 use super::super::{Done, Figure};
 use super::Task;
+use super::image_figures::balls;
 use super::settings::Darts;
 use crate::reproduce::settings::Form;
 use run::GpuSpec;
@@ -129,7 +130,8 @@ pub(super) fn darts(task: &Task<'_>) -> Result<Done, RunError> {
         vec![dots("points", shown.map(|[x, y]| (*x, *y)).collect())],
     );
     let made = with.row(&row.about, (ours, Verdict::of(holds), note));
-    Ok(Done { row: Row { numbers: facts, ran, ..made }, figures: vec![figure] })
+    let in_cube = balls(&deep.points, *row.radius_3d.get(form))?;
+    Ok(Done { row: Row { numbers: facts, ran, ..made }, figures: vec![figure, in_cube] })
 }
 
 /// A p within these is that of white noise.

@@ -4,6 +4,7 @@ use pipeline::{CacheSpec, Replacement};
 use workloads::multiview::Layout;
 
 use super::Task;
+use super::image_figures::{self, Line};
 use super::settings::{Policy, Size, Views};
 use crate::chart::multiview::{Bench, Lanes};
 use crate::reproduce::band::{Cases, one_at_a_time};
@@ -17,12 +18,23 @@ use run::RunError;
 
 /// VI-13.
 pub(super) fn stereo(task: &Task<'_>) -> Result<Done, RunError> {
-    done(&task.with(|settings| &settings.vi_13), ["VI_fig17_stereo", "VI_fig17_stereo_band"])
+    done(
+        &task.with(|settings| &settings.vi_13),
+        ["VI_fig17_stereo", "VI_fig17_stereo_band", "VI_fig17_stereo_images"],
+    )
 }
 
 /// VI-14.
 pub(super) fn seven(task: &Task<'_>) -> Result<Done, RunError> {
-    done(&task.with(|settings| &settings.vi_14), ["VI_fig17_seven", "VI_fig17_seven_band"])
+    done(
+        &task.with(|settings| &settings.vi_14),
+        ["VI_fig17_seven", "VI_fig17_seven_band", "VI_fig17_seven_images"],
+    )
+}
+
+/// Number of views, and steps of the line that a view covers.
+fn shape(row: &Views, form: Form) -> [u32; 2] {
+    [*row.views.get(form), *row.overlap.get(form)]
 }
 
 /// One value of everything that is left open.
@@ -68,13 +80,29 @@ impl Point {
         )
     }
 
-    /// Lanes of all views and of one, for `views` that are two lenses apart or `overlap` steps of a line.
-    fn lanes(&self, [views, overlap]: [u32; 2]) -> Result<Lanes, StudyError> {
+    /// `views` that are two lenses apart or `overlap` steps of a line.
+    fn layout(&self, [views, overlap]: [u32; 2]) -> Layout {
         let aperture = self.lens_over_eyes * self.eyes;
-        let layout = match overlap {
+        match overlap {
             0 => Layout { views, ..Layout::stereo(self.eyes, aperture) },
             _ => Layout { overlap, ..Layout::line(views, self.eyes + 2.0 * aperture, aperture) },
-        };
+        }
+    }
+
+    /// Images of all views of the frame.
+    fn images(&self, name: &'static str, shape: [u32; 2]) -> Result<Figure, RunError> {
+        let Layout { views, spacing, aperture, overlap } = self.layout(shape);
+        let (scene, frame) = (self.scene.0.as_str(), self.scene.1);
+        let (samples, shutter) = (self.samples, self.shutter);
+        image_figures::views(
+            name,
+            &Line { scene, frame, views, spacing, aperture, overlap, samples, shutter },
+        )
+    }
+
+    /// Lanes of all views and of one.
+    fn lanes(&self, shape: [u32; 2]) -> Result<Lanes, StudyError> {
+        let layout = self.layout(shape);
         let replacement = match self.policy {
             Policy::Lru => Replacement::Lru,
             Policy::Fifo => Replacement::Fifo,
@@ -99,8 +127,7 @@ struct Tried<'a> {
 impl Tried<'_> {
     /// Shader lanes of all views over those of one, less one, in %.
     fn increase(&mut self, point: &Point) -> Result<f64, RunError> {
-        let shape = [*self.row.views.get(self.form), *self.row.overlap.get(self.form)];
-        let lanes = point.lanes(shape).map_err(RunError::setting)?;
+        let lanes = point.lanes(shape(self.row, self.form)).map_err(RunError::setting)?;
         self.ran += lanes.ran;
         Ok(100.0 * (lanes.all as f64 / lanes.one as f64 - 1.0))
     }
@@ -205,7 +232,7 @@ type Entries = (u32, f64, f64);
 /// Increases in % over the distance of the eyes, for images of one size.
 type Curves = Vec<(Size, Vec<(f64, f64)>)>;
 
-fn done(with: &With<'_, Views>, figures: [&'static str; 2]) -> Result<Done, RunError> {
+fn done(with: &With<'_, Views>, figures: [&'static str; 3]) -> Result<Done, RunError> {
     let (row, form) = (with.settings, with.form);
     let base = Point::base(row, form);
     let cases = Cases::new("increase of shader invocations in %", VARIED);
@@ -232,7 +259,9 @@ fn done(with: &With<'_, Views>, figures: [&'static str; 2]) -> Result<Done, RunE
         ("increase_at_16384_entries_percent", at(16_384).unwrap_or(f64::NAN)),
     ]);
     let ran = ran(&work);
-    let figures = vec![over_entries(figures[0], row, &entries), banded(figures[1], row, form, &curves)];
+    let images = base.images(figures[2], shape(row, form))?;
+    let figures =
+        vec![over_entries(figures[0], row, &entries), banded(figures[1], row, form, &curves), images];
     let judged = Row { numbers: facts, ran, ..with.banded(&row.about, text, band) };
     Ok(Done { row: judged.limited(&cache_sizes(row, form, &entries)), figures })
 }
@@ -330,7 +359,7 @@ fn over_the_rest(tried: &mut Tried<'_>, base: &Point) -> Result<(), RunError> {
 
 /// Lanes of all views and of one over the entries of the cache, for the figure.
 fn entries(row: &Views, form: Form, base: &Point) -> Result<Vec<Entries>, RunError> {
-    let shape = [*row.views.get(form), *row.overlap.get(form)];
+    let shape = shape(row, form);
     let pixels = f64::from(base.size_px.0) * f64::from(base.size_px.1);
     let at = |&quads: &u32| {
         let lanes = Point { quads, ..base.clone() }.lanes(shape).map_err(RunError::setting)?;

@@ -1,0 +1,310 @@
+//! The job `compute`: raster passes draw a scene, and groups of lanes work on what they stored.
+
+use glam::{Vec3, Vec4};
+use pipeline::random::mix;
+use pipeline::surface::{Format, SurfaceSpec};
+use pipeline::{
+    Attachment, Attachments, Clear, Compare, DepthState, Draw, DrawState, Gpu, Lane, LensShape, RasterPass,
+    SampleTable, Shader, ShadingPoint, SurfaceId, SurfaceView, Target, Texture, Viewport,
+};
+use warnings::{Code, Warning};
+
+use super::display::Show;
+use super::kernels::Kernels;
+use super::light_culling::LightSphere;
+use super::options::{Kernel, Options};
+use crate::error::LoadError;
+use crate::job::{Drawn, DrawsScene, Fact, Flag, Flags, IMAGE_SIZE, Job, JobError, OptionSource, Request};
+use crate::scene::{Frame, Overrides, Scene};
+
+/// Run options in use. Scenes are drawn without motion and lens, as bounds of tiles hold for one view.
+pub(crate) const FLAGS: Flags =
+    Flags { uses: &[Flag::Size, Flag::Samples, Flag::Clip, Flag::Camera], instead: &[] };
+
+/// Makes the job `compute`.
+///
+/// # Errors
+/// As [`Compute::new`].
+pub fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<dyn Job>, LoadError> {
+    Ok(Box::new(Compute::new(options.read()?, request.overrides, request.seed)?))
+}
+
+/// Cycles of an access to shared memory, on average, from which a reduction gives a warning: half of the rate is lost.
+pub const CYCLES_PER_ACCESS: f64 = 2.0;
+/// Atomics of a warp on a word, or cycles of one in shared memory, on average, from which a histogram gives a warning: a quarter of
+/// a warp of 32 waits in line.
+pub const ATOMICS_PER_WORD: f64 = 8.0;
+
+/// Grey to which a lower contrast draws all colours.
+const GREY: Vec3 = Vec3::splat(0.18);
+
+/// A scene, and what groups compute of it.
+pub struct Compute {
+    scene: Scene,
+    options: Options,
+    samples: SampleTable,
+    seed: u64,
+}
+
+impl Compute {
+    /// The job with its scene, with a sample a pixel unless `overrides` say otherwise.
+    ///
+    /// # Errors
+    /// [`LoadError`] for a scene that cannot be loaded, or an invalid option or setting.
+    pub fn new(options: Options, overrides: &Overrides, seed: u64) -> Result<Self, LoadError> {
+        options.check()?;
+        let samples = overrides.samples.unwrap_or(1);
+        let still = Overrides {
+            shutter: Some(0.0),
+            lens_radius: Some(0.0),
+            samples: Some(samples),
+            ..overrides.clone()
+        };
+        let scene = crate::load(&options.scene)?.with_overrides(&still)?;
+        let samples = SampleTable::low_discrepancy(samples, seed, LensShape::Disk);
+        let samples =
+            samples.map_err(|error| LoadError::Setting { setting: "samples", message: error.to_string() })?;
+        Ok(Self { scene, options, samples, seed })
+    }
+
+    /// Size of the image.
+    ///
+    /// # Errors
+    /// [`JobError`] if it has no pixels, or too many.
+    pub fn viewport(&self) -> Result<Viewport, JobError> {
+        let settings = self.scene.settings();
+        Viewport::new(settings.width, settings.height).ok_or_else(|| JobError::Setting(IMAGE_SIZE.to_owned()))
+    }
+
+    /// Samples of the pixels.
+    pub fn samples(&self) -> &SampleTable {
+        &self.samples
+    }
+
+    /// Draws the depths of a frame.
+    ///
+    /// # Errors
+    /// [`JobError`] if they cannot be drawn.
+    pub fn depths(&self, frame: &Frame, gpu: &mut Gpu<'_>) -> Result<SurfaceId, JobError> {
+        let depth = self.surface(gpu, "depth", Format::D32)?;
+        let to =
+            Attachments { colours: Vec::new(), depth: Some(Attachment::cleared(depth, Clear::default())) };
+        let opaque = frame.draws(&self.scene)?;
+        let opaque: Vec<Draw<'_>> = opaque.into_iter().filter(|draw| draw.state.depth.write).collect();
+        self.raster("depth pre-pass", (frame, &opaque), &to, gpu)?;
+        Ok(depth)
+    }
+
+    /// Draws the image of a frame, on the depths of a pre-pass if there is one.
+    ///
+    /// # Errors
+    /// [`JobError`] if it cannot be drawn.
+    pub fn image(
+        &self,
+        frame: &Frame,
+        prepass: Option<SurfaceId>,
+        gpu: &mut Gpu<'_>,
+    ) -> Result<SurfaceId, JobError> {
+        let image = self.surface(gpu, "image", Format::Rgba16f)?;
+        let depth = match prepass {
+            Some(depth) => Attachment::loaded(depth),
+            None => Attachment::cleared(self.surface(gpu, "depth", Format::D32)?, Clear::default()).dropped(),
+        };
+        let mut draws = frame.draws(&self.scene)?;
+        if prepass.is_some() {
+            draws = draws.into_iter().map(after_prepass).collect();
+        }
+        let background = self.flattened(self.scene.background()).extend(1.0);
+        let colours = vec![Attachment::cleared(image, background)];
+        let to = Attachments { colours, depth: Some(depth) };
+        let flat: Vec<Flattened<'_>> =
+            draws.iter().map(|draw| Flattened { shader: draw.shader, job: self }).collect();
+        if self.options.contrast < 1.0 {
+            draws = draws.iter().zip(&flat).map(|(draw, flat)| Draw { shader: flat, ..*draw }).collect();
+        }
+        self.raster("image", (frame, &draws), &to, gpu)?;
+        Ok(image)
+    }
+
+    /// Spheres that lights reach, spread evenly over the bounds of a frame.
+    pub fn lights(&self, frame: &Frame) -> Result<Vec<LightSphere>, JobError> {
+        let draws = frame.draws(&self.scene)?;
+        let points = || draws.iter().flat_map(|draw| draw.geometry.open().iter().copied());
+        let Some((low, high)) = points().reduce(Vec3::min).zip(points().reduce(Vec3::max)) else {
+            return Ok(Vec::new());
+        };
+        let radius = self.options.light_radius * (high - low).length();
+        let uniform = |light: u32, axis: u64| {
+            let word = mix(mix(self.seed ^ axis << 32) ^ u64::from(light));
+            (word >> 40) as f32 / 16_777_216.0
+        };
+        let centre = |light| low + (high - low) * Vec3::from([0, 1, 2].map(|axis| uniform(light, axis)));
+        Ok((0..self.options.lights).map(|light| LightSphere { centre: centre(light), radius }).collect())
+    }
+
+    fn surface(&self, gpu: &mut Gpu<'_>, name: &str, format: Format) -> Result<SurfaceId, JobError> {
+        let spec = SurfaceSpec::new(name, self.viewport()?, format);
+        Ok(gpu.create(&spec.sampled(self.scene.settings().samples)))
+    }
+
+    fn raster(
+        &self,
+        name: &str,
+        (frame, draws): (&Frame, &[Draw<'_>]),
+        to: &Attachments,
+        gpu: &mut Gpu<'_>,
+    ) -> Result<(), JobError> {
+        let (spec, viewport, background) = (gpu.spec(), self.viewport()?, self.scene.background());
+        let settings = pipeline::Settings { spec, viewport, samples: &self.samples, background };
+        let pass = RasterPass::new(&frame.camera, draws, &settings).named(name);
+        gpu.draw(&pass.onto(Target::Surfaces(to)).without_image())?;
+        Ok(())
+    }
+
+    fn flattened(&self, color: Vec3) -> Vec3 {
+        GREY + (color - GREY) * self.options.contrast
+    }
+}
+
+/// The draw on the depths of a pre-pass, which its nearest samples equal.
+fn after_prepass(draw: Draw<'_>) -> Draw<'_> {
+    let depth = DepthState { test: Compare::LessEqual, write: false };
+    draw.with_state(DrawState { depth, ..draw.state })
+}
+
+/// A shader with less contrast.
+struct Flattened<'a> {
+    shader: &'a dyn Shader,
+    job: &'a Compute,
+}
+
+impl Shader for Flattened<'_> {
+    fn texture(&self) -> Option<&Texture> {
+        self.shader.texture()
+    }
+
+    fn vertex(&self, lane: &Lane, position: Vec3) {
+        self.shader.vertex(lane, position);
+    }
+
+    fn shade(&self, lane: &Lane, at: &ShadingPoint, texel: Vec4) -> Vec4 {
+        let color = self.shader.shade(lane, at, texel);
+        let contrast = self.job.options.contrast;
+        lane.madd(Vec3::splat(contrast), color.truncate(), GREY * (1.0 - contrast)).extend(color.w)
+    }
+
+    fn may_discard(&self) -> bool {
+        self.shader.may_discard()
+    }
+}
+
+/// What groups made of a frame.
+struct Made {
+    image: Vec<Vec3>,
+    facts: Vec<Fact>,
+    warnings: Vec<Warning>,
+}
+
+impl DrawsScene for Compute {
+    fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    fn draw_frame(&self, frame: &Frame, gpu: &mut Gpu<'_>) -> Result<Drawn, JobError> {
+        let Made { image, facts, warnings } = match self.options.kernel {
+            Kernel::Reduction => self.expose(frame, gpu)?,
+            Kernel::Histogram => self.equalise(frame, gpu)?,
+            Kernel::LightCulling => self.heat(frame, gpu)?,
+        };
+        Ok(Drawn { image, moving: false, lens: false, facts, warnings })
+    }
+}
+
+fn view(gpu: &mut Gpu<'_>, id: SurfaceId) -> Result<SurfaceView, JobError> {
+    gpu.surface_view(id).ok_or_else(|| JobError::Setting("a pass stored nothing".to_owned()))
+}
+
+impl Compute {
+    fn expose(&self, frame: &Frame, gpu: &mut Gpu<'_>) -> Result<Made, JobError> {
+        let image = self.image(frame, None, gpu)?;
+        let image = view(gpu, image)?;
+        let mut kernels = Kernels::new(gpu, &self.options)?;
+        let mean = kernels.mean_luminance(&image)?;
+        let cycles = kernels.cycles_per_shared_access();
+        let facts =
+            [("mean_luminance", f64::from(kernels.values(mean)[0])), ("cycles_per_shared_access", cycles)];
+        let message = || {
+            format!(
+                "an access of a warp to shared memory takes {cycles:.1} cycles on average (a warning from {CYCLES_PER_ACCESS} on): lanes ask a bank \
+                 for several words; order=sequential with stride=1, or padded=true, avoids it"
+            )
+        };
+        let warning = (cycles >= CYCLES_PER_ACCESS).then(|| Warning::new(Code::BankConflicts, message()));
+        let shown = kernels.display(&image, Show::Exposed(mean), &[mean.reads()])?;
+        Ok(Made { image: shown, facts: named(facts), warnings: warning.into_iter().collect() })
+    }
+
+    fn equalise(&self, frame: &Frame, gpu: &mut Gpu<'_>) -> Result<Made, JobError> {
+        let image = self.image(frame, None, gpu)?;
+        let image = view(gpu, image)?;
+        let mut kernels = Kernels::new(gpu, &self.options)?;
+        let counts = kernels.histogram(&image)?;
+        let in_line = kernels.cycles_per_shared_access().max(kernels.atomics_per_word());
+        let sums = kernels.sums(counts)?;
+        let bins = kernels.values(counts);
+        let [all, most] = [bins.iter().sum::<u32>(), bins.iter().copied().max().unwrap_or(0)].map(f64::from);
+        let facts = [
+            ("values_counted", all),
+            ("fullest_bin_share", most / all.max(1.0)),
+            ("atomics_in_line", in_line),
+        ];
+        let message = || {
+            format!(
+                "an atomic waits for {:.1} others on average (a warning from {} on), as lanes of a warp count in the same bin: the fullest has {:.0} % \
+                 of the values; more copies with padded=true help in shared memory",
+                in_line - 1.0,
+                ATOMICS_PER_WORD - 1.0,
+                100.0 * most / all.max(1.0)
+            )
+        };
+        let warning = (in_line >= ATOMICS_PER_WORD).then(|| Warning::new(Code::AtomicContention, message()));
+        let shown = kernels.display(&image, Show::Equalised(sums), &[sums.reads()])?;
+        Ok(Made { image: shown, facts: named(facts), warnings: warning.into_iter().collect() })
+    }
+
+    fn heat(&self, frame: &Frame, gpu: &mut Gpu<'_>) -> Result<Made, JobError> {
+        let (lights, viewport) = (self.lights(frame)?, self.viewport()?);
+        let depth = self.depths(frame, gpu)?;
+        let stored = view(gpu, depth)?;
+        let mut kernels = Kernels::new(gpu, &self.options)?;
+        let found = kernels.cull(&stored, (&frame.camera, viewport), &lights)?;
+        let tiles = kernels.tile_lights(&found);
+        let full = tiles.counts.iter().filter(|count| **count > self.options.list).count();
+        let image = self.image(frame, Some(depth), gpu)?;
+        let image = view(gpu, image)?;
+        let (lists, blocks) = found;
+        let show = Show::Heat { counts: lists.counts, most: lists.most, tiles: blocks };
+        let reads = [lists.counts.reads(), lists.most.reads()];
+        let shown = Kernels::new(gpu, &self.options)?.display(&image, show, &reads)?;
+        let sum: u64 = tiles.counts.iter().copied().map(u64::from).sum();
+        let facts = [
+            ("lights_per_tile", sum as f64 / tiles.counts.len() as f64),
+            ("most_lights", f64::from(tiles.counts.iter().copied().max().unwrap_or(0))),
+            ("tiles_full", full as f64),
+        ];
+        let message = || {
+            format!(
+                "{full} of {} tiles have more lights than the {} of a list, and lose the others; a longer list=..., a smaller tile_px or \
+                 depth_bounds=true help",
+                tiles.counts.len(),
+                self.options.list
+            )
+        };
+        let warning = (full > 0).then(|| Warning::new(Code::LightListsFull, message()));
+        Ok(Made { image: shown, facts: named(facts), warnings: warning.into_iter().collect() })
+    }
+}
+
+fn named<const N: usize>(facts: [(&'static str, f64); N]) -> Vec<Fact> {
+    facts.into_iter().map(|(name, value)| Fact { name, value }).collect()
+}

@@ -1,0 +1,214 @@
+//! Passes of groups: a reduction, a histogram, lists of lights, and the image made of them.
+
+use activity::{Counts, Event};
+use pipeline::{
+    Buffer, BufferBinding, Camera, ComputeError, ComputePass, Gpu, GroupShader, PassError, SurfaceView,
+    Viewport,
+};
+
+use super::block::{Blocks, Slots};
+use super::display::{Display, Show, decoded};
+use super::histogram::{Count, Scan};
+use super::light_culling::{Cull, ImagePlane, LightBuffer, LightSphere, Lists};
+use super::options::Options;
+use super::reduction::{BlockSums, Mean};
+use glam::Vec3;
+
+/// The passes of groups of a frame.
+pub struct Kernels<'a, 'e> {
+    gpu: &'a mut Gpu<'e>,
+    options: &'a Options,
+    /// Banks of a shared memory.
+    banks: u32,
+    /// Events of all passes but the one that writes the image.
+    counts: Counts,
+}
+
+/// Lists of the lights of tiles.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct TileLights {
+    /// Tiles across and down.
+    pub tiles: [u32; 2],
+    /// Number of lights of each tile, row by row.
+    pub counts: Vec<u32>,
+    /// Numbers of the lights of each tile, as far as its list has them.
+    pub lists: Vec<Vec<u32>>,
+}
+
+impl<'a, 'e> Kernels<'a, 'e> {
+    /// Passes on `gpu`.
+    ///
+    /// # Errors
+    /// [`PassError::Compute`] if the GPU has no compute unit.
+    pub fn new(gpu: &'a mut Gpu<'e>, options: &'a Options) -> Result<Self, PassError> {
+        let missing = || PassError::Compute { pass: "compute".to_owned(), error: ComputeError::Missing };
+        let banks = gpu.spec().compute.ok_or_else(missing)?.banks;
+        Ok(Self { gpu, options, banks, counts: Counts::default() })
+    }
+
+    /// Mean luminance of an image, in a buffer of one word.
+    ///
+    /// # Errors
+    /// [`PassError`] if the GPU does not take the pass.
+    pub fn mean_luminance(&mut self, image: &SurfaceView) -> Result<Buffer<f32>, PassError> {
+        let Options { order, group, .. } = *self.options;
+        let (slots, blocks) = (self.slots(), self.blocks(image));
+        let shared_bytes = 4 * slots.words(group);
+        let groups = blocks.groups();
+        let sums = self.gpu.buffer("sums", &vec![0.0_f32; (groups[0] * groups[1]) as usize]);
+        let mean = self.gpu.buffer("mean", &[0.0_f32]);
+        let shader = BlockSums { image: *image, blocks, slots, order, sums };
+        let bindings = [image.reads(), sums.writes()];
+        self.dispatch("block sums", (groups, group, shared_bytes), &bindings, &shader)?;
+        let count = (blocks.count() * u64::from(image.samples())) as f32;
+        let shader = Mean { sums, slots, order, count, mean };
+        self.dispatch("mean", ([1; 3], group, shared_bytes), &[sums.reads(), mean.writes()], &shader)?;
+        Ok(mean)
+    }
+
+    /// Histogram of the luminance of an image.
+    ///
+    /// # Errors
+    /// [`PassError`] if the GPU does not take the pass.
+    pub fn histogram(&mut self, image: &SurfaceView) -> Result<Buffer<u32>, PassError> {
+        let Options { atomics, copies, bins, group, padded, .. } = *self.options;
+        let blocks = self.blocks(image);
+        let counts = self.gpu.buffer("histogram", &vec![0_u32; bins as usize]);
+        let copy_words = bins + u32::from(padded);
+        let shader = Count { image: *image, blocks, atomics, copies, copy_words, counts };
+        let sizes = (blocks.groups(), group, 4 * shader.words());
+        self.dispatch("histogram", sizes, &[image.reads(), counts.writes()], &shader)?;
+        Ok(counts)
+    }
+
+    /// Sums of a histogram up to each bin.
+    ///
+    /// # Errors
+    /// [`PassError`] if the GPU does not take the pass.
+    pub fn sums(&mut self, counts: Buffer<u32>) -> Result<Buffer<u32>, PassError> {
+        let bins = counts.len();
+        let sums = self.gpu.buffer("sums", &vec![0_u32; bins as usize]);
+        let sizes = ([1; 3], bins, 8 * bins);
+        self.dispatch("sums", sizes, &[counts.reads(), sums.writes()], &Scan { counts, sums })?;
+        Ok(sums)
+    }
+
+    /// Lists of the lights that reach what each tile of a depth surface shows.
+    ///
+    /// # Errors
+    /// [`PassError`] if the GPU does not take the pass.
+    pub(super) fn cull(
+        &mut self,
+        depth: &SurfaceView,
+        (camera, viewport): (&Camera, Viewport),
+        lights: &[LightSphere],
+    ) -> Result<(Lists, Blocks), PassError> {
+        let Options { depth_bounds, tile_px, group, list: capacity, .. } = *self.options;
+        let blocks = Blocks::tiles(depth.size(), tile_px);
+        let tiles = blocks.groups()[0] * blocks.groups()[1];
+        let words = self.gpu.buffer("lights", &LightBuffer::values(lights, camera));
+        let lists = Lists {
+            counts: self.gpu.buffer("counts", &vec![0_u32; tiles as usize]),
+            lights: self.gpu.buffer("lists", &vec![0_u32; (tiles * capacity) as usize]),
+            capacity,
+            most: self.gpu.buffer("most", &[0_u32]),
+        };
+        let lights = LightBuffer { words, count: lights.len() as u32 };
+        let plane = ImagePlane::new(camera, viewport);
+        let shader = Cull { depth: *depth, depth_bounds, blocks, plane, lights, lists };
+        let written = [lists.counts.writes(), lists.lights.writes(), lists.most.writes()];
+        let bindings = [&[depth.reads(), words.reads()][..], &written].concat();
+        let sizes = (blocks.groups(), group, 4 * Cull::words(group));
+        self.dispatch("light culling", sizes, &bindings, &shader)?;
+        Ok((lists, blocks))
+    }
+
+    /// The lists as the host reads them.
+    pub(super) fn tile_lights(&self, (lists, blocks): &(Lists, Blocks)) -> TileLights {
+        let (counts, words) = (self.gpu.values(lists.counts), self.gpu.values(lists.lights));
+        let of_tiles = words.chunks(lists.capacity as usize).zip(&counts);
+        let lists = of_tiles.map(|(list, count)| list[..list.len().min(*count as usize)].to_vec()).collect();
+        let [across, down, _] = blocks.groups();
+        TileLights { tiles: [across, down], counts, lists }
+    }
+
+    /// Lists of the lights of each tile, on the host.
+    ///
+    /// # Errors
+    /// [`PassError`] if the GPU does not take the pass.
+    pub fn light_lists(
+        &mut self,
+        depth: &SurfaceView,
+        view: (&Camera, Viewport),
+        lights: &[LightSphere],
+    ) -> Result<TileLights, PassError> {
+        let lists = self.cull(depth, view, lights)?;
+        Ok(self.tile_lights(&lists))
+    }
+
+    /// Writes the image, and returns it.
+    pub(super) fn display(
+        &mut self,
+        image: &SurfaceView,
+        show: Show,
+        reads: &[BufferBinding],
+    ) -> Result<Vec<Vec3>, PassError> {
+        let ([width, height], group) = (image.size(), self.options.group);
+        let out = self.gpu.buffer("image", &vec![0_u32; width as usize * height as usize]);
+        let blocks = Blocks::new(image.size(), group, 1, 1);
+        let bindings = [&[image.reads(), out.writes()], reads].concat();
+        let before = self.counts;
+        let shader = Display { image: *image, blocks, show, out };
+        self.dispatch("display", (blocks.groups(), group, 0), &bindings, &shader)?;
+        self.counts = before;
+        Ok(decoded(&self.gpu.values(out)))
+    }
+
+    /// The values of a buffer.
+    pub fn values<T: pipeline::compute::Word>(&self, buffer: Buffer<T>) -> Vec<T> {
+        self.gpu.values(buffer)
+    }
+
+    /// Cycles that an access of a warp to shared memory takes on average, with the least it could take as 1; 1 without any.
+    pub fn cycles_per_shared_access(&self) -> f64 {
+        let cycles = self.counts[Event::SharedCycles];
+        ratio(cycles, cycles - self.counts[Event::BankConflicts])
+    }
+
+    /// Atomics of a warp on a word of a buffer, on average; 1 without any.
+    pub fn atomics_per_word(&self) -> f64 {
+        let atomics = self.counts[Event::Atomics];
+        ratio(atomics, atomics - self.counts[Event::AtomicConflicts])
+    }
+
+    /// Events of all passes but the one that writes the image.
+    pub fn counts(&self) -> &Counts {
+        &self.counts
+    }
+
+    fn slots(&self) -> Slots {
+        let pad_log2 = self.options.padded.then(|| self.banks.ilog2());
+        Slots { first: 0, stride: self.options.stride, pad_log2 }
+    }
+
+    fn blocks(&self, image: &SurfaceView) -> Blocks {
+        let Options { group, per_lane, step, .. } = *self.options;
+        Blocks::new(image.size(), group, per_lane, step)
+    }
+
+    fn dispatch(
+        &mut self,
+        name: &str,
+        (groups, group_size, shared_bytes): ([u32; 3], u32, u32),
+        bindings: &[BufferBinding],
+        shader: &dyn GroupShader,
+    ) -> Result<(), PassError> {
+        let pass = ComputePass { name, groups, group_size, shared_bytes, bindings, shader };
+        self.counts += &self.gpu.dispatch(&pass)?;
+        Ok(())
+    }
+}
+
+fn ratio(all: u64, least: u64) -> f64 {
+    if least == 0 { 1.0 } else { all as f64 / least as f64 }
+}

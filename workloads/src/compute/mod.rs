@@ -1,0 +1,31 @@
+//! Programs of groups on surfaces that raster passes of the same frame wrote.
+//!
+//! - [`Kernels`]: the mean luminance of an image by a reduction, its histogram by atomics, and the lights of each tile by the
+//!   depths of a pre-pass.
+//! - [`Options`]: sizes of groups, layouts of shared memory and kinds of atomics; [`Blocks`], [`Order`]: which pixels a lane
+//!   works on, and the steps of a tree.
+//! - [`job()`]: the workload.
+
+mod block;
+mod display;
+mod histogram;
+mod job;
+mod kernels;
+mod light_culling;
+mod options;
+mod reduction;
+
+use pipeline::{GroupLane, SurfaceView};
+
+pub use block::{Blocks, Order};
+pub use histogram::{Atomics, bin};
+pub(crate) use job::FLAGS;
+pub use job::{ATOMICS_PER_WORD, CYCLES_PER_ACCESS, Compute, job};
+pub use kernels::{Kernels, TileLights};
+pub use light_culling::LightSphere;
+pub use options::{Kernel, Options};
+
+/// Luminance of a sample of an image in linear RGB: loads and a dot product.
+fn luminance(lane: &GroupLane<'_, '_>, image: &SurfaceView, pixel: [u32; 2], sample: u32) -> f32 {
+    lane.dot(lane.texel(image, pixel, sample).truncate(), display::LUMINANCE)
+}
