@@ -2,7 +2,7 @@
 
 use super::bin::TileWork;
 use super::settings::Features;
-use super::test_selection::{TestResult, TestPlan, TestSelector, Workload};
+use super::test_selection::{TestPlan, TestResult, TestSelector, Workload};
 use crate::geometry::Shear;
 use crate::sample_test;
 use crate::setup::Triangle;

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::Features;
 use super::pass::{Draw, Pass, Staged};
 use super::replay::Replay;
-use crate::setup::{SetupResult, PixelRect, Triangle, bounds, is_flat, madds, set_up};
+use crate::setup::{PixelRect, SetupResult, Triangle, bounds, is_flat, madds, set_up};
 use crate::traversal::{self, Box5, LensLines, thresholds};
 
 /// A triangle for traversal, with the pixels it may touch.

@@ -23,7 +23,7 @@ use rayon::prelude::*;
 
 use crate::depth::vertex_range;
 use crate::geometry::{Clip, Cull, Geometry, MovingVertex, Projection};
-use crate::setup::{SetupResult, PixelRect, Triangle, bounds, distribute, set_up};
+use crate::setup::{PixelRect, SetupResult, Triangle, bounds, distribute, set_up};
 use crate::simd::{Width, dispatch};
 use cells::Facing;
 pub use raster::Tally;
@@ -156,7 +156,8 @@ fn set_up_triangle(
     cull: Cull,
 ) -> Option<(Span, BinTriangle)> {
     let Projection { shear, near, .. } = &layout.projection;
-    let SetupResult::Ready(triangle) = set_up(id, corners, cull, shear, *near, layout.viewport.half_px()) else {
+    let SetupResult::Ready(triangle) = set_up(id, corners, cull, shear, *near, layout.viewport.half_px())
+    else {
         return None;
     };
     let pixels = bounds(&triangle, shear, layout.viewport);

@@ -90,7 +90,8 @@ fn mean_widths(motion: Motion, lens: bool, count: u32) -> [f64; 6] {
     let (mut sums, mut tiles) = ([0.0; 6], 0);
     while tiles < count {
         let v = random(motion, &mut r);
-        let SetupResult::Ready(triangle) = set_up(0, [&v[0], &v[1], &v[2]], Cull::None, &shear, NEAR, [40.0; 2])
+        let SetupResult::Ready(triangle) =
+            set_up(0, [&v[0], &v[1], &v[2]], Cull::None, &shear, NEAR, [40.0; 2])
         else {
             continue;
         };

@@ -98,7 +98,8 @@ impl Eye {
             [0, 1, 2].map(|k| self.projection.vertex(beam.open[k].as_vec3(), beam.close[k].as_vec3()));
         let [a, b, c]: [&MovingVertex; 3] = vertices.each_ref();
         let half_px = self.viewport.half_px();
-        let SetupResult::Ready(triangle) = set_up(0, [a, b, c], Cull::None, self.shear(), NEAR, half_px) else {
+        let SetupResult::Ready(triangle) = set_up(0, [a, b, c], Cull::None, self.shear(), NEAR, half_px)
+        else {
             return None;
         };
         let ends = triangle.corners.map(|corner| {

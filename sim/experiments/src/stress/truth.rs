@@ -324,7 +324,8 @@ mod tests {
 
     fn truth(open: [[f32; 3]; 3], close: [[f32; 3]; 3], shear: Shear, tile: TileRect) -> Truth {
         let v = [0, 1, 2].map(|k| MovingVertex { open: open[k], close: close[k] });
-        let SetupResult::Ready(triangle) = set_up(0, [&v[0], &v[1], &v[2]], Cull::None, &shear, 0.1, [64.0; 2])
+        let SetupResult::Ready(triangle) =
+            set_up(0, [&v[0], &v[1], &v[2]], Cull::None, &shear, 0.1, [64.0; 2])
         else {
             panic!("the triangle is visible");
         };

@@ -8,7 +8,8 @@ use pipeline::{Camera, Cull, Draw, Geometry, Gpu, LensShape, RasterPass, SampleT
 use run::{GpuSpec, RunError};
 use workloads::Overrides;
 use workloads::job::{OptionSource, Request};
-use workloads::material::{Light, Material, SurfaceShader};
+use workloads::lighting::Light;
+use workloads::material::{Material, SurfaceShader};
 use workloads::{catalog, shapes};
 
 use crate::reproduce::Figure;
