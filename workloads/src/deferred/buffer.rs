@@ -92,9 +92,9 @@ impl GBuffer {
         [self.base, self.normal, self.depth].map(Binding::Surface)
     }
 
-    /// What light meets at a sample, without the direction to the camera.
-    pub fn reader(&self, rate: super::Rate) -> Reader {
-        Reader { normals: self.normals, rate }
+    /// A reader for lighting passes: of every sample, or of the first of a pixel for all of them.
+    pub fn reader(&self, per_sample: bool) -> Reader {
+        Reader { normals: self.normals, per_sample }
     }
 }
 
@@ -130,7 +130,7 @@ impl Shader for Writer<'_> {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Reader {
     normals: NormalFormat,
-    rate: super::Rate,
+    per_sample: bool,
 }
 
 /// What a G-buffer has at a sample.
@@ -143,7 +143,7 @@ pub(super) struct Stored {
 impl Reader {
     /// The surface at a sample of a full-screen quad or light volume; `None` where there is none.
     pub fn read(&self, lane: &Lane, at: &ShadingPoint) -> Option<Stored> {
-        let sample = if self.rate == super::Rate::Sample { at.sample } else { 0 };
+        let sample = if self.per_sample { at.sample } else { 0 };
         let load = |slot| lane.load_sample(slot, at.pixel, sample);
         let depth = load(DEPTH_SLOT).x;
         if !lane.branch(depth < f32::INFINITY) {

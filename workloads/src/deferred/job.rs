@@ -322,7 +322,8 @@ impl<'a> Stage<'a> {
     /// Lights the G-buffer.
     fn light(&self, buffer: &GBuffer, surfaces: &[Surfaced<'a>], gpu: &mut Gpu<'_>) -> Result<u64, JobError> {
         let Options { lighting, rate, .. } = self.job.options;
-        let (reader, rays) = (buffer.reader(rate), CameraRays::new(self.camera()));
+        let per_sample = rate == Rate::Sample;
+        let (reader, rays) = (buffer.reader(per_sample), CameraRays::new(self.camera()));
         let Some(first) = surfaces.first() else { return Ok(0) };
         let (all, bindings) = (&self.job.lights[..], buffer.bindings());
         let in_loop = if lighting == LightPass::Screen { all } else { &[] };
@@ -335,7 +336,7 @@ impl<'a> Stage<'a> {
         }
         let colours = vec![Attachment::cleared(self.lit, Vec4::ZERO)];
         let targets = Attachments { colours, depth: None };
-        self.pass("lighting", &draws, &targets, gpu, rate == Rate::Sample)
+        self.pass("lighting", &draws, &targets, gpu, per_sample)
     }
 
     /// The image of the lit samples.

@@ -13,7 +13,7 @@ use super::Passes;
 use crate::job_frame::JobFrame;
 use crate::reproduce::band::{Cases, one_at_a_time};
 use crate::reproduce::figure::{POWER, TIME, line};
-use crate::reproduce::row::{Row, With, numbers};
+use crate::reproduce::row::{Number, Row, With, numbers};
 use crate::reproduce::settings::{Form, Setting};
 use crate::reproduce::stage::{Recording, Stage};
 use crate::reproduce::{Done, Figure};
@@ -201,56 +201,49 @@ impl Tried<'_> {
 /// Unit of relative errors in the report.
 const PER: f64 = 1e-15;
 
+impl Tried<'_> {
+    /// Every open setting, one at a time.
+    fn sweep(&mut self, progress: &Progress) -> Result<(), RunError> {
+        let (row, bar) = (self.row, progress.bar("deferred", 5));
+        self.along("lights", &row.lights, u32::to_string, |point, value| point.lights = value)?;
+        bar.inc();
+        let name = |lighting: &LightPass| format!("{lighting:?}").to_lowercase();
+        self.along("lighting", &row.lighting, name, |point, value| point.lighting = value)?;
+        bar.inc();
+        self.along("range", &row.range, f32::to_string, |point, value| point.range = value)?;
+        bar.inc();
+        let name = |normals: &NormalFormat| format!("{normals:?}").to_lowercase();
+        self.along("normals", &row.normals, name, |point, value| point.normals = value)?;
+        bar.inc();
+        let size = |(width, height): &(u32, u32)| format!("{width}x{height}");
+        self.along("size_px", &row.size_px, size, |point, value| point.size_px = value)?;
+        bar.inc();
+        Ok(())
+    }
+}
+
 /// II-1.
 pub(super) fn row(with: &With<'_, Passes>, bench: &Bench<'_>, progress: &Progress) -> Result<Done, RunError> {
     let (row, form) = (with.settings, with.form);
-    let bar = progress.bar("deferred", 6);
     let cases = Cases::new("relative difference in 1e-15", "one at a time");
     let mut tried = Tried { bench, row, form, cases, errors: Vec::new(), invocations: 0.0 };
     let base = bench.measure(row, form, &Point::base(row, form))?;
-    bar.inc();
-    tried.along("lights", &row.lights, u32::to_string, |point, value| point.lights = value)?;
-    bar.inc();
-    tried.along(
-        "lighting",
-        &row.lighting,
-        |of| format!("{of:?}").to_lowercase(),
-        |point, value| {
-            point.lighting = value;
-        },
-    )?;
-    bar.inc();
-    tried.along("range", &row.range, f32::to_string, |point, value| point.range = value)?;
-    bar.inc();
-    tried.along(
-        "normals",
-        &row.normals,
-        |of| format!("{of:?}").to_lowercase(),
-        |point, value| {
-            point.normals = value;
-        },
-    )?;
-    bar.inc();
-    let size = |(width, height): &(u32, u32)| format!("{width}x{height}");
-    tried.along("size_px", &row.size_px, size, |point, value| point.size_px = value)?;
-    bar.inc();
-    let values = [row.lights.values(), row.lighting.values(), row.range.values()];
-    let [lights, lighting, range] = values;
-    let full = one_at_a_time([lights, lighting, range, row.normals.values(), row.size_px.values()]);
+    tried.sweep(progress)?;
+    let [lights, lighting] = [row.lights.values(), row.lighting.values()];
+    let full = [lights, lighting, row.range.values(), row.normals.values(), row.size_px.values()];
     let Tried { cases, errors, invocations, .. } = tried;
-    let band = cases.band(full).ok_or_else(|| RunError::setting("II-1: no open setting has two values"))?;
+    let band = cases.band(one_at_a_time(full));
+    let band = band.ok_or_else(|| RunError::setting("II-1: no open setting has two values"))?;
     let made = with.banded(&row.about, ours(&base.split, row, form), band);
     let largest = errors.iter().copied().fold(base.split.error(), f64::max);
-    let facts = facts(&base.split, largest);
-    let frames = base.recording.truth.frames.len() as f64;
     let ran = numbers([
-        ("frames_recorded_per_case", frames),
+        ("frames_recorded_per_case", base.recording.truth.frames.len() as f64),
         ("cases", errors.len() as f64),
         ("lighting_invocations", base.invocations + invocations),
         ("samples_recorded", base.recording.trace.samples() as f64),
     ]);
     let figure = figure(&base, bench.pc.platform.idle_w.value());
-    Ok(Done { row: Row { numbers: facts, ran, ..made }, figures: vec![figure] })
+    Ok(Done { row: Row { numbers: facts(&base.split, largest), ran, ..made }, figures: vec![figure] })
 }
 
 fn ours(split: &Split, row: &Passes, form: Form) -> String {
@@ -264,7 +257,7 @@ fn ours(split: &Split, row: &Passes, form: Form) -> String {
     )
 }
 
-fn facts(split: &Split, largest: f64) -> Vec<crate::reproduce::row::Number> {
+fn facts(split: &Split, largest: f64) -> Vec<Number> {
     numbers([
         ("frame_nJ_per_pixel", 1e9 * split.frame),
         ("g_buffer_nJ_per_pixel", 1e9 * split.g_buffer),
