@@ -249,9 +249,9 @@ impl Compute {
         let image = view(gpu, image)?;
         let mut kernels = Kernels::new(gpu, &self.options)?;
         let counts = kernels.histogram(&image)?;
-        let in_line = kernels.cycles_per_shared_access().max(kernels.atomics_per_word());
-        let sums = kernels.sums(counts)?;
         let bins = kernels.values(counts);
+        let in_line = kernels.atomics_in_line(bins.iter().copied().map(u64::from).sum());
+        let sums = kernels.sums(counts)?;
         let [all, most] = [bins.iter().sum::<u32>(), bins.iter().copied().max().unwrap_or(0)].map(f64::from);
         let facts = [
             ("values_counted", all),

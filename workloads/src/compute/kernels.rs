@@ -181,6 +181,15 @@ impl<'a, 'e> Kernels<'a, 'e> {
         ratio(atomics, atomics - self.counts[Event::AtomicConflicts])
     }
 
+    /// Atomics that follow each other in an access of a warp on average, of a histogram of so many values: in shared memory all
+    /// conflicts are theirs, as lanes clear and add up words beside each other.
+    pub fn atomics_in_line(&self, values: u64) -> f64 {
+        let lanes = self.gpu.spec().compute.map_or(1, |spec| spec.warp_lanes.min(self.options.group));
+        let accesses = values as f64 / f64::from(lanes);
+        let in_shared = 1.0 + self.counts[Event::BankConflicts] as f64 / accesses.max(1.0);
+        in_shared.max(self.atomics_per_word())
+    }
+
     /// Events of all passes but the one that writes the image.
     pub fn counts(&self) -> &Counts {
         &self.counts

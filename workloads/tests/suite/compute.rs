@@ -363,6 +363,10 @@ fn weak_regimes_have_warnings_and_others_none() {
     for atomics in [Atomics::Shared, Atomics::Global] {
         assert_eq!(codes(Options { atomics, contrast: 0.0, ..histogram.clone() }), ["atomic-contention"]);
     }
+    // Copies of a bin are in one bank, unless they are padded.
+    let flat = Options { copies: 8, contrast: 0.0, ..histogram };
+    assert_eq!(codes(flat.clone()), ["atomic-contention"]);
+    assert!(codes(Options { padded: true, ..flat }).is_empty());
     assert_eq!(codes(Options { list: 1, ..Options::default() }), ["light-lists-full"]);
     assert!(codes(Options { list: 512, ..Options::default() }).is_empty());
 }

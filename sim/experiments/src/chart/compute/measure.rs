@@ -166,7 +166,7 @@ impl Bench {
                 let pairs = share(&self.histogram).into_iter().zip(share(&other));
                 Some(0.5 * pairs.map(|(a, b)| (a - b).abs()).sum::<f64>())
             }
-            (Sweep::Tile, _) => Some(self.in_vain(&self.lists(&job, options)?, options.tile_px)),
+            (Sweep::Tile, _) => Some(self.wasted(&self.lists(&job, options)?, options.tile_px)),
             _ => None,
         })
     }
@@ -181,9 +181,9 @@ impl Bench {
     }
 
     /// Share of the lights in lists that reach no sample of their tile.
-    fn in_vain(&self, tiles: &TileLights, side: u32) -> f64 {
+    fn wasted(&self, tiles: &TileLights, side: u32) -> f64 {
         let (width, height) = self.size;
-        let [mut listed, mut in_vain] = [0_u64; 2];
+        let [mut listed, mut wasted] = [0_u64; 2];
         for (tile, list) in (0..).zip(&tiles.lists) {
             let [left, top] = [tile % tiles.tiles[0] * side, tile / tiles.tiles[0] * side];
             let rows = top..(top + side).min(height);
@@ -194,9 +194,9 @@ impl Bench {
                 points.iter().any(|point| point.distance_squared(centre) <= radius * radius)
             };
             listed += list.len() as u64;
-            in_vain += list.iter().filter(|light| !reaches(&self.lights[**light as usize])).count() as u64;
+            wasted += list.iter().filter(|light| !reaches(&self.lights[**light as usize])).count() as u64;
         }
-        in_vain as f64 / listed.max(1) as f64
+        wasted as f64 / listed.max(1) as f64
     }
 
     /// The point that the sample of a pixel sees, in world space; `None` for the background.

@@ -115,7 +115,7 @@ impl Study for ComputeChart {
         to.chart("compute", ["Cost of programs of groups", &subject], panels)?;
         let errors = vec![
             self.error_panel(Sweep::Step, "error (%)"),
-            self.error_panel(Sweep::Tile, "lights in vain (%)"),
+            self.error_panel(Sweep::Tile, "wasted lights (%)"),
         ];
         to.chart("compute_error", ["Error over cost of programs of groups", &subject], errors)
     }

@@ -93,7 +93,7 @@ mod tests {
     }
 
     #[test]
-    fn time_and_depth_are_told_apart() {
+    fn time_and_depth_are_distinguished() {
         let still = square([0.0; 3], [0.0; 3]);
         // In front at all times; through the square at depth 0; and there only at its end, after the first has left.
         let in_front = square([0.0, 0.0, 3.0], [0.0, 0.0, 3.0]);

@@ -142,7 +142,7 @@ pub(super) fn balls(points: &[[f64; 3]], radius: f64) -> Result<Figure, RunError
         let first = corners.len() as u32;
         corners.extend(ball.positions.iter().map(|corner| *corner + *centre));
         triangles.extend(ball.triangles.iter().map(|three| three.map(|corner| first + corner)));
-        // Colour by place along the axes, so that depth and layers are told apart.
+        // Colour by place along the axes, so that layers can be distinguished.
         colors.extend(
             ball.positions.iter().map(|_| 0.15 + 0.85 * (*centre + 0.5).clamp(Vec3::ZERO, Vec3::ONE)),
         );
