@@ -1,7 +1,7 @@
 //! A run: from a scene and a GPU to frames in joules, a power trace and a folder of results.
 //!
 //! ```text
-//! RunOptions -> Plan -> open -> prepare -> Prepared -> run: simulate -> measure -> Outcome -> write
+//! RunOptions -> Plan -> open -> prepare -> Prepared -> run: simulate -> measure -> FinishedRun -> write
 //! ```
 //!
 //! - [`RunOptions`]: everything that may be requested; [`Plan`]: with all inputs loaded and checked.
@@ -56,7 +56,7 @@ pub use frame::{BIN_PS, CrashedFrame, frames_of};
 pub use gpu::{GpuError, GpuSpec, PowerFiles};
 pub use heat::HeatPicture;
 pub use measure::{Checks, Measurement, Resolution};
-pub use options::{HeatQuantity, Method, PacingChoice, Requested, RunOptions, Sampling};
+pub use options::{HeatQuantity, PacingChoice, Requested, RunOptions, Sampling, TimingChoice};
 pub use passes::{PassSummary, WorkSummary};
 pub use plan::{Plan, fits_memory};
 pub use provenance::{Host, Input, Provenance, again};
@@ -67,7 +67,7 @@ pub use stalls::StallShares;
 pub use summary::{Detection, Figures, FrameRow, Summary};
 
 /// Results of a run.
-pub struct Outcome {
+pub struct FinishedRun {
     /// Options and loaded inputs.
     pub plan: Plan,
     /// Frames as simulated: the ground truth.
@@ -126,7 +126,7 @@ impl Prepared {
     ///
     /// # Errors
     /// As [`prepare`]. Earlier results in `dir` then stay unchanged.
-    pub fn run(self, mut dir: OutDir, progress: &Progress) -> Result<Outcome, RunError> {
+    pub fn run(self, mut dir: OutDir, progress: &Progress) -> Result<FinishedRun, RunError> {
         let Self { plan, provenance, distinct, mut choice } = self;
         let simulated = simulate::simulate(&plan, &distinct, &dir, progress)?;
         if let Some(choice) = &mut choice {
@@ -138,7 +138,7 @@ impl Prepared {
         let summary =
             Summary { choice, verified, ..Summary::new(&plan, provenance, &simulated, &measurement) }
                 .with_choice_warnings();
-        let outcome = Outcome { plan, simulated, measurement, summary };
+        let outcome = FinishedRun { plan, simulated, measurement, summary };
         write::write(&outcome, &dir, progress)?;
         dir.publish()?;
         Ok(outcome)
@@ -157,7 +157,7 @@ pub fn open(plan: &Plan, out: &Destination) -> Result<OutDir, RunError> {
 ///
 /// # Errors
 /// As [`open`], [`prepare`] and [`Prepared::run`].
-pub fn run(options: RunOptions, out: &Destination, progress: &Progress) -> Result<Outcome, RunError> {
+pub fn run(options: RunOptions, out: &Destination, progress: &Progress) -> Result<FinishedRun, RunError> {
     let plan = Plan::resolve(options)?;
     let dir = open(&plan, out)?;
     prepare(plan, None, None, progress)?.run(dir, progress)

@@ -179,7 +179,7 @@ impl Default for RunOptions {
 
 /// Value of `--timing`: a timing level for every frame, or sampled simulation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
-pub enum Method {
+pub enum TimingChoice {
     /// Every unit from cycle to cycle: the reference, slow
     Stepped,
     /// A recurrence over packets
@@ -191,7 +191,7 @@ pub enum Method {
     Sampled,
 }
 
-impl Method {
+impl TimingChoice {
     /// Timing level of the simulated frames.
     pub const fn level(self) -> Level {
         match self {

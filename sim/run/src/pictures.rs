@@ -3,7 +3,7 @@
 use activity::Unit;
 use power_model::Part;
 
-use super::{Outcome, RunFrame, stalls};
+use super::{FinishedRun, RunFrame, stalls};
 use output::MeanSd;
 use output::plot::{
     FrameEnergyPlot, FrameEnergyPoint, FramePowerPlot, Picture, PowerPart, PowerRun, UnitLane, UnitPlot,
@@ -17,7 +17,7 @@ pub(super) struct Plot {
 }
 
 /// All plots of a run.
-pub(super) fn plots(outcome: &Outcome) -> Vec<Plot> {
+pub(super) fn plots(outcome: &FinishedRun) -> Vec<Plot> {
     let subject = format!("{} on {}", outcome.plan.name, outcome.plan.gpu.name);
     let shown = shown_frame(outcome);
     let mut plots = vec![
@@ -56,7 +56,7 @@ pub(super) fn plots(outcome: &Outcome) -> Vec<Plot> {
 }
 
 /// Frame shown in detail: the simulated frame nearest to the marked one, and its index in the run.
-fn shown_frame(outcome: &Outcome) -> (usize, &RunFrame) {
+fn shown_frame(outcome: &FinishedRun) -> (usize, &RunFrame) {
     let middle = outcome.simulated.frames.len() / 2;
     let known = outcome.simulated.in_order().enumerate().filter(|(_, frame)| frame.observed().is_some());
     let (place, frame) =
@@ -64,7 +64,7 @@ fn shown_frame(outcome: &Outcome) -> (usize, &RunFrame) {
     (place, frame)
 }
 
-fn power_run(outcome: &Outcome, subject: &str) -> Picture {
+fn power_run(outcome: &FinishedRun, subject: &str) -> Picture {
     let measurement = &outcome.measurement;
     let power: Vec<f64> = measurement.trace.powers_w().collect();
     let found: Vec<f64> = measurement.found.starts.iter().map(|start| start.time_s).collect();
@@ -83,7 +83,7 @@ fn power_run(outcome: &Outcome, subject: &str) -> Picture {
 }
 
 /// Parts that consumed energy, in the order of all plots: overhead first, then units.
-pub(super) fn parts_in_use(outcome: &Outcome) -> Vec<Part> {
+pub(super) fn parts_in_use(outcome: &FinishedRun) -> Vec<Part> {
     let energy = outcome.measurement.run.energy();
     let (units, overhead): (Vec<Part>, Vec<Part>) = Part::ALL
         .into_iter()
@@ -92,7 +92,7 @@ pub(super) fn parts_in_use(outcome: &Outcome) -> Vec<Part> {
     overhead.into_iter().chain(units).collect()
 }
 
-fn frame_power(outcome: &Outcome, subject: &str, (place, frame): (usize, &RunFrame)) -> Picture {
+fn frame_power(outcome: &FinishedRun, subject: &str, (place, frame): (usize, &RunFrame)) -> Picture {
     let trace = &outcome.measurement.trace;
     let paced = &outcome.measurement.run.frames[place];
     let samples: Vec<(f64, f64)> = (0..trace.samples())
@@ -114,7 +114,7 @@ fn frame_power(outcome: &Outcome, subject: &str, (place, frame): (usize, &RunFra
     .picture(&outcome.plan.options.plot_style)
 }
 
-fn unit_busy(outcome: &Outcome, subject: &str, frame: &RunFrame) -> Picture {
+fn unit_busy(outcome: &FinishedRun, subject: &str, frame: &RunFrame) -> Picture {
     let total = outcome.simulated.total();
     let lane = |unit: Unit| UnitLane {
         name: unit.name(),
@@ -129,7 +129,7 @@ fn unit_busy(outcome: &Outcome, subject: &str, frame: &RunFrame) -> Picture {
     .picture(&outcome.plan.options.plot_style)
 }
 
-fn frame_energy(outcome: &Outcome, subject: &str) -> Picture {
+fn frame_energy(outcome: &FinishedRun, subject: &str) -> Picture {
     let frames: Vec<FrameEnergyPoint> = outcome
         .summary
         .frames

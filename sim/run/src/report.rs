@@ -15,13 +15,13 @@ use crate::frame::image_name;
 use crate::heat::heat_name;
 use crate::pictures::{Plot, parts_in_use};
 use crate::stalls;
-use crate::{HeatQuantity, Host, Input, Outcome, PassSummary, RunError, WorkSummary};
+use crate::{FinishedRun, HeatQuantity, Host, Input, PassSummary, RunError, WorkSummary};
 
 /// Largest number of draws of a pass in the report; all are in the summary.
 const MAX_DRAWS: usize = 48;
 
 /// Collects the contents of the report.
-pub(super) fn report<'a>(outcome: &'a Outcome, plots: &[Plot]) -> Result<Report<'a>, RunError> {
+pub(super) fn report<'a>(outcome: &'a FinishedRun, plots: &[Plot]) -> Result<Report<'a>, RunError> {
     let plan = &outcome.plan;
     Ok(Report {
         title: format!("{} on {}", plan.name, plan.gpu.name).into(),
@@ -43,7 +43,7 @@ pub(super) fn report<'a>(outcome: &'a Outcome, plots: &[Plot]) -> Result<Report<
     })
 }
 
-fn warnings(outcome: &Outcome) -> Vec<WarningRow> {
+fn warnings(outcome: &FinishedRun) -> Vec<WarningRow> {
     let row = |w: &warnings::Warning| WarningRow {
         code: w.code.name().to_owned(),
         message: w.message.clone(),
@@ -52,7 +52,7 @@ fn warnings(outcome: &Outcome) -> Vec<WarningRow> {
     outcome.summary.warnings.iter().map(row).collect()
 }
 
-fn images(outcome: &Outcome) -> Result<Vec<ReportImage>, RunError> {
+fn images(outcome: &FinishedRun) -> Result<Vec<ReportImage>, RunError> {
     let viewport = outcome.plan.viewport;
     let mut pictures: Vec<_> = outcome.simulated.pictures.iter().collect();
     // The middle image comes first and large; the others follow in order as thumbnails.
@@ -78,7 +78,7 @@ fn images(outcome: &Outcome) -> Result<Vec<ReportImage>, RunError> {
         .collect()
 }
 
-fn heat(outcome: &Outcome) -> impl Iterator<Item = ReportImage> {
+fn heat(outcome: &FinishedRun) -> impl Iterator<Item = ReportImage> {
     outcome.simulated.heat.iter().map(|map| ReportImage {
         caption: match map.of {
             HeatQuantity::Event(event) => {
@@ -96,7 +96,7 @@ fn plot(plot: &Plot) -> Result<ReportPlot, RunError> {
     Ok(ReportPlot { caption, svg: plot.picture.svg()?, stem })
 }
 
-fn parts(outcome: &Outcome) -> Vec<PartRow> {
+fn parts(outcome: &FinishedRun) -> Vec<PartRow> {
     let energy = outcome.measurement.run.energy();
     let row = |part: Part| PartRow {
         name: part.name().to_owned(),
@@ -108,7 +108,7 @@ fn parts(outcome: &Outcome) -> Vec<PartRow> {
     parts_in_use(outcome).into_iter().map(row).collect()
 }
 
-fn frames(outcome: &Outcome) -> Vec<FrameRow> {
+fn frames(outcome: &FinishedRun) -> Vec<FrameRow> {
     let rows = outcome.summary.frames.iter().zip(outcome.measurement.by_true_frame());
     rows.map(|(row, measured)| FrameRow {
         frame: u64::from(row.frame),
@@ -133,7 +133,7 @@ fn frame_flags(predicted: bool, flags: String) -> String {
     }
 }
 
-fn passes(outcome: &Outcome) -> Vec<PassRow> {
+fn passes(outcome: &FinishedRun) -> Vec<PassRow> {
     let rows = &outcome.summary.passes;
     let time_s: f64 = rows.iter().map(|pass| pass.all.time_s).sum();
     let energy_j: f64 = rows.iter().map(|pass| pass.all.energy_j).sum();
@@ -159,7 +159,7 @@ fn passes(outcome: &Outcome) -> Vec<PassRow> {
     rows.iter().map(row).collect()
 }
 
-fn units(outcome: &Outcome) -> Vec<UnitRow> {
+fn units(outcome: &FinishedRun) -> Vec<UnitRow> {
     let busy = &outcome.summary.unit_busy;
     let row = |unit: Unit| {
         let share = busy.get(unit.name()).copied();
@@ -175,7 +175,7 @@ fn units(outcome: &Outcome) -> Vec<UnitRow> {
     Unit::ALL.into_iter().filter(is_listed).map(row).collect()
 }
 
-fn counters(outcome: &Outcome) -> Vec<CounterRow> {
+fn counters(outcome: &FinishedRun) -> Vec<CounterRow> {
     let frames = outcome.simulated.known().count().max(1) as f64;
     let pixels = outcome.plan.pixels() as f64;
     let row = |(event, total): (Event, u64)| {
@@ -193,7 +193,7 @@ fn counters(outcome: &Outcome) -> Vec<CounterRow> {
 }
 
 /// Facts below the heading: scene, hardware, model, limits.
-fn facts(outcome: &Outcome) -> Vec<FactRow> {
+fn facts(outcome: &FinishedRun) -> Vec<FactRow> {
     let (plan, summary) = (&outcome.plan, &outcome.summary);
     let mut facts = vec![
         FactRow::new("scene", plan.name.clone()),
@@ -221,7 +221,7 @@ fn bound(bound: Bound) -> &'static str {
 }
 
 /// Settings in use.
-fn settings(outcome: &Outcome) -> Vec<FactRow> {
+fn settings(outcome: &FinishedRun) -> Vec<FactRow> {
     let settings = &outcome.summary.settings;
     let device = outcome.measurement.device.spec();
     let mut rows = vec![
@@ -253,7 +253,7 @@ fn settings(outcome: &Outcome) -> Vec<FactRow> {
 }
 
 /// Camera of the first frame; for a workload without a scene only the lens.
-fn camera(outcome: &Outcome) -> Vec<FactRow> {
+fn camera(outcome: &FinishedRun) -> Vec<FactRow> {
     let lens = |radius: f32| match radius > 0.0 {
         true => format!("radius {radius} scene units"),
         false => "none: a pinhole".to_owned(),
@@ -286,7 +286,7 @@ fn camera(outcome: &Outcome) -> Vec<FactRow> {
 }
 
 /// Input files.
-fn inputs(outcome: &Outcome) -> Vec<FactRow> {
+fn inputs(outcome: &FinishedRun) -> Vec<FactRow> {
     let row = |input: &Input| FactRow {
         name: input.path.clone(),
         value: input.sha256.clone().unwrap_or_else(|| "missing".to_owned()),
@@ -296,7 +296,7 @@ fn inputs(outcome: &Outcome) -> Vec<FactRow> {
 }
 
 /// Program, command line and host.
-fn host(outcome: &Outcome) -> Vec<FactRow> {
+fn host(outcome: &FinishedRun) -> Vec<FactRow> {
     let Host { command, directory, revision, threads, cores, cpu, system, architecture } =
         &outcome.summary.host;
     let unknown = || "unknown".to_owned();
@@ -311,13 +311,13 @@ fn host(outcome: &Outcome) -> Vec<FactRow> {
     ]
 }
 
-fn frame_range(outcome: &Outcome) -> String {
+fn frame_range(outcome: &FinishedRun) -> String {
     let frames = &outcome.plan.job.settings().frames;
     format!("{} ({}..{})", frames.end - frames.start, frames.start, frames.end)
 }
 
 /// Files beside the report, with descriptions.
-fn files(outcome: &Outcome) -> Vec<FileLink> {
+fn files(outcome: &FinishedRun) -> Vec<FileLink> {
     let heat = [(
         "heat/",
         "where in each frame counters counted, or energy was used: pictures, values of the pixels and of the tiles",

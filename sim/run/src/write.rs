@@ -8,14 +8,14 @@ use power_model::Part;
 use timing::{DrawSpan, PassTime};
 use traces::energy::{ExtraColumn, FrameEnergy, FrameTable};
 use traces::io::perfetto::{
-    self, CounterTrack, FrameSpan, MAX_SLICES, PassSpan, Timeline, UnitTrack, slices_of_bins,
+    self, CounterTrack, FrameSpan, MAX_SLICES, PassSpan, PerfettoTimeline, UnitTrack, slices_of_bins,
 };
 use traces::score::{TOLERANCE_S, truth_beside};
 
 use crate::frame::image_name;
 use crate::heat::heat_name;
 use crate::passes::take_turns;
-use crate::{FIGURES, FrameRow, Observed, Outcome, Plan, RunError, pictures, report, stalls};
+use crate::{FIGURES, FinishedRun, FrameRow, Observed, Plan, RunError, pictures, report, stalls};
 
 /// Files that a run may write.
 pub(super) fn claim(plan: &Plan) -> Claim {
@@ -34,7 +34,7 @@ pub(super) fn claim(plan: &Plan) -> Claim {
 }
 
 /// Writes all files except images, which the simulation has written.
-pub(super) fn write(outcome: &Outcome, dir: &OutDir, progress: &Progress) -> Result<(), RunError> {
+pub(super) fn write(outcome: &FinishedRun, dir: &OutDir, progress: &Progress) -> Result<(), RunError> {
     let bar = progress.bar("files", 4);
     let trace = &outcome.measurement.trace;
     dir.write_file("trace.parquet", |out| Ok(traces::io::parquet::write(trace, out)?))?;
@@ -56,7 +56,7 @@ pub(super) fn write(outcome: &Outcome, dir: &OutDir, progress: &Progress) -> Res
     Ok(dir.write_json(SUMMARY, &outcome.summary)?)
 }
 
-fn write_frames(outcome: &Outcome, dir: &OutDir) -> Result<(), RunError> {
+fn write_frames(outcome: &FinishedRun, dir: &OutDir) -> Result<(), RunError> {
     let measurement = &outcome.measurement;
     let truth = truth_beside(&measurement.frames, &measurement.truth, TOLERANCE_S);
     let table = FrameTable::new(measurement.frames.clone(), Some(outcome.plan.pixels()))
@@ -67,7 +67,7 @@ fn write_frames(outcome: &Outcome, dir: &OutDir) -> Result<(), RunError> {
 }
 
 /// Columns of a sampled run: whether a frame is predicted, and the ends of its energy interval.
-fn predictions(outcome: &Outcome) -> Vec<ExtraColumn> {
+fn predictions(outcome: &FinishedRun) -> Vec<ExtraColumn> {
     if outcome.simulated.sampled.is_none() {
         return Vec::new();
     }
@@ -95,7 +95,7 @@ fn predictions(outcome: &Outcome) -> Vec<ExtraColumn> {
 const NS: f64 = 1e9;
 
 /// Timeline for the Perfetto viewer: frames, units in use, total power and power by part.
-fn timeline<'a>(outcome: &'a Outcome, process: &'a str) -> Timeline<'a> {
+fn timeline<'a>(outcome: &'a FinishedRun, process: &'a str) -> PerfettoTimeline<'a> {
     let total = outcome.simulated.total();
     let units = Unit::ALL
         .into_iter()
@@ -107,14 +107,14 @@ fn timeline<'a>(outcome: &'a Outcome, process: &'a str) -> Timeline<'a> {
     let starts: Vec<u64> = outcome.measurement.run.frames.iter().map(|paced| ns(paced.start_s)).collect();
     let power = std::iter::once(total_power(outcome)).chain(parts.map(|part| part_power(outcome, part)));
     let counters = power.chain(stalls::tracks(&outcome.simulated, &starts)).collect();
-    Timeline { process, frames: frames(outcome), units, counters }
+    PerfettoTimeline { process, frames: frames(outcome), units, counters }
 }
 
 fn ns(time_s: f64) -> u64 {
     (time_s * NS).round() as u64
 }
 
-fn frames(outcome: &Outcome) -> Vec<FrameSpan> {
+fn frames(outcome: &FinishedRun) -> Vec<FrameSpan> {
     let frames = outcome.simulated.in_order().zip(&outcome.summary.frames);
     let most = MAX_SLICES / outcome.summary.frames.len().max(1);
     outcome
@@ -187,7 +187,7 @@ fn draws(
     observed.spans.iter().filter_map(span).collect()
 }
 
-fn unit_track(outcome: &Outcome, unit: Unit) -> UnitTrack<'static> {
+fn unit_track(outcome: &FinishedRun, unit: Unit) -> UnitTrack<'static> {
     let limit = (MAX_SLICES / outcome.simulated.frames.len().max(1)).max(1);
     let slices = outcome
         .measurement
@@ -203,13 +203,13 @@ fn unit_track(outcome: &Outcome, unit: Unit) -> UnitTrack<'static> {
     UnitTrack { name: unit.name(), doc: unit.doc(), slices }
 }
 
-fn total_power(outcome: &Outcome) -> CounterTrack<'static> {
+fn total_power(outcome: &FinishedRun) -> CounterTrack<'static> {
     let curve = &outcome.measurement.run.curve;
     let points = curve.edges_s().iter().zip(curve.watts()).map(|(&edge, &watts)| (ns(edge), watts)).collect();
     CounterTrack { name: "power, total", unit: "W", points }
 }
 
-fn part_power(outcome: &Outcome, part: Part) -> CounterTrack<'static> {
+fn part_power(outcome: &FinishedRun, part: Part) -> CounterTrack<'static> {
     let idle_w = outcome.plan.platform.idle_w.value();
     let between = if part == Part::Idle { idle_w } else { 0.0 };
     let mut points = vec![(0, between)];

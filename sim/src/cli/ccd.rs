@@ -115,12 +115,12 @@ struct Unknown {
 /// Result of a case, or its error.
 #[derive(Serialize)]
 #[serde(untagged)]
-enum Outcome {
+enum CaseResult {
     Found(Found),
     Unknown(Unknown),
 }
 
-impl Outcome {
+impl CaseResult {
     fn new(case: &CaseFiles, objects: Result<Vec<Object>, String>, answers: &[Answer]) -> Self {
         let case_id = case.id.clone();
         match objects {
@@ -195,21 +195,21 @@ pub(super) fn run(args: &CcdArgs, terminal: &Terminal) -> Result<(), Failure> {
 }
 
 /// Results of all cases, in order. The threads share the pairs of all cases.
-fn answered(cases: &[CaseFiles], search: &Search, progress: &Progress) -> Vec<Outcome> {
+fn answered(cases: &[CaseFiles], search: &Search, progress: &Progress) -> Vec<CaseResult> {
     let all: Vec<_> = cases.par_iter().map(objects).collect();
     let known: Vec<&[Object]> = all.iter().map(|case| case.as_deref().unwrap_or_default()).collect();
     let pairs = known.iter().map(|objects| candidates(objects).len() as u64).sum();
     let bar = progress.bar("pairs", pairs);
     let answers = detect_each(&known, search, || bar.inc());
     let outcomes = cases.iter().zip(all).zip(answers);
-    outcomes.map(|((case, objects), answers)| Outcome::new(case, objects, &answers)).collect()
+    outcomes.map(|((case, objects), answers)| CaseResult::new(case, objects, &answers)).collect()
 }
 
 /// Fails if a case has no result; the message names each.
-fn unanswered(outcomes: &[Outcome], terminal: &Terminal) -> Result<(), Failure> {
+fn unanswered(outcomes: &[CaseResult], terminal: &Terminal) -> Result<(), Failure> {
     let errors = outcomes.iter().filter_map(|outcome| match outcome {
-        Outcome::Found(_) => None,
-        Outcome::Unknown(unknown) => Some(unknown.error.clone()),
+        CaseResult::Found(_) => None,
+        CaseResult::Unknown(unknown) => Some(unknown.error.clone()),
     });
     let errors: Vec<String> = errors.collect();
     let message = match (&errors[..], outcomes.len()) {
@@ -223,10 +223,10 @@ fn unanswered(outcomes: &[Outcome], terminal: &Terminal) -> Result<(), Failure> 
     Err(Failure { message, code: 1 })
 }
 
-fn text(outcomes: &[Outcome]) -> String {
+fn text(outcomes: &[CaseResult]) -> String {
     let mut table =
         Table::new(["case", "objects", "triangles", "boxes touch", "may collide", "contact found"]);
-    for case in outcomes.iter().filter_map(Outcome::found) {
+    for case in outcomes.iter().filter_map(CaseResult::found) {
         table.row([
             case.case_id.clone(),
             case.objects.to_string(),
@@ -270,7 +270,7 @@ impl<'a> Rows<'a> {
     }
 
     /// Writes the rows of all cases with a result.
-    pub fn write(self, outcomes: &[Outcome]) -> Result<(), Failure> {
+    pub fn write(self, outcomes: &[CaseResult]) -> Result<(), Failure> {
         let failed = |message: String| Failure { message, code: 1 };
         match self {
             Self::Unasked => Ok(()),
@@ -285,10 +285,10 @@ impl<'a> Rows<'a> {
     }
 }
 
-fn all(outcomes: &[Outcome], out: impl Write) -> csv::Result<()> {
+fn all(outcomes: &[CaseResult], out: impl Write) -> csv::Result<()> {
     let mut csv = csv::WriterBuilder::new().has_headers(false).from_writer(out);
     csv.write_record(["case_id", "a", "b", "may_collide"])?;
-    outcomes.iter().filter_map(Outcome::found).try_for_each(|case| lines(case, &mut csv))?;
+    outcomes.iter().filter_map(CaseResult::found).try_for_each(|case| lines(case, &mut csv))?;
     Ok(csv.flush()?)
 }
 

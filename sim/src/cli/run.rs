@@ -13,8 +13,8 @@ use output::terminal::{Terminal, Verbosity};
 use output::{Destination, MeanSd};
 use power_model::Bound;
 use run::{
-    DryRun, HeatQuantity, Method, Outcome, PacingChoice, Plan, Prepared, Requested, RunError, RunOptions,
-    Summary, again, open, prepare,
+    DryRun, FinishedRun, HeatQuantity, PacingChoice, Plan, Prepared, Requested, RunError, RunOptions,
+    Summary, TimingChoice, again, open, prepare,
 };
 use serde::Serialize;
 use workloads::job::OptionSource;
@@ -74,7 +74,7 @@ pub struct RunArgs {
     pub bound: Bound,
     /// Timing level; `quintile chart timing` shows its accuracy
     #[arg(long, value_enum, default_value_t)]
-    pub timing: Method,
+    pub timing: TimingChoice,
     /// Let a probe choose level, frames and dimensions so that the error of cycles and energy is at most this, for example 2%
     #[arg(long, value_name = "P%", value_parser = percent, conflicts_with = "timing", allow_hyphen_values = true)]
     pub accuracy: Option<f64>,
@@ -267,7 +267,7 @@ struct Printed<'a> {
 }
 
 /// Text of a finished run for the terminal.
-fn text(args: &RunArgs, outcome: &Outcome) -> String {
+fn text(args: &RunArgs, outcome: &FinishedRun) -> String {
     let (summary, settings) = (&outcome.summary, &outcome.summary.settings);
     let mut lines = vec![
         format!(
@@ -319,7 +319,7 @@ fn found(summary: &Summary) -> String {
 }
 
 /// Table of measured and true values, one row per quantity.
-fn figures(outcome: &Outcome) -> Table {
+fn figures(outcome: &FinishedRun) -> Table {
     let mut table = Table::new(["", "measured in the trace", "simulator's truth"]);
     let is_single = outcome.summary.settings.frames == 1;
     for row in outcome.summary.headline() {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use traces::io::perfetto::{
-    BusySlice, CounterTrack, FrameSpan, MAX_POINTS, PassSpan, Timeline, UnitTrack, write,
+    BusySlice, CounterTrack, FrameSpan, MAX_POINTS, PassSpan, PerfettoTimeline, UnitTrack, write,
 };
 
 /// A decoded field: a varint, eight bytes, or bytes that may be a message.
@@ -142,7 +142,7 @@ fn read(bytes: &[u8]) -> Decoded {
     decoded
 }
 
-fn timeline(points: Vec<(u64, f64)>) -> Timeline<'static> {
+fn timeline(points: Vec<(u64, f64)>) -> PerfettoTimeline<'static> {
     let draw = |start_ns| PassSpan {
         name: "draw 1".to_owned(),
         start_ns: start_ns + 30,
@@ -169,7 +169,7 @@ fn timeline(points: Vec<(u64, f64)>) -> Timeline<'static> {
         BusySlice { start_ns: 0, end_ns: 40, utilisation: 0.55 },
         BusySlice { start_ns: 40, end_ns: 60, utilisation: 1.0 },
     ];
-    Timeline {
+    PerfettoTimeline {
         process: "quintile tiny",
         frames: vec![span(0, 0), span(1, 100)],
         units: vec![UnitTrack { name: "setup", doc: "Prepares.", slices }],
@@ -177,7 +177,7 @@ fn timeline(points: Vec<(u64, f64)>) -> Timeline<'static> {
     }
 }
 
-fn bytes(timeline: &Timeline<'_>) -> Vec<u8> {
+fn bytes(timeline: &PerfettoTimeline<'_>) -> Vec<u8> {
     let mut bytes = Vec::new();
     write(timeline, &mut bytes).unwrap();
     bytes
@@ -242,7 +242,7 @@ fn a_long_counter_is_bounded_and_keeps_its_spike() {
 
 #[test]
 fn an_empty_run_is_a_trace_too_and_bytes_repeat() {
-    assert_eq!(read(&bytes(&Timeline::default())).events.len(), 0);
+    assert_eq!(read(&bytes(&PerfettoTimeline::default())).events.len(), 0);
     let timeline = timeline(vec![(0, 1.0)]);
     assert_eq!(bytes(&timeline), bytes(&timeline));
 }

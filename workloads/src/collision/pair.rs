@@ -89,7 +89,7 @@ pub(super) struct Round {
 }
 
 /// Result of a round.
-pub(super) enum Outcome {
+pub(super) enum PairResult {
     /// The objects are apart.
     Apart,
     /// The fragments exceeded the budget.
@@ -154,9 +154,11 @@ impl<'a> Pair<'a> {
         let params = PassParams { resolution, bins, fit: Fit::Edges };
         let budget = FragmentBudget::unlimited();
         match self.round(params, &mut Resources { scratch, budget, observer }) {
-            Outcome::Apart => Verdict::Apart,
-            Outcome::BudgetExceeded => self.maybe(0, false),
-            Outcome::Overlap(Round { window, tiles, seen }) => Verdict::Maybe { bounds: window, tiles, seen },
+            PairResult::Apart => Verdict::Apart,
+            PairResult::BudgetExceeded => self.maybe(0, false),
+            PairResult::Overlap(Round { window, tiles, seen }) => {
+                Verdict::Maybe { bounds: window, tiles, seen }
+            }
         }
     }
 
@@ -201,15 +203,15 @@ impl<'a> Pair<'a> {
     }
 
     /// Runs three passes. When refining, drops triangles that touch nothing after each pass.
-    pub fn round(&mut self, params: PassParams, resources: &mut Resources<'_, impl Observer>) -> Outcome {
+    pub fn round(&mut self, params: PassParams, resources: &mut Resources<'_, impl Observer>) -> PairResult {
         let mut remaining = time_bins(&self.window, params.bins);
         let (mut tiles, mut seen) = (0, false);
         for axis in 0..3 {
-            let Some(hull) = joined(&remaining) else { return Outcome::Apart };
+            let Some(hull) = joined(&remaining) else { return PairResult::Apart };
             let tiling = Tiling { resolution: params.resolution, min_width: self.min_tile_width() };
             let pass = Pass::new(axis, &hull, tiling, params.fit);
             let Some(found) = self.compare(&pass, &remaining, resources) else {
-                return Outcome::BudgetExceeded;
+                return PairResult::BudgetExceeded;
             };
             tiles = found.tiles;
             seen |= self.search.zoom && self.has_crossing(&found);
@@ -221,7 +223,8 @@ impl<'a> Pair<'a> {
                 break;
             }
         }
-        joined(&remaining).map_or(Outcome::Apart, |window| Outcome::Overlap(Round { window, tiles, seen }))
+        joined(&remaining)
+            .map_or(PairResult::Apart, |window| PairResult::Overlap(Round { window, tiles, seen }))
     }
 
     /// Compares both objects in one pass, in chunks of time bins that fit in memory; `None` if the fragments
@@ -316,9 +319,9 @@ impl Pair<'_> {
             let (before, triangles) = (self.window, self.triangles());
             let params = PassParams { resolution, bins: self.bins(resolution), fit };
             let round = match self.round(params, &mut resources) {
-                Outcome::Apart => return Verdict::Apart,
-                Outcome::BudgetExceeded => break,
-                Outcome::Overlap(round) => round,
+                PairResult::Apart => return Verdict::Apart,
+                PairResult::BudgetExceeded => break,
+                PairResult::Overlap(round) => round,
             };
             self.window = round.window;
             last = self.maybe(round.tiles, round.seen);

@@ -90,12 +90,12 @@ pub fn measure(
     value: f64,
     size: Size,
     gpu: &GpuSpec,
-    methods: &[Method],
+    methods: &[TestMethod],
 ) -> Result<Vec<StressRow>, RunError> {
     on_subject(family, value, size, super::SEED, gpu, |subject| {
         let pairs = Pairs::of(subject, PAIRS[usize::from(size != Size::FULL)]);
         let (reference, brute) = subject.reference()?;
-        let row = |method: &Method| -> Result<_, PassError> {
+        let row = |method: &TestMethod| -> Result<_, PassError> {
             let seen = subject.seen(method.features)?;
             Ok(StressRow {
                 family: family.name,
@@ -271,7 +271,7 @@ fn holds(found: &Hulls, truth: &Hulls) -> bool {
 
 /// A named set of tests.
 #[derive(Clone, Copy, Debug)]
-pub struct Method {
+pub struct TestMethod {
     /// Its name in tables and charts.
     pub name: &'static str,
     /// The tests that are on.
@@ -284,21 +284,21 @@ const EDGES: Features = Features { edges: true, ..NONE };
 const FACING: Features = Features { facing: true, facing_splits: Features::ALL.facing_splits, ..NONE };
 
 /// The sets that `quintile stress` compares, each a line.
-pub const METHODS: [Method; 14] = [
-    Method { name: "box only", features: NONE },
-    Method { name: "lens lines", features: Features { lens_lines: true, ..NONE } },
-    Method { name: "sides", features: SIDES },
-    Method { name: "facing", features: FACING },
-    Method { name: "edges", features: EDGES },
-    Method { name: "screen", features: Features { screen: true, ..NONE } },
-    Method { name: "sides+edges", features: Features { edges: true, ..SIDES } },
-    Method { name: "facing+edges", features: Features { edges: true, ..FACING } },
-    Method { name: "edges+screen", features: Features { screen: true, ..EDGES } },
-    Method { name: "sides+edges+screen", features: Features { edges: true, screen: true, ..SIDES } },
-    Method { name: "z_max", features: Features { z_max: true, ..NONE } },
-    Method { name: "all but coarse", features: Features { coarse: false, ..Features::ALL } },
-    Method { name: "all", features: Features::ALL },
-    Method { name: "auto", features: Features { auto: true, ..Features::ALL } },
+pub const METHODS: [TestMethod; 14] = [
+    TestMethod { name: "box only", features: NONE },
+    TestMethod { name: "lens lines", features: Features { lens_lines: true, ..NONE } },
+    TestMethod { name: "sides", features: SIDES },
+    TestMethod { name: "facing", features: FACING },
+    TestMethod { name: "edges", features: EDGES },
+    TestMethod { name: "screen", features: Features { screen: true, ..NONE } },
+    TestMethod { name: "sides+edges", features: Features { edges: true, ..SIDES } },
+    TestMethod { name: "facing+edges", features: Features { edges: true, ..FACING } },
+    TestMethod { name: "edges+screen", features: Features { screen: true, ..EDGES } },
+    TestMethod { name: "sides+edges+screen", features: Features { edges: true, screen: true, ..SIDES } },
+    TestMethod { name: "z_max", features: Features { z_max: true, ..NONE } },
+    TestMethod { name: "all but coarse", features: Features { coarse: false, ..Features::ALL } },
+    TestMethod { name: "all", features: Features::ALL },
+    TestMethod { name: "auto", features: Features { auto: true, ..Features::ALL } },
 ];
 
 /// A test that can be switched on: its letter in charts, its name, and how.

@@ -210,7 +210,7 @@ impl Report {
             .shown("family", |family| family.name, plain)
             .before("Cost over that of the best method, at the worst value of each family.\n\n")
             .after(self.below());
-        let method = |table: Table<_>, method: &measure::Method| {
+        let method = |table: Table<_>, method: &measure::TestMethod| {
             let cost = |family: &&&'static Family| self.over_best(family, method.name, false);
             table.shown(method.name, cost, optional(fixed(2)))
         };

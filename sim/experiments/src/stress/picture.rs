@@ -4,7 +4,7 @@ use workloads::stress::Family;
 
 use super::Report;
 use super::choice::{Choice, Choices};
-use super::measure::{METHODS, Method, StressRow};
+use super::measure::{METHODS, StressRow, TestMethod};
 use output::plot::{Chart, ChartPanel, Look, Mark, Matrix, MatrixPanel, Paint, Picture, Scale, Series};
 
 /// Cost over that of the best method, by method and family: at the first and at the worst value.
@@ -106,7 +106,7 @@ pub(super) fn family(report: &Report, family: &Family, measure: &Measure, look: 
         values.filter_map(|(place, value)| Some((place as f64, value?))).collect()
     };
     let all: Vec<Vec<(f64, f64)>> = METHODS.iter().map(|method| line(method.name)).collect();
-    let panel = |(method, own): (&Method, &Vec<(f64, f64)>)| {
+    let panel = |(method, own): (&TestMethod, &Vec<(f64, f64)>)| {
         let others = Series::new("", Mark::Faint(all.clone())).painted(Paint::Grey);
         let own = Series::curve("", own.iter().copied()).painted(Paint::Like(0));
         ChartPanel::new(method.name, ["", measure.name], vec![others, own])

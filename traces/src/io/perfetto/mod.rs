@@ -24,7 +24,7 @@ pub const MAX_SLICES: usize = 10_000;
 
 /// Contents of a timeline. Times are in ns from the start of the run.
 #[derive(Clone, Debug, Default)]
-pub struct Timeline<'a> {
+pub struct PerfettoTimeline<'a> {
     /// Name of the process, for example `quintile default on hd7970`.
     pub process: &'a str,
     /// Frames in order.
@@ -113,7 +113,7 @@ const COUNTERS_UUID: u64 = PROCESS_UUID + 0x2_0000;
 ///
 /// # Errors
 /// Those of `out`.
-pub fn write(timeline: &Timeline<'_>, out: &mut dyn Write) -> io::Result<()> {
+pub fn write(timeline: &PerfettoTimeline<'_>, out: &mut dyn Write) -> io::Result<()> {
     let mut trace = Trace { out };
     trace.process(timeline.process)?;
     trace.frames(&timeline.frames)?;
@@ -139,7 +139,7 @@ pub fn save(trace: &dyn TraceReader, path: &Path) -> Result<(), WriteError> {
         let point = |(index, watts)| ((header.time_ns(index) - start_ns).unsigned_abs(), watts);
         let points = extremes.0.kept().into_iter().map(point).collect();
         let counters = vec![CounterTrack { name: "power", unit: "W", points }];
-        let timeline = Timeline { process: "trace", counters, ..Timeline::default() };
+        let timeline = PerfettoTimeline { process: "trace", counters, ..PerfettoTimeline::default() };
         write(&timeline, out).map_err(|error| WriteError::Encode(error.to_string()))
     })
 }
