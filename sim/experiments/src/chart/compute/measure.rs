@@ -20,7 +20,7 @@ const STRIDES: [u32; 6] = [1, 2, 4, 8, 16, 32];
 /// Lanes of a group whose sums at the largest stride fit into shared memory, with padding.
 const STRIDE_GROUP: u32 = 64;
 /// Contrasts of the image.
-const CONTRASTS: [f32; 7] = [0.0, 0.01, 0.03, 0.1, 0.3, 0.6, 1.0];
+const CONTRASTS: [f64; 7] = [0.0, 0.01, 0.03, 0.1, 0.3, 0.6, 1.0];
 /// Copies of the histogram.
 const COPIES: u32 = 8;
 /// Steps between pixels that are read.
@@ -78,8 +78,8 @@ impl Case {
         ];
         for contrast in CONTRASTS {
             for (method, atomics, copies, padded) in places {
-                let options = Options { contrast, atomics, copies, padded, ..histogram.clone() };
-                add(Sweep::Contrast, f64::from(contrast), method, options);
+                let options = Options { contrast: contrast as f32, atomics, copies, padded, ..histogram.clone() };
+                add(Sweep::Contrast, contrast, method, options);
             }
         }
         for step in STEPS {
