@@ -324,9 +324,9 @@ fn a_pass_waits_for_the_groups_that_read_what_it_overwrites() {
         let colours = vec![Attachment::cleared(target, Vec4::ZERO)];
         let targets = Attachments { colours, depth: None };
         let pass_onto = RasterPass::new(&camera, &draws, &settings).onto(Target::Surfaces(&targets));
-        let drawn = gpu.draw(&pass_onto).unwrap();
+        gpu.draw(&pass_onto).unwrap();
         gpu.wait();
-        let values = gpu.view("values", drawn.surface, &[0.0_f32; 64 * 32]).unwrap();
+        let values = gpu.surface_view(target).unwrap();
         let other = gpu.buffer("other", &[0_u32]);
         let bindings = if is_read { vec![values.reads()] } else { vec![other.reads()] };
         gpu.dispatch(&pass(1, 32, &bindings, &idle)).unwrap();
