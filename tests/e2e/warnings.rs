@@ -15,7 +15,7 @@ const TESTED: &str = "tests of the workload bring it about, each in a run of its
 const COMMAND: &str = "a run does not give it; tests of `quintile trace` bring it about";
 
 /// Codes without a test here, with the reason.
-const NOT_PROVOKED: [(&str, &str); 24] = [
+const NOT_PROVOKED: [(&str, &str); 27] = [
     ("ambiguous-alignment", COMMAND),
     ("anchors-off", COMMAND),
     ("clipped", COMMAND),
@@ -32,9 +32,12 @@ const NOT_PROVOKED: [(&str, &str); 24] = [
         "flat-mark",
         "a run marks starts of its frames, where power rises; a unit test in `traces` has marks in noise",
     ),
+    ("atomic-contention", TESTED),
+    ("bank-conflicts", TESTED),
     ("deferred-moving-camera", TESTED),
     ("deferred-one-surface", TESTED),
     ("lens-wider-than-receiver", TESTED),
+    ("light-lists-full", TESTED),
     ("materials-simplified", TESTED),
     ("shading-cache-small", TESTED),
     ("shadow-banding", TESTED),

@@ -50,9 +50,10 @@ impl UnitTime {
         }
     }
 
-    /// `part` of `whole` of the time, rounded down.
-    fn part(&self, part: u64, whole: u64) -> Self {
-        let of = |time: Time| (u128::from(time) * u128::from(part) / u128::from(whole)) as Time;
+    /// The part of the time from `from` to `to` of `whole`. Parts that follow each other add up to the whole.
+    fn part(&self, [from, to]: [u64; 2], whole: u64) -> Self {
+        let up_to = |time: Time, end: u64| (u128::from(time) * u128::from(end) / u128::from(whole)) as Time;
+        let of = |time: Time| up_to(time, to) - up_to(time, from);
         let Self { busy, idle, starved, blocked } = *self;
         Self { busy: of(busy), idle: of(idle), starved: starved.map(of), blocked: blocked.map(of) }
     }
@@ -146,8 +147,8 @@ impl Stalls {
                 break;
             }
             let end = self.clocks.ps(self.end.min((at + 1) * self.length));
-            let within = to_ps.min(end).saturating_sub(from_ps.max(begin));
-            if within > 0 {
+            let within = [from_ps, to_ps].map(|ps| ps.clamp(begin, end) - begin);
+            if within[0] < within[1] {
                 sum.merge(&interval[unit as usize].part(within, end - begin));
             }
         }
@@ -193,5 +194,7 @@ mod tests {
         // The second interval has 44 cycles of work in 256.
         assert_eq!([of([0, 384]), of([384, 1000])], [(278, 106), (22, 594)]);
         assert_eq!(of([768, 1000]), (0, 232), "the last interval ends with the frame");
+        let parts = (0..1000).map(|cycle| of([cycle, cycle + 1])).fold((0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
+        assert_eq!(parts, (300, 700), "however short they are");
     }
 }

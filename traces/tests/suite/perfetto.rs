@@ -216,8 +216,8 @@ fn slices_nest_and_close_on_every_track() {
     assert_eq!(
         named,
         [
-            "frame 0", "busy", "map", "image", "idle", "frame 1", "busy", "map", "image", "idle", "60 %",
-            "100 %"
+            "frame 0", "busy", "map", "image", "draw 1", "idle", "frame 1", "busy", "map", "image", "draw 1",
+            "idle", "60 %", "100 %"
         ]
     );
 }

@@ -78,7 +78,8 @@ impl Case {
         ];
         for contrast in CONTRASTS {
             for (method, atomics, copies, padded) in places {
-                let options = Options { contrast: contrast as f32, atomics, copies, padded, ..histogram.clone() };
+                let options =
+                    Options { contrast: contrast as f32, atomics, copies, padded, ..histogram.clone() };
                 add(Sweep::Contrast, contrast, method, options);
             }
         }
