@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""JLS of ours held against pyjls 0.17: samples to the bit, summaries against numpy, times, notes, lost samples; then speed.
+"""JLS of ours compared with pyjls 0.17: samples to the bit, summaries against numpy, times, notes, lost samples; then speed.
 
     jls_beside_pyjls.py QUINTILE                            files that `quintile trace convert` and `trace sample` write
     jls_beside_pyjls.py --golden FILE                       the golden file of traces/tests/suite/jls_write.rs (JLS_GOLDEN=FILE writes it)
@@ -32,7 +32,7 @@ def near(said, truth, share, least, what):
         assert abs(said - truth) <= share * abs(truth) + least, f"{what}: {said}, not {truth}"
 
 
-def samples_alike(reader, number, truth):
+def check_samples(reader, number, truth):
     """Read whole, and from places about those where a chunk, an index or a summary ends."""
     assert reader.signals[number].length == len(truth), (reader.signals[number].length, len(truth))
     bits = truth.view(np.uint32)
@@ -45,10 +45,10 @@ def samples_alike(reader, number, truth):
             assert np.array_equal(reader.fsr(number, int(at), count).view(np.uint32), bits[at : at + count]), at
 
 
-def statistics_alike(reader, number, truth):
+def check_statistics(reader, number, truth):
     """`fsr_statistics` over spans of every level. One span is put together exactly; of several only those that begin and
     end with entries are: pyjls shares an entry between two spans. What it makes of stretches with lost samples is not
-    looked at here, as it counts them in; `entries_alike` does."""
+    looked at here, as it counts them in; `check_entries` does."""
     rng = np.random.default_rng(2)
     n, truth = len(truth), truth.astype(np.float64)
     spread = truth.std() + 1e-12
@@ -85,7 +85,7 @@ def chunks(data):
         at += 32 + (0 if length == 0 else (length + 4 + 7) // 8 * 8)
 
 
-def entries_alike(path, number, truth):
+def check_entries(path, number, truth):
     """Every entry of every summary in the file against numpy in f64, lost samples left out; entries per level."""
     with open(path, "rb") as file:
         data = file.read()
@@ -106,7 +106,7 @@ def entries_alike(path, number, truth):
     return told
 
 
-def times_alike(reader, number, samples, rate_hz, start_s):
+def check_times(reader, number, samples, rate_hz, start_s):
     last = samples - 1
     for sample in {0, last // 3, last}:
         truth = (Fraction(start_s) + Fraction(sample) / Fraction(rate_hz) - UNIX_2018) * SECOND
@@ -125,7 +125,7 @@ def notes(reader):
     return (data if isinstance(data, dict) else json.loads(data))["trace"]
 
 
-def whole_alike(path, current, voltage, rate_hz, start_s):
+def check_whole(path, current, voltage, rate_hz, start_s):
     with Reader(path) as reader:
         named = {signal.name: number for number, signal in reader.signals.items()}
         assert [(s.name, s.units) for n, s in reader.signals.items() if n] == [("current", "A"), ("voltage", "V")]
@@ -135,11 +135,11 @@ def whole_alike(path, current, voltage, rate_hz, start_s):
         for name, truth in ("current", current), ("voltage", voltage):
             number = named[name]
             assert reader.signals[number].sample_rate == round(rate_hz)
-            samples_alike(reader, number, truth)
+            check_samples(reader, number, truth)
             if np.isfinite(truth).all():
-                spans += statistics_alike(reader, number, truth)
-            levels = entries_alike(path, number, truth)
-            times_alike(reader, number, len(truth), rate_hz, start_s)
+                spans += check_statistics(reader, number, truth)
+            levels = check_entries(path, number, truth)
+            check_times(reader, number, len(truth), rate_hz, start_s)
     print(f"{os.path.basename(path)}: {len(current)} samples, {spans} spans, entries by level {levels}, "
           f"{os.path.getsize(path) / len(current):.3f} bytes a sample")
 
@@ -169,7 +169,7 @@ def correctness(program, folder):
         source, path = os.path.join(folder, "a.parquet"), os.path.join(folder, f"{samples}.jls")
         parquet(source, current, voltage, rate_hz, start_s)
         run(program, "convert", source, path)
-        whole_alike(path, current, voltage, rate_hz, start_s)
+        check_whole(path, current, voltage, rate_hz, start_s)
     lost(program, folder)
 
 
@@ -196,7 +196,7 @@ def lost(program, folder):
         column = np.full(length, np.nan, np.float32)
         column[rows] = table[name].to_numpy()
         truth.append(column)
-    whole_alike(paths[1], *truth, 50e3, start_s)
+    check_whole(paths[1], *truth, 50e3, start_s)
     print(f"{length - len(rows)} lost samples are NaN")
 
 
@@ -210,7 +210,7 @@ def golden(path):
     for column in made:
         column[1000:1100] = column[29_000:] = np.nan
     assert all(np.array_equal(a.view(np.uint32), b.view(np.uint32)) for a, b in zip(truth, made))
-    whole_alike(path, *made, 50e3, 1.25)
+    check_whole(path, *made, 50e3, 1.25)
 
 
 def theirs(samples, path):

@@ -59,7 +59,7 @@ def main():
         ends, faces, owner = load(f"{a.folder}/{name}.mts.gz")
         edges = ipctk.edges(faces)
         mesh = ipctk.CollisionMesh(np.asfortranarray(ends[0]), edges, faces)
-        # Contact within an object is not asked for.
+        # Contact within an object is not reported.
         mesh.can_collide = ipctk.VertexPatchesCanCollide(owner) if hasattr(ipctk, "VertexPatchesCanCollide") else mesh.can_collide
         scenes[name] = (mesh, [np.asfortranarray(end) for end in ends])
     for _ in range(a.rounds):

@@ -60,7 +60,7 @@ impl PassParts {
     }
 }
 
-/// Time that one draw has at a stretch, from the end of the span before.
+/// Time that one draw has without a break, from the end of the span before.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DrawSpan {
     /// Pass number in the frame.

@@ -189,7 +189,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn links_stay_links_and_what_is_no_file_stays_what_it_is() {
+    fn links_and_devices_stay_what_they_are() {
         let folder = tempfile::tempdir().unwrap();
         let [file, link] = ["a.txt", "link.txt"].map(|name| folder.path().join(name));
         fs::write(&file, "old").unwrap();
@@ -214,6 +214,6 @@ mod tests {
         );
         // Where a folder takes no files.
         assert!(write_file(Path::new("/proc/self/a.txt"), none).is_err());
-        assert!(write_file(Path::new("/"), none).unwrap_err().to_string().contains("/: is no file"));
+        assert!(write_file(Path::new("/"), none).unwrap_err().to_string().contains("/: is not a file"));
     }
 }

@@ -193,7 +193,7 @@ struct CsvRows {
     held: bool,
     /// Rows with more or fewer fields than there are names: the first, its time if it has one, and how many.
     uneven: Option<(u64, Option<f64>, u64)>,
-    /// How many of the first rows have something in a field for which there is no name.
+    /// How many of the first rows have something in a field without a name.
     surplus: u64,
 }
 

@@ -295,7 +295,7 @@ pub enum WriteError {
         source: std::io::Error,
     },
     /// A path that names no file.
-    #[error("{path}: is no file that could be written over; name a file", path = path.display())]
+    #[error("{path}: is not a file that can be replaced; name a file", path = path.display())]
     NoName {
         /// The path.
         path: PathBuf,

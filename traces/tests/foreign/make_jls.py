@@ -111,8 +111,8 @@ def unclosed():
     os.wait()
 
 
-def mended():
-    """The instrument's recording cut off, then mended by opening it: lists still lead to where the next chunks were."""
+def repaired():
+    """The instrument's recording cut off, then repaired by opening it: lists still lead to where the next chunks were."""
     with open(path("pyjls.jls"), "rb") as file:
         whole = file.read()
     for length in 19_000, 44_500:
@@ -127,6 +127,6 @@ types()
 gaps()
 rates()
 unclosed()
-mended()
+repaired()
 for name in os.listdir(FOLDER):
     os.chmod(path(name), 0o644)

@@ -115,7 +115,7 @@ fn pass_times(timed: &Timed) -> Vec<u64> {
     timed.passes.iter().map(|pass| pass.end_ps - std::mem::replace(&mut before, pass.end_ps)).collect()
 }
 
-/// Time of the spans that are asked for.
+/// Time of the spans that are requested.
 fn spent(spans: &[DrawSpan], is_asked: impl Fn(&DrawSpan) -> bool) -> u64 {
     let mut before = 0;
     let each = spans.iter().map(|span| (span, span.end_ps - std::mem::replace(&mut before, span.end_ps)));
