@@ -1,6 +1,6 @@
 //! Frame starts from one marked frame (the thesis' Paper III, section 3.1). A window of power around the mark
 //! is compared with every window of the trace by summed squared difference. A threshold chosen from the trace
-//! itself separates starts from the rest; where it cannot, the result carries a [`Warning`](warnings::Warning).
+//! itself separates starts from the rest; where it cannot, the result carries a [`Warning`].
 //!
 //! Constants of the finder have their reason beside them. Those that state none were tuned on the synthetic scenes and
 //! seeds of `docs/finding.md`, section *Flags*, which also has the result on seeds that were not used.
