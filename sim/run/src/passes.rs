@@ -41,7 +41,7 @@ pub struct WorkSummary {
     pub dram_bytes: u64,
     /// Event counts.
     pub counts: Counts,
-    /// Busy, idle and stalled shares of each unit's time, if the timing level records stalls.
+    /// Busy, idle and stalled shares of the time of each unit that the pass used, if the timing level records stalls.
     pub stalls: BTreeMap<&'static str, StallShares>,
 }
 
@@ -84,7 +84,8 @@ pub(crate) fn summaries(plan: &Plan, simulated: &Simulated) -> Vec<PassSummary> 
         add(&mut groups, &FrameWork::new(observed), others_w);
     }
     let mut rows: Vec<_> = groups.into_iter().map(|group| group.summary(&plan.model)).collect();
-    let all = write_back.summary(&plan.model);
+    let used = write_back.counts;
+    let all = write_back.summary(&plan.model, &used);
     rows.push(PassSummary { name: WRITE_BACK.to_owned(), passes: 0, all, draws: Vec::new(), others: None });
     rows
 }
@@ -134,7 +135,8 @@ impl Spent<'_> {
         self.counts += counts;
     }
 
-    fn summary(self, model: &PowerModel) -> WorkSummary {
+    /// Stalls are those of the units that did any of the work in `used`.
+    fn summary(self, model: &PowerModel, used: &Counts) -> WorkSummary {
         let Self { time_s, others_j, counts, stalled } = self;
         let events_j = model.counts_energy(&counts).total_j();
         WorkSummary {
@@ -142,7 +144,7 @@ impl Spent<'_> {
             energy_j: events_j + others_j,
             events_j,
             dram_bytes: counts[Event::DramReadBytes] + counts[Event::DramWriteBytes],
-            stalls: stalls::shares_of(&stalled, &counts),
+            stalls: stalls::shares_of(&stalled, used),
             counts,
         }
     }
@@ -202,12 +204,13 @@ impl<'a> Group<'a> {
     fn summary(self, model: &PowerModel) -> PassSummary {
         let is_listed = (2..=MAX_DRAWS).contains(&self.draws.len());
         let draws = if is_listed { self.draws } else { Vec::new() };
+        let used = self.all.counts;
         PassSummary {
             name: self.name,
             passes: self.passes,
-            all: self.all.summary(model),
-            draws: draws.into_iter().map(|draw| draw.summary(model)).collect(),
-            others: is_listed.then(|| self.others.summary(model)),
+            all: self.all.summary(model, &used),
+            draws: draws.into_iter().map(|draw| draw.summary(model, &used)).collect(),
+            others: is_listed.then(|| self.others.summary(model, &used)),
         }
     }
 }
