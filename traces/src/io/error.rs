@@ -187,7 +187,11 @@ pub enum ReadError {
         value: String,
     },
     /// A time stamp is not later than the one before it.
-    #[error("{path}: row {row}: time {time_s} s is not after {before_s} s: sort the rows and drop repeats", path = path.display())]
+    #[error(
+        "{path}: row {row}: time {time_s} s is not after {before_s} s: sort the rows and drop repeats, or give --rate if \
+         times are rounded more coarsely than samples follow each other",
+        path = path.display()
+    )]
     Unsorted {
         /// The file.
         path: PathBuf,

@@ -3,7 +3,7 @@
 
 use super::columns::{Layout, Open, Opened, Rail, RowBatch, RowSource};
 use super::samples::Description;
-use super::time_base::mean_rate_hz;
+use super::time_base::{max_offset_periods, mean_rate_hz};
 use super::{FORMATS, ReadError, ReadOptions, Repair, TraceFormat, VOLTAGE_V, readable};
 use crate::trace::Metadata;
 use std::fmt::{Display, Formatter, Result as Written};
@@ -291,8 +291,15 @@ fn check_rate(rows: &Rows, open: Open, options: &ReadOptions) -> Result<(), Read
     let times = (0..stamps.len()).map(|row| stamps.time_s(row)).filter(|time_s| time_s.is_finite());
     let mut times: Vec<f64> = times.collect();
     times.sort_by(f64::total_cmp);
+    let (count, span_s) =
+        (times.len(), times.last().zip(times.first()).map_or(0.0, |(last, first)| last - first));
+    let steps = times.windows(2).map(|pair| pair[1] - pair[0]).filter(|step_s| *step_s > 0.0);
+    let resolution_s = steps.fold(f64::INFINITY, f64::min);
     times.dedup();
-    if times.len() < 2 {
+    let off_periods = requested_hz * span_s - (count as f64 - 1.0);
+    let is_rounding =
+        times.len() < count && off_periods.abs() <= max_offset_periods(true, resolution_s, requested_hz);
+    if times.len() < 2 || is_rounding {
         return Ok(());
     }
     let rate_hz = mean_rate_hz(&times);

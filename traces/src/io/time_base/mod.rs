@@ -199,9 +199,14 @@ pub(crate) struct Fit {
     guess_s: Option<f64>,
     /// The rates that put every row so far in its place, Hz.
     rates_hz: [f64; 2],
+    /// The smallest step forward so far, s: stamps are no finer than that.
+    smallest_step_s: f64,
+    /// Whether a stamp is that of the row before.
+    repeats: bool,
     unsorted: Option<ReadError>,
     misstep: Option<ReadError>,
-    misplaced: Option<ReadError>,
+    /// With how far it is off, in periods.
+    misplaced: Option<(f64, ReadError)>,
 }
 
 /// Start and rate.
@@ -225,6 +230,8 @@ impl Fit {
             head: Vec::new(),
             guess_s: None,
             rates_hz: [0.0, f64::INFINITY],
+            smallest_step_s: f64::INFINITY,
+            repeats: false,
             unsorted: None,
             misstep: None,
             misplaced: None,
@@ -271,6 +278,7 @@ impl Fit {
             }
             self.narrow(stamp, row);
         }
+        self.smallest_step_s = self.smallest_step_s.min(step as f64 / 1e9);
         (self.before, self.rows) = (Some(stamps.stamp(len - 1)), self.rows + len as u64);
         true
     }
@@ -278,18 +286,36 @@ impl Fit {
     fn push_one(&mut self, stamp: Stamp) {
         let row = self.rows;
         self.unsorted = self.out_of_order(stamp);
+        self.look_at_resolution(stamp);
         if self.stated_hz.is_none() {
             self.look_at_step(stamp);
         }
         self.first.get_or_insert(stamp);
         if let Some((off, rate_hz)) = self.off(stamp, row).zip(self.stated_hz)
-            && off.abs() > MAX_OFFSET_PERIODS
+            && off.abs() > self.max_offset_periods(rate_hz)
             && self.misplaced.is_none()
         {
-            self.misplaced = Some(self.uneven(row, stamp, off, rate_hz));
+            self.misplaced = Some((off.abs(), self.uneven(row, stamp, off, rate_hz)));
         }
         self.narrow(stamp, row);
         (self.before, self.rows) = (Some(stamp), row + 1);
+    }
+
+    /// Learns how finely stamps are rounded; once they repeat, a row that is off by no more than that is in its place.
+    fn look_at_resolution(&mut self, stamp: Stamp) {
+        let Some(step_s) = self.before.map(|before| stamp.since_s(before)) else { return };
+        if step_s > 0.0 {
+            self.smallest_step_s = self.smallest_step_s.min(step_s);
+        }
+        self.repeats |= step_s == 0.0;
+        if let Some(rate_hz) = self.stated_hz.filter(|_| self.repeats) {
+            let max_periods = self.max_offset_periods(rate_hz);
+            self.misplaced.take_if(|(off_periods, _)| *off_periods <= max_periods);
+        }
+    }
+
+    fn max_offset_periods(&self, rate_hz: f64) -> f64 {
+        max_offset_periods(self.repeats, self.smallest_step_s, rate_hz)
     }
 
     fn out_of_order(&self, stamp: Stamp) -> Option<ReadError> {
@@ -298,7 +324,10 @@ impl Fit {
             let (column, value) = ("time_s".to_owned(), time_s.to_string());
             return Some(ReadError::Value { path: path(), row, column, value });
         }
-        let before = self.before.filter(|before| stamp.since_s(*before) <= 0.0)?;
+        // With a stated rate, stamps may be coarser than the samples, and repeat.
+        let repeats = |since_s: f64| since_s == 0.0 && self.stated_hz.is_none();
+        let is_wrong = |since_s: f64| since_s < 0.0 || repeats(since_s);
+        let before = self.before.filter(|before| is_wrong(stamp.since_s(*before)))?;
         Some(ReadError::Unsorted { path: path(), row, time_s, before_s: before.time_s() })
     }
 
@@ -369,7 +398,13 @@ impl Fit {
         if self.guess_s.is_none() {
             self.guess();
         }
-        if let Some(error) = self.misstep.take().or(self.misplaced.take()) {
+        if self.rows > 1
+            && self.smallest_step_s.is_infinite()
+            && let Some(time_s) = self.first.map(Stamp::time_s)
+        {
+            return Err(ReadError::Unsorted { path: self.path, row: 2, time_s, before_s: time_s });
+        }
+        if let Some(error) = self.misstep.take().or(self.misplaced.take().map(|(_, error)| error)) {
             return Err(error);
         }
         let unknown = || ReadError::NoRate { path: self.path.clone() };
@@ -395,6 +430,12 @@ impl Fit {
             self.stated_start_s.filter(|start_s| (start_s - first_s).abs() * rate_hz <= MAX_OFFSET_PERIODS);
         Ok(Fitted { grid: Grid { start_s: stated.unwrap_or(first_s), rate_hz }, sure })
     }
+}
+
+/// Largest distance of a stamp from its place, in sample periods. Stamps that repeat are rounded to `resolution_s`: half of it
+/// may be missing at the first row, half of it at this one.
+pub(crate) fn max_offset_periods(repeats: bool, resolution_s: f64, rate_hz: f64) -> f64 {
+    MAX_OFFSET_PERIODS + if repeats { resolution_s * rate_hz } else { 0.0 }
 }
 
 fn off_step(step_s: f64, guess_s: f64) -> bool {

@@ -182,6 +182,25 @@ fn a_wrong_stated_rate_is_found() {
 }
 
 #[test]
+fn stamps_coarser_than_the_samples_need_a_stated_rate_and_agree_with_it() {
+    let rounded = |rate_hz: f64| {
+        Stamps::Seconds((0..900).map(|i| (f64::from(i) * 1e3 / rate_hz).round() / 1e3).collect())
+    };
+    let stated = |rate_hz| Description { rate_hz: Some(rate_hz), ..Description::default() };
+    let grid = |stamps: &Stamps, description: &Description| grid(Path::new("t.csv"), stamps, description);
+    for rate_hz in [1250.0, 2500.0, 9000.0] {
+        let stamps = rounded(rate_hz);
+        assert_eq!(grid(&stamps, &stated(rate_hz)).unwrap(), Grid { start_s: 0.0, rate_hz });
+        let error = grid(&stamps, &Description::default()).unwrap_err().to_string();
+        assert!(error.contains("give --rate"), "{error}");
+        let error = grid(&stamps, &stated(1.02 * rate_hz)).unwrap_err().to_string();
+        assert!(error.contains("off an even rate"), "{error}");
+    }
+    let error = grid(&Stamps::Seconds(vec![2.0; 9]), &stated(1e3)).unwrap_err().to_string();
+    assert!(error.contains("row 2: time 2 s is not after 2 s"), "{error}");
+}
+
+#[test]
 fn coarse_stamps_with_gaps_have_their_rate() {
     let stamps = (0..4000_u32).filter(|row| row % 1000 != 500);
     let times: Vec<f64> = stamps.map(|row| libm::round(f64::from(row) * 2.2) / 1000.0).collect();
