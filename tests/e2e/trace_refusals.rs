@@ -201,6 +201,20 @@ fn a_rail_that_is_the_sum_of_others_is_reported_unless_rails_are_chosen() {
 }
 
 #[test]
+fn assumed_units_and_unread_columns_are_noted() {
+    let inputs = Inputs::new();
+    let note = |names: &str| {
+        let rows: String = (0..99).map(|i| format!("{},12,0.5,9\n", f64::from(i) / 1000.0)).collect();
+        let trace = inputs.put("t.csv", format!("{names}\n{rows}"));
+        quintile().call(["trace", "convert", &trace, &inputs.path("o.csv")]).stderr
+    };
+    assert!(note("time_s,x,y,power").contains("no unit at power: read as"));
+    let stderr = note("time_s,voltage_V,current_A,power_W");
+    assert!(stderr.contains("power_W is not read: power is voltage times current"), "{stderr}");
+    assert_eq!(note("time_s,voltage_V,current_A,x"), "");
+}
+
+#[test]
 fn anchors_of_another_clock_or_beyond_the_stamps_give_a_warning() {
     let inputs = Inputs::new();
     let (trace, stamps) = (recording(&inputs), inputs.put("stamps.txt", "1.01\n1.02\n1.03\n1.04\n"));

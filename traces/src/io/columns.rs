@@ -14,6 +14,8 @@ pub(super) struct Picked {
     pub index: usize,
     pub name: String,
     pub scale: f64,
+    /// Whether its name or the file states its unit.
+    pub has_unit: bool,
 }
 
 /// The columns of a rail, as indices into [`Layout::values`].
@@ -32,6 +34,8 @@ pub(super) struct Layout {
     pub rails: Vec<Rail>,
     /// Their names, in order.
     pub names: Vec<String>,
+    /// Columns of power that are not read, as their rails have voltage and current.
+    pub unread: Vec<String>,
 }
 
 impl Layout {
@@ -112,8 +116,9 @@ fn pick(path: &Path, names: &[String], column: &str, of: Quantity) -> Result<Pic
         );
         return Err(ReadError::Conflict { path: path.to_owned(), reason });
     }
-    let scale = parsed.filter(|named| named.quantity == of).map_or(1.0, |named| named.scale);
-    Ok(Picked { index, name: names[index].clone(), scale })
+    let named = parsed.filter(|named| named.quantity == of);
+    let (scale, has_unit) = named.map_or((1.0, false), |named| (named.scale, named.has_unit));
+    Ok(Picked { index, name: names[index].clone(), scale, has_unit })
 }
 
 /// Factor from a column to s, V, A or W, by the unit that the file has beside its name, if that is not empty.
@@ -148,6 +153,7 @@ fn by_hand(path: &Path, names: &[String], options: &ReadOptions) -> Result<Layou
             values: vec![power],
             rails: vec![Rail::Power { power: 0 }],
             names: vec![String::new()],
+            unread: Vec::new(),
         });
     }
     let current =
@@ -157,14 +163,14 @@ fn by_hand(path: &Path, names: &[String], options: &ReadOptions) -> Result<Layou
         (None, Some(voltage)) => (vec![voltage, current], Rail::Measured { voltage: 0, current: 1 }),
         (None, None) => return Err(missing(path, names, VOLTAGE_V)),
     };
-    Ok(Layout { time, values, rails: vec![rail], names: vec![String::new()] })
+    Ok(Layout { time, values, rails: vec![rail], names: vec![String::new()], unread: Vec::new() })
 }
 
 fn time_column(path: &Path, names: &[String]) -> Result<Option<Picked>, ReadError> {
     let mut times = names.iter().enumerate().filter_map(|(index, name)| {
         let named =
             parse_name(name).filter(|named| named.quantity == Quantity::Time && named.rail.is_empty())?;
-        Some(Picked { index, name: name.clone(), scale: named.scale })
+        Some(Picked { index, name: name.clone(), scale: named.scale, has_unit: named.has_unit })
     });
     let first = times.next();
     // Nanoseconds are whole numbers and thereby exact: of two columns of times, theirs is taken.
@@ -185,7 +191,7 @@ fn by_name(path: &Path, names: &[String], options: &ReadOptions) -> Result<Layou
     let mut rails = Rails::new();
     for (index, name) in names.iter().enumerate() {
         let Some(named) = parse_name(name).filter(|named| named.quantity != Quantity::Time) else { continue };
-        let picked = Picked { index, name: name.clone(), scale: named.scale };
+        let picked = Picked { index, name: name.clone(), scale: named.scale, has_unit: named.has_unit };
         if rails.entry(named.rail).or_default().insert(named.quantity, picked).is_some() {
             return Err(ReadError::DuplicateColumn {
                 path: path.to_owned(),
@@ -197,7 +203,8 @@ fn by_name(path: &Path, names: &[String], options: &ReadOptions) -> Result<Layou
         Some(column) => Some(pick(path, names, column, Quantity::Time)?),
         None => time_column(path, names)?,
     };
-    let mut layout = Layout { time, values: Vec::new(), rails: Vec::new(), names: Vec::new() };
+    let mut layout =
+        Layout { time, values: Vec::new(), rails: Vec::new(), names: Vec::new(), unread: Vec::new() };
     for (name, columns) in chosen(path, names, options, rails)? {
         layout.add(path, names, options, &name, columns)?;
     }
@@ -256,7 +263,9 @@ impl Layout {
     /// [`ReadError::Unit`] if they contradict the names, [`ReadError::UnitUnknown`] if they are not known.
     pub fn with_units(&mut self, path: &Path, units: &BTreeMap<String, String>) -> Result<(), ReadError> {
         let put = |picked: &mut Picked, of: Quantity| match units.get(&picked.name) {
-            Some(unit) => scale_by(path, picked, unit, of).map(|scale| picked.scale = scale),
+            Some(unit) => scale_by(path, picked, unit, of).map(|scale| {
+                (picked.scale, picked.has_unit) = (scale, picked.has_unit || !unit.is_empty());
+            }),
             None => Ok(()),
         };
         self.time.as_mut().map_or(Ok(()), |time| put(time, Quantity::Time))?;
@@ -295,6 +304,7 @@ impl Layout {
                 None => return Err(missing(path, names, &format!("{prefix}{CURRENT_A}"))),
             },
         };
+        self.unread.extend(columns.remove(&Quantity::Power).map(|power| power.name));
         self.rails.push(rail_of);
         self.names.push(rail.to_owned());
         Ok(())

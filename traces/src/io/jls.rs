@@ -241,6 +241,7 @@ impl JlsRows {
         for picked in &mut layout.values {
             let signal = signals[picked.index];
             picked.scale = scale(signal).unwrap_or(picked.scale);
+            picked.has_unit |= scale(signal).is_some();
             let samples = reader.samples(signal).map_err(refuse)?;
             tracks.push(Track { name: signal.name.clone(), rate_hz: signal.rate_hz, samples });
         }

@@ -136,6 +136,17 @@ impl Rows {
         &self.layout.names
     }
 
+    /// Columns without a unit in their name or beside it: they are read as s, V, A and W.
+    pub fn without_unit(&self) -> impl Iterator<Item = &str> {
+        let columns = self.layout.time.iter().chain(&self.layout.values);
+        columns.filter(|column| !column.has_unit).map(|column| column.name.as_str())
+    }
+
+    /// Columns of power that are not read: the power is their rail's voltage times its current.
+    pub fn unread(&self) -> &[String] {
+        &self.layout.unread
+    }
+
     /// The columns that voltages and currents are read from, for messages; one of powers twice.
     pub(crate) fn channel_names(&self) -> [String; 2] {
         let name = |column: usize| self.layout.values[column].name.clone();

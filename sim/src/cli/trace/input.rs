@@ -188,7 +188,7 @@ impl InputArgs {
         terminal: &Terminal,
     ) -> Result<(Trace, Vec<Repair>), Failure> {
         let loaded = read(path, &self.options()?)?;
-        self.warn_of_sums(path, terminal)?;
+        self.warn_of_columns(path, terminal)?;
         note_repairs(path, &loaded.repairs, terminal);
         Ok((loaded.trace, loaded.repairs))
     }
@@ -196,31 +196,39 @@ impl InputArgs {
     /// The trace, of any length: read in pieces, or in memory where it has to be repaired. Repairs are reported.
     pub(super) fn source(&self, terminal: &Terminal) -> Result<(Box<dyn TraceReader>, Vec<Repair>), Failure> {
         let (trace, repairs) = open(&self.trace, &self.options()?)?;
-        self.warn_of_sums(&self.trace, terminal)?;
+        self.warn_of_columns(&self.trace, terminal)?;
         note_repairs(&self.trace, &repairs, terminal);
         Ok((trace, repairs))
     }
 
-    /// Warns of a rail that is added to those that it is the sum of.
-    pub(super) fn warn_of_sums(&self, path: &Path, terminal: &Terminal) -> Result<(), Failure> {
-        if !self.rail.is_empty() {
-            return Ok(());
+    /// Warns of a rail that is added to those that it is the sum of, and notes how columns are read.
+    pub(super) fn warn_of_columns(&self, path: &Path, terminal: &Terminal) -> Result<(), Failure> {
+        let rows = Rows::open(path, &self.options()?)?;
+        let without_unit: Vec<&str> = rows.without_unit().collect();
+        if !without_unit.is_empty() {
+            let columns = without_unit.join(", ");
+            terminal.note(&format!("{}: no unit at {columns}: read as s, V, A or W", shown(path)));
         }
-        if let Some(sum) = rail_of_sums(path, &self.options()?)? {
+        if !rows.unread().is_empty() {
+            let columns = rows.unread().join(", ");
+            terminal.note(&format!("{}: {columns} is not read: power is voltage times current", shown(path)));
+        }
+        if self.rail.is_empty() { self.warn_of_sums(&rows, terminal) } else { Ok(()) }
+    }
+
+    fn warn_of_sums(&self, rows: &Rows, terminal: &Terminal) -> Result<(), Failure> {
+        if let Some(sum) = rail_of_sums(rows.path(), &self.options()?)? {
             let others: Vec<String> = sum.others.iter().map(|rail| format!("--rail {rail}")).collect();
             let alone = if sum.rail.is_empty() { String::new() } else { format!("--rail {}, or ", sum.rail) };
             terminal.warn_of(Code::RailCountedTwice, &format!("{sum}: give {alone}{}", others.join(" ")));
-            return Ok(());
-        }
-        let rows = Rows::open(path, &self.options()?)?;
-        if rows.rails().len() > 1 {
+        } else if rows.rails().len() > 1 {
             let name = |rail: &String| {
                 if rail.is_empty() { "the one without a name".to_owned() } else { rail.clone() }
             };
             let rails: Vec<String> = rows.rails().iter().map(name).collect();
             terminal.note(&format!(
                 "{}: {} rails are added up: {}; --rail chooses",
-                shown(path),
+                shown(rows.path()),
                 rails.len(),
                 rails.join(", ")
             ));
@@ -310,7 +318,7 @@ fn in_pieces(
     terminal: &Terminal,
 ) -> Result<Frames, Failure> {
     let set = search.of_file(path, &input.options()?)?;
-    input.warn_of_sums(path, terminal)?;
+    input.warn_of_columns(path, terminal)?;
     Ok(Frames { set, repairs: Vec::new() })
 }
 

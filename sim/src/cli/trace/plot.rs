@@ -131,7 +131,7 @@ fn columns(args: &PlotArgs, terminal: &Terminal) -> Result<([f64; 2], Vec<Column
         return Ok((shown, columns.unwrap_or_default()));
     }
     let (path, options) = (args.input.trace.as_path(), args.input.options()?);
-    args.input.warn_of_sums(path, terminal)?;
+    args.input.warn_of_columns(path, terminal)?;
     let (pyramid, make): (_, Make) = match args.keep_pyramid {
         true => (Pyramid::of_file(path, &options)?, Pyramid::anew),
         false => (Pyramid::look(path, &options)?, Pyramid::build),
