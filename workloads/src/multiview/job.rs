@@ -101,8 +101,13 @@ impl MultiView {
         options.layout().check()?;
         let settings = scene.settings().clone();
         let across = if options.show == Show::SideBySide { options.views.max(1) } else { 1 };
-        let settings = Settings { width: settings.width.saturating_mul(across), ..settings };
         settings.check()?;
+        let width = settings.width;
+        let settings = Settings { width: width.saturating_mul(across), ..settings };
+        settings.check().map_err(|_| LoadError::Setting {
+            setting: "views",
+            message: format!("{across}: side by side, views of {width} pixels are wider than an image can be: make --size smaller, or show them otherwise"),
+        })?;
         let settings = Settings { focus: options.focus.or(settings.focus), ..settings };
         let view = Viewport::new(settings.width / across, settings.height);
         let refused = |message: &str| LoadError::Setting { setting: "size", message: message.to_owned() };
