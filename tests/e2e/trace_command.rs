@@ -262,6 +262,11 @@ fn sampling_alignment_energy_and_frontiers_answer() {
     ];
     // The rail sags by R I; a voltage by specification misses that and finds too much.
     assert!(json(folder.path(), &coarse)["relative_error"].as_f64().unwrap() > 0.02);
+    let as_fine = json(folder.path(), &["sample", "t.csv", "--out", "same.parquet"]);
+    assert_eq!(as_fine["device"]["rate_hz"], 5000.0, "no finer than the trace");
+    let finer =
+        quintile(folder.path(), &["sample", "t.csv", "--device-rate", "1e4", "--out", "finer.parquet"]);
+    assert!(String::from_utf8_lossy(&finer.stderr).contains("more than the 5000 Hz of the trace"));
     fs::write(folder.path().join("s.csv"), "0\n10\n20\n").unwrap();
     let aligned =
         json(folder.path(), &["align", "t.csv", "s.csv", "--anchor", "0=0.1", "--anchor", "10=0.2"]);

@@ -126,7 +126,7 @@ pub struct SampleArgs {
     /// The device in a JSON file, whose defaults are those below and +-30 A, +-20 V; the options below change it
     #[arg(long, value_name = "FILE.json")]
     pub device: Option<PathBuf>,
-    /// Samples per second, 1 to 10 million (default: 50kHz)
+    /// Samples per second, 1 to 10 million (default: 50kHz, or the trace's if that is lower)
     #[arg(long, value_name = "HZ", allow_hyphen_values = true, value_parser = rate)]
     pub device_rate: Option<f64>,
     /// Bits of both converters, 1 to 24 (default: 14)
@@ -198,7 +198,8 @@ pub(super) fn sample(args: &SampleArgs, terminal: &Terminal) -> Result<(), Failu
     args.check_rate()?;
     let (trace, _) = args.input.source(terminal)?;
     let peaks = Peaks::of(&*trace)?;
-    let device = Device::new(args.spec(&peaks)?).map_err(|error| wrong(error.to_string()))?;
+    let device =
+        Device::new(args.spec(&peaks, trace.header().rate_hz)?).map_err(|error| wrong(error.to_string()))?;
     let sampled = device.resample_in_pieces(&*trace)?;
     if let Some(warning) = sampled.clipping() {
         warn_with(&warning, "widen it with --current-range or --voltage-range", terminal);
@@ -208,6 +209,12 @@ pub(super) fn sample(args: &SampleArgs, terminal: &Terminal) -> Result<(), Failu
     }
     if let Some(losses) = sampled.losses() {
         terminal.warn_of(Code::PacketsLost, &format!("{losses}; --repair fills them"));
+    }
+    let (from_hz, to_hz) = (trace.header().rate_hz, device.spec().rate_hz);
+    if to_hz > from_hz {
+        terminal.note(&format!(
+            "{to_hz} Hz is more than the {from_hz} Hz of the trace: the device sees steps between its samples"
+        ));
     }
     save(&sampled, &args.out, terminal)?;
     let header = sampled.header();
@@ -236,9 +243,10 @@ pub(super) fn sample(args: &SampleArgs, terminal: &Terminal) -> Result<(), Failu
 }
 
 impl SampleArgs {
-    /// The device: that of the file, or the default one with a range that fits, and what options change of it.
-    fn spec(&self, peaks: &Peaks) -> Result<DeviceSpec, Failure> {
-        let base = self.base(peaks)?;
+    /// The device: that of the file, or the default one with a range that fits and no more samples than the trace has; and
+    /// what options change of it.
+    fn spec(&self, peaks: &Peaks, trace_rate_hz: f64) -> Result<DeviceSpec, Failure> {
+        let base = self.base(peaks, trace_rate_hz)?;
         let ranged = match self.current_range {
             Some(range_a) => base.clone().with_current_range(range_a),
             None => base.clone(),
@@ -258,10 +266,11 @@ impl SampleArgs {
     }
 
     /// The device before options change it.
-    fn base(&self, peaks: &Peaks) -> Result<DeviceSpec, Failure> {
+    fn base(&self, peaks: &Peaks, trace_rate_hz: f64) -> Result<DeviceSpec, Failure> {
         let Some(path) = &self.device else {
             let rail_v = self.rail_voltage.unwrap_or(peaks.voltage_v);
-            return Ok(DeviceSpec::fitting(rail_v, peaks.power_w));
+            let fitting = DeviceSpec::fitting(rail_v, peaks.power_w);
+            return Ok(DeviceSpec { rate_hz: fitting.rate_hz.min(trace_rate_hz), ..fitting });
         };
         let hint =
             "--device takes a JSON file with the fields of a device, such as those that `--json` prints";
