@@ -12,7 +12,7 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// The first bytes of files that hold no trace, or none that is read; what they are, and the remedy if it is not to give a trace.
-const FOREIGN: [(&[u8], &str, Option<&str>); 7] = [
+const FOREIGN: [(&[u8], &str, Option<&str>); 9] = [
     (b"\xd3tagfmt", "a JLS recording of version 1", Some("export it to CSV from the program that made it")),
     (b"\x89HDF\r\n", "an HDF5 file", Some("export its channels to CSV or Parquet")),
     (
@@ -24,6 +24,8 @@ const FOREIGN: [(&[u8], &str, Option<&str>); 7] = [
     (b"\x89PNG", "a PNG image", None),
     (b"\xff\xd8\xff", "a JPEG image", None),
     (b"%PDF", "a PDF document", None),
+    (b"\xff\xfe", "a text in UTF-16", Some("save it as UTF-8")),
+    (b"\xfe\xff", "a text in UTF-16", Some("save it as UTF-8")),
 ];
 
 /// Whether these bytes are not text: control characters other than white space, as in UTF-16.
