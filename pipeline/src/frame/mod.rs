@@ -13,6 +13,7 @@ mod pass;
 mod query;
 mod replay;
 mod resolve;
+mod resolve_pass;
 mod screen_pass;
 mod settings;
 mod surface;
@@ -39,6 +40,7 @@ use pass::Pass;
 pub use pass::{Draw, RasterPass, Resident, Target};
 pub use query::{IntervalAnswer, IntervalQueries, MovingBox, SampledAnswer, SampledAnswers, SampledQueries};
 use replay::Replay;
+pub use resolve_pass::ResolvePass;
 pub use settings::{Features, PipelineSpec, Settings, Shading, SpecError};
 use worker::Worker;
 

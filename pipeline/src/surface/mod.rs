@@ -107,6 +107,10 @@ impl Texels {
         self.samples
     }
 
+    pub fn viewport(&self) -> Viewport {
+        self.viewport
+    }
+
     pub fn size(&self) -> [u32; 2] {
         [self.viewport.width(), self.viewport.height()]
     }
