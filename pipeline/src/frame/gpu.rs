@@ -383,7 +383,8 @@ impl<'e> Gpu<'e> {
     }
 
     fn reads_of(&self, at: &AddressMap, pass: &RasterPass<'_>) -> Reads {
-        let surfaces = pass.read_surfaces().filter_map(|id| Some(self.surfaces.get(id)?.region.address()));
+        let surfaces =
+            self.surfaces.read_in(pass).filter_map(|id| Some(self.surfaces.get(id)?.region.address()));
         Reads {
             vertices: at.vertices.iter().map(|buffer| buffer.address).collect(),
             tiles: at.textures.iter().flatten().copied().chain(surfaces).collect(),

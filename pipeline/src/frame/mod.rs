@@ -9,6 +9,7 @@ mod fragments;
 mod gpu;
 mod heat;
 mod lanes;
+mod levels;
 mod pass;
 mod query;
 mod replay;

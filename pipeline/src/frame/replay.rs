@@ -329,6 +329,7 @@ fn count_quad(access: &QuadAccess, work: QuadWork, counts: &mut PacketCounts) {
     counts[Event::QuadsShaded] += 1;
     counts[Event::PixelInvocations] += 4;
     counts[Event::HelperInvocations] += 4 - access.lanes.count_ones();
+    counts[Event::CentroidInvocations] += work.centroids;
     counts[Event::ShaderOps] += 4 * work.ops;
     counts[Event::TextureFetches] += work.fetches;
 }

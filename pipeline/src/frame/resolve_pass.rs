@@ -45,7 +45,7 @@ struct Places {
 }
 
 /// Formats whose values have a mean.
-const AVERAGED: &str = "those of colours other than integers, which have a mean";
+pub(super) const AVERAGED: &str = "those of colours other than integers, which have a mean";
 
 impl Gpu<'_> {
     /// Resolves samples into the pixels of another surface, whose format may differ. The pass waits for those that read what it
