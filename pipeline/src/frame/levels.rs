@@ -47,8 +47,11 @@ impl Gpu<'_> {
     /// # Errors
     /// [`PassError::Surface`] if nothing is stored in the finest level, or values of its format have no mean.
     pub fn make_levels(&mut self, name: &str, id: SurfaceId) -> Result<Counts, PassError> {
-        let mut counts = Counts::default();
-        for level in 1..self.surfaces.levels(id).max(2) {
+        let (levels, mut counts) = (self.surfaces.levels(id), Counts::default());
+        if levels == 0 {
+            return Err(self.surfaces.refused(name, id, SurfaceProblem::Unknown));
+        }
+        for level in 1..levels {
             counts += &self.halve(&format!("{name} level {level}"), id.level(level - 1), id.level(level))?;
         }
         Ok(counts)

@@ -190,7 +190,11 @@ fn every_level_is_a_pass_that_waits_for_the_one_before() {
     assert_eq!(counts[Event::HelperInvocations], 3);
     assert_eq!(counts[Event::TextureFetches], 64 + 16 + 4 + 4);
     assert_eq!(counts[Event::ColourWrites], 64 + 16 + 4 + 1);
-    assert_eq!(counts[Event::ShaderOps], 2 * 88, "the position of a fetch");
+    assert_eq!(
+        counts[Event::ShaderOps],
+        2 * 88 + 4 * 3 * 13,
+        "the position of a fetch, and the vertices of four triangles"
+    );
     // Level 1 reads the 16 lines of the finest, the others 4, 4 (a whole tile), 4 and 4.
     assert_eq!(report.passes[1].counts()[Event::TextureMisses], 16);
     // Images in whole tiles of 8 x 8 texels: one of 16 x 16, and four.

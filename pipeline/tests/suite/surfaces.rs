@@ -417,15 +417,11 @@ impl Part {
 /// What a format keeps of a value.
 fn rounded(format: Format, value: Vec4) -> Vec4 {
     let [r, g, b, a] = value.to_array();
+    // The nearest code, of two as near the larger: means of codes lie between them.
     let unorm = |x: f32| {
-        (0..=255)
-            .map(|code| code as f32 / 255.0)
-            .min_by(|p, q| {
-                let error =
-                    |code: &f32| (f64::from(*code) * 255.0 - 255.0 * f64::from(x.clamp(0.0, 1.0))).abs();
-                error(p).total_cmp(&error(q)).then(q.total_cmp(p))
-            })
-            .unwrap()
+        let error = |code: &u8| (f64::from(*code) - 255.0 * f64::from(x.clamp(0.0, 1.0))).abs();
+        let code = (0..=255_u8).min_by(|p, q| error(p).total_cmp(&error(q)).then(q.cmp(p)));
+        f32::from(code.unwrap()) / 255.0
     };
     let srgb = |x: f32| srgb8_to_linear(linear_to_srgb8(x));
     match format {
