@@ -38,7 +38,7 @@ impl Surfaces {
     }
 
     fn check_bindings(&self, pass: &RasterPass<'_>, targets: &Attachments) -> Result<(), PassError> {
-        for id in pass.read_surfaces() {
+        for id in self.read_in(pass) {
             let problem = match self.get(id) {
                 None => SurfaceProblem::Unknown,
                 Some(_) if targets.all().any(|(target, ..)| target == id) => SurfaceProblem::Feedback,
@@ -85,6 +85,9 @@ fn misfit(pass: &RasterPass<'_>, spec: &SurfaceSpec<'_>, is_depth: bool) -> Opti
     }
     if spec.viewport != viewport {
         return Some(SurfaceProblem::Size(size(spec.viewport), size(viewport)));
+    }
+    if spec.levels > 1 && spec.samples > 1 {
+        return Some(SurfaceProblem::Levels(spec.levels, spec.samples));
     }
     (spec.samples != samples).then_some(SurfaceProblem::Samples(spec.samples, samples))
 }
