@@ -5,7 +5,6 @@ use std::sync::Arc;
 use glam::Vec4;
 
 use super::error::{PassError, SurfaceProblem};
-use super::pass::RasterPass;
 use crate::memory::{AddressSpace, Surface};
 use crate::state::Clear;
 use crate::surface::{Layout, SurfaceSpec, Texels};
@@ -163,11 +162,6 @@ impl Surfaces {
             Binding::Surface(id) => vec![id],
             Binding::Levels(id) => (0..self.levels(id).max(1)).map(|level| id.level(level)).collect(),
         }
-    }
-
-    /// What a pass reads.
-    pub fn read_in<'s>(&'s self, pass: &'s RasterPass<'_>) -> impl Iterator<Item = SurfaceId> + 's {
-        pass.draws.iter().flat_map(|draw| draw.bindings).flat_map(|binding| self.read_by(binding))
     }
 
     /// The error that `problem` is with a surface in a pass.

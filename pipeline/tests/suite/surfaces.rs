@@ -330,7 +330,7 @@ impl Step {
                 tints,
             });
         }
-        let from = (0..5).filter(|surface| written[*surface] && formats[*surface].can_blend()).next_back();
+        let from = (0..5).rfind(|surface| written[*surface] && formats[*surface].can_blend());
         let resolves =
             from.map(|from| Resolving { from, to: usize::from(r.next() < 0.5), drops: r.next() < 0.3 });
         if let Some(Resolving { from, to, drops }) = resolves {
