@@ -257,12 +257,10 @@ fn log<S: TileShader>(
 ) -> BodyLog<S::Output> {
     let (mut tiles, mut rest, mut state) = (Vec::new(), Vec::new(), S::Body::default());
     for (item, primitive) in body.iter().zip(start..).filter(|(item, _)| !item.is_culled(lanes.costs()).0) {
-        let prepared = item.rasterizer.prepare(&item.triangle);
         let after = item.rasterizer.rasterize_counted(
-            &prepared,
+            &item.triangle,
             draw.grid,
             item.part.clone(),
-            lanes.costs(),
             |tile, touch, work: &mut TileLoop| {
                 let output = shader.run(&mut state, lanes, &TileIntervals { primitive, tile, touch });
                 let tests = std::mem::take(work);
@@ -299,10 +297,6 @@ fn vertices(gpu: &mut Gpu<'_>, draw: &ConservativeDraw<'_>, costs: &Costs) {
             let outcome = if is_culled { Event::TrianglesFaceCulled } else { Event::TrianglesSetUp };
             counts[outcome] += 1;
             counts[Event::SetupMadds] += madds;
-            if !is_culled {
-                counts[Event::SetupMadds] +=
-                    primitive.rasterizer.prepare_counted(&primitive.triangle, costs).1;
-            }
         }
         let from = draw.vertices.address() + 3 * BATCH as u64 * number * bytes;
         gpu.memory().vertices(from, u64::from(vertices) * bytes, counts);

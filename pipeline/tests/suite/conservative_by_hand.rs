@@ -100,9 +100,7 @@ fn an_edge_may_be_off_by_more_at_the_border_of_a_tile_than_in_its_middle() {
         [(points, moved, [1.0, 0.0, 0.0]), (turned(points), turned(moved), [0.0, 1.0, 0.0])]
     {
         let unsure = MovingTriangle::uncertain(points, points, off).unwrap();
-        let touches = |triangle: &MovingTriangle| {
-            rasterizer.touch(&rasterizer.prepare(triangle), &tile, &Region::WHOLE).is_some()
-        };
+        let touches = |triangle: &MovingTriangle| rasterizer.touch(triangle, &tile, &Region::WHOLE).is_some();
         assert!(touches(&still(moved)) && touches(&unsure) && !touches(&still(points)));
     }
 }
@@ -129,11 +127,11 @@ fn products_that_vanish_miss_nothing() {
         let scaled = |p: [i32; 3]| [0, 1, 2].map(|axis| f64::from(4 * p[axis]) * units[axis]);
         let point = [0, 1, 2].map(|axis| f64::from(at(axis)) * units[axis]);
         let rasterizer = Rasterizer::new(View::orthographic());
-        let prepared = rasterizer.prepare(&still(corners.map(scaled)));
+        let triangle = still(corners.map(scaled));
         for reach in [0.0, 1.0, 7.0] {
             let side = |axis: usize| [point[axis] - reach * units[axis], point[axis] + reach * units[axis]];
             let tile = Rect { x: side(0), y: side(1) };
-            let touch = rasterizer.touch(&prepared, &tile, &Region::WHOLE);
+            let touch = rasterizer.touch(&triangle, &tile, &Region::WHOLE);
             let z = touch.unwrap_or_else(|| panic!("units of {units:?} are missed")).z;
             assert!(z[0] <= point[2] && point[2] <= z[1], "{z:?} in units of {units:?}");
         }
