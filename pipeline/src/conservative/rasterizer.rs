@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::triangle::{Rounded, madds};
+use super::triangle::{Rounded, door_madds};
 use super::{MovingTriangle, Rect, Region, Touch, View};
 use crate::depth::{Bounder, DepthBound, exact_interval_madds, set_up_madds};
 use crate::traversal::{
@@ -147,7 +147,7 @@ impl<'a> Tests<'a> {
         let rounded = Rounded::new(&rasterizer.view, triangle, rect);
         let (moving, bound) = (rounded.triangle.moving, DepthBound::LocalPlanes);
         let work = TileLoop {
-            place_madds: madds(moving, rasterizer.view.is_perspective()),
+            place_madds: door_madds(moving, rasterizer.view.is_perspective()),
             depth_madds: set_up_madds(bound, moving),
             ..TileLoop::default()
         };
@@ -212,12 +212,29 @@ impl<'a> Tests<'a> {
             self.work.side_madds += madds;
             within = left.ok_or(Culled::BySides)?;
         }
-        let edges = Edges::<f64>::new(Seen::new(triangle, shear, tile, &within));
-        let whole = TimePieces::one(Piece { t: within.t, faces: [true; 2] });
-        let (times, more) = EdgeBounds::new(&edges).timeline(&edges, &whole, [true; 2]);
-        self.work.place_madds += edge_madds(triangle.moving, within.lens);
-        self.work.edge_madds += edge_bound_madds(triangle.moving, within.lens) + more;
+        let times = self.edges(tile, &within);
         times.hull().map(|t| Box5 { t, ..within }).ok_or(Culled::ByEdges)
+    }
+
+    /// Times at which the triangle may be inside its edges. An edge is bilinear in u and v, so it is bounded by its
+    /// bounds from the corners of the lens.
+    fn edges(&mut self, tile: &TileRect, within: &Box5) -> TimePieces {
+        let Rounded { triangle, shear, .. } = &self.rounded;
+        let corners = [(0, 0), (1, 0), (0, 1), (1, 1)];
+        let corners = &corners[..if within.lens { 4 } else { 1 }];
+        let from = |&(i, j): &(usize, usize)| {
+            let corner = Box5 { u: [within.u[i]; 2], v: [within.v[j]; 2], ..*within };
+            Edges::<f64>::new(Seen::new(triangle, shear, tile, &corner))
+        };
+        let first = from(&corners[0]);
+        let others = corners[1..].iter().map(|corner| EdgeBounds::new(&from(corner)));
+        let bounds = others.fold(EdgeBounds::new(&first), |bounds, other| bounds.hull(&other));
+        let whole = TimePieces::one(Piece { t: within.t, faces: [true; 2] });
+        let (times, more) = bounds.timeline(&first, &whole, [true; 2]);
+        let views = corners.len() as u32;
+        self.work.place_madds += views * edge_madds(triangle.moving, within.lens);
+        self.work.edge_madds += views * edge_bound_madds(triangle.moving, within.lens) + more;
+        times
     }
 
     fn halved(&mut self, tile: &TileRect, within: Box5, halvings: u32) -> Result<Touch, Culled> {

@@ -45,6 +45,11 @@ impl MovingTriangle {
         &self.close
     }
 
+    /// Whether its ends differ.
+    pub(crate) fn is_moving(&self) -> bool {
+        self.open != self.close
+    }
+
     fn vertices(&self) -> impl Iterator<Item = &[f64; 3]> {
         self.open.iter().chain(&self.close)
     }
@@ -113,7 +118,7 @@ impl Rounded {
             .fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], p| [lo.min(p[2]), hi.max(p[2])]);
         let middle = |[lo, hi]: [f64; 2]| 0.5 * (lo + hi);
         let origin = [middle(rect.x), middle(rect.y), if perspective { 0.0 } else { middle(depths) }];
-        let moving = triangle.open != triangle.close;
+        let moving = triangle.is_moving();
         let [open, close] =
             [triangle.open, triangle.close].map(|end| end.map(|p| moved(p, origin, perspective)));
         let delta = |k: usize, axis: usize| if moving { close[k][axis] - open[k][axis] } else { 0.0 };
@@ -194,10 +199,10 @@ fn moved<R: Real>(p: [R; 3], origin: [R; 3], perspective: bool) -> [R; 3] {
     [x, y, if perspective { p[2] } else { p[2] - origin[2] }]
 }
 
-/// Multiply-adds at the door: moving the vertices to the origin, and their differences. Scales are exponents.
-pub(super) const fn madds(moving: bool, perspective: bool) -> u32 {
-    let moved = 3 * if perspective { 2 } else { 3 };
-    if moving { 2 * moved + 9 } else { moved }
+/// Multiply-adds of moving the vertices to the origin. Scales are exponents, and differences belong to set-up.
+pub(super) const fn door_madds(moving: bool, perspective: bool) -> u32 {
+    let ends = if moving { 2 } else { 1 };
+    3 * ends * if perspective { 2 } else { 3 }
 }
 
 #[cfg(test)]
@@ -210,13 +215,9 @@ mod tests {
         for perspective in [false, true] {
             let tally = Tally::default();
             let point = |p: [f64; 3]| p.map(|c| Counting::new(c, &tally));
-            for _ in 0..3 {
-                moved(point([1.0, 2.0, 3.0]), point([4.0, 5.0, 6.0]), perspective);
-            }
-            let still = tally.madds();
-            assert_eq!(still, madds(false, perspective));
-            // Differences of three vertices on three axes.
-            assert_eq!(2 * still + 9, madds(true, perspective));
+            moved(point([1.0, 2.0, 3.0]), point([4.0, 5.0, 6.0]), perspective);
+            assert_eq!(3 * tally.madds(), door_madds(false, perspective));
+            assert_eq!(6 * tally.madds(), door_madds(true, perspective));
         }
     }
 

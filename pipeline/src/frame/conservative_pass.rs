@@ -13,8 +13,9 @@ use super::Gpu;
 use super::lanes::{LaneWork, Lanes};
 use crate::conservative::{Grid, MovingTriangle, Rasterizer, TileLoop, Touch};
 use crate::depth::{Numbers, Real};
-use crate::geometry::{Projection, Viewport};
+use crate::geometry::{Cull, Projection, Viewport};
 use crate::memory::Surface;
+use crate::setup;
 use crate::tally::{Costs, Kernel};
 
 /// Triangles of a packet of vertices.
@@ -297,6 +298,9 @@ fn vertices(gpu: &mut Gpu<'_>, draw: &ConservativeDraw<'_>, costs: &Costs) {
             let outcome = if is_culled { Event::TrianglesFaceCulled } else { Event::TrianglesSetUp };
             counts[outcome] += 1;
             counts[Event::SetupMadds] += madds;
+            if !is_culled {
+                counts[Event::SetupMadds] += setup::madds(primitive.triangle.is_moving(), Cull::None);
+            }
         }
         let from = draw.vertices.address() + 3 * BATCH as u64 * number * bytes;
         gpu.memory().vertices(from, u64::from(vertices) * bytes, counts);

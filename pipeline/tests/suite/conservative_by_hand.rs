@@ -40,12 +40,16 @@ fn times_and_depths_are_those_of_the_passing() {
     for (tile, touch) in touched {
         let enters = (f64::from(tile[0]) - 0.5).max(0.0) / 4.0;
         let leaves = (f64::from(tile[0]) + 1.0).min(4.0) / 4.0;
-        let close_to = |a: f64, b: f64| (a - b).abs() < 1e-12;
-        assert!(close_to(touch.t[0], enters) && close_to(touch.t[1], leaves), "{tile:?} {touch:?}");
-        assert!(
-            close_to(touch.z[0], 1.0 + enters) && close_to(touch.z[1], 1.0 + leaves),
-            "{tile:?} {touch:?}"
-        );
+        // Widened by 2^-20 of what makes up a distance: 8 of the tiles, 8 and 4 of a vertex and its motion, which takes
+        // that much longer at a speed of 4.
+        let off = (8.0 + 12.0) / 4.0 / f64::from(1 << 20);
+        let holds = |found: [f64; 2], exact: [f64; 2]| {
+            found[0] <= exact[0]
+                && exact[1] <= found[1]
+                && exact[0] - found[0] + (found[1] - exact[1]) <= 2.0 * off
+        };
+        assert!(holds(touch.t, [enters, leaves]), "{tile:?} {touch:?}");
+        assert!(holds(touch.z, [1.0 + enters, 1.0 + leaves]), "{tile:?} {touch:?}");
     }
 }
 
