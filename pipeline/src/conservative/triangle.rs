@@ -112,47 +112,18 @@ fn to_one(size: f64) -> f64 {
 impl Rounded {
     /// `triangle` in `view` for tiles within `rect`.
     pub fn new(view: &View, triangle: &MovingTriangle, rect: &Rect) -> Self {
-        let (perspective, (s, a)) = (view.is_perspective(), view.shear());
-        let depths = triangle
-            .vertices()
-            .fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], p| [lo.min(p[2]), hi.max(p[2])]);
-        let middle = |[lo, hi]: [f64; 2]| 0.5 * (lo + hi);
-        let origin = [middle(rect.x), middle(rect.y), if perspective { 0.0 } else { middle(depths) }];
-        let moving = triangle.is_moving();
-        let [open, close] =
-            [triangle.open, triangle.close].map(|end| end.map(|p| moved(p, origin, perspective)));
-        let delta = |k: usize, axis: usize| if moving { close[k][axis] - open[k][axis] } else { 0.0 };
-        let largest = [0, 1, 2]
-            .map(|axis| (0..3).map(|k| open[k][axis].abs() + delta(k, axis).abs()).fold(0.0, f64::max));
-        let depth_off = triangle.uncertainty[2] + MOVED * (triangle.largest(2) + origin[2].abs());
-        let deep = to_one(largest[2]);
-        let depth = Unit { origin: origin[2], scale: [deep, 1.0] };
-        let axis = |axis: usize| {
-            let (at, reach) = (origin[axis].abs(), [rect.x, rect.y][axis][1] - origin[axis]);
-            // Magnitudes of the terms of a vertex as seen, and the error of these terms before they are rounded.
-            let bent = a[axis].abs();
-            let (shift, turned) = (s[axis] - a[axis] * origin[2], bent * largest[2]);
-            let seen = if perspective { reach * largest[2] } else { reach };
-            let size = largest[axis] + shift.abs() + turned + seen;
-            let by_depth = if perspective { at + reach + bent } else { bent };
-            let terms = triangle.largest(axis) + if perspective { at * triangle.largest(2) } else { at };
-            let off = triangle.uncertainty[axis]
-                + by_depth * depth_off
-                + MOVED * (terms + s[axis].abs() + bent * origin[2].abs());
-            Axis { shift, size, slack: ROUNDED * size + 2.0 * off }
-        };
-        let axes = [axis(0), axis(1)];
-        let wide = axes.map(|axis| to_one(axis.size));
+        let door = Door::new(view, triangle, rect);
+        let (perspective, a, moving) = (view.is_perspective(), view.shear().1, triangle.is_moving());
+        let axes = [door.axis(0), door.axis(1), door.depth()];
+        let scale = axes.map(|axis| to_one(axis.size + axis.slack));
+        let deep = scale[2];
         let image = [0, 1].map(|axis| Unit {
-            origin: origin[axis],
-            scale: [if perspective { deep.recip() } else { 1.0 }, wide[axis]],
+            origin: door.origin[axis],
+            scale: [if perspective { deep.recip() } else { 1.0 }, scale[axis]],
         });
-        let scale = [wide[0], wide[1], deep];
-        let corner = |k: usize| Corner {
-            open: [0, 1, 2].map(|axis| (open[k][axis] * scale[axis]) as f32),
-            delta: [0, 1, 2].map(|axis| (delta(k, axis) * scale[axis]) as f32),
-        };
-        let depth_slack = round_up((0.5 * ROUNDED * largest[2] + depth_off) * deep);
+        let depth = Unit { origin: door.origin[2], scale: [deep, 1.0] };
+        let rounded = |p: [f64; 3]| [0, 1, 2].map(|axis| (p[axis] * scale[axis]) as f32);
+        let corner = |k: usize| Corner { open: rounded(door.open[k]), delta: rounded(door.delta[k]) };
         Self {
             triangle: Triangle {
                 id: 0,
@@ -160,15 +131,15 @@ impl Rounded {
                 moving,
                 behind: false,
                 faces: [true; 2],
-                slack: [0, 1].map(|axis| round_up(axes[axis].slack * wide[axis])),
+                slack: [0, 1].map(|axis| round_up(axes[axis].slack * scale[axis])),
             },
             shear: Shear {
-                s: [0, 1].map(|axis| (axes[axis].shift * wide[axis]) as f32),
-                a: [0, 1].map(|axis| (a[axis] / deep * wide[axis]) as f32),
+                s: [0, 1].map(|axis| (axes[axis].shift * scale[axis]) as f32),
+                a: [0, 1].map(|axis| (a[axis] / deep * scale[axis]) as f32),
                 parallel: !perspective,
             },
             near: depth.outward([view.near(); 2])[0],
-            depth_slack,
+            depth_slack: round_up(axes[2].slack * deep),
             image,
             depth,
         }
@@ -185,12 +156,72 @@ impl Rounded {
     }
 }
 
-/// An axis of the image at the door, in the units of the input.
+/// A triangle moved to the middle of the tiles, in the units of the input.
+struct Door<'a> {
+    view: &'a View,
+    triangle: &'a MovingTriangle,
+    origin: [f64; 3],
+    /// Half the extent of the tiles.
+    reach: [f64; 2],
+    open: [[f64; 3]; 3],
+    delta: [[f64; 3]; 3],
+    /// Largest magnitude of a vertex and its motion on each axis.
+    largest: [f64; 3],
+    /// Error of a depth before it is rounded.
+    depth_off: f64,
+}
+
+/// An axis at the door.
 #[derive(Clone, Copy)]
 struct Axis {
+    /// Shift of the lens, as in [`Shear::s`].
     shift: f64,
+    /// Magnitudes of the terms of a vertex as seen.
     size: f64,
+    /// Slack of the image, or error of a depth.
     slack: f64,
+}
+
+impl<'a> Door<'a> {
+    fn new(view: &'a View, triangle: &'a MovingTriangle, rect: &Rect) -> Self {
+        let perspective = view.is_perspective();
+        let depths = triangle.vertices().map(|p| p[2]);
+        let depths = depths.fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], z| [lo.min(z), hi.max(z)]);
+        let middle = |[lo, hi]: [f64; 2]| 0.5 * (lo + hi);
+        let origin = [middle(rect.x), middle(rect.y), if perspective { 0.0 } else { middle(depths) }];
+        let ends = [triangle.open, triangle.close].map(|end| end.map(|p| moved(p, origin, perspective)));
+        let [open, close] = ends;
+        let difference = |k: usize| [0, 1, 2].map(|axis| close[k][axis] - open[k][axis]);
+        let delta = if triangle.is_moving() { [0, 1, 2].map(difference) } else { Default::default() };
+        let largest = [0, 1, 2]
+            .map(|axis| (0..3).map(|k| open[k][axis].abs() + delta[k][axis].abs()).fold(0.0, f64::max));
+        let depth_off = triangle.uncertainty[2] + MOVED * (triangle.largest(2) + origin[2].abs());
+        let reach = [rect.x[1] - origin[0], rect.y[1] - origin[1]];
+        Self { view, triangle, origin, reach, open, delta, largest, depth_off }
+    }
+
+    fn depth(&self) -> Axis {
+        let size = self.largest[2];
+        Axis { shift: 0.0, size, slack: 0.5 * ROUNDED * size + self.depth_off }
+    }
+
+    fn axis(&self, axis: usize) -> Axis {
+        let (perspective, (s, a)) = (self.view.is_perspective(), self.view.shear());
+        let (at, reach, bent) = (self.origin[axis].abs(), self.reach[axis], a[axis].abs());
+        let shift = s[axis] - a[axis] * self.origin[2];
+        let deepest = self.largest[2];
+        let size = self.largest[axis]
+            + shift.abs()
+            + bent * deepest
+            + if perspective { reach * deepest } else { reach };
+        // Errors before anything is rounded to `f32`.
+        let by_depth = if perspective { at + reach + bent } else { bent };
+        let terms =
+            self.triangle.largest(axis) + if perspective { at * self.triangle.largest(2) } else { at };
+        let terms = terms + s[axis].abs() + bent * self.origin[2].abs();
+        let off = self.triangle.uncertainty[axis] + by_depth * self.depth_off + MOVED * terms;
+        Axis { shift, size, slack: ROUNDED * size + 2.0 * off }
+    }
 }
 
 /// A vertex, with the middle of the tiles at the origin.

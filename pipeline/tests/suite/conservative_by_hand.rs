@@ -53,6 +53,19 @@ fn times_and_depths_are_those_of_the_passing() {
     }
 }
 
+/// Whatever the depth and the distance, a triangle at one depth is there within the rounding of `f64`.
+#[test]
+fn a_triangle_at_one_depth_stays_there() {
+    for z in [0.0, 1.0, 1e-30, -3.1e7, 1e40] {
+        let flat = still([[0.25, 0.25, z], [3.5, 0.25, z], [0.25, 3.5, z]]);
+        let touched = all(&Rasterizer::new(View::orthographic()), &flat, &GRID);
+        assert!(touched.len() > 6);
+        for (_, Touch { z: [lo, hi], .. }) in touched {
+            assert!(lo <= z && z <= hi && hi - lo <= 1e-13 * z.abs(), "{lo} {z} {hi}");
+        }
+    }
+}
+
 #[test]
 fn points_nearer_than_the_near_depth_are_invisible() {
     let behind = still([[0.0, 0.0, -1.0], [1.0, 0.0, -2.0], [0.0, 1.0, 0.125]]);
