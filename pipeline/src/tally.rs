@@ -84,24 +84,8 @@ impl Branches for &Path {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub(crate) enum Kernel {
-    /// Preparing a triangle.
-    Prepare = 16,
-    /// Bringing a triangle to a tile.
-    Place,
-    /// Bringing it to another time.
-    Within,
-    /// All sides of a tile, through a pinhole.
-    Sides,
-    /// A side of a tile, through a lens.
-    Side,
-    /// The near depth.
-    Near,
-    /// The edges of a triangle.
-    Edges,
-    /// Depths in a tile.
-    Depths,
     /// The face that a triangle shows.
-    Facing,
+    Facing = 16,
     /// A point in a still triangle.
     Inside,
     /// The times of a point in a moving triangle.

@@ -9,12 +9,12 @@
 //! - `u^`, `v^`, `t^` and `z^` contain every lens position, time and depth at which it does;
 //! - triangles without area (points, segments) and triangles that reach behind the camera are included.
 //!
-//! *Precision.* Input and arithmetic are `f64`, with coordinates relative to the tile. Each test includes a
-//! bound of its own rounding, a few parts in 2^48 of the magnitudes involved. Rounding to `f32` instead would
-//! widen a triangle by 2^-24 of its distance from the origin, a whole pixel at 1e7, and would need an error
-//! bound beside every number. The mode runs per tile, not per sample, so `f64` is affordable. The error of
-//! inexact input ([`MovingTriangle::uncertain`]) is carried as inflation. It is at least [`MIN_UNCERTAINTY`],
-//! which covers products that underflow.
+//! *Precision.* The tile tests and depth planes are those of standard mode ([`traversal`](crate::traversal),
+//! [`depth`](crate::depth)). They take `f32`, so a triangle is rounded at the door, relative to the middle of the
+//! tiles, and the error is carried as inflation together with that of inexact input
+//! ([`MovingTriangle::uncertain`]). For an exact triangle the sides of a tile move out by at most 2^-21 of the terms of
+//! a vertex as seen, half the extent of the tiles included: 0.002 tiles across a grid of 2048. Times and lens positions
+//! are rounded outward to `f32`.
 //!
 //! ```
 //! use pipeline::conservative::{Grid, MovingTriangle, Rasterizer, View};
@@ -28,12 +28,10 @@
 //! assert_eq!(tiles.len(), 7);
 //! ```
 
-mod edges;
 mod rasterizer;
-mod sides;
 mod triangle;
 mod view;
 
 pub use rasterizer::{Grid, Rasterizer, TileLoop};
-pub use triangle::{MIN_UNCERTAINTY, MovingTriangle, Prepared};
+pub use triangle::MovingTriangle;
 pub use view::{Rect, Region, Touch, View};

@@ -1,7 +1,15 @@
-//! Moving triangles in `f64`, and their vertices relative to a tile.
+//! Moving triangles in `f64`, and the triangles in `f32` that the tile tests take.
+//!
+//! At the door of the tile tests a triangle is moved so that the middle of the tiles is the origin, in `f64`, scaled
+//! by powers of two so that no number leaves the range of `f32`, and rounded to `f32`. The slack that the tile tests
+//! allow for the rounding of samples in standard mode here bounds the rounding at the door and the uncertainty of
+//! the input. Tiles, lens positions and times are rounded outward.
 
-use super::{Rect, Region, View};
-use crate::depth::{Numbers, Real};
+use super::{Rect, View};
+use crate::depth::{Real, round_down, round_up};
+use crate::geometry::Shear;
+use crate::setup::{Corner, Triangle};
+use crate::traversal::TileRect;
 
 /// A triangle whose vertices `[x, y, depth]` move linearly from `open` to `close`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -11,7 +19,7 @@ pub struct MovingTriangle {
     uncertainty: [f64; 3],
 }
 
-/// Larger coordinates may overflow in the tests.
+/// Larger coordinates may overflow at the door.
 const MAX_COORDINATE: f64 = 1e60;
 
 impl MovingTriangle {
@@ -36,238 +44,220 @@ impl MovingTriangle {
     pub fn close(&self) -> &[[f64; 3]; 3] {
         &self.close
     }
+
+    /// Whether its ends differ.
+    pub(crate) fn is_moving(&self) -> bool {
+        self.open != self.close
+    }
+
+    fn vertices(&self) -> impl Iterator<Item = &[f64; 3]> {
+        self.open.iter().chain(&self.close)
+    }
+
+    /// Largest magnitude along an axis.
+    fn largest(&self, axis: usize) -> f64 {
+        self.vertices().map(|p| p[axis].abs()).fold(0.0, f64::max)
+    }
 }
 
-/// Smallest uncertainty of a coordinate. Products of three such errors do not underflow, so values that
-/// underflow stay within the noise.
-pub const MIN_UNCERTAINTY: f64 = 1e-90;
+/// Rounding to `f32`, relative: four times half an ulp. A vertex at a time is `open + t delta`, both rounded.
+const ROUNDED: f64 = 1.0 / (1_u64 << 22) as f64;
 
-/// A triangle prepared for the tests of tiles.
+/// Rounding of moving to the origin in `f64`, relative to the coordinates before: more than four of 2^-53 each.
+const MOVED: f64 = 1.0 / (1_u64 << 50) as f64;
+
+/// A triangle and a view at the door of the tile tests, for tiles within one rectangle.
 #[derive(Clone, Copy, Debug)]
-pub struct Prepared {
-    pub(super) triangle: MovingTriangle,
-    /// Closing minus opening position.
+pub(super) struct Rounded {
+    pub triangle: Triangle,
+    pub shear: Shear,
+    /// Smallest visible depth; negative infinity for all.
+    pub near: f32,
+    /// Bound of the error of a depth.
+    pub depth_slack: f32,
+    /// Unit of the image on each axis, and its origin.
+    image: [Unit; 2],
+    depth: Unit,
+}
+
+/// A coordinate is `(value - origin) scale` in `f32`, where `scale` is a product of two powers of two.
+#[derive(Clone, Copy, Debug, Default)]
+struct Unit {
+    origin: f64,
+    scale: [f64; 2],
+}
+
+impl Unit {
+    fn of(&self, value: f64) -> f64 {
+        (value - self.origin) * self.scale[0] * self.scale[1]
+    }
+
+    /// A range with more than the rounding of [`Self::of`] on either side.
+    fn outward(&self, [lo, hi]: [f64; 2]) -> [f32; 2] {
+        let off = |value: f64| MOVED * (value.abs() + self.origin.abs()) * self.scale[0] * self.scale[1];
+        [round_down(self.of(lo) - off(lo)), round_up(self.of(hi) + off(hi))]
+    }
+
+    fn back(&self, value: f32) -> f64 {
+        f64::from(value) / self.scale[1] / self.scale[0] + self.origin
+    }
+}
+
+/// The power of two that brings a size to between 1/2 and 1, for sizes of normal numbers.
+fn to_one(size: f64) -> f64 {
+    let exponent = (size.to_bits() >> 52).clamp(23, 2023);
+    f64::from_bits((2045 - exponent) << 52)
+}
+
+impl Rounded {
+    /// `triangle` in `view` for tiles within `rect`.
+    pub fn new(view: &View, triangle: &MovingTriangle, rect: &Rect) -> Self {
+        let door = Door::new(view, triangle, rect);
+        let (perspective, a, moving) = (view.is_perspective(), view.shear().1, triangle.is_moving());
+        let axes = [door.axis(0), door.axis(1), door.depth()];
+        let scale = axes.map(|axis| to_one(axis.size + axis.slack));
+        let deep = scale[2];
+        let image = [0, 1].map(|axis| Unit {
+            origin: door.origin[axis],
+            scale: [if perspective { deep.recip() } else { 1.0 }, scale[axis]],
+        });
+        let depth = Unit { origin: door.origin[2], scale: [deep, 1.0] };
+        let rounded = |p: [f64; 3]| [0, 1, 2].map(|axis| (p[axis] * scale[axis]) as f32);
+        let corner = |k: usize| Corner { open: rounded(door.open[k]), delta: rounded(door.delta[k]) };
+        Self {
+            triangle: Triangle {
+                id: 0,
+                corners: [0, 1, 2].map(corner),
+                moving,
+                behind: false,
+                faces: [true; 2],
+                slack: [0, 1].map(|axis| round_up(axes[axis].slack * scale[axis])),
+            },
+            shear: Shear {
+                s: [0, 1].map(|axis| (axes[axis].shift * scale[axis]) as f32),
+                a: [0, 1].map(|axis| (a[axis] / deep * scale[axis]) as f32),
+                parallel: !perspective,
+            },
+            near: depth.outward([view.near(); 2])[0],
+            depth_slack: round_up(axes[2].slack * deep),
+            image,
+            depth,
+        }
+    }
+
+    /// A rectangle of the image as the tile tests see it.
+    pub fn tile(&self, rect: &Rect) -> TileRect {
+        TileRect { x: self.image[0].outward(rect.x), y: self.image[1].outward(rect.y) }
+    }
+
+    /// Depths in their own unit.
+    pub fn depths(&self, z: [f32; 2]) -> [f64; 2] {
+        z.map(|z| self.depth.back(z))
+    }
+}
+
+/// A triangle moved to the middle of the tiles, in the units of the input.
+struct Door<'a> {
+    view: &'a View,
+    triangle: &'a MovingTriangle,
+    origin: [f64; 3],
+    /// Half the extent of the tiles.
+    reach: [f64; 2],
+    open: [[f64; 3]; 3],
     delta: [[f64; 3]; 3],
-    pub(super) moving: bool,
-    /// Largest magnitude on each axis.
-    pub(super) size: [f64; 3],
-    /// Largest magnitude of a weight.
-    pub(super) weight: f64,
-    /// Error bound of a weight.
-    pub(super) weight_off: f64,
+    /// Largest magnitude of a vertex and its motion on each axis.
+    largest: [f64; 3],
+    /// Error of a depth before it is rounded.
+    depth_off: f64,
 }
 
-impl Prepared {
-    pub(super) fn new<N: Numbers>(numbers: N, triangle: &MovingTriangle, view: &View) -> Self {
-        let all = || triangle.open.iter().chain(&triangle.close);
-        let size = [0, 1, 2].map(|axis| all().map(|p| p[axis].abs()).fold(0.0, f64::max));
+/// An axis at the door.
+#[derive(Clone, Copy)]
+struct Axis {
+    /// Shift of the lens, as in [`Shear::s`].
+    shift: f64,
+    /// Magnitudes of the terms of a vertex as seen.
+    size: f64,
+    /// Slack of the image, or error of a depth.
+    slack: f64,
+}
+
+impl<'a> Door<'a> {
+    fn new(view: &'a View, triangle: &'a MovingTriangle, rect: &Rect) -> Self {
         let perspective = view.is_perspective();
-        let uncertainty = triangle.uncertainty.map(|off| off.max(MIN_UNCERTAINTY));
-        let moving = numbers.branch(triangle.open != triangle.close);
-        let difference = |k: usize, axis: usize| {
-            let [open, close] = [triangle.open, triangle.close].map(|end| numbers.number(end[k][axis]));
-            (close - open).value()
-        };
-        let delta = if moving {
-            [0, 1, 2].map(|k| [0, 1, 2].map(|axis| difference(k, axis)))
-        } else {
-            Default::default()
-        };
-        Self {
-            triangle: MovingTriangle { uncertainty, ..*triangle },
-            delta,
-            moving,
-            size,
-            weight: if perspective { size[2] } else { 1.0 },
-            weight_off: if perspective { uncertainty[2] } else { 0.0 },
-        }
+        let depths = triangle.vertices().map(|p| p[2]);
+        let depths = depths.fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], z| [lo.min(z), hi.max(z)]);
+        let middle = |[lo, hi]: [f64; 2]| 0.5 * (lo + hi);
+        let origin = [middle(rect.x), middle(rect.y), if perspective { 0.0 } else { middle(depths) }];
+        let ends = [triangle.open, triangle.close].map(|end| end.map(|p| moved(p, origin, perspective)));
+        let [open, close] = ends;
+        let difference = |k: usize| [0, 1, 2].map(|axis| close[k][axis] - open[k][axis]);
+        let delta = if triangle.is_moving() { [0, 1, 2].map(difference) } else { Default::default() };
+        let largest = [0, 1, 2]
+            .map(|axis| (0..3).map(|k| open[k][axis].abs() + delta[k][axis].abs()).fold(0.0, f64::max));
+        let depth_off = triangle.uncertainty[2] + MOVED * (triangle.largest(2) + origin[2].abs());
+        let reach = [rect.x[1] - origin[0], rect.y[1] - origin[1]];
+        Self { view, triangle, origin, reach, open, delta, largest, depth_off }
     }
 
-    pub(super) fn uncertainty(&self) -> &[f64; 3] {
-        &self.triangle.uncertainty
+    fn depth(&self) -> Axis {
+        let size = self.largest[2];
+        Axis { shift: 0.0, size, slack: 0.5 * ROUNDED * size + self.depth_off }
     }
 
-    /// Coordinates of the vertices along `axes` at time `t`; at the ends of the shutter exactly as given.
-    pub(super) fn at<N: Numbers, const AXES: usize>(
-        &self,
-        numbers: N,
-        axes: [usize; AXES],
-        t: f64,
-    ) -> [[N::Number; AXES]; 3] {
-        let of = |end: &[[f64; 3]; 3]| end.map(|p| axes.map(|axis| numbers.number(p[axis])));
-        let open = of(&self.triangle.open);
-        if numbers.branch(t == 0.0 || !self.moving) {
-            return open;
-        }
-        if numbers.branch(t == 1.0) {
-            return of(&self.triangle.close);
-        }
-        let (t, delta) = (numbers.number(t), of(&self.delta));
-        [0, 1, 2].map(|k| std::array::from_fn(|axis| open[k][axis] + t * delta[k][axis]))
+    fn axis(&self, axis: usize) -> Axis {
+        let (perspective, (s, a)) = (self.view.is_perspective(), self.view.shear());
+        let (at, reach, bent) = (self.origin[axis].abs(), self.reach[axis], a[axis].abs());
+        let shift = s[axis] - a[axis] * self.origin[2];
+        let deepest = self.largest[2];
+        let size = self.largest[axis]
+            + shift.abs()
+            + bent * deepest
+            + if perspective { reach * deepest } else { reach };
+        // Errors before anything is rounded to `f32`.
+        let by_depth = if perspective { at + reach + bent } else { bent };
+        let terms =
+            self.triangle.largest(axis) + if perspective { at * self.triangle.largest(2) } else { at };
+        let terms = terms + s[axis].abs() + bent * self.origin[2].abs();
+        let off = self.triangle.uncertainty[axis] + by_depth * self.depth_off + MOVED * terms;
+        Axis { shift, size, slack: ROUNDED * size + 2.0 * off }
     }
 }
 
-/// Rounding error of a few operations, relative to the sum of magnitudes: sixteen of 2^-53 each, and twice
-/// that.
-pub(super) const ROUNDING: f64 = 1.0 / (1_u64 << 48) as f64;
-
-/// Vertices at both ends of a time interval, relative to the middle of a tile, so that large coordinates lose
-/// little precision.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Seen<R> {
-    pub view: View,
-    /// `[x - X w, y - Y w, depth]` by end and vertex; `(X, Y)` is the middle of the tile.
-    pub points: [[[R; 3]; 3]; 2],
-    middle: [R; 2],
-    /// Distances of the tile's sides from its middle.
-    pub tile: [[R; 2]; 2],
-    /// Error bound in x and y of a vertex seen from a point of the tile and a lens position.
-    pub noise: [R; 2],
-    /// Error bound of a depth.
-    pub depth_noise: R,
-    /// Largest magnitudes of the terms of `points`, uncertainty included.
-    pub size: [R; 3],
+/// A vertex, with the middle of the tiles at the origin.
+fn moved<R: Real>(p: [R; 3], origin: [R; 3], perspective: bool) -> [R; 3] {
+    let [x, y] = [0, 1].map(|axis| p[axis] - if perspective { origin[axis] * p[2] } else { origin[axis] });
+    [x, y, if perspective { p[2] } else { p[2] - origin[2] }]
 }
 
-impl Seen<f64> {
-    /// The same in the numbers of a kernel.
-    pub fn on<N: Numbers>(&self, numbers: N) -> Seen<N::Number> {
-        let number = |value: f64| numbers.number(value);
-        Seen {
-            view: self.view,
-            points: self.points.map(|end| end.map(|p| p.map(number))),
-            middle: self.middle.map(number),
-            tile: self.tile.map(|side| side.map(number)),
-            noise: self.noise.map(number),
-            depth_noise: number(self.depth_noise),
-            size: self.size.map(number),
-        }
-    }
+/// Multiply-adds of moving the vertices to the origin. Scales are exponents, and differences belong to set-up.
+pub(super) const fn door_madds(moving: bool, perspective: bool) -> u32 {
+    let ends = if moving { 2 } else { 1 };
+    3 * ends * if perspective { 2 } else { 3 }
 }
 
-impl<R: Real> Seen<R> {
-    pub fn new<N: Numbers<Number = R>>(
-        numbers: N,
-        view: &View,
-        prepared: &Prepared,
-        rect: &Rect,
-        region: &Region,
-    ) -> Self {
-        let number = |value: f64| numbers.number(value);
-        let rounding = R::new(ROUNDING);
-        let sides = [rect.x, rect.y].map(|side| side.map(number));
-        let middle = sides.map(|[lo, hi]| R::new(0.5) * (lo + hi));
-        let largest = prepared.size.map(number);
-        let (weight, unsure) = (number(prepared.weight), prepared.uncertainty().map(number));
-        let off = number(prepared.weight_off);
-        let is_perspective = numbers.branch(view.is_perspective());
-        let has_lens = numbers.branch(view.has_lens());
-        let noise = [0, 1].map(|axis| {
-            let side = sides[axis][0].magnitude().larger(sides[axis][1].magnitude());
-            let lens = has_lens.then(|| {
-                let (s, a) = view.shear();
-                [s, a].map(|of| number(of[axis]).magnitude())
-            });
-            let sum = lens.map_or(largest[axis], |[s, a]| largest[axis] + s + a * largest[2]);
-            let noise = rounding * (sum + side * weight) + unsure[axis];
-            let noise = lens.map_or(noise, |[_, a]| noise + a * unsure[2]);
-            if is_perspective { noise + side * off } else { noise }
-        });
-        let size = [0, 1, 2].map(|axis| {
-            let (mut size, mut unsure) = (largest[axis], unsure[axis]);
-            if axis < 2 {
-                size = size + middle[axis].magnitude() * weight;
-            }
-            if axis < 2 && is_perspective {
-                unsure = unsure + middle[axis].magnitude() * off;
-            }
-            // A plane uses `ROUNDING` times this as noise.
-            size + unsure / rounding
-        });
-        Self {
-            view: *view,
-            points: points(numbers, view, prepared, middle, region),
-            middle,
-            tile: [0, 1].map(|axis| sides[axis].map(|side| side - middle[axis])),
-            noise,
-            depth_noise: rounding * largest[2] + unsure[2],
-            size,
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tally::{Counting, Tally};
+
+    #[test]
+    fn the_cost_of_the_door_is_that_of_its_kernel() {
+        for perspective in [false, true] {
+            let tally = Tally::default();
+            let point = |p: [f64; 3]| p.map(|c| Counting::new(c, &tally));
+            moved(point([1.0, 2.0, 3.0]), point([4.0, 5.0, 6.0]), perspective);
+            assert_eq!(3 * tally.madds(), door_madds(false, perspective));
+            assert_eq!(6 * tally.madds(), door_madds(true, perspective));
         }
     }
 
-    /// [`Self::points`] within another region.
-    pub fn points_within<N: Numbers<Number = R>>(
-        &self,
-        numbers: N,
-        prepared: &Prepared,
-        region: &Region,
-    ) -> [[[R; 3]; 3]; 2] {
-        points(numbers, &self.view, prepared, self.middle, region)
+    #[test]
+    fn sizes_are_brought_to_one() {
+        for size in [1.0, 0.75, 3e-300, 7e300, 0.0, 1e-310] {
+            let scaled = size * to_one(size);
+            assert!((0.5..1.0).contains(&scaled) || size < 1e-300, "{size}: {scaled}");
+            assert!(scaled < 1.0 && to_one(size).log2().fract() == 0.0);
+        }
     }
-
-    /// Weight of a point on the homogeneous image plane.
-    fn weight(&self, depth: R) -> R {
-        weight(&self.view, depth)
-    }
-
-    /// Vertex `k` at `end` of the time along `axis`, seen through a pinhole from `side`, relative to the
-    /// middle of the tile.
-    pub fn through_pinhole(&self, axis: usize, k: usize, end: usize, side: R) -> R {
-        let p = &self.points[end][k];
-        p[axis] - side * self.weight(p[2])
-    }
-
-    /// The same vertex seen from `lens` on the lens.
-    pub fn from<N: Numbers<Number = R>>(
-        &self,
-        numbers: N,
-        axis: usize,
-        [k, end]: [usize; 2],
-        [lens, side]: [R; 2],
-    ) -> R {
-        let depth = self.points[end][k][2];
-        self.through_pinhole(axis, k, end, side) + lens * self.shift(numbers, axis, depth)
-    }
-
-    /// Shift of a point at this depth from the middle of the lens to its rim.
-    fn shift<N: Numbers<Number = R>>(&self, numbers: N, axis: usize, depth: R) -> R {
-        let (s, a) = self.view.shear();
-        numbers.number(a[axis]) * depth - numbers.number(s[axis])
-    }
-
-    /// Vertices at both ends as homogeneous points of the image, seen through a pinhole from the middle of
-    /// the tile.
-    pub fn homogeneous(&self) -> [[[R; 3]; 3]; 2] {
-        self.points.map(|end| end.map(|[x, y, depth]| [x, y, self.weight(depth)]))
-    }
-
-    /// The same vertices seen from `lens` on the lens.
-    pub fn homogeneous_from<N: Numbers<Number = R>>(&self, numbers: N, lens: [R; 2]) -> [[[R; 3]; 3]; 2] {
-        self.points.map(|end| {
-            end.map(|[x, y, depth]| {
-                let at = |axis: usize, x: R| x + lens[axis] * self.shift(numbers, axis, depth);
-                [at(0, x), at(1, y), self.weight(depth)]
-            })
-        })
-    }
-}
-
-fn weight<R: Real>(view: &View, depth: R) -> R {
-    if view.is_perspective() { depth } else { R::new(1.0) }
-}
-
-/// Vertices at both ends of a region's time, seen from `middle`.
-fn points<N: Numbers>(
-    numbers: N,
-    view: &View,
-    prepared: &Prepared,
-    middle: [N::Number; 2],
-    region: &Region,
-) -> [[[N::Number; 3]; 3]; 2] {
-    region.t.map(|t| {
-        prepared.at(numbers, [0, 1, 2], t).map(|[x, y, depth]| {
-            let w = weight(view, depth);
-            [x - middle[0] * w, y - middle[1] * w, depth]
-        })
-    })
 }

@@ -105,19 +105,23 @@ impl Region {
     /// The whole lens and shutter.
     pub const WHOLE: Self = Self { u: [-1.0, 1.0], v: [-1.0, 1.0], t: [0.0, 1.0] };
 
-    /// Both halves in time.
-    pub(super) fn halves(&self) -> [Self; 2] {
-        let [lo, hi] = self.t;
-        let middle = 0.5 * (lo + hi);
-        [Self { t: [lo, middle], ..*self }, Self { t: [middle, hi], ..*self }]
+    /// The box rounded outward to `f32`; `lens` says whether the camera has a lens.
+    pub(super) fn outward(&self, lens: bool) -> Box5 {
+        Box5 { u: outward(self.u), v: outward(self.v), t: outward(self.t), lens }
+    }
+
+    /// The part of the region in a box.
+    pub(super) fn within(&self, part: &Box5) -> Self {
+        let both = |mine: [f64; 2], part: [f32; 2]| {
+            let [lo, hi] = part.map(f64::from);
+            [mine[0].max(lo), mine[1].min(hi)]
+        };
+        let [u, v] = if part.lens { [both(self.u, part.u), both(self.v, part.v)] } else { [self.u, self.v] };
+        Self { u, v, t: both(self.t, part.t) }
     }
 }
 
 impl Touch {
-    pub(super) fn new(region: &Region, z: [f64; 2]) -> Self {
-        Self { u: region.u, v: region.v, t: region.t, z }
-    }
-
     /// Hull of the intervals of both.
     #[must_use]
     pub fn hull(&self, other: &Self) -> Self {
@@ -138,7 +142,7 @@ impl Touch {
     /// The box and the depth range rounded outward to `f32`, for [`DepthBoxes`](crate::depth::DepthBoxes).
     /// `lens` says whether the camera has a lens.
     pub fn outward(&self, lens: bool) -> (Box5, [f32; 2]) {
-        (Box5 { u: outward(self.u), v: outward(self.v), t: outward(self.t), lens }, outward(self.z))
+        (self.region().outward(lens), outward(self.z))
     }
 }
 

@@ -58,6 +58,16 @@ pub const fn interval_madds(bound: DepthBound, moving: bool, lens: bool) -> u32 
     }
 }
 
+/// Multiply-adds of one interval of a triangle in conservative mode, by [`DepthBound::LocalPlanes`]: counted likewise.
+pub(crate) const fn exact_interval_madds(moving: bool, lens: bool) -> u32 {
+    match (moving, lens) {
+        (false, false) => 32,
+        (false, true) => 114,
+        (true, false) => 144,
+        (true, true) => 292,
+    }
+}
+
 /// Smallest and largest depth of the vertices of `triangle` for times in `t`. The depth at a sample is a
 /// convex combination, clamped to the range of the vertices. Vertices move monotonically, also with rounding,
 /// so the extremes are at the ends of the interval.
@@ -96,6 +106,23 @@ impl Bounder {
             Some([lo, hi]) => both(vertices, [round_down(lo), round_up(hi)]),
             None => vertices,
         }
+    }
+}
+
+impl Bounder {
+    /// Interval of the depths of all points seen in `tile` and `within` of a triangle whose vertices are off by half the
+    /// slack, and by `depth` in depth. It is empty if there are none.
+    pub(crate) fn over_exact(&self, tile: &TileRect, within: &Box5, depth: f32) -> [f32; 2] {
+        let [lo, hi] = vertex_range(&self.triangle, within.t);
+        // Vertices at a time are rounded, and then the bound is.
+        let wider = 2.0 * depth;
+        let vertices = [(lo - wider).next_down(), (hi + wider).next_up()];
+        let region = Region::new(tile, within);
+        let planes = self
+            .facts
+            .as_ref()
+            .and_then(|facts| facts.exact(self.shutter.as_ref(), &region, f64::from(wider)));
+        planes.map_or(vertices, |[lo, hi]| both(vertices, [round_down(lo), round_up(hi)]))
     }
 }
 
@@ -165,19 +192,47 @@ impl<R: Real> Facts<R> {
     /// Depths allowed by the planes of set-up or, without these, by planes through the triangle at the ends
     /// of the region's time. The interval includes the rounding of the sample test.
     fn over(&self, shutter: Option<&[MovingPlane<R>; 2]>, region: &Region<R>) -> Option<[R; 2]> {
-        let beam = match (region.lens, self.parallel) {
+        let (beam, ends) = (self.beam(region), self.ends(region));
+        let margin = margin(&ends[..self.different()], &beam, self.slack, self.size[2])?;
+        self.planes(shutter, region, &beam, &ends, &margin)
+    }
+
+    /// The same for every point of a triangle whose vertices are off by half the slack, and by `depth` in depth.
+    fn exact(&self, shutter: Option<&[MovingPlane<R>; 2]>, region: &Region<R>, depth: R) -> Option<[R; 2]> {
+        let margin = Margin { off: self.slack.map(|slack| R::new(0.5) * slack), depth };
+        self.planes(shutter, region, &self.beam(region), &self.ends(region), &margin)
+    }
+
+    fn beam(&self, region: &Region<R>) -> Beam<R> {
+        match (region.lens, self.parallel) {
             (Some(lens), false) => Beam::lens(region.tile, lens, self.s, self.a),
             (None, false) => Beam::pinhole(region.tile),
             (Some(lens), true) => Beam::oblique(region.tile, lens, self.s, self.a),
             (None, true) => Beam::orthographic(region.tile),
-        };
-        let ends = if self.moving { region.t.map(|t| self.at(t)) } else { [self.open; 2] };
-        let different = if self.moving { 2 } else { 1 };
-        let margin = margin(&ends[..different], &beam, self.slack, self.size[2])?;
-        let planes = shutter.copied().unwrap_or_else(|| self.through(&ends));
-        let bounds = planes[..different].iter().map(|plane| {
+        }
+    }
+
+    /// Vertices at the ends of the time.
+    fn ends(&self, region: &Region<R>) -> [Points<R>; 2] {
+        if self.moving { region.t.map(|t| self.at(t)) } else { [self.open; 2] }
+    }
+
+    fn different(&self) -> usize {
+        if self.moving { 2 } else { 1 }
+    }
+
+    fn planes(
+        &self,
+        shutter: Option<&[MovingPlane<R>; 2]>,
+        region: &Region<R>,
+        beam: &Beam<R>,
+        ends: &[Points<R>; 2],
+        margin: &Margin<R>,
+    ) -> Option<[R; 2]> {
+        let planes = shutter.copied().unwrap_or_else(|| self.through(ends));
+        let bounds = planes[..self.different()].iter().map(|plane| {
             let reach = if shutter.is_some() && self.moving { plane.within(region.t) } else { plane.whole() };
-            plane.depths(reach, &beam, margin.off, ())
+            plane.depths(reach, beam, margin.off, ())
         });
         tightest(bounds).map(|[lo, hi]| [lo - margin.depth, hi + margin.depth])
     }
@@ -328,6 +383,12 @@ mod tests {
             assert!(found.is_some());
             // The vertices at the ends of the interval are computed in any case.
             assert_eq!(over, interval_madds(bound, moving, lens), "tile, {bound:?} {moving} {lens}");
+            if bound == DepthBound::LocalPlanes {
+                let exact = madds(|| found = facts.exact(shutter.as_ref(), &region, Counted(0.01)));
+                assert!(found.is_some());
+                // The range of the vertices is widened at both ends.
+                assert_eq!(exact + 2, exact_interval_madds(moving, lens), "exact, {moving} {lens}");
+            }
         }
     }
 

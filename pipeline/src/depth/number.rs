@@ -110,7 +110,7 @@ pub(super) fn dot<R: Real>(a: [R; 3], b: [R; 3]) -> R {
 }
 
 /// `a x b`.
-pub(crate) fn cross<R: Real>(a: [R; 3], b: [R; 3]) -> [R; 3] {
+pub(super) fn cross<R: Real>(a: [R; 3], b: [R; 3]) -> [R; 3] {
     let part = |i: usize, j: usize| a[i].madd(b[j], -(a[j] * b[i]));
     [part(1, 2), part(2, 0), part(0, 1)]
 }

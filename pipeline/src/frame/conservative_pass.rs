@@ -13,8 +13,9 @@ use super::Gpu;
 use super::lanes::{LaneWork, Lanes};
 use crate::conservative::{Grid, MovingTriangle, Rasterizer, TileLoop, Touch};
 use crate::depth::{Numbers, Real};
-use crate::geometry::{Projection, Viewport};
+use crate::geometry::{Cull, Projection, Viewport};
 use crate::memory::Surface;
+use crate::setup;
 use crate::tally::{Costs, Kernel};
 
 /// Triangles of a packet of vertices.
@@ -257,12 +258,10 @@ fn log<S: TileShader>(
 ) -> BodyLog<S::Output> {
     let (mut tiles, mut rest, mut state) = (Vec::new(), Vec::new(), S::Body::default());
     for (item, primitive) in body.iter().zip(start..).filter(|(item, _)| !item.is_culled(lanes.costs()).0) {
-        let prepared = item.rasterizer.prepare(&item.triangle);
         let after = item.rasterizer.rasterize_counted(
-            &prepared,
+            &item.triangle,
             draw.grid,
             item.part.clone(),
-            lanes.costs(),
             |tile, touch, work: &mut TileLoop| {
                 let output = shader.run(&mut state, lanes, &TileIntervals { primitive, tile, touch });
                 let tests = std::mem::take(work);
@@ -300,8 +299,7 @@ fn vertices(gpu: &mut Gpu<'_>, draw: &ConservativeDraw<'_>, costs: &Costs) {
             counts[outcome] += 1;
             counts[Event::SetupMadds] += madds;
             if !is_culled {
-                counts[Event::SetupMadds] +=
-                    primitive.rasterizer.prepare_counted(&primitive.triangle, costs).1;
+                counts[Event::SetupMadds] += setup::madds(primitive.triangle.is_moving(), Cull::None);
             }
         }
         let from = draw.vertices.address() + 3 * BATCH as u64 * number * bytes;

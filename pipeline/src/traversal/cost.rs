@@ -16,6 +16,11 @@ pub const fn side_madds(moving: bool, lens: bool, behind: bool) -> u32 {
     by(moving, lens, [6, 24, 18, 48]) * if behind { 2 } else { 1 }
 }
 
+/// Testing a triangle against the near depth, without roots.
+pub const fn near_madds(moving: bool) -> u32 {
+    by(moving, false, [4, 13, 0, 0])
+}
+
 /// Select by dimensions in use: 2D, with time, with lens, both.
 const fn by(moving: bool, lens: bool, madds: [u32; 4]) -> u32 {
     madds[moving as usize + 2 * lens as usize]
@@ -151,6 +156,18 @@ mod tests {
                     assert_eq!(madds, madds_found, "{moving} {lens} {behind} {x}");
                 }
             }
+        }
+    }
+
+    #[test]
+    fn the_cost_of_the_near_depth_is_that_of_its_kernel() {
+        for (moving, near) in
+            [false, true].into_iter().flat_map(|moving| [0.1, 3.5, 5.0, 9.0].map(|near| (moving, near)))
+        {
+            let triangle = triangle(moving, &SHEAR);
+            let within = Box5 { t: [0.25, 0.75], ..Box5::whole(true) };
+            let (madds, (_, found)) = count(|| narrow_near::<Counted>(&triangle, near, 0.01, &within));
+            assert_eq!(madds, found, "{moving} {near}");
         }
     }
 

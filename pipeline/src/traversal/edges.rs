@@ -156,6 +156,15 @@ impl<N: Number> EdgeBounds<N> {
         Self { ranges, moving: edges.view.moving }
     }
 
+    /// Bounds that hold where either of two does.
+    pub fn hull(&self, other: &Self) -> Self {
+        let ranges = [0, 1, 2].map(|k| {
+            let ([low, high], [lower, higher]) = (&self.ranges[k], &other.ranges[k]);
+            [low.zip(lower, N::min), high.zip(higher, N::max)]
+        });
+        Self { ranges, moving: self.moving }
+    }
+
     /// The part of the time, from 0 to 1, in which a sample may see one of `faces`, and the number of
     /// quadratics solved. The clockwise face needs all three edges to reach above zero, the other face all
     /// below. So if the facing is known, one edge suffices to cull; otherwise one negative and one positive

@@ -3,6 +3,10 @@
 //!
 //! A test is conservative: it may keep too much but never too little. It evaluates the expressions of the
 //! sample test at the corners of the tile, with an allowance for the rounding of both.
+//!
+//! Both modes of the pipeline run these tests. They take vertices in `f32` that may be off by half of
+//! [`slack`](crate::setup::Triangle::slack): in standard mode by the rounding of the sample test, in conservative mode by
+//! that of the input ([`conservative`](crate::conservative)).
 
 mod cost;
 mod edges;
@@ -29,5 +33,5 @@ pub use lens_spans::{LensSpan, LensSpans};
 pub use number::{Number, Pieces, Quadratic};
 pub use region::{Box5, Faces, Piece, TileRect, TimePieces, View};
 pub use screen::{SCREEN_GAIN_MADDS, Screen, screen_madds};
-pub use side_planes::{narrow, narrow_counted};
+pub use side_planes::{narrow, narrow_counted, narrow_near};
 pub use time_interval::{TimeIntervals, time_interval, time_interval_counted, time_interval_over};

@@ -60,6 +60,27 @@ pub(super) fn narrow_sides<N: Number>(
     (Some(current), madds)
 }
 
+/// The part of `within` in which a vertex may be beyond the depth `near`, and the cost in multiply-adds. `slack` bounds the
+/// error of a depth. The near depth is a side that no lens position moves.
+pub fn narrow_near<N: Number>(
+    triangle: &Triangle,
+    near: f32,
+    slack: f32,
+    within: &Box5,
+) -> (Option<Box5>, u32) {
+    let (mut times, mut roots) = (None, 0);
+    let limit = N::from(near) - N::from(2.0 * slack);
+    for corner in &triangle.corners {
+        let [open, delta] = [corner.open[2], corner.delta[2]].map(N::from);
+        let at = |t: f32| if triangle.moving { open + N::from(t) * delta } else { open } - limit;
+        let first = at(within.t[0]);
+        let last = if triangle.moving { at(within.t[1]) } else { first };
+        times = union(times, above(within.t, first, last, &mut roots));
+    }
+    let madds = cost::near_madds(triangle.moving) + roots * cost::SIDE_ROOT;
+    (times.map(|t| Box5 { t, ..*within }), madds)
+}
+
 /// One side of a tile; the left and top sides are `positive`.
 struct Side<'a, N> {
     triangle: &'a Triangle,

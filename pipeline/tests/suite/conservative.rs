@@ -3,9 +3,8 @@
 
 use std::collections::{HashMap, HashSet};
 
-use pipeline::conservative::{Grid, MovingTriangle, Rasterizer, Rect, Region, TileLoop, Touch, View};
+use pipeline::conservative::{Grid, MovingTriangle, Rasterizer, Rect, Region, Touch, View};
 use pipeline::random::{mix, unit};
-use pipeline::tally::Costs;
 
 struct Numbers(u64);
 
@@ -281,39 +280,6 @@ fn no_tile_is_missed_and_nothing_lies_outside() {
 /// Worst case of rounding: far from the origin, a thin triangle passes, at one time and from one lens
 /// position, through the corner of four tiles within `f64` precision. The tiles in which it is found have to
 /// be reported.
-/// A triangle that takes a path seen before has the work of one that is counted, whatever the triangle and the view.
-#[test]
-fn work_found_by_path_is_that_of_counting() {
-    let (known, none) = (Costs::remembered(), Costs::default());
-    let mut r = Numbers(12);
-    let mut all = TileLoop::default();
-    for _ in 0..200 {
-        for (kind, view) in KINDS.iter().flat_map(|kind| VIEWS.iter().map(move |view| (*kind, view))) {
-            let [open, close] = triangle(kind, view, &mut r);
-            let Some(moving) = MovingTriangle::new(open, close) else { continue };
-            let rasterizer = Rasterizer::new(*view);
-            let work = |costs: &Costs| {
-                let (prepared, madds) = rasterizer.prepare_counted(&moving, costs);
-                let mut works = Vec::new();
-                let each = |_, _: &Touch, work: &mut TileLoop| works.push(std::mem::take(work));
-                let rest = rasterizer.rasterize_counted(
-                    &prepared,
-                    &GRID,
-                    [0..GRID.columns, 0..GRID.rows],
-                    costs,
-                    each,
-                );
-                works.push(rest);
-                (madds, works)
-            };
-            let found = work(&known);
-            assert_eq!(found, work(&none), "{kind:?} {view:?} {open:?} {close:?}");
-            found.1.iter().for_each(|work| all.depth_madds += work.depth_madds);
-        }
-    }
-    assert!(all.depth_madds > 1_000_000, "{all:?}");
-}
-
 #[test]
 fn a_corner_cut_off_by_a_rounding_is_reported() {
     let grid = Grid { origin: [1e6, -1e6], ..GRID };
@@ -380,16 +346,15 @@ fn tiles_can_be_walked_by_hand() {
     let rasterizer = Rasterizer::new(VIEWS[3]);
     let ends = triangle(Kind::Ordinary, &VIEWS[3], &mut r);
     let moving = MovingTriangle::new(ends[0], ends[1]).unwrap();
-    let prepared = rasterizer.prepare(&moving);
     let mut reported = HashMap::new();
     rasterizer.rasterize(&moving, &GRID, |tile, touch| {
         reported.insert(tile, *touch);
     });
     let whole = Rect { x: [-8.0, 8.0], y: [-8.0, 8.0] };
-    let coarse = rasterizer.touch(&prepared, &whole, &Region::WHOLE).unwrap();
+    let coarse = rasterizer.touch(&moving, &whole, &Region::WHOLE).unwrap();
     for ([column, row], touch) in &reported {
         let rect = GRID.rect(&(*column..column + 1), &(*row..row + 1));
-        assert!(rasterizer.touch(&prepared, &rect, &coarse.region()).is_some());
+        assert!(rasterizer.touch(&moving, &rect, &coarse.region()).is_some());
         assert!(coarse.t[0] <= touch.t[0] && touch.t[1] <= coarse.t[1], "{coarse:?} {touch:?}");
     }
 }

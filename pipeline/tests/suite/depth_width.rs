@@ -75,10 +75,10 @@ fn exact(triangle: &[MovingVertex; 3], shear: &Shear, tile: &TileRect, within: &
     let wide = |range: [f32; 2]| range.map(f64::from);
     let ends = [triangle.map(|v| v.open.map(f64::from)), triangle.map(|v| v.close.map(f64::from))];
     let rasterizer = Rasterizer::new(View::of(shear, NEAR)).halving(0);
-    let prepared = rasterizer.prepare(&MovingTriangle::new(ends[0], ends[1]).unwrap());
+    let moving = MovingTriangle::new(ends[0], ends[1]).unwrap();
     let rect = Rect { x: wide(tile.x), y: wide(tile.y) };
     let region = Region { u: wide(within.u), v: wide(within.v), t: wide(within.t) };
-    rasterizer.touch(&prepared, &rect, &region).map_or(0.0, |touch| touch.z[1] - touch.z[0])
+    rasterizer.touch(&moving, &rect, &region).map_or(0.0, |touch| touch.z[1] - touch.z[0])
 }
 
 /// Mean widths over that of the vertices in the whole shutter: the four methods, the last one without

@@ -11,6 +11,7 @@ mod common;
 mod compute;
 mod conservative;
 mod conservative_by_hand;
+mod conservative_exact;
 mod conservative_pass;
 mod costs;
 mod culling;

@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
-use pipeline::conservative::MIN_UNCERTAINTY;
 
 use super::bounds::{Bounds, Ends, times_inside};
 use crate::error::LoadError;
@@ -109,15 +108,10 @@ impl Object {
         self.triangles.is_empty()
     }
 
-    /// Uncertainty for the rasterizer, large enough for products that underflow. The boxes do not need it.
-    pub(super) fn raster_uncertainty(&self) -> f64 {
-        self.uncertainty.max(MIN_UNCERTAINTY)
-    }
-
     /// Times at which a triangle may be inside a box of space and time.
     pub(super) fn times_inside(&self, triangle: u32, within: &Bounds) -> Option<[f64; 2]> {
         let triangle = triangle as usize;
-        times_inside(&self.triangles[triangle], &self.boxes[triangle], within, self.raster_uncertainty())
+        times_inside(&self.triangles[triangle], &self.boxes[triangle], within, self.uncertainty)
     }
 
     /// Swept box.

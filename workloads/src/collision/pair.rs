@@ -169,8 +169,8 @@ impl<'a> Pair<'a> {
 
     /// Least useful width of a tile. Rounding of borders and uncertainty of corners are as large.
     pub fn min_tile_width(&self) -> f64 {
-        let raster_uncertainty = self.objects.iter().map(|object| object.raster_uncertainty());
-        raster_uncertainty.fold(self.window.rounding(), f64::max)
+        let uncertainty = self.objects.iter().map(|object| object.uncertainty);
+        uncertainty.fold(self.window.rounding(), f64::max)
     }
 
     /// Triangles of both objects in the window.

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use pipeline::Primitive;
-use pipeline::conservative::{Grid, MovingTriangle, Prepared, Rasterizer, Region, Touch, View};
+use pipeline::conservative::{Grid, MovingTriangle, Rasterizer, Region, Touch, View};
 
 use super::bounds::{Bounds, Ends, NOTHING, TzBox, TzBuffer, hull, meet};
 use super::object::Object;
@@ -163,7 +163,7 @@ impl Pass {
             let Some(times) = self.times(object, triangle) else { continue };
             let first = remaining.partition_point(|(_, bounds)| bounds.time[1] < times[0]);
             let open = remaining[first..].iter().take_while(|(_, bounds)| bounds.time[0] <= times[1]);
-            let mut drawing = Drawing { pass: self, object, triangle, item, prepared: None };
+            let mut drawing = Drawing { pass: self, object, triangle, item, turned: None };
             for (bin, bounds) in open {
                 let times = meet(bounds.time, times);
                 let in_bin = times.map(|t| InBin { bin: *bin, bounds, t });
@@ -247,8 +247,8 @@ struct Drawing<'a> {
     object: &'a Object,
     triangle: u32,
     item: u32,
-    /// Set-up of the edges, computed for the first time bin.
-    prepared: Option<Prepared>,
+    /// The triangle in view space, from the first time bin on.
+    turned: Option<MovingTriangle>,
 }
 
 impl Drawing<'_> {
@@ -267,26 +267,24 @@ impl Drawing<'_> {
             return false;
         }
         let mut emit = |tile, t, z| each(&Fragment { tile, bin, item, inside: TzBox { t, z, triangle } });
-        let Some(prepared) = self.edges() else {
+        let Some(turned) = self.edges() else {
             for row in rows {
                 columns.clone().for_each(|column| emit([column, row], t, near[pass.axis]));
             }
             return true;
         };
-        rasterizer(t).rasterize_part(prepared, &pass.grid, [columns, rows], |tile, touch| {
-            emit(tile, touch.t, touch.z)
-        });
+        rasterizer(t)
+            .rasterize_part(turned, &pass.grid, [columns, rows], |tile, touch| emit(tile, touch.t, touch.z));
         true
     }
 
-    /// Set-up of the edges, if this pass tests edges.
-    fn edges(&mut self) -> Option<&Prepared> {
-        if self.pass.fit == Fit::Edges && self.prepared.is_none() {
+    /// The triangle in view space, if this pass tests edges.
+    fn edges(&mut self) -> Option<&MovingTriangle> {
+        if self.pass.fit == Fit::Edges && self.turned.is_none() {
             let ends = &self.object.triangles[self.triangle as usize];
-            let turned = self.pass.turned(ends, self.object.raster_uncertainty());
-            self.prepared = turned.map(|turned| Rasterizer::new(View::orthographic()).prepare(&turned));
+            self.turned = self.pass.turned(ends, self.object.uncertainty);
         }
-        self.prepared.as_ref()
+        self.turned.as_ref()
     }
 
     /// The triangle in a time bin, `again` or not; `None` if it is not there.
@@ -294,7 +292,7 @@ impl Drawing<'_> {
         let (pass, item, triangle, bin) = (self.pass, self.item, self.triangle, in_bin.bin);
         let part = pass.tiles_of(&near(self.object, triangle, in_bin.t, in_bin.bounds)?);
         let ends = &self.object.triangles[triangle as usize];
-        let turned = pass.turned(ends, self.object.raster_uncertainty())?;
+        let turned = pass.turned(ends, self.object.uncertainty)?;
         let (rasterizer, body) = (rasterizer(in_bin.t), item);
         let primitive = Primitive { triangle: turned, rasterizer, part, body, again, back_only: false };
         Some(BinnedPrimitive { primitive, item, triangle, bin })
@@ -306,8 +304,7 @@ fn near(object: &Object, triangle: u32, t: [f64; 2], remaining: &Bounds) -> Opti
     let triangle = triangle as usize;
     let (ends, whole) = (&object.triangles[triangle], &object.boxes[triangle].space);
     let side = |axis: usize| {
-        let swept =
-            if t == [0.0, 1.0] { whole[axis] } else { swept(ends, axis, t, object.raster_uncertainty()) };
+        let swept = if t == [0.0, 1.0] { whole[axis] } else { swept(ends, axis, t, object.uncertainty) };
         meet(swept, remaining.space[axis])
     };
     Some([side(0)?, side(1)?, side(2)?])

@@ -89,8 +89,7 @@ impl PlainPasses {
             return result;
         }
         let window = Bounds { time: [0.0, 1.0], ..objects[0].bounds.hull(&objects[1].bounds) };
-        let min_width =
-            objects.iter().map(|object| object.raster_uncertainty()).fold(window.rounding(), f64::max);
+        let min_width = objects.iter().map(|object| object.uncertainty).fold(window.rounding(), f64::max);
         let lists = objects.map(|object| (0..object.len() as u32).collect::<Vec<_>>());
         let parts = [0, 1].map(|which| Part { object: objects[which], list: &lists[which] });
         for axis in 0..3 {

@@ -80,7 +80,7 @@ impl Sweeps {
         observer: &mut impl Observer,
     ) -> Vec<usize> {
         let hull = set.iter().fold(Bounds::NOTHING, |hull, &object| hull.hull(objects[object].bounds()));
-        let uncertainty = set.iter().map(|&object| objects[object].raster_uncertainty());
+        let uncertainty = set.iter().map(|&object| objects[object].uncertainty);
         let tiling =
             Tiling { resolution: self.resolution, min_width: uncertainty.fold(hull.rounding(), f64::max) };
         let pass = Pass::new(axis, &hull, tiling, Fit::Edges);

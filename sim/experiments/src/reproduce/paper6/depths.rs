@@ -1,7 +1,7 @@
 //! VI-15: depth intervals by moving planes against those by vertices (Appendix A), in both modes, over what the tile test leaves.
 
 use glam::{Affine3A, Vec3};
-use pipeline::conservative::{Grid, MovingTriangle, Prepared, Rasterizer, Touch, View};
+use pipeline::conservative::{Grid, MovingTriangle, Rasterizer, Touch, View};
 use pipeline::depth::{Bounder, DepthBound};
 use pipeline::geometry::Projection;
 use pipeline::random::{mix, unit};
@@ -409,8 +409,7 @@ impl<'a> Alone<'a> {
             [self.vertices.map(|v| v.open.map(f64::from)), self.vertices.map(|v| v.close.map(f64::from))];
         let Some(exact) = MovingTriangle::new(ends[0], ends[1]) else { return widths };
         let rasterizer = Rasterizer::new(View::of(&self.projection.shear, self.projection.near));
-        let prepared = rasterizer.prepare(&exact);
-        let tiles = Tiles::new(&rasterizer, &prepared, self.scene.viewport, side_px);
+        let tiles = Tiles::new(&rasterizer, &exact, self.scene.viewport, side_px);
         let vertices = self.width(self.by_vertices());
         let mut hit = vec![false; tiles.touched.len()];
         for place in 0..u64::from(places) {
@@ -490,14 +489,14 @@ struct Tiles {
 const BORDER_PX: f64 = 1e-7;
 
 impl Tiles {
-    fn new(rasterizer: &Rasterizer, prepared: &Prepared, viewport: Viewport, side_px: u32) -> Self {
+    fn new(rasterizer: &Rasterizer, triangle: &MovingTriangle, viewport: Viewport, side_px: u32) -> Self {
         let [width, height] = [viewport.width(), viewport.height()];
         let (columns, rows) = (width.div_ceil(side_px), height.div_ceil(side_px));
         let half = [width, height].map(|side| 0.5 * f64::from(side));
         let side = f64::from(side_px);
         let grid = Grid { origin: [-half[0], -half[1]], tile: [side; 2], columns, rows };
         let mut touched = vec![None; (columns * rows) as usize];
-        rasterizer.rasterize_part(prepared, &grid, [0..columns, 0..rows], |[column, row], touch| {
+        rasterizer.rasterize_part(triangle, &grid, [0..columns, 0..rows], |[column, row], touch| {
             touched[(row * columns + column) as usize] = Some(*touch);
         });
         Self { touched, columns: columns as usize, rows: rows as usize, half, side }
