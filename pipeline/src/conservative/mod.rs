@@ -10,7 +10,7 @@
 //! - triangles without area (points, segments) and triangles that reach behind the camera are included.
 //!
 //! *Precision.* The tile tests and depth planes are those of standard mode ([`traversal`](crate::traversal),
-//! [`depth`](crate::depth)). They take `f32`, so a triangle is rounded at the door, relative to the middle of the
+//! [`depth`](crate::depth)). They take `f32`, so a triangle is rounded before them, relative to the middle of the
 //! tiles, and the error is carried as inflation together with that of inexact input
 //! ([`MovingTriangle::uncertain`]). For an exact triangle the sides of a tile move out by at most 2^-21 of the terms of
 //! a vertex as seen, half the extent of the tiles included: 0.002 tiles across a grid of 2048. Times and lens positions

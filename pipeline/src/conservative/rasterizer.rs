@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::triangle::{Rounded, door_madds};
+use super::triangle::{Rounded, recentring_madds};
 use super::{MovingTriangle, Rect, Region, Touch, View};
 use crate::depth::{Bounder, DepthBound, exact_interval_madds, set_up_madds};
 use crate::traversal::{
@@ -147,7 +147,7 @@ impl<'a> Tests<'a> {
         let rounded = Rounded::new(&rasterizer.view, triangle, rect);
         let (moving, bound) = (rounded.triangle.moving, DepthBound::LocalPlanes);
         let work = TileLoop {
-            place_madds: door_madds(moving, rasterizer.view.is_perspective()),
+            place_madds: recentring_madds(moving, rasterizer.view.is_perspective()),
             depth_madds: set_up_madds(bound, moving),
             ..TileLoop::default()
         };

@@ -1,8 +1,8 @@
 //! Moving triangles in `f64`, and the triangles in `f32` that the tile tests take.
 //!
-//! At the door of the tile tests a triangle is moved so that the middle of the tiles is the origin, in `f64`, scaled
+//! Before the tile tests a triangle is moved so that the middle of the tiles is the origin, in `f64`, scaled
 //! by powers of two so that no number leaves the range of `f32`, and rounded to `f32`. The slack that the tile tests
-//! allow for the rounding of samples in standard mode here bounds the rounding at the door and the uncertainty of
+//! allow for the rounding of samples in standard mode here bounds the rounding of vertices and the uncertainty of
 //! the input. Tiles, lens positions and times are rounded outward.
 
 use super::{Rect, View};
@@ -19,7 +19,7 @@ pub struct MovingTriangle {
     uncertainty: [f64; 3],
 }
 
-/// Larger coordinates may overflow at the door.
+/// Larger coordinates may overflow when they are moved.
 const MAX_COORDINATE: f64 = 1e60;
 
 impl MovingTriangle {
@@ -66,7 +66,7 @@ const ROUNDED: f64 = 1.0 / (1_u64 << 22) as f64;
 /// Rounding of moving to the origin in `f64`, relative to the coordinates before: more than four of 2^-53 each.
 const MOVED: f64 = 1.0 / (1_u64 << 50) as f64;
 
-/// A triangle and a view at the door of the tile tests, for tiles within one rectangle.
+/// A triangle and a view as the tile tests take them, for tiles within one rectangle.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Rounded {
     pub triangle: Triangle,
@@ -112,18 +112,19 @@ fn to_one(size: f64) -> f64 {
 impl Rounded {
     /// `triangle` in `view` for tiles within `rect`.
     pub fn new(view: &View, triangle: &MovingTriangle, rect: &Rect) -> Self {
-        let door = Door::new(view, triangle, rect);
+        let recentred = Recentred::new(view, triangle, rect);
         let (perspective, a, moving) = (view.is_perspective(), view.shear().1, triangle.is_moving());
-        let axes = [door.axis(0), door.axis(1), door.depth()];
+        let axes = [recentred.axis(0), recentred.axis(1), recentred.depth()];
         let scale = axes.map(|axis| to_one(axis.size + axis.slack));
         let deep = scale[2];
         let image = [0, 1].map(|axis| Unit {
-            origin: door.origin[axis],
+            origin: recentred.origin[axis],
             scale: [if perspective { deep.recip() } else { 1.0 }, scale[axis]],
         });
-        let depth = Unit { origin: door.origin[2], scale: [deep, 1.0] };
+        let depth = Unit { origin: recentred.origin[2], scale: [deep, 1.0] };
         let rounded = |p: [f64; 3]| [0, 1, 2].map(|axis| (p[axis] * scale[axis]) as f32);
-        let corner = |k: usize| Corner { open: rounded(door.open[k]), delta: rounded(door.delta[k]) };
+        let corner =
+            |k: usize| Corner { open: rounded(recentred.open[k]), delta: rounded(recentred.delta[k]) };
         Self {
             triangle: Triangle {
                 id: 0,
@@ -157,7 +158,7 @@ impl Rounded {
 }
 
 /// A triangle moved to the middle of the tiles, in the units of the input.
-struct Door<'a> {
+struct Recentred<'a> {
     view: &'a View,
     triangle: &'a MovingTriangle,
     origin: [f64; 3],
@@ -171,7 +172,7 @@ struct Door<'a> {
     depth_off: f64,
 }
 
-/// An axis at the door.
+/// An axis of a recentred triangle.
 #[derive(Clone, Copy)]
 struct Axis {
     /// Shift of the lens, as in [`Shear::s`].
@@ -182,7 +183,7 @@ struct Axis {
     slack: f64,
 }
 
-impl<'a> Door<'a> {
+impl<'a> Recentred<'a> {
     fn new(view: &'a View, triangle: &'a MovingTriangle, rect: &Rect) -> Self {
         let perspective = view.is_perspective();
         let depths = triangle.vertices().map(|p| p[2]);
@@ -231,7 +232,7 @@ fn moved<R: Real>(p: [R; 3], origin: [R; 3], perspective: bool) -> [R; 3] {
 }
 
 /// Multiply-adds of moving the vertices to the origin. Scales are exponents, and differences belong to set-up.
-pub(super) const fn door_madds(moving: bool, perspective: bool) -> u32 {
+pub(super) const fn recentring_madds(moving: bool, perspective: bool) -> u32 {
     let ends = if moving { 2 } else { 1 };
     3 * ends * if perspective { 2 } else { 3 }
 }
@@ -242,13 +243,13 @@ mod tests {
     use crate::tally::{Counting, Tally};
 
     #[test]
-    fn the_cost_of_the_door_is_that_of_its_kernel() {
+    fn the_cost_of_recentring_is_that_of_its_kernel() {
         for perspective in [false, true] {
             let tally = Tally::default();
             let point = |p: [f64; 3]| p.map(|c| Counting::new(c, &tally));
             moved(point([1.0, 2.0, 3.0]), point([4.0, 5.0, 6.0]), perspective);
-            assert_eq!(3 * tally.madds(), door_madds(false, perspective));
-            assert_eq!(6 * tally.madds(), door_madds(true, perspective));
+            assert_eq!(3 * tally.madds(), recentring_madds(false, perspective));
+            assert_eq!(6 * tally.madds(), recentring_madds(true, perspective));
         }
     }
 

@@ -129,7 +129,7 @@ impl Case {
     }
 }
 
-/// Time of all touches in one tile, and the intervals that conservative mode reports.
+/// The tile of every touch is reported, and its time and lens position are in the intervals.
 #[test]
 fn every_touch_that_integers_show_is_reported() {
     let (mut touches, mut corners, mut reported_tiles, mut touched_tiles) = (0_u64, 0_u64, 0, 0);
