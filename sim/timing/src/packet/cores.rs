@@ -249,10 +249,11 @@ impl Cores {
         let part = |part: u32| share(demand.threads, part, chunk.of).start;
         let threads = part(chunk.first + chunk.count) - part(chunk.first);
         let operations = u64::from(threads) * u64::from(demand.ops);
-        // A warp wider than a core takes several cycles per operation.
-        let wide = Time::from(threads.div_ceil(chunk.count).div_ceil(self.lanes_of_core).saturating_sub(1))
-            * self.period;
-        let alone = Time::from(demand.steps().max(1)) * (self.alu + wide);
+        // A warp wider than a core takes several cycles per operation. One of a group has operations in some of its steps only.
+        let steps = u64::from(demand.steps().max(1));
+        let lanes = operations.div_ceil(steps * u64::from(chunk.count));
+        let wide = lanes.div_ceil(u64::from(self.lanes_of_core)).saturating_sub(1) * self.period;
+        let alone = steps * (self.alu + wide);
         let issued = match operations * self.period {
             0 => 0,
             work => self.lanes.reserve_as(visit.turn, ready.from, work).1,
