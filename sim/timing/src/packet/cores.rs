@@ -117,6 +117,9 @@ pub(super) struct Cores {
     /// Warp launches, one per cycle.
     sends: Calendar,
     lanes: Calendar,
+    /// Warp slots of the cores, which both kinds share.
+    slots: Calendar,
+    cores: u32,
     period: Time,
     alu: Time,
     lanes_of_core: u32,
@@ -135,6 +138,8 @@ impl Cores {
             fifos: [fifo.clone(), fifo],
             sends: Calendar::new(Time::from(SLOT_CYCLES) * period, 1),
             lanes: Calendar::new(Time::from(SLOT_CYCLES) * period, spec.cores.get() * spec.lanes.get()),
+            slots: Calendar::new(Time::from(SLOT_CYCLES) * period, spec.cores.get() * spec.warps.get()),
+            cores: spec.cores.get(),
             period,
             alu: period * Time::from(spec.alu_latency_cycles),
             groups: GroupRoom::new(machine),
@@ -147,6 +152,11 @@ impl Cores {
     /// Calendar of the lanes.
     pub fn lanes(&self) -> &Calendar {
         &self.lanes
+    }
+
+    /// When the last work that made room for other work ends.
+    pub fn yielded(&self) -> Time {
+        self.lanes.yielded().max(self.slots.yielded())
     }
 
     /// Simulate a packet of vertices or pixels, or a group.
@@ -168,7 +178,7 @@ impl Cores {
             if uses_data {
                 ready = self.data(visit, &chunk, ready, builder, memory, &mut run);
             }
-            let done = self.operate(visit, &chunk, ready);
+            let done = self.operate(visit, &chunk, sent.from, ready);
             self.fifos[kind].slots.note_all(chunk.count, done.from, done.to);
             run.done = run.done.max(done.to);
         }
@@ -242,9 +252,9 @@ impl Cores {
         Span { from: first + state.latency, to: departed + state.latency }
     }
 
-    /// Run the operations of some warps, ready between `ready.from` and `ready.to`. Returns when the first and
+    /// Run the operations of some warps, sent from `sent` on and ready between `ready.from` and `ready.to`. Returns when the first and
     /// the last warp are done.
-    fn operate(&mut self, visit: &Visit<'_>, chunk: &Chunk, ready: Span) -> Span {
+    fn operate(&mut self, visit: &Visit<'_>, chunk: &Chunk, sent: Time, ready: Span) -> Span {
         let demand = visit.demand;
         let part = |part: u32| share(demand.threads, part, chunk.of).start;
         let threads = part(chunk.first + chunk.count) - part(chunk.first);
@@ -253,12 +263,19 @@ impl Cores {
         let steps = u64::from(demand.steps().max(1));
         let lanes = operations.div_ceil(steps * u64::from(chunk.count));
         let wide = lanes.div_ceil(u64::from(self.lanes_of_core)).saturating_sub(1) * self.period;
-        let alone = steps * (self.alu + wide);
+        // Its warps have the lanes of as many cores, those of a group of one.
+        let cores = if demand.group.is_some() { 1 } else { chunk.count.min(self.cores) };
+        let of_cores = u64::from(cores * self.lanes_of_core);
+        let alone = (steps * (self.alu + wide)).max(operations * self.period / of_cores);
         let issued = match operations * self.period {
             0 => 0,
             work => self.lanes.reserve_as(visit.turn, ready.from, work).1,
         };
-        let last = (ready.to + alone).max(issued + self.alu.saturating_sub(self.period));
+        // Warps of both kinds take turns on the slots. How long others keep the lanes does not count, as a warp is faster with
+        // fewer beside it.
+        let held = u64::from(chunk.count) * (alone + ready.from.saturating_sub(sent));
+        let held = self.slots.reserve_as(visit.turn, sent, held).1;
+        let last = (ready.to + alone).max(issued + self.alu.saturating_sub(self.period)).max(held);
         Span { from: last - (ready.to - ready.from).min(last - ready.from), to: last }
     }
 }

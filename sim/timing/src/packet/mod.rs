@@ -274,7 +274,7 @@ impl PacketClock {
         }
         self.tally.packet_done(counts);
         if turn == Turn::Late {
-            let yielded = self.cores.lanes().yielded().max(self.memory.yielded());
+            let yielded = self.cores.yielded().max(self.memory.yielded());
             self.gates.delay(yielded);
             self.end = self.end.max(yielded);
         }
