@@ -4,12 +4,14 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use super::calendar::{Calendar, QueueTimes};
+use super::drain::{Drain, OnCores};
 use super::memory::Memory;
 use super::station::aligned;
 use super::{Span, Visit};
 use crate::clock::{Clocks, Time};
 use crate::data_unit::DataUnit;
 use crate::demand::{DemandBuilder, ServiceDemand, Station, share};
+use crate::draws::Left;
 use crate::spec::MachineSpec;
 
 /// Cycles per slot of the calendars.
@@ -35,6 +37,10 @@ pub(super) struct Run {
     pub done: Time,
     /// When the packet leaves the cores.
     pub departed: Time,
+    /// How long its last warps wait for their data.
+    pub waited: Time,
+    /// When they have them.
+    pub ready: Time,
     /// When its data unit works on it.
     pub data: Span,
     /// When its lines pass the L2 and memory.
@@ -95,11 +101,17 @@ impl GroupRoom {
         Self { machine: machine.clone(), ends: BinaryHeap::new() }
     }
 
+    /// Groups like that of `demand` that have room at once; all packets of other kinds have.
+    fn most(&self, demand: &ServiceDemand, warps: u32) -> usize {
+        demand.group.map_or(usize::MAX, |group| {
+            let per_core = self.machine.groups_per_core(warps, group.shared_bytes).max(1);
+            self.machine.shader.cores.get() as usize * per_core as usize
+        })
+    }
+
     /// When there is room for the group of `demand`; 0 for other packets.
     fn at(&mut self, demand: &ServiceDemand, warps: u32) -> Time {
-        let Some(group) = demand.group else { return 0 };
-        let per_core = self.machine.groups_per_core(warps, group.shared_bytes).max(1);
-        let most = self.machine.shader.cores.get() as usize * per_core as usize;
+        let most = self.most(demand, warps);
         let mut room = 0;
         while self.ends.len() >= most
             && let Some(Reverse(end)) = self.ends.pop()
@@ -125,6 +137,7 @@ pub(super) struct Cores {
     lanes_of_core: u32,
     warp_lanes: u32,
     groups: GroupRoom,
+    drain: Drain,
     data: [DataState; DataUnit::ALL.len()],
 }
 
@@ -143,6 +156,7 @@ impl Cores {
             period,
             alu: period * Time::from(spec.alu_latency_cycles),
             groups: GroupRoom::new(machine),
+            drain: Drain::new(machine, clocks),
             lanes_of_core: spec.lanes.get(),
             warp_lanes: spec.warp_lanes.get(),
             data: DataUnit::ALL.map(|unit| DataState::new(machine, clocks, unit)),
@@ -167,7 +181,15 @@ impl Cores {
         let fifo = &mut self.fifos[kind];
         let taken = visit.arrive.max(fifo.sent).max(fifo.flights.room_at());
         let room = taken.max(self.groups.at(demand, warps));
-        let mut run = Run { taken, done: taken, departed: taken, data: Span::NONE, memory: Span::NONE };
+        let mut run = Run {
+            taken,
+            done: taken,
+            departed: taken,
+            waited: 0,
+            ready: 0,
+            data: Span::NONE,
+            memory: Span::NONE,
+        };
         let uses_data = kind == 1 && demand.uses_data();
         for first in (0..warps).step_by(WARPS_PER_CHUNK as usize) {
             let chunk = Chunk { first, count: WARPS_PER_CHUNK.min(warps - first), of: warps };
@@ -178,6 +200,8 @@ impl Cores {
             if uses_data {
                 ready = self.data(visit, &chunk, ready, builder, memory, &mut run);
             }
+            run.ready = ready.to;
+            run.waited = ready.to - (sent.to + self.period).min(ready.to);
             let done = self.operate(visit, &chunk, sent.from, ready);
             self.fifos[kind].slots.note_all(chunk.count, done.from, done.to);
             run.done = run.done.max(done.to);
@@ -185,11 +209,35 @@ impl Cores {
         if demand.group.is_some() {
             self.groups.ends.push(Reverse(run.done));
         }
+        if kind == 1 {
+            self.drain.note(demand, self.on_cores(visit, warps, &run));
+        }
         let fifo = &mut self.fifos[kind];
         run.departed = aligned(run.done.max(fifo.departed).max(visit.room), self.period);
         fifo.departed = run.departed;
         fifo.flights.note(run.departed);
         run
+    }
+
+    fn on_cores(&self, visit: &Visit<'_>, warps: u32, run: &Run) -> OnCores {
+        let demand = visit.demand;
+        OnCores {
+            arrive: visit.arrive,
+            data: run.waited,
+            ready: run.ready,
+            warps,
+            threads: demand.threads,
+            ops: demand.ops,
+            steps: demand.steps(),
+            room: self.groups.most(demand, warps),
+            behind: 0,
+            latency: 0,
+        }
+    }
+
+    /// When the last packets of pixels and groups have left, if none comes any more; in the calendars they have left at `calendar`.
+    pub fn drain(&mut self, calendar: Time) -> Option<Left> {
+        self.drain.end(calendar)
     }
 
     /// Send warps, one per cycle, as slots on the cores and in front of the data unit become free. Returns when the
