@@ -151,7 +151,7 @@ impl Drain {
         let number = self.left + self.packets.len();
         let work = packet.lanes();
         let is_idle = work == 0.0;
-        let done = is_idle.then(|| self.started + self.cores.alu as f64);
+        let done = is_idle.then_some(self.started + self.cores.alu as f64);
         self.packets.push_back(InTurn { packet, done });
         if !is_idle {
             self.held += warps;
