@@ -143,10 +143,9 @@ const UNIT: f64 = 1.0 / 4_294_967_296.0;
 
 /// Whether a point is in one of the two halves of a box, without what the other one has.
 fn is_in(lane: &Lane, cell: &Cell, is_upper: bool, point: &[f64; AXES]) -> bool {
-    for axis in 0..AXES {
-        let [low, high] = [cell.low[axis], cell.high[axis]];
+    for (axis, ((&at, &low), &high)) in point.iter().zip(&cell.low).zip(&cell.high).enumerate() {
         let is_limited = axis < 2 || [low, high] != [0.0, 1.0];
-        if is_limited && (lane.branch(point[axis] < low) || lane.branch(point[axis] >= high)) {
+        if is_limited && (lane.branch(at < low) || lane.branch(at >= high)) {
             return false;
         }
     }
