@@ -31,7 +31,7 @@ const MAX_AGREEMENT_SHARE: f64 = 1e-4;
 const SMOOTHED_MOVES: usize = 8;
 
 /// Positions of windows, samples, moved forward; `anchor` is the place of the start in a window of `width`
-/// samples. `fixed` ones stay.
+/// samples. What a start is the `fixed` ones say: where neighbours differ after those by as much, all starts stay.
 pub(super) fn refine_starts(
     power: &[f64],
     positions: Vec<f64>,
@@ -58,8 +58,9 @@ pub(super) fn refine_starts(
         })
         .collect();
     let moves = smoothed(&smoothed(&moves, upper_median), |near| mean(near));
-    let refined = positions.iter().zip(moves).zip(fixed);
-    refined.map(|((position, by), fixed)| if *fixed { *position } else { position + by }).collect()
+    let of_marks =
+        moves.iter().zip(fixed).filter(|(_, fixed)| **fixed).map(|(by, _)| *by).fold(0.0, f64::max);
+    positions.iter().zip(moves).map(|(position, by)| position + (by - of_marks).max(0.0)).collect()
 }
 
 /// How much each frame and the next differ at each of `length` samples from their starts on, W^2.
