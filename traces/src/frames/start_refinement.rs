@@ -159,6 +159,22 @@ mod tests {
     }
 
     #[test]
+    fn what_a_start_is_the_mark_says_and_no_frame_beside_it_becomes_longer() {
+        // Neighbours differ after every start, also after the marked one: moving all but that would make the frame before
+        // it shorter and it longer by the move.
+        let (power, right) = frames(60, |_| 4);
+        let early: Vec<f64> = right.iter().map(|start| start - 16.0).collect();
+        let mut marked = [false; 60];
+        marked[30] = true;
+        let found = refine_starts(&power, early.clone(), &marked, 0.0, WIDTH);
+        assert_eq!(found[30], early[30]);
+        for (found, early) in found.windows(2).zip(early.windows(2)) {
+            let longer = (found[1] - found[0]) - (early[1] - early[0]);
+            assert!(longer.abs() < 0.5, "{longer}");
+        }
+    }
+
+    #[test]
     fn exact_equality_of_a_coarse_recorder_moves_nothing() {
         // Without noise some samples are equal to the last bit; those before them differ by less than what
         // matters.
