@@ -1,7 +1,6 @@
 //! Finding frames: by a given method, by the most suitable one, or from a mark that the program proposes.
 
 use super::assess::uncovered_work;
-use super::judge::Judge;
 use super::marks::{MarkError, Marks, Placed, Placement, default_window, flat_mark_of};
 use super::matched::{find_matched, noise_variance};
 use super::register::register;
@@ -68,14 +67,16 @@ const MIN_STARTS: usize = 4;
 /// Least share of the sequence at an even period, and least correlation of neighbours, of a plainly good one.
 /// In noise the correlation is 0.05, in frames at 0 dB 0.3 to 0.5.
 const PLAIN_COVERAGE_AND_SIMILARITY: [f64; 2] = [0.9, 0.5];
+/// In windows of fewer samples shapes are too coarse to track: the method with the most even period is taken.
+const COARSE_WINDOW_SAMPLES: usize = 20;
 /// In windows of fewer samples the sum of squares is kept: any period can be found among so many similar
 /// windows.
 const MIN_WINDOW_SAMPLES: usize = 8;
 /// Traces of more samples are tracked only where the sum of squares gives a warning.
 const MAX_TRACKED_SAMPLES: usize = 1 << 24;
-/// By how much another method must be better than tracking, whose starts are placed most exactly. Between 0 and 0.05 it
-/// hardly matters which.
-const MIN_JUDGED_GAIN: f64 = 0.02;
+/// Share of the trace that another method must cover more at an even period, to be preferred to the sum of
+/// squares.
+const MIN_COVERAGE_GAIN: f64 = 0.02;
 
 /// [`FinderMethod::Auto`].
 pub(super) fn find_auto(trace: &Trace, marks: &Marks) -> Result<Found, MarkError> {
@@ -91,38 +92,24 @@ pub(super) fn find_auto(trace: &Trace, marks: &Marks) -> Result<Found, MarkError
         let plain = |tracked: &Found| enough_starts(tracked, &squares) && even_and_similar(trace, tracked);
         return Ok(tracked.filter(plain).unwrap_or(squares));
     }
+    if samples < COARSE_WINDOW_SAMPLES {
+        return Ok(most_even(
+            squares,
+            [find_tracked(trace, marks)?, find_matched(trace, marks, FinderMethod::Normalized)?],
+        ));
+    }
     let long_and_clear = trace.samples() > MAX_TRACKED_SAMPLES && squares.threshold.clarity() >= 1.0;
     if long_and_clear {
         return Ok(squares);
     }
     let tracked = find_tracked(trace, marks)?;
-    best_judged(trace, marks, tracked, [squares, find_matched(trace, marks, FinderMethod::Normalized)?])
+    let is_clear = squares.threshold.clarity() >= 1.0 && !is_unsure(&squares);
+    Ok(if is_clear && is_unsure(&tracked) { squares } else { tracked })
 }
 
-/// Tracking, unless its starts fit the trace and the mark less well than those of another method.
-fn best_judged(trace: &Trace, marks: &Marks, tracked: Found, others: [Found; 2]) -> Result<Found, MarkError> {
-    let placement = marks.place(trace)?;
-    let power: Vec<f64> = trace.powers_w().collect();
-    let judge = Judge::new(&power, &placement);
-    let value = |found: &Found| judge.value(&window_offsets(trace, found));
-    let best = (value(&tracked) + MIN_JUDGED_GAIN, tracked);
-    let better = |best: (f64, Found), other: Found| {
-        let value = value(&other);
-        if value > best.0 { (value, other) } else { best }
-    };
-    Ok(others.into_iter().fold(best, better).1)
-}
-
-/// First samples of the windows at the starts that lie in the trace, in order.
-fn window_offsets(trace: &Trace, found: &Found) -> Vec<usize> {
-    let first = |time_s: f64| libm::round(trace.position(time_s - found.window.pre_s));
-    found
-        .starts
-        .iter()
-        .map(|start| first(start.time_s))
-        .filter(|&first| first >= 0.0)
-        .map(|first| first as usize)
-        .collect()
+/// Whether every start but the marks has a confidence below one half.
+fn is_unsure(found: &Found) -> bool {
+    found.starts.iter().all(|start| start.marked || start.confidence < 0.5)
 }
 
 /// Whether tracking found enough starts for a test: many, or fewer than the sum of squares where that gives a
@@ -139,6 +126,14 @@ fn enough_starts(tracked: &Found, squares: &Found) -> bool {
 fn even_and_similar(trace: &Trace, found: &Found) -> bool {
     let [even, similar] = PLAIN_COVERAGE_AND_SIMILARITY;
     covered_s(found) >= even * span_s(found) && neighbour_similarity(trace, found) >= similar
+}
+
+/// The result that covers most time at an even period.
+fn most_even(first: Found, others: [Found; 2]) -> Found {
+    others.into_iter().fold(first, |best, other| {
+        let more_s = covered_s(&other) - covered_s(&best);
+        if more_s > MIN_COVERAGE_GAIN * span_s(&best).max(span_s(&other)) { other } else { best }
+    })
 }
 
 fn covered_s(found: &Found) -> f64 {
@@ -225,8 +220,14 @@ fn rises(trace: &Trace) -> Vec<f64> {
 /// frames that repeat. 0 for fewer than two windows inside the trace.
 pub(super) fn neighbour_similarity(trace: &Trace, found: &Found) -> f64 {
     let width = libm::round((found.window.pre_s + found.window.post_s) * trace.rate_hz()) as usize;
-    let mut firsts = window_offsets(trace, found);
-    firsts.retain(|first| first + width <= trace.samples());
+    let first = |time_s: f64| libm::round(trace.position(time_s - found.window.pre_s));
+    let firsts: Vec<usize> = found
+        .starts
+        .iter()
+        .map(|start| first(start.time_s))
+        .filter(|&first| first >= 0.0 && first as usize + width <= trace.samples())
+        .map(|first| first as usize)
+        .collect();
     let power: Vec<f64> = trace.powers_w().collect();
     let window = |first: usize| &power[first..first + width];
     let similarity = |pair: &[usize]| correlation(window(pair[0]), window(pair[1]));

@@ -63,92 +63,38 @@ pub(crate) fn start_after_idle(
 
 /// `method` says by which distance: that of squares, or the normalized one.
 pub(super) fn find_matched(trace: &Trace, marks: &Marks, method: FinderMethod) -> Result<Found, MarkError> {
+    let measure = if method == FinderMethod::Normalized { normalized } else { squares };
     let placement = marks.place(trace)?;
     let power: Vec<f64> = trace.powers_w().collect();
-    let matches = Matches::new(trace, &power, &placement, method);
-    Ok(matches.found(marks, matches.threshold()))
-}
+    let (profile, nearest) = nearest_profile(&power, &placement, measure);
+    let spacing = spacing(placement.samples);
+    let candidates = candidates(&profile, &placement, spacing);
+    let distances: Vec<f64> = candidates.iter().map(|candidate| candidate.distance_w2).collect();
+    let noise = noise_variance(&power);
+    let noise_w2 = 2.0 * placement.samples as f64 * noise;
+    let background_w2 = median_of(profile.iter().copied(), profile.len());
+    let threshold =
+        choose(&distances, background_w2, noise_w2, misalignment_w2(&power, &placement), |value_w2| {
+            evenness(&candidates, &placement, value_w2)
+        });
 
-/// The minima of the distance to the marked windows.
-pub(super) struct Matches<'a> {
-    trace: &'a Trace,
-    power: &'a [f64],
-    placement: &'a Placement,
-    method: FinderMethod,
-    profile: Vec<f64>,
-    nearest: Vec<usize>,
-    candidates: Vec<Candidate>,
-    noise_w2: f64,
-}
-
-impl<'a> Matches<'a> {
-    pub fn new(trace: &'a Trace, power: &'a [f64], placement: &'a Placement, method: FinderMethod) -> Self {
-        let measure = if method == FinderMethod::Normalized { normalized } else { squares };
-        let (profile, nearest) = nearest_profile(power, placement, measure);
-        let candidates = candidates(&profile, placement, spacing(placement.samples));
-        Self {
-            trace,
-            power,
-            placement,
-            method,
-            profile,
-            nearest,
-            candidates,
-            noise_w2: noise_variance(power),
-        }
+    let mut starts = marked_starts(&placement, &profile);
+    let matcher = Matcher { trace, power: &power, placement: &placement, threshold: &threshold };
+    let confidence = confidence(&threshold);
+    for candidate in candidates.iter().filter(|candidate| candidate.distance_w2 < threshold.value_w2) {
+        let mark = nearest.get(candidate.offset).copied().unwrap_or(0);
+        starts.push(matcher.start_near(candidate, mark, &confidence));
     }
-
-    fn distances(&self) -> Vec<f64> {
-        self.candidates.iter().map(|candidate| candidate.distance_w2).collect()
+    starts.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
+    starts.dedup_by(|later, earlier| later.time_s <= earlier.time_s);
+    if let Some(first) = matcher.start_after_idle(&starts, spacing) {
+        starts.insert(0, first);
     }
-
-    /// The threshold chosen from the minima alone.
-    pub fn threshold(&self) -> Threshold {
-        let noise_w2 = 2.0 * self.placement.samples as f64 * self.noise_w2;
-        let background_w2 = median_of(self.profile.iter().copied(), self.profile.len());
-        let alignment_w2 = misalignment_w2(self.power, self.placement);
-        choose(&self.distances(), background_w2, noise_w2, alignment_w2, |value_w2| self.evenness(value_w2))
-    }
-
-    /// Offsets of the windows below a threshold, and of the marks, in order.
-    pub fn offsets(&self, value_w2: f64) -> Vec<usize> {
-        let below = self.candidates.iter().filter(|candidate| candidate.distance_w2 < value_w2);
-        let mut offsets: Vec<usize> = below
-            .map(|candidate| candidate.offset)
-            .chain(self.placement.marks.iter().map(|mark| mark.first))
-            .collect();
-        offsets.sort_unstable();
-        offsets
-    }
-
-    /// How evenly the starts are spaced if the threshold is `value_w2`.
-    fn evenness(&self, value_w2: f64) -> f64 {
-        let ends = self.candidates.first().zip(self.candidates.last());
-        regularity(&self.offsets(value_w2), ends.map_or(0, |(first, last)| last.offset - first.offset))
-    }
-
-    /// The starts below a threshold.
-    pub fn found(&self, marks: &Marks, threshold: Threshold) -> Found {
-        let (trace, spacing) = (self.trace, spacing(self.placement.samples));
-        let mut starts = marked_starts(self.placement, &self.profile);
-        let matcher = Matcher { trace, power: self.power, placement: self.placement, threshold: &threshold };
-        let confidence = confidence(&threshold);
-        for candidate in self.candidates.iter().filter(|candidate| candidate.distance_w2 < threshold.value_w2)
-        {
-            let mark = self.nearest.get(candidate.offset).copied().unwrap_or(0);
-            starts.push(matcher.start_near(candidate, mark, &confidence));
-        }
-        starts.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
-        starts.dedup_by(|later, earlier| later.time_s <= earlier.time_s);
-        if let Some(first) = matcher.start_after_idle(&starts, spacing) {
-            starts.insert(0, first);
-        }
-        let end_tolerance_s = 0.5 * spacing as f64 * trace.period_s();
-        starts.retain(|start| start.marked || start.time_s < marks.end_s - end_tolerance_s);
-        let mut found = assess::conclude(trace, marks, self.placement, starts, threshold);
-        found.warnings.extend(flat_mark_of(self.power, self.placement, libm::sqrt(self.noise_w2)));
-        Found { method: self.method, ..found }
-    }
+    let end_tolerance_s = 0.5 * spacing as f64 * trace.period_s();
+    starts.retain(|start| start.marked || start.time_s < marks.end_s - end_tolerance_s);
+    let mut found = assess::conclude(trace, marks, &placement, starts, threshold);
+    found.warnings.extend(flat_mark_of(&power, &placement, libm::sqrt(noise)));
+    Ok(Found { method, ..found })
 }
 
 /// The minima that could be starts, without the marks and their surroundings.
@@ -162,8 +108,21 @@ fn candidates(profile: &[f64], placement: &Placement, spacing: usize) -> Vec<Can
         .collect()
 }
 
+/// How evenly the starts are spaced if the threshold is `value_w2`.
+fn evenness(candidates: &[Candidate], placement: &Placement, value_w2: f64) -> f64 {
+    let below = candidates
+        .iter()
+        .filter(|candidate| candidate.distance_w2 < value_w2)
+        .map(|candidate| candidate.offset);
+    let mut offsets: Vec<usize> = below.chain(placement.marks.iter().map(|mark| mark.first)).collect();
+    offsets.sort_unstable();
+    let span =
+        candidates.last().map_or(0, |last| last.offset) - candidates.first().map_or(0, |first| first.offset);
+    regularity(&offsets, span)
+}
+
 /// The smallest distance to any mark's window at each offset, and with several marks which one it was.
-pub(super) fn nearest_profile(
+fn nearest_profile(
     power: &[f64],
     placement: &Placement,
     measure: fn(&[f64], &[f64]) -> Vec<f64>,

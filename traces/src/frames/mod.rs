@@ -8,7 +8,6 @@
 mod assess;
 mod find;
 mod idle_gap;
-mod judge;
 mod marks;
 mod matched;
 mod periodicity;
@@ -213,9 +212,9 @@ pub enum FinderMethod {
     /// The sequence of starts with the most evidence: similar to several templates, by shape and by squares,
     /// to each other, and at an even period.
     Tracking,
-    /// Of the other three the one whose starts fit trace and mark best, by a criterion that needs no truth. With fewer
-    /// than 8 samples in the window the sum of squares. Also the sum of squares for fewer than 16 frames, unless
-    /// tracking is plainly better, or more than 16 million samples without a warning.
+    /// Tracking. With fewer than 20 samples in the window, the most even of tracking, the sum of squares and
+    /// normalized; with fewer than 8 the sum of squares. Also the sum of squares for fewer than 16 frames, or
+    /// more than 16 million samples without a warning.
     #[default]
     Auto,
 }
