@@ -105,8 +105,8 @@ impl MultiView {
         let width = settings.width;
         let settings = Settings { width: width.saturating_mul(across), ..settings };
         settings.check().map_err(|_| LoadError::Setting {
-            setting: "views",
-            message: format!("{across}: side by side, views of {width} pixels are wider than an image can be: make --size smaller, or show them otherwise"),
+            setting: "size",
+            message: format!("{across} views of {width} pixels side by side are wider than an image can be: make each smaller, or show them otherwise"),
         })?;
         let settings = Settings { focus: options.focus.or(settings.focus), ..settings };
         let view = Viewport::new(settings.width / across, settings.height);
