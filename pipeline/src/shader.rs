@@ -165,7 +165,7 @@ impl<'a> Lane<'a> {
     }
 
     /// Filtered texel at `uv` of the texture or surface bound to `slot`, in linear RGBA, at a level of detail (0 for the
-    /// finest; surfaces have one level). An unbound slot reads as zero. The texture unit does the work: a fetch is no
+    /// finest; a surface that is bound by one level has no others). An unbound slot reads as zero. The texture unit does the work: a fetch is no
     /// operation of the lane.
     pub fn fetch(&self, slot: usize, uv: Vec2, lod: f32) -> Vec4 {
         let Some(bound) = self.bound.get(slot) else { return Vec4::ZERO };

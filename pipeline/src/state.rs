@@ -283,6 +283,10 @@ pub struct DrawState {
     pub colour_mask: [bool; 4],
     /// State of the second to the last colour target; those without one have that of the first.
     pub others: [Option<ColourState>; MAX_TARGETS - 1],
+    /// Whether a pixel whose middle the triangle does not cover is shaded at the centroid of the samples that it covers, in place
+    /// of the middle, where attributes are beyond those of the vertices. It serves still triangles through a pinhole and without
+    /// clip planes across the shutter; others are shaded as without it.
+    pub centroid: bool,
 }
 
 impl Default for DrawState {
@@ -320,7 +324,8 @@ impl DrawState {
     /// Opaque triangles, the nearest of which is stored.
     pub fn new(cull: Cull) -> Self {
         let (depth, blend) = (DepthState::default(), Blend::Replace);
-        Self { cull, depth, stencil: None, blend, colour_mask: [true; 4], others: [None; MAX_TARGETS - 1] }
+        let others = [None; MAX_TARGETS - 1];
+        Self { cull, depth, stencil: None, blend, colour_mask: [true; 4], others, centroid: false }
     }
 
     /// Whether the nearest sample and its colour are stored, as the sample test does without further state.

@@ -179,9 +179,18 @@ const BLOCK: u32 = 4;
 /// Level of detail as one or two mip levels and the weight of the coarser one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Footprint {
-    fine: usize,
-    coarse: usize,
-    weight: f32,
+    pub(crate) fine: usize,
+    pub(crate) coarse: usize,
+    pub(crate) weight: f32,
+}
+
+impl Footprint {
+    /// Footprint at a level of detail, 0 for the finest and `last` for the coarsest level; NaN is 0.
+    pub(crate) fn at_lod(lod: f32, last: usize) -> Self {
+        let lod = lod.max(0.0).min(last as f32);
+        let fine = lod as usize;
+        Self { fine, coarse: (fine + 1).min(last), weight: lod - fine as f32 }
+    }
 }
 
 /// A texture at an address in memory.
@@ -208,10 +217,7 @@ impl<'a> Sampler<'a> {
 
     /// Footprint at a level of detail, 0 for the finest level; NaN is 0.
     pub fn at_lod(&self, lod: f32) -> Footprint {
-        let last = self.texture.levels().len() - 1;
-        let lod = lod.max(0.0).min(last as f32);
-        let fine = lod as usize;
-        Footprint { fine, coarse: (fine + 1).min(last), weight: lod - fine as f32 }
+        Footprint::at_lod(lod, self.texture.levels().len() - 1)
     }
 
     /// Filtered texel at `uv` in linear RGBA.

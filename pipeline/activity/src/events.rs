@@ -68,6 +68,7 @@ activity! {
         VertexInvocations "vertex_invocations" "A vertex shader run."
         PixelInvocations "pixel_invocations" "A pixel shader lane run, helper lanes included."
         HelperInvocations "helper_invocations" "A lane run only to complete a quad."
+        CentroidInvocations "centroid_invocations" "Of the pixel lanes: one at the centroid of the samples that its triangle covers."
         ShaderOps "shader_ops" "A multiply-add or simpler operation of one shader lane."
     }
     Compute "compute" "Starts groups of lanes on the shader cores; has their shared memory, buffers, atomics and barriers." {

@@ -10,9 +10,21 @@ use crate::state::Clear;
 use crate::surface::{Layout, SurfaceSpec, Texels};
 use crate::texture::Texture;
 
-/// A surface of a frame.
+/// A surface of a frame, at one level of its chain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct SurfaceId(u32);
+pub struct SurfaceId {
+    /// Number of the finest level in the frame.
+    first: u32,
+    level: u32,
+}
+
+impl SurfaceId {
+    /// The surface at another level, 0 for the finest.
+    #[must_use]
+    pub fn level(self, level: u32) -> Self {
+        Self { level, ..self }
+    }
+}
 
 /// Contents of a target before the first draw of a pass.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -86,11 +98,13 @@ impl Attachments {
 pub enum Binding<'a> {
     /// A texture.
     Texture(&'a Texture),
-    /// A surface that an earlier pass of the frame stored.
+    /// A level of a surface that an earlier pass of the frame stored.
     Surface(SurfaceId),
+    /// All levels of a surface, each of which an earlier pass of the frame stored.
+    Levels(SurfaceId),
 }
 
-/// A surface with its place and its contents.
+/// A level of a surface with its place and its contents.
 #[derive(Clone, Debug)]
 pub(super) struct SurfaceState {
     name: String,
@@ -113,24 +127,54 @@ pub(super) struct Surfaces(Vec<SurfaceState>);
 
 impl Surfaces {
     pub fn create(&mut self, spec: &SurfaceSpec<'_>, tile_px: u32, space: &mut AddressSpace) -> SurfaceId {
-        let region = space.take(Layout::new(spec, tile_px, 0).1);
-        let layout = Layout::new(spec, tile_px, region.address()).0;
-        let (name, spec) = (spec.name.to_owned(), SurfaceSpec { name: "", ..*spec });
-        self.0.push(SurfaceState { name, spec, region, layout, texels: None });
-        SurfaceId(self.0.len() as u32 - 1)
+        let first = self.0.len() as u32;
+        for (level, viewport) in (0..).map_while(|level| Some((level, spec.size_of(level)?))) {
+            let (name, spec) = (level_name(spec.name, level), SurfaceSpec { name: "", viewport, ..*spec });
+            let region = space.take(Layout::new(&spec, tile_px, 0).1);
+            let layout = Layout::new(&spec, tile_px, region.address()).0;
+            self.0.push(SurfaceState { name, spec, region, layout, texels: None });
+        }
+        SurfaceId { first, level: 0 }
     }
 
     pub fn get(&self, id: SurfaceId) -> Option<&SurfaceState> {
-        self.0.get(id.0 as usize)
+        self.0.get(self.index(id)?)
     }
 
     pub fn get_mut(&mut self, id: SurfaceId) -> Option<&mut SurfaceState> {
-        self.0.get_mut(id.0 as usize)
+        let index = self.index(id)?;
+        self.0.get_mut(index)
+    }
+
+    fn index(&self, id: SurfaceId) -> Option<usize> {
+        (id.level < self.levels(id)).then_some(id.first as usize + id.level as usize)
+    }
+
+    /// Levels of a surface, 0 for one of another frame.
+    pub fn levels(&self, id: SurfaceId) -> u32 {
+        self.0.get(id.first as usize).map_or(0, |state| state.spec.levels)
+    }
+
+    /// What a binding reads: levels of a surface.
+    pub fn read_by(&self, binding: &Binding<'_>) -> Vec<SurfaceId> {
+        match *binding {
+            Binding::Texture(_) => Vec::new(),
+            Binding::Surface(id) => vec![id],
+            Binding::Levels(id) => (0..self.levels(id).max(1)).map(|level| id.level(level)).collect(),
+        }
     }
 
     /// The error that `problem` is with a surface in a pass.
     pub fn refused(&self, pass: &str, id: SurfaceId, problem: SurfaceProblem) -> PassError {
-        let surface = self.get(id).map_or_else(|| format!("number {}", id.0), |state| state.name.clone());
+        let number = || level_name(&format!("number {}", id.first), id.level);
+        let missing =
+            || self.0.get(id.first as usize).map_or_else(number, |state| level_name(&state.name, id.level));
+        let surface = self.get(id).map_or_else(missing, |state| state.name.clone());
         PassError::Surface { pass: pass.to_owned(), surface, problem }
     }
+}
+
+/// Name of a level in messages.
+fn level_name(surface: &str, level: u32) -> String {
+    if level == 0 { surface.to_owned() } else { format!("{surface}, level {level}") }
 }

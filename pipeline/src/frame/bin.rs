@@ -5,6 +5,7 @@ use activity::{Counts, Event, PacketCounts};
 use super::pass::Pass;
 use super::test_selection::TestSelector;
 use crate::depth::DepthTile;
+use crate::geometry::Viewport;
 use crate::sample_test::PixelHits;
 use crate::shading::QuadAccess;
 
@@ -55,13 +56,18 @@ impl Bin {
         let (viewport, side) = (pass.settings.viewport, pass.settings.spec.tile_px);
         self.tiles.iter().enumerate().filter_map(move |(index, tile)| {
             let [x, y] = self.tile_origin(pass, index);
-            let [columns, rows] = [viewport.width().saturating_sub(x), viewport.height().saturating_sub(y)];
-            let [columns, rows] = [columns.min(side), rows.min(side)];
-            let row = (1_u64 << columns) - 1;
-            let pixels = (0..rows).fold(0_u64, |mask, r| mask | row << (r * side));
+            let pixels = tile_pixels(viewport, [x, y], side);
             (pixels != 0).then(|| (Self::tile_number(pass, [x, y]), index, pixels, tile.is_some()))
         })
     }
+}
+
+/// Mask of the pixels of the tile at `origin` that are in the image, row by row.
+pub(super) fn tile_pixels(viewport: Viewport, [x, y]: [u32; 2], side: u32) -> u64 {
+    let [columns, rows] = [viewport.width().saturating_sub(x), viewport.height().saturating_sub(y)];
+    let [columns, rows] = [columns.min(side), rows.min(side)];
+    let row = (1_u64 << columns) - 1;
+    (0..rows).fold(0_u64, |mask, r| mask | row << (r * side))
 }
 
 /// Tile tests since the last packet of the bin.

@@ -71,6 +71,9 @@ pub enum SurfaceProblem {
     /// The samples differ.
     #[error("it has {0} samples per pixel, but the pass has {1}; make both the same")]
     Samples(u32, u32),
+    /// It has several levels and several samples.
+    #[error("it has {0} levels and {1} samples per pixel; resolve the samples into a surface with levels")]
+    Levels(u32, u32),
     /// It is a target twice.
     #[error("it is a target of the pass twice; remove one of them")]
     Twice,

@@ -240,7 +240,7 @@ impl<'e> Gpu<'e> {
     }
 
     /// Whether a pass since the last barrier reads `surface`.
-    fn is_read(&self, surface: Surface) -> bool {
+    pub(super) fn is_read(&self, surface: Surface) -> bool {
         self.reads.iter().any(|&address| surface.contains(address))
     }
 
@@ -352,15 +352,20 @@ impl<'e> Gpu<'e> {
     /// Keeps the contents of the targets of a pass, the depths last.
     fn store(&mut self, targets: &Attachments, contents: Vec<Texels>) {
         for ((id, _, store), texels) in targets.all().zip(contents) {
-            let Some(state) = self.surfaces.get_mut(id) else { continue };
-            let place = state.region;
-            state.texels = (store == Store::Store).then(|| Arc::new(texels));
-            // What was stored before is no longer a result either.
-            self.results.retain(|result| *result != place);
-            self.pending.retain(|result| *result != place);
-            if store == Store::Store {
-                self.keep(place);
-            }
+            self.replace(id, (store == Store::Store).then_some(texels));
+        }
+    }
+
+    /// Replaces the contents of a surface by those that a pass stored; `None` drops them.
+    pub(super) fn replace(&mut self, id: SurfaceId, texels: Option<Texels>) {
+        let Some(state) = self.surfaces.get_mut(id) else { return };
+        let (place, is_stored) = (state.region, texels.is_some());
+        state.texels = texels.map(Arc::new);
+        // What was stored before is no longer a result either.
+        self.results.retain(|result| *result != place);
+        self.pending.retain(|result| *result != place);
+        if is_stored {
+            self.keep(place);
         }
     }
 
@@ -378,7 +383,8 @@ impl<'e> Gpu<'e> {
     }
 
     fn reads_of(&self, at: &AddressMap, pass: &RasterPass<'_>) -> Reads {
-        let surfaces = pass.read_surfaces().filter_map(|id| Some(self.surfaces.get(id)?.region.address()));
+        let surfaces =
+            self.surfaces.read_in(pass).filter_map(|id| Some(self.surfaces.get(id)?.region.address()));
         Reads {
             vertices: at.vertices.iter().map(|buffer| buffer.address).collect(),
             tiles: at.textures.iter().flatten().copied().chain(surfaces).collect(),

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use glam::Vec4;
 
-use super::attachments::{Attachment, Attachments, Binding, Load, Store, SurfaceId, Surfaces};
+use super::attachments::{Attachment, Attachments, Binding, Load, Store, Surfaces};
 use super::{Features, Settings, Shading};
 use crate::depth::{BoxGrid, DepthBoxes, DepthTile};
 use crate::geometry::{Camera, Clip, Cull, Geometry, MovingVertex, Projection, Viewport};
@@ -359,9 +359,13 @@ fn bound<'a>(
             known.push((texture, address));
             Some(Bound::texture(Sampler::new(texture, address)))
         }
-        Binding::Surface(id) => {
-            let state = surfaces.get(id)?;
-            Some(Bound::surface(Arc::clone(state.texels.as_ref()?), state.layout))
+        Binding::Surface(_) | Binding::Levels(_) => {
+            let stored = |id| {
+                let state = surfaces.get(id)?;
+                Some((Arc::clone(state.texels.as_ref()?), state.layout))
+            };
+            let levels = surfaces.read_by(binding).into_iter().map(stored);
+            Some(Bound::surface(levels.collect::<Option<_>>()?))
         }
     };
     draws.iter().map(|draw| draw.bindings.iter().filter_map(&mut bind).collect()).collect()
@@ -572,14 +576,6 @@ impl<'a> RasterPass<'a> {
     #[must_use]
     pub fn shaded_per_sample(self) -> Self {
         Self { per_sample: true, ..self }
-    }
-
-    /// Surfaces that its draws read.
-    pub(super) fn read_surfaces(&self) -> impl Iterator<Item = SurfaceId> {
-        self.draws.iter().flat_map(|draw| draw.bindings).filter_map(|binding| match binding {
-            Binding::Surface(id) => Some(*id),
-            Binding::Texture(_) => None,
-        })
     }
 
     /// Pixels of the image, in whole tiles.

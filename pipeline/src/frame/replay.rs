@@ -6,6 +6,7 @@ use super::Shading;
 use super::bin::Bin;
 use super::bin::{BinLog, Work};
 use super::pass::{Pass, Plane, SAMPLE_BYTES, VertexBuffer};
+use super::resolve::{SampleLine, TileResolve, tile_lines};
 use super::surface::{QuadWork, Surface};
 use crate::memory::{Access, Cache, CacheError, LINE_BYTES, MemorySystem};
 use crate::random::mix;
@@ -236,22 +237,7 @@ impl<'a> Replay<'a> {
         let spec = self.pass.settings.spec;
         let pixel_bytes = u64::from(self.pass.settings.samples.per_pixel()) * sample_bytes;
         let first_byte = u64::from(tile) * u64::from(spec.tile_px * spec.tile_px) * pixel_bytes;
-        let (mut remaining, mut open) = (pixels, None);
-        while remaining != 0 {
-            let pixel = u64::from(remaining.trailing_zeros());
-            remaining &= remaining - 1;
-            let first = first_byte + pixel * pixel_bytes;
-            for line in first / LINE_BYTES..=(first + pixel_bytes - 1) / LINE_BYTES {
-                open = match open {
-                    Some((same, held)) if same == line => Some((line, held | 1 << pixel)),
-                    before => {
-                        before.into_iter().for_each(|(line, held)| each(self, line, held));
-                        Some((line, 1 << pixel))
-                    }
-                };
-            }
-        }
-        open.into_iter().for_each(|(line, held)| each(self, line, held));
+        tile_lines([first_byte, pixel_bytes], pixels, |line, held| each(self, line, held));
     }
 
     /// Emit the packets that end the tiles of a bin: their samples are resolved, or stored in surfaces. Depths of a depth
@@ -303,17 +289,20 @@ impl<'a> Replay<'a> {
 
     fn resolve_tile(&mut self, tile: u32, pixels: u64, touched: bool) -> Packet {
         let mut packet = Packet { tile, ..Packet::new(PacketKind::Resolve, self.pass.number) };
-        let counts = &mut packet.counts;
-        counts[Event::PixelsResolved] = pixels.count_ones() * self.pass.views.len() as u32;
+        let count = pixels.count_ones();
+        let mut work = TileResolve { pixels: count * self.pass.views.len() as u32, ..TileResolve::default() };
         if touched {
             let samples: u32 = self.pass.views.iter().map(ExactSizeIterator::len).sum::<usize>() as u32;
-            counts[Event::SamplesResolved] = pixels.count_ones() * samples;
+            work.samples = count * samples;
             let [depth, colour, _] = compressed(self.pass);
             self.lines(tile, pixels, SAMPLE_BYTES, |this, line, _| {
-                let fresh = !this.colour_used[0][line as usize];
-                this.memory.colour(colour + line * LINE_BYTES, false, fresh, counts);
-                this.memory.discard(colour + line * LINE_BYTES);
-                this.memory.discard(depth + line * LINE_BYTES);
+                let [colour, depth] = [colour, depth].map(|base| base + line * LINE_BYTES);
+                let is_fresh = !this.colour_used[0][line as usize];
+                work.reads.push(SampleLine {
+                    address: colour,
+                    is_fresh,
+                    dropped: [Some(colour), Some(depth)],
+                });
             });
         }
         let side = u64::from(self.pass.settings.spec.tile_px);
@@ -321,10 +310,9 @@ impl<'a> Replay<'a> {
         for view in 0..self.pass.views.len() as u64 {
             let first =
                 self.pass.addresses.image.address() + (view * self.pass.tiles() + u64::from(tile)) * bytes;
-            for line in first / LINE_BYTES..=(first + bytes - 1) / LINE_BYTES {
-                self.memory.colour(line * LINE_BYTES, true, true, counts);
-            }
+            work.writes.extend(first / LINE_BYTES..=(first + bytes - 1) / LINE_BYTES);
         }
+        work.count(self.memory, &mut packet.counts);
         packet
     }
 }
@@ -341,6 +329,7 @@ fn count_quad(access: &QuadAccess, work: QuadWork, counts: &mut PacketCounts) {
     counts[Event::QuadsShaded] += 1;
     counts[Event::PixelInvocations] += 4;
     counts[Event::HelperInvocations] += 4 - access.lanes.count_ones();
+    counts[Event::CentroidInvocations] += work.centroids;
     counts[Event::ShaderOps] += 4 * work.ops;
     counts[Event::TextureFetches] += work.fetches;
 }

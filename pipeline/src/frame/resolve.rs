@@ -1,8 +1,10 @@
-//! Resolve: from visible triangles of samples to the image.
+//! Resolve: from the samples of pixels to their means, at the end of a raster pass and as a pass of its own; and the work of the
+//! colour unit that does it.
 
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
 
+use activity::{Event, PacketCounts};
 use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 
@@ -11,6 +13,7 @@ use super::pass::{First, Pass, Plane};
 use super::surface::{Grid, SampleView, Surface, own_pixel};
 use super::{Settings, Shading};
 use crate::depth::DepthTile;
+use crate::memory::{LINE_BYTES, MemorySystem};
 use crate::random::mix;
 use crate::sampling::TileSamples;
 use crate::surface::{SurfaceSpec, Texels};
@@ -185,6 +188,72 @@ fn resolve_tile(
 fn means(pass: &Pass<'_>, sums: &[Vec3], pixels: usize) -> Vec<Vec3> {
     let counts = pass.views.iter().map(|samples| samples.len().max(1) as f32);
     sums.chunks_exact(pixels).zip(counts).flat_map(|(sums, n)| sums.iter().map(move |sum| *sum / n)).collect()
+}
+
+/// Mean of the samples of each pixel of a surface, in linear light and the order of the samples.
+pub(super) fn mean_values(texels: &Texels) -> Vec<Vec4> {
+    let [width, height] = texels.size();
+    let samples = texels.samples() as usize;
+    let mean = |pixel: usize| {
+        let sum: Vec4 = (0..samples).map(|sample| texels.get(pixel * samples + sample)).sum();
+        sum / samples as f32
+    };
+    (0..width as usize * height as usize).into_par_iter().map(mean).collect()
+}
+
+/// A line of samples that is read to resolve them.
+pub(super) struct SampleLine {
+    pub address: u64,
+    /// Whether it holds its clear value.
+    pub is_fresh: bool,
+    /// Lines that are no longer needed afterwards.
+    pub dropped: [Option<u64>; 2],
+}
+
+/// Samples of a tile that become pixels: work of the colour unit.
+#[derive(Default)]
+pub(super) struct TileResolve {
+    /// Words of samples.
+    pub samples: u32,
+    /// Words of pixels.
+    pub pixels: u32,
+    pub reads: Vec<SampleLine>,
+    /// Numbers of the lines that are written whole.
+    pub writes: Vec<u64>,
+}
+
+impl TileResolve {
+    /// Reads the samples, then writes the pixels.
+    pub fn count(&self, memory: &mut MemorySystem, counts: &mut PacketCounts) {
+        counts[Event::SamplesResolved] = self.samples;
+        counts[Event::PixelsResolved] = self.pixels;
+        for SampleLine { address, is_fresh, dropped } in &self.reads {
+            memory.colour(*address, false, *is_fresh, counts);
+            dropped.iter().flatten().for_each(|line| memory.discard(*line));
+        }
+        self.writes.iter().for_each(|line| memory.colour(line * LINE_BYTES, true, true, counts));
+    }
+}
+
+/// Call `each` for every line that holds one of `pixels` of a tile, with the mask of these pixels. The first byte of the tile and
+/// the bytes of a pixel are given.
+pub(super) fn tile_lines([first_byte, pixel_bytes]: [u64; 2], pixels: u64, mut each: impl FnMut(u64, u64)) {
+    let (mut remaining, mut open) = (pixels, None);
+    while remaining != 0 {
+        let pixel = u64::from(remaining.trailing_zeros());
+        remaining &= remaining - 1;
+        let first = first_byte + pixel * pixel_bytes;
+        for line in first / LINE_BYTES..=(first + pixel_bytes - 1) / LINE_BYTES {
+            open = match open {
+                Some((same, held)) if same == line => Some((line, held | 1 << pixel)),
+                before => {
+                    before.into_iter().for_each(|(line, held)| each(line, held));
+                    Some((line, 1 << pixel))
+                }
+            };
+        }
+    }
+    open.into_iter().for_each(|(line, held)| each(line, held));
 }
 
 /// Values by cell.

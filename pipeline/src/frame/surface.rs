@@ -4,8 +4,9 @@ use std::cell::RefCell;
 
 use glam::{Vec2, Vec3, Vec4};
 
-use super::pass::Pass;
-use crate::geometry::Viewport;
+use super::Shading;
+use super::pass::{Draw, Pass};
+use crate::geometry::{Clip, Viewport};
 use crate::sample_test::exact;
 use crate::sampling::{Sample, TileSamples};
 use crate::setup::Corner;
@@ -24,6 +25,8 @@ pub(super) struct QuadWork {
     pub ops: u32,
     /// Fetches of all lanes.
     pub fetches: u32,
+    /// Lanes at the centroid of their samples.
+    pub centroids: u32,
 }
 
 impl QuadWork {
@@ -80,6 +83,8 @@ pub(super) struct Surface<'a> {
     corners: [Corner; 3],
     reference: [[f32; 3]; 3],
     sampler: Option<Sampler<'a>>,
+    /// Corners as the sample test sees them, if pixels are shaded at centroids.
+    covering: Option<[Corner; 3]>,
 }
 
 impl<'a> Surface<'a> {
@@ -92,7 +97,42 @@ impl<'a> Surface<'a> {
         let sampler = textured
             .zip(pass.addresses.textures[draw])
             .map(|(texture, address)| Sampler::new(texture, address));
-        Self { pass, draw, vertices, corners, reference, sampler }
+        let covering = covering(pass, draw, triangle);
+        Self { pass, draw, vertices, corners, reference, sampler, covering }
+    }
+
+    /// Barycentric weights of the point at which a cell is shaded: its middle, or the centroid of the covered samples.
+    fn weights_of(&self, cell: [i32; 2]) -> [f32; 3] {
+        match self.centroid(cell) {
+            Some(at) => weights_at(&self.reference, at),
+            None => shading::cell_weights(&self.reference, cell, self.pass.origin),
+        }
+    }
+
+    /// Image coordinate of the mean of the samples of a pixel that the triangle covers; `None` where it covers the middle or none
+    /// of them, and in draws without centroids.
+    fn centroid(&self, cell: [i32; 2]) -> Option<[f32; 2]> {
+        let (corners, settings) = (self.covering.as_ref()?, self.pass.settings);
+        let (viewport, source) = (settings.viewport, settings.samples);
+        let [x, y] = [u32::try_from(cell[0]).ok()?, u32::try_from(cell[1]).ok()?];
+        if x >= viewport.width() || y >= viewport.height() {
+            return None;
+        }
+        let first = [Viewport::edge(x, viewport.width()), Viewport::edge(y, viewport.height())];
+        let (shear, near) = (&self.pass.projection.shear, self.pass.projection.near);
+        let covers = |s: &Sample| {
+            let rays = [shear.ray(0, first[0] + s.x, s.u), shear.ray(1, first[1] + s.y, s.v)];
+            exact::covers(corners, rays, s.t, near)
+        };
+        if covers(&Sample { x: 0.5, y: 0.5, t: REFERENCE_TIME, ..Sample::default() }) {
+            return None;
+        }
+        let mut samples = vec![Sample::default(); source.per_pixel() as usize];
+        source.pixel_into(x, y, &mut samples);
+        samples.retain(covers);
+        let sum: Vec2 = samples.iter().map(|s| Vec2::new(s.x, s.y)).sum();
+        let mean = sum / samples.len() as f32;
+        (!samples.is_empty()).then(|| [first[0] + mean.x, first[1] + mean.y])
     }
 
     /// Linear RGB radiance and opacity of a cell, a function of the triangle and the cell alone.
@@ -109,7 +149,7 @@ impl<'a> Surface<'a> {
 
     /// Shader input and texel of a cell.
     fn of_cell(&self, cell: [i32; 2]) -> (ShadingPoint, Vec4) {
-        let weights = shading::cell_weights(&self.reference, cell, self.pass.origin);
+        let weights = self.weights_of(cell);
         let texel = self.sampler.map_or(Vec4::ONE, |sampler| {
             let uv = self.uv(weights);
             sampler.sample(uv, &self.footprint(&sampler, cell.map(|c| c >> 1)))
@@ -154,7 +194,9 @@ impl<'a> Surface<'a> {
             self.run_all(lane, self.of_cell([2 * quad[0] + x, 2 * quad[1] + y]));
         };
         let fetches = self.fetch(quad, &mut line);
-        self.work(LANES.into_iter(), of_cell, line).fetching(fetches)
+        let cells = LANES.map(|[x, y]| [2 * quad[0] + x, 2 * quad[1] + y]);
+        let centroids = cells.iter().filter(|cell| self.centroid(**cell).is_some()).count() as u32;
+        QuadWork { centroids, ..self.work(LANES.into_iter(), of_cell, line).fetching(fetches) }
     }
 
     fn run_all(&self, lane: &Lane, (at, texel): (ShadingPoint, Vec4)) {
@@ -173,13 +215,14 @@ impl<'a> Surface<'a> {
         line: impl FnMut(u64),
     ) -> QuadWork {
         if let Some(ops) = self.program().pixel_ops.filter(|_| !self.reads_bindings()) {
-            return QuadWork { ops, fetches: 0 };
+            return QuadWork { ops, ..QuadWork::default() };
         }
         let lines = RefCell::default();
         let work = lanes.fold(QuadWork::default(), |work, own| {
             let lane = Lane::noting(&self.pass.bound[self.draw], &lines);
             run(own, &lane);
-            QuadWork { ops: work.ops.max(lane.ops()), fetches: work.fetches + lane.fetches() }
+            let (ops, fetches) = (work.ops.max(lane.ops()), work.fetches + lane.fetches());
+            QuadWork { ops, fetches, ..work }
         });
         lines.into_inner().into_iter().for_each(line);
         work
@@ -190,8 +233,7 @@ impl<'a> Surface<'a> {
         let Some(sampler) = self.sampler else { return 0 };
         let footprint = self.footprint(&sampler, quad);
         for [x, y] in LANES {
-            let weights =
-                shading::cell_weights(&self.reference, [2 * quad[0] + x, 2 * quad[1] + y], self.pass.origin);
+            let weights = self.weights_of([2 * quad[0] + x, 2 * quad[1] + y]);
             sampler.lines(self.uv(weights), &footprint, &mut line);
         }
         4 * Sampler::fetches(&footprint)
@@ -237,6 +279,17 @@ impl<'a> Surface<'a> {
         let (uv, color) = (self.uv(weights), self.color(weights));
         ShadingPoint { position, normal, to_camera, uv, color, ..ShadingPoint::FACING }
     }
+}
+
+/// Corners that decide which samples of a pixel a triangle covers, if it is shaded at their centroid.
+fn covering(pass: &Pass<'_>, draw: usize, triangle: u32) -> Option<[Corner; 3]> {
+    let Draw { state, geometry, .. } = &pass.draws[draw];
+    let is_whole = [pass.clip, geometry.clip()].iter().all(|clip| *clip == Clip::NONE);
+    if !state.centroid || pass.lens || !is_whole || pass.shading == Shading::PerSample {
+        return None;
+    }
+    let (corners, moving) = pass.moving_corners(triangle);
+    (!moving).then_some(corners)
 }
 
 /// A triangle as seen by one sample.

@@ -1,6 +1,6 @@
 //! Checks of the targets and bindings of a pass, before it is drawn.
 
-use super::attachments::{Attachments, Surfaces};
+use super::attachments::{Attachments, SurfaceId, Surfaces};
 use super::error::{PassError, SurfaceProblem};
 use super::pass::{RasterPass, Target};
 use crate::geometry::Viewport;
@@ -15,6 +15,11 @@ impl Surfaces {
         self.check_targets(pass, targets)?;
         self.check_bindings(pass, targets)?;
         if let Target::Surfaces(targets) = pass.target { self.check_states(pass, targets) } else { Ok(()) }
+    }
+
+    /// What a pass reads.
+    pub fn read_in<'s>(&'s self, pass: &'s RasterPass<'_>) -> impl Iterator<Item = SurfaceId> + 's {
+        pass.draws.iter().flat_map(|draw| draw.bindings).flat_map(|binding| self.read_by(binding))
     }
 
     fn check_targets(&self, pass: &RasterPass<'_>, targets: &Attachments) -> Result<(), PassError> {
@@ -38,7 +43,7 @@ impl Surfaces {
     }
 
     fn check_bindings(&self, pass: &RasterPass<'_>, targets: &Attachments) -> Result<(), PassError> {
-        for id in pass.read_surfaces() {
+        for id in self.read_in(pass) {
             let problem = match self.get(id) {
                 None => SurfaceProblem::Unknown,
                 Some(_) if targets.all().any(|(target, ..)| target == id) => SurfaceProblem::Feedback,
@@ -85,6 +90,9 @@ fn misfit(pass: &RasterPass<'_>, spec: &SurfaceSpec<'_>, is_depth: bool) -> Opti
     }
     if spec.viewport != viewport {
         return Some(SurfaceProblem::Size(size(spec.viewport), size(viewport)));
+    }
+    if spec.levels > 1 && spec.samples > 1 {
+        return Some(SurfaceProblem::Levels(spec.levels, spec.samples));
     }
     (spec.samples != samples).then_some(SurfaceProblem::Samples(spec.samples, samples))
 }

@@ -91,6 +91,13 @@ impl Camera {
         Self::still(pose, positive("half the height of the view", half_height)?, true, near)
     }
 
+    /// An orthographic view along `z` of a screen two units high, for passes over a whole surface.
+    pub(crate) fn of_screen() -> Self {
+        let (open, close) = (Affine3A::IDENTITY, Affine3A::IDENTITY);
+        let (orthographic, shift, clip) = (true, Vec2::ZERO, Clip::NONE);
+        Self { open, close, half_height: 1.0, orthographic, shift, lens: None, near: 0.5, clip }
+    }
+
     fn still(pose: Affine3A, half_height: f32, orthographic: bool, near: f32) -> Result<Self, CameraError> {
         let (shift, near) = (Vec2::ZERO, positive("near depth", near)?);
         Self { open: pose, close: pose, half_height, orthographic, shift, lens: None, near, clip: Clip::NONE }

@@ -262,6 +262,20 @@ impl<'a> Geometry<'a> {
         Ok(Self { open, close, normals: &[], uvs: &[], colors: &[], triangles, clip: Clip::NONE })
     }
 
+    /// One still triangle of finite corners.
+    pub(crate) fn triangle(corners: &'a [Vec3; 3]) -> Self {
+        let triangles = &[[0, 1, 2]];
+        Self {
+            open: corners,
+            close: corners,
+            normals: &[],
+            uvs: &[],
+            colors: &[],
+            triangles,
+            clip: Clip::NONE,
+        }
+    }
+
     /// The geometry with one normal per vertex (at mid-shutter, in world space, of any length).
     ///
     /// # Errors

@@ -21,6 +21,12 @@ pub(crate) fn seen(corners: &[Corner; 3], rows: &SampleRows<'_>, lane: usize) ->
     corners.map(|corner| see(&corner, slope, lens, rows.t[lane]))
 }
 
+/// Whether a sample with these rays ([`crate::geometry::Shear::ray`]) is inside a triangle and beyond the near depth at time `t`.
+pub(crate) fn covers(corners: &[Corner; 3], [across, down]: [[f32; 2]; 2], t: f32, near: f32) -> bool {
+    let seen = corners.map(|corner| see(&corner, [across[0], down[0]], [across[1], down[1]], t));
+    hit(&seen, [true; 2]).is_some_and(|(depth, _)| depth > near)
+}
+
 /// One vertex, with the operations of the kernel in their order.
 fn see(corner: &Corner, slope: [f32; 2], lens: [f32; 2], t: f32) -> Seen {
     let [x, y, w] = corner.at(t);

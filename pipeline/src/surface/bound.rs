@@ -6,7 +6,7 @@ use glam::{Vec2, Vec4};
 
 use super::{Layout, Texels};
 use crate::memory::LINE_BYTES;
-use crate::texture::{Sampler, Wrap, taps};
+use crate::texture::{Footprint, Sampler, Wrap, taps};
 
 /// What a shader reads in one of its slots.
 #[derive(Clone, Debug)]
@@ -15,7 +15,8 @@ pub struct Bound<'a>(Source<'a>);
 #[derive(Clone, Debug)]
 enum Source<'a> {
     Texture(Sampler<'a>),
-    Surface(Arc<Texels>, Layout),
+    /// Levels, from the finest.
+    Surface(Vec<(Arc<Texels>, Layout)>),
 }
 
 impl<'a> Bound<'a> {
@@ -24,37 +25,60 @@ impl<'a> Bound<'a> {
         Self(Source::Texture(sampler))
     }
 
-    /// A surface that an earlier pass wrote.
-    pub(crate) fn surface(texels: Arc<Texels>, layout: Layout) -> Self {
-        Self(Source::Surface(texels, layout))
+    /// Levels of a surface that earlier passes wrote, from the finest.
+    pub(crate) fn surface(levels: Vec<(Arc<Texels>, Layout)>) -> Self {
+        Self(Source::Surface(levels))
     }
 
     /// Filtered texel at `uv`, and the number of bilinear fetches. `line` gets every line that is read.
-    pub(crate) fn fetch(&self, uv: Vec2, lod: f32, line: impl FnMut(u64)) -> (Vec4, u32) {
+    pub(crate) fn fetch(&self, uv: Vec2, lod: f32, mut line: impl FnMut(u64)) -> (Vec4, u32) {
         match &self.0 {
             Source::Texture(sampler) => {
                 let footprint = sampler.at_lod(lod);
                 sampler.lines(uv, &footprint, line);
                 (sampler.sample(uv, &footprint), Sampler::fetches(&footprint))
             }
-            Source::Surface(texels, layout) => (bilinear(texels, layout, uv, line), 1),
+            Source::Surface(levels) => trilinear(levels, uv, lod, &mut line),
         }
     }
 
     /// Unfiltered sample of a pixel; zero outside of a surface and for textures.
     pub(crate) fn load(&self, pixel: [i32; 2], sample: u32, mut line: impl FnMut(u64)) -> Vec4 {
-        let Source::Surface(texels, layout) = &self.0 else { return Vec4::ZERO };
+        let Source::Surface(levels) = &self.0 else { return Vec4::ZERO };
+        let Some((texels, layout)) = levels.first() else { return Vec4::ZERO };
         let Some(value) = texels.at(pixel, sample) else { return Vec4::ZERO };
         line(layout.at(pixel.map(|part| part as u32), sample) / LINE_BYTES * LINE_BYTES);
         value
     }
 }
 
+/// Mean of the two levels next to `lod`, as of a texture, and the number of bilinear fetches. Levels that are not filtered are not
+/// mixed: the nearest is read.
+fn trilinear(
+    levels: &[(Arc<Texels>, Layout)],
+    uv: Vec2,
+    lod: f32,
+    line: &mut impl FnMut(u64),
+) -> (Vec4, u32) {
+    let Some(last) = levels.len().checked_sub(1) else { return (Vec4::ZERO, 0) };
+    let Footprint { fine, coarse, weight } = Footprint::at_lod(lod, last);
+    let mut level = |index: usize| bilinear(&levels[index].0, &levels[index].1, uv, &mut *line);
+    if !is_filtered(&levels[0].0) {
+        return (level(if weight < 0.5 { fine } else { coarse }), 1);
+    }
+    let first = level(fine);
+    if weight == 0.0 { (first, 1) } else { (first.lerp(level(coarse), weight), 2) }
+}
+
+fn is_filtered(texels: &Texels) -> bool {
+    texels.format().can_blend() && texels.samples() == 1
+}
+
 /// Mean of the four texels around `uv` by their distance; border texels continue. Integers, depths and surfaces of several
 /// samples are not filtered: the nearest texel, the first sample.
 fn bilinear(texels: &Texels, layout: &Layout, uv: Vec2, mut line: impl FnMut(u64)) -> Vec4 {
     let (around, fraction) = taps(texels.size(), [Wrap::Clamp; 2], uv);
-    let is_filtered = texels.format().can_blend() && texels.samples() == 1;
+    let is_filtered = is_filtered(texels);
     let nearest = usize::from(fraction.x >= 0.5) + 2 * usize::from(fraction.y >= 0.5);
     let mut previous = u64::MAX;
     let mut read = |[x, y]: [u32; 2]| {
@@ -82,7 +106,7 @@ mod tests {
         let spec = SurfaceSpec::new("ramp", Viewport::new(16, 4).unwrap(), format);
         let mut texels = Texels::filled(&spec, Vec4::ZERO);
         (0..64).for_each(|index| texels.set(index, Vec4::splat((index % 16) as f32)));
-        Bound::surface(Arc::new(texels), Layout::new(&spec, 8, 1024).0)
+        Bound::surface(vec![(Arc::new(texels), Layout::new(&spec, 8, 1024).0)])
     }
 
     fn lines(read: impl FnOnce(&mut dyn FnMut(u64)) -> Vec4) -> (f32, Vec<u64>) {

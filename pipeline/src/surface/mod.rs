@@ -25,12 +25,35 @@ pub struct SurfaceSpec<'a> {
     pub format: Format,
     /// Samples per pixel.
     pub samples: u32,
+    /// Levels of its mip chain, 1 for none.
+    pub levels: u32,
 }
 
 impl<'a> SurfaceSpec<'a> {
-    /// A surface with one sample per pixel.
+    /// A surface with one sample per pixel and one level.
     pub fn new(name: &'a str, viewport: Viewport, format: Format) -> Self {
-        Self { name, viewport, format, samples: 1 }
+        Self { name, viewport, format, samples: 1, levels: 1 }
+    }
+
+    /// The surface with a chain of `levels`, at least one and at most down to a pixel. Each is half as wide and high as the one
+    /// before, rounded down.
+    #[must_use]
+    pub fn with_levels(self, levels: u32) -> Self {
+        let most = self.viewport.width().max(self.viewport.height()).ilog2() + 1;
+        Self { levels: levels.clamp(1, most), ..self }
+    }
+
+    /// The surface with a chain down to one pixel.
+    #[must_use]
+    pub fn mipmapped(self) -> Self {
+        self.with_levels(u32::MAX)
+    }
+
+    /// Size of a level; `None` beyond the last.
+    pub fn size_of(&self, level: u32) -> Option<Viewport> {
+        let side = |side: u32| (side >> level).max(1);
+        let is_there = level < self.levels;
+        is_there.then(|| Viewport::new(side(self.viewport.width()), side(self.viewport.height())))?
     }
 
     /// The surface with `samples` per pixel.
@@ -105,6 +128,10 @@ impl Texels {
 
     pub fn samples(&self) -> u32 {
         self.samples
+    }
+
+    pub fn viewport(&self) -> Viewport {
+        self.viewport
     }
 
     pub fn size(&self) -> [u32; 2] {

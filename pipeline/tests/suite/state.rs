@@ -77,6 +77,7 @@ pub(crate) fn state(r: &mut Uniform) -> DrawState {
         blend: pick(r, &Blend::ALL),
         colour_mask: pick(r, &[[true; 4], [true; 4], [false; 4], mask]),
         others: [None; 3],
+        centroid: r.next() < 0.2,
     }
 }
 

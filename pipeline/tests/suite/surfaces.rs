@@ -1,5 +1,5 @@
-//! Surfaces: passes onto any of them, with any formats, states, load and store operations, leave what storing every sample of
-//! every triangle in order leaves.
+//! Surfaces: passes onto any of them, with any formats, states, load and store operations, resolves and mip chains between them,
+//! leave what storing every sample of every triangle in order, and plain loops over samples and texels, leave.
 
 use std::ops::Range;
 
@@ -11,6 +11,7 @@ use proptest::prelude::*;
 
 use crate::common::stage::*;
 use crate::common::*;
+use crate::levels::{PlainLevel, chain, mixed_levels};
 use crate::state::{changed, mixed, passes, pick, state};
 
 const COLOURS: [Format; 6] =
@@ -38,6 +39,42 @@ impl Shader for Neighbour {
     }
 }
 
+/// Adds a fetch from the levels in slot 0 to a colour.
+struct Coarse {
+    colour: Vec4,
+    lod: f32,
+}
+
+impl Coarse {
+    /// Off the middle of the pixel, so that texels have different weights.
+    fn uv(pixel: [i32; 2]) -> Vec2 {
+        let size = [viewport().width(), viewport().height()].map(|side| side as f32);
+        Vec2::new((pixel[0] as f32 + 0.3) / size[0], (pixel[1] as f32 + 0.9) / size[1])
+    }
+}
+
+impl Shader for Coarse {
+    fn shade(&self, lane: &Lane, at: &ShadingPoint, _: Vec4) -> Vec4 {
+        lane.add(lane.fetch(0, Self::uv(at.pixel), self.lod), self.colour)
+    }
+}
+
+/// What draws of a pass read, by number of the surface.
+#[derive(Clone, Copy)]
+enum Read {
+    Neighbour(usize),
+    /// All levels of a resolved surface, at a level of detail.
+    Levels(usize, f32),
+}
+
+/// Samples that are resolved into a surface with levels, by number.
+#[derive(Clone, Copy)]
+struct Resolving {
+    from: usize,
+    to: usize,
+    drops: bool,
+}
+
 /// Triangles of a soup with a state and colours.
 struct Part {
     triangles: Range<usize>,
@@ -50,7 +87,8 @@ struct Step {
     colours: Vec<(usize, Load<Vec4>, Store)>,
     depth: Option<(usize, Load<Clear>, Store)>,
     parts: Vec<Part>,
-    reads: Option<usize>,
+    reads: Option<Read>,
+    resolves: Option<Resolving>,
 }
 
 /// Random passes over the same triangles.
@@ -59,8 +97,13 @@ struct Story {
     optics: Optics,
     table: SampleTable,
     formats: Vec<Format>,
+    /// Formats of the surfaces with levels.
+    resolved: [Format; 2],
     steps: Vec<Step>,
 }
+
+/// Contents of all samples and of all levels.
+type Contents = (Vec<Option<Vec<Vec4>>>, Vec<Option<Vec<PlainLevel>>>);
 
 fn viewport() -> Viewport {
     Viewport::new(40, 26).unwrap()
@@ -88,14 +131,15 @@ impl Story {
         let mut r = Uniform::new(seed ^ 11);
         let mut formats: Vec<Format> = (0..5).map(|_| pick(&mut r, &COLOURS)).collect();
         formats.extend([Format::D32, Format::D24S8]);
-        let mut written = [false; 7];
-        let steps = (0..3).map(|_| Step::new(&mut r, &formats, &mut written, count)).collect();
+        let (mut written, mut filled) = ([false; 7], [false; 2]);
+        let resolved = [0, 1].map(|_| pick(&mut r, &COLOURS[..5]));
+        let steps = (0..4).map(|_| Step::new(&mut r, &formats, (&mut written, &mut filled), count)).collect();
         let table = SampleTable::low_discrepancy(per_pixel, seed, LensShape::Disk).unwrap();
-        Self { soup: Soup::new(kind, count as u32, seed), optics, table, formats, steps }
+        Self { soup: Soup::new(kind, count as u32, seed), optics, table, formats, resolved, steps }
     }
 
     /// Contents of all surfaces after all passes.
-    fn drawn(&self, spec: &PipelineSpec) -> Vec<Option<Vec<Vec4>>> {
+    fn drawn(&self, spec: &PipelineSpec) -> Contents {
         let settings =
             Settings { spec, viewport: viewport(), samples: &self.table, background: Vec3::splat(0.5) };
         let mut gpu = Gpu::quiet(spec).unwrap();
@@ -104,12 +148,24 @@ impl Story {
             gpu.create(&SurfaceSpec::new("any", viewport(), format).sampled(samples))
         };
         let ids: Vec<SurfaceId> = self.formats.iter().map(|format| surface(&mut gpu, *format)).collect();
+        let mipped = |format| SurfaceSpec::new("levels", viewport(), format).mipmapped();
+        let chains = self.resolved.map(|format| gpu.create(&mipped(format)));
         let camera = camera(self.optics);
         for step in &self.steps {
             let targets = step.attachments(&ids);
-            let bindings: Vec<Binding<'_>> =
-                step.reads.map(|read| Binding::Surface(ids[read])).into_iter().collect();
-            let readers: Vec<Neighbour> = step.parts.iter().map(|part| Neighbour(part.tints.0[0])).collect();
+            let binding = step.reads.map(|read| match read {
+                Read::Neighbour(surface) => Binding::Surface(ids[surface]),
+                Read::Levels(surface, _) => Binding::Levels(chains[surface]),
+            });
+            let bindings: Vec<Binding<'_>> = binding.into_iter().collect();
+            let reader = |part: &Part| -> Box<dyn Shader> {
+                let colour = part.tints.0[0];
+                match step.reads {
+                    Some(Read::Levels(_, lod)) => Box::new(Coarse { colour, lod }),
+                    _ => Box::new(Neighbour(colour)),
+                }
+            };
+            let readers: Vec<Box<dyn Shader>> = step.parts.iter().map(reader).collect();
             let draws: Vec<Draw<'_>> = step
                 .parts
                 .iter()
@@ -117,18 +173,26 @@ impl Story {
                 .map(|(part, reader)| {
                     let Soup { open, close, triangles } = &self.soup;
                     let geometry = Geometry::new(open, close, &triangles[part.triangles.clone()]).unwrap();
-                    let shader: &dyn Shader = if bindings.is_empty() { &part.tints } else { reader };
+                    let shader: &dyn Shader = if bindings.is_empty() { &part.tints } else { &**reader };
                     Draw::new(geometry, shader, Cull::None).with_state(part.state).binding(&bindings)
                 })
                 .collect();
             let pass = RasterPass::new(&camera, &draws, &settings).onto(Target::Surfaces(&targets));
             let pass = if step.reads.is_some() { pass.shaded_per_sample() } else { pass };
             gpu.draw(&pass).unwrap();
+            if let Some(Resolving { from, to, drops }) = step.resolves {
+                let pass = ResolvePass::new("resolve", ids[from]);
+                gpu.resolve(&if drops { pass.dropping() } else { pass }, chains[to]).unwrap();
+                gpu.make_levels("chain", chains[to]).unwrap();
+            }
         }
-        ids.iter().map(|id| gpu.contents(*id)).collect()
+        let levels =
+            |id: &SurfaceId| (0..6).map(|level| PlainLevel::of(&gpu, *id, viewport(), level)).collect();
+        (ids.iter().map(|id| gpu.contents(*id)).collect(), chains.iter().map(levels).collect())
     }
 
-    fn reference(&self) -> Vec<Option<Vec<Vec4>>> {
+    fn reference(&self) -> Contents {
+        let mut chains: Vec<Option<Vec<PlainLevel>>> = vec![None; 2];
         let count = viewport().pixels() * self.table.per_pixel() as usize;
         let mut stored: Vec<Option<Vec<Vec4>>> = vec![None; self.formats.len()];
         for step in &self.steps {
@@ -152,7 +216,15 @@ impl Story {
                     })
                     .collect();
                 for part in &step.parts {
-                    let read = |index: usize| self.neighbour(stored[step.reads?].as_ref()?, index);
+                    let read = |index: usize| match step.reads? {
+                        Read::Neighbour(surface) => self.neighbour(stored[surface].as_ref()?, index),
+                        Read::Levels(surface, lod) => {
+                            let (pixel, width) =
+                                (index / self.table.per_pixel() as usize, viewport().width());
+                            let at = [pixel as u32 % width, pixel as u32 / width].map(|part| part as i32);
+                            Some(mixed_levels(chains[surface].as_ref()?, Coarse::uv(at), lod))
+                        }
+                    };
                     let round = |depth: f32| {
                         self.formats
                             .get(depth_of)
@@ -182,8 +254,23 @@ impl Story {
             for ((surface, store), values) in stores.chain(depth) {
                 stored[surface] = (store == Store::Store).then_some(values);
             }
+            if let Some(Resolving { from, to, drops }) = step.resolves {
+                let samples = self.table.per_pixel() as usize;
+                let all = stored[from].as_ref().unwrap();
+                let mean = |pixel: &[Vec4]| {
+                    let mut sum = Vec4::ZERO;
+                    pixel.iter().for_each(|sample| sum += *sample);
+                    rounded(self.resolved[to], sum / samples as f32)
+                };
+                let size = [viewport().width(), viewport().height()].map(|side| side as usize);
+                let finest = PlainLevel { size, values: all.chunks(samples).map(mean).collect() };
+                chains[to] = Some(chain(finest, |value| rounded(self.resolved[to], value)));
+                if drops {
+                    stored[from] = None;
+                }
+            }
         }
-        stored
+        (stored, chains)
     }
 
     /// Sample to the right of the one with this index.
@@ -202,7 +289,12 @@ fn cleared<V>(load: Load<V>, value: impl Fn(V) -> Vec4) -> Option<Vec4> {
 }
 
 impl Step {
-    fn new(r: &mut Uniform, formats: &[Format], written: &mut [bool; 7], count: usize) -> Self {
+    fn new(
+        r: &mut Uniform,
+        formats: &[Format],
+        (written, filled): (&mut [bool; 7], &mut [bool; 2]),
+        count: usize,
+    ) -> Self {
         let mut free: Vec<usize> = (0..5).collect();
         let targets = pick(r, &[0, 1, 1, 2, 3, 4]);
         let mut chosen = Vec::new();
@@ -210,7 +302,11 @@ impl Step {
             chosen.push(free.remove((r.next() * free.len() as f32) as usize));
         }
         // A pass of a reader has one colour.
-        let reads = free.iter().copied().find(|surface| written[*surface] && chosen.len() == 1);
+        let neighbour = free.iter().copied().find(|surface| written[*surface]).map(Read::Neighbour);
+        let levels =
+            (0..2).find(|surface| filled[*surface]).map(|surface| Read::Levels(surface, 5.5 * r.next()));
+        let reads = (if r.next() < 0.5 { levels.or(neighbour) } else { neighbour.or(levels) })
+            .filter(|_| chosen.len() == 1);
         let clear = Clear { depth: pick(r, &[f32::INFINITY, 6.0, 0.0]), stencil: pick(r, &[0, 1, 255]) };
         let depth = pick(r, &[None, Some(5), Some(6), Some(6)]);
         let depth = depth.map(|surface| (surface, load(r, written[surface], clear), store(r)));
@@ -234,7 +330,13 @@ impl Step {
                 tints,
             });
         }
-        Self { colours, depth, parts, reads }
+        let from = (0..5).rfind(|surface| written[*surface] && formats[*surface].can_blend());
+        let resolves =
+            from.map(|from| Resolving { from, to: usize::from(r.next() < 0.5), drops: r.next() < 0.3 });
+        if let Some(Resolving { from, to, drops }) = resolves {
+            (written[from], filled[to]) = (!drops, true);
+        }
+        Self { colours, depth, parts, reads, resolves }
     }
 
     fn attachments(&self, ids: &[SurfaceId]) -> Attachments {
@@ -315,15 +417,11 @@ impl Part {
 /// What a format keeps of a value.
 fn rounded(format: Format, value: Vec4) -> Vec4 {
     let [r, g, b, a] = value.to_array();
+    // The nearest code, of two as near the larger: means of codes lie between them.
     let unorm = |x: f32| {
-        (0..=255)
-            .map(|code| code as f32 / 255.0)
-            .min_by(|p, q| {
-                let error =
-                    |code: &f32| (f64::from(*code) * 255.0 - 255.0 * f64::from(x.clamp(0.0, 1.0))).abs();
-                error(p).total_cmp(&error(q)).then(q.total_cmp(p))
-            })
-            .unwrap()
+        let error = |code: &u8| (f64::from(*code) - 255.0 * f64::from(x.clamp(0.0, 1.0))).abs();
+        let code = (0..=255_u8).min_by(|p, q| error(p).total_cmp(&error(q)).then(q.cmp(p)));
+        f32::from(code.unwrap()) / 255.0
     };
     let srgb = |x: f32| srgb8_to_linear(linear_to_srgb8(x));
     match format {
@@ -370,12 +468,17 @@ proptest! {
         };
         let story = Story::new(kind, lens.into(), per_pixel, count, seed);
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        let (ours, reference) = (pool.install(|| story.drawn(&spec)), story.reference());
+        let ((ours, levels), (reference, wanted)) = (pool.install(|| story.drawn(&spec)), story.reference());
         let bits = |all: &[Option<Vec<Vec4>>]| -> Vec<Option<Vec<[u32; 4]>>> {
             all.iter().map(|one| Some(one.as_ref()?.iter().map(|v| v.to_array().map(f32::to_bits)).collect())).collect()
         };
         for (number, (ours, theirs)) in bits(&ours).iter().zip(bits(&reference)).enumerate() {
             prop_assert!(*ours == theirs, "surface {number} of {:?} differs", story.formats[number]);
+        }
+        for (number, (ours, theirs)) in levels.iter().zip(&wanted).enumerate() {
+            let ours: Option<Vec<_>> = ours.as_ref().map(|levels| levels.iter().map(PlainLevel::bits).collect());
+            let theirs: Option<Vec<_>> = theirs.as_ref().map(|levels| levels.iter().map(PlainLevel::bits).collect());
+            prop_assert!(ours == theirs, "levels {number} of {:?} differ", story.resolved[number]);
         }
     }
 }

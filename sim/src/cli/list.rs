@@ -228,7 +228,11 @@ const OPTIONS: &[WorkloadOptions] = &[
     WorkloadOptions {
         workload: "compute",
         options: &[
-            Doc("kernel", Names(&["reduction", "histogram", "light_culling"]), "what groups compute"),
+            Doc(
+                "kernel",
+                Names(&["reduction", "mip_chain", "histogram", "light_culling"]),
+                "what groups compute",
+            ),
             Doc("scene", SCENE, "the scene, drawn without motion and without a lens"),
             Doc("group", Words("a power of two, 16 to 1024"), "lanes of a group"),
             Doc("per_lane", Numbers(1.0, 64.0), "pixels of a lane, of reduction and histogram"),

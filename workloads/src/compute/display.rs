@@ -11,6 +11,8 @@ use super::histogram::bin;
 pub(super) enum Show {
     /// Colours exposed for this mean luminance, and compressed (Reinhard et al. 2002, equation 3).
     Exposed(Buffer<f32>),
+    /// The same for the luminance of the only texel of a level.
+    ExposedBy(SurfaceView),
     /// Colours whose luminance is the share of values up to their bin, by sums over bins.
     Equalised(Buffer<u32>),
     /// Counts of the tiles of these blocks over the largest, as the colours of a hot body, over the image in grey.
@@ -69,14 +71,20 @@ impl Display {
     }
 }
 
+/// A colour exposed for a mean luminance.
+fn exposed(lane: &GroupLane<'_, '_>, color: Vec3, mean: f32) -> Vec3 {
+    let exposure = lane.mul(KEY, lane.recip(lane.max(mean, DARKEST)));
+    let exposed = lane.scale(color, exposure);
+    let over = lane.add(Vec3::ONE, exposed).to_array().map(|part| lane.recip(part));
+    lane.mul(exposed, Vec3::from(over))
+}
+
 impl Show {
     fn color(&self, lane: &GroupLane<'_, '_>, pixel: [u32; 2], color: Vec3) -> Vec3 {
         match self {
-            Self::Exposed(mean) => {
-                let exposure = lane.mul(KEY, lane.recip(lane.max(lane.load(*mean, 0), DARKEST)));
-                let exposed = lane.scale(color, exposure);
-                let over = lane.add(Vec3::ONE, exposed).to_array().map(|part| lane.recip(part));
-                lane.mul(exposed, Vec3::from(over))
+            Self::Exposed(mean) => exposed(lane, color, lane.load(*mean, 0)),
+            Self::ExposedBy(level) => {
+                exposed(lane, color, lane.dot(lane.texel(level, [0; 2], 0).truncate(), LUMINANCE))
             }
             Self::Equalised(sums) => {
                 let luminance = lane.dot(color, LUMINANCE);

@@ -5,11 +5,11 @@ use pipeline::random::mix;
 use pipeline::surface::{Format, SurfaceSpec};
 use pipeline::{
     Attachment, Attachments, Clear, Compare, DepthState, Draw, DrawState, Gpu, Lane, LensShape, RasterPass,
-    SampleTable, Shader, ShadingPoint, SurfaceId, SurfaceView, Target, Texture, Viewport,
+    ResolvePass, SampleTable, Shader, ShadingPoint, SurfaceId, SurfaceView, Target, Texture, Viewport,
 };
 use warnings::{Code, Warning};
 
-use super::display::Show;
+use super::display::{LUMINANCE, Show};
 use super::kernels::Kernels;
 use super::light_culling::LightSphere;
 use super::options::{Kernel, Options};
@@ -105,7 +105,8 @@ impl Compute {
         prepass: Option<SurfaceId>,
         gpu: &mut Gpu<'_>,
     ) -> Result<SurfaceId, JobError> {
-        let image = self.surface(gpu, "image", Format::Rgba16f)?;
+        let levels = if self.is_chained() && self.samples.per_pixel() == 1 { u32::MAX } else { 1 };
+        let image = gpu.create(&self.surface_spec("image", Format::Rgba16f)?.with_levels(levels));
         let depth = match prepass {
             Some(depth) => Attachment::loaded(depth),
             None => Attachment::cleared(self.surface(gpu, "depth", Format::D32)?, Clear::default()).dropped(),
@@ -142,9 +143,35 @@ impl Compute {
         Ok((0..self.options.lights).map(|light| LightSphere { centre: centre(light), radius }).collect())
     }
 
+    /// Draws the image of a frame with one sample per pixel, and its mip chain. Samples of a pixel are resolved first. The last
+    /// level is the mean, without the columns and rows that odd sizes leave out.
+    ///
+    /// # Errors
+    /// [`JobError`] if it cannot be drawn.
+    pub fn chain(&self, frame: &Frame, gpu: &mut Gpu<'_>) -> Result<Chain, JobError> {
+        let image = self.image(frame, None, gpu)?;
+        let spec = SurfaceSpec::new("pixels", self.viewport()?, Format::Rgba16f).mipmapped();
+        let pixels =
+            if self.is_chained() && self.samples.per_pixel() == 1 { image } else { gpu.create(&spec) };
+        if pixels != image {
+            gpu.resolve(&ResolvePass::new("resolve", image).dropping(), pixels)?;
+        }
+        gpu.make_levels(CHAIN, pixels)?;
+        let last = pixels.level(spec.levels - 1);
+        let mean = gpu.contents(last).and_then(|texels| Some(texels.first()?.truncate()));
+        Ok(Chain { pixels, last, mean: mean.unwrap_or_default().dot(LUMINANCE) })
+    }
+
+    fn is_chained(&self) -> bool {
+        self.options.kernel == Kernel::MipChain
+    }
+
     fn surface(&self, gpu: &mut Gpu<'_>, name: &str, format: Format) -> Result<SurfaceId, JobError> {
-        let spec = SurfaceSpec::new(name, self.viewport()?, format);
-        Ok(gpu.create(&spec.sampled(self.scene.settings().samples)))
+        Ok(gpu.create(&self.surface_spec(name, format)?))
+    }
+
+    fn surface_spec<'n>(&self, name: &'n str, format: Format) -> Result<SurfaceSpec<'n>, JobError> {
+        Ok(SurfaceSpec::new(name, self.viewport()?, format).sampled(self.scene.settings().samples))
     }
 
     fn raster(
@@ -198,6 +225,20 @@ impl Shader for Flattened<'_> {
     }
 }
 
+/// Start of the names of the passes that draw a mip chain.
+pub const CHAIN: &str = "mean";
+
+/// A mip chain of the image.
+#[derive(Clone, Copy, Debug)]
+pub struct Chain {
+    /// The surface, at its finest level.
+    pub pixels: SurfaceId,
+    /// Its last level, of one texel.
+    pub last: SurfaceId,
+    /// Luminance of that texel.
+    pub mean: f32,
+}
+
 /// What groups made of a frame.
 struct Made {
     image: Vec<Vec3>,
@@ -213,6 +254,7 @@ impl DrawsScene for Compute {
     fn draw_frame(&self, frame: &Frame, gpu: &mut Gpu<'_>) -> Result<Drawn, JobError> {
         let Made { image, facts, warnings } = match self.options.kernel {
             Kernel::Reduction => self.expose(frame, gpu)?,
+            Kernel::MipChain => self.expose_by_chain(frame, gpu)?,
             Kernel::Histogram => self.equalise(frame, gpu)?,
             Kernel::LightCulling => self.heat(frame, gpu)?,
         };
@@ -242,6 +284,14 @@ impl Compute {
         let warning = (cycles >= CYCLES_PER_ACCESS).then(|| Warning::new(Code::BankConflicts, message()));
         let shown = kernels.display(&image, Show::Exposed(mean), &[mean.reads()])?;
         Ok(Made { image: shown, facts: named(facts), warnings: warning.into_iter().collect() })
+    }
+
+    fn expose_by_chain(&self, frame: &Frame, gpu: &mut Gpu<'_>) -> Result<Made, JobError> {
+        let Chain { pixels, last, mean } = self.chain(frame, gpu)?;
+        let (image, level) = (view(gpu, pixels)?, view(gpu, last)?);
+        let mut kernels = Kernels::new(gpu, &self.options)?;
+        let shown = kernels.display(&image, Show::ExposedBy(level), &[level.reads()])?;
+        Ok(Made { image: shown, facts: named([("mean_luminance", f64::from(mean))]), warnings: Vec::new() })
     }
 
     fn equalise(&self, frame: &Frame, gpu: &mut Gpu<'_>) -> Result<Made, JobError> {

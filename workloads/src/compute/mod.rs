@@ -1,6 +1,6 @@
 //! Programs of groups on surfaces that raster passes of the same frame wrote.
 //!
-//! - [`Kernels`]: the mean luminance of an image by a reduction, its histogram by atomics, and the lights of each tile by the
+//! - [`Kernels`]: the mean luminance of an image by a reduction ([`Chain`]: by a mip chain), its histogram by atomics, and the lights of each tile by the
 //!   depths of a pre-pass.
 //! - [`Options`]: sizes of groups, layouts of shared memory and kinds of atomics; [`Blocks`], [`Order`]: which pixels a lane
 //!   works on, and the steps of a tree.
@@ -20,7 +20,7 @@ use pipeline::{GroupLane, SurfaceView};
 pub use block::{Blocks, Order};
 pub use histogram::{Atomics, bin};
 pub(crate) use job::FLAGS;
-pub use job::{ATOMICS_PER_WORD, CYCLES_PER_ACCESS, Compute, job};
+pub use job::{ATOMICS_PER_WORD, CHAIN, CYCLES_PER_ACCESS, Chain, Compute, job};
 pub use kernels::{Kernels, TileLights};
 pub use light_culling::LightSphere;
 pub use options::{Kernel, Options};

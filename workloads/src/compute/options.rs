@@ -13,6 +13,8 @@ use crate::job::must_hold;
 pub enum Kernel {
     /// Mean luminance of the image, for its exposure.
     Reduction,
+    /// The same by a mip chain, which raster passes draw from level to level.
+    MipChain,
     /// Histogram of the luminance of the image, to equalise it.
     Histogram,
     /// Lights that reach each tile of the image.

@@ -5,7 +5,7 @@ use glam::{Vec2, Vec3, Vec4};
 use pipeline::sampling::{Pattern, SampleSource};
 use pipeline::{
     Attachment, Attachments, Binding, Blend, Camera, Clear, Cull, DepthState, Draw, DrawState, Format,
-    Geometry, Gpu, RasterPass, Rendered, SampleSpec, SampleTable, Shader, SurfaceId, SurfaceSpec, Target,
+    Geometry, Gpu, RasterPass, Rendered, ResolvePass, SampleSpec, Shader, SurfaceId, SurfaceSpec, Target,
     Viewport,
 };
 use serde::{Deserialize, Serialize};
@@ -13,7 +13,7 @@ use warnings::{Code, Warning};
 
 use super::buffer::{GBuffer, NormalFormat, Writer};
 use super::lights::{bounds, point_lights};
-use super::shaders::{CameraRays, Forward, Resolve, Screen, Volume};
+use super::shaders::{CameraRays, Forward, Screen, Volume};
 use crate::error::LoadError;
 use crate::job::{
     Drawn, DrawsScene, Fact, Flag, Flags, IMAGE_SIZE, Job, JobError, OptionSource, Request, must_hold,
@@ -106,8 +106,6 @@ pub struct Deferred {
     options: Options,
     lights: Vec<PointLight>,
     samples: Box<dyn SampleSource>,
-    /// One sample in the middle of each pixel.
-    middle: SampleTable,
 }
 
 impl Deferred {
@@ -134,8 +132,6 @@ impl Deferred {
         let scene = scene.with_overrides(&overrides)?;
         let wrong = |setting, message: String| LoadError::Setting { setting, message };
         let multisample = SampleSpec { pattern: Pattern::Multisample, ..SampleSpec::default() };
-        let middle = SampleTable::new(&multisample, 1, seed);
-        let middle = middle.map_err(|error| wrong("samples", error.to_string()))?;
         let table = match &overrides.table {
             Some(table) => SampleChoice::load(table)?,
             None => SampleChoice::Described(multisample),
@@ -143,7 +139,7 @@ impl Deferred {
         let first = scene.frame(0).map_err(|error| wrong("frames", error.to_string()))?;
         let lights = point_lights(bounds(&first), options.lights, options.range);
         let samples = table.source(scene.settings().samples, seed)?;
-        Ok(Self { scene, options, lights, samples, middle })
+        Ok(Self { scene, options, lights, samples })
     }
 
     fn regime_warnings(&self, frame: &Frame) -> Vec<Warning> {
@@ -341,13 +337,8 @@ impl<'a> Stage<'a> {
 
     /// The image of the lit samples.
     fn resolve(&self, gpu: &mut Gpu<'_>) -> Result<Rendered, JobError> {
-        let sky = self.job.scene.background();
-        let shader = Resolve { samples: self.job.samples.per_pixel(), sky };
-        let bindings = [Binding::Surface(self.lit)];
-        let draws = [self.screen.draw(&shader, &bindings)?];
-        let (spec, samples, background) = (gpu.spec(), &self.job.middle, sky);
-        let settings = pipeline::Settings { spec, viewport: self.viewport, samples, background };
-        Ok(gpu.draw(&RasterPass::new(self.camera(), &draws, &settings).named("resolve"))?)
+        let pass = ResolvePass::new("resolve", self.lit).dropping();
+        Ok(gpu.resolve_image(&pass, self.job.scene.background())?)
     }
 }
 

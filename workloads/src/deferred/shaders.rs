@@ -1,5 +1,4 @@
-//! Shaders that light surfaces: forward, from a G-buffer by a quad over the screen or by a light volume, and the one that makes the
-//! image of the lit samples.
+//! Shaders that light surfaces: forward, and from a G-buffer by a quad over the screen or by a light volume.
 
 use glam::{Vec3, Vec4};
 use pipeline::{Camera, Lane, Shader, ShadingPoint, Texture};
@@ -97,21 +96,5 @@ impl Shader for Volume {
         let Some(stored) = stored else { return Vec4::ZERO };
         let position = self.rays.at(lane, at.position, stored.depth);
         self.light.radiance(lane, &stored.point, position).extend(0.0)
-    }
-}
-
-/// Mean of the lit samples of a pixel over the sky, which shows where nothing covers it.
-pub(super) struct Resolve {
-    pub samples: u32,
-    pub sky: Vec3,
-}
-
-impl Shader for Resolve {
-    fn shade(&self, lane: &Lane, at: &ShadingPoint, _: Vec4) -> Vec4 {
-        let add = |sum, sample| lane.add(sum, lane.load_sample(0, at.pixel, sample));
-        let sum = (0..self.samples).fold(Vec4::ZERO, add);
-        let mean = lane.scale(sum, 1.0 / self.samples as f32);
-        let uncovered = lane.sub(1.0, mean.w);
-        lane.madd(Vec3::splat(uncovered), self.sky, mean.truncate()).extend(1.0)
     }
 }

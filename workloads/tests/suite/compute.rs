@@ -122,6 +122,36 @@ fn the_mean_of_one_grey_is_the_grey() {
     assert_eq!((found, luminances), (grey, vec![grey; 64 * 32]));
 }
 
+/// A chain keeps halves and leaves out the last row or column of odd sizes.
+#[test]
+fn the_mean_of_a_mip_chain_is_that_of_its_pixels() {
+    let options = Options { kernel: Kernel::MipChain, ..Options::default() };
+    let error = |size: (u32, u32), samples: u32| {
+        let (spec, job) = (hardware(), job(&options, size, samples));
+        let mut gpu = Gpu::quiet(&spec).unwrap();
+        let chain = job.chain(&first_frame(&job), &mut gpu).unwrap();
+        let pixels = luminances(&gpu.contents(chain.pixels).unwrap());
+        assert_eq!(pixels.len() as u32, size.0 * size.1);
+        let names: Vec<String> = gpu.finish().passes.into_iter().map(|pass| pass.name).collect();
+        assert_eq!(names.iter().filter(|name| *name == "resolve").count(), usize::from(samples > 1));
+        let exact = pixels.iter().copied().map(f64::from).sum::<f64>() / pixels.len() as f64;
+        (f64::from(chain.mean) / exact - 1.0).abs()
+    };
+    for samples in [1, 4] {
+        // Six levels of halves, each with an error of half a step.
+        assert!(error((64, 32), samples) < 6.0 * 2.0_f64.powi(-11));
+        assert!(error((127, 31), samples) > 6.0 * 2.0_f64.powi(-11), "odd sizes");
+    }
+}
+
+#[test]
+fn a_mip_chain_exposes_as_the_reduction_does() {
+    let image = |kernel| packets(&Options { kernel, ..Options::default() }, 2).1;
+    let [chain, reduction] = [Kernel::MipChain, Kernel::Reduction].map(image);
+    let most = chain.iter().zip(&reduction).map(|(a, b)| (*a - *b).abs().max_element()).fold(0.0, f32::max);
+    assert!(most < 0.05 && chain != vec![chain[0]; chain.len()], "{most}");
+}
+
 #[test]
 fn bank_conflicts_are_those_of_the_layout() {
     let conflicts = |order, stride, padded| {

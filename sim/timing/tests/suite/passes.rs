@@ -6,7 +6,8 @@ use timing::stepped::StepOptions;
 use timing::{MachineSpec, Recorder, Timed};
 
 use crate::common::{
-    Packets, bound_level, clocks, packet_level, packet_level_into, plain, read, size, stepped, stepped_into,
+    Packets, bound_level, client, clocks, packet_level, packet_level_into, plain, read, size, stepped,
+    stepped_into,
 };
 use crate::conservation::{OF_BARRIERS, machine, passes, through_levels, total};
 
@@ -158,6 +159,25 @@ fn a_barrier_waits_for_the_lines_that_are_read_before() {
     let [truth, found, _] = levels(&machine, &packets).map(|timed| timed.cycles);
     assert!(alone > 500);
     assert_eq!([truth, found], [alone + 1 + 20 + 1, alone_packet + 1 + 20 + 1]);
+}
+
+/// A pass that resolves `n` tiles follows the tiles before it without a barrier, and a tile takes the longer of its reads and its
+/// writes. The six units before that of colour have no work, but a cycle of latency each.
+#[test]
+fn a_resolve_takes_the_longer_of_its_reads_and_its_writes() {
+    let mut machine = plain();
+    machine.colour = client("{\"samples_resolved\": 4, \"pixels_resolved\": 1}");
+    for (n, samples, pixels) in [(1_u32, 256, 32), (10, 256, 32), (10, 64, 64), (40, 4, 1)] {
+        let mut packets = pass(0, 5, 30);
+        let counts = [(Event::SamplesResolved, samples), (Event::PixelsResolved, pixels)];
+        packets.extend((0..n).map(|_| of(1, PacketKind::Resolve, &counts)));
+        let each = u64::from((samples / 4).max(pixels));
+        let alone = front_takes(5) + 30 + 1 + 6;
+        let [truth, found, bound] = levels(&machine, &packets).map(|timed| timed.cycles);
+        assert_eq!([truth, found], [alone + u64::from(n) * each; 2], "{n} {samples} {pixels}");
+        // It may miss the latency of the path: seven units.
+        assert!(bound.abs_diff(truth) <= 7, "bound: {bound} for {truth}");
+    }
 }
 
 /// With `c` cycles in the front end and `t` in the tiles, and `c < t <= c + 5`.

@@ -7,7 +7,7 @@ use pipeline::Gpu;
 use pipeline::sampling::{Sample, SampleSource};
 use run::{GpuSpec, Observed, Plan, RunError, RunOptions, frames_of};
 use workloads::Overrides;
-use workloads::compute::{Atomics, Compute, Kernel, Kernels, LightSphere, Options, Order, TileLights};
+use workloads::compute::{Atomics, CHAIN, Compute, Kernel, Kernels, LightSphere, Options, Order, TileLights};
 use workloads::job::{DrawsScene, OptionSource};
 use workloads::scene::Frame;
 
@@ -33,6 +33,8 @@ const LIST: u32 = 512;
 const GPU: &str = "reference";
 /// The pass that writes the image.
 const DISPLAY: &str = "display";
+/// The mean by a mip chain.
+pub(super) const CHAIN_METHOD: &str = "mip chain";
 /// Seed of samples and lights.
 const SEED: u64 = 1;
 
@@ -88,6 +90,7 @@ impl Case {
                 add(Sweep::Step, f64::from(step), method, Options { step, ..kernel.clone() });
             }
         }
+        add(Sweep::Step, 1.0, CHAIN_METHOD, Options { kernel: Kernel::MipChain, ..Options::default() });
         for tile_px in TILES {
             for (method, depth_bounds) in [("depth bounds", true), ("frustum", false)] {
                 let options = Options { tile_px, depth_bounds, ..culling.clone() };
@@ -158,6 +161,11 @@ impl Bench {
                 })?;
                 Some((mean / self.mean - 1.0).abs())
             }
+            (Sweep::Step, Kernel::MipChain) => {
+                let mut gpu = Gpu::quiet(&self.gpu.pipeline).map_err(RunError::setting)?;
+                let chain = job.chain(frame, &mut gpu).map_err(RunError::setting)?;
+                Some((f64::from(chain.mean) / self.mean - 1.0).abs())
+            }
             (Sweep::Step, _) => {
                 let other = histogram(&job, &self.gpu, frame, options)?;
                 let share = |bins: &[u32]| {
@@ -220,12 +228,14 @@ fn job(options: &Options, size: (u32, u32)) -> Result<Compute, RunError> {
     Ok(Compute::new(options.clone(), &overrides, SEED)?)
 }
 
-/// Cycles, energy of the events and conflicts of the passes of the program: those of groups but the one that writes the image.
+/// Cycles, energy of the events and conflicts of the passes of the program: those of groups but the one that writes the image, and
+/// those that draw a mip chain.
 fn cost(plan: &Plan, observed: &Observed) -> [f64; 3] {
     let (mut all, mut before_ps) = ([0.0; 3], 0);
     for (pass, time) in observed.report.passes.iter().zip(&observed.times) {
         let counts = pass.counts();
-        if counts[Event::Groups] > 0 && pass.name != DISPLAY {
+        let is_of_groups = counts[Event::Groups] > 0 && pass.name != DISPLAY;
+        if is_of_groups || pass.name.starts_with(&format!("{CHAIN} level ")) {
             all[0] += (time.end_ps - before_ps) as f64 * 1e-12 * plan.gpu.core_hz;
             all[1] += plan.model.counts_energy(&counts).total_j();
             all[2] += (counts[Event::BankConflicts] + counts[Event::AtomicConflicts]) as f64;

@@ -13,7 +13,7 @@ use serde::Serialize;
 use crate::study::table::{Sheet, Table, count, fixed, optional, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
 use crate::study::{Gallery, Study, StudyError};
-use measure::{Bench, Case};
+use measure::{Bench, CHAIN_METHOD, Case};
 
 /// How much is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -161,7 +161,7 @@ impl ComputeRow {
     fn subject(&self) -> &'static str {
         match (self.sweep, self.method) {
             (Sweep::Tile, _) => "lights of tiles",
-            (_, "reduction") => "mean luminance",
+            (_, "reduction" | CHAIN_METHOD) => "mean luminance",
             _ => "histogram of luminance",
         }
     }
@@ -169,7 +169,7 @@ impl ComputeRow {
     fn error_name(&self) -> &'static str {
         match (self.sweep, self.method) {
             (Sweep::Tile, _) => "lights in lists that reach nothing",
-            (_, "reduction") => "error of the mean luminance",
+            (_, "reduction" | CHAIN_METHOD) => "error of the mean luminance",
             _ => "wrong shares of the histogram",
         }
     }
@@ -255,6 +255,11 @@ mod tests {
             assert!(row(Sweep::Step, method, 8.0).error_percent > Some(0.0), "{method}");
             assert!(row(Sweep::Step, method, 8.0).cycles < row(Sweep::Step, method, 1.0).cycles);
         }
+        let chain = row(Sweep::Step, CHAIN_METHOD, 1.0);
+        assert!(
+            chain.cycles > 0.0 && chain.error_percent > Some(0.0),
+            "odd sizes leave texels out: {chain:?}"
+        );
         let [with, without] = ["depth bounds", "frustum"].map(|method| row(Sweep::Tile, method, 16.0));
         assert!(with.error_percent < without.error_percent, "{with:?} {without:?}");
     }
