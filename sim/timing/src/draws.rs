@@ -73,11 +73,11 @@ pub struct DrawSpan {
 
 /// A packet that has left the machine.
 #[derive(Clone, Copy, Debug)]
-struct Left {
-    pass: u32,
-    draw: u32,
-    batch: u32,
-    at: Time,
+pub(crate) struct Left {
+    pub pass: u32,
+    pub draw: u32,
+    pub batch: u32,
+    pub at: Time,
 }
 
 /// The draws of a frame, from its packets in the order of the stream.
@@ -121,6 +121,11 @@ impl DrawTimes {
             self.ahead.pop_front();
         }
         self.advance(left);
+    }
+
+    /// Record that the last tile leaves later than it was said to.
+    pub fn delayed(&mut self, tile: Left) {
+        self.advance(tile);
     }
 
     fn advance(&mut self, left: Left) {

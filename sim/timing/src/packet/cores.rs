@@ -4,12 +4,14 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use super::calendar::{Calendar, QueueTimes};
+use super::drain::{Drain, OnCores};
 use super::memory::Memory;
 use super::station::aligned;
 use super::{Span, Visit};
 use crate::clock::{Clocks, Time};
 use crate::data_unit::DataUnit;
 use crate::demand::{DemandBuilder, ServiceDemand, Station, share};
+use crate::draws::Left;
 use crate::spec::MachineSpec;
 
 /// Cycles per slot of the calendars.
@@ -35,6 +37,10 @@ pub(super) struct Run {
     pub done: Time,
     /// When the packet leaves the cores.
     pub departed: Time,
+    /// How long its last warps wait for their data.
+    pub waited: Time,
+    /// When they have them.
+    pub ready: Time,
     /// When its data unit works on it.
     pub data: Span,
     /// When its lines pass the L2 and memory.
@@ -95,11 +101,17 @@ impl GroupRoom {
         Self { machine: machine.clone(), ends: BinaryHeap::new() }
     }
 
+    /// Groups like that of `demand` that have room at once; all packets of other kinds have.
+    fn most(&self, demand: &ServiceDemand, warps: u32) -> usize {
+        demand.group.map_or(usize::MAX, |group| {
+            let per_core = self.machine.groups_per_core(warps, group.shared_bytes).max(1);
+            self.machine.shader.cores.get() as usize * per_core as usize
+        })
+    }
+
     /// When there is room for the group of `demand`; 0 for other packets.
     fn at(&mut self, demand: &ServiceDemand, warps: u32) -> Time {
-        let Some(group) = demand.group else { return 0 };
-        let per_core = self.machine.groups_per_core(warps, group.shared_bytes).max(1);
-        let most = self.machine.shader.cores.get() as usize * per_core as usize;
+        let most = self.most(demand, warps);
         let mut room = 0;
         while self.ends.len() >= most
             && let Some(Reverse(end)) = self.ends.pop()
@@ -117,11 +129,15 @@ pub(super) struct Cores {
     /// Warp launches, one per cycle.
     sends: Calendar,
     lanes: Calendar,
+    /// Warp slots of the cores, which both kinds share.
+    slots: Calendar,
+    cores: u32,
     period: Time,
     alu: Time,
     lanes_of_core: u32,
     warp_lanes: u32,
     groups: GroupRoom,
+    drain: Drain,
     data: [DataState; DataUnit::ALL.len()],
 }
 
@@ -135,9 +151,12 @@ impl Cores {
             fifos: [fifo.clone(), fifo],
             sends: Calendar::new(Time::from(SLOT_CYCLES) * period, 1),
             lanes: Calendar::new(Time::from(SLOT_CYCLES) * period, spec.cores.get() * spec.lanes.get()),
+            slots: Calendar::new(Time::from(SLOT_CYCLES) * period, spec.cores.get() * spec.warps.get()),
+            cores: spec.cores.get(),
             period,
             alu: period * Time::from(spec.alu_latency_cycles),
             groups: GroupRoom::new(machine),
+            drain: Drain::new(machine, clocks),
             lanes_of_core: spec.lanes.get(),
             warp_lanes: spec.warp_lanes.get(),
             data: DataUnit::ALL.map(|unit| DataState::new(machine, clocks, unit)),
@@ -149,6 +168,11 @@ impl Cores {
         &self.lanes
     }
 
+    /// When the last work that made room for other work ends.
+    pub fn yielded(&self) -> Time {
+        self.lanes.yielded().max(self.slots.yielded())
+    }
+
     /// Simulate a packet of vertices or pixels, or a group.
     pub fn run(&mut self, visit: &Visit<'_>, builder: &DemandBuilder, memory: &mut Memory) -> Run {
         let demand = visit.demand;
@@ -157,7 +181,15 @@ impl Cores {
         let fifo = &mut self.fifos[kind];
         let taken = visit.arrive.max(fifo.sent).max(fifo.flights.room_at());
         let room = taken.max(self.groups.at(demand, warps));
-        let mut run = Run { taken, done: taken, departed: taken, data: Span::NONE, memory: Span::NONE };
+        let mut run = Run {
+            taken,
+            done: taken,
+            departed: taken,
+            waited: 0,
+            ready: 0,
+            data: Span::NONE,
+            memory: Span::NONE,
+        };
         let uses_data = kind == 1 && demand.uses_data();
         for first in (0..warps).step_by(WARPS_PER_CHUNK as usize) {
             let chunk = Chunk { first, count: WARPS_PER_CHUNK.min(warps - first), of: warps };
@@ -168,18 +200,44 @@ impl Cores {
             if uses_data {
                 ready = self.data(visit, &chunk, ready, builder, memory, &mut run);
             }
-            let done = self.operate(visit, &chunk, ready);
+            run.ready = ready.to;
+            run.waited = ready.to - (sent.to + self.period).min(ready.to);
+            let done = self.operate(visit, &chunk, sent.from, ready);
             self.fifos[kind].slots.note_all(chunk.count, done.from, done.to);
             run.done = run.done.max(done.to);
         }
         if demand.group.is_some() {
             self.groups.ends.push(Reverse(run.done));
         }
+        if kind == 1 {
+            self.drain.note(demand, self.on_cores(visit, warps, &run));
+        }
         let fifo = &mut self.fifos[kind];
         run.departed = aligned(run.done.max(fifo.departed).max(visit.room), self.period);
         fifo.departed = run.departed;
         fifo.flights.note(run.departed);
         run
+    }
+
+    fn on_cores(&self, visit: &Visit<'_>, warps: u32, run: &Run) -> OnCores {
+        let demand = visit.demand;
+        OnCores {
+            arrive: visit.arrive,
+            data: run.waited,
+            ready: run.ready,
+            warps,
+            threads: demand.threads,
+            ops: demand.ops,
+            steps: demand.steps(),
+            room: self.groups.most(demand, warps),
+            behind: 0,
+            latency: 0,
+        }
+    }
+
+    /// When the last packets of pixels and groups have left, if none comes any more; in the calendars they have left at `calendar`.
+    pub fn drain(&mut self, calendar: Time) -> Option<Left> {
+        self.drain.end(calendar)
     }
 
     /// Send warps, one per cycle, as slots on the cores and in front of the data unit become free. Returns when the
@@ -242,22 +300,30 @@ impl Cores {
         Span { from: first + state.latency, to: departed + state.latency }
     }
 
-    /// Run the operations of some warps, ready between `ready.from` and `ready.to`. Returns when the first and
+    /// Run the operations of some warps, sent from `sent` on and ready between `ready.from` and `ready.to`. Returns when the first and
     /// the last warp are done.
-    fn operate(&mut self, visit: &Visit<'_>, chunk: &Chunk, ready: Span) -> Span {
+    fn operate(&mut self, visit: &Visit<'_>, chunk: &Chunk, sent: Time, ready: Span) -> Span {
         let demand = visit.demand;
         let part = |part: u32| share(demand.threads, part, chunk.of).start;
         let threads = part(chunk.first + chunk.count) - part(chunk.first);
         let operations = u64::from(threads) * u64::from(demand.ops);
-        // A warp wider than a core takes several cycles per operation.
-        let wide = Time::from(threads.div_ceil(chunk.count).div_ceil(self.lanes_of_core).saturating_sub(1))
-            * self.period;
-        let alone = Time::from(demand.steps().max(1)) * (self.alu + wide);
+        // A warp wider than a core takes several cycles per operation. One of a group has operations in some of its steps only.
+        let steps = u64::from(demand.steps().max(1));
+        let lanes = operations.div_ceil(steps * u64::from(chunk.count));
+        let wide = lanes.div_ceil(u64::from(self.lanes_of_core)).saturating_sub(1) * self.period;
+        // Its warps have the lanes of as many cores, those of a group of one.
+        let cores = if demand.group.is_some() { 1 } else { chunk.count.min(self.cores) };
+        let of_cores = u64::from(cores * self.lanes_of_core);
+        let alone = (steps * (self.alu + wide)).max(operations * self.period / of_cores);
         let issued = match operations * self.period {
             0 => 0,
             work => self.lanes.reserve_as(visit.turn, ready.from, work).1,
         };
-        let last = (ready.to + alone).max(issued + self.alu.saturating_sub(self.period));
+        // Warps of both kinds take turns on the slots. How long others keep the lanes does not count, as a warp is faster with
+        // fewer beside it.
+        let held = u64::from(chunk.count) * (alone + ready.from.saturating_sub(sent));
+        let held = self.slots.reserve_as(visit.turn, sent, held).1;
+        let last = (ready.to + alone).max(issued + self.alu.saturating_sub(self.period)).max(held);
         Span { from: last - (ready.to - ready.from).min(last - ready.from), to: last }
     }
 }

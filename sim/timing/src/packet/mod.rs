@@ -27,6 +27,7 @@
 
 mod calendar;
 mod cores;
+mod drain;
 mod levels;
 mod memory;
 mod station;
@@ -237,6 +238,9 @@ impl PacketClock {
 
     /// Move a packet from its first station to its last.
     fn walk(&mut self, demand: &ServiceDemand, counts: &PacketCounts, lines: &[LineAccess]) {
+        if demand.barrier.is_some() {
+            self.drain();
+        }
         let first = demand.first();
         // A barrier comes when all packets before it have left.
         let mut arrive = if demand.barrier.is_some() { self.end } else { self.gates.opens(demand) };
@@ -274,10 +278,20 @@ impl PacketClock {
         }
         self.tally.packet_done(counts);
         if turn == Turn::Late {
-            let yielded = self.cores.lanes().yielded().max(self.memory.yielded());
+            let yielded = self.cores.yielded().max(self.memory.yielded());
             self.gates.delay(yielded);
             self.end = self.end.max(yielded);
         }
+    }
+
+    /// The cores run empty.
+    fn drain(&mut self) {
+        let Some(drained) = self.cores.drain(self.end).filter(|drained| drained.at > self.end) else {
+            return;
+        };
+        self.end = drained.at;
+        self.passes.note(drained.pass, Time::MAX, drained.at);
+        self.draws.delayed(drained);
     }
 
     fn serve(&mut self, visit: &Visit<'_>, counts: &PacketCounts, memory: &mut Span) -> Time {
@@ -306,6 +320,7 @@ impl PacketClock {
     /// Activity of all packets added.
     pub fn finish(mut self) -> Timed {
         self.catch_up(None);
+        self.drain();
         let end = self.end.max(self.memory.ends_at());
         let end_ps = self.clocks.ps(end);
         let channels = self.memory.buses().count() as u64;

@@ -284,3 +284,22 @@ fn rows_and_banks_by_hand() {
     // First ready first come: line 1 overtakes line 16.
     assert_eq!(run(&[0, 16, 1]), run(&[0, 1, 16]));
 }
+
+/// Tiles with a warp each come faster than the lanes serve them. The cores serve those under way in turn, so the last ones leave
+/// lanes idle. `packet` knows how long that takes, whatever the number of tiles.
+#[test]
+fn cores_run_empty_as_they_serve_warps_in_turn() {
+    let mut machine = plain();
+    let shader = &mut machine.shader;
+    (shader.lanes, shader.warp_lanes, shader.warps) = (size(32), size(32), size(16));
+    (shader.cores, shader.in_flight, shader.alu_latency_cycles) = (size(2), size(32), size(8));
+    for tiles_of_stream in [20, 40, 80, 300] {
+        let counts =
+            vec![(Event::PixelInvocations, 32), (Event::ShaderOps, 32 * 40), (Event::ColourWrites, 16)];
+        let packets = tiles((0..tiles_of_stream).map(|_| counts.clone()));
+        let truth = stepped(&machine, &packets).cycles;
+        let found = packet_level(&machine, clocks(), &packets).cycles;
+        let off = found as f64 / truth as f64 - 1.0;
+        assert!(off.abs() < 0.02, "{tiles_of_stream} tiles: {found} of {truth}");
+    }
+}

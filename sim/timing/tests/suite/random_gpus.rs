@@ -1,7 +1,7 @@
 //! GPUs drawn at random: how far `packet` is off on the streams that challenge it.
 
-use timing::streams::failures;
-use timing::{AccuracyWarning, Level};
+use timing::streams::{Failure, failures};
+use timing::{AccuracyWarning, Level, Timed};
 
 use crate::common::size;
 use crate::rates::Gpu;
@@ -64,42 +64,86 @@ fn drawn(seed: u64) -> Gpu {
     gpu
 }
 
-/// Streams by GPU on which `packet` is more than 8 % off and does not warn: what was found, 14 of 120.
-const FAR: [(u64, &str); 14] = [
+/// Streams by GPU on which `packet` is more than 8 % off and does not warn: what was found, 8 of 120.
+const FAR: [(u64, &str); 8] = [
     (1, "thrashing caches"),
-    (2, "work in turn"),
-    (2, "passes side by side"),
-    (2, "groups that fill a core"),
     (2, "groups that stream"),
     (3, "passes in a chain"),
     (4, "groups that stream"),
-    (5, "groups that fill a core"),
-    (7, "groups that fill a core"),
     (7, "groups and draws side by side"),
-    (8, "64 passes of one triangle"),
     (8, "passes in a chain"),
     (8, "groups that stream"),
     (8, "atomics on one word"),
 ];
 
+/// What `packet` and `bound` say of a stream on a GPU.
+struct Pair {
+    seed: u64,
+    name: &'static str,
+    /// Error of the cycles in percent, and whether the level warns.
+    packet: (f64, bool),
+    bound: (f64, bool),
+}
+
+/// All streams on the GPU of a seed.
+fn pairs(seed: u64) -> Vec<Pair> {
+    let gpu = drawn(seed);
+    // Queues of one are slow and the same for all.
+    let cases = failures(&gpu.units, BATCH).into_iter().filter(|case| case.name != "queues of one");
+    let pair = |case: Failure| {
+        let [truth, packet, bound] = gpu.run(&case.units, &case.packets);
+        let judged = |level, timed: &Timed| {
+            let percent = 100.0 * (timed.cycles as f64 / truth.cycles as f64 - 1.0);
+            (percent, !AccuracyWarning::all(level, timed).is_empty())
+        };
+        let pair = Pair {
+            seed,
+            name: case.name,
+            packet: judged(Level::Packet, &packet),
+            bound: judged(Level::Bound, &bound),
+        };
+        let words =
+            |(percent, warns): (f64, bool)| format!("{percent:+.1} %{}", if warns { ", warns" } else { "" });
+        println!("{seed} {}: packet {}; bound {}", pair.name, words(pair.packet), words(pair.bound));
+        pair
+    };
+    cases.map(pair).collect()
+}
+
+/// Seeds to work with, as `SEEDS=100..120`; other than those of the tests.
+#[test]
+#[ignore = "a tool: SEEDS=100..120 cargo test -p timing --release --test suite seeds_to_work_with -- --ignored --nocapture"]
+fn seeds_to_work_with() {
+    let seeds = std::env::var("SEEDS").unwrap_or_default();
+    let (from, to) = seeds.split_once("..").expect("SEEDS=FROM..TO");
+    let all: Vec<_> = (from.parse().unwrap()..to.parse().unwrap()).flat_map(pairs).collect();
+    for (level, of) in
+        [("packet", (|pair: &Pair| pair.packet) as fn(&Pair) -> (f64, bool)), ("bound", |pair| pair.bound)]
+    {
+        let count = |far: bool, warns: bool| {
+            all.iter().map(of).filter(|found| (found.0.abs() > 8.0, found.1) == (far, warns)).count()
+        };
+        let mut errors: Vec<_> = all.iter().map(|pair| of(pair).0.abs()).collect();
+        errors.sort_by(f64::total_cmp);
+        println!(
+            "{level}: {} pairs, median {:.2} %, worst {:.1} %; beyond 8 %: {} warned, {} silent; within: {} warned",
+            all.len(),
+            errors[errors.len() / 2],
+            errors[errors.len() - 1],
+            count(true, true),
+            count(true, false),
+            count(false, true)
+        );
+    }
+}
+
 #[test]
 fn packet_is_close_on_random_gpus_or_warns() {
-    let (mut far, mut errors) = (Vec::new(), Vec::new());
-    for seed in SEEDS {
-        let gpu = drawn(seed);
-        // Queues of one are slow and the same for all.
-        for case in failures(&gpu.units, BATCH).into_iter().filter(|case| case.name != "queues of one") {
-            let [truth, packet, _] = gpu.run(&case.units, &case.packets);
-            let percent = 100.0 * (packet.cycles as f64 / truth.cycles as f64 - 1.0);
-            let warns = !AccuracyWarning::all(Level::Packet, &packet).is_empty();
-            println!("{} on {seed}: {percent:+.1} %{}", case.name, if warns { ", warns" } else { "" });
-            errors.push(percent.abs());
-            if percent.abs() > 8.0 && !warns {
-                far.push((seed, case.name));
-            }
-        }
-    }
+    let all: Vec<_> = SEEDS.flat_map(pairs).collect();
+    let mut errors: Vec<_> = all.iter().map(|pair| pair.packet.0.abs()).collect();
     errors.sort_by(f64::total_cmp);
     assert!(errors[errors.len() / 2] < 2.0, "median {}", errors[errors.len() / 2]);
+    let is_far = |pair: &&Pair| pair.packet.0.abs() > 8.0 && !pair.packet.1;
+    let far: Vec<_> = all.iter().filter(is_far).map(|pair| (pair.seed, pair.name)).collect();
     assert_eq!(far, FAR);
 }

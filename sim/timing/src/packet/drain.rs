@@ -1,0 +1,233 @@
+//! What the order of the calendars misses when the cores run empty.
+//!
+//! The lanes serve all warps in turn, so packets under way together end together: processor sharing (Kleinrock 1967), with a
+//! speed limit, as a warp makes a step in no less than its latency. A calendar serves them one after another. Both do the same
+//! work in the same time while packets come. When none comes any more, the last ones of the lanes leave some of them idle,
+//! and the unit behind still has most of them to do. So packets are served a second time here, in turn. Only the time of a drain
+//! comes from it.
+
+use std::cmp::Reverse;
+use std::collections::{BinaryHeap, VecDeque};
+
+use crate::clock::{Clocks, Time};
+use crate::demand::{ServiceDemand, Station};
+use crate::draws::Left;
+use crate::spec::MachineSpec;
+
+/// A packet of pixels or a group on the cores.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct OnCores {
+    pub arrive: Time,
+    /// How long its warps wait for their data, and when the last have them.
+    pub data: Time,
+    pub ready: Time,
+    pub warps: u32,
+    pub threads: u32,
+    pub ops: u32,
+    /// Operations one after another.
+    pub steps: u32,
+    /// Packets like it that have room on the cores at once.
+    pub room: usize,
+    /// Service in the unit behind, and its latency if the packet goes there.
+    pub behind: Time,
+    pub latency: Time,
+}
+
+/// The cores as they serve packets of pixels and groups in turn, since they were empty.
+#[derive(Clone, Debug)]
+pub(super) struct Drain {
+    /// Packets that have not left, and the number of those that have.
+    packets: VecDeque<InTurn>,
+    left: usize,
+    /// The last packet; its time is not known.
+    last: Option<Left>,
+    /// When the last warp is sent, when the last packet begins, when the last leaves the cores and when the unit behind.
+    sent: f64,
+    started: f64,
+    departed: f64,
+    gone: f64,
+    /// When the last has left the machine.
+    ended: f64,
+    /// The least wait for data.
+    least_data: Time,
+    /// The longest program of a packet alone, and the longest service behind.
+    longest: Time,
+    longest_behind: Time,
+    /// Warp slots taken.
+    held: u64,
+    now: f64,
+    /// Steps so far of a packet that was there from the beginning.
+    steps: f64,
+    /// Lanes of a step of all active packets.
+    lanes: f64,
+    /// Active packets: the steps at which each ends, in parts of [`PARTS`], and its number.
+    active: BinaryHeap<Reverse<(u64, usize)>>,
+    cores: CoreSizes,
+}
+
+/// Parts of a step.
+const PARTS: f64 = 1024.0;
+
+#[derive(Clone, Copy, Debug)]
+struct InTurn {
+    packet: OnCores,
+    done: Option<f64>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct CoreSizes {
+    in_flight: usize,
+    period: Time,
+    alu: Time,
+    lanes: f64,
+    lanes_of_core: u64,
+    slots: u64,
+    /// Latency of the cores and of the unit behind, and its cycle.
+    latencies: [Time; 2],
+    behind_period: Time,
+}
+
+impl Drain {
+    pub fn new(machine: &MachineSpec, clocks: &Clocks) -> Self {
+        let spec = &machine.shader;
+        let period = clocks.period(spec.clock);
+        let latency = |station: Station| {
+            let common = machine.common(station.unit());
+            clocks.period(common.clock) * Time::from(common.latency_cycles)
+        };
+        let cores = CoreSizes {
+            in_flight: spec.in_flight.get() as usize,
+            period,
+            alu: period * Time::from(spec.alu_latency_cycles),
+            lanes: f64::from(spec.cores.get()) * f64::from(spec.lanes.get()),
+            lanes_of_core: spec.lanes.get().into(),
+            slots: u64::from(spec.cores.get()) * u64::from(spec.warps.get()),
+            latencies: [Station::Pixel, Station::Colour].map(latency),
+            behind_period: clocks.period(machine.common(Station::Colour.unit()).clock),
+        };
+        Self {
+            packets: VecDeque::new(),
+            left: 0,
+            last: None,
+            sent: 0.0,
+            started: 0.0,
+            departed: 0.0,
+            gone: 0.0,
+            ended: 0.0,
+            least_data: Time::MAX,
+            longest: 0,
+            longest_behind: 0,
+            held: 0,
+            now: 0.0,
+            steps: 0.0,
+            lanes: 0.0,
+            active: BinaryHeap::new(),
+            cores,
+        }
+    }
+
+    /// Add the next packet.
+    pub fn note(&mut self, demand: &ServiceDemand, mut packet: OnCores) {
+        packet.behind = self.cores.behind_period * Time::from(demand.service[Station::Colour as usize]);
+        packet.latency = if demand.last == Station::Colour { self.cores.latencies[1] } else { 0 };
+        self.last = Some(Left { pass: demand.pass, draw: demand.draw, batch: demand.batch, at: 0 });
+        self.longest = self.longest.max(Time::from(packet.steps) * self.cores.alu);
+        self.longest_behind = self.longest_behind.max(packet.behind);
+        let warps = u64::from(packet.warps);
+        let mut admitted = self.sent.max(packet.arrive as f64);
+        let room = self.cores.in_flight.min(packet.room);
+        while !self.packets.is_empty() && self.packets.len() >= room {
+            admitted = admitted.max(self.leave());
+        }
+        // Its first warp needs a slot.
+        while self.held >= self.cores.slots && self.end_next(f64::INFINITY) {
+            admitted = admitted.max(self.now);
+        }
+        self.sent = admitted + (warps * self.cores.period) as f64;
+        // Waits are longer where packets before it delay its lines; those come no later in turn.
+        self.least_data = self.least_data.min(packet.data);
+        self.started = self.started.max(self.sent + self.least_data as f64).max(packet.ready as f64);
+        self.advance(self.started);
+        let number = self.left + self.packets.len();
+        let work = packet.lanes();
+        let is_idle = work == 0.0;
+        let done = is_idle.then_some(self.started + self.cores.alu as f64);
+        self.packets.push_back(InTurn { packet, done });
+        if !is_idle {
+            self.held += warps;
+            self.lanes += work;
+            let ends = self.steps + f64::from(packet.steps);
+            self.active.push(Reverse(((ends * PARTS) as u64, number)));
+        }
+    }
+
+    /// When the last packet has left, if none comes any more; `None` if there was none. In the calendars they have left at `calendar`.
+    ///
+    /// Lanes are never idle while a packet waits for them, in either order. So no more is lost than the program of a packet,
+    /// and the work behind of those under way.
+    pub fn end(&mut self, calendar: Time) -> Option<Left> {
+        let most = calendar + self.longest + self.longest_behind * self.packets.len() as Time;
+        while !self.packets.is_empty() {
+            self.leave();
+        }
+        (self.steps, self.lanes, self.least_data) = (0.0, 0.0, Time::MAX);
+        (self.longest, self.longest_behind) = (0, 0);
+        self.last.take().map(|last| Left { at: most.min(self.ended as Time), ..last })
+    }
+
+    /// Let the oldest packet leave. Returns when it leaves the cores.
+    fn leave(&mut self) -> f64 {
+        while self.packets.front().is_some_and(|packet| packet.done.is_none()) && self.end_next(f64::INFINITY)
+        {
+        }
+        let Some(InTurn { packet, done }) = self.packets.pop_front() else { return self.departed };
+        self.left += 1;
+        self.departed = self.departed.max(done.unwrap_or(self.now));
+        let arrived = self.departed + self.cores.latencies[0] as f64;
+        self.gone = self.gone.max(arrived) + packet.behind as f64;
+        self.ended = self.ended.max(self.gone + packet.latency as f64);
+        self.departed
+    }
+
+    /// Serve until `to`.
+    fn advance(&mut self, to: f64) {
+        while self.now < to && self.end_next(to) {}
+        self.now = self.now.max(to);
+    }
+
+    /// Serve until a packet ends, or until `to`. Returns whether one ended.
+    fn end_next(&mut self, to: f64) -> bool {
+        let Some(&Reverse((ends, number))) = self.active.peek() else { return false };
+        let packet = self.packets[number - self.left].packet;
+        let ends = ends as f64 / PARTS;
+        let step = self.cores.step(self.lanes, &packet);
+        let until = self.now + (ends - self.steps).max(0.0) * step;
+        if to < until {
+            self.steps += (to - self.now) / step;
+            self.now = to;
+            return false;
+        }
+        (self.steps, self.now) = (self.steps.max(ends), until);
+        self.active.pop();
+        self.lanes -= packet.lanes();
+        self.held -= u64::from(packet.warps);
+        self.packets[number - self.left].done = Some(until);
+        true
+    }
+}
+
+impl CoreSizes {
+    /// Time of a step of all packets, of which `lanes` are active and `packet` ends first.
+    fn step(&self, lanes: f64, packet: &OnCores) -> f64 {
+        let of_warp = (packet.lanes() / f64::from(packet.warps)).ceil() as u64;
+        let wide = of_warp.div_ceil(self.lanes_of_core).saturating_sub(1) * self.period;
+        (lanes * self.period as f64 / self.lanes).max((self.alu + wide) as f64)
+    }
+}
+
+impl OnCores {
+    /// Lanes of a step.
+    fn lanes(&self) -> f64 {
+        f64::from(self.threads) * f64::from(self.ops) / f64::from(self.steps.max(1))
+    }
+}
