@@ -275,6 +275,27 @@ impl<'a> Lane<'a> {
         a >> bits
     }
 
+    /// Bits that differ in `a` and `b`.
+    #[inline(always)]
+    pub fn xor(&self, a: u32, b: u32) -> u32 {
+        self.count(1);
+        a ^ b
+    }
+
+    /// Lower 32 bits of `a b`.
+    #[inline(always)]
+    pub fn mul_low(&self, a: u32, b: u32) -> u32 {
+        self.count(1);
+        a.wrapping_mul(b)
+    }
+
+    /// `a` as a number in double precision.
+    #[inline(always)]
+    pub fn number(&self, a: u32) -> f64 {
+        self.count(1);
+        f64::from(a)
+    }
+
     /// `a` rounded toward zero, as an integer; the nearest integer of 32 bits beyond their range, and 0 for NaN.
     #[inline(always)]
     pub fn truncate(&self, a: f32) -> u32 {
@@ -322,6 +343,20 @@ impl<'a> Lane<'a> {
     pub fn ln(&self, a: f64) -> f64 {
         self.count(2);
         libm::log(a)
+    }
+
+    /// `e` to the power of `a`: a product, and two to its power.
+    #[inline(always)]
+    pub fn exp(&self, a: f64) -> f64 {
+        self.count(2);
+        libm::exp(a)
+    }
+
+    /// Cosine of an angle: a product that makes it revolutions, and the cosine of those.
+    #[inline(always)]
+    pub fn cos(&self, a: f64) -> f64 {
+        self.count(2);
+        libm::cos(a)
     }
 
     /// Angle of a vector: a quotient, a polynomial of six terms in its square, and a selection for each octant.

@@ -360,9 +360,20 @@ const OPTIONS: &[WorkloadOptions] = &[
     WorkloadOptions {
         workload: "sampling",
         options: &[
-            Doc("radius", Numbers(0.005, 0.5), "least distance of points in the unit square"),
-            Doc("rounds", Numbers(1.0, 8.0), "rounds that are rasterized"),
-            Doc("periodic", SWITCH, "whether the domain is a torus instead of a box"),
+            Doc("points", Names(&["darts", "noise", "volume"]), "kind of points"),
+            Doc(
+                "dimensions",
+                Numbers(0.0, 5.0),
+                "2 or 3 for darts, 1 to 4 for noise, 3 to 5 for volumes; 0 for the fewest",
+            ),
+            Doc(
+                "radius",
+                Numbers(0.005, 0.5),
+                "least distance of darts in the unit square, in 3D from 0.03 on",
+            ),
+            Doc("rounds", Numbers(1.0, 8.0), "rounds of darts that are rasterized"),
+            Doc("periodic", SWITCH, "whether the domain of darts is a torus instead of a box"),
+            Doc("count", Numbers(100.0, 2e6), "points of noise on average"),
         ],
         defaults: || serde_json::to_string(&points::job::Options::default()),
     },

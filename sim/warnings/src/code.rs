@@ -132,6 +132,10 @@ codes! {
     /// `quintile sample poisson`: more than one uncovered region per 100 points is thinner than the float
     /// spacing.
     PointsThinRegions = "points-thin-regions" in Workload,
+    /// `sampling`: less than 90 % of the darts' points come from passes.
+    PointsFromHost = "points-from-host" in Workload,
+    /// `sampling`: noise takes more than 20 candidates for a point.
+    PointsRejected = "points-rejected" in Workload,
     /// `soft-shadows` has fewer than 16 distinct light samples.
     ShadowBanding = "shadow-banding" in Workload,
     /// The bias is below half a texel of the map or above eight.

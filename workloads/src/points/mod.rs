@@ -4,11 +4,14 @@
 //!   methods.
 //! - [`volume`]: uniform points in volumes bounded by moving triangles, and in closed surfaces.
 //! - [`white`]: independent points that follow a density, in one to four dimensions.
-//! - [`job`]: uncovered regions drawn by the rasterizer, as a workload of the modelled hardware.
+//! - [`noise`]: the same, from columns that are drawn, one dimension higher.
+//! - [`job`]: all three drawn on the modelled hardware, as a workload.
 //! - [`quality`]: minimum distance, holes, spectra, chi-square; [`thin_regions_warning`]: when precision
 //!   limits the result.
 
+mod drawn;
 pub mod job;
+pub mod noise;
 pub mod poisson;
 pub mod quality;
 pub mod rivals;

@@ -8,6 +8,7 @@
 use std::f64::consts::TAU;
 use std::path::Path;
 
+use pipeline::Lane;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -103,17 +104,17 @@ pub fn white_noise<const D: usize>(
 }
 
 /// Upper bounds of a density over equal cells.
-struct Columns<'a, const D: usize> {
+pub(super) struct Columns<'a, const D: usize> {
     density: &'a dyn Density<D>,
     across: u64,
     /// Height of each column.
-    heights: Vec<f64>,
+    pub(super) heights: Vec<f64>,
     /// Cumulative heights.
     sums: Vec<f64>,
 }
 
 impl<'a, const D: usize> Columns<'a, D> {
-    fn new(density: &'a dyn Density<D>, across: u32) -> Result<Self, WhiteError> {
+    pub(super) fn new(density: &'a dyn Density<D>, across: u32) -> Result<Self, WhiteError> {
         let wide = u64::from(across);
         let count = wide.checked_pow(D as u32).filter(|&count| (1..=1 << 24).contains(&count));
         let count = count.filter(|_| across <= 4096).ok_or(WhiteError::Columns(across))?;
@@ -143,7 +144,7 @@ impl<'a, const D: usize> Columns<'a, D> {
 }
 
 /// Low corner of a cell.
-fn low<const D: usize>(number: u64, across: u64) -> [f64; D] {
+pub(super) fn low<const D: usize>(number: u64, across: u64) -> [f64; D] {
     std::array::from_fn(|k| (number / across.pow(k as u32) % across) as f64 / across as f64)
 }
 
@@ -205,6 +206,12 @@ pub trait Density<const D: usize>: Sync {
     fn upper_bound(&self, low: &[f64; D], high: &[f64; D]) -> f64;
 }
 
+/// A density that a shader can compute.
+pub trait Shaded<const D: usize>: Density<D> {
+    /// The density at a point, with operations that the lane counts.
+    fn on(&self, lane: &Lane, point: &[f64; D]) -> f64;
+}
+
 /// Named densities of any dimension.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -227,8 +234,8 @@ const WAVES: f64 = 3.0;
 /// Allowance for rounding, as a factor.
 const ROUNDING: f64 = 1.0 + 1e-12;
 
-fn wave(x: f64) -> f64 {
-    0.5 + 0.5 * libm::cos(TAU * WAVES * x)
+fn wave(lane: &Lane, x: f64) -> f64 {
+    lane.madd(0.5, lane.cos(lane.mul(TAU * WAVES, x)), 0.5)
 }
 
 impl Named {
@@ -244,15 +251,7 @@ impl Named {
 
 impl<const D: usize> Density<D> for Named {
     fn at(&self, point: &[f64; D]) -> f64 {
-        match self {
-            Self::Constant => 1.0,
-            Self::Ramp => point.iter().sum::<f64>() / D as f64,
-            Self::Gauss => {
-                let square: f64 = point.iter().map(|x| (x - 0.5) * (x - 0.5)).sum();
-                libm::exp(-square / SPREAD)
-            }
-            Self::Waves => point.iter().map(|&x| wave(x)).product(),
-        }
+        self.on(&Lane::default(), point)
     }
 
     fn upper_bound(&self, low: &[f64; D], high: &[f64; D]) -> f64 {
@@ -262,12 +261,30 @@ impl<const D: usize> Density<D> for Named {
             // The maximum of the wave if it is in the interval, otherwise an end.
             Self::Waves => {
                 let crest = (low[k] * WAVES).ceil() / WAVES;
+                let wave = |x: f64| wave(&Lane::default(), x);
                 let ends = if wave(low[k]) > wave(high[k]) { low[k] } else { high[k] };
                 if crest <= high[k] { crest } else { ends }
             }
         };
         let highest: [f64; D] = std::array::from_fn(near);
         ROUNDING * self.at(&highest)
+    }
+}
+
+impl<const D: usize> Shaded<D> for Named {
+    fn on(&self, lane: &Lane, point: &[f64; D]) -> f64 {
+        match self {
+            Self::Constant => 1.0,
+            Self::Ramp => lane.div(point.iter().fold(0.0, |sum, x| lane.add(sum, *x)), D as f64),
+            Self::Gauss => {
+                let square = point.iter().fold(0.0, |sum, x| {
+                    let away = lane.sub(*x, 0.5);
+                    lane.madd(away, away, sum)
+                });
+                lane.exp(lane.div(-square, SPREAD))
+            }
+            Self::Waves => point.iter().fold(1.0, |product, &x| lane.mul(product, wave(lane, x))),
+        }
     }
 }
 

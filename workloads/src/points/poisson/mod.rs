@@ -182,9 +182,9 @@ pub(super) fn check_room(radius: f64, dimensions: usize, cells: f64) -> Result<(
 mod tests;
 
 /// Darts per uncovered cell of the first level.
-const DARTS_PER_FIRST_CELL: f64 = 0.9;
+pub(in crate::points) const DARTS_PER_FIRST_CELL: f64 = 0.9;
 /// Darts per uncovered cell of later levels.
-const DARTS_PER_LATER_CELL: f64 = 0.6;
+pub(in crate::points) const DARTS_PER_LATER_CELL: f64 = 0.6;
 
 /// Maximal Poisson disk points. The result does not depend on the number of threads.
 ///

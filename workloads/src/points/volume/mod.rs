@@ -4,20 +4,18 @@
 //! - [`Bounds`]: *conservative mode*. The rasterizer bounds the third coordinate of a volume in every tile:
 //!   the time of moving triangles for a [`Torus`], the depth of the surface for a [`Solid`]. Random points of
 //!   these bounds are tested.
-//! - [`standard_mode`]: samples of the rasterizer that a moving triangle covers and that are inside the
-//!   volume (Fig. 9).
+//! - [`standard_mode`]: samples of a pass that moving triangles cover and whose pixel shader finds them inside the volume
+//!   (Fig. 9), in three ([`Torus`]), four and five dimensions ([`Blurred`]).
 
 use std::collections::HashMap;
 use std::f64::consts::{PI, TAU};
 
-use glam::{Affine3A, DVec3, Vec3};
+use glam::{DVec3, Vec3};
 use pipeline::conservative::{Grid, MovingTriangle, Rasterizer, Region, View};
-use pipeline::sampling::{Sample, SampleSource};
-use pipeline::{Camera, Clip, Cull, Draw, Geometry, PassError, PipelineSpec, RasterPass, Settings, Viewport};
+use pipeline::{Clip, Cull, Draw, Geometry, Lane};
 use rayon::prelude::*;
 
 use super::Stream;
-use crate::visibility::Unshaded;
 
 /// A volume with an inside test.
 pub trait Inside: Sync {
@@ -372,30 +370,32 @@ impl Torus {
 
 impl Inside for Torus {
     fn contains(&self, point: &[f64; 3], _tile: usize) -> bool {
-        let [x, y, t] = point.map(|at| at - 0.5);
-        let from_ring = (x * x + y * y).sqrt() - self.ring;
-        from_ring * from_ring + t * t <= self.tube * self.tube
+        let [x, y, t] = *point;
+        self.has(&Lane::default(), &[x, y, t, 0.0, 0.0])
     }
 }
 
-/// Samples of the rasterizer over the unit cube `x, y, t`.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Covered {
-    /// Samples inside the solid.
-    pub points: Vec<[f64; 3]>,
-    /// Number of samples that a moving triangle covers.
-    pub covered: u64,
-    /// Number of all samples.
-    pub samples: u64,
+impl Domain for Torus {
+    fn has(&self, lane: &Lane, &[x, y, t, ..]: &Point) -> bool {
+        let [x, y, t] = [x, y, t].map(|at| lane.sub(at, 0.5));
+        let from_ring = lane.sub(lane.root(lane.madd(y, y, lane.mul(x, x))), self.ring);
+        lane.branch(lane.madd(t, t, lane.mul(from_ring, from_ring)) <= self.tube * self.tube)
+    }
+
+    fn prisms(&self) -> Vec<Prisms> {
+        Prisms::of(self)
+    }
 }
 
+/// Depth of the triangles.
+const DEPTH: f32 = 1.0;
 /// Prisms along the axis.
 const LAYERS: u32 = 16;
 /// Prisms around the axis.
 const SECTORS: u32 = 48;
 
-/// Geometry of one draw.
-struct Prisms {
+/// Geometry of one draw: moving triangles in a span of time.
+pub struct Prisms {
     ends: [Vec<Vec3>; 2],
     triangles: Vec<[u32; 3]>,
     clip: Clip,
@@ -411,7 +411,7 @@ impl Prisms {
         let all = [f32::NEG_INFINITY, f32::INFINITY];
         let clip = Clip::new(all, all, layer.t.map(|t| t as f32))?;
         let ends =
-            layer.ends.map(|end| end.iter().map(|[x, y]| Vec3::new(*x as f32, *y as f32, 1.0)).collect());
+            layer.ends.map(|end| end.iter().map(|[x, y]| Vec3::new(*x as f32, *y as f32, DEPTH)).collect());
         Some(Self { ends, triangles: layer.triangles, clip })
     }
 
@@ -425,57 +425,8 @@ impl Prisms {
     }
 }
 
-/// Camera of the unit square, with y up, for a square image.
-pub(in crate::points) fn camera() -> Option<Camera> {
-    let middle = Affine3A::from_translation(Vec3::new(-0.5, -0.5, 0.0));
-    Camera::orthographic(middle, 0.5, 0.01).ok()
-}
+/// The space of samples: x and y (up) of the unit square, time, and both axes of the lens, -1 to 1.
+pub type Point = [f64; 5];
 
-/// Position of a sample in the unit cube.
-pub(in crate::points) fn place(sample: &Sample, pixel: [u32; 2], side: u32) -> [f64; 3] {
-    let across = (f64::from(pixel[0]) + f64::from(sample.x)) / f64::from(side);
-    let down = (f64::from(pixel[1]) + f64::from(sample.y)) / f64::from(side);
-    [across, 1.0 - down, f64::from(sample.t)]
-}
-
-/// Samples of an image of `side` by `side` pixels inside a torus, found by drawing moving triangles around
-/// it.
-///
-/// # Errors
-/// [`PassError`] if a cache of `spec` cannot be built.
-pub fn standard_mode(
-    torus: &Torus,
-    side: u32,
-    samples: &dyn SampleSource,
-    spec: &PipelineSpec,
-) -> Result<Covered, PassError> {
-    let (prisms, viewport) = (Prisms::of(torus), Viewport::new(side, side));
-    let (Some(camera), Some(viewport)) = (camera(), viewport) else { return Ok(Covered::default()) };
-    let settings = Settings { spec, viewport, samples, background: Vec3::ZERO };
-    let seen = RasterPass::new(&camera, &Prisms::draws(&prisms, &Unshaded), &settings).visibility()?;
-    Ok(inside(torus, side, samples, &seen))
-}
-
-/// The visible samples inside a torus.
-pub(in crate::points) fn inside(
-    torus: &Torus,
-    side: u32,
-    samples: &dyn SampleSource,
-    seen: &[(u32, u32)],
-) -> Covered {
-    let per_pixel = samples.per_pixel() as usize;
-    let (mut own, mut found) = (vec![Sample::default(); per_pixel], Covered::default());
-    found.samples = seen.len() as u64;
-    for (pixel, seen) in (0..).zip(seen.chunks(per_pixel)) {
-        let at = [pixel % side, pixel / side];
-        samples.pixel_into(at[0], at[1], &mut own);
-        for (sample, _) in own.iter().zip(seen).filter(|(_, (triangle, _))| *triangle != u32::MAX) {
-            found.covered += 1;
-            let point = place(sample, at, side);
-            if torus.contains(&point, 0) {
-                found.points.push(point);
-            }
-        }
-    }
-    found
-}
+mod standard;
+pub use standard::{Blurred, Covered, Domain, every_sample, fill, standard_mode};

@@ -1,5 +1,6 @@
+use activity::Event;
 use glam::DVec3;
-use pipeline::sampling::{HashedSamples, LensShape, Sample, SampleSource};
+use pipeline::sampling::{HashedSamples, LensShape};
 
 use super::*;
 use crate::job::testing::hardware;
@@ -18,12 +19,12 @@ fn cube() -> (Vec<DVec3>, Vec<[u32; 3]>) {
 fn the_torus_has_the_volume_and_the_moment_of_its_samples() {
     let torus = Torus::default();
     let samples = HashedSamples::new(4, 256, 8, LensShape::Square).unwrap();
-    let found = standard_mode(&torus, 256, &samples, &hardware()).unwrap();
+    let (found, _) = standard_mode(&torus, 256, &samples, &hardware()).unwrap();
     let (n, all) = (found.points.len() as f64, found.samples as f64);
     let share = torus.volume();
     let deviation = (all * share * (1.0 - share)).sqrt();
     assert!((n - all * share).abs() < 3.0 * deviation, "{n} of {}", all * share);
-    let moment = |[x, y, _]: &[f64; 3]| (x - 0.5).powi(2) + (y - 0.5).powi(2);
+    let moment = |[x, y, ..]: &Point| (x - 0.5).powi(2) + (y - 0.5).powi(2);
     let sum: f64 = found.points.iter().map(moment).sum();
     assert!((sum / all / torus.moment() - 1.0).abs() < 0.01, "{}", sum / all);
     assert!(found.covered as f64 > n && (found.covered as f64) < 1.2 * n, "{} covered", found.covered);
@@ -33,15 +34,28 @@ fn the_torus_has_the_volume_and_the_moment_of_its_samples() {
 fn no_sample_of_the_torus_is_missed_by_the_moving_triangles() {
     for torus in [Torus::default(), Torus { ring: 0.21, tube: 0.2 }, Torus { ring: 0.45, tube: 0.02 }] {
         let samples = HashedSamples::new(9, 96, 16, LensShape::Square).unwrap();
-        let found = standard_mode(&torus, 96, &samples, &hardware()).unwrap();
-        let mut own = [Sample::default(); 16];
-        let mut brute = 0;
-        for pixel in 0..96 * 96 {
-            let at = [pixel % 96, pixel / 96];
-            samples.pixel_into(at[0], at[1], &mut own);
-            brute += own.iter().filter(|sample| torus.contains(&place(sample, at, 96), 0)).count();
-        }
-        assert_eq!(found.points.len(), brute, "{torus:?}");
+        let (found, work) = standard_mode(&torus, 96, &samples, &hardware()).unwrap();
+        assert_eq!(found.points, every_sample(&torus, 96, &samples), "{torus:?}");
+        let counts = work.counts();
+        assert!(counts[Event::PixelInvocations] >= counts[Event::SamplesHit]);
+        assert!(counts[Event::ShaderOps] > 0 && found.covered >= found.points.len() as u64);
+    }
+}
+
+#[test]
+fn four_and_five_dimensions_have_their_volume_and_no_sample_is_missed() {
+    let still = Blurred { blur: 0.0, ..Blurred::FIVE };
+    for disk in [Blurred::FOUR, Blurred::FIVE, still] {
+        let samples = HashedSamples::new(11, 128, 16, LensShape::Square).unwrap();
+        let (found, _) = standard_mode(&disk, 128, &samples, &hardware()).unwrap();
+        assert_eq!(found.points, every_sample(&disk, 128, &samples), "{disk:?}");
+        let (n, all, share) = (found.points.len() as f64, found.samples as f64, disk.volume());
+        let deviation = (all * share * (1.0 - share)).sqrt();
+        assert!((n - all * share).abs() < 3.0 * deviation, "{disk:?}: {n} of {}", all * share);
+        let lane = Lane::default();
+        let sum: f64 = found.points.iter().map(|point| disk.from_axis(&lane, point)).sum();
+        assert!((sum / all / disk.moment() - 1.0).abs() < 0.02, "{disk:?}: {}", sum / all);
+        assert!(found.covered as f64 > n && (found.covered as f64) < 1.1 * n, "{} covered", found.covered);
     }
 }
 

@@ -1,10 +1,10 @@
 //! Rows VI-9 and VI-10: points by darts, and points that follow a density.
 
-use pipeline::FrameReport;
 use std::ops::RangeInclusive;
 
-use activity::Event;
-use workloads::points::job::{self, rasterized};
+use pipeline::{Gpu, PipelineSpec};
+use workloads::points::job::{Rasterized, rasterized};
+use workloads::points::noise::{NoiseSpec, draw_noise};
 use workloads::points::poisson::{Domain, PoissonDisk, PoissonSpec, Spacing, ball, poisson_disk, saturation};
 use workloads::points::quality::{ChiSquare, chi_square, closer_than, free_share, largest_hole, upper_tail};
 use workloads::points::white::{
@@ -13,13 +13,14 @@ use workloads::points::white::{
 
 use super::super::band::Cases;
 use super::super::figure::{dots, line};
-use super::super::row::{Row, numbers};
+use super::super::row::{self, Row, numbers};
 use super::super::verdict::Verdict;
 use super::super::{Done, Figure};
 use super::Task;
 use super::image_figures::balls;
 use super::settings::Darts;
 use crate::reproduce::settings::Form;
+use crate::study::Ran;
 use run::GpuSpec;
 use run::RunError;
 
@@ -63,36 +64,47 @@ impl Checked {
     }
 }
 
-/// Darts in two dimensions, the first rounds of them rasterized, and in three.
-fn thrown(row: &Darts, form: Form) -> Result<(job::Rasterized, FrameReport, PoissonDisk<3>), RunError> {
-    let options =
-        job::Options { radius: *row.radius_2d.get(form), rounds: *row.rounds.get(form), periodic: true };
-    let size = [*row.side_px.get(form), *row.samples.get(form)];
-    let (flat, work) =
-        rasterized(options, size[0], size[1], *row.seed.get(form), &GpuSpec::load("reference")?.pipeline)?;
-    let radius = *row.radius_3d.get(form);
-    let spec =
-        PoissonSpec { radius, domain: Domain::Torus, seed: *row.seed.get(form), spacing: Spacing::Double };
-    Ok((flat, work, poisson_disk::<3>(&spec).map_err(failed)?))
+/// Darts of which the first rounds are rasterized, and the points of the CPU sampler.
+struct Thrown<const D: usize> {
+    darts: Rasterized<D>,
+    ran: Ran,
+    cpu_points: usize,
+}
+
+impl<const D: usize> Thrown<D> {
+    fn new(row: &Darts, radius: f64, form: Form) -> Result<Self, RunError> {
+        let seed = *row.seed.get(form);
+        let spec = PoissonSpec { radius, domain: Domain::Torus, seed, spacing: Spacing::Double };
+        let hardware = GpuSpec::load("reference")?.pipeline;
+        let (darts, work) = rasterized::<D>(&spec, *row.rounds.get(form), &hardware)?;
+        let ran = Ran { fragments: darts.fragments, ..Ran::of(&work) };
+        Ok(Self { darts, ran, cpu_points: poisson_disk::<D>(&spec).map_err(failed)?.points.len() })
+    }
+
+    fn text(&self, checked: &Checked) -> String {
+        format!(
+            "{D}D, {} of the points from {} candidates in rasterized uncovered regions in {} passes: {}; the CPU sampler alone has {} points",
+            self.darts.drawn,
+            self.darts.candidates,
+            self.darts.passes,
+            checked.text(),
+            self.cpu_points
+        )
+    }
 }
 
 /// VI-9: dart throwing in two and three dimensions.
 pub(super) fn darts(task: &Task<'_>) -> Result<Done, RunError> {
     let with = task.with(|settings| &settings.vi_9);
     let (row, form) = (with.settings, with.form);
-    let (flat, work, deep) = thrown(row, form)?;
+    let flat = Thrown::<2>::new(row, *row.radius_2d.get(form), form)?;
+    let deep = Thrown::<3>::new(row, *row.radius_3d.get(form), form)?;
     let places = *row.places.get(form);
-    let in_plane = Checked::of(&flat.found, *row.radius_2d.get(form), places);
-    let in_space = Checked::of(&deep, *row.radius_3d.get(form), places);
-    let holds = in_plane.is_maximal() && in_space.is_maximal() && flat.drawn > 0;
-    let ours = format!(
-        "2D, {} of the points from {} samples that hit rasterized uncovered regions in {} passes: {}; 3D, thrown on the CPU: {}",
-        flat.drawn,
-        flat.candidates,
-        flat.passes,
-        in_plane.text(),
-        in_space.text()
-    );
+    let in_plane = Checked::of(&flat.darts.found, *row.radius_2d.get(form), places);
+    let in_space = Checked::of(&deep.darts.found, *row.radius_3d.get(form), places);
+    let is_drawn = flat.darts.drawn > 0 && deep.darts.drawn > 0;
+    let holds = in_plane.is_maximal() && in_space.is_maximal() && is_drawn;
+    let ours = format!("{}; {}", flat.text(&in_plane), deep.text(&in_space));
     let note = format!(
         "{} of {places} random places in the plane and {} in space are free; saturated random addition has densities {} and {}",
         libm::round(in_plane.free * places as f64),
@@ -102,8 +114,11 @@ pub(super) fn darts(task: &Task<'_>) -> Result<Done, RunError> {
     );
     let facts = numbers([
         ("points_2d", in_plane.points as f64),
-        ("points_2d_from_samples", flat.drawn as f64),
+        ("points_2d_from_passes", flat.darts.drawn as f64),
+        ("points_2d_of_cpu", flat.cpu_points as f64),
         ("points_3d", in_space.points as f64),
+        ("points_3d_from_passes", deep.darts.drawn as f64),
+        ("points_3d_of_cpu", deep.cpu_points as f64),
         ("closer_pairs", (in_plane.closer + in_space.closer) as f64),
         ("hole_over_r_2d", in_plane.hole),
         ("hole_over_r_3d", in_space.hole),
@@ -112,14 +127,11 @@ pub(super) fn darts(task: &Task<'_>) -> Result<Done, RunError> {
         ("packing_density_3d", in_space.density),
         ("thin_regions", (in_plane.thin_regions + in_space.thin_regions) as f64),
     ]);
-    let ran = numbers([
-        ("passes", f64::from(flat.passes)),
-        ("triangles", work.triangles() as f64),
-        ("samples_tested", work.counts()[Event::SamplesTested] as f64),
-        ("samples_hit", flat.candidates as f64),
-    ]);
+    let mut ran = row::ran(&[flat.ran, deep.ran].into_iter().sum());
+    let made = [flat.darts.made + deep.darts.made, flat.darts.candidates + deep.darts.candidates];
+    ran.extend(numbers([("candidates", made[0] as f64), ("candidates_in_regions", made[1] as f64)]));
     let radius = *row.radius_2d.get(form);
-    let shown = flat.found.points.iter().filter(|[x, y]| *x < 40.0 * radius && *y < 20.0 * radius);
+    let shown = flat.darts.found.points.iter().filter(|[x, y]| *x < 40.0 * radius && *y < 20.0 * radius);
     let figure = Figure::plane(
         "VI_fig11",
         [
@@ -130,19 +142,43 @@ pub(super) fn darts(task: &Task<'_>) -> Result<Done, RunError> {
         vec![dots("points", shown.map(|[x, y]| (*x, *y)).collect())],
     );
     let made = with.row(&row.about, (ours, Verdict::of(holds), note));
-    let in_cube = balls(&deep.points, *row.radius_3d.get(form))?;
+    let in_cube = balls(&deep.darts.found.points, *row.radius_3d.get(form))?;
     Ok(Done { row: Row { numbers: facts, ran, ..made }, figures: vec![figure, in_cube] })
 }
 
 /// A p within these is that of white noise.
 type Fits = RangeInclusive<f64>;
 
-/// Chi-square of sets of points by different seeds.
-struct Tested(Vec<ChiSquare>);
+/// Chi-square of sets of points by different seeds, and the work of the passes that made them.
+struct Tested {
+    sets: Vec<ChiSquare>,
+    ran: Ran,
+    points: u64,
+    candidates: u64,
+}
 
 impl Tested {
-    /// Sets of so many points each, seeds from 1 on.
-    fn new<const D: usize>([sets, points, cells]: [u64; 3], numbers: Numbers) -> Result<Self, RunError> {
+    /// Sets of so many points each on average, from columns that are drawn; seeds from 1 on.
+    fn drawn<const D: usize>(
+        [sets, points, cells]: [u64; 3],
+        hardware: &PipelineSpec,
+    ) -> Result<Self, RunError> {
+        let expected = shares::<D>(&Named::Gauss, cells, 8);
+        let mut tested = Self { sets: Vec::new(), ran: Ran::default(), points: 0, candidates: 0 };
+        for seed in 1..=sets {
+            let spec = NoiseSpec { count: points as f64, seed, across: columns_for(D) };
+            let mut gpu = Gpu::quiet(hardware).map_err(failed)?;
+            let found = draw_noise::<D>(&Named::Gauss, &spec, &mut gpu).map_err(failed)?;
+            tested.ran += Ran { fragments: found.fragments, ..Ran::of(&gpu.finish()) };
+            tested.points += found.points.len() as u64;
+            tested.candidates += found.candidates;
+            tested.sets.push(chi_square(&counts(&found.points, cells), &expected));
+        }
+        Ok(tested)
+    }
+
+    /// The same on the CPU, of so many points each.
+    fn on_cpu<const D: usize>([sets, points, cells]: [u64; 3], numbers: Numbers) -> Result<Self, RunError> {
         let density: &dyn Density<D> = &Named::Gauss;
         let expected = shares(density, cells, 8);
         let one = |seed| {
@@ -150,12 +186,13 @@ impl Tested {
             let points = white_noise(density, &spec).map_err(failed)?.points;
             Ok::<ChiSquare, RunError>(chi_square(&counts(&points, cells), &expected))
         };
-        (1..=sets).map(one).collect::<Result<_, _>>().map(Self)
+        let tests = (1..=sets).map(one).collect::<Result<_, _>>()?;
+        Ok(Self { sets: tests, ran: Ran::default(), points: sets * points, candidates: 0 })
     }
 
     /// p of the first sets together.
     fn p(&self, sets: u64) -> f64 {
-        let first = self.0.iter().take(sets as usize);
+        let first = self.sets.iter().take(sets as usize);
         let (statistic, freedom) =
             first.fold((0.0, 0), |(sum, freedom), set| (sum + set.statistic, freedom + set.freedom));
         upper_tail(statistic, freedom)
@@ -163,22 +200,32 @@ impl Tested {
 
     /// Sets whose own p is outside.
     fn outside(&self, fits: &Fits) -> usize {
-        self.0.iter().filter(|set| !fits.contains(&set.p)).count()
+        self.sets.iter().filter(|set| !fits.contains(&set.p)).count()
     }
 }
 
-/// Independent candidates, or those of a low-discrepancy sequence, in 1D to 4D.
+/// Sets on the CPU in 1D to 4D: independent candidates, or those of a low-discrepancy sequence.
 fn in_four(
-    sets: u64,
-    points: u64,
+    [sets, points]: [u64; 2],
     cells: (u64, u64, u64, u64),
     numbers: Numbers,
 ) -> Result<[Tested; 4], RunError> {
     Ok([
-        Tested::new::<1>([sets, points, cells.0], numbers)?,
-        Tested::new::<2>([sets, points, cells.1], numbers)?,
-        Tested::new::<3>([sets, points, cells.2], numbers)?,
-        Tested::new::<4>([sets, points, cells.3], numbers)?,
+        Tested::on_cpu::<1>([sets, points, cells.0], numbers)?,
+        Tested::on_cpu::<2>([sets, points, cells.1], numbers)?,
+        Tested::on_cpu::<3>([sets, points, cells.2], numbers)?,
+        Tested::on_cpu::<4>([sets, points, cells.3], numbers)?,
+    ])
+}
+
+/// Sets that are drawn, in 1D to 4D.
+fn drawn_in_four([sets, points]: [u64; 2], cells: (u64, u64, u64, u64)) -> Result<[Tested; 4], RunError> {
+    let hardware = GpuSpec::load("reference")?.pipeline;
+    Ok([
+        Tested::drawn::<1>([sets, points, cells.0], &hardware)?,
+        Tested::drawn::<2>([sets, points, cells.1], &hardware)?,
+        Tested::drawn::<3>([sets, points, cells.2], &hardware)?,
+        Tested::drawn::<4>([sets, points, cells.3], &hardware)?,
     ])
 }
 
@@ -190,8 +237,9 @@ pub(super) fn densities(task: &Task<'_>) -> Result<Done, RunError> {
     let fits = row.fits.get(form).0..=row.fits.get(form).1;
     let (base, all) = (*row.sets.get(form), row.sets.all(form));
     let most = all.iter().copied().max().unwrap_or(base);
-    let own = in_four(most, points as u64, cells, Numbers::Independent)?;
-    let even = in_four(most, points as u64, cells, Numbers::LowDiscrepancy)?;
+    let own = drawn_in_four([most, points as u64], cells)?;
+    let cpu = in_four([most, points as u64], cells, Numbers::Independent)?;
+    let even = in_four([most, points as u64], cells, Numbers::LowDiscrepancy)?;
     let p = |of: &[Tested; 4], sets: u64| of.each_ref().map(|tested| tested.p(sets));
     let four = |p: [f64; 4]| p.map(|p| format!("{p:.4}")).join(", ");
     // The p that is nearest to either end of the range, by its distance from one half.
@@ -205,7 +253,7 @@ pub(super) fn densities(task: &Task<'_>) -> Result<Done, RunError> {
     let band = tried.band(row.sets.values()).ok_or_else(|| failed("no set"))?;
     let tests = 4 * most;
     let ours = format!(
-        "chi-square of {points} points of a bell a set, 1D to 4D: p = {} for {base} sets together, {} for one; {} of the {tests} sets alone are \
+        "chi-square of some {points} points of a bell a set, from drawn columns, 1D to 4D: p = {} for {base} sets together, {} for one; {} of the {tests} sets alone are \
          outside, {:.1} by chance",
         four(p(&own, base)),
         four(p(&own, 1)),
@@ -214,9 +262,10 @@ pub(super) fn densities(task: &Task<'_>) -> Result<Done, RunError> {
     );
     let made = with.banded(&row.about, ours, band);
     let note = format!(
-        "{}. Candidates of a low-discrepancy sequence, as the sample tables of the rasterizer are, give p = {}: near 1 they fit better than white \
-         noise would, near 0 worse",
+        "{}. On the CPU independent candidates give p = {}. Those of a low-discrepancy sequence, as the sample tables of the rasterizer are, give \
+         p = {}: near 1 they fit better than white noise would, near 0 worse",
         made.note,
+        four(p(&cpu, base)),
         four(p(&even, base))
     );
     let [pooled, single] = [p(&own, base), p(&own, 1)];
@@ -230,7 +279,13 @@ pub(super) fn densities(task: &Task<'_>) -> Result<Done, RunError> {
         ("p_3d_one_set", single[2]),
         ("p_4d_one_set", single[3]),
     ]);
-    let ran = numbers([("sets", tests as f64), ("points", (tests * points as u64) as f64)]);
+    let sum = |of: fn(&Tested) -> u64| own.iter().map(of).sum::<u64>() as f64;
+    let mut ran = row::ran(&own.iter().map(|tested| tested.ran).sum());
+    ran.extend(numbers([
+        ("sets", tests as f64),
+        ("points", sum(|tested| tested.points)),
+        ("candidates", sum(|tested| tested.candidates)),
+    ]));
     Ok(Done { row: Row { numbers: facts, ran, note, ..made }, figures: vec![histogram(points)?] })
 }
 

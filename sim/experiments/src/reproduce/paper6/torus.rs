@@ -1,15 +1,17 @@
 //! Row VI-8: samples in a torus that is drawn as moving triangles, and how far they scatter about what is expected of them.
 
+use pipeline::Lane;
 use pipeline::sampling::{HashedSamples, LensShape};
 use workloads::points::quality::upper_tail;
-use workloads::points::volume::{Covered, Torus, standard_mode};
+use workloads::points::volume::{Blurred, Covered, Point, Torus, every_sample, standard_mode};
 
 use super::super::band::Cases;
 use super::super::figure::dots;
-use super::super::row::{Number, Row, numbers};
+use super::super::row::{self, Number, Row, numbers};
 use super::super::{Done, Figure};
 use super::Task;
 use crate::reproduce::settings::About;
+use crate::study::Ran;
 use run::GpuSpec;
 use run::RunError;
 
@@ -24,10 +26,59 @@ struct Filled {
     expected: f64,
     integral: f64,
     off: [f64; 2],
+    ran: Ran,
+    /// Samples that differ from those found by testing every one on the CPU.
+    differing: usize,
 }
 
-fn from_axis([x, y, _]: &[f64; 3]) -> f64 {
+fn from_axis([x, y, ..]: &Point) -> f64 {
     (x - 0.5).powi(2) + (y - 0.5).powi(2)
+}
+
+/// How many points are in one list alone, or in another place. Both are in the order of pixels.
+fn differing(a: &[Point], b: &[Point]) -> usize {
+    a.len().abs_diff(b.len()) + a.iter().zip(b).filter(|(a, b)| a != b).count()
+}
+
+/// A blurred disk in four or five dimensions.
+struct Disk {
+    dimensions: u32,
+    count_off: f64,
+    integral: f64,
+    moment: f64,
+    differing: usize,
+    ran: Ran,
+}
+
+impl Disk {
+    fn new(dimensions: u32, seed: u64, [side, samples]: [u32; 2]) -> Result<Self, RunError> {
+        let disk = if dimensions == 4 { Blurred::FOUR } else { Blurred::FIVE };
+        let gpu = GpuSpec::load("reference")?;
+        let samples =
+            HashedSamples::new(seed, side, samples, LensShape::Square).ok_or_else(|| failed("samples"))?;
+        let (found, work) = standard_mode(&disk, side, &samples, &gpu.pipeline).map_err(failed)?;
+        let (lane, all) = (Lane::default(), found.samples as f64);
+        let sum: f64 = found.points.iter().map(|point| disk.from_axis(&lane, point)).sum();
+        Ok(Self {
+            dimensions,
+            count_off: count_off(found.points.len() as f64, all, disk.volume()),
+            integral: sum / all,
+            moment: disk.moment(),
+            differing: differing(&found.points, &every_sample(&disk, side, &samples)),
+            ran: Ran::of(&work),
+        })
+    }
+
+    fn text(&self) -> String {
+        format!(
+            "In {}D, a disk out of focus{}, the count is {:+.2} standard errors off and the integral {:.6}, exactly {:.6}",
+            self.dimensions,
+            if self.dimensions == 5 { " and in motion" } else { "" },
+            self.count_off,
+            self.integral,
+            self.moment
+        )
+    }
 }
 
 /// How many standard errors a count is off, each of `all` independent samples being counted with the probability `share`.
@@ -40,14 +91,15 @@ impl Filled {
         let gpu = GpuSpec::load("reference")?;
         let samples =
             HashedSamples::new(seed, side, samples, LensShape::Square).ok_or_else(|| failed("samples"))?;
-        let found = standard_mode(torus, side, &samples, &gpu.pipeline).map_err(failed)?;
+        let (found, work) = standard_mode(torus, side, &samples, &gpu.pipeline).map_err(failed)?;
+        let differing = differing(&found.points, &every_sample(torus, side, &samples));
         let (n, all, share) = (found.points.len() as f64, found.samples as f64, torus.volume());
         let values: Vec<f64> = found.points.iter().map(from_axis).collect();
         let integral = values.iter().sum::<f64>() / all;
         let squares = values.iter().map(|value| value * value).sum::<f64>() / all;
         let integral_off = (integral - torus.moment()) / ((squares - integral * integral) / all).sqrt();
         let off = [count_off(n, all, share), integral_off];
-        Ok(Self { found, inside: n, expected: all * share, integral, off })
+        Ok(Self { found, inside: n, expected: all * share, integral, off, ran: Ran::of(&work), differing })
     }
 
     /// The farther of count and integral.
@@ -62,7 +114,7 @@ impl Filled {
         let mean = torus.moment() / torus.volume();
         let mut octants = [(0.0, 0.0, 0.0); 8];
         for point in &self.found.points {
-            let [x, y, t] = point.map(|at| usize::from(at >= 0.5));
+            let [x, y, t, ..] = point.map(|at| usize::from(at >= 0.5));
             let (n, sum, squares) = &mut octants[4 * x + 2 * y + t];
             let off = from_axis(point) - mean;
             *n += 1.0;
@@ -157,9 +209,13 @@ fn rarity(errors: f64) -> f64 {
 const SAID_OF_TOLERANCE: &str =
     "The samples of a pixel are stratified, so that 3 standard errors of independent ones are generous.";
 
+/// What the file says of shapes that were not drawn when it was committed, and what holds now.
+const SAID_OF_SHAPES: &str = "no shapes in four or five dimensions.";
+const SHAPES: &str = "the shapes in four and five dimensions are judged by no condition.";
+
 /// The file's words, with what is computed in the place of that sentence.
 fn about(file: &About) -> About {
-    let kept = file.limits.replace(SAID_OF_TOLERANCE, "");
+    let kept = file.limits.replace(SAID_OF_TOLERANCE, "").replace(SAID_OF_SHAPES, SHAPES);
     let strata = "Samples are random in their pixel and in time; the standard errors are those of samples random in the whole image.";
     let scatter = "the deviations in the octants of the torus scatter no more than those of independent samples (chi-square, as rarely wrong \
                    as one of them within the standard errors)";
@@ -192,9 +248,24 @@ pub(super) fn row(task: &Task<'_>) -> Result<Done, RunError> {
     let band = tried.band(row.seed.values() + 1).ok_or_else(|| failed("no seed"))?;
     let first = &filled[0];
     let made = with.banded(&about(&row.about), ours(first, &torus), band);
-    let note = format!("{}. {}", made.note, scatter.text(most));
-    let numbers = facts(first).into_iter().chain(scatter.facts()).collect();
-    Ok(Done { row: Row { numbers, note, ran: ran(&filled), ..made }, figures: vec![slice(&first.found)] })
+    let disks = [Disk::new(4, row.seed.all(form)[0], size)?, Disk::new(5, row.seed.all(form)[0], size)?];
+    let differing =
+        disks.iter().map(|disk| disk.differing).chain(filled.iter().map(|one| one.differing)).sum::<usize>();
+    let note = format!(
+        "{}. {}. {}. {}. {differing} samples differ from those found by testing all samples on the CPU",
+        made.note,
+        scatter.text(most),
+        disks[0].text(),
+        disks[1].text()
+    );
+    let mut numbers: Vec<Number> = facts(first).into_iter().chain(scatter.facts()).collect();
+    numbers.extend(self::numbers([
+        ("deviation_of_count_4d", disks[0].count_off),
+        ("deviation_of_count_5d", disks[1].count_off),
+        ("differing_from_cpu", differing as f64),
+    ]));
+    let ran = ran(&filled, &disks);
+    Ok(Done { row: Row { numbers, note, ran, ..made }, figures: vec![slice(&first.found)] })
 }
 
 fn ours(first: &Filled, torus: &Torus) -> String {
@@ -221,17 +292,19 @@ fn facts(first: &Filled) -> Vec<Number> {
     ])
 }
 
-fn ran(filled: &[Filled]) -> Vec<Number> {
-    numbers([
+fn ran(filled: &[Filled], disks: &[Disk]) -> Vec<Number> {
+    let mut ran = row::ran(&filled.iter().map(|one| one.ran).chain(disks.iter().map(|disk| disk.ran)).sum());
+    ran.extend(numbers([
         ("samples", filled.iter().map(|one| one.found.samples as f64).sum()),
         ("samples_covered_by_triangles", filled.iter().map(|one| one.found.covered as f64).sum()),
         ("samples_inside", filled.iter().map(|one| one.inside).sum()),
-    ])
+    ]));
+    ran
 }
 
 /// Figure 9: the samples near a plane through the axis.
 fn slice(found: &Covered) -> Figure {
-    let near = found.points.iter().filter(|[_, y, _]| (y - 0.5).abs() < 0.01);
+    let near = found.points.iter().filter(|[_, y, ..]| (y - 0.5).abs() < 0.01);
     Figure::plane(
         "VI_fig9",
         [
@@ -239,7 +312,7 @@ fn slice(found: &Covered) -> Figure {
             "those within 0.01 of a plane through its axis",
         ],
         ["x", "t"],
-        vec![dots("samples", near.map(|[x, _, t]| (*x, *t)).collect())],
+        vec![dots("samples", near.map(|[x, _, t, ..]| (*x, *t)).collect())],
     )
 }
 
@@ -254,7 +327,7 @@ mod tests {
     fn the_file_does_not_decide_what_the_tolerance_is() {
         let (settings, _) = load::<Settings>(None).unwrap();
         let file = &settings.vi_8.about;
-        assert!(file.limits.contains(SAID_OF_TOLERANCE));
+        assert!(file.limits.contains(SAID_OF_TOLERANCE) && file.limits.contains(SAID_OF_SHAPES));
         let about = about(file);
         assert!(
             !about.limits.contains("generous") && about.limits.starts_with("Standard mode, in x, y and t")
@@ -298,7 +371,7 @@ mod tests {
         let honest: Vec<Filled> = seeds.map(|seed| Filled::new(&torus, seed, [128, 4]).unwrap()).collect();
         let repeated = |one: &Filled| {
             let kept = one.found.points.iter().step_by(4);
-            let points: Vec<[f64; 3]> = kept.flat_map(|point| [*point; 4]).collect();
+            let points: Vec<Point> = kept.flat_map(|point| [*point; 4]).collect();
             Filled { found: Covered { points, ..one.found.clone() }, ..*one }
         };
         let scatter =

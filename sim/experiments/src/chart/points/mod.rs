@@ -18,6 +18,10 @@ use workloads::points::white::{Density, Named, Numbers, WhiteError, WhiteSpec, c
 use crate::study::table::{Sheet, Table, count, fixed, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
 use crate::study::{Gallery, Study, StudyError};
+use workloads::points::job::{LEAST_DRAWN_SHARE, MAX_CANDIDATES_PER_POINT};
+
+mod drawn;
+pub use drawn::{DrawnRow, Weak};
 
 /// Effort of the measurement.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -45,14 +49,21 @@ pub struct PointsChart {
     pub coarse: Vec<Coarse>,
     /// Candidates for a point that follows a density.
     pub columns: Vec<Columns>,
+    /// Rasterization beside the CPU sampler.
+    pub drawn: Vec<DrawnRow>,
+    /// Share of darts from passes, over rounds.
+    pub rounds: Vec<Weak>,
+    /// Candidates for a point of noise, over points.
+    pub rejected: Vec<Weak>,
 }
 
 impl Study for PointsChart {
     const NAME: &'static str = "points";
     const ABOUT: &'static str =
         "Points of all kinds: quality over points a second, spectra, and where it fails";
-    const PICTURES: &'static [&'static str] = &["points_quality", "points_spectra", "points_failures"];
-    const FILES: &'static [&'static str] = &["points.csv", "points.json"];
+    const PICTURES: &'static [&'static str] =
+        &["points_quality", "points_spectra", "points_failures", "points_drawn"];
+    const FILES: &'static [&'static str] = &["points.csv", "points_drawn.csv", "points.json"];
 
     type Effort = PointsEffort;
     const FULL: PointsEffort =
@@ -61,7 +72,7 @@ impl Study for PointsChart {
         PointsEffort { radius: [0.025, 0.1], darts: 100_000, seeds: 2, finest_bits: 22, white: 20_000 };
 
     fn measure(effort: PointsEffort, _scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
-        let bar = progress.bar("points", 14);
+        let bar = progress.bar("points", 16);
         let [plane, space] = effort.radius;
         let mut rows = measured::<2>(&effort, plane, &bar).map_err(StudyError::pipeline)?;
         rows.extend(measured::<3>(&effort, space, &bar).map_err(StudyError::pipeline)?);
@@ -69,7 +80,11 @@ impl Study for PointsChart {
         bar.inc();
         let columns = columns(&effort).map_err(StudyError::pipeline)?;
         bar.inc();
-        Ok(Self { effort, rows, coarse, columns })
+        let drawn = drawn::rows(&effort)?;
+        bar.inc();
+        let (rounds, rejected) = (drawn::rounds(&effort)?, drawn::rejected(&effort)?);
+        bar.inc();
+        Ok(Self { effort, rows, coarse, columns, drawn, rounds, rejected })
     }
 
     fn draw(&self, to: &Gallery<'_>) -> Result<(), OutputError> {
@@ -78,7 +93,9 @@ impl Study for PointsChart {
         to.chart("points_quality", ["Largest hole and free share over speed", &subject], self.quality())?;
         to.chart("points_spectra", ["Power over frequency, all directions", &subject], self.spectra())?;
         let subject = "points of the plane that keep their distance, on ever coarser grids of numbers (marked: points-thin-regions), and candidates for points that follow a density";
-        to.chart("points_failures", ["Where points fail", subject], self.failures())
+        to.chart("points_failures", ["Where points fail", subject], self.failures())?;
+        let subject = "a frame of the workload sampling on the reference GPU; the CPU sampler on one thread; marked: a run warns";
+        to.chart("points_drawn", ["Points by rasterization and on the CPU", subject], self.by_rasterization())
     }
 
     fn tables(&self) -> Vec<Sheet> {
@@ -113,7 +130,19 @@ impl Study for PointsChart {
             .detail("candidates a point", |c| c.candidates_each, fixed(3))
             .detail("p", |c| c.p, fixed(3))
             .detail("p, low discrepancy", |c| c.p_low_discrepancy, fixed(4));
-        vec![rows.sheet(), coarse.sheet(), columns.sheet()]
+        let drawn = Table::of(&self.drawn)
+            .column("kind", "points", |row| row.kind, plain)
+            .column("dimensions", "D", |row| row.dimensions, plain)
+            .column("points", "number", |row| row.points, count)
+            .column("triangles", "triangles", |row| row.triangles, count)
+            .column("shader_ops", "shader operations", |row| row.shader_ops, count)
+            .column("frame_s", "frame (s)", |row| row.frame_s, |s| format!("{s:.2e}"))
+            .column("frame_j", "frame (J)", |row| row.frame_j, |j| format!("{j:.2e}"))
+            .column("cpu_s", "CPU (s)", |row| row.cpu_s, |s| format!("{s:.2e}"))
+            .column("error", "error", |row| row.error, fixed(4))
+            .column("cpu_error", "error, CPU", |row| row.cpu_error, fixed(4))
+            .csv("points_drawn.csv");
+        vec![rows.sheet(), coarse.sheet(), columns.sheet(), drawn.sheet()]
     }
 
     fn tradeoff(&self) -> Vec<TradeoffPoint> {
@@ -182,6 +211,41 @@ impl PointsChart {
             ChartPanel::new(&title, ["frequency over rate of points", "power"], last.map(curve).collect())
         };
         vec![panel(2), panel(3)]
+    }
+
+    /// Cost a point of rasterization and of the CPU sampler, and where rasterization fails.
+    fn by_rasterization(&self) -> Vec<ChartPanel> {
+        let curve = |kind: &'static str, name: String, of: fn(&DrawnRow) -> f64| {
+            let rows = self.drawn.iter().filter(move |row| row.kind == kind);
+            Series::curve(name, rows.map(|row| (f64::from(row.dimensions), of(row))))
+        };
+        let pair = |kind: &'static str| {
+            let of_frame = |row: &DrawnRow| row.frame_s / row.points.max(1) as f64;
+            let of_cpu = |row: &DrawnRow| row.cpu_s / row.points.max(1) as f64;
+            [curve(kind, format!("{kind}, drawn"), of_frame), curve(kind, format!("{kind}, CPU"), of_cpu)]
+        };
+        let cost = ["darts", "noise", "volume"].into_iter().flat_map(pair).collect();
+        let over =
+            |weak: &[Weak], name: &str| Series::curve(name, weak.iter().map(|weak| (weak.at, weak.value)));
+        let few = self.rounds.iter().rfind(|weak| weak.value < LEAST_DRAWN_SHARE);
+        let loose = self.rejected.iter().rfind(|weak| weak.value > MAX_CANDIDATES_PER_POINT);
+        vec![
+            ChartPanel::new("cost of a point", ["dimensions", "time a point (s)"], cost)
+                .on(Scale::Even, Scale::Decades),
+            ChartPanel::new(
+                "too few rounds of darts, 2D",
+                ["rounds", "share of points from passes"],
+                vec![over(&self.rounds, "darts, 2D")],
+            )
+            .failing(few.map(|weak| 0.0..weak.at), "a run warns"),
+            ChartPanel::new(
+                "too few points of noise, 4D",
+                ["points on average", "candidates for a point"],
+                vec![over(&self.rejected, "noise, 4D")],
+            )
+            .on(Scale::Decades, Scale::Decades)
+            .failing(loose.map(|weak| 0.0..weak.at), "a run warns"),
+        ]
     }
 
     /// Numbers too coarse for the disks, and columns too few for the density.
@@ -434,5 +498,15 @@ mod tests {
             assert_eq!(maximal, row.method == UNCOVERED, "{row:?}");
             assert!(row.closer_pairs == 0 && row.points_per_s > 0.0, "{row:?}");
         }
+        for row in &chart.drawn {
+            let is_right = match row.kind {
+                "darts" => row.error <= 1e-9 && row.cpu_error <= 1e-9,
+                // Drawn samples are those of the CPU.
+                "volume" => row.error == row.cpu_error,
+                _ => (1e-4..0.9999).contains(&row.error),
+            };
+            assert!(is_right && row.frame_s > 0.0 && row.frame_j > 0.0 && row.points > 0, "{row:?}");
+        }
+        assert!(chart.rounds.is_sorted_by(|a, b| a.value <= b.value), "{:?}", chart.rounds);
     }
 }
