@@ -31,7 +31,7 @@ const MAX_AGREEMENT_SHARE: f64 = 1e-4;
 const SMOOTHED_MOVES: usize = 8;
 
 /// Positions of windows, samples, moved forward; `anchor` is the place of the start in a window of `width`
-/// samples. `fixed` ones stay.
+/// samples. What a start is the `fixed` ones say: where neighbours differ after those by as much, all starts stay.
 pub(super) fn refine_starts(
     power: &[f64],
     positions: Vec<f64>,
@@ -58,8 +58,9 @@ pub(super) fn refine_starts(
         })
         .collect();
     let moves = smoothed(&smoothed(&moves, upper_median), |near| mean(near));
-    let refined = positions.iter().zip(moves).zip(fixed);
-    refined.map(|((position, by), fixed)| if *fixed { *position } else { position + by }).collect()
+    let of_marks =
+        moves.iter().zip(fixed).filter(|(_, fixed)| **fixed).map(|(by, _)| *by).fold(0.0, f64::max);
+    positions.iter().zip(moves).map(|(position, by)| position + (by - of_marks).max(0.0)).collect()
 }
 
 /// How much each frame and the next differ at each of `length` samples from their starts on, W^2.
@@ -155,6 +156,22 @@ mod tests {
         assert_eq!(refine_starts(&power, right.clone(), &[false; 40], 0.0, WIDTH), right);
         let early: Vec<f64> = right.iter().map(|start| start - 11.0).collect();
         assert_eq!(refine_starts(&power, early.clone(), &[true; 40], 0.0, WIDTH), early);
+    }
+
+    #[test]
+    fn what_a_start_is_the_mark_says_and_no_frame_beside_it_becomes_longer() {
+        // Neighbours differ after every start, also after the marked one: moving all but that would make the frame before
+        // it shorter and it longer by the move.
+        let (power, right) = frames(60, |_| 4);
+        let early: Vec<f64> = right.iter().map(|start| start - 16.0).collect();
+        let mut marked = [false; 60];
+        marked[30] = true;
+        let found = refine_starts(&power, early.clone(), &marked, 0.0, WIDTH);
+        assert_eq!(found[30], early[30]);
+        for (found, early) in found.windows(2).zip(early.windows(2)) {
+            let longer = (found[1] - found[0]) - (early[1] - early[0]);
+            assert!(longer.abs() < 0.5, "{longer}");
+        }
     }
 
     #[test]

@@ -6,6 +6,16 @@
 //! [`Scenario::scene`] makes a curve of it, and [`Recording`] samples that with a recorder of some rate,
 //! resolution and noise. All random numbers are functions of (seed, purpose, frame, draw), so a longer scene
 //! begins like a shorter one.
+//!
+//! [`WITNESSES`] are four more devices of other structure, which share nothing with these scenes or each other.
+
+mod on_demand;
+mod one_process;
+mod pipelined;
+mod several_processes;
+mod witness;
+
+pub use witness::{WITNESSES, Witness};
 
 use crate::device::{Device, DeviceError, DeviceSpec, SampleError};
 use crate::energy::TrueFrame;

@@ -3,6 +3,8 @@
 //! Scenes are those of [`traces::synth`], whose frames are known. Each is recorded, frames are marked as by hand (0.1 ms off at most),
 //! and the outcome is compared with the ground truth: F1 of starts within 0.5 ms, and the energy error of frames whose two ends were found.
 
+mod witnesses;
+
 use std::time::Instant;
 
 use output::OutputError;
@@ -15,7 +17,8 @@ use traces::frames::{FinderMethod, Marks, Options, default_window, find_with};
 use traces::score::{TOLERANCE_S, score, true_beside_found};
 use traces::synth::{Recording, SCENARIOS, Scenario, Scene};
 
-use crate::study::table::{Sheet, Table, optional, plain, share};
+use self::witnesses::{WitnessRow, WitnessSummary};
+use crate::study::table::{Sheet, Table, fixed, optional, plain, share};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
 use crate::study::{Gallery, Study, StudyError};
 
@@ -35,6 +38,8 @@ pub struct FramesEffort {
     pub bits: &'static [u32],
     /// Seeds of scenes and noise.
     pub seeds: &'static [u64],
+    /// Seeds of the [witnesses](traces::synth::WITNESSES).
+    pub witness_seeds: &'static [u64],
 }
 
 /// Search for frames.
@@ -144,6 +149,8 @@ pub struct FramesChart {
     pub effort: FramesEffort,
     /// By axis, value, scene and method.
     pub rows: Vec<FramesRow>,
+    /// By kind of device, seed and method.
+    pub witnesses: Vec<WitnessRow>,
 }
 
 impl Study for FramesChart {
@@ -151,7 +158,8 @@ impl Study for FramesChart {
     const ABOUT: &'static str =
         "Frame starts found and energy error, by method, over sampling rate, noise, bits and host time";
     const PICTURES: &'static [&'static str] = &["frames_rate", "frames_noise", "frames_bits", "frames_time"];
-    const FILES: &'static [&'static str] = &["frame_finding.csv", "frame_finding.json"];
+    const FILES: &'static [&'static str] =
+        &["frame_finding.csv", "frame_witnesses.csv", "frame_finding.json"];
     const SHOWS_TIME: bool = true;
 
     type Effort = FramesEffort;
@@ -161,6 +169,7 @@ impl Study for FramesChart {
         snrs_db: &[40.0, 30.0, 20.0, 10.0, 5.0, 0.0],
         bits: &[4, 6, 8, 10, 12, 14, 16],
         seeds: &[1, 2],
+        witness_seeds: &[101, 102, 103],
     };
     const QUICK: FramesEffort = FramesEffort {
         frames: 60,
@@ -168,6 +177,7 @@ impl Study for FramesChart {
         snrs_db: &[40.0, 10.0, 0.0],
         bits: &[6, 10, 14],
         seeds: &[1],
+        witness_seeds: &[1],
     };
 
     fn measure(effort: FramesEffort, _scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
@@ -190,7 +200,8 @@ impl Study for FramesChart {
                 bar.inc();
             }
         }
-        Ok(Self { effort, rows })
+        let witnesses = witnesses::measure(effort.frames, effort.witness_seeds)?;
+        Ok(Self { effort, rows, witnesses })
     }
 
     fn draw(&self, to: &Gallery<'_>) -> Result<(), OutputError> {
@@ -230,7 +241,15 @@ impl Study for FramesChart {
             .data("right_flagged", |row| row.outcome.right_flagged)
             .data("host_s_per_1e6", |row| row.outcome.host_s_per_1e6)
             .csv("frame_finding.csv");
-        vec![self.by_scene(), self.by_value(), rows.sheet()]
+        let witnesses = Table::of(&self.witnesses)
+            .data("witness", |row| row.witness)
+            .data("seed", |row| row.seed)
+            .data("method", |row| row.method)
+            .data("f1", |row| row.f1.first().copied())
+            .data("f1_worst_mark", |row| row.f1.iter().copied().reduce(f64::min))
+            .data("calibration_error", |row| row.calibration.error())
+            .csv("frame_witnesses.csv");
+        vec![self.by_scene(), self.by_value(), self.by_witness(), rows.sheet(), witnesses.sheet()]
     }
 
     /// Every method at each ratio of signal to noise, over all scenes.
@@ -349,6 +368,19 @@ impl FramesChart {
             .detail("wrong frames flagged", wrong, plain)
             .detail("right ones flagged", right, plain)
             .after(format!("*: mean F1 below {FAILS_BELOW}; in brackets how many scenes are below\n"))
+            .sheet()
+    }
+
+    /// Every method on every kind of device.
+    fn by_witness(&self) -> Sheet {
+        let below = |of: &WitnessSummary| format!("{} of {}", of.below_simple, of.devices);
+        Table::of(witnesses::summaries(&self.witnesses))
+            .detail("device", |of| of.witness, plain)
+            .detail("method", |of| of.method, plain)
+            .detail("F1, first mark", |of| of.first, fixed(3))
+            .detail("F1, worst of five marks", |of| of.worst, fixed(3))
+            .detail("below the better simple method", below, plain)
+            .detail("calibration error", |of| of.calibration.error(), optional(fixed(3)))
             .sheet()
     }
 
@@ -497,8 +529,14 @@ mod tests {
     use super::*;
     use crate::study::written;
 
-    const SMALL: FramesEffort =
-        FramesEffort { frames: 40, rates_hz: &[1e3, 20e3], snrs_db: &[30.0], bits: &[], seeds: &[1] };
+    const SMALL: FramesEffort = FramesEffort {
+        frames: 40,
+        rates_hz: &[1e3, 20e3],
+        snrs_db: &[30.0],
+        bits: &[],
+        seeds: &[1],
+        witness_seeds: &[],
+    };
 
     fn small() -> (tempfile::TempDir, FramesChart) {
         let (dir, chart, _) = written::<FramesChart>(SMALL);
