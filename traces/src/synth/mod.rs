@@ -9,6 +9,7 @@
 //!
 //! [`WITNESSES`] are four more devices of other structure, which share nothing with these scenes or each other.
 
+mod layers;
 mod on_demand;
 mod one_process;
 mod pipelined;

@@ -6,7 +6,7 @@
 //! the same hand-over; in between areas are filled. The processor polls for a while after the last frame, dozes, and sleeps; from sleep it
 //! wakes up by a ramp.
 
-use super::witness::{Dice, Drawn, Layers};
+use super::layers::{Dice, Drawn, Layers};
 
 const NAME: &str = "on demand";
 /// Power asleep, dozing and polling, W, and after how long it dozes and sleeps, s.

@@ -6,7 +6,7 @@
 //! earlier ones. A governor looks at the load every tenth of a second and picks one of its clocks, not always
 //! the right one. Frames are uncapped, limited to a rate by sleeping, or wait for the display, whose ticks heavy frames miss.
 
-use super::witness::{Dice, Drawn, Layers};
+use super::layers::{Dice, Drawn, Layers};
 
 const NAME: &str = "one process";
 /// Static power, power of full activity at the highest clock, W.

@@ -6,7 +6,7 @@
 //! tile rows with powers of their own; it waits for the bins. While both run they share memory, and binning is slower. Heavy
 //! and light phases of the game move the bottleneck from one unit to another. The rail sees the sum.
 
-use super::witness::{Dice, Drawn, Layers};
+use super::layers::{Dice, Drawn, Layers};
 use core::f64::consts::TAU;
 
 const NAME: &str = "pipelined";

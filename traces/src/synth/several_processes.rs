@@ -6,7 +6,7 @@
 //! decoded a buffer at a time; a radio listens at its interval and now and then transfers for longer; the backlight
 //! is pulsed at a rate that has nothing to do with any of them.
 
-use super::witness::{Dice, Drawn, Layers};
+use super::layers::{Dice, Drawn, Layers};
 use core::f64::consts::TAU;
 
 const NAME: &str = "several processes";

@@ -37,6 +37,8 @@ impl Cell {
 pub(super) struct Lattice {
     /// Cells along each axis.
     pub across: [u32; AXES],
+    /// Which axes the candidates have; along the others they are in the middle.
+    used: [bool; AXES],
     /// Seed of the candidates.
     pub seed: u32,
     /// Cumulative Poisson probabilities of the number of candidates in a cell, in units of 2^-32.
@@ -94,8 +96,8 @@ fn mixed(lane: &Lane, word: u32) -> u32 {
 }
 
 impl Lattice {
-    /// A lattice with `mean` candidates in a cell on average; `None` if that is not within 0 and [`MAX_MEAN`].
-    pub fn new(across: [u32; AXES], mean: f64, seed: u64) -> Option<Self> {
+    /// A lattice with `mean` candidates in a cell on average, random along the axes `used`; `None` if that is not within 0 and [`MAX_MEAN`].
+    pub fn new(across: [u32; AXES], used: &[usize], mean: f64, seed: u64) -> Option<Self> {
         let is_usable = (0.0..=MAX_MEAN).contains(&mean) && across.iter().all(|count| *count > 0);
         let (mut one, mut sum) = (libm::exp(-mean), 0.0);
         let cumulative = (1..=MAX_PER_CELL).map(|count| {
@@ -105,7 +107,8 @@ impl Lattice {
             (sum * 2.0_f64.powi(32)) as u32
         });
         let seed = (seed ^ seed >> 32) as u32;
-        is_usable.then(|| Self { across, seed, cumulative: cumulative.collect() })
+        let used = std::array::from_fn(|axis| used.contains(&axis));
+        is_usable.then(|| Self { across, used, seed, cumulative: cumulative.collect() })
     }
 
     /// Makes the candidates of a cell.
@@ -116,8 +119,7 @@ impl Lattice {
         while lane.branch(self.cumulative.get(count as usize).is_some_and(|&sum| sum < chosen)) {
             let first = 2 + count * (AXES as u32 + 1);
             let along = |axis: usize| {
-                if self.across[axis] == 1 && axis > 1 {
-                    // The axis is not used.
+                if !self.used[axis] {
                     return 0.5;
                 }
                 // In the middle of the words' intervals, so that rounding moves no point out of its cell.
@@ -256,7 +258,7 @@ pub(super) fn draw(
     let tile = [columns, rows].map(|count| 1.0 / f64::from(count));
     let grid = Grid { origin: [0.0; 2], tile, columns, rows };
     let primitives = primitives(cells, &grid);
-    let axes = lattice.across.iter().skip(2).filter(|count| **count > 1).count() as u64 + 2;
+    let axes = lattice.used.iter().filter(|used| **used).count() as u64;
     let point_bytes = axes * COORDINATE_BYTES;
     let results = gpu.surface(cells.len() as u64 * PLACES * point_bytes);
     let vertices = gpu.surface(3 * primitives.len() as u64 * u64::from(VERTEX_BYTES));

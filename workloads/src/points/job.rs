@@ -186,7 +186,9 @@ fn regions<const D: usize>(cubes: &[Cube<D>], round: u32, seed: u64) -> Option<(
     let mut across = [1; AXES];
     across[..D].fill((1.0 / side).round() as u32);
     let mean = if round == 0 { DARTS_PER_FIRST_CELL } else { DARTS_PER_LATER_CELL };
-    Some((cubes.iter().map(cell).collect(), Lattice::new(across, mean, mix(seed ^ u64::from(round)))?))
+    let used: [usize; D] = std::array::from_fn(|axis| axis);
+    let lattice = Lattice::new(across, &used, mean, mix(seed ^ u64::from(round)))?;
+    Some((cubes.iter().map(cell).collect(), lattice))
 }
 
 /// Draws the uncovered regions of a round and returns the candidates in them, in random order.

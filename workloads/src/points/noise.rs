@@ -100,7 +100,8 @@ impl<'a, const D: usize> Lifted<'a, D> {
         domain.iter().for_each(|&axis| across[axis] = spec.across);
         across[up] = slabs as u32;
         let mean = candidates / bounds.heights.len() as f64 / slabs;
-        let lattice = Lattice::new(across, mean, spec.seed).ok_or(WhiteError::Nothing)?;
+        let used = [domain, &[up]].concat();
+        let lattice = Lattice::new(across, &used, mean, spec.seed).ok_or(WhiteError::Nothing)?;
         Ok(Self { density, cells, lattice, highest })
     }
 
@@ -182,6 +183,7 @@ mod tests {
     fn drawn_points_are_those_of_the_host_in_every_dimension() {
         same::<1>(37, 16);
         same::<2>(12, 5);
+        same::<2>(64, 5);
         same::<3>(5, 3);
         same::<4>(3, 2);
     }

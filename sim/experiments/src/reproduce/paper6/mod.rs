@@ -105,13 +105,16 @@ pub(super) fn rows(options: &Options, progress: &Progress) -> Result<(Origin, Ve
 
 /// What the file says of figures that were not drawn when it was committed, and what holds now. Files of settings are not changed
 /// once a number was computed with them.
-const DRAWN_SINCE: [[&str; 2]; 5] = [
+const DRAWN_SINCE: [[&str; 2]; 7] = [
     ["; Figure 6 itself is not drawn.", "."],
     [
-        "In 2D the first rounds of darts are samples of rasterized squares; conflicts, the division of voids and what is finer than pixels are \
-         done on the CPU. In 3D all darts are thrown on the CPU: no prism is drawn, and the 3D half of Figure 11 is not either.",
-        "The first rounds of darts are random candidates in squares (2D) and prisms (3D) that conservative mode drew; conflicts, the division \
-         of voids and later rounds are done on the CPU. Figure 11 in 3D shows the points.",
+        "In 2D the first rounds of darts are samples of rasterized squares;",
+        "The first rounds of darts are random candidates in squares (2D) and prisms (3D) that conservative mode drew;",
+    ],
+    ["and what is finer than pixels are done on the CPU.", "and later rounds are done on the CPU."],
+    [
+        "In 3D all darts are thrown on the CPU: no prism is drawn, and the 3D half of Figure 11 is not either.",
+        "Figure 11 in 3D shows the points.",
     ],
     [
         "No triangle is drawn: points are chosen on the CPU from columns that bound the density.",
@@ -153,6 +156,8 @@ mod tests {
         let (settings, _) = load::<Settings>(None).unwrap();
         let abouts = [
             &settings.vi_2.about,
+            &settings.vi_9.about,
+            &settings.vi_9.about,
             &settings.vi_9.about,
             &settings.vi_10.about,
             &settings.vi_11.about,
