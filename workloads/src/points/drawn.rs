@@ -13,6 +13,7 @@ use std::ops::Range;
 
 use pipeline::conservative::{Grid, MovingTriangle, Rasterizer, Region, View};
 use pipeline::memory::Surface;
+use pipeline::random::mix;
 use pipeline::{ConservativeDraw, Gpu, Lane, Lanes, Primitive, TileIntervals, TileShader};
 
 /// Axes: x, y, time, and both of the lens, each 0 to 1. Of the lens, -1 to 1, one half is used.
@@ -106,7 +107,8 @@ impl Lattice {
             // The cast saturates.
             (sum * 2.0_f64.powi(32)) as u32
         });
-        let seed = (seed ^ seed >> 32) as u32;
+        // Mixed, as neighbouring seeds would have the same cells in another order.
+        let seed = (mix(seed) >> 32) as u32;
         let used = std::array::from_fn(|axis| used.contains(&axis));
         is_usable.then(|| Self { across, used, seed, cumulative: cumulative.collect() })
     }

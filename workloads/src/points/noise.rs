@@ -199,6 +199,19 @@ mod tests {
         assert_ne!(with(1).points, drawn::<2>(Named::Gauss, &NoiseSpec { seed: 2, ..spec }).points);
     }
 
+    /// Neighbouring seeds once had the same cells in another order.
+    #[test]
+    fn neighbouring_seeds_share_no_place_within_a_column() {
+        let places = |seed| {
+            let spec = NoiseSpec { count: 2000.0, seed, across: 16 };
+            let within = |point: &[f64; 1]| ((point[0] * 16.0).fract() * 1e10) as u64;
+            let points = drawn::<1>(Named::Constant, &spec).points;
+            points.iter().map(within).collect::<std::collections::HashSet<u64>>()
+        };
+        assert!(places(2).len() > 1000);
+        assert!(places(2).is_disjoint(&places(3)));
+    }
+
     #[test]
     fn too_many_columns_are_refused() {
         let hardware = hardware();
