@@ -151,7 +151,9 @@ impl Drain {
         let number = self.left + self.packets.len();
         let work = packet.lanes();
         let is_idle = work == 0.0;
-        let done = is_idle.then_some(self.started + self.cores.alu as f64);
+        // What has no warp, as a resolve, passes the cores without a step.
+        let alone = if warps > 0 { self.cores.alu as f64 } else { 0.0 };
+        let done = is_idle.then_some(self.started + alone);
         self.packets.push_back(InTurn { packet, done });
         if !is_idle {
             self.held += warps;
