@@ -100,7 +100,7 @@ pub(crate) fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<d
     }
     if !known.contains(&options.dimensions) {
         let range = format!("{} to {}", known.start(), known.end());
-        return refused("dimensions", format!("{}: points of this kind have {range}", options.dimensions));
+        return refused("points", format!("these have {range} dimensions, not {}", options.dimensions));
     }
     let least = if options.dimensions == 3 && options.points == Kind::Darts { LEAST_IN_SPACE } else { 0.005 };
     if !(least..=0.5).contains(&options.radius) {
