@@ -67,7 +67,9 @@ const NOT_PROVOKED: [(&str, &str); 27] = [
 ];
 
 /// Codes that the tests below produce, and `orthographic-view`, which `visibility_inputs` tests.
-const PROVOKED: [&str; 55] = [
+const PROVOKED: [&str; 57] = [
+    "points-from-host",
+    "points-rejected",
     "accuracy-missed",
     "alpha-ignored",
     "behind-camera",
@@ -580,6 +582,15 @@ fn without_margins(inputs: &Inputs) -> String {
         .replace("tail_s: Assumed(0.25", "tail_s: Assumed(0");
     assert_ne!(text, short, "the platform has other margins now");
     inputs.put("short.ron", short)
+}
+
+#[test]
+fn points_that_passes_do_not_make_and_candidates_in_vain() {
+    let frame = ["--frames", "0..1", "--size", "64x64"];
+    let run = |set: &[&str]| quintile().run("sampling", &[&frame[..], set].concat());
+    assert_warns(&run(&["--set", "rounds=1", "--set", "radius=0.1"]), "points-from-host");
+    let loose = ["--set", "points=noise", "--set", "dimensions=4", "--set", "count=100"];
+    assert_warns(&run(&loose), "points-rejected");
 }
 
 #[test]

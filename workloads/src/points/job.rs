@@ -112,6 +112,12 @@ pub(crate) fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<d
     if !(100.0..=2e6).contains(&options.count) {
         return refused("count", format!("{}: it has to be 100 to 2000000", options.count));
     }
+    if options.points != Kind::Volume && request.overrides.samples.is_some() {
+        return refused(
+            "points",
+            "these bring samples of their own: only `points=volume` takes --samples".to_owned(),
+        );
+    }
     let usual = Settings { width: 512, height: 512, samples: 4, ..Settings::default() };
     let settings = usual.with(request.overrides)?;
     if settings.width != settings.height {

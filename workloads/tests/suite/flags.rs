@@ -58,7 +58,7 @@ fn used_flags_change_the_result() {
         ("glossy", &["--size", "--samples", "--shutter", "--lens", "--focus"]),
         ("multiview", &["--size", "--samples", "--shutter", "--focus"]),
         ("occlusion", &["--size", "--samples", "--table"]),
-        ("sampling", &["--size", "--samples"]),
+        ("sampling", &["--size"]),
         ("soft-shadows", &["--size", "--samples", "--shutter"]),
     ] {
         for (flag, change) in FLAGS {

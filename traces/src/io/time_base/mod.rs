@@ -432,10 +432,15 @@ impl Fit {
     }
 }
 
-/// Largest distance of a stamp from its place, in sample periods. Stamps that repeat are rounded to `resolution_s`: half of it
+/// Steps of stamps that are coarser than the samples take more periods than this; otherwise a stamp that repeats is a row too many.
+const COARSE_PERIODS: f64 = 1.1;
+
+/// Largest distance of a stamp from its place, in sample periods. Stamps that repeat may be rounded to `resolution_s`: half of it
 /// may be missing at the first row, half of it at this one.
 pub(crate) fn max_offset_periods(repeats: bool, resolution_s: f64, rate_hz: f64) -> f64 {
-    MAX_OFFSET_PERIODS + if repeats { resolution_s * rate_hz } else { 0.0 }
+    let resolution_periods = resolution_s * rate_hz;
+    let is_coarse = repeats && resolution_periods > COARSE_PERIODS;
+    MAX_OFFSET_PERIODS + if is_coarse { resolution_periods } else { 0.0 }
 }
 
 fn off_step(step_s: f64, guess_s: f64) -> bool {

@@ -196,6 +196,9 @@ fn stamps_coarser_than_the_samples_need_a_stated_rate_and_agree_with_it() {
         let error = grid(&stamps, &stated(1.02 * rate_hz)).unwrap_err().to_string();
         assert!(error.contains("off an even rate"), "{error}");
     }
+    let twice = Stamps::Seconds([0, 1, 2, 2, 3, 4].map(|i| f64::from(i) / 1e3).to_vec());
+    let error = grid(&twice, &stated(1e3)).unwrap_err().to_string();
+    assert!(error.contains("row 4") && error.contains("1.00 sample periods off"), "a row too many: {error}");
     let error = grid(&Stamps::Seconds(vec![2.0; 9]), &stated(1e3)).unwrap_err().to_string();
     assert!(error.contains("row 2: time 2 s is not after 2 s"), "{error}");
 }
