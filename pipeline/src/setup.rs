@@ -5,11 +5,11 @@ use crate::geometry::{Cull, MovingVertex, Shear, Viewport};
 /// A vertex `open + t delta` on the image plane, as `[x, y, w]` (see [`MovingVertex`]). In this form a still
 /// vertex equals `open` to the last bit at all times.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Corner {
+pub struct Corner<C = f32> {
     /// Position when the shutter opens.
-    pub open: [f32; 3],
+    pub open: [C; 3],
     /// Closing minus opening position, rounded once.
-    pub delta: [f32; 3],
+    pub delta: [C; 3],
 }
 
 impl Corner {
@@ -35,11 +35,11 @@ impl Corner {
 
 /// A triangle for traversal.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Triangle {
+pub struct Triangle<C = f32> {
     /// Triangle number in the pass. At equal depth the lower number wins.
     pub id: u32,
     /// Vertices.
-    pub corners: [Corner; 3],
+    pub corners: [Corner<C>; 3],
     /// Whether any vertex moves; still triangles drop the time dimension.
     pub moving: bool,
     /// Whether any vertex is behind the camera at an end of the shutter, where perspective mirrors it; always
@@ -49,7 +49,7 @@ pub struct Triangle {
     /// screen.
     pub faces: [bool; 2],
     /// Rounding allowance of a tile test in `x` and `y`, in their units.
-    pub slack: [f32; 2],
+    pub slack: [C; 2],
 }
 
 /// Result of set-up.

@@ -2,9 +2,9 @@
 
 use std::ops::Range;
 
-use super::triangle::{Rounded, recentring_madds};
+use super::triangle::{Precision, Rounded, recentring_madds};
 use super::{MovingTriangle, Rect, Region, Touch, View};
-use crate::depth::{Bounder, DepthBound, exact_interval_madds, set_up_madds};
+use crate::depth::{DepthBound, ExactBounder, exact_interval_madds, set_up_madds};
 use crate::traversal::{
     Box5, EdgeBounds, Edges, Piece, TileRect, TimePieces, View as Seen, edge_bound_madds, edge_madds,
     narrow_counted, narrow_near,
@@ -111,7 +111,7 @@ impl Rasterizer {
         if columns.is_empty() || rows.is_empty() {
             return TileLoop::default();
         }
-        let mut tests = Tests::new(self, triangle, &grid.rect(&columns, &rows), &self.clip);
+        let mut tests = Tests::<Door>::new(self, triangle, &grid.rect(&columns, &rows), &self.clip);
         let within = self.clip.outward(self.view.has_lens());
         tests.descend(grid, [columns, rows], within, &mut each);
         tests.work
@@ -120,7 +120,7 @@ impl Rasterizer {
     /// Intervals in which a triangle may touch `rect` within `region`, or `None` if it cannot. For
     /// callers with their own tile hierarchy: intervals of a tile are valid for the tiles inside.
     pub fn touch(&self, triangle: &MovingTriangle, rect: &Rect, region: &Region) -> Option<Touch> {
-        let mut tests = Tests::new(self, triangle, rect, region);
+        let mut tests = Tests::<Door>::new(self, triangle, rect, region);
         tests.touch(rect, region.outward(self.view.has_lens())).ok()
     }
 }
@@ -133,25 +133,27 @@ enum Culled {
 }
 
 /// The tests of one triangle, and their work.
-struct Tests<'a> {
+type Door = f64;
+
+struct Tests<'a, C> {
     rasterizer: &'a Rasterizer,
     region: &'a Region,
-    rounded: Rounded,
-    bounder: Bounder,
+    rounded: Rounded<C>,
+    bounder: ExactBounder,
     work: TileLoop,
 }
 
-impl<'a> Tests<'a> {
+impl<'a, C: Precision> Tests<'a, C> {
     /// Tests of tiles within `rect`.
     fn new(rasterizer: &'a Rasterizer, triangle: &MovingTriangle, rect: &Rect, region: &'a Region) -> Self {
-        let rounded = Rounded::new(&rasterizer.view, triangle, rect);
-        let (moving, bound) = (rounded.triangle.moving, DepthBound::LocalPlanes);
+        let rounded = Rounded::<C>::new(&rasterizer.view, triangle, rect);
+        let moving = rounded.triangle.moving;
         let work = TileLoop {
             place_madds: recentring_madds(moving, rasterizer.view.is_perspective()),
-            depth_madds: set_up_madds(bound, moving),
+            depth_madds: set_up_madds(DepthBound::LocalPlanes, moving),
             ..TileLoop::default()
         };
-        let bounder = Bounder::new(&rounded.triangle, &rounded.shear, bound);
+        let bounder = ExactBounder::new(&rounded.triangle, &rounded.shear);
         Self { rasterizer, region, rounded, bounder, work }
     }
 
@@ -159,7 +161,7 @@ impl<'a> Tests<'a> {
         &mut self,
         grid: &Grid,
         [columns, rows]: [Range<u32>; 2],
-        within: Box5,
+        within: Box5<C>,
         each: &mut impl FnMut([u32; 2], &Touch, &mut TileLoop),
     ) {
         if columns.is_empty() || rows.is_empty() {
@@ -196,19 +198,19 @@ impl<'a> Tests<'a> {
         tested.ok()
     }
 
-    fn touch(&mut self, rect: &Rect, within: Box5) -> Result<Touch, Culled> {
+    fn touch(&mut self, rect: &Rect, within: Box5<C>) -> Result<Touch, Culled> {
         self.halved(&self.rounded.tile(rect), within, self.rasterizer.halvings)
     }
 
     /// The part of `within` in which the triangle may touch the tile: inside its sides, beyond the near depth, and inside
     /// its own edges. Which face it shows does not matter, as it may have no area.
-    fn part(&mut self, tile: &TileRect, within: Box5) -> Result<Box5, Culled> {
+    fn part(&mut self, tile: &TileRect<C>, within: Box5<C>) -> Result<Box5<C>, Culled> {
         let Rounded { triangle, shear, near, depth_slack, .. } = &self.rounded;
-        let (left, madds) = narrow_counted::<f64>(triangle, shear, tile, &within);
+        let (left, madds) = narrow_counted::<f64, _>(triangle, shear, tile, &within);
         self.work.side_madds += madds;
         let mut within = left.ok_or(Culled::BySides)?;
-        if *near != f32::NEG_INFINITY {
-            let (left, madds) = narrow_near::<f64>(triangle, *near, *depth_slack, &within);
+        if self.rasterizer.view.near() != f64::NEG_INFINITY {
+            let (left, madds) = narrow_near::<f64, _>(triangle, *near, *depth_slack, &within);
             self.work.side_madds += madds;
             within = left.ok_or(Culled::BySides)?;
         }
@@ -218,13 +220,13 @@ impl<'a> Tests<'a> {
 
     /// Times at which the triangle may be inside its edges. An edge is bilinear in u and v, so it is bounded by its
     /// bounds from the corners of the lens.
-    fn edges(&mut self, tile: &TileRect, within: &Box5) -> TimePieces {
+    fn edges(&mut self, tile: &TileRect<C>, within: &Box5<C>) -> TimePieces<C> {
         let Rounded { triangle, shear, .. } = &self.rounded;
         let corners = [(0, 0), (1, 0), (0, 1), (1, 1)];
         let corners = &corners[..if within.lens { 4 } else { 1 }];
         let from = |&(i, j): &(usize, usize)| {
             let corner = Box5 { u: [within.u[i]; 2], v: [within.v[j]; 2], ..*within };
-            Edges::<f64>::new(Seen::new(triangle, shear, tile, &corner))
+            Edges::<f64, C>::new(Seen::new(triangle, shear, tile, &corner))
         };
         let first = from(&corners[0]);
         let others = corners[1..].iter().map(|corner| EdgeBounds::new(&from(corner)));
@@ -237,10 +239,10 @@ impl<'a> Tests<'a> {
         times
     }
 
-    fn halved(&mut self, tile: &TileRect, within: Box5, halvings: u32) -> Result<Touch, Culled> {
+    fn halved(&mut self, tile: &TileRect<C>, within: Box5<C>, halvings: u32) -> Result<Touch, Culled> {
         let within = self.part(tile, within)?;
         let [start, end] = within.t;
-        let middle = 0.5 * (start + end);
+        let middle = C::nearest(0.5) * (start + end);
         if halvings == 0 || !self.rounded.triangle.moving || !(start < middle && middle < end) {
             return self.depths(tile, &within).ok_or(Culled::ByEdges);
         }
@@ -250,9 +252,9 @@ impl<'a> Tests<'a> {
     }
 
     /// The intervals with the depths (thesis, Paper VI, Appendix A, both tests), or `None` if there are none.
-    fn depths(&mut self, tile: &TileRect, within: &Box5) -> Option<Touch> {
+    fn depths(&mut self, tile: &TileRect<C>, within: &Box5<C>) -> Option<Touch> {
         self.work.depth_madds += exact_interval_madds(self.rounded.triangle.moving, within.lens);
-        let [lo, hi] = self.rounded.depths(self.bounder.over_exact(tile, within, self.rounded.depth_slack));
+        let [lo, hi] = self.rounded.depths(self.bounder.over(tile, within, self.rounded.depth_slack));
         let z = [lo.max(self.rasterizer.view.near()), hi];
         let Region { u, v, t } = self.region.within(within);
         [u, v, t, z].iter().all(|[lo, hi]| lo <= hi).then_some(Touch { u, v, t, z })

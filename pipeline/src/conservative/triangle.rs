@@ -6,10 +6,10 @@
 //! the input. Tiles, lens positions and times are rounded outward.
 
 use super::{Rect, View};
-use crate::depth::{Real, round_down, round_up};
+use crate::depth::Real;
 use crate::geometry::Shear;
 use crate::setup::{Corner, Triangle};
-use crate::traversal::TileRect;
+use crate::traversal::{Coordinate, TileRect};
 
 /// A triangle whose vertices `[x, y, depth]` move linearly from `open` to `close`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,27 +60,40 @@ impl MovingTriangle {
     }
 }
 
-/// Rounding to `f32`, relative: four times half an ulp. A vertex at a time is `open + t delta`, both rounded.
-const ROUNDED: f64 = 1.0 / (1_u64 << 22) as f64;
+/// Type of the coordinates in which triangles are tested.
+pub(super) trait Precision: Coordinate {
+    /// Bound of the rounding of a vertex as seen, relative to the magnitudes of its terms, times two.
+    const ROUNDED: f64;
+}
+
+/// A vertex at a time is `open + t delta`, each of which is off by half an ulp: 2^-24. What follows is `f64`, whose
+/// rounding is far less.
+impl Precision for f32 {
+    const ROUNDED: f64 = 1.0 / (1_u64 << 22) as f64;
+}
+
+impl Precision for f64 {
+    const ROUNDED: f64 = 1.0 / (1_u64 << 46) as f64;
+}
 
 /// Rounding of moving to the origin in `f64`, relative to the coordinates before: more than four of 2^-53 each.
 const MOVED: f64 = 1.0 / (1_u64 << 50) as f64;
 
 /// A triangle and a view as the tile tests take them, for tiles within one rectangle.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Rounded {
-    pub triangle: Triangle,
-    pub shear: Shear,
+pub(super) struct Rounded<C> {
+    pub triangle: Triangle<C>,
+    pub shear: Shear<C>,
     /// Smallest visible depth; negative infinity for all.
-    pub near: f32,
+    pub near: C,
     /// Bound of the error of a depth.
-    pub depth_slack: f32,
+    pub depth_slack: C,
     /// Unit of the image on each axis, and its origin.
     image: [Unit; 2],
     depth: Unit,
 }
 
-/// A coordinate is `(value - origin) scale` in `f32`, where `scale` is a product of two powers of two.
+/// A coordinate is `(value - origin) scale`, where `scale` is a product of two powers of two.
 #[derive(Clone, Copy, Debug, Default)]
 struct Unit {
     origin: f64,
@@ -93,13 +106,13 @@ impl Unit {
     }
 
     /// A range with more than the rounding of [`Self::of`] on either side.
-    fn outward(&self, [lo, hi]: [f64; 2]) -> [f32; 2] {
+    fn outward<C: Coordinate>(&self, [lo, hi]: [f64; 2]) -> [C; 2] {
         let off = |value: f64| MOVED * (value.abs() + self.origin.abs()) * self.scale[0] * self.scale[1];
-        [round_down(self.of(lo) - off(lo)), round_up(self.of(hi) + off(hi))]
+        [C::at_most(self.of(lo) - off(lo)), C::at_least(self.of(hi) + off(hi))]
     }
 
-    fn back(&self, value: f32) -> f64 {
-        f64::from(value) / self.scale[1] / self.scale[0] + self.origin
+    fn back(&self, value: impl Into<f64>) -> f64 {
+        value.into() / self.scale[1] / self.scale[0] + self.origin
     }
 }
 
@@ -109,10 +122,10 @@ fn to_one(size: f64) -> f64 {
     f64::from_bits((2045 - exponent) << 52)
 }
 
-impl Rounded {
+impl<C: Precision> Rounded<C> {
     /// `triangle` in `view` for tiles within `rect`.
     pub fn new(view: &View, triangle: &MovingTriangle, rect: &Rect) -> Self {
-        let recentred = Recentred::new(view, triangle, rect);
+        let recentred = Recentred::new(view, triangle, rect, C::ROUNDED);
         let (perspective, a, moving) = (view.is_perspective(), view.shear().1, triangle.is_moving());
         let axes = [recentred.axis(0), recentred.axis(1), recentred.depth()];
         let scale = axes.map(|axis| to_one(axis.size + axis.slack));
@@ -122,7 +135,7 @@ impl Rounded {
             scale: [if perspective { deep.recip() } else { 1.0 }, scale[axis]],
         });
         let depth = Unit { origin: recentred.origin[2], scale: [deep, 1.0] };
-        let rounded = |p: [f64; 3]| [0, 1, 2].map(|axis| (p[axis] * scale[axis]) as f32);
+        let rounded = |p: [f64; 3]| [0, 1, 2].map(|axis| C::nearest(p[axis] * scale[axis]));
         let corner =
             |k: usize| Corner { open: rounded(recentred.open[k]), delta: rounded(recentred.delta[k]) };
         Self {
@@ -132,27 +145,27 @@ impl Rounded {
                 moving,
                 behind: false,
                 faces: [true; 2],
-                slack: [0, 1].map(|axis| round_up(axes[axis].slack * scale[axis])),
+                slack: [0, 1].map(|axis| C::at_least(axes[axis].slack * scale[axis])),
             },
             shear: Shear {
-                s: [0, 1].map(|axis| (axes[axis].shift * scale[axis]) as f32),
-                a: [0, 1].map(|axis| (a[axis] / deep * scale[axis]) as f32),
+                s: [0, 1].map(|axis| C::nearest(axes[axis].shift * scale[axis])),
+                a: [0, 1].map(|axis| C::nearest(a[axis] / deep * scale[axis])),
                 parallel: !perspective,
             },
             near: depth.outward([view.near(); 2])[0],
-            depth_slack: round_up(axes[2].slack * deep),
+            depth_slack: C::at_least(axes[2].slack * deep),
             image,
             depth,
         }
     }
 
     /// A rectangle of the image as the tile tests see it.
-    pub fn tile(&self, rect: &Rect) -> TileRect {
+    pub fn tile(&self, rect: &Rect) -> TileRect<C> {
         TileRect { x: self.image[0].outward(rect.x), y: self.image[1].outward(rect.y) }
     }
 
     /// Depths in their own unit.
-    pub fn depths(&self, z: [f32; 2]) -> [f64; 2] {
+    pub fn depths(&self, z: [C; 2]) -> [f64; 2] {
         z.map(|z| self.depth.back(z))
     }
 }
@@ -170,6 +183,8 @@ struct Recentred<'a> {
     largest: [f64; 3],
     /// Error of a depth before it is rounded.
     depth_off: f64,
+    /// [`Precision::ROUNDED`].
+    rounded: f64,
 }
 
 /// An axis of a recentred triangle.
@@ -184,7 +199,7 @@ struct Axis {
 }
 
 impl<'a> Recentred<'a> {
-    fn new(view: &'a View, triangle: &'a MovingTriangle, rect: &Rect) -> Self {
+    fn new(view: &'a View, triangle: &'a MovingTriangle, rect: &Rect, rounded: f64) -> Self {
         let perspective = view.is_perspective();
         let depths = triangle.vertices().map(|p| p[2]);
         let depths = depths.fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], z| [lo.min(z), hi.max(z)]);
@@ -198,12 +213,12 @@ impl<'a> Recentred<'a> {
             .map(|axis| (0..3).map(|k| open[k][axis].abs() + delta[k][axis].abs()).fold(0.0, f64::max));
         let depth_off = triangle.uncertainty[2] + MOVED * (triangle.largest(2) + origin[2].abs());
         let reach = [rect.x[1] - origin[0], rect.y[1] - origin[1]];
-        Self { view, triangle, origin, reach, open, delta, largest, depth_off }
+        Self { view, triangle, origin, reach, open, delta, largest, depth_off, rounded }
     }
 
     fn depth(&self) -> Axis {
         let size = self.largest[2];
-        Axis { shift: 0.0, size, slack: 0.5 * ROUNDED * size + self.depth_off }
+        Axis { shift: 0.0, size, slack: 0.5 * self.rounded * size + self.depth_off }
     }
 
     fn axis(&self, axis: usize) -> Axis {
@@ -221,7 +236,7 @@ impl<'a> Recentred<'a> {
             self.triangle.largest(axis) + if perspective { at * self.triangle.largest(2) } else { at };
         let terms = terms + s[axis].abs() + bent * self.origin[2].abs();
         let off = self.triangle.uncertainty[axis] + by_depth * self.depth_off + MOVED * terms;
-        Axis { shift, size, slack: ROUNDED * size + 2.0 * off }
+        Axis { shift, size, slack: self.rounded * size + 2.0 * off }
     }
 }
 

@@ -1,8 +1,7 @@
 //! Views, tiles, and boxes of lens and time of conservative mode.
 
-use crate::depth::{round_down, round_up};
 use crate::geometry::Shear;
-use crate::traversal::Box5;
+use crate::traversal::{Box5, Coordinate};
 
 /// A projection of points `[x, y, depth]`, in units of the tile borders (such as pixels).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -105,15 +104,15 @@ impl Region {
     /// The whole lens and shutter.
     pub const WHOLE: Self = Self { u: [-1.0, 1.0], v: [-1.0, 1.0], t: [0.0, 1.0] };
 
-    /// The box rounded outward to `f32`; `lens` says whether the camera has a lens.
-    pub(super) fn outward(&self, lens: bool) -> Box5 {
+    /// The box rounded outward; `lens` says whether the camera has a lens.
+    pub(super) fn outward<C: Coordinate>(&self, lens: bool) -> Box5<C> {
         Box5 { u: outward(self.u), v: outward(self.v), t: outward(self.t), lens }
     }
 
     /// The part of the region in a box.
-    pub(super) fn within(&self, part: &Box5) -> Self {
-        let both = |mine: [f64; 2], part: [f32; 2]| {
-            let [lo, hi] = part.map(f64::from);
+    pub(super) fn within<C: Coordinate>(&self, part: &Box5<C>) -> Self {
+        let both = |mine: [f64; 2], part: [C; 2]| {
+            let [lo, hi]: [f64; 2] = part.map(Into::into);
             [mine[0].max(lo), mine[1].min(hi)]
         };
         let [u, v] = if part.lens { [both(self.u, part.u), both(self.v, part.v)] } else { [self.u, self.v] };
@@ -146,7 +145,7 @@ impl Touch {
     }
 }
 
-/// Narrowest `f32` range that contains the `f64` range.
-fn outward([lo, hi]: [f64; 2]) -> [f32; 2] {
-    [round_down(lo), round_up(hi)]
+/// Narrowest range of coordinates that contains the range.
+fn outward<C: Coordinate>([lo, hi]: [f64; 2]) -> [C; 2] {
+    [C::at_most(lo), C::at_least(hi)]
 }

@@ -3,11 +3,11 @@
 
 use serde::Deserialize;
 
-use super::number::{Real, both, cross, hull, round_down, round_up};
+use super::number::{Real, both, cross, hull, range};
 use super::plane::{Beam, MovingPlane, Points, normal, sides, tightest};
 use crate::geometry::Shear;
 use crate::setup::Triangle;
-use crate::traversal::{Box5, TileRect};
+use crate::traversal::{Box5, Coordinate, TileRect};
 
 /// Method of bounding the depth of a triangle over a tile. Each method includes the bounds of the methods
 /// before it.
@@ -103,26 +103,35 @@ impl Bounder {
         let vertices = vertex_range(&self.triangle, t);
         let Some(facts) = &self.facts else { return vertices };
         match facts.over(self.shutter.as_ref(), &Region::new(tile, within)) {
-            Some([lo, hi]) => both(vertices, [round_down(lo), round_up(hi)]),
+            Some([lo, hi]) => both(vertices, [f32::at_most(lo), f32::at_least(hi)]),
             None => vertices,
         }
     }
 }
 
-impl Bounder {
+/// Depth bounds of a triangle in conservative mode, by [`DepthBound::LocalPlanes`].
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ExactBounder {
+    facts: Facts<f64>,
+    /// The plane of a still triangle.
+    shutter: Option<[MovingPlane<f64>; 2]>,
+}
+
+impl ExactBounder {
+    /// Prepare depth bounds of `triangle` under a lens with `shear`.
+    pub fn new<C: Coordinate>(triangle: &Triangle<C>, shear: &Shear<C>) -> Self {
+        let facts = Facts::new(triangle, shear);
+        let shutter = (!triangle.moving).then(|| facts.shutter());
+        Self { facts, shutter }
+    }
+
     /// Interval of the depths of all points seen in `tile` and `within` of a triangle whose vertices are off by half the
     /// slack, and by `depth` in depth. It is empty if there are none.
-    pub(crate) fn over_exact(&self, tile: &TileRect, within: &Box5, depth: f32) -> [f32; 2] {
-        let [lo, hi] = vertex_range(&self.triangle, within.t);
-        // Vertices at a time are rounded, and then the bound is.
-        let wider = 2.0 * depth;
-        let vertices = [(lo - wider).next_down(), (hi + wider).next_up()];
-        let region = Region::new(tile, within);
-        let planes = self
-            .facts
-            .as_ref()
-            .and_then(|facts| facts.exact(self.shutter.as_ref(), &region, f64::from(wider)));
-        planes.map_or(vertices, |[lo, hi]| both(vertices, [round_down(lo), round_up(hi)]))
+    pub fn over<C: Coordinate>(&self, tile: &TileRect<C>, within: &Box5<C>, depth: C) -> [C; 2] {
+        // Twice the error covers the rounding of vertices at a time, and of the bound.
+        let [lo, hi] =
+            self.facts.exact(self.shutter.as_ref(), &Region::new(tile, within), 2.0 * depth.into());
+        [C::at_most(lo), C::at_least(hi)]
     }
 }
 
@@ -134,8 +143,8 @@ struct Region<R> {
 }
 
 impl Region<f64> {
-    fn new(tile: &TileRect, within: &Box5) -> Self {
-        let wide = |range: [f32; 2]| range.map(f64::from);
+    fn new<C: Coordinate>(tile: &TileRect<C>, within: &Box5<C>) -> Self {
+        let wide = |range: [C; 2]| range.map(Into::into);
         Self {
             tile: [wide(tile.x), wide(tile.y)],
             lens: within.lens.then(|| [wide(within.u), wide(within.v)]),
@@ -159,14 +168,14 @@ struct Facts<R> {
 }
 
 impl Facts<f64> {
-    fn new(triangle: &Triangle, shear: &Shear) -> Self {
-        let [s, a] = [shear.s, shear.a].map(|part| part.map(f64::from));
-        let open = triangle.corners.map(|corner| corner.open.map(f64::from));
-        let delta = triangle.corners.map(|corner| corner.delta.map(f64::from));
+    fn new<C: Coordinate>(triangle: &Triangle<C>, shear: &Shear<C>) -> Self {
+        let [s, a]: [[f64; 2]; 2] = [shear.s, shear.a].map(|part| part.map(Into::into));
+        let open: Points<f64> = triangle.corners.map(|corner| corner.open.map(Into::into));
+        let delta: Points<f64> = triangle.corners.map(|corner| corner.delta.map(Into::into));
         let largest =
             |axis: usize| (0..3).map(|k| open[k][axis].abs() + delta[k][axis].abs()).fold(0.0, f64::max);
         let size = [largest(0) + s[0].abs(), largest(1) + s[1].abs(), largest(2)];
-        let (moving, slack, parallel) = (triangle.moving, triangle.slack.map(f64::from), shear.parallel);
+        let (moving, slack, parallel) = (triangle.moving, triangle.slack.map(Into::into), shear.parallel);
         Self { open, delta, moving, size, slack, s, a, parallel }
     }
 }
@@ -197,10 +206,15 @@ impl<R: Real> Facts<R> {
         self.planes(shutter, region, &beam, &ends, &margin)
     }
 
-    /// The same for every point of a triangle whose vertices are off by half the slack, and by `depth` in depth.
-    fn exact(&self, shutter: Option<&[MovingPlane<R>; 2]>, region: &Region<R>, depth: R) -> Option<[R; 2]> {
+    /// Depths of every point of a triangle whose vertices are off by half the slack, and by `depth` in depth.
+    fn exact(&self, shutter: Option<&[MovingPlane<R>; 2]>, region: &Region<R>, depth: R) -> [R; 2] {
         let margin = Margin { off: self.slack.map(|slack| R::new(0.5) * slack), depth };
-        self.planes(shutter, region, &self.beam(region), &self.ends(region), &margin)
+        let ends = self.ends(region);
+        let [first, last] = ends.map(|points| range(points.map(|p| p[2])));
+        let [lo, hi] = hull(first, last);
+        let vertices = [lo - depth, hi + depth];
+        let planes = self.planes(shutter, region, &self.beam(region), &ends, &margin);
+        planes.map_or(vertices, |planes| both(vertices, planes))
     }
 
     fn beam(&self, region: &Region<R>) -> Beam<R> {
@@ -384,10 +398,8 @@ mod tests {
             // The vertices at the ends of the interval are computed in any case.
             assert_eq!(over, interval_madds(bound, moving, lens), "tile, {bound:?} {moving} {lens}");
             if bound == DepthBound::LocalPlanes {
-                let exact = madds(|| found = facts.exact(shutter.as_ref(), &region, Counted(0.01)));
-                assert!(found.is_some());
-                // The range of the vertices is widened at both ends.
-                assert_eq!(exact + 2, exact_interval_madds(moving, lens), "exact, {moving} {lens}");
+                let exact = madds(|| _ = facts.exact(shutter.as_ref(), &region, Counted(0.01)));
+                assert_eq!(exact, exact_interval_madds(moving, lens), "exact, {moving} {lens}");
             }
         }
     }

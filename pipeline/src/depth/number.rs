@@ -130,17 +130,6 @@ pub(super) fn hull<R: Real>(a: [R; 2], b: [R; 2]) -> [R; 2] {
     [a[0].smaller(b[0]), a[1].larger(b[1])]
 }
 
-/// Largest `f32` at or below `value`.
-pub(crate) fn round_down(value: f64) -> f32 {
-    let near = value as f32;
-    if f64::from(near) > value { near.next_down() } else { near }
-}
-
-/// Smallest `f32` at or above `value`.
-pub(crate) fn round_up(value: f64) -> f32 {
-    -round_down(-value)
-}
-
 #[cfg(test)]
 pub(super) mod counting {
     use super::Real;
@@ -196,20 +185,6 @@ pub(super) mod counting {
 
         fn madd(self, b: Self, c: Self) -> Self {
             count(self.0 * b.0 + c.0)
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn rounding_is_outward_and_no_further() {
-        for value in [1.0 / 3.0, -1.0 / 3.0, 0.1, 7.0, -7.0, 0.0, 1e-50, -1e-50, 1e30] {
-            let (below, above) = (round_down(value), round_up(value));
-            assert!(f64::from(below) <= value && value <= f64::from(above), "{value}");
-            assert!(above == below || above == below.next_up(), "{value}: {below} to {above}");
         }
     }
 }

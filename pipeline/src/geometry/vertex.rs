@@ -41,11 +41,11 @@ impl MovingVertex {
 /// Both forms are `(x - base) - slope w` with a `base` and a `slope` of the sample, so one sample test serves
 /// both; see [`Self::ray`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Shear {
+pub struct Shear<C = f32> {
     /// Projection scale times lens radius: pixels times scene units, or pixels in an orthographic view.
-    pub s: [f32; 2],
+    pub s: [C; 2],
     /// `s` over the focus depth.
-    pub a: [f32; 2],
+    pub a: [C; 2],
     /// Whether the view is orthographic.
     pub parallel: bool,
 }

@@ -20,14 +20,14 @@
 //! form, so bounds of its coefficients hold at all times. (Munkberg and Akenine-Moeller 2012 bound edges this
 //! way; the form relative to the middle of the box is new here.)
 
-use super::number::{Number, Quadratic};
+use super::number::{Coordinate, Number, Quadratic};
 use super::region::{Faces, Piece, TimePieces};
 use super::{View, cost};
 
 /// Edges of a triangle over a box; edge `k` is opposite vertex `k`.
 #[derive(Clone, Copy, Debug)]
-pub struct Edges<N = f64> {
-    pub(super) view: View<N>,
+pub struct Edges<N = f64, C = f32> {
+    pub(super) view: View<N, C>,
     pub(super) edges: [Edge<N>; 3],
 }
 
@@ -42,16 +42,16 @@ pub(super) struct Edge<N> {
     pub depths: [N; 2],
 }
 
-impl<N: Number> Edges<N> {
+impl<N: Number, C: Coordinate> Edges<N, C> {
     /// Edges of the triangle in `view`.
-    pub fn new(view: View<N>) -> Self {
+    pub fn new(view: View<N, C>) -> Self {
         let edge = |i: usize, j: usize| Edge::new(&view, i, j);
         let edges = [edge(1, 2), edge(2, 0), edge(0, 1)];
         Self { view, edges }
     }
 
     /// Whether `t` covers the whole time of the box, as far as it matters.
-    pub fn spans(&self, t: [f32; 2]) -> bool {
+    pub fn spans(&self, t: [C; 2]) -> bool {
         !self.view.moving || t == self.view.t
     }
 
@@ -68,7 +68,7 @@ impl<N: Number> Edges<N> {
 }
 
 impl<N: Number> Edge<N> {
-    fn new(view: &View<N>, i: usize, j: usize) -> Self {
+    fn new<C: Coordinate>(view: &View<N, C>, i: usize, j: usize) -> Self {
         let [open, close] = view.ends.map(|points| (points[i], points[j]));
         let product = |f: fn([N; 3], [N; 3]) -> N| {
             let start = f(open.0, open.1);
@@ -117,7 +117,7 @@ impl<N: Number> Edge<N> {
     }
 
     /// Lower and upper bound in the arithmetic of the sample test, as quadratics of time.
-    pub(super) fn range(&self, view: &View<N>, skew: N) -> [Quadratic<N>; 2] {
+    pub(super) fn range<C: Coordinate>(&self, view: &View<N, C>, skew: N) -> [Quadratic<N>; 2] {
         let [from, to] = self.depths.map(N::abs);
         let bend = [from, from.max(to), to];
         let axes = if view.lens { 4 } else { 2 };
@@ -150,7 +150,7 @@ pub struct EdgeBounds<N = f64> {
 
 impl<N: Number> EdgeBounds<N> {
     /// Bounds of each of `edges` over the whole box.
-    pub fn new(edges: &Edges<N>) -> Self {
+    pub fn new<C: Coordinate>(edges: &Edges<N, C>) -> Self {
         let skew = edges.skew();
         let ranges = edges.edges.map(|edge| edge.range(&edges.view, skew));
         Self { ranges, moving: edges.view.moving }
@@ -182,7 +182,12 @@ impl<N: Number> EdgeBounds<N> {
 
     /// The same for each piece of `times`, for the `drawn` faces; `edges` are those bounded. The second
     /// result is the cost in multiply-adds beyond those of the edges themselves.
-    pub fn timeline(&self, edges: &Edges<N>, times: &TimePieces, drawn: Faces) -> (TimePieces, u32) {
+    pub fn timeline<C: Coordinate>(
+        &self,
+        edges: &Edges<N, C>,
+        times: &TimePieces<C>,
+        drawn: Faces,
+    ) -> (TimePieces<C>, u32) {
         let (mut left, mut madds) = (TimePieces::empty(), 0);
         for piece in times.pieces() {
             let part = if edges.spans(piece.t) {

@@ -108,11 +108,11 @@ impl LensSpans {
         tile: &TileRect,
         within: &Box5,
     ) -> (Option<(Self, Box5)>, u32) {
-        let (common, mut madds) = narrow_sides::<N>(triangle, shear, tile, within, 1);
+        let (common, mut madds) = narrow_sides::<N, _>(triangle, shear, tile, within, 1);
         let Some(common) = common else { return (None, madds) };
         let kept = self.kept(&common, |span| {
             let LensSpan { u, t } = span.within(&common)?;
-            let (left, more) = narrow_sides::<N>(triangle, shear, tile, &Box5 { u, t, ..common }, 0);
+            let (left, more) = narrow_sides::<N, _>(triangle, shear, tile, &Box5 { u, t, ..common }, 0);
             madds += more;
             left.map(|Box5 { u, t, .. }| LensSpan { u, t })
         });

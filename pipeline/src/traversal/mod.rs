@@ -30,7 +30,7 @@ pub use edges::{EdgeBounds, Edges};
 pub use facing::Facing;
 pub use lens_lines::LensLines;
 pub use lens_spans::{LensSpan, LensSpans};
-pub use number::{Number, Pieces, Quadratic};
+pub use number::{Coordinate, Number, Pieces, Quadratic};
 pub use region::{Box5, Faces, Piece, TileRect, TimePieces, View};
 pub use screen::{SCREEN_GAIN_MADDS, Screen, screen_madds};
 pub use side_planes::{narrow, narrow_counted, narrow_near};

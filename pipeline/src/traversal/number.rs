@@ -5,6 +5,81 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use crate::tally::{Branches, Counting};
 
+/// Type of the coordinates, lens positions and times that the tile tests take and return. They compute with a
+/// [`Number`] in between.
+pub trait Coordinate:
+    Copy + PartialOrd + Into<f64> + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self>
+{
+    /// Zero.
+    const ZERO: Self;
+
+    /// The value nearest to `value`.
+    fn nearest(value: f64) -> Self;
+    /// Magnitude.
+    fn abs(self) -> Self;
+    /// Maximum; the other one if one is NaN.
+    fn max(self, other: Self) -> Self;
+    /// Minimum; the other one if one is NaN.
+    fn min(self, other: Self) -> Self;
+    /// The next greater value.
+    fn next_up(self) -> Self;
+    /// The next smaller value.
+    fn next_down(self) -> Self;
+
+    /// Largest one at or below `value`.
+    fn at_most(value: f64) -> Self {
+        let near = Self::nearest(value);
+        if near.into() > value { near.next_down() } else { near }
+    }
+
+    /// Smallest one at or above `value`.
+    fn at_least(value: f64) -> Self {
+        let near = Self::nearest(value);
+        if near.into() < value { near.next_up() } else { near }
+    }
+}
+
+macro_rules! coordinate {
+    ($type:ident) => {
+        impl Coordinate for $type {
+            const ZERO: Self = 0.0;
+
+            #[inline(always)]
+            fn nearest(value: f64) -> Self {
+                value as Self
+            }
+
+            #[inline(always)]
+            fn abs(self) -> Self {
+                self.abs()
+            }
+
+            #[inline(always)]
+            fn max(self, other: Self) -> Self {
+                self.max(other)
+            }
+
+            #[inline(always)]
+            fn min(self, other: Self) -> Self {
+                self.min(other)
+            }
+
+            #[inline(always)]
+            fn next_up(self) -> Self {
+                self.next_up()
+            }
+
+            #[inline(always)]
+            fn next_down(self) -> Self {
+                self.next_down()
+            }
+        }
+    };
+}
+
+coordinate!(f32);
+coordinate!(f64);
+
 /// Number type of the kernels of the tile tests. A generic kernel can be run with counting numbers to measure
 /// its cost.
 pub trait Number:
@@ -44,6 +119,11 @@ pub trait Number:
     /// Zero.
     fn zero() -> Self {
         Self::from(0.0)
+    }
+
+    /// A coordinate.
+    fn of(coordinate: impl Coordinate) -> Self {
+        Self::constant(coordinate.into())
     }
 }
 
@@ -333,6 +413,16 @@ mod tests {
             Pieces::None => false,
             Pieces::One(piece) => within(piece),
             Pieces::Two(first, last) => within(first) || within(last),
+        }
+    }
+
+    #[test]
+    fn rounding_is_outward_and_no_further() {
+        for value in [1.0 / 3.0, -1.0 / 3.0, 0.1, 7.0, -7.0, 0.0, 1e-50, -1e-50, 1e30] {
+            let (below, above) = (f32::at_most(value), f32::at_least(value));
+            assert!(f64::from(below) <= value && value <= f64::from(above), "{value}");
+            assert!(above == below || above == below.next_up(), "{value}: {below} to {above}");
+            assert_eq!([f64::at_most(value), f64::at_least(value)], [value; 2]);
         }
     }
 

@@ -1,16 +1,16 @@
 //! Tiles, boxes of lens and time, timelines of visible faces, and a triangle seen from the middle of a box.
 
-use super::number::Number;
+use super::number::{Coordinate, Number};
 use crate::geometry::{Clip, Shear, Viewport};
-use crate::setup::Triangle;
+use crate::setup::{Corner, Triangle};
 
 /// A tile in pixels from the centre of the image.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TileRect {
+pub struct TileRect<C = f32> {
     /// Range of x.
-    pub x: [f32; 2],
+    pub x: [C; 2],
     /// Range of y.
-    pub y: [f32; 2],
+    pub y: [C; 2],
 }
 
 impl TileRect {
@@ -26,13 +26,13 @@ impl TileRect {
 
 /// A closed box of lens positions and times.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Box5 {
+pub struct Box5<C = f32> {
     /// Lens position.
-    pub u: [f32; 2],
+    pub u: [C; 2],
     /// Lens position.
-    pub v: [f32; 2],
+    pub v: [C; 2],
     /// Time.
-    pub t: [f32; 2],
+    pub t: [C; 2],
     /// Whether the camera has a lens; without one `u` and `v` are unused.
     pub lens: bool,
 }
@@ -75,14 +75,14 @@ pub type Faces = [bool; 2];
 
 /// A piece of time with the faces that may be visible in it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Piece {
+pub struct Piece<C = f32> {
     /// First and last time, both included. Pieces do not overlap.
-    pub t: [f32; 2],
+    pub t: [C; 2],
     /// Faces that the triangle may show, drawn or not.
     pub faces: Faces,
 }
 
-impl Piece {
+impl<C> Piece<C> {
     /// Whether the visible face is known.
     pub fn is_decided(&self) -> bool {
         self.faces != [true; 2]
@@ -96,24 +96,29 @@ impl Piece {
 
 /// Pieces of time in order.
 #[derive(Clone, Copy, Debug)]
-pub struct TimePieces {
-    pieces: [Piece; Self::MAX],
+pub struct TimePieces<C = f32> {
+    pieces: [Piece<C>; MAX_PIECES],
     len: usize,
 }
 
+/// Largest number of pieces of a timeline.
+const MAX_PIECES: usize = 8;
+
 impl TimePieces {
     /// Largest number of pieces.
-    pub const MAX: usize = 8;
+    pub const MAX: usize = MAX_PIECES;
     /// Largest number of time bisections.
     pub const MAX_SPLITS: u32 = Self::MAX.ilog2();
+}
 
+impl<C: Coordinate> TimePieces<C> {
     /// No time.
     pub const fn empty() -> Self {
-        Self { pieces: [Piece { t: [0.0; 2], faces: [false; 2] }; Self::MAX], len: 0 }
+        Self { pieces: [Piece { t: [C::ZERO; 2], faces: [false; 2] }; MAX_PIECES], len: 0 }
     }
 
     /// One piece.
-    pub fn one(piece: Piece) -> Self {
+    pub fn one(piece: Piece<C>) -> Self {
         let mut timeline = Self::empty();
         timeline.push(piece);
         timeline
@@ -121,8 +126,8 @@ impl TimePieces {
 
     /// Append a piece. It is merged with the last piece if it follows at once with the same faces. If the
     /// list is full the last piece grows, which is conservative.
-    pub fn push(&mut self, piece: Piece) {
-        let full = self.len == Self::MAX;
+    pub fn push(&mut self, piece: Piece<C>) {
+        let full = self.len == MAX_PIECES;
         match self.pieces[..self.len].last_mut() {
             Some(last) if full || (last.faces == piece.faces && last.t[1].next_up() >= piece.t[0]) => {
                 last.t[1] = last.t[1].max(piece.t[1]);
@@ -136,7 +141,7 @@ impl TimePieces {
     }
 
     /// The pieces.
-    pub fn pieces(&self) -> &[Piece] {
+    pub fn pieces(&self) -> &[Piece<C>] {
         &self.pieces[..self.len]
     }
 
@@ -156,7 +161,7 @@ impl TimePieces {
     }
 
     /// Hull from the first time to the last.
-    pub fn hull(&self) -> Option<[f32; 2]> {
+    pub fn hull(&self) -> Option<[C; 2]> {
         let pieces = self.pieces();
         Some([pieces.first()?.t[0], pieces.last()?.t[1]])
     }
@@ -179,15 +184,15 @@ pub(super) type Point<N> = [N; 3];
 /// (x', y') + (alpha w - s du - dX, beta w - s' dv - dY)
 /// ```
 #[derive(Clone, Copy, Debug)]
-pub struct View<N = f64> {
+pub struct View<N = f64, C = f32> {
     /// Vertices at both ends of the time interval; equal for a still triangle.
     pub(super) ends: [[Point<N>; 3]; 2],
     /// Middle in X, Y, u, v.
-    pub(super) middle: [f32; 4],
+    pub(super) middle: [C; 4],
     /// Half the extent in X, Y, u, v.
     pub(super) half: [N; 4],
     /// Time interval.
-    pub(super) t: [f32; 2],
+    pub(super) t: [C; 2],
     pub(super) s: [N; 2],
     pub(super) a: [N; 2],
     pub(super) moving: bool,
@@ -203,26 +208,26 @@ pub struct View<N = f64> {
     pub(super) depth: [N; 2],
 }
 
-impl<N: Number> View<N> {
+impl<N: Number, C: Coordinate> View<N, C> {
     /// `triangle` seen from the middle of `tile` and `within`.
-    pub fn new(triangle: &Triangle, shear: &Shear, tile: &TileRect, within: &Box5) -> Self {
+    pub fn new(triangle: &Triangle<C>, shear: &Shear<C>, tile: &TileRect<C>, within: &Box5<C>) -> Self {
         let (moving, lens) = (triangle.moving, within.lens);
-        let [u, v] = if lens { [within.u, within.v] } else { [[0.0; 2]; 2] };
+        let [u, v] = if lens { [within.u, within.v] } else { [[C::ZERO; 2]; 2] };
         let ranges = [tile.x, tile.y, u, v];
         // Rounded to the numbers that samples are compared with; the extent is measured from there.
-        let middle = ranges.map(|[lo, hi]| 0.5 * (lo + hi));
+        let middle = ranges.map(|[lo, hi]| C::nearest(0.5) * (lo + hi));
         let mut half = [N::zero(); 4];
         for axis in 0..if lens { 4 } else { 2 } {
-            let [lo, hi] = ranges[axis].map(N::from);
-            half[axis] = (hi - N::from(middle[axis])).max(N::from(middle[axis]) - lo);
+            let [lo, hi] = ranges[axis].map(N::of);
+            half[axis] = (hi - N::of(middle[axis])).max(N::of(middle[axis]) - lo);
         }
         let mut view = Self {
             ends: [[[N::zero(); 3]; 3]; 2],
             middle,
             half,
-            t: if moving { within.t } else { [0.0; 2] },
-            s: shear.s.map(N::from),
-            a: shear.a.map(N::from),
+            t: if moving { within.t } else { [C::ZERO; 2] },
+            s: shear.s.map(N::of),
+            a: shear.a.map(N::of),
             moving,
             lens,
             parallel: shear.parallel,
@@ -235,14 +240,14 @@ impl<N: Number> View<N> {
         view
     }
 
-    fn transform(&mut self, triangle: &Triangle) {
+    fn transform(&mut self, triangle: &Triangle<C>) {
         let rays = [0, 1].map(|axis| self.middle_ray(axis));
         for end in 0..if self.moving { 2 } else { 1 } {
             for (point, corner) in self.ends[end].iter_mut().zip(&triangle.corners) {
-                let open = corner.open.map(N::from);
+                let open = corner.open.map(N::of);
                 *point = if self.moving {
-                    let t = N::from(self.t[end]);
-                    [0, 1, 2].map(|axis| open[axis] + t * N::from(corner.delta[axis]))
+                    let t = N::of(self.t[end]);
+                    [0, 1, 2].map(|axis| open[axis] + t * N::of(corner.delta[axis]))
                 } else {
                     open
                 };
@@ -259,7 +264,7 @@ impl<N: Number> View<N> {
 
     /// Slope and base of the middle, as if it were a sample ([`Shear::ray`]).
     fn middle_ray(&self, axis: usize) -> [N; 2] {
-        let [at, lens] = [axis, 2 + axis].map(|k| N::from(self.middle[k]));
+        let [at, lens] = [axis, 2 + axis].map(|k| N::of(self.middle[k]));
         match (self.parallel, self.lens) {
             (false, false) => [at, lens * self.s[axis]],
             (false, true) => [at - lens * self.a[axis], lens * self.s[axis]],
@@ -274,7 +279,7 @@ impl<N: Number> View<N> {
         if self.parallel { N::from(1.0) } else { depth }
     }
 
-    fn measure(&mut self, triangle: &Triangle) {
+    fn measure(&mut self, triangle: &Triangle<C>) {
         let sway = [0, 1].map(|axis| self.sway(axis));
         for points in &self.ends[..if self.moving { 2 } else { 1 }] {
             for point in points {
@@ -292,11 +297,11 @@ impl<N: Number> View<N> {
                 self.reach[axis] = self.reach[axis] + self.half[axis];
             }
         }
-        let deepest = |corner: &crate::setup::Corner| corner.open[2].abs() + corner.delta[2].abs();
-        self.depth[1] = self.weight(N::from(triangle.corners.iter().map(deepest).fold(0.0, f32::max)));
+        let deepest = |corner: &Corner<C>| corner.open[2].abs() + corner.delta[2].abs();
+        self.depth[1] = self.weight(N::of(triangle.corners.iter().map(deepest).fold(C::ZERO, C::max)));
         // The sample test is exact for points seen from the sample, which are rounded by up to half the slack
         // on each axis.
-        let [slack_x, slack_y] = triangle.slack.map(|slack| N::from(2.0 * slack));
+        let [slack_x, slack_y] = triangle.slack.map(|slack| N::of(C::nearest(2.0) * slack));
         self.rounding = slack_x * (self.reach[1] + slack_y) + slack_y * self.reach[0];
     }
 
@@ -311,15 +316,16 @@ impl<N: Number> View<N> {
     }
 
     /// Position of the time `t` in the interval, from 0 to 1.
-    pub(super) fn phase(&self, t: f32) -> N {
-        let [start, end] = self.t.map(N::from);
-        if end > start { (N::from(t) - start) / (end - start) } else { N::zero() }
+    pub(super) fn phase(&self, t: C) -> N {
+        let [start, end] = self.t.map(N::of);
+        if end > start { (N::of(t) - start) / (end - start) } else { N::zero() }
     }
 
     /// Times of a part of the interval given from 0 to 1, rounded outward. NaN stands for an end.
-    pub(super) fn times(&self, part: [N; 2]) -> [f32; 2] {
+    pub(super) fn times(&self, part: [N; 2]) -> [C; 2] {
         let ([start, end], [lo, hi]) = (self.t, part.map(Into::<f64>::into));
-        let at = |phase: f64| (f64::from(start) + phase * (f64::from(end) - f64::from(start))) as f32;
+        let [from, to]: [f64; 2] = self.t.map(Into::into);
+        let at = |phase: f64| C::nearest(from + phase * (to - from));
         [at(lo).next_down().max(start), at(hi).next_up().min(end)]
     }
 }

@@ -7,49 +7,49 @@
 //! is for every `X` of the tile, so both edges of the tile are tested there. In an orthographic view `d =
 //! x(t) + u (a w(t) - s) - X0`, for any sign of `w`.
 
-use super::number::Number;
+use super::number::{Coordinate, Number};
 use super::{Box5, TileRect, cost};
 use crate::geometry::Shear;
 use crate::setup::{Corner, Triangle};
 
 /// The part of `within` in which `triangle` may touch `tile`, or `None` if it cannot.
 pub fn narrow(triangle: &Triangle, shear: &Shear, tile: &TileRect, within: &Box5) -> Option<Box5> {
-    narrow_counted::<f64>(triangle, shear, tile, within).0
+    narrow_counted::<f64, _>(triangle, shear, tile, within).0
 }
 
 /// The same, with its cost in multiply-adds.
-pub fn narrow_counted<N: Number>(
-    triangle: &Triangle,
-    shear: &Shear,
-    tile: &TileRect,
-    within: &Box5,
-) -> (Option<Box5>, u32) {
-    let (left, madds) = narrow_sides::<N>(triangle, shear, tile, within, 0);
+pub fn narrow_counted<N: Number, C: Coordinate>(
+    triangle: &Triangle<C>,
+    shear: &Shear<C>,
+    tile: &TileRect<C>,
+    within: &Box5<C>,
+) -> (Option<Box5<C>>, u32) {
+    let (left, madds) = narrow_sides::<N, _>(triangle, shear, tile, within, 0);
     let Some(left) = left else { return (None, madds) };
-    let (left, more) = narrow_sides::<N>(triangle, shear, tile, &left, 1);
+    let (left, more) = narrow_sides::<N, _>(triangle, shear, tile, &left, 1);
     (left, madds + more)
 }
 
 /// The same for the two sides along one axis: 0 for x and u, 1 for y and v.
-pub(super) fn narrow_sides<N: Number>(
-    triangle: &Triangle,
-    shear: &Shear,
-    tile: &TileRect,
-    within: &Box5,
+pub(super) fn narrow_sides<N: Number, C: Coordinate>(
+    triangle: &Triangle<C>,
+    shear: &Shear<C>,
+    tile: &TileRect<C>,
+    within: &Box5<C>,
     axis: usize,
-) -> (Option<Box5>, u32) {
+) -> (Option<Box5<C>>, u32) {
     let (mut current, mut madds) = (*within, 0);
     let price = cost::side_madds(triangle.moving, within.lens, triangle.behind);
     let [low, high] = if axis == 0 { tile.x } else { tile.y };
     for (edge, other, sign) in [(low, high, 1.0), (high, low, -1.0)] {
         let edges = if triangle.behind { [edge, other] } else { [edge, edge] };
-        let side = Side::<N> {
+        let side = Side::<N, C> {
             triangle,
-            s: N::from(shear.s[axis]),
-            a: N::from(shear.a[axis]),
+            s: N::of(shear.s[axis]),
+            a: N::of(shear.a[axis]),
             parallel: shear.parallel,
             axis,
-            edges: edges.map(N::from),
+            edges: edges.map(N::of),
             positive: sign > 0.0,
         };
         let (next, roots) = side.narrow(&current);
@@ -62,17 +62,17 @@ pub(super) fn narrow_sides<N: Number>(
 
 /// The part of `within` in which a vertex may be beyond the depth `near`, and the cost in multiply-adds. `slack` bounds the
 /// error of a depth. The near depth is a side that no lens position moves.
-pub fn narrow_near<N: Number>(
-    triangle: &Triangle,
-    near: f32,
-    slack: f32,
-    within: &Box5,
-) -> (Option<Box5>, u32) {
+pub fn narrow_near<N: Number, C: Coordinate>(
+    triangle: &Triangle<C>,
+    near: C,
+    slack: C,
+    within: &Box5<C>,
+) -> (Option<Box5<C>>, u32) {
     let (mut times, mut roots) = (None, 0);
-    let limit = N::from(near) - N::from(2.0 * slack);
+    let limit = N::of(near) - N::of(C::nearest(2.0) * slack);
     for corner in &triangle.corners {
-        let [open, delta] = [corner.open[2], corner.delta[2]].map(N::from);
-        let at = |t: f32| if triangle.moving { open + N::from(t) * delta } else { open } - limit;
+        let [open, delta] = [corner.open[2], corner.delta[2]].map(N::of);
+        let at = |t: C| if triangle.moving { open + N::of(t) * delta } else { open } - limit;
         let first = at(within.t[0]);
         let last = if triangle.moving { at(within.t[1]) } else { first };
         times = union(times, above(within.t, first, last, &mut roots));
@@ -82,8 +82,8 @@ pub fn narrow_near<N: Number>(
 }
 
 /// One side of a tile; the left and top sides are `positive`.
-struct Side<'a, N> {
-    triangle: &'a Triangle,
+struct Side<'a, N, C> {
+    triangle: &'a Triangle<C>,
     s: N,
     a: N,
     parallel: bool,
@@ -92,14 +92,14 @@ struct Side<'a, N> {
     positive: bool,
 }
 
-impl<N: Number> Side<'_, N> {
-    fn narrow(&self, within: &Box5) -> (Option<Box5>, u32) {
+impl<N: Number, C: Coordinate> Side<'_, N, C> {
+    fn narrow(&self, within: &Box5<C>) -> (Option<Box5<C>>, u32) {
         let lens = match (within.lens, self.axis) {
-            (false, _) => [0.0, 0.0],
+            (false, _) => [C::ZERO; 2],
             (true, 0) => within.u,
             (true, _) => within.v,
         };
-        let slack = N::from(2.0 * self.triangle.slack[self.axis]);
+        let slack = N::of(C::nearest(2.0) * self.triangle.slack[self.axis]);
         let (mut times, mut places, mut roots) = (None, None, 0);
         for corner in &self.triangle.corners {
             for &edge in &self.edges[..if self.triangle.behind { 2 } else { 1 }] {
@@ -126,23 +126,30 @@ impl<N: Number> Side<'_, N> {
 
     /// Distances of a vertex to the inner side of `edge`, plus a slack, by end of the lens and end of the
     /// time interval.
-    fn distances(&self, corner: &Corner, within: &Box5, lens: [f32; 2], edge: N, slack: N) -> [[N; 2]; 2] {
+    fn distances(
+        &self,
+        corner: &Corner<C>,
+        within: &Box5<C>,
+        lens: [C; 2],
+        edge: N,
+        slack: N,
+    ) -> [[N; 2]; 2] {
         let ends = |end: usize| {
             let [x, w] = [self.axis, 2].map(|k| {
-                let open = N::from(corner.open[k]);
+                let open = N::of(corner.open[k]);
                 if self.triangle.moving {
-                    open + N::from(within.t[end]) * N::from(corner.delta[k])
+                    open + N::of(within.t[end]) * N::of(corner.delta[k])
                 } else {
                     open
                 }
             });
             let flat = x - if self.parallel { edge } else { edge * w };
             let shift = if within.lens { self.a * w - self.s } else { N::zero() };
-            let from = |place: f32| {
-                let d = if within.lens { flat + N::from(place) * shift } else { flat };
+            let from = |place: C| {
+                let d = if within.lens { flat + N::of(place) * shift } else { flat };
                 if self.positive { d + slack } else { slack - d }
             };
-            if within.lens { lens.map(from) } else { [from(0.0); 2] }
+            if within.lens { lens.map(from) } else { [from(C::ZERO); 2] }
         };
         let first = ends(0);
         let last = if self.triangle.moving { ends(1) } else { first };
@@ -152,7 +159,7 @@ impl<N: Number> Side<'_, N> {
 
 /// The part of `range` in which the linear function with the values `lo` and `hi` at its ends is not
 /// negative.
-fn above<N: Number>(range: [f32; 2], lo: N, hi: N, roots: &mut u32) -> Option<[f32; 2]> {
+fn above<N: Number, C: Coordinate>(range: [C; 2], lo: N, hi: N, roots: &mut u32) -> Option<[C; 2]> {
     match (lo < N::zero(), hi < N::zero()) {
         (false, false) => Some(range),
         (true, true) => None,
@@ -161,18 +168,19 @@ fn above<N: Number>(range: [f32; 2], lo: N, hi: N, roots: &mut u32) -> Option<[f
             // The slack is twice the rounding of the sample test, which also covers the rounding of the
             // quotient; the nudge covers the mapping to the range. NaN leaves the range unchanged.
             let share = lo / (lo - hi);
-            let root: f64 = (N::from(range[0]) + (N::from(range[1]) - N::from(range[0])) * share).into();
+            let [from, to] = range.map(N::of);
+            let root = C::nearest((from + (to - from) * share).into());
             Some(if starts_below {
-                [(root as f32).next_down().max(range[0]), range[1]]
+                [root.next_down().max(range[0]), range[1]]
             } else {
-                [range[0], (root as f32).next_up().min(range[1])]
+                [range[0], root.next_up().min(range[1])]
             })
         }
     }
 }
 
 /// Smallest interval that contains both.
-pub(super) fn union(a: Option<[f32; 2]>, b: Option<[f32; 2]>) -> Option<[f32; 2]> {
+pub(super) fn union<C: Coordinate>(a: Option<[C; 2]>, b: Option<[C; 2]>) -> Option<[C; 2]> {
     match (a, b) {
         (Some(a), Some(b)) => Some([a[0].min(b[0]), a[1].max(b[1])]),
         (a, b) => a.or(b),
