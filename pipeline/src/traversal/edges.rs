@@ -21,7 +21,7 @@
 //! way; the form relative to the middle of the box is new here.)
 
 use super::number::{Coordinate, Number, Quadratic};
-use super::region::{Faces, Piece, TimePieces};
+use super::region::{Faces, Piece, Point, TimePieces};
 use super::{View, cost};
 
 /// Edges of a triangle over a box; edge `k` is opposite vertex `k`.
@@ -44,6 +44,7 @@ pub(super) struct Edge<N> {
 
 impl<N: Number, C: Coordinate> Edges<N, C> {
     /// Edges of the triangle in `view`.
+    #[inline]
     pub fn new(view: View<N, C>) -> Self {
         let edge = |i: usize, j: usize| Edge::new(&view, i, j);
         let edges = [edge(1, 2), edge(2, 0), edge(0, 1)];
@@ -68,24 +69,20 @@ impl<N: Number, C: Coordinate> Edges<N, C> {
 }
 
 impl<N: Number> Edge<N> {
+    #[inline(always)]
     fn new<C: Coordinate>(view: &View<N, C>, i: usize, j: usize) -> Self {
-        let [open, close] = view.ends.map(|points| (points[i], points[j]));
-        let product = |f: fn([N; 3], [N; 3]) -> N| {
-            let start = f(open.0, open.1);
-            if !view.moving {
-                return Quadratic::constant(start);
-            }
-            let middle = (f(open.0, close.1) + f(close.0, open.1)) * N::from(0.5);
-            Quadratic([start, middle, f(close.0, close.1)])
-        };
-        let difference = |axis: usize| [open, close].map(|(i, j)| j[axis] - i[axis]);
+        let [open, close] = view.ends.map(|points| [points[i], points[j]]);
+        let difference = |axis: usize| [open, close].map(|[p, q]| q[axis] - p[axis]);
         let over_time = |[start, end]: [N; 2]| {
             if view.moving { Quadratic::linear(start, end) } else { Quadratic::constant(start) }
         };
         let none = Quadratic::constant(N::zero());
         // Slopes that the view does not need are not computed.
         let [along, across] = if view.lens || !view.parallel {
-            [product(|p, q| p[2] * q[1] - q[2] * p[1]), product(|p, q| q[2] * p[0] - p[2] * q[0])]
+            [
+                product(view.moving, open, close, |p, q| p[2] * q[1] - q[2] * p[1]),
+                product(view.moving, open, close, |p, q| q[2] * p[0] - p[2] * q[0]),
+            ]
         } else {
             [none; 2]
         };
@@ -96,7 +93,7 @@ impl<N: Number> Edge<N> {
         };
         let [by_x, by_y] = if view.parallel { [-down, right] } else { [-along, -across] };
         let mut edge = Self {
-            value: product(|p, q| p[0] * q[1] - p[1] * q[0]),
+            value: product(view.moving, open, close, |p, q| p[0] * q[1] - p[1] * q[0]),
             slopes: [by_x, by_y, none, none],
             depths: [N::zero(); 2],
         };
@@ -117,6 +114,7 @@ impl<N: Number> Edge<N> {
     }
 
     /// Lower and upper bound in the arithmetic of the sample test, as quadratics of time.
+    #[inline]
     pub(super) fn range<C: Coordinate>(&self, view: &View<N, C>, skew: N) -> [Quadratic<N>; 2] {
         let [from, to] = self.depths.map(N::abs);
         let bend = [from, from.max(to), to];
@@ -138,6 +136,22 @@ impl<N: Number> Edge<N> {
         }
         range
     }
+}
+
+/// A product of two vertices that move.
+#[inline(always)]
+fn product<N: Number>(
+    moving: bool,
+    open: [Point<N>; 2],
+    close: [Point<N>; 2],
+    f: impl Fn(Point<N>, Point<N>) -> N,
+) -> Quadratic<N> {
+    let start = f(open[0], open[1]);
+    if !moving {
+        return Quadratic::constant(start);
+    }
+    let middle = (f(open[0], close[1]) + f(close[0], open[1])) * N::from(0.5);
+    Quadratic([start, middle, f(close[0], close[1])])
 }
 
 /// Lower and upper bounds of three edges over a box, as quadratics of time (after Munkberg and

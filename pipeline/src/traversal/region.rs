@@ -210,6 +210,7 @@ pub struct View<N = f64, C = f32> {
 
 impl<N: Number, C: Coordinate> View<N, C> {
     /// `triangle` seen from the middle of `tile` and `within`.
+    #[inline]
     pub fn new(triangle: &Triangle<C>, shear: &Shear<C>, tile: &TileRect<C>, within: &Box5<C>) -> Self {
         let (moving, lens) = (triangle.moving, within.lens);
         let [u, v] = if lens { [within.u, within.v] } else { [[C::ZERO; 2]; 2] };
@@ -240,6 +241,7 @@ impl<N: Number, C: Coordinate> View<N, C> {
         view
     }
 
+    #[inline]
     fn transform(&mut self, triangle: &Triangle<C>) {
         let rays = [0, 1].map(|axis| self.middle_ray(axis));
         for end in 0..if self.moving { 2 } else { 1 } {
@@ -279,6 +281,7 @@ impl<N: Number, C: Coordinate> View<N, C> {
         if self.parallel { N::from(1.0) } else { depth }
     }
 
+    #[inline]
     fn measure(&mut self, triangle: &Triangle<C>) {
         let sway = [0, 1].map(|axis| self.sway(axis));
         for points in &self.ends[..if self.moving { 2 } else { 1 }] {

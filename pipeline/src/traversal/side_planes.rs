@@ -68,15 +68,15 @@ pub fn narrow_near<N: Number, C: Coordinate>(
     slack: C,
     within: &Box5<C>,
 ) -> (Option<Box5<C>>, u32) {
-    let (mut times, mut roots) = (None, 0);
     let limit = N::of(near) - N::of(C::nearest(2.0) * slack);
-    for corner in &triangle.corners {
+    let depths = triangle.corners.each_ref().map(|corner| {
         let [open, delta] = [corner.open[2], corner.delta[2]].map(N::of);
         let at = |t: C| if triangle.moving { open + N::of(t) * delta } else { open } - limit;
         let first = at(within.t[0]);
-        let last = if triangle.moving { at(within.t[1]) } else { first };
-        times = union(times, above(within.t, first, last, &mut roots));
-    }
+        [first, if triangle.moving { at(within.t[1]) } else { first }]
+    });
+    let mut roots = 0;
+    let times = above(within.t, &depths, &mut roots);
     let madds = cost::near_madds(triangle.moving) + roots * cost::SIDE_ROOT;
     (times.map(|t| Box5 { t, ..*within }), madds)
 }
@@ -94,88 +94,109 @@ struct Side<'a, N, C> {
 
 impl<N: Number, C: Coordinate> Side<'_, N, C> {
     fn narrow(&self, within: &Box5<C>) -> (Option<Box5<C>>, u32) {
-        let lens = match (within.lens, self.axis) {
-            (false, _) => [C::ZERO; 2],
-            (true, 0) => within.u,
-            (true, _) => within.v,
-        };
-        let slack = N::of(C::nearest(2.0) * self.triangle.slack[self.axis]);
-        let (mut times, mut places, mut roots) = (None, None, 0);
-        for corner in &self.triangle.corners {
-            for &edge in &self.edges[..if self.triangle.behind { 2 } else { 1 }] {
-                let d = self.distances(corner, within, lens, edge, slack);
-                for [opening, closing] in &d[..if within.lens { 2 } else { 1 }] {
-                    times = union(times, above(within.t, *opening, *closing, &mut roots));
-                }
-                if within.lens {
-                    let ends = if self.triangle.moving { 2 } else { 1 };
-                    for (left, right) in d[0].iter().zip(&d[1]).take(ends) {
-                        places = union(places, above(lens, *left, *right, &mut roots));
-                    }
-                }
-            }
+        if within.lens { self.through_lens(within) } else { self.through_pinhole(within) }
+    }
+
+    fn through_pinhole(&self, within: &Box5<C>) -> (Option<Box5<C>>, u32) {
+        let (slack, mut times, mut roots) = (self.slack(), None, 0);
+        for &edge in self.edges() {
+            let d = self.triangle.corners.each_ref().map(|corner| {
+                self.at_ends(|end| {
+                    let w = if self.parallel { N::zero() } else { self.at(corner, 2, within.t[end]) };
+                    self.inward(self.flat(self.at(corner, self.axis, within.t[end]), edge, w), slack)
+                })
+            });
+            times = union(times, above(within.t, &d, &mut roots));
         }
-        let Some(t) = times else { return (None, roots) };
+        (times.map(|t| Box5 { t, ..*within }), roots)
+    }
+
+    fn through_lens(&self, within: &Box5<C>) -> (Option<Box5<C>>, u32) {
+        let lens = if self.axis == 0 { within.u } else { within.v };
+        let (slack, mut times, mut places, mut roots) = (self.slack(), None, None, 0);
+        for (corner, &edge) in
+            self.triangle.corners.iter().flat_map(|c| self.edges().iter().map(move |e| (c, e)))
+        {
+            let d = self.at_ends(|end| {
+                let [x, w] = [self.axis, 2].map(|axis| self.at(corner, axis, within.t[end]));
+                let (flat, shift) = (self.flat(x, edge, w), self.a * w - self.s);
+                lens.map(|place| self.inward(flat + N::of(place) * shift, slack))
+            });
+            let over_time = [0, 1].map(|place| d.map(|end| end[place]));
+            times = union(times, above(within.t, &over_time, &mut roots));
+            let over_lens = &d[..if self.triangle.moving { 2 } else { 1 }];
+            places = union(places, above(lens, over_lens, &mut roots));
+        }
+        let (Some(t), Some(places)) = (times, places) else { return (None, roots) };
         let mut next = Box5 { t, ..*within };
-        if within.lens {
-            let Some(places) = places else { return (None, roots) };
-            *if self.axis == 0 { &mut next.u } else { &mut next.v } = places;
-        }
+        *if self.axis == 0 { &mut next.u } else { &mut next.v } = places;
         (Some(next), roots)
     }
 
-    /// Distances of a vertex to the inner side of `edge`, plus a slack, by end of the lens and end of the
-    /// time interval.
-    fn distances(
-        &self,
-        corner: &Corner<C>,
-        within: &Box5<C>,
-        lens: [C; 2],
-        edge: N,
-        slack: N,
-    ) -> [[N; 2]; 2] {
-        let ends = |end: usize| {
-            let [x, w] = [self.axis, 2].map(|k| {
-                let open = N::of(corner.open[k]);
-                if self.triangle.moving {
-                    open + N::of(within.t[end]) * N::of(corner.delta[k])
-                } else {
-                    open
-                }
-            });
-            let flat = x - if self.parallel { edge } else { edge * w };
-            let shift = if within.lens { self.a * w - self.s } else { N::zero() };
-            let from = |place: C| {
-                let d = if within.lens { flat + N::of(place) * shift } else { flat };
-                if self.positive { d + slack } else { slack - d }
-            };
-            if within.lens { lens.map(from) } else { [from(C::ZERO); 2] }
-        };
-        let first = ends(0);
-        let last = if self.triangle.moving { ends(1) } else { first };
-        [[first[0], last[0]], [first[1], last[1]]]
+    /// Edges of the tile that bound a vertex.
+    fn edges(&self) -> &[N] {
+        &self.edges[..if self.triangle.behind { 2 } else { 1 }]
+    }
+
+    /// Something at both ends of the time interval.
+    #[inline(always)]
+    fn at_ends<T: Copy>(&self, of: impl Fn(usize) -> T) -> [T; 2] {
+        let first = of(0);
+        [first, if self.triangle.moving { of(1) } else { first }]
+    }
+
+    #[inline(always)]
+    fn at(&self, corner: &Corner<C>, axis: usize, t: C) -> N {
+        let open = N::of(corner.open[axis]);
+        if self.triangle.moving { open + N::of(t) * N::of(corner.delta[axis]) } else { open }
+    }
+
+    /// Distance to `edge` through a pinhole.
+    #[inline(always)]
+    fn flat(&self, x: N, edge: N, w: N) -> N {
+        x - if self.parallel { edge } else { edge * w }
+    }
+
+    fn slack(&self) -> N {
+        N::of(C::nearest(2.0) * self.triangle.slack[self.axis])
+    }
+
+    /// Distance on the inner side, plus the slack.
+    #[inline(always)]
+    fn inward(&self, d: N, slack: N) -> N {
+        if self.positive { d + slack } else { slack - d }
     }
 }
 
-/// The part of `range` in which the linear function with the values `lo` and `hi` at its ends is not
-/// negative.
-fn above<N: Number, C: Coordinate>(range: [C; 2], lo: N, hi: N, roots: &mut u32) -> Option<[C; 2]> {
-    match (lo < N::zero(), hi < N::zero()) {
-        (false, false) => Some(range),
-        (true, true) => None,
-        (starts_below, _) => {
-            *roots += 1;
-            // The slack is twice the rounding of the sample test, which also covers the rounding of the
-            // quotient; the nudge covers the mapping to the range. NaN leaves the range unchanged.
-            let share = lo / (lo - hi);
-            let [from, to] = range.map(N::of);
-            let root = C::nearest((from + (to - from) * share).into());
-            Some(if starts_below {
-                [root.next_down().max(range[0]), range[1]]
-            } else {
-                [range[0], root.next_up().min(range[1])]
-            })
-        }
+/// The part of `range` in which one of some linear functions, given by the values at its ends, is not negative.
+#[inline(always)]
+fn above<N: Number, C: Coordinate>(range: [C; 2], functions: &[[N; 2]], roots: &mut u32) -> Option<[C; 2]> {
+    let (mut whole, mut crossing) = (false, 0);
+    for [lo, hi] in functions {
+        let below = [*lo < N::zero(), *hi < N::zero()];
+        whole |= below == [false; 2];
+        crossing += u32::from(below[0] != below[1]);
+    }
+    *roots += crossing;
+    // The roots are there, but nothing is added to the whole range.
+    if whole || crossing == 0 {
+        return whole.then_some(range);
+    }
+    let crossing = functions.iter().filter(|[lo, hi]| (*lo < N::zero()) != (*hi < N::zero()));
+    crossing.map(|ends| Some(beside_root(range, *ends))).fold(None, union)
+}
+
+/// The part of `range` on the side of the root of a linear function where it is not negative.
+fn beside_root<N: Number, C: Coordinate>(range: [C; 2], [lo, hi]: [N; 2]) -> [C; 2] {
+    // The slack is twice the rounding of the sample test, which also covers the rounding of the quotient and of its
+    // product with the range; the nudge covers that of the sum. NaN leaves the range unchanged.
+    let share = lo / (lo - hi);
+    let [from, to] = range.map(N::of);
+    let root = C::nearest((from + (to - from) * share).into());
+    if lo < N::zero() {
+        [root.next_down().max(range[0]), range[1]]
+    } else {
+        [range[0], root.next_up().min(range[1])]
     }
 }
 
@@ -193,7 +214,7 @@ mod tests {
 
     #[test]
     fn the_part_above_zero() {
-        let part = |range: [f32; 2], lo: f64, hi: f64| above(range, lo, hi, &mut 0);
+        let part = |range: [f32; 2], lo: f64, hi: f64| above(range, &[[lo, hi]], &mut 0);
         assert_eq!(part([0.0, 1.0], 1.0, 2.0), Some([0.0, 1.0]));
         assert_eq!(part([0.0, 1.0], -1.0, -2.0), None);
         let [lo, hi] = part([0.0, 1.0], -1.0, 1.0).unwrap();
