@@ -6,8 +6,8 @@ use super::triangle::{Precision, Rounded, recentring_madds};
 use super::{MovingTriangle, Rect, Region, Touch, View};
 use crate::depth::{DepthBound, ExactBounder, exact_interval_madds, set_up_madds};
 use crate::traversal::{
-    Box5, EdgeBounds, Edges, Piece, TileRect, TimePieces, View as Seen, edge_bound_madds, edge_madds,
-    narrow_counted, narrow_near,
+    Box5, EdgeBounds, Edges, TileRect, View as Seen, edge_bound_madds, edge_madds, narrow_by_sides,
+    narrow_near,
 };
 
 /// A grid of equal tiles.
@@ -161,7 +161,7 @@ impl<'a, C: Precision> Tests<'a, C> {
         &mut self,
         grid: &Grid,
         [columns, rows]: [Range<u32>; 2],
-        within: Box5<C>,
+        mut within: Box5<C>,
         each: &mut impl FnMut([u32; 2], &Touch, &mut TileLoop),
     ) {
         if columns.is_empty() || rows.is_empty() {
@@ -177,8 +177,11 @@ impl<'a, C: Precision> Tests<'a, C> {
             return;
         }
         self.work.blocks += 1;
-        let part = self.part(&self.rounded.tile(&rect), within);
-        let Some(within) = self.kept(part) else { return };
+        let tile = self.rounded.tile(&rect);
+        let part = self.part(&tile, &mut within);
+        if self.kept(part).is_none() {
+            return;
+        }
         let middle = |range: &Range<u32>| range.start + (range.end - range.start).div_ceil(2);
         let (column, row) = (middle(&columns), middle(&rows));
         for rows in [rows.start..row, row..rows.end] {
@@ -202,45 +205,46 @@ impl<'a, C: Precision> Tests<'a, C> {
         self.halved(&self.rounded.tile(rect), within, self.rasterizer.halvings)
     }
 
-    /// The part of `within` in which the triangle may touch the tile: inside its sides, beyond the near depth, and inside
-    /// its own edges. Which face it shows does not matter, as it may have no area.
-    fn part(&mut self, tile: &TileRect<C>, within: Box5<C>) -> Result<Box5<C>, Culled> {
+    /// Narrows `within` to the part in which the triangle may touch the tile: inside its sides, beyond the near depth, and
+    /// inside its own edges. Which face it shows does not matter, as it may have no area.
+    fn part(&mut self, tile: &TileRect<C>, within: &mut Box5<C>) -> Result<(), Culled> {
         let Rounded { triangle, shear, near, depth_slack, .. } = &self.rounded;
-        let (left, madds) = narrow_counted::<f64, _>(triangle, shear, tile, &within);
+        let (mut is_left, madds) = narrow_by_sides::<f64, C>(triangle, shear, tile, within);
         self.work.side_madds += madds;
-        let mut within = left.ok_or(Culled::BySides)?;
-        if self.rasterizer.view.near() != f64::NEG_INFINITY {
-            let (left, madds) = narrow_near::<f64, _>(triangle, *near, *depth_slack, &within);
+        if is_left && self.rasterizer.view.near() != f64::NEG_INFINITY {
+            let (beyond, madds) = narrow_near::<f64, C>(triangle, *near, *depth_slack, within);
             self.work.side_madds += madds;
-            within = left.ok_or(Culled::BySides)?;
+            is_left = beyond;
         }
-        let times = self.edges(tile, &within);
-        times.hull().map(|t| Box5 { t, ..within }).ok_or(Culled::ByEdges)
+        if !is_left {
+            return Err(Culled::BySides);
+        }
+        within.t = self.edges(tile, within).ok_or(Culled::ByEdges)?;
+        Ok(())
     }
 
     /// Times at which the triangle may be inside its edges. An edge is bilinear in u and v, so it is bounded by its
     /// bounds from the corners of the lens.
-    fn edges(&mut self, tile: &TileRect<C>, within: &Box5<C>) -> TimePieces<C> {
+    fn edges(&mut self, tile: &TileRect<C>, within: &Box5<C>) -> Option<[C; 2]> {
         let Rounded { triangle, shear, .. } = &self.rounded;
-        let corners = [(0, 0), (1, 0), (0, 1), (1, 1)];
-        let corners = &corners[..if within.lens { 4 } else { 1 }];
-        let from = |&(i, j): &(usize, usize)| {
-            let corner = Box5 { u: [within.u[i]; 2], v: [within.v[j]; 2], ..*within };
-            Edges::<f64, C>::new(Seen::new(triangle, shear, tile, &corner))
-        };
-        let first = from(&corners[0]);
-        let others = corners[1..].iter().map(|corner| EdgeBounds::new(&from(corner)));
-        let bounds = others.fold(EdgeBounds::new(&first), |bounds, other| bounds.hull(&other));
-        let whole = TimePieces::one(Piece { t: within.t, faces: [true; 2] });
-        let (times, more) = bounds.timeline(&first, &whole, [true; 2]);
-        let views = corners.len() as u32;
+        let corner = |i: usize, j: usize| Box5 { u: [within.u[i]; 2], v: [within.v[j]; 2], ..*within };
+        let from = |corner: &Box5<C>| Edges::<f64, C>::new(Seen::new(triangle, shear, tile, corner));
+        let first = from(&corner(0, 0));
+        let (mut bounds, mut views) = (EdgeBounds::new(&first), 1);
+        if within.lens {
+            for (i, j) in [(1, 0), (0, 1), (1, 1)] {
+                bounds = bounds.hull(&EdgeBounds::new(&from(&corner(i, j))));
+                views += 1;
+            }
+        }
+        let (times, more) = bounds.times(&first, within.t, [true; 2]);
         self.work.place_madds += views * edge_madds(triangle.moving, within.lens);
         self.work.edge_madds += views * edge_bound_madds(triangle.moving, within.lens) + more;
         times
     }
 
-    fn halved(&mut self, tile: &TileRect<C>, within: Box5<C>, halvings: u32) -> Result<Touch, Culled> {
-        let within = self.part(tile, within)?;
+    fn halved(&mut self, tile: &TileRect<C>, mut within: Box5<C>, halvings: u32) -> Result<Touch, Culled> {
+        self.part(tile, &mut within)?;
         let [start, end] = within.t;
         let middle = C::nearest(0.5) * (start + end);
         if halvings == 0 || !self.rounded.triangle.moving || !(start < middle && middle < end) {

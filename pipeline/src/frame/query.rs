@@ -169,7 +169,7 @@ impl<'a> IntervalQueries<'a> {
         let (shear, px) = (&self.projection.shear, self.pyramid.side_px(level));
         let rect = TileRect::new(self.pyramid.viewport(), [column * px, row * px], px);
         answer.tiles += 1;
-        let (narrowed, madds) = narrow_counted::<f64, _>(&side.triangle, shear, &rect, within);
+        let (narrowed, madds) = narrow_counted::<f64>(&side.triangle, shear, &rect, within);
         answer.madds[1] += u64::from(madds);
         let Some(narrowed) = narrowed else { return true };
         if self.behind(side, level, [column, row], &rect, &narrowed, answer) {

@@ -253,7 +253,7 @@ impl Subject<'_> {
         let (triangle, shear, within) = (self.triangle, self.shear, &remaining.within);
         let (next, madds) = match &remaining.spans {
             None => {
-                let (next, madds) = narrow_counted::<f64, _>(triangle, shear, rect, within);
+                let (next, madds) = narrow_counted::<f64>(triangle, shear, rect, within);
                 (next.map(|next| (None, next)), madds)
             }
             Some(spans) => {

@@ -127,7 +127,7 @@ mod tests {
             let (bounds, _) = count(|| EdgeBounds::new(&edges));
             let (screen, _) = count(|| Screen::new(&edges, within.t, [true; 2]));
             let (sides, (_, madds_found)) =
-                count(|| narrow_counted::<Counted, _>(&triangle, &shear, &tile, &within));
+                count(|| narrow_counted::<Counted>(&triangle, &shear, &tile, &within));
             println!("{moving} {lens}: {found} {facing} {bounds} {screen} {sides}");
             assert!(10 * found <= 11 * edge_madds(moving, lens) + 1, "{found}");
             assert!(10 * facing <= 11 * facing_madds(moving, lens, 0), "{facing}");
@@ -152,7 +152,7 @@ mod tests {
                     let tile = TileRect { x: [x, x + 8.0], y: [16.0, 24.0] };
                     let within = Box5 { t: [0.25, 0.75], ..Box5::whole(lens) };
                     let (madds, (_, madds_found)) =
-                        count(|| narrow_counted::<Counted, _>(&triangle, &shear, &tile, &within));
+                        count(|| narrow_counted::<Counted>(&triangle, &shear, &tile, &within));
                     assert_eq!(madds, madds_found, "{moving} {lens} {behind} {x}");
                 }
             }
@@ -165,8 +165,9 @@ mod tests {
             [false, true].into_iter().flat_map(|moving| [0.1, 3.5, 5.0, 9.0].map(|near| (moving, near)))
         {
             let triangle = triangle(moving, &SHEAR);
-            let within = Box5 { t: [0.25, 0.75], ..Box5::whole(true) };
-            let (madds, (_, found)) = count(|| narrow_near::<Counted, _>(&triangle, near, 0.01, &within));
+            let mut within = Box5 { t: [0.25, 0.75], ..Box5::whole(true) };
+            let (madds, (_, found)) =
+                count(|| narrow_near::<Counted, _>(&triangle, near, 0.01, &mut within));
             assert_eq!(madds, found, "{moving} {near}");
         }
     }

@@ -196,31 +196,38 @@ impl<N: Number> EdgeBounds<N> {
 
     /// The same for each piece of `times`, for the `drawn` faces; `edges` are those bounded. The second
     /// result is the cost in multiply-adds beyond those of the edges themselves.
-    pub fn timeline<C: Coordinate>(
-        &self,
-        edges: &Edges<N, C>,
-        times: &TimePieces<C>,
-        drawn: Faces,
-    ) -> (TimePieces<C>, u32) {
+    pub fn timeline(&self, edges: &Edges<N>, times: &TimePieces, drawn: Faces) -> (TimePieces, u32) {
         let (mut left, mut madds) = (TimePieces::empty(), 0);
         for piece in times.pieces() {
-            let part = if edges.spans(piece.t) {
-                [N::zero(), N::from(1.0)]
-            } else {
-                madds += 2 * cost::PHASE;
-                piece.t.map(|t| edges.view.phase(t))
-            };
-            let (part, roots) = self.narrow(part, piece.seen(drawn));
-            madds += roots * cost::ROOT;
-            if let Some(part) = part {
-                let [lo, hi] = if self.moving { edges.view.times(part) } else { piece.t };
-                let t = [lo.max(piece.t[0]), hi.min(piece.t[1])];
-                if t[0] <= t[1] {
-                    left.push(Piece { t, ..*piece });
-                }
+            let (t, more) = self.times(edges, piece.t, piece.seen(drawn));
+            madds += more;
+            if let Some(t) = t {
+                left.push(Piece { t, ..*piece });
             }
         }
         (left, madds)
+    }
+
+    /// The same for the times `t` and the faces that a sample may see in them.
+    pub fn times<C: Coordinate>(
+        &self,
+        edges: &Edges<N, C>,
+        t: [C; 2],
+        faces: Faces,
+    ) -> (Option<[C; 2]>, u32) {
+        let mut madds = 0;
+        let part = if edges.spans(t) {
+            [N::zero(), N::from(1.0)]
+        } else {
+            madds += 2 * cost::PHASE;
+            t.map(|t| edges.view.phase(t))
+        };
+        let (part, roots) = self.narrow(part, faces);
+        madds += roots * cost::ROOT;
+        let Some(part) = part else { return (None, madds) };
+        let [lo, hi] = if self.moving { edges.view.times(part) } else { t };
+        let left = [lo.max(t[0]), hi.min(t[1])];
+        ((left[0] <= left[1]).then_some(left), madds)
     }
 
     /// For each edge its upper bound on the side of the face; on that of the clockwise face if both are

@@ -73,7 +73,7 @@ impl<N: Number> Facing<N> {
     /// bisected up to `splits` times. The second result is the number of bisections.
     pub fn timeline(&self, t: [f32; 2], drawn: Faces, splits: u32) -> (TimePieces, u32) {
         let (mut timeline, mut done) = (TimePieces::empty(), 0);
-        let splits = if self.moving { splits.min(<TimePieces>::MAX_SPLITS) } else { 0 };
+        let splits = if self.moving { splits.min(TimePieces::MAX_SPLITS) } else { 0 };
         self.bisect([t[0], t[1], t[1]], drawn, splits, &mut timeline, &mut done);
         (timeline, done)
     }

@@ -108,13 +108,17 @@ impl LensSpans {
         tile: &TileRect,
         within: &Box5,
     ) -> (Option<(Self, Box5)>, u32) {
-        let (common, mut madds) = narrow_sides::<N, _>(triangle, shear, tile, within, 1);
-        let Some(common) = common else { return (None, madds) };
+        let mut common = *within;
+        let (is_left, mut madds) = narrow_sides::<N, _>(triangle, shear, tile, &mut common, 1);
+        if !is_left {
+            return (None, madds);
+        }
         let kept = self.kept(&common, |span| {
             let LensSpan { u, t } = span.within(&common)?;
-            let (left, more) = narrow_sides::<N, _>(triangle, shear, tile, &Box5 { u, t, ..common }, 0);
+            let mut left = Box5 { u, t, ..common };
+            let (is_left, more) = narrow_sides::<N, _>(triangle, shear, tile, &mut left, 0);
             madds += more;
-            left.map(|Box5 { u, t, .. }| LensSpan { u, t })
+            is_left.then_some(LensSpan { u: left.u, t: left.t })
         });
         (kept, madds)
     }

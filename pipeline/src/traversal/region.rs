@@ -75,14 +75,14 @@ pub type Faces = [bool; 2];
 
 /// A piece of time with the faces that may be visible in it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Piece<C = f32> {
+pub struct Piece {
     /// First and last time, both included. Pieces do not overlap.
-    pub t: [C; 2],
+    pub t: [f32; 2],
     /// Faces that the triangle may show, drawn or not.
     pub faces: Faces,
 }
 
-impl<C> Piece<C> {
+impl Piece {
     /// Whether the visible face is known.
     pub fn is_decided(&self) -> bool {
         self.faces != [true; 2]
@@ -96,29 +96,24 @@ impl<C> Piece<C> {
 
 /// Pieces of time in order.
 #[derive(Clone, Copy, Debug)]
-pub struct TimePieces<C = f32> {
-    pieces: [Piece<C>; MAX_PIECES],
+pub struct TimePieces {
+    pieces: [Piece; Self::MAX],
     len: usize,
 }
 
-/// Largest number of pieces of a timeline.
-const MAX_PIECES: usize = 8;
-
 impl TimePieces {
     /// Largest number of pieces.
-    pub const MAX: usize = MAX_PIECES;
+    pub const MAX: usize = 8;
     /// Largest number of time bisections.
     pub const MAX_SPLITS: u32 = Self::MAX.ilog2();
-}
 
-impl<C: Coordinate> TimePieces<C> {
     /// No time.
     pub const fn empty() -> Self {
-        Self { pieces: [Piece { t: [C::ZERO; 2], faces: [false; 2] }; MAX_PIECES], len: 0 }
+        Self { pieces: [Piece { t: [0.0; 2], faces: [false; 2] }; Self::MAX], len: 0 }
     }
 
     /// One piece.
-    pub fn one(piece: Piece<C>) -> Self {
+    pub fn one(piece: Piece) -> Self {
         let mut timeline = Self::empty();
         timeline.push(piece);
         timeline
@@ -126,8 +121,8 @@ impl<C: Coordinate> TimePieces<C> {
 
     /// Append a piece. It is merged with the last piece if it follows at once with the same faces. If the
     /// list is full the last piece grows, which is conservative.
-    pub fn push(&mut self, piece: Piece<C>) {
-        let full = self.len == MAX_PIECES;
+    pub fn push(&mut self, piece: Piece) {
+        let full = self.len == Self::MAX;
         match self.pieces[..self.len].last_mut() {
             Some(last) if full || (last.faces == piece.faces && last.t[1].next_up() >= piece.t[0]) => {
                 last.t[1] = last.t[1].max(piece.t[1]);
@@ -141,7 +136,7 @@ impl<C: Coordinate> TimePieces<C> {
     }
 
     /// The pieces.
-    pub fn pieces(&self) -> &[Piece<C>] {
+    pub fn pieces(&self) -> &[Piece] {
         &self.pieces[..self.len]
     }
 
@@ -161,7 +156,7 @@ impl<C: Coordinate> TimePieces<C> {
     }
 
     /// Hull from the first time to the last.
-    pub fn hull(&self) -> Option<[C; 2]> {
+    pub fn hull(&self) -> Option<[f32; 2]> {
         let pieces = self.pieces();
         Some([pieces.first()?.t[0], pieces.last()?.t[1]])
     }

@@ -14,20 +14,34 @@ use crate::setup::{Corner, Triangle};
 
 /// The part of `within` in which `triangle` may touch `tile`, or `None` if it cannot.
 pub fn narrow(triangle: &Triangle, shear: &Shear, tile: &TileRect, within: &Box5) -> Option<Box5> {
-    narrow_counted::<f64, _>(triangle, shear, tile, within).0
+    narrow_counted::<f64>(triangle, shear, tile, within).0
 }
 
 /// The same, with its cost in multiply-adds.
-pub fn narrow_counted<N: Number, C: Coordinate>(
+pub fn narrow_counted<N: Number>(
+    triangle: &Triangle,
+    shear: &Shear,
+    tile: &TileRect,
+    within: &Box5,
+) -> (Option<Box5>, u32) {
+    let mut left = *within;
+    let (is_left, madds) = narrow_by_sides::<N, _>(triangle, shear, tile, &mut left);
+    (is_left.then_some(left), madds)
+}
+
+/// Narrows `within` to the part in which `triangle` may touch `tile`. Whether there is one, and the cost in multiply-adds.
+pub fn narrow_by_sides<N: Number, C: Coordinate>(
     triangle: &Triangle<C>,
     shear: &Shear<C>,
     tile: &TileRect<C>,
-    within: &Box5<C>,
-) -> (Option<Box5<C>>, u32) {
-    let (left, madds) = narrow_sides::<N, _>(triangle, shear, tile, within, 0);
-    let Some(left) = left else { return (None, madds) };
-    let (left, more) = narrow_sides::<N, _>(triangle, shear, tile, &left, 1);
-    (left, madds + more)
+    within: &mut Box5<C>,
+) -> (bool, u32) {
+    let (is_left, madds) = narrow_sides::<N, _>(triangle, shear, tile, within, 0);
+    if !is_left {
+        return (false, madds);
+    }
+    let (is_left, more) = narrow_sides::<N, _>(triangle, shear, tile, within, 1);
+    (is_left, madds + more)
 }
 
 /// The same for the two sides along one axis: 0 for x and u, 1 for y and v.
@@ -35,13 +49,13 @@ pub(super) fn narrow_sides<N: Number, C: Coordinate>(
     triangle: &Triangle<C>,
     shear: &Shear<C>,
     tile: &TileRect<C>,
-    within: &Box5<C>,
+    within: &mut Box5<C>,
     axis: usize,
-) -> (Option<Box5<C>>, u32) {
-    let (mut current, mut madds) = (*within, 0);
+) -> (bool, u32) {
+    let mut madds = 0;
     let price = cost::side_madds(triangle.moving, within.lens, triangle.behind);
     let [low, high] = if axis == 0 { tile.x } else { tile.y };
-    for (edge, other, sign) in [(low, high, 1.0), (high, low, -1.0)] {
+    for (edge, other, positive) in [(low, high, true), (high, low, false)] {
         let edges = if triangle.behind { [edge, other] } else { [edge, edge] };
         let side = Side::<N, C> {
             triangle,
@@ -50,24 +64,25 @@ pub(super) fn narrow_sides<N: Number, C: Coordinate>(
             parallel: shear.parallel,
             axis,
             edges: edges.map(N::of),
-            positive: sign > 0.0,
+            positive,
         };
-        let (next, roots) = side.narrow(&current);
+        let (is_left, roots) = side.narrow(within);
         madds += price + roots * cost::SIDE_ROOT;
-        let Some(next) = next else { return (None, madds) };
-        current = next;
+        if !is_left {
+            return (false, madds);
+        }
     }
-    (Some(current), madds)
+    (true, madds)
 }
 
-/// The part of `within` in which a vertex may be beyond the depth `near`, and the cost in multiply-adds. `slack` bounds the
-/// error of a depth. The near depth is a side that no lens position moves.
+/// Narrows `within` to the part in which a vertex may be beyond the depth `near`. Whether there is one, and the cost in
+/// multiply-adds. `slack` bounds the error of a depth. The near depth is a side that no lens position moves.
 pub fn narrow_near<N: Number, C: Coordinate>(
     triangle: &Triangle<C>,
     near: C,
     slack: C,
-    within: &Box5<C>,
-) -> (Option<Box5<C>>, u32) {
+    within: &mut Box5<C>,
+) -> (bool, u32) {
     let limit = N::of(near) - N::of(C::nearest(2.0) * slack);
     let depths = triangle.corners.each_ref().map(|corner| {
         let [open, delta] = [corner.open[2], corner.delta[2]].map(N::of);
@@ -78,7 +93,7 @@ pub fn narrow_near<N: Number, C: Coordinate>(
     let mut roots = 0;
     let times = above(within.t, &depths, &mut roots);
     let madds = cost::near_madds(triangle.moving) + roots * cost::SIDE_ROOT;
-    (times.map(|t| Box5 { t, ..*within }), madds)
+    (times.map(|t| within.t = t).is_some(), madds)
 }
 
 /// One side of a tile; the left and top sides are `positive`.
@@ -93,11 +108,12 @@ struct Side<'a, N, C> {
 }
 
 impl<N: Number, C: Coordinate> Side<'_, N, C> {
-    fn narrow(&self, within: &Box5<C>) -> (Option<Box5<C>>, u32) {
+    /// Narrows `within` to the part on the inner side. Whether there is one, and the number of roots.
+    fn narrow(&self, within: &mut Box5<C>) -> (bool, u32) {
         if within.lens { self.through_lens(within) } else { self.through_pinhole(within) }
     }
 
-    fn through_pinhole(&self, within: &Box5<C>) -> (Option<Box5<C>>, u32) {
+    fn through_pinhole(&self, within: &mut Box5<C>) -> (bool, u32) {
         let (slack, mut times, mut roots) = (self.slack(), None, 0);
         for &edge in self.edges() {
             let d = self.triangle.corners.each_ref().map(|corner| {
@@ -108,10 +124,10 @@ impl<N: Number, C: Coordinate> Side<'_, N, C> {
             });
             times = union(times, above(within.t, &d, &mut roots));
         }
-        (times.map(|t| Box5 { t, ..*within }), roots)
+        (times.map(|t| within.t = t).is_some(), roots)
     }
 
-    fn through_lens(&self, within: &Box5<C>) -> (Option<Box5<C>>, u32) {
+    fn through_lens(&self, within: &mut Box5<C>) -> (bool, u32) {
         let lens = if self.axis == 0 { within.u } else { within.v };
         let (slack, mut times, mut places, mut roots) = (self.slack(), None, None, 0);
         for (corner, &edge) in
@@ -127,10 +143,10 @@ impl<N: Number, C: Coordinate> Side<'_, N, C> {
             let over_lens = &d[..if self.triangle.moving { 2 } else { 1 }];
             places = union(places, above(lens, over_lens, &mut roots));
         }
-        let (Some(t), Some(places)) = (times, places) else { return (None, roots) };
-        let mut next = Box5 { t, ..*within };
-        *if self.axis == 0 { &mut next.u } else { &mut next.v } = places;
-        (Some(next), roots)
+        let (Some(t), Some(places)) = (times, places) else { return (false, roots) };
+        within.t = t;
+        *if self.axis == 0 { &mut within.u } else { &mut within.v } = places;
+        (true, roots)
     }
 
     /// Edges of the tile that bound a vertex.
