@@ -61,12 +61,20 @@ pub struct Rasterizer {
     view: View,
     clip: Region,
     halvings: u32,
+    in_doubles: bool,
 }
 
 impl Rasterizer {
-    /// A rasterizer for the whole lens and shutter in `view`; the time of a touched tile is halved twice.
+    /// A rasterizer for the whole lens and shutter in `view`, with tests in `f32`; the time of a touched tile is halved
+    /// twice.
     pub fn new(view: View) -> Self {
-        Self { view, clip: Region::WHOLE, halvings: 2 }
+        Self { view, clip: Region::WHOLE, halvings: 2, in_doubles: false }
+    }
+
+    /// The rasterizer with tests in `f64`, for tiles smaller than the precision of `f32`.
+    #[must_use]
+    pub fn in_doubles(self) -> Self {
+        Self { in_doubles: true, ..self }
     }
 
     /// The rasterizer limited to a part of lens and shutter, ends included (user clip planes).
@@ -105,25 +113,55 @@ impl Rasterizer {
         &self,
         triangle: &MovingTriangle,
         grid: &Grid,
-        [columns, rows]: [Range<u32>; 2],
+        part: [Range<u32>; 2],
         mut each: impl FnMut([u32; 2], &Touch, &mut TileLoop),
+    ) -> TileLoop {
+        if self.in_doubles {
+            self.tiles::<f64>(triangle, grid, part, &mut each)
+        } else {
+            self.tiles::<f32>(triangle, grid, part, &mut each)
+        }
+    }
+
+    fn tiles<C: Precision>(
+        &self,
+        triangle: &MovingTriangle,
+        grid: &Grid,
+        [columns, rows]: [Range<u32>; 2],
+        each: Each<'_>,
     ) -> TileLoop {
         if columns.is_empty() || rows.is_empty() {
             return TileLoop::default();
         }
-        let mut tests = Tests::<Door>::new(self, triangle, &grid.rect(&columns, &rows), &self.clip);
+        let mut tests = Tests::<C>::new(self, triangle, &grid.rect(&columns, &rows), &self.clip);
         let within = self.clip.outward(self.view.has_lens());
-        tests.descend(grid, [columns, rows], within, &mut each);
+        tests.descend(grid, [columns, rows], within, each);
         tests.work
     }
 
     /// Intervals in which a triangle may touch `rect` within `region`, or `None` if it cannot. For
     /// callers with their own tile hierarchy: intervals of a tile are valid for the tiles inside.
     pub fn touch(&self, triangle: &MovingTriangle, rect: &Rect, region: &Region) -> Option<Touch> {
-        let mut tests = Tests::<Door>::new(self, triangle, rect, region);
+        if self.in_doubles {
+            self.touch_in::<f64>(triangle, rect, region)
+        } else {
+            self.touch_in::<f32>(triangle, rect, region)
+        }
+    }
+
+    fn touch_in<C: Precision>(
+        &self,
+        triangle: &MovingTriangle,
+        rect: &Rect,
+        region: &Region,
+    ) -> Option<Touch> {
+        let mut tests = Tests::<C>::new(self, triangle, rect, region);
         tests.touch(rect, region.outward(self.view.has_lens())).ok()
     }
 }
+
+/// What is called with every tile. It is not a parameter of a type, so that the tests are compiled here, in one piece.
+type Each<'a> = &'a mut dyn FnMut([u32; 2], &Touch, &mut TileLoop);
 
 /// The test that culled a tile.
 #[derive(Clone, Copy)]
@@ -133,8 +171,6 @@ enum Culled {
 }
 
 /// The tests of one triangle, and their work.
-type Door = f64;
-
 struct Tests<'a, C> {
     rasterizer: &'a Rasterizer,
     region: &'a Region,
@@ -162,7 +198,7 @@ impl<'a, C: Precision> Tests<'a, C> {
         grid: &Grid,
         [columns, rows]: [Range<u32>; 2],
         mut within: Box5<C>,
-        each: &mut impl FnMut([u32; 2], &Touch, &mut TileLoop),
+        each: Each<'_>,
     ) {
         if columns.is_empty() || rows.is_empty() {
             return;

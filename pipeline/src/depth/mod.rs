@@ -14,10 +14,10 @@ mod number;
 pub mod plane;
 mod pyramid;
 
-pub(crate) use bound::{ExactBounder, exact_interval_madds};
 pub use bound::{Bounder, DepthBound, interval_madds, set_up_madds, vertex_range};
+pub(crate) use bound::{ExactBounder, exact_interval_madds};
 pub use boxes::{DepthBoxes, DepthTile, Visible};
 pub use grid::{BoxGrid, DepthSpec};
-pub use number::Real;
 pub(crate) use number::Numbers;
+pub use number::Real;
 pub use pyramid::Pyramid;

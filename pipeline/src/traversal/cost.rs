@@ -166,8 +166,7 @@ mod tests {
         {
             let triangle = triangle(moving, &SHEAR);
             let mut within = Box5 { t: [0.25, 0.75], ..Box5::whole(true) };
-            let (madds, (_, found)) =
-                count(|| narrow_near::<Counted, _>(&triangle, near, 0.01, &mut within));
+            let (madds, (_, found)) = count(|| narrow_near::<Counted, _>(&triangle, near, 0.01, &mut within));
             assert_eq!(madds, found, "{moving} {near}");
         }
     }

@@ -273,7 +273,9 @@ impl Drawing<'_> {
             }
             return true;
         };
-        rasterizer(t)
+        // Refinement goes beyond the precision of `f32`, which is relative to the triangle.
+        let rasterizer = rasterizer(t).in_doubles();
+        rasterizer
             .rasterize_part(turned, &pass.grid, [columns, rows], |tile, touch| emit(tile, touch.t, touch.z));
         true
     }
