@@ -73,11 +73,11 @@ impl Precision for f32 {
     const ROUNDED: f64 = 1.0 / (1_u64 << 22) as f64;
 }
 
-/// Half of 128 of 2^-53, of which the tests use less. A vertex as seen takes eight roundings, and so leaves 112 of 2^-53 of
-/// `2 X Y` to an edge, if no vertex is farther than `X` and `Y` from the tile in terms of its coordinates. The coefficients
-/// of an edge and their sums over the tile take at most 32, its roots 20 (twelve operations on a number that changes by
-/// at most `8 X Y`). A side takes five for its root. One ulp, by which roots are moved outward, covers the last sum. A depth
-/// takes four.
+/// 128 times `u` = 2^-53, half of which bounds a vertex as seen. It takes 8. So if no vertex is farther than `X` and `Y` from
+/// any point of the tile, `112 u 2 X Y` of the slack of an edge remains. Of this the coefficients of the edge and their
+/// sums over the tile take at most 32, and its roots 24: their discriminant is that of coefficients off by 2 each, and their
+/// other operations move them by at most 5 `u` of the time, in which the edge changes by `4 2 X Y`. The last sum of a root is
+/// covered by the ulp by which roots are moved outward. Sides and depths take less.
 impl Precision for f64 {
     const ROUNDED: f64 = 1.0 / (1_u64 << 46) as f64;
 }

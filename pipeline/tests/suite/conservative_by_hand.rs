@@ -53,6 +53,20 @@ fn times_and_depths_are_those_of_the_passing() {
     }
 }
 
+/// Beside a border by 2^-30 of the tiles, which `f32` does not tell from touching it; beside it by 2^-19, which it does.
+#[test]
+fn only_doubles_tell_a_gap_of_a_billionth() {
+    let touched = |gap: f64, rasterizer: Rasterizer| {
+        let triangle = still([[0.5, 0.5, 1.0], [1.0 - gap, 0.5, 1.0], [0.5, 0.75, 1.0]]);
+        all(&rasterizer, &triangle, &GRID).len()
+    };
+    let (single, double) =
+        (Rasterizer::new(View::orthographic()), Rasterizer::new(View::orthographic()).in_doubles());
+    let gaps = [16.0 / f64::from(1 << 30), 16.0 / f64::from(1 << 19)];
+    assert_eq!(gaps.map(|gap| touched(gap, single)), [2, 1]);
+    assert_eq!(gaps.map(|gap| touched(gap, double)), [1, 1]);
+}
+
 /// Whatever the depth and the distance, a triangle at one depth is there within the rounding of `f64`.
 #[test]
 fn a_triangle_at_one_depth_stays_there() {
