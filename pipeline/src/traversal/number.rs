@@ -121,6 +121,11 @@ pub trait Number:
         Self::from(0.0)
     }
 
+    /// Work that the modelled unit does although its result is not used. The host need not do it.
+    fn unused(work: impl FnOnce()) {
+        work();
+    }
+
     /// A coordinate.
     fn of(coordinate: impl Coordinate) -> Self {
         Self::constant(coordinate.into())
@@ -128,6 +133,9 @@ pub trait Number:
 }
 
 impl Number for f64 {
+    #[inline(always)]
+    fn unused(_: impl FnOnce()) {}
+
     fn constant(value: f64) -> Self {
         value
     }

@@ -194,12 +194,16 @@ fn above<N: Number, C: Coordinate>(range: [C; 2], functions: &[[N; 2]], roots: &
         crossing += u32::from(below[0] != below[1]);
     }
     *roots += crossing;
-    // The roots are there, but nothing is added to the whole range.
-    if whole || crossing == 0 {
+    if crossing == 0 {
         return whole.then_some(range);
     }
     let crossing = functions.iter().filter(|[lo, hi]| (*lo < N::zero()) != (*hi < N::zero()));
-    crossing.map(|ends| Some(beside_root(range, *ends))).fold(None, union)
+    let parts = crossing.map(|ends| beside_root(range, *ends));
+    if whole {
+        N::unused(|| parts.for_each(drop));
+        return Some(range);
+    }
+    parts.map(Some).fold(None, union)
 }
 
 /// The part of `range` on the side of the root of a linear function where it is not negative.
