@@ -585,7 +585,7 @@ fn without_margins(inputs: &Inputs) -> String {
 }
 
 #[test]
-fn points_that_passes_do_not_make_and_candidates_in_vain() {
+fn points_that_passes_do_not_make_and_rejected_candidates() {
     let frame = ["--frames", "0..1", "--size", "64x64"];
     let run = |set: &[&str]| quintile().run("sampling", &[&frame[..], set].concat());
     assert_warns(&run(&["--set", "rounds=1", "--set", "radius=0.1"]), "points-from-host");

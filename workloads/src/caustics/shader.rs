@@ -139,8 +139,9 @@ impl TileShader for LightShader<'_> {
         };
         let flat = corners.map(|face| face.map(|p| [p.x, p.y]));
         let mask = masks.at(tile.tile);
+        let covered = *mask;
         let mut shaded = Shaded { tests: 0, lit: Vec::new() };
-        for bit in (0..TILE_PX * TILE_PX).filter(|bit| *mask >> bit & 1 == 0).collect::<Vec<u32>>() {
+        for bit in (0..TILE_PX * TILE_PX).filter(|bit| covered >> bit & 1 == 0) {
             let [x, y] = [tile.tile[0] * TILE_PX + bit % TILE_PX, tile.tile[1] * TILE_PX + bit / TILE_PX];
             let at = eye.pixel_centre([x, y]);
             let near = (0..2).all(|axis| (reach[axis][0]..=reach[axis][1]).contains(&at[axis]));
