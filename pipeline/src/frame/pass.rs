@@ -230,7 +230,7 @@ impl<'a> Pass<'a> {
         self.colours.iter().enumerate().filter(move |(number, _)| writes(*number))
     }
 
-    /// What is left of the pass: its images, or the depths of a depth pass.
+    /// Result of the pass: its images, or the depths of a depth pass.
     pub fn result(&self) -> Surface {
         if self.addresses.image.bytes() > 0 { self.addresses.image } else { self.depth.place }
     }
@@ -306,7 +306,7 @@ impl Plane {
         matches!(self.first, First::Loaded(_))
     }
 
-    /// What is left of a value after it was stored.
+    /// A value as its format stores it.
     pub fn round(&self, value: Vec4) -> Vec4 {
         self.format.map_or(value, |format| format.round(value))
     }
@@ -341,7 +341,21 @@ fn planes(
     (depth(depths), vec![Plane::inner(colours, pass.settings.background.extend(1.0))])
 }
 
-/// What the shader of each draw reads. A texture bound to several draws has one address.
+/// Addresses of textures; one that several draws use has one.
+#[derive(Default)]
+struct TextureAddresses(Vec<(*const Texture, u64)>);
+
+impl TextureAddresses {
+    /// The address that is known, `given`, or new.
+    fn of(&mut self, texture: &Texture, given: Option<u64>, space: &mut AddressSpace) -> u64 {
+        let known = self.0.iter().find(|(seen, _)| std::ptr::eq(*seen, texture)).map(|known| known.1);
+        let address = given.or(known).unwrap_or_else(|| space.take(texture.bytes()).address());
+        self.0.push((texture, address));
+        address
+    }
+}
+
+/// What the shader of each draw reads.
 fn bound<'a>(
     draws: &[Draw<'a>],
     addresses: &AddressMap,
@@ -351,13 +365,10 @@ fn bound<'a>(
     let own = draws.iter().map(|draw| draw.shader.texture());
     let own =
         own.zip(&addresses.textures).filter_map(|(texture, at)| Some((std::ptr::from_ref(texture?), (*at)?)));
-    let mut known: Vec<(*const Texture, u64)> = own.collect();
+    let mut known = TextureAddresses(own.collect());
     let mut bind = |binding: &Binding<'a>| match *binding {
         Binding::Texture(texture) => {
-            let place = known.iter().find(|(seen, _)| std::ptr::eq(*seen, texture)).map(|known| known.1);
-            let address = place.unwrap_or_else(|| space.take(texture.bytes()).address());
-            known.push((texture, address));
-            Some(Bound::texture(Sampler::new(texture, address)))
+            Some(Bound::texture(Sampler::new(texture, known.of(texture, None, space))))
         }
         Binding::Surface(_) | Binding::Levels(_) => {
             let stored = |id| {
@@ -408,15 +419,9 @@ pub(super) fn resident<'s>(
             draw.resident.vertices.unwrap_or_else(new)
         })
         .collect();
-    let mut known: Vec<(*const Texture, u64)> = Vec::new();
+    let mut known = TextureAddresses::default();
     draws.iter().zip(vertices).map(move |(draw, vertices)| {
-        let texture = draw.shader.texture().map(|texture| {
-            let shared = known.iter().find(|(seen, _)| std::ptr::eq(*seen, texture)).map(|known| known.1);
-            let address = draw.resident.texture.or(shared);
-            let address = address.unwrap_or_else(|| space.take(texture.bytes()).address());
-            known.push((texture, address));
-            address
-        });
+        let texture = draw.shader.texture().map(|texture| known.of(texture, draw.resident.texture, space));
         (vertices, texture)
     })
 }

@@ -219,7 +219,7 @@ impl<'a> Replay<'a> {
             for access in pixels {
                 let memory = &mut self.memory;
                 let line = |line| memory.texture(line, counts);
-                let work = surface.quad_at(self.pass, access, &samples, line);
+                let work = surface.quad_at(access, &samples, line);
                 count_quad(access, work, counts);
             }
         }

@@ -3,13 +3,14 @@
 use glam::{Vec3, Vec4};
 use pipeline::random::mix;
 use pipeline::surface::{Format, SurfaceSpec};
+use pipeline::texture::LUMINANCE;
 use pipeline::{
     Attachment, Attachments, Clear, Compare, DepthState, Draw, DrawState, Gpu, Lane, LensShape, RasterPass,
     ResolvePass, SampleTable, Shader, ShadingPoint, SurfaceId, SurfaceView, Target, Texture, Viewport,
 };
 use warnings::{Code, Warning};
 
-use super::display::{LUMINANCE, Show};
+use super::display::Show;
 use super::kernels::Kernels;
 use super::light_culling::LightSphere;
 use super::options::{Kernel, Options};
@@ -239,26 +240,18 @@ pub struct Chain {
     pub mean: f32,
 }
 
-/// What groups made of a frame.
-struct Made {
-    image: Vec<Vec3>,
-    facts: Vec<Fact>,
-    warnings: Vec<Warning>,
-}
-
 impl DrawsScene for Compute {
     fn scene(&self) -> &Scene {
         &self.scene
     }
 
     fn draw_frame(&self, frame: &Frame, gpu: &mut Gpu<'_>) -> Result<Drawn, JobError> {
-        let Made { image, facts, warnings } = match self.options.kernel {
-            Kernel::Reduction => self.expose(frame, gpu)?,
-            Kernel::MipChain => self.expose_by_chain(frame, gpu)?,
-            Kernel::Histogram => self.equalise(frame, gpu)?,
-            Kernel::LightCulling => self.heat(frame, gpu)?,
-        };
-        Ok(Drawn { image, moving: false, lens: false, facts, warnings })
+        match self.options.kernel {
+            Kernel::Reduction => self.expose(frame, gpu),
+            Kernel::MipChain => self.expose_by_chain(frame, gpu),
+            Kernel::Histogram => self.equalise(frame, gpu),
+            Kernel::LightCulling => self.heat(frame, gpu),
+        }
     }
 }
 
@@ -267,7 +260,7 @@ fn view(gpu: &mut Gpu<'_>, id: SurfaceId) -> Result<SurfaceView, JobError> {
 }
 
 impl Compute {
-    fn expose(&self, frame: &Frame, gpu: &mut Gpu<'_>) -> Result<Made, JobError> {
+    fn expose(&self, frame: &Frame, gpu: &mut Gpu<'_>) -> Result<Drawn, JobError> {
         let image = self.image(frame, None, gpu)?;
         let image = view(gpu, image)?;
         let mut kernels = Kernels::new(gpu, &self.options)?;
@@ -283,18 +276,20 @@ impl Compute {
         };
         let warning = (cycles >= CYCLES_PER_ACCESS).then(|| Warning::new(Code::BankConflicts, message()));
         let shown = kernels.display(&image, Show::Exposed(mean), &[mean.reads()])?;
-        Ok(Made { image: shown, facts: named(facts), warnings: warning.into_iter().collect() })
+        let (facts, warnings) = (Fact::all(facts), warning.into_iter().collect());
+        Ok(Drawn { image: shown, facts, warnings, ..Drawn::default() })
     }
 
-    fn expose_by_chain(&self, frame: &Frame, gpu: &mut Gpu<'_>) -> Result<Made, JobError> {
+    fn expose_by_chain(&self, frame: &Frame, gpu: &mut Gpu<'_>) -> Result<Drawn, JobError> {
         let Chain { pixels, last, mean } = self.chain(frame, gpu)?;
         let (image, level) = (view(gpu, pixels)?, view(gpu, last)?);
         let mut kernels = Kernels::new(gpu, &self.options)?;
         let shown = kernels.display(&image, Show::ExposedBy(level), &[level.reads()])?;
-        Ok(Made { image: shown, facts: named([("mean_luminance", f64::from(mean))]), warnings: Vec::new() })
+        let facts = Fact::all([("mean_luminance", f64::from(mean))]);
+        Ok(Drawn { image: shown, facts, ..Drawn::default() })
     }
 
-    fn equalise(&self, frame: &Frame, gpu: &mut Gpu<'_>) -> Result<Made, JobError> {
+    fn equalise(&self, frame: &Frame, gpu: &mut Gpu<'_>) -> Result<Drawn, JobError> {
         let image = self.image(frame, None, gpu)?;
         let image = view(gpu, image)?;
         let mut kernels = Kernels::new(gpu, &self.options)?;
@@ -319,10 +314,11 @@ impl Compute {
         };
         let warning = (in_line >= ATOMICS_PER_WORD).then(|| Warning::new(Code::AtomicContention, message()));
         let shown = kernels.display(&image, Show::Equalised(sums), &[sums.reads()])?;
-        Ok(Made { image: shown, facts: named(facts), warnings: warning.into_iter().collect() })
+        let (facts, warnings) = (Fact::all(facts), warning.into_iter().collect());
+        Ok(Drawn { image: shown, facts, warnings, ..Drawn::default() })
     }
 
-    fn heat(&self, frame: &Frame, gpu: &mut Gpu<'_>) -> Result<Made, JobError> {
+    fn heat(&self, frame: &Frame, gpu: &mut Gpu<'_>) -> Result<Drawn, JobError> {
         let (lights, viewport) = (self.lights(frame)?, self.viewport()?);
         let depth = self.depths(frame, gpu)?;
         let stored = view(gpu, depth)?;
@@ -351,10 +347,7 @@ impl Compute {
             )
         };
         let warning = (full > 0).then(|| Warning::new(Code::LightListsFull, message()));
-        Ok(Made { image: shown, facts: named(facts), warnings: warning.into_iter().collect() })
+        let (facts, warnings) = (Fact::all(facts), warning.into_iter().collect());
+        Ok(Drawn { image: shown, facts, warnings, ..Drawn::default() })
     }
-}
-
-fn named<const N: usize>(facts: [(&'static str, f64); N]) -> Vec<Fact> {
-    facts.into_iter().map(|(name, value)| Fact { name, value }).collect()
 }

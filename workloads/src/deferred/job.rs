@@ -87,8 +87,8 @@ impl Default for Options {
 impl Options {
     fn check(&self) -> Result<(), LoadError> {
         must_hold([
-            ("lights", self.lights <= 4096, "0 to 4096"),
-            ("range", (1e-15..=1e15).contains(&self.range), "1e-15 to 1e15 scene units"),
+            ("lights", &self.lights, self.lights <= 4096, "0 to 4096"),
+            ("range", &self.range, (1e-15..=1e15).contains(&self.range), "1e-15 to 1e15 scene units"),
         ])
     }
 }

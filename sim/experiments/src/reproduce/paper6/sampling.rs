@@ -85,7 +85,7 @@ impl<const D: usize> Thrown<D> {
         format!(
             "{D}D, {} of the points from {} candidates in rasterized uncovered regions in {} passes: {}; the CPU sampler alone has {} points",
             self.darts.drawn,
-            self.darts.candidates,
+            self.darts.kept,
             self.darts.passes,
             checked.text(),
             self.cpu_points
@@ -128,7 +128,7 @@ pub(super) fn darts(task: &Task<'_>) -> Result<Done, RunError> {
         ("thin_regions", (in_plane.thin_regions + in_space.thin_regions) as f64),
     ]);
     let mut ran = row::ran(&[flat.ran, deep.ran].into_iter().sum());
-    let made = [flat.darts.made + deep.darts.made, flat.darts.candidates + deep.darts.candidates];
+    let made = [flat.darts.candidates + deep.darts.candidates, flat.darts.kept + deep.darts.kept];
     ran.extend(numbers([("candidates", made[0] as f64), ("candidates_in_regions", made[1] as f64)]));
     let radius = *row.radius_2d.get(form);
     let shown = flat.darts.found.points.iter().filter(|[x, y]| *x < 40.0 * radius && *y < 20.0 * radius);
