@@ -6,7 +6,7 @@ use super::matched::{find_matched, noise_variance};
 use super::register::register;
 use super::split_frames::SplitFrames;
 use super::start_refinement::refine_starts;
-use super::threshold::{Rule, Threshold, choose};
+use super::threshold::{Rule, Threshold};
 use super::track::{Start, track};
 use super::vsync::{Snapped, snap_to_ticks};
 use super::{FinderMethod, Found, FrameStart, SUSPECT_CONFIDENCE, marked_starts, spacing};

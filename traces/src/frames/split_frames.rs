@@ -102,7 +102,7 @@ fn segments(confidence_factors: &[f64]) -> Vec<Range<usize>> {
     bounds
         .windows(2)
         .map(|two| two[0]..two[1])
-        .filter(|segment| left.get(segment.start) < Some(&1.0))
+        .filter(|segment| confidence_factors[segment.start] < 1.0)
         .collect()
 }
 
