@@ -53,7 +53,7 @@ pub(super) fn executions(task: &Task<'_>) -> Result<Done, RunError> {
     tried.along("slope", slopes.iter().map(judged)).with_base(slope);
     tried.along("depth_m", depths.iter().map(judged)).with_base(depth_m);
     let full = one_at_a_time([row.slope.values(), row.depth_m.values()]);
-    let band = tried.band(full).ok_or_else(|| RunError::setting("VI-6 has nothing to try"))?;
+    let band = tried.band(full)?;
     let [moving, refined, hull, prism] = base.executions;
     let part = |total: u64| total as f64 / prism as f64;
     let ours = format!(
@@ -141,7 +141,7 @@ pub(super) fn no_light_is_lost(task: &Task<'_>) -> Result<Done, RunError> {
     }
     tried.along("floor of turned beams", at);
     let full = row.slope.values() * row.pleat.values() + row.turned_floors.get(Form::Full).len();
-    let band = tried.band(full).ok_or_else(|| RunError::setting("VI-7 has nothing to try"))?;
+    let band = tried.band(full)?;
     let [once, twice, thrice] = all.by_hits;
     let ours = format!(
         "{} missed of {} pairs of a pixel and a beam; {once} of them are hit once, {twice} twice and {thrice} three times",

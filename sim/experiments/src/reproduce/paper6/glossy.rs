@@ -89,7 +89,7 @@ pub(super) fn row(task: &Task<'_>) -> Result<Done, RunError> {
     }
     tried.along("index", at).with_base(index);
     let full = one_at_a_time([row.lens_radius.values(), row.index.values()]);
-    let band = tried.band(full).ok_or_else(|| RunError::setting("VI-11 has nothing to try"))?;
+    let band = tried.band(full)?;
     let [reflected, refracted] = base.errors.map(|both| both.map(|row| row.rmse));
     let (first, last) = (&base.blurs[0], &base.blurs[base.blurs.len() - 1]);
     let ours = format!(

@@ -105,7 +105,7 @@ pub(super) fn rate(task: &Task<'_>) -> Result<Done, RunError> {
     let at = motions.into_iter().map(|(motion, gain, grows)| (motion, gain, grows && wrong == 0));
     tried.along("motion_m", at).with_base(motion);
     let full = one_at_a_time([row.tile_px.values(), row.motion_m.values()]);
-    let band = tried.band(full).ok_or_else(|| RunError::setting("VI-4 has nothing to try"))?;
+    let band = tried.band(full)?;
     let base = curves.iter().find(|(name, _)| *name == format!("{tile_px}-pixel tiles"));
     let listed: Vec<String> =
         base.iter().flat_map(|(_, rates)| rates).map(|(boxes, rate)| format!("{boxes}: {rate:.3}")).collect();
@@ -221,7 +221,7 @@ pub(super) fn cost(task: &Task<'_>) -> Result<Done, RunError> {
         tried.along(&format!("boxes_charged ({which})"), at.collect::<Vec<_>>());
     }
     let full = row.objects.values() * row.boxes_charged.values();
-    let band = tried.band(full).ok_or_else(|| RunError::setting("VI-5 has nothing to try"))?;
+    let band = tried.band(full)?;
     let base = costs(*row.objects.get(form), *row.boxes_charged.get(form));
     let [tests, bytes, madds] = least(&base);
     let charged = least(&costs(*row.objects.get(form), 1.0));

@@ -250,7 +250,7 @@ pub(super) fn densities(task: &Task<'_>) -> Result<Done, RunError> {
         (sets, farthest(p).unwrap_or(f64::NAN), p.iter().all(|p| fits.contains(p)))
     };
     tried.along("sets", all.iter().map(judged));
-    let band = tried.band(row.sets.values()).ok_or_else(|| failed("no set"))?;
+    let band = tried.band(row.sets.values())?;
     let tests = 4 * most;
     let ours = format!(
         "chi-square of some {points} points of a bell a set, from drawn columns, 1D to 4D: p = {} for {base} sets together, {} for one; {} of the {tests} sets alone are \
