@@ -67,9 +67,7 @@ const NOT_PROVOKED: [(&str, &str); 27] = [
 ];
 
 /// Codes that the tests below produce, and `orthographic-view`, which `visibility_inputs` tests.
-const PROVOKED: [&str; 57] = [
-    "points-from-host",
-    "points-rejected",
+const PROVOKED: [&str; 59] = [
     "accuracy-missed",
     "alpha-ignored",
     "behind-camera",
@@ -102,6 +100,7 @@ const PROVOKED: [&str; 57] = [
     "light-ignored",
     "memory-rows",
     "metallic-ignored",
+    "mip-chain-odd",
     "missed-vsync",
     "missing-image",
     "missing-material",
@@ -114,9 +113,12 @@ const PROVOKED: [&str; 57] = [
     "orthographic-view",
     "packets-lost",
     "platform-mismatch",
+    "points-from-host",
+    "points-rejected",
     "points-thin-regions",
     "primitive-dropped",
     "reflection-ignored",
+    "samples-without-blur",
     "short-frame",
     "sliver-triangles",
     "sub-sample-triangles",
@@ -591,6 +593,22 @@ fn points_that_passes_do_not_make_and_rejected_candidates() {
     assert_warns(&run(&["--set", "rounds=1", "--set", "radius=0.1"]), "points-from-host");
     let loose = ["--set", "points=noise", "--set", "dimensions=4", "--set", "count=100"];
     assert_warns(&run(&loose), "points-rejected");
+}
+
+#[test]
+fn samples_of_one_time_and_odd_mip_chains() {
+    let frame = ["--frames", "18..19", "--size", "80x45"];
+    let sharp = ["--table", "msaa", "--samples", "4", "--lens", "0"];
+    assert_warns(&quintile().run("default", &[&frame[..], &sharp].concat()), "samples-without-blur");
+    let blurred = quintile().run("deferred", &[&frame[..], &["--samples", "4", "--shutter", "0.5"]].concat());
+    assert!(
+        !blurred.warning_codes().contains(&"samples-without-blur".to_owned()),
+        "samples spread over the open shutter"
+    );
+    assert_warns(
+        &quintile().run("compute", &[&frame[..], &["--set", "kernel=mip_chain"]].concat()),
+        "mip-chain-odd",
+    );
 }
 
 #[test]

@@ -115,6 +115,8 @@ codes! {
     BudgetMissed = "budget-missed" in Simulator,
     /// A frame takes longer than a display period.
     MissedVsync = "missed-vsync" in Simulator,
+    /// All samples of a pixel have one time while something moves, or one lens position behind a lens.
+    SamplesWithoutBlur = "samples-without-blur" in Simulator,
     /// The shortest wave is under four squares of generator triangles long.
     CausticsCoarse = "caustics-coarse" in Workload,
     /// The sides of light volumes cross for more than a tenth of their length on average.
@@ -129,6 +131,8 @@ codes! {
     AtomicContention = "atomic-contention" in Workload,
     /// A tile of `compute` has more lights than its list takes.
     LightListsFull = "light-lists-full" in Workload,
+    /// The mip chain of `compute` leaves out a row or column of the image.
+    MipChainOdd = "mip-chain-odd" in Workload,
     /// `quintile sample poisson`: more than one uncovered region per 100 points is thinner than the float
     /// spacing.
     PointsThinRegions = "points-thin-regions" in Workload,

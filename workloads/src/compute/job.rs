@@ -255,6 +255,20 @@ impl DrawsScene for Compute {
     }
 }
 
+/// Warns if the chain leaves out pixels. Each level halves a side and drops the rest, so a power of two is left of it.
+fn left_out(viewport: Viewport) -> Option<Warning> {
+    let [columns, rows] = [viewport.width(), viewport.height()].map(|side| 1_usize << side.ilog2());
+    let share = (columns * rows) as f64 / viewport.pixels() as f64;
+    (share < 1.0).then(|| {
+        let message = format!(
+            "levels of odd size leave out their last row or column: the mean is that of {columns} x {rows} pixels, {:.0} % of the image; \
+             --set kernel=reduction takes all",
+            100.0 * share
+        );
+        Warning::new(Code::MipChainOdd, message)
+    })
+}
+
 fn view(gpu: &mut Gpu<'_>, id: SurfaceId) -> Result<SurfaceView, JobError> {
     gpu.surface_view(id).ok_or_else(|| JobError::Setting("a pass stored nothing".to_owned()))
 }
@@ -286,7 +300,8 @@ impl Compute {
         let mut kernels = Kernels::new(gpu, &self.options)?;
         let shown = kernels.display(&image, Show::ExposedBy(level), &[level.reads()])?;
         let facts = Fact::all([("mean_luminance", f64::from(mean))]);
-        Ok(Drawn { image: shown, facts, ..Drawn::default() })
+        let warnings = left_out(self.viewport()?).into_iter().collect();
+        Ok(Drawn { image: shown, facts, warnings, ..Drawn::default() })
     }
 
     fn equalise(&self, frame: &Frame, gpu: &mut Gpu<'_>) -> Result<Drawn, JobError> {

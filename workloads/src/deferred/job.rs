@@ -2,11 +2,10 @@
 
 use activity::Event;
 use glam::{Vec2, Vec3, Vec4};
-use pipeline::sampling::{Pattern, SampleSource};
+use pipeline::sampling::SampleSource;
 use pipeline::{
     Attachment, Attachments, Binding, Blend, Camera, Clear, Cull, DepthState, Draw, DrawState, Format,
-    Geometry, Gpu, RasterPass, Rendered, ResolvePass, SampleSpec, Shader, SurfaceId, SurfaceSpec, Target,
-    Viewport,
+    Geometry, Gpu, RasterPass, Rendered, ResolvePass, Shader, SurfaceId, SurfaceSpec, Target, Viewport,
 };
 use serde::{Deserialize, Serialize};
 use warnings::{Code, Warning};
@@ -20,7 +19,7 @@ use crate::job::{
 };
 use crate::lighting::PointLight;
 use crate::material::SurfaceShader;
-use crate::samples::SampleChoice;
+use crate::samples::{SampleChoice, blur_warning};
 use crate::scene::{Frame, Overrides, Scene};
 use crate::shapes;
 
@@ -93,6 +92,8 @@ impl Options {
     }
 }
 
+/// Name of the sample table without a shutter.
+const MULTISAMPLE: &str = "msaa";
 /// Radiance of lit samples.
 const LIT: Format = Format::Rgba16f;
 /// State of what is drawn over the image, without depths.
@@ -117,25 +118,25 @@ impl Deferred {
         Self::of(crate::load(&options.scene)?, options, overrides, seed)
     }
 
-    /// The same in a given scene. Unless `overrides` change them, pixels have one sample in the middle, and the shutter has no length.
+    /// The same in a given scene. Unless `overrides` change them, pixels have one sample in the middle, and the shutter has no length;
+    /// without a shutter, several samples of a pixel are those of multisampling.
     ///
     /// # Errors
     /// [`LoadError`] for an invalid option.
     pub fn of(scene: Scene, options: Options, overrides: &Overrides, seed: u64) -> Result<Self, LoadError> {
         options.check()?;
+        let shutter = overrides.shutter.unwrap_or(0.0);
+        let multisample = || (shutter == 0.0).then(|| MULTISAMPLE.to_owned());
         let overrides = Overrides {
             samples: overrides.samples.or(Some(1)),
-            shutter: overrides.shutter.or(Some(0.0)),
+            shutter: Some(shutter),
             lens_radius: Some(0.0),
+            table: overrides.table.clone().or_else(multisample),
             ..overrides.clone()
         };
         let scene = scene.with_overrides(&overrides)?;
         let wrong = |setting, message: String| LoadError::Setting { setting, message };
-        let multisample = SampleSpec { pattern: Pattern::Multisample, ..SampleSpec::default() };
-        let table = match &overrides.table {
-            Some(table) => SampleChoice::load(table)?,
-            None => SampleChoice::Described(multisample),
-        };
+        let table = SampleChoice::load(&scene.settings().table)?;
         let first = scene.frame(0).map_err(|error| wrong("frames", error.to_string()))?;
         let lights = point_lights(bounds(&first), options.lights, options.range);
         let samples = table.source(scene.settings().samples, seed)?;
@@ -190,8 +191,10 @@ impl DrawsScene for Deferred {
             Fact { name: "g_buffer_bytes_per_pixel", value: bytes as f64 },
             Fact { name: "lighting_invocations", value: lit_runs as f64 },
         ];
-        let warnings = self.regime_warnings(frame);
-        Ok(Drawn { image, moving: frame.is_moving(), lens: false, facts, warnings })
+        let mut warnings = self.regime_warnings(frame);
+        let moving = frame.is_moving();
+        warnings.extend(blur_warning(&*self.samples, moving, false));
+        Ok(Drawn { image, moving, lens: false, facts, warnings })
     }
 }
 

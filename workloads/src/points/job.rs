@@ -57,7 +57,7 @@ pub struct Options {
     pub points: Kind,
     /// Dimensions; 0 for the fewest of the kind.
     pub dimensions: u32,
-    /// Minimum distance of darts, 0.005 to 0.5, in 3D from 0.03 on.
+    /// Minimum distance of darts, 0.005 to 0.5, in 3D from 0.03 on; 0 for 0.02 in 2D and 0.06 in 3D.
     pub radius: f64,
     /// Rounds of darts that are rasterized, 1 to 8.
     pub rounds: u32,
@@ -70,7 +70,7 @@ pub struct Options {
 impl Default for Options {
     fn default() -> Self {
         let (points, dimensions) = (Kind::Darts, 0);
-        Self { points, dimensions, radius: 0.02, rounds: 5, periodic: true, count: 20_000.0 }
+        Self { points, dimensions, radius: 0.0, rounds: 5, periodic: true, count: 20_000.0 }
     }
 }
 
@@ -102,7 +102,11 @@ pub(crate) fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<d
         let range = format!("{} to {}", known.start(), known.end());
         return refused("dimensions", format!("{}: such points have {range}", options.dimensions));
     }
-    let least = if options.dimensions == 3 && options.points == Kind::Darts { MIN_RADIUS_3D } else { 0.005 };
+    let in_space = options.dimensions == 3 && options.points == Kind::Darts;
+    if options.radius == 0.0 {
+        options.radius = if in_space { 0.06 } else { 0.02 };
+    }
+    let least = if in_space { MIN_RADIUS_3D } else { 0.005 };
     if !(least..=0.5).contains(&options.radius) {
         return refused("radius", format!("{:?}: it has to be {least} to 0.5", options.radius));
     }
@@ -278,7 +282,7 @@ impl Sampling {
         let side = self.settings.height;
         let image = picture(plane(&found.points), side, (0.15 * radius * f64::from(side)) as i64);
         let warnings = host_warning(drawn, found.points.len()).into_iter().collect();
-        Ok(Drawn { image, facts, warnings, ..Drawn::default() })
+        Ok(Drawn { image, moving: D > 2, lens: false, facts, warnings })
     }
 
     fn noise<const D: usize>(&self, seed: u64, gpu: &mut Gpu<'_>) -> Result<Drawn, JobError> {
@@ -292,7 +296,8 @@ impl Sampling {
         ]);
         let image = picture(plane(&found.points), self.settings.height, 0);
         let warnings = rejected_warning(found.candidates, found.points.len()).into_iter().collect();
-        Ok(Drawn { image, facts, warnings, ..Drawn::default() })
+        // The density is one more dimension. The third is time, the others are the lens.
+        Ok(Drawn { image, moving: D > 1, lens: D > 2, facts, warnings })
     }
 
     fn volume(&self, seed: u64, gpu: &mut Gpu<'_>) -> Result<Drawn, JobError> {
@@ -310,7 +315,8 @@ impl Sampling {
             ("points_expected", share * found.samples as f64),
             ("samples_covered", found.covered as f64),
         ]);
-        Ok(Drawn { image: found.image, facts, ..Drawn::default() })
+        let (moving, lens) = (self.options.dimensions != 4, self.options.dimensions > 3);
+        Ok(Drawn { image: found.image, moving, lens, facts, ..Drawn::default() })
     }
 }
 
