@@ -282,10 +282,11 @@ impl Compute {
         let cycles = kernels.cycles_per_shared_access();
         let facts =
             [("mean_luminance", f64::from(kernels.values(mean)[0])), ("cycles_per_shared_access", cycles)];
+        let padding = if self.options.padded || !kernels.padding_fits() { "" } else { ", or padded=true," };
         let message = || {
             format!(
                 "an access of a warp to shared memory takes {cycles:.1} cycles on average (a warning from {CYCLES_PER_ACCESS} on): lanes ask a bank \
-                 for several words; order=sequential with stride=1, or padded=true, avoids it"
+                 for several words; order=sequential with stride=1{padding} avoids it"
             )
         };
         let warning = (cycles >= CYCLES_PER_ACCESS).then(|| Warning::new(Code::BankConflicts, message()));
