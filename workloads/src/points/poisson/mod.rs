@@ -184,7 +184,7 @@ pub(super) fn check_room(radius: f64, dimensions: usize, cells: f64) -> Result<(
     }
     // Padding costs relatively more for fewer cells, and the printed value must work.
     let most = 0.8 * points / over;
-    Err(PoissonError::TooMany { points, least: 1.05 * radius_for(most, dimensions), most })
+    Err(PoissonError::TooMany { points, least: 1.05 * radius_for(most, dimensions, Domain::Torus), most })
 }
 
 #[cfg(test)]
