@@ -14,7 +14,7 @@ use super::lanes::{LaneWork, Lanes};
 use crate::conservative::{Grid, MovingTriangle, Rasterizer, TileLoop, Touch};
 use crate::depth::{Numbers, Real};
 use crate::geometry::{Projection, Viewport};
-use crate::memory::Surface;
+use crate::memory::MemoryRange;
 use crate::tally::{Costs, Kernel};
 
 /// Triangles of a packet of vertices.
@@ -68,7 +68,7 @@ pub struct ConservativeDraw<'a> {
     /// Tiles along a side of a block whose tiles of one triangle make one packet: those of a tile of the image.
     pub block: u32,
     /// The vertices in memory, three of each triangle.
-    pub vertices: Surface,
+    pub vertices: MemoryRange,
     /// Bytes of a vertex, at both ends of the shutter if it moves.
     pub vertex_bytes: u32,
     /// What moved the vertices to the image plane, at both ends; `None` if they are there in memory.

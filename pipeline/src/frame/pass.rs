@@ -9,7 +9,7 @@ use super::attachments::{Attachment, Attachments, Binding, Load, Store, Surfaces
 use super::{Features, Settings, Shading};
 use crate::depth::{BoxGrid, DepthBoxes, DepthTile};
 use crate::geometry::{Camera, Clip, Cull, Geometry, MovingVertex, Projection, Viewport};
-use crate::memory::{AddressSpace, LINE_BYTES, Surface};
+use crate::memory::{AddressSpace, LINE_BYTES, MemoryRange};
 use crate::sampling::TileSamples;
 use crate::setup::Corner;
 use crate::shader::{Program, Shader};
@@ -231,7 +231,7 @@ impl<'a> Pass<'a> {
     }
 
     /// Result of the pass: its images, or the depths of a depth pass.
-    pub fn result(&self) -> Surface {
+    pub fn result(&self) -> MemoryRange {
         if self.addresses.image.bytes() > 0 { self.addresses.image } else { self.depth.place }
     }
 
@@ -254,7 +254,7 @@ impl<'a> Pass<'a> {
 
 /// Values of all samples of a pass: depths, or the colours of a target.
 pub(super) struct Plane {
-    pub place: Surface,
+    pub place: MemoryRange,
     pub sample_bytes: u64,
     /// Format in a surface of the frame; others keep values as they were computed.
     pub format: Option<Format>,
@@ -272,7 +272,7 @@ pub(super) enum First {
 
 impl Plane {
     /// Values that end with the pass, or with the frame.
-    fn inner(place: Surface, value: Vec4) -> Self {
+    fn inner(place: MemoryRange, value: Vec4) -> Self {
         let first = First::Cleared(value);
         Self { place, sample_bytes: SAMPLE_BYTES, format: None, first, is_stored: false }
     }
@@ -328,7 +328,7 @@ fn planes(
     if let Target::Surfaces(targets) = pass.target {
         let colour = |to| Plane::attached(to, |value| value, surfaces);
         let depth = targets.depth.as_ref().and_then(|to| Plane::attached(to, depth_of, surfaces));
-        let depth = depth.unwrap_or_else(|| Plane::inner(Surface::NOWHERE, depth_of(pass.clear)));
+        let depth = depth.unwrap_or_else(|| Plane::inner(MemoryRange::NOWHERE, depth_of(pass.clear)));
         return (depth, targets.colours.iter().filter_map(colour).collect());
     }
     let bytes = pass.padded_pixels() * u64::from(pass.settings.samples.per_pixel()) * SAMPLE_BYTES;
@@ -386,7 +386,7 @@ fn bound<'a>(
 #[derive(Clone, Debug)]
 pub(super) struct AddressMap {
     /// Images, one after the other.
-    pub image: Surface,
+    pub image: MemoryRange,
     /// Vertices of each draw.
     pub vertices: Vec<VertexBuffer>,
     /// First byte of the texture of each draw, if it has any; draws with the same texture have the same address.
@@ -468,7 +468,7 @@ impl<'a> Draw<'a> {
 
     /// The draw with the texture of its shader in `surface`, as an earlier pass wrote it.
     #[must_use]
-    pub fn reading(self, surface: Surface) -> Self {
+    pub fn reading(self, surface: MemoryRange) -> Self {
         Self { resident: Resident { texture: Some(surface.address()), ..self.resident }, ..self }
     }
 }

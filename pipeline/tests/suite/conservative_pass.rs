@@ -7,7 +7,7 @@ use crate::common::*;
 use activity::{Counts, Event, PacketKind};
 use glam::Vec3;
 use pipeline::conservative::{Grid, MovingTriangle, Rasterizer, View};
-use pipeline::memory::Surface;
+use pipeline::memory::MemoryRange;
 use pipeline::random::{mix, unit};
 use pipeline::*;
 
@@ -26,7 +26,7 @@ fn primitive(corners: [[[f64; 3]; 3]; 2], body: u32) -> Primitive {
 
 /// Merges a word at each tile, with two operations.
 struct Merge {
-    target: Surface,
+    target: MemoryRange,
     runs: AtomicU32,
 }
 
@@ -55,7 +55,7 @@ fn drawn(primitives: &[Primitive], block: u32) -> (Vec<Tile>, Vec<PacketKind>, C
         kinds.push(packet.kind);
     })
     .unwrap();
-    let [target, vertices] = [64 * 4, 3 * 24 * primitives.len() as u64].map(|bytes| gpu.surface(bytes));
+    let [target, vertices] = [64 * 4, 3 * 24 * primitives.len() as u64].map(|bytes| gpu.allocate(bytes));
     let shader = Merge { target, runs: AtomicU32::new(0) };
     let mut pass = gpu.begin_conservative("boxes", None);
     let draw =
@@ -151,7 +151,7 @@ fn a_full_screen_pass_runs_every_pixel() {
     let spec = spec(Features::ALL);
     let viewport = Viewport::new(21, 13).unwrap();
     let mut gpu = Gpu::quiet(&spec).unwrap();
-    let source = gpu.surface(4096);
+    let source = gpu.allocate(4096);
     let drawn = gpu.shade_pixels("grey", viewport, |lanes, [x, y]| {
         lanes.fetch(source.address(), 4);
         lanes.run(|lane| Vec3::splat(lane.add(x as f32, y as f32)))

@@ -3,7 +3,7 @@
 
 use glam::DVec3;
 use pipeline::conservative::{Grid, MovingTriangle, Rasterizer, View};
-use pipeline::memory::Surface;
+use pipeline::memory::MemoryRange;
 use pipeline::{ConservativeDraw, Gpu, Lanes, Primitive, TileIntervals, TileShader};
 
 use super::bound::BoundingVolume;
@@ -28,9 +28,9 @@ pub(super) fn draw_on(gpu: &mut Gpu<'_>, beams: &[Beam], eye: &Eye, method: Meth
     let [columns, rows] = [viewport.width(), viewport.height()].map(|side| side.div_ceil(TILE_PX));
     let side = f64::from(TILE_PX);
     let grid = Grid { origin: [-half_width, -half_height], tile: [side; 2], columns, rows };
-    let target = gpu.surface(u64::from(columns * rows) * TILE_PIXELS * LIGHT_BYTES);
+    let target = gpu.allocate(u64::from(columns * rows) * TILE_PIXELS * LIGHT_BYTES);
     let (primitives, faces) = primitives(&seen, method, &grid);
-    let vertices = gpu.surface(3 * primitives.len() as u64 * u64::from(VERTEX_BYTES));
+    let vertices = gpu.allocate(3 * primitives.len() as u64 * u64::from(VERTEX_BYTES));
     // The maps of a GPU with other tiles cannot show these.
     let of_image = (gpu.spec().tile_px == TILE_PX).then_some(viewport);
     let mut picture = Picture {
@@ -98,7 +98,7 @@ struct LightShader<'a> {
     seen: &'a [Option<Seen>],
     faces: &'a [Face],
     light: Light,
-    target: Surface,
+    target: MemoryRange,
     /// Tiles in a row of the image.
     columns: u32,
 }

@@ -1,7 +1,7 @@
 //! The passes of collision detection on the modelled hardware, in conservative mode, and their image.
 
 use glam::Vec3;
-use pipeline::memory::Surface;
+use pipeline::memory::MemoryRange;
 use pipeline::{
     ConservativeDraw, ConservativePass, Gpu, Lane, Lanes, Primitive, TileIntervals, TileShader, Viewport,
 };
@@ -49,12 +49,12 @@ impl BoxLayout {
 pub(super) struct PassesOnGpu<'a, 'e> {
     gpu: &'a mut Gpu<'e>,
     pass: ConservativePass,
-    vertices: Surface,
+    vertices: MemoryRange,
     picture: Picture,
     viewport: Viewport,
     layout: BoxLayout,
     /// Boxes of the first and of the second object.
-    boxes: [Surface; 2],
+    boxes: [MemoryRange; 2],
     method: Method,
     fragments: u64,
 }
@@ -74,8 +74,8 @@ impl<'a, 'e> PassesOnGpu<'a, 'e> {
     ) -> Self {
         let layout = BoxLayout::new(viewport, gpu.spec().tile_px, bins);
         let most = objects.iter().map(Object::len).max().unwrap_or(0) as u64;
-        let vertices = gpu.surface(3 * most * u64::from(VERTEX_BYTES));
-        let boxes = [(); 2].map(|()| gpu.surface(layout.bytes()));
+        let vertices = gpu.allocate(3 * most * u64::from(VERTEX_BYTES));
+        let boxes = [(); 2].map(|()| gpu.allocate(layout.bytes()));
         let picture = Picture::new(objects, viewport.width() as usize);
         let (pass, fragments) = Default::default();
         Self { gpu, pass, vertices, picture, viewport, layout, boxes, method, fragments }
@@ -91,7 +91,7 @@ impl<'a, 'e> PassesOnGpu<'a, 'e> {
     }
 
     /// Where the boxes of a part are. The second part only reads those of the first unless boxes are compared.
-    fn target(&self, which: usize, is_test: bool) -> Surface {
+    fn target(&self, which: usize, is_test: bool) -> MemoryRange {
         self.boxes[if is_test || self.method == Method::FragmentBox { 0 } else { which }]
     }
 }
@@ -106,7 +106,7 @@ fn meets(lane: &Lane, known: &TzBox, t: [f64; 2], z: [f64; 2]) -> bool {
 struct BoxShader<'a> {
     primitives: &'a [BinnedPrimitive],
     pass: &'a Pass,
-    target: Surface,
+    target: MemoryRange,
     known: Option<&'a TzBuffer>,
     layout: BoxLayout,
 }

@@ -107,7 +107,7 @@ impl Compute {
         gpu: &mut Gpu<'_>,
     ) -> Result<SurfaceId, JobError> {
         let levels = if self.is_chained() && self.samples.per_pixel() == 1 { u32::MAX } else { 1 };
-        let image = gpu.create(&self.surface_spec("image", Format::Rgba16f)?.with_levels(levels));
+        let image = gpu.create_surface(&self.surface_spec("image", Format::Rgba16f)?.with_levels(levels));
         let depth = match prepass {
             Some(depth) => Attachment::loaded(depth),
             None => Attachment::cleared(self.surface(gpu, "depth", Format::D32)?, Clear::default()).dropped(),
@@ -152,8 +152,11 @@ impl Compute {
     pub fn chain(&self, frame: &Frame, gpu: &mut Gpu<'_>) -> Result<Chain, JobError> {
         let image = self.image(frame, None, gpu)?;
         let spec = SurfaceSpec::new("pixels", self.viewport()?, Format::Rgba16f).mipmapped();
-        let pixels =
-            if self.is_chained() && self.samples.per_pixel() == 1 { image } else { gpu.create(&spec) };
+        let pixels = if self.is_chained() && self.samples.per_pixel() == 1 {
+            image
+        } else {
+            gpu.create_surface(&spec)
+        };
         if pixels != image {
             gpu.resolve(&ResolvePass::new("resolve", image).dropping(), pixels)?;
         }
@@ -168,7 +171,7 @@ impl Compute {
     }
 
     fn surface(&self, gpu: &mut Gpu<'_>, name: &str, format: Format) -> Result<SurfaceId, JobError> {
-        Ok(gpu.create(&self.surface_spec(name, format)?))
+        Ok(gpu.create_surface(&self.surface_spec(name, format)?))
     }
 
     fn surface_spec<'n>(&self, name: &'n str, format: Format) -> Result<SurfaceSpec<'n>, JobError> {

@@ -174,7 +174,7 @@ impl DrawsScene for Deferred {
         let viewport = Viewport::new(settings.width, settings.height)
             .ok_or_else(|| JobError::Setting(IMAGE_SIZE.to_owned()))?;
         let samples = self.samples.per_pixel();
-        let lit = gpu.create(&SurfaceSpec::new("lit samples", viewport, LIT).sampled(samples));
+        let lit = gpu.create_surface(&SurfaceSpec::new("lit samples", viewport, LIT).sampled(samples));
         let stage = Stage { job: self, frame, viewport, lit, screen: Corners::of(frame, viewport) };
         let surfaces = stage.surfaces(gpu)?;
         let lit_runs = match self.options.method {
@@ -280,7 +280,7 @@ impl<'a> Stage<'a> {
     /// Surfaces lit as they are drawn, onto cleared samples.
     fn forward(&self, surfaces: &[Surfaced<'a>], gpu: &mut Gpu<'_>) -> Result<u64, JobError> {
         let spec = SurfaceSpec::new("depths", self.viewport, Format::D32);
-        let depth = gpu.create(&spec.sampled(self.job.samples.per_pixel()));
+        let depth = gpu.create_surface(&spec.sampled(self.job.samples.per_pixel()));
         let colours = vec![Attachment::cleared(self.lit, Vec4::ZERO)];
         let depth = Some(Attachment::cleared(depth, Clear::default()).dropped());
         self.lit_forward("forward", surfaces.iter().collect(), &Attachments { colours, depth }, gpu)

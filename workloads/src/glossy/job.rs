@@ -3,7 +3,7 @@
 
 use activity::Event;
 use glam::{DVec3, Vec3};
-use pipeline::memory::Surface;
+use pipeline::memory::MemoryRange;
 use pipeline::{Camera, Cull, Draw, Geometry, Gpu, RasterPass, Rendered, SampleSpec, SampleTable, Viewport};
 use serde::{Deserialize, Serialize};
 use warnings::{Code, Warning};
@@ -151,7 +151,7 @@ impl Glossy {
         texels: &[Vec3],
         camera: &Camera,
         mut draws: Vec<Draw<'_>>,
-        memory: Surface,
+        memory: MemoryRange,
         gpu: &mut Gpu<'_>,
     ) -> Result<Rendered, JobError> {
         let shader = ReceiverShader::new(texels, map.viewport, BASE, self.options.fresnel)

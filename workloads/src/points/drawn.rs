@@ -12,7 +12,7 @@
 use std::ops::Range;
 
 use pipeline::conservative::{Grid, MovingTriangle, Rasterizer, Region, View};
-use pipeline::memory::Surface;
+use pipeline::memory::MemoryRange;
 use pipeline::random::mix;
 use pipeline::{ConservativeDraw, Gpu, Lane, Lanes, Primitive, TileIntervals, TileShader};
 
@@ -163,7 +163,7 @@ struct Candidates<'a> {
     cells: &'a [Cell],
     lattice: &'a Lattice,
     within: &'a dyn Within,
-    results: Surface,
+    results: MemoryRange,
     point_bytes: u64,
 }
 
@@ -262,8 +262,8 @@ pub(super) fn draw(
     let primitives = primitives(cells, &grid);
     let axes = lattice.used.iter().filter(|used| **used).count() as u64;
     let point_bytes = axes * COORDINATE_BYTES;
-    let results = gpu.surface(cells.len() as u64 * PLACES * point_bytes);
-    let vertices = gpu.surface(3 * primitives.len() as u64 * u64::from(VERTEX_BYTES));
+    let results = gpu.allocate(cells.len() as u64 * PLACES * point_bytes);
+    let vertices = gpu.allocate(3 * primitives.len() as u64 * u64::from(VERTEX_BYTES));
     let draw = ConservativeDraw {
         primitives: &primitives,
         grid: &grid,

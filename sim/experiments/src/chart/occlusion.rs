@@ -382,7 +382,7 @@ impl Drawn {
         let projection = Projection::new(&self.scene.camera, self.viewport);
         let queries = IntervalQueries::new(&pyramid, &projection);
         let mut gpu = Gpu::quiet(&self.spec)?;
-        let stored = gpu.surface(DEPTH_BYTES * self.depths.len() as u64);
+        let stored = gpu.allocate(DEPTH_BYTES * self.depths.len() as u64);
         gpu.gather("farthest depths", &pyramid, stored);
         let gathering = gpu.counts_of_pass();
         let answers = gpu.ask("queries", &queries, &self.scene.boxes);

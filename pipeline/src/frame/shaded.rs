@@ -1,4 +1,4 @@
-//! Surfaces: the shading cell of a sample, and shading at cells and at samples.
+//! Shaded triangles: the shading cell of a sample, and shading at cells and at samples.
 
 use std::cell::RefCell;
 
@@ -76,7 +76,7 @@ pub(super) fn own_pixel(samples: &TileSamples, slot: usize, tile: [u32; 2], side
 }
 
 /// One triangle as a surface for shading.
-pub(super) struct Surface<'a> {
+pub(super) struct ShadedTriangle<'a> {
     pass: &'a Pass<'a>,
     draw: usize,
     vertices: [usize; 3],
@@ -87,7 +87,7 @@ pub(super) struct Surface<'a> {
     covering: Option<[Corner; 3]>,
 }
 
-impl<'a> Surface<'a> {
+impl<'a> ShadedTriangle<'a> {
     pub fn new(pass: &'a Pass<'a>, triangle: u32) -> Self {
         let (draw, vertices) = pass.corners(triangle);
         let corners = vertices.map(|vertex| Corner::new(&pass.vertices[draw][vertex]));
@@ -344,7 +344,7 @@ impl SampleView {
     }
 }
 
-impl Surface<'_> {
+impl ShadedTriangle<'_> {
     /// Linear RGB radiance and opacity at the sample's own point.
     pub fn shade_at(&self, lane: &Lane, view: &SampleView) -> Vec4 {
         let (at, texel) = self.of_view(view);
