@@ -255,14 +255,12 @@ struct OpenRow {
     until: Time,
     /// When the next row begins to open.
     closes: Time,
-    /// Lines of the channel before it was opened, plus its own lines.
-    own: u64,
     /// Time on the bus of lines that joined it.
     joined: Time,
 }
 
 impl OpenRow {
-    const NONE: Self = Self { row: u32::MAX, since: 0, opened: 0, until: 0, closes: 0, own: 0, joined: 0 };
+    const NONE: Self = Self { row: u32::MAX, since: 0, opened: 0, until: 0, closes: 0, joined: 0 };
 }
 
 /// A bank: calendar of its row activations, and its latest rows, the newest first.
@@ -276,8 +274,6 @@ struct Bank {
 struct Channel {
     bus: Calendar,
     banks: Vec<Bank>,
-    /// Lines so far.
-    lines: u64,
     /// The latest groups of lines, a ring, and where the oldest is.
     recent: Box<[Waiting]>,
     oldest: usize,
@@ -345,10 +341,7 @@ struct RowUse {
     seen: Time,
     opened: Time,
     issued: Time,
-    /// Lines of the channel before them.
-    lines: u64,
-    /// Their number, and their time on the bus.
-    count: u64,
+    /// Their time on the bus.
     work: Time,
 }
 
@@ -381,7 +374,6 @@ impl Dram {
         let channel = Channel {
             bus,
             banks: vec![bank; spec.banks.get() as usize],
-            lines: 0,
             recent: vec![Waiting::default(); remembered].into(),
             oldest: 0,
             last_bank: 0,
@@ -438,7 +430,7 @@ impl Dram {
         let is_alone = channel.is_of(address.bank, self.queue);
         let bank = &mut channel.banks[address.bank];
         let work = self.burst * Time::from(count);
-        let open = bank.joins(address.row, seen.from, channel.lines, self.queue);
+        let open = bank.joins(address.row, seen.from);
         let opened = match open {
             Some(at) => {
                 let open = bank.rows[at];
@@ -474,16 +466,13 @@ impl Dram {
             seen: seen.from,
             opened,
             issued: end - self.burst,
-            lines: channel.lines,
-            count: count.into(),
             work,
         };
         if let Some(at) = open.filter(|&at| used.issued >= bank.rows[at].closes) {
             bank.delay(at, work);
         }
         bank.note(used, open);
-        channel.lines += u64::from(count);
-        channel.note(address.bank, Waiting { seen: seen.from, issued: used.issued, count: used.count });
+        channel.note(address.bank, Waiting { seen: seen.from, issued: used.issued, count: count.into() });
         self.end = self.end.max(end);
         end + self.cas
     }
@@ -521,24 +510,22 @@ impl Bank {
         self.rows.iter().position(|open| open.since <= seen).unwrap_or(self.rows.len() - 1)
     }
 
-    /// Place of the opening of `row` that a line joins which arrives at `seen`, after `lines` lines of its channel; `None` if
-    /// it has to open its row.
+    /// Place of the opening of `row` that a line joins which enters the queue at `seen`; `None` if it has to open its row.
     ///
     /// First ready first come (Rixner et al. 2000): a line joins pending lines of its row, ahead of older requests to other
-    /// rows, until the next row opens. The exception is a queue full of other lines, which hides the line from the scheduler.
-    fn joins(&self, row: u32, seen: Time, lines: u64, queue: u64) -> Option<usize> {
+    /// rows, until the next row opens. Lines that the queue has no room for enter it later.
+    fn joins(&self, row: u32, seen: Time) -> Option<usize> {
         let latest = self.place(seen);
-        let is_pending = |open: &OpenRow| open.row == row && seen < open.closes && lines - open.own < queue;
+        let is_pending = |open: &OpenRow| open.row == row && seen < open.closes;
         let latest = Some(latest).filter(|&at| self.rows[at].row == row);
         latest.or_else(|| self.rows.iter().position(is_pending))
     }
 
     /// Record lines of a row: those that joined the row at `joined`, or opened theirs.
     fn note(&mut self, used: RowUse, joined: Option<usize>) {
-        let RowUse { row, seen, opened, issued, lines, count, work } = used;
+        let RowUse { row, seen, opened, issued, work } = used;
         if let Some(open) = joined.map(|at| &mut self.rows[at]) {
             open.until = open.until.max(issued);
-            open.own += count;
             open.joined += work;
             return;
         }
@@ -547,7 +534,7 @@ impl Bank {
         let known = self.rows.iter().skip(at).position(|open| open.row == row).map(|after| at + after);
         let until = known.map_or(issued, |known| self.rows[known].until.max(issued));
         self.rows.copy_within(at..known.unwrap_or(self.rows.len() - 1), at + 1);
-        self.rows[at] = OpenRow { row, since: seen, opened, until, closes, own: lines + count, joined: 0 };
+        self.rows[at] = OpenRow { row, since: seen, opened, until, closes, joined: 0 };
     }
 }
 
@@ -557,32 +544,21 @@ mod tests {
 
     #[test]
     fn a_line_joins_others_of_its_row_until_the_next_opens() {
-        let used = |row, [seen, opened, issued]: [Time; 3], [lines, count]: [u64; 2]| RowUse {
-            row,
-            seen,
-            opened,
-            issued,
-            lines,
-            count,
-            work: count,
-        };
+        let used = |row, [seen, opened, issued]: [Time; 3]| RowUse { row, seen, opened, issued, work: 1 };
         let mut bank = Bank { time: Calendar::new(16, 1), rows: vec![OpenRow::NONE; 4].into() };
-        let joins =
-            |bank: &Bank, row, seen, lines| bank.joins(row, seen, lines, 4).map(|at| bank.rows[at].opened);
-        assert_eq!(joins(&bank, 7, 0, 0), None);
-        bank.note(used(7, [0, 4, 10], [0, 1]), None);
-        assert_eq!((joins(&bank, 7, 50, 9), joins(&bank, 8, 5, 1)), (Some(4), None));
+        let joins = |bank: &Bank, row, seen| bank.joins(row, seen).map(|at| bank.rows[at].opened);
+        assert_eq!(joins(&bank, 7, 0), None);
+        bank.note(used(7, [0, 4, 10]), None);
+        assert_eq!((joins(&bank, 7, 50), joins(&bank, 8, 5)), (Some(4), None));
         bank.rows[0].closes = 12;
-        bank.note(used(8, [5, 16, 20], [1, 1]), None);
-        assert_eq!([11, 12].map(|seen| joins(&bank, 7, seen, 2)), [Some(4), None]);
-        bank.note(used(7, [9, 4, 30], [2, 1]), Some(1));
+        bank.note(used(8, [5, 16, 20]), None);
+        assert_eq!([11, 12].map(|seen| joins(&bank, 7, seen)), [Some(4), None]);
+        bank.note(used(7, [9, 4, 30]), Some(1));
         let rows = |bank: &Bank| [0, 1, 2].map(|at: usize| (bank.rows[at].row, bank.rows[at].until));
         assert_eq!(rows(&bank)[..2], [(8, 20), (7, 30)]);
-        // Four lines of other rows came in between.
-        bank.note(used(8, [40, 16, 60], [3, 3]), Some(0));
-        assert_eq!([5, 6].map(|lines| joins(&bank, 7, 9, lines)), [Some(4), None]);
+        bank.note(used(8, [40, 16, 60]), Some(0));
         // A row that comes earlier in time, and later in the stream.
-        bank.note(used(9, [3, 12, 13], [6, 1]), None);
+        bank.note(used(9, [3, 12, 13]), None);
         assert_eq!((rows(&bank), bank.rows[1].closes), ([(8, 60), (9, 13), (7, 30)], 16));
     }
 }
