@@ -180,7 +180,11 @@ impl Cores {
         let warps = demand.warps(self.warp_lanes);
         let fifo = &mut self.fifos[kind];
         let taken = visit.arrive.max(fifo.sent).max(fifo.flights.room_at());
-        let room = taken.max(self.groups.at(demand, warps));
+        let mut room = taken.max(self.groups.at(demand, warps));
+        if demand.group.is_some() {
+            let like = self.groups.most(demand, warps);
+            room = room.max(aligned(self.drain.admits(visit.arrive, like) as Time, self.period));
+        }
         let mut run = Run {
             taken,
             done: taken,

@@ -42,6 +42,7 @@ pub(super) struct Drain {
     /// The last packet; its time is not known.
     last: Option<Left>,
     /// When the last warp is sent, when the last packet begins, when the last leaves the cores and when the unit behind.
+    admitted: f64,
     sent: f64,
     started: f64,
     departed: f64,
@@ -109,6 +110,7 @@ impl Drain {
             packets: VecDeque::new(),
             left: 0,
             last: None,
+            admitted: 0.0,
             sent: 0.0,
             started: 0.0,
             departed: 0.0,
@@ -134,16 +136,7 @@ impl Drain {
         self.longest = self.longest.max(Time::from(packet.steps) * self.cores.alu);
         self.longest_behind = self.longest_behind.max(packet.behind);
         let warps = u64::from(packet.warps);
-        let mut admitted = self.sent.max(packet.arrive as f64);
-        let room = self.cores.in_flight.min(packet.room);
-        while !self.packets.is_empty() && self.packets.len() >= room {
-            admitted = admitted.max(self.leave());
-        }
-        // Its first warp needs a slot.
-        while self.held >= self.cores.slots && self.end_next(f64::INFINITY) {
-            admitted = admitted.max(self.now);
-        }
-        self.sent = admitted + (warps * self.cores.period) as f64;
+        self.sent = self.admits(packet.arrive, packet.room) + (warps * self.cores.period) as f64;
         // Waits are longer where packets before it delay its lines; those come no later in turn.
         self.least_data = self.least_data.min(packet.data);
         self.started = self.started.max(self.sent + self.least_data as f64).max(packet.ready as f64);
@@ -161,6 +154,21 @@ impl Drain {
             let ends = self.steps + f64::from(packet.steps);
             self.active.push(Reverse(((ends * PARTS) as u64, number)));
         }
+    }
+
+    /// When the next packet, which arrives at `arrive`, has room on the cores. They have room for `room` packets like it.
+    pub fn admits(&mut self, arrive: Time, room: usize) -> f64 {
+        let mut admitted = self.sent.max(arrive as f64);
+        let room = self.cores.in_flight.min(room);
+        while !self.packets.is_empty() && self.packets.len() >= room {
+            admitted = admitted.max(self.leave());
+        }
+        // Its first warp needs a slot.
+        while self.held >= self.cores.slots && self.end_next(f64::INFINITY) {
+            admitted = admitted.max(self.now);
+        }
+        self.admitted = self.admitted.max(admitted);
+        self.admitted
     }
 
     /// When the last packet has left, if none comes any more; `None` if there was none. In the calendars they have left at `calendar`.

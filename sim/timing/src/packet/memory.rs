@@ -241,7 +241,7 @@ const RECENT_GROUPS: usize = 4;
 const MAX_RECENT_GROUPS: usize = 256;
 
 /// Most rows that are remembered per bank; the queue of a channel may hold lines of as many rows as it has places.
-const MAX_REMEMBERED_ROWS: usize = 32;
+const MAX_REMEMBERED_ROWS: usize = 256;
 
 /// An opened row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
