@@ -180,8 +180,8 @@ impl Cores {
         let warps = demand.warps(self.warp_lanes);
         let fifo = &mut self.fifos[kind];
         let taken = visit.arrive.max(fifo.sent).max(fifo.flights.room_at());
-        let mut room = taken.max(self.groups.at(demand, warps));
-        if demand.group.is_some() {
+        let mut room = taken;
+        if kind == 1 {
             let like = self.groups.most(demand, warps);
             room = room.max(aligned(self.drain.admits(visit.arrive, like) as Time, self.period));
         }

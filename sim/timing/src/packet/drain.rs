@@ -54,8 +54,8 @@ pub(super) struct Drain {
     /// The longest program of a packet alone, and the longest service behind.
     longest: Time,
     longest_behind: Time,
-    /// Warp slots taken.
-    held: u64,
+    /// Free warp slots, by the time when they become free.
+    slots: VecDeque<(f64, u32)>,
     now: f64,
     /// Steps so far of a packet that was there from the beginning.
     steps: f64,
@@ -82,7 +82,6 @@ struct CoreSizes {
     alu: Time,
     lanes: f64,
     lanes_of_core: u64,
-    slots: u64,
     /// Latency of the cores and of the unit behind, and its cycle.
     latencies: [Time; 2],
     behind_period: Time,
@@ -102,7 +101,6 @@ impl Drain {
             alu: period * Time::from(spec.alu_latency_cycles),
             lanes: f64::from(spec.cores.get()) * f64::from(spec.lanes.get()),
             lanes_of_core: spec.lanes.get().into(),
-            slots: u64::from(spec.cores.get()) * u64::from(spec.warps.get()),
             latencies: [Station::Pixel, Station::Colour].map(latency),
             behind_period: clocks.period(machine.common(Station::Colour.unit()).clock),
         };
@@ -119,7 +117,7 @@ impl Drain {
             least_data: Time::MAX,
             longest: 0,
             longest_behind: 0,
-            held: 0,
+            slots: VecDeque::from([(0.0, spec.cores.get() * spec.warps.get())]),
             now: 0.0,
             steps: 0.0,
             lanes: 0.0,
@@ -135,8 +133,8 @@ impl Drain {
         self.last = Some(Left { pass: demand.pass, draw: demand.draw, batch: demand.batch, at: 0 });
         self.longest = self.longest.max(Time::from(packet.steps) * self.cores.alu);
         self.longest_behind = self.longest_behind.max(packet.behind);
-        let warps = u64::from(packet.warps);
-        self.sent = self.admits(packet.arrive, packet.room) + (warps * self.cores.period) as f64;
+        self.admits(packet.arrive, packet.room);
+        self.send(packet.warps);
         // Waits are longer where packets before it delay its lines; those come no later in turn.
         self.least_data = self.least_data.min(packet.data);
         self.started = self.started.max(self.sent + self.least_data as f64).max(packet.ready as f64);
@@ -145,11 +143,13 @@ impl Drain {
         let work = packet.lanes();
         let is_idle = work == 0.0;
         // What has no warp, as a resolve, passes the cores without a step.
-        let alone = if warps > 0 { self.cores.alu as f64 } else { 0.0 };
+        let alone = if packet.warps > 0 { self.cores.alu as f64 } else { 0.0 };
         let done = is_idle.then_some(self.started + alone);
         self.packets.push_back(InTurn { packet, done });
+        if is_idle && packet.warps > 0 {
+            self.slots.push_back((self.started + alone, packet.warps));
+        }
         if !is_idle {
-            self.held += warps;
             self.lanes += work;
             let ends = self.steps + f64::from(packet.steps);
             self.active.push(Reverse(((ends * PARTS) as u64, number)));
@@ -163,12 +163,33 @@ impl Drain {
         while !self.packets.is_empty() && self.packets.len() >= room {
             admitted = admitted.max(self.leave());
         }
-        // Its first warp needs a slot.
-        while self.held >= self.cores.slots && self.end_next(f64::INFINITY) {
-            admitted = admitted.max(self.now);
-        }
-        self.admitted = self.admitted.max(admitted);
+        self.admitted = self.admitted.max(admitted).max(self.slot().unwrap_or(0.0));
         self.admitted
+    }
+
+    /// When the next free slot for a warp becomes free; `None` if no warp is there to free one.
+    fn slot(&mut self) -> Option<f64> {
+        while self.slots.is_empty() && self.end_next(f64::INFINITY) {}
+        self.slots.front().map(|&(free, _)| free)
+    }
+
+    /// Send warps, one a cycle, as slots become free.
+    fn send(&mut self, warps: u32) {
+        self.sent = self.admitted;
+        let mut remaining = warps;
+        while remaining > 0
+            && let Some(free) = self.slot()
+            && let Some((_, count)) = self.slots.front_mut()
+        {
+            let taken = remaining.min(*count);
+            *count -= taken;
+            let is_empty = *count == 0;
+            self.sent = self.sent.max(free) + (Time::from(taken) * self.cores.period) as f64;
+            remaining -= taken;
+            if is_empty {
+                self.slots.pop_front();
+            }
+        }
     }
 
     /// When the last packet has left, if none comes any more; `None` if there was none. In the calendars they have left at `calendar`.
@@ -220,7 +241,7 @@ impl Drain {
         (self.steps, self.now) = (self.steps.max(ends), until);
         self.active.pop();
         self.lanes -= packet.lanes();
-        self.held -= u64::from(packet.warps);
+        self.slots.push_back((until, packet.warps));
         self.packets[number - self.left].done = Some(until);
         true
     }
