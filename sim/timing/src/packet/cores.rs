@@ -244,6 +244,11 @@ impl Cores {
         self.drain.end(calendar)
     }
 
+    /// When the last packets of pixels and groups of the batches up to `batch` have left; in the calendars they have at `calendar`.
+    pub fn left(&mut self, batch: u32, calendar: Time) -> Time {
+        self.drain.left(batch, calendar)
+    }
+
     /// Send warps, one per cycle, as slots on the cores and in front of the data unit become free. Returns when the
     /// first and the last warp are sent.
     fn send(&mut self, kind: usize, from: Time, warps: u32, unit: Option<DataUnit>) -> Span {

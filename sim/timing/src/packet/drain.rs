@@ -72,6 +72,7 @@ const PARTS: f64 = 1024.0;
 #[derive(Clone, Copy, Debug)]
 struct InTurn {
     packet: OnCores,
+    batch: u32,
     done: Option<f64>,
 }
 
@@ -145,7 +146,7 @@ impl Drain {
         // What has no warp, as a resolve, passes the cores without a step.
         let alone = if packet.warps > 0 { self.cores.alu as f64 } else { 0.0 };
         let done = is_idle.then_some(self.started + alone);
-        self.packets.push_back(InTurn { packet, done });
+        self.packets.push_back(InTurn { packet, batch: demand.batch, done });
         if is_idle && packet.warps > 0 {
             self.slots.push_back((self.started + alone, packet.warps));
         }
@@ -192,6 +193,18 @@ impl Drain {
         }
     }
 
+    /// When the last packet of the batches up to `batch` has left; in the calendars they have at `calendar`.
+    pub fn left(&mut self, batch: u32, calendar: Time) -> Time {
+        let most = calendar + self.longest + self.longest_behind * self.packets.len() as Time;
+        if self.packets.front().is_none_or(|packet| packet.batch > batch) {
+            return calendar;
+        }
+        while self.packets.front().is_some_and(|packet| packet.batch <= batch) {
+            self.leave();
+        }
+        most.min(self.ended as Time).max(calendar)
+    }
+
     /// When the last packet has left, if none comes any more; `None` if there was none. In the calendars they have left at `calendar`.
     ///
     /// Lanes are never idle while a packet waits for them, in either order. So no more is lost than the program of a packet,
@@ -211,7 +224,7 @@ impl Drain {
         while self.packets.front().is_some_and(|packet| packet.done.is_none()) && self.end_next(f64::INFINITY)
         {
         }
-        let Some(InTurn { packet, done }) = self.packets.pop_front() else { return self.departed };
+        let Some(InTurn { packet, done, .. }) = self.packets.pop_front() else { return self.departed };
         self.left += 1;
         self.departed = self.departed.max(done.unwrap_or(self.now));
         let arrived = self.departed + self.cores.latencies[0] as f64;

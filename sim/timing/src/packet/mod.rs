@@ -231,6 +231,11 @@ impl PacketClock {
                 return;
             }
             if let Some((demand, counts, lines)) = self.ahead.pop_front() {
+                if let Some(before) = demand.batch.checked_sub(2)
+                    && let Some(at) = self.gates.traversed.get_mut(before as usize)
+                {
+                    *at = self.cores.left(before, *at);
+                }
                 self.walk(&demand, &counts, &lines);
             }
         }
