@@ -255,12 +255,14 @@ struct OpenRow {
     until: Time,
     /// When the next row begins to open.
     closes: Time,
+    /// Lines of the channel up to its last line so far.
+    last: u64,
     /// Time on the bus of lines that joined it.
     joined: Time,
 }
 
 impl OpenRow {
-    const NONE: Self = Self { row: u32::MAX, since: 0, opened: 0, until: 0, closes: 0, joined: 0 };
+    const NONE: Self = Self { row: u32::MAX, since: 0, opened: 0, until: 0, closes: 0, last: 0, joined: 0 };
 }
 
 /// A bank: calendar of its row activations, and its latest rows, the newest first.
@@ -274,6 +276,8 @@ struct Bank {
 struct Channel {
     bus: Calendar,
     banks: Vec<Bank>,
+    /// Lines so far.
+    lines: u64,
     /// The latest groups of lines, a ring, and where the oldest is.
     recent: Box<[Waiting]>,
     oldest: usize,
@@ -341,7 +345,8 @@ struct RowUse {
     seen: Time,
     opened: Time,
     issued: Time,
-    /// Their time on the bus.
+    /// Lines of the channel up to them, and their time on the bus.
+    lines: u64,
     work: Time,
 }
 
@@ -374,6 +379,7 @@ impl Dram {
         let channel = Channel {
             bus,
             banks: vec![bank; spec.banks.get() as usize],
+            lines: 0,
             recent: vec![Waiting::default(); remembered].into(),
             oldest: 0,
             last_bank: 0,
@@ -430,7 +436,7 @@ impl Dram {
         let is_alone = channel.is_of(address.bank, self.queue);
         let bank = &mut channel.banks[address.bank];
         let work = self.burst * Time::from(count);
-        let open = bank.joins(address.row, seen.from);
+        let open = bank.joins(address.row, seen.from, channel.lines, self.queue);
         let opened = match open {
             Some(at) => {
                 let open = bank.rows[at];
@@ -461,11 +467,13 @@ impl Dram {
         };
         let ready = opened.max(seen.from);
         let end = channel.bus.reserve_as(turn, ready, work).1.max(seen.to + self.burst);
+        channel.lines += u64::from(count);
         let used = RowUse {
             row: address.row,
             seen: seen.from,
             opened,
             issued: end - self.burst,
+            lines: channel.lines,
             work,
         };
         if let Some(at) = open.filter(|&at| used.issued >= bank.rows[at].closes) {
@@ -514,18 +522,19 @@ impl Bank {
     ///
     /// First ready first come (Rixner et al. 2000): a line joins pending lines of its row, ahead of older requests to other
     /// rows, until the next row opens. Lines that the queue has no room for enter it later.
-    fn joins(&self, row: u32, seen: Time) -> Option<usize> {
+    fn joins(&self, row: u32, seen: Time, lines: u64, queue: u64) -> Option<usize> {
         let latest = self.place(seen);
-        let is_pending = |open: &OpenRow| open.row == row && seen < open.closes;
+        let is_pending = |open: &OpenRow| open.row == row && seen < open.closes && lines - open.last < queue;
         let latest = Some(latest).filter(|&at| self.rows[at].row == row);
         latest.or_else(|| self.rows.iter().position(is_pending))
     }
 
     /// Record lines of a row: those that joined the row at `joined`, or opened theirs.
     fn note(&mut self, used: RowUse, joined: Option<usize>) {
-        let RowUse { row, seen, opened, issued, work } = used;
+        let RowUse { row, seen, opened, issued, lines, work } = used;
         if let Some(open) = joined.map(|at| &mut self.rows[at]) {
             open.until = open.until.max(issued);
+            open.last = lines;
             open.joined += work;
             return;
         }
@@ -534,7 +543,7 @@ impl Bank {
         let known = self.rows.iter().skip(at).position(|open| open.row == row).map(|after| at + after);
         let until = known.map_or(issued, |known| self.rows[known].until.max(issued));
         self.rows.copy_within(at..known.unwrap_or(self.rows.len() - 1), at + 1);
-        self.rows[at] = OpenRow { row, since: seen, opened, until, closes, joined: 0 };
+        self.rows[at] = OpenRow { row, since: seen, opened, until, closes, last: lines, joined: 0 };
     }
 }
 
