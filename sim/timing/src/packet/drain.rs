@@ -48,7 +48,7 @@ pub(super) struct Drain {
     departed: f64,
     gone: f64,
     /// When the last has left the machine.
-    ended: f64,
+    last_end: f64,
     /// The least wait for data.
     least_data: Time,
     /// The longest program of a packet alone, and the longest service behind.
@@ -61,8 +61,8 @@ pub(super) struct Drain {
     steps: f64,
     /// Lanes of a step of all active packets.
     lanes: f64,
-    /// Active packets: the steps at which each ends, in parts of [`PARTS`], and its number.
-    active: BinaryHeap<Reverse<(u64, usize)>>,
+    /// Active warps: the steps at which they end, in parts of [`PARTS`], the number of their packet, and how many there are.
+    active: BinaryHeap<Reverse<(u64, usize, u32)>>,
     cores: CoreSizes,
 }
 
@@ -73,7 +73,9 @@ const PARTS: f64 = 1024.0;
 struct InTurn {
     packet: OnCores,
     batch: u32,
-    done: Option<f64>,
+    /// Warps not done, and when the last so far was.
+    remaining: u32,
+    done: f64,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -114,7 +116,7 @@ impl Drain {
             started: 0.0,
             departed: 0.0,
             gone: 0.0,
-            ended: 0.0,
+            last_end: 0.0,
             least_data: Time::MAX,
             longest: 0,
             longest_behind: 0,
@@ -134,26 +136,60 @@ impl Drain {
         self.last = Some(Left { pass: demand.pass, draw: demand.draw, batch: demand.batch, at: 0 });
         self.longest = self.longest.max(Time::from(packet.steps) * self.cores.alu);
         self.longest_behind = self.longest_behind.max(packet.behind);
-        self.admits(packet.arrive, packet.room);
-        self.send(packet.warps);
         // Waits are longer where packets before it delay its lines; those come no later in turn.
         self.least_data = self.least_data.min(packet.data);
-        self.started = self.started.max(self.sent + self.least_data as f64).max(packet.ready as f64);
-        self.advance(self.started);
-        let number = self.left + self.packets.len();
-        let work = packet.lanes();
-        let is_idle = work == 0.0;
-        // What has no warp, as a resolve, passes the cores without a step.
-        let alone = if packet.warps > 0 { self.cores.alu as f64 } else { 0.0 };
-        let done = is_idle.then_some(self.started + alone);
-        self.packets.push_back(InTurn { packet, batch: demand.batch, done });
-        if is_idle && packet.warps > 0 {
-            self.slots.push_back((self.started + alone, packet.warps));
+        self.sent = self.admits(packet.arrive, packet.room);
+        self.packets.push_back(InTurn { packet, batch: demand.batch, remaining: packet.warps, done: 0.0 });
+        let mut remaining = packet.warps;
+        while remaining > 0
+            && let Some(count) = self.send(remaining)
+        {
+            remaining -= count;
+            self.start(&packet, count, remaining == 0);
         }
-        if !is_idle {
-            self.lanes += work;
+        if packet.warps == 0 {
+            // What has no warp, as a resolve, passes the cores without a step.
+            self.start(&packet, 0, true);
+        }
+    }
+
+    /// Send up to `most` warps, one a cycle, to slots that become free together. Returns their number; `None` if no warp is there
+    /// to free a slot.
+    fn send(&mut self, most: u32) -> Option<u32> {
+        let free = self.slot()?;
+        let (_, slots) = self.slots.front_mut()?;
+        let count = most.min(*slots);
+        *slots -= count;
+        if *slots == 0 {
+            self.slots.pop_front();
+        }
+        self.sent = self.sent.max(free) + (Time::from(count) * self.cores.period) as f64;
+        Some(count)
+    }
+
+    /// Begin with `warps` warps of the last packet, which are the last of it if `is_last`.
+    fn start(&mut self, packet: &OnCores, warps: u32, is_last: bool) {
+        let ready = if is_last { packet.ready as f64 } else { 0.0 };
+        self.started = self.started.max(self.sent + self.least_data as f64).max(ready);
+        self.advance(self.started);
+        let number = self.left + self.packets.len() - 1;
+        let lanes = packet.lanes_of_warp() * f64::from(warps);
+        if lanes > 0.0 {
+            self.lanes += lanes;
             let ends = self.steps + f64::from(packet.steps);
-            self.active.push(Reverse(((ends * PARTS) as u64, number)));
+            self.active.push(Reverse(((ends * PARTS) as u64, number, warps)));
+        } else {
+            self.ended(number, warps, self.started + if warps > 0 { self.cores.alu as f64 } else { 0.0 });
+        }
+    }
+
+    /// Warps of a packet end at `at`.
+    fn ended(&mut self, number: usize, warps: u32, at: f64) {
+        let packet = &mut self.packets[number - self.left];
+        packet.remaining -= warps;
+        packet.done = at;
+        if warps > 0 {
+            self.slots.push_back((at, warps));
         }
     }
 
@@ -174,25 +210,6 @@ impl Drain {
         self.slots.front().map(|&(free, _)| free)
     }
 
-    /// Send warps, one a cycle, as slots become free.
-    fn send(&mut self, warps: u32) {
-        self.sent = self.admitted;
-        let mut remaining = warps;
-        while remaining > 0
-            && let Some(free) = self.slot()
-            && let Some((_, count)) = self.slots.front_mut()
-        {
-            let taken = remaining.min(*count);
-            *count -= taken;
-            let is_empty = *count == 0;
-            self.sent = self.sent.max(free) + (Time::from(taken) * self.cores.period) as f64;
-            remaining -= taken;
-            if is_empty {
-                self.slots.pop_front();
-            }
-        }
-    }
-
     /// When the last packet of the batches up to `batch` has left; in the calendars they have at `calendar`.
     pub fn left(&mut self, batch: u32, calendar: Time) -> Time {
         let most = calendar + self.longest + self.longest_behind * self.packets.len() as Time;
@@ -202,7 +219,7 @@ impl Drain {
         while self.packets.front().is_some_and(|packet| packet.batch <= batch) {
             self.leave();
         }
-        most.min(self.ended as Time).max(calendar)
+        most.min(self.last_end as Time).max(calendar)
     }
 
     /// When the last packet has left, if none comes any more; `None` if there was none. In the calendars they have left at `calendar`.
@@ -216,20 +233,18 @@ impl Drain {
         }
         (self.steps, self.lanes, self.least_data) = (0.0, 0.0, Time::MAX);
         (self.longest, self.longest_behind) = (0, 0);
-        self.last.take().map(|last| Left { at: most.min(self.ended as Time), ..last })
+        self.last.take().map(|last| Left { at: most.min(self.last_end as Time), ..last })
     }
 
     /// Let the oldest packet leave. Returns when it leaves the cores.
     fn leave(&mut self) -> f64 {
-        while self.packets.front().is_some_and(|packet| packet.done.is_none()) && self.end_next(f64::INFINITY)
-        {
-        }
+        while self.packets.front().is_some_and(|packet| packet.remaining > 0) && self.end_next(f64::INFINITY) {}
         let Some(InTurn { packet, done, .. }) = self.packets.pop_front() else { return self.departed };
         self.left += 1;
-        self.departed = self.departed.max(done.unwrap_or(self.now));
+        self.departed = self.departed.max(done);
         let arrived = self.departed + self.cores.latencies[0] as f64;
         self.gone = self.gone.max(arrived) + packet.behind as f64;
-        self.ended = self.ended.max(self.gone + packet.latency as f64);
+        self.last_end = self.last_end.max(self.gone + packet.latency as f64);
         self.departed
     }
 
@@ -239,9 +254,9 @@ impl Drain {
         self.now = self.now.max(to);
     }
 
-    /// Serve until a packet ends, or until `to`. Returns whether one ended.
+    /// Serve until warps end, or until `to`. Returns whether some ended.
     fn end_next(&mut self, to: f64) -> bool {
-        let Some(&Reverse((ends, number))) = self.active.peek() else { return false };
+        let Some(&Reverse((ends, number, warps))) = self.active.peek() else { return false };
         let packet = self.packets[number - self.left].packet;
         let ends = ends as f64 / PARTS;
         let step = self.cores.step(self.lanes, &packet);
@@ -253,25 +268,24 @@ impl Drain {
         }
         (self.steps, self.now) = (self.steps.max(ends), until);
         self.active.pop();
-        self.lanes -= packet.lanes();
-        self.slots.push_back((until, packet.warps));
-        self.packets[number - self.left].done = Some(until);
+        self.lanes -= packet.lanes_of_warp() * f64::from(warps);
+        self.ended(number, warps, until);
         true
     }
 }
 
 impl CoreSizes {
-    /// Time of a step of all packets, of which `lanes` are active and `packet` ends first.
+    /// Time of a step of all warps, of which `lanes` lanes are active and those of `packet` end first.
     fn step(&self, lanes: f64, packet: &OnCores) -> f64 {
-        let of_warp = (packet.lanes() / f64::from(packet.warps)).ceil() as u64;
+        let of_warp = packet.lanes_of_warp().ceil() as u64;
         let wide = of_warp.div_ceil(self.lanes_of_core).saturating_sub(1) * self.period;
         (lanes * self.period as f64 / self.lanes).max((self.alu + wide) as f64)
     }
 }
 
 impl OnCores {
-    /// Lanes of a step.
-    fn lanes(&self) -> f64 {
-        f64::from(self.threads) * f64::from(self.ops) / f64::from(self.steps.max(1))
+    /// Lanes of a step of a warp.
+    fn lanes_of_warp(&self) -> f64 {
+        f64::from(self.threads) * f64::from(self.ops) / f64::from(self.steps.max(1) * self.warps.max(1))
     }
 }
