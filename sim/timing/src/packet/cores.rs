@@ -39,8 +39,8 @@ pub(super) struct Run {
     pub departed: Time,
     /// How long its last warps wait for their data.
     pub waited: Time,
-    /// When they have them.
-    pub ready: Time,
+    /// When the first and the last warp have them.
+    pub ready: Span,
     /// When its data unit works on it.
     pub data: Span,
     /// When its lines pass the L2 and memory.
@@ -190,7 +190,7 @@ impl Cores {
             done: taken,
             departed: taken,
             waited: 0,
-            ready: 0,
+            ready: Span::NONE,
             data: Span::NONE,
             memory: Span::NONE,
         };
@@ -204,7 +204,7 @@ impl Cores {
             if uses_data {
                 ready = self.data(visit, &chunk, ready, builder, memory, &mut run);
             }
-            run.ready = ready.to;
+            run.ready = run.ready.with(ready.from, ready.to);
             run.waited = ready.to - (sent.to + self.period).min(ready.to);
             let done = self.operate(visit, &chunk, sent.from, ready);
             self.fifos[kind].slots.note_all(chunk.count, done.from, done.to);
@@ -228,7 +228,7 @@ impl Cores {
         OnCores {
             arrive: visit.arrive,
             data: run.waited,
-            ready: run.ready,
+            ready: if warps > 0 { run.ready } else { Span { from: 0, to: 0 } },
             warps,
             threads: demand.threads,
             ops: demand.ops,

@@ -14,13 +14,15 @@ use crate::demand::{ServiceDemand, Station};
 use crate::draws::Left;
 use crate::spec::MachineSpec;
 
+use super::Span;
+
 /// A packet of pixels or a group on the cores.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct OnCores {
     pub arrive: Time,
-    /// How long its warps wait for their data, and when the last have them.
+    /// How long its last warps wait for their data, and when the first and the last have them.
     pub data: Time,
-    pub ready: Time,
+    pub ready: Span,
     pub warps: u32,
     pub threads: u32,
     pub ops: u32,
@@ -145,11 +147,11 @@ impl Drain {
             && let Some(count) = self.send(remaining)
         {
             remaining -= count;
-            self.start(&packet, count, remaining == 0);
+            self.start(&packet, count, remaining);
         }
         if packet.warps == 0 {
             // What has no warp, as a resolve, passes the cores without a step.
-            self.start(&packet, 0, true);
+            self.start(&packet, 0, 0);
         }
     }
 
@@ -167,9 +169,11 @@ impl Drain {
         Some(count)
     }
 
-    /// Begin with `warps` warps of the last packet, which are the last of it if `is_last`.
-    fn start(&mut self, packet: &OnCores, warps: u32, is_last: bool) {
-        let ready = if is_last { packet.ready as f64 } else { 0.0 };
+    /// Begin with `warps` warps of the last packet, of which `remaining` remain.
+    fn start(&mut self, packet: &OnCores, warps: u32, remaining: u32) {
+        let Span { from, to } = packet.ready;
+        let before = (to - from) / Time::from(packet.warps.max(2) - 1) * Time::from(remaining);
+        let ready = (to - before) as f64;
         self.started = self.started.max(self.sent + self.least_data as f64).max(ready);
         self.advance(self.started);
         let number = self.left + self.packets.len() - 1;
