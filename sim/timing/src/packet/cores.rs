@@ -1,8 +1,5 @@
 //! Shader cores and data units of the level `packet`.
 
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
-
 use super::calendar::{Calendar, QueueTimes};
 use super::drain::{Drain, OnCores};
 use super::memory::Memory;
@@ -88,40 +85,6 @@ impl DataState {
     }
 }
 
-/// Room for groups on the cores, as if all groups under way needed as much as the next.
-#[derive(Clone, Debug)]
-struct GroupRoom {
-    machine: MachineSpec,
-    /// When the groups under way end.
-    ends: BinaryHeap<Reverse<Time>>,
-}
-
-impl GroupRoom {
-    fn new(machine: &MachineSpec) -> Self {
-        Self { machine: machine.clone(), ends: BinaryHeap::new() }
-    }
-
-    /// Groups like that of `demand` that have room at once; all packets of other kinds have.
-    fn most(&self, demand: &ServiceDemand, warps: u32) -> usize {
-        demand.group.map_or(usize::MAX, |group| {
-            let per_core = self.machine.groups_per_core(warps, group.shared_bytes).max(1);
-            self.machine.shader.cores.get() as usize * per_core as usize
-        })
-    }
-
-    /// When there is room for the group of `demand`; 0 for other packets.
-    fn at(&mut self, demand: &ServiceDemand, warps: u32) -> Time {
-        let most = self.most(demand, warps);
-        let mut room = 0;
-        while self.ends.len() >= most
-            && let Some(Reverse(end)) = self.ends.pop()
-        {
-            room = end;
-        }
-        room
-    }
-}
-
 /// All cores and data units.
 #[derive(Clone, Debug)]
 pub(super) struct Cores {
@@ -136,7 +99,7 @@ pub(super) struct Cores {
     alu: Time,
     lanes_of_core: u32,
     warp_lanes: u32,
-    groups: GroupRoom,
+    machine: MachineSpec,
     drain: Drain,
     data: [DataState; DataUnit::ALL.len()],
 }
@@ -155,7 +118,7 @@ impl Cores {
             cores: spec.cores.get(),
             period,
             alu: period * Time::from(spec.alu_latency_cycles),
-            groups: GroupRoom::new(machine),
+            machine: machine.clone(),
             drain: Drain::new(machine, clocks),
             lanes_of_core: spec.lanes.get(),
             warp_lanes: spec.warp_lanes.get(),
@@ -182,8 +145,8 @@ impl Cores {
         let taken = visit.arrive.max(fifo.sent).max(fifo.flights.room_at());
         let mut room = taken;
         if kind == 1 {
-            let like = self.groups.most(demand, warps);
-            room = room.max(aligned(self.drain.admits(visit.arrive, like) as Time, self.period));
+            let admitted = self.drain.admits(visit.arrive, self.most(demand, warps));
+            room = room.max(aligned(admitted.round() as Time, self.period));
         }
         let mut run = Run {
             taken,
@@ -210,9 +173,6 @@ impl Cores {
             self.fifos[kind].slots.note_all(chunk.count, done.from, done.to);
             run.done = run.done.max(done.to);
         }
-        if demand.group.is_some() {
-            self.groups.ends.push(Reverse(run.done));
-        }
         if kind == 1 {
             self.drain.note(demand, self.on_cores(visit, warps, &run));
         }
@@ -221,6 +181,15 @@ impl Cores {
         fifo.departed = run.departed;
         fifo.flights.note(run.departed);
         run
+    }
+
+    /// Packets like that of `demand` that have room on the cores at once. Only groups need room but for their warps; all groups
+    /// under way are taken to need as much.
+    fn most(&self, demand: &ServiceDemand, warps: u32) -> usize {
+        demand.group.map_or(usize::MAX, |group| {
+            let per_core = self.machine.groups_per_core(warps, group.shared_bytes).max(1);
+            self.machine.shader.cores.get() as usize * per_core as usize
+        })
     }
 
     fn on_cores(&self, visit: &Visit<'_>, warps: u32, run: &Run) -> OnCores {
@@ -233,7 +202,7 @@ impl Cores {
             threads: demand.threads,
             ops: demand.ops,
             steps: demand.steps(),
-            room: self.groups.most(demand, warps),
+            room: self.most(demand, warps),
             behind: 0,
             latency: 0,
         }

@@ -181,7 +181,7 @@ impl Drain {
         if lanes > 0.0 {
             self.lanes += lanes;
             let ends = self.steps + f64::from(packet.steps);
-            self.active.push(Reverse(((ends * PARTS) as u64, number, warps)));
+            self.active.push(Reverse(((ends * PARTS).round() as u64, number, warps)));
         } else {
             self.ended(number, warps, self.started + if warps > 0 { self.cores.alu as f64 } else { 0.0 });
         }
