@@ -65,6 +65,7 @@ pub fn bound(machine: &MachineSpec, clocks: Clocks, totals: &Totals, mut recorde
         unit_cycles: 0,
         packets: totals.segments().map(|segment| u64::from(segment.packets)).sum(),
         rows: Some(share),
+        disputed: None,
         passes: passes.finish(machine, &clocks, timeline.duration_ps, &totals.parts()),
         spans: Vec::new(),
         timeline,

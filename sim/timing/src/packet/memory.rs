@@ -1,6 +1,8 @@
 //! L2, levels below it and memory of the level `packet`: runs of lines enter calendars. Memory has a calendar per bus, and the latest rows of
 //! each bank.
 
+use std::collections::HashMap;
+
 use activity::{LEVELS, LevelRequests, LineAccess, LineKind, Unit};
 
 use super::Span;
@@ -9,7 +11,7 @@ use super::levels::{Levels, Passed};
 use crate::address::AddressMap;
 use crate::clock::{Clocks, Time};
 use crate::demand::CLIENTS;
-use crate::spec::{DramSpec, MachineSpec};
+use crate::spec::MachineSpec;
 
 /// Times of a group of line requests.
 #[derive(Clone, Copy, Debug)]
@@ -97,7 +99,7 @@ impl Memory {
         let spec = &machine.l2;
         let period = clocks.period(spec.clock);
         Self {
-            dram: Dram::new(&machine.dram, clocks),
+            dram: Dram::new(machine, clocks),
             levels: Levels::new(machine, clocks),
             l2: Calendar::new(Time::from(SLOT_CYCLES) * period, spec.lines_per_cycle.get()),
             ports: std::array::from_fn(|_| QueueTimes::new(spec.queue.get())),
@@ -173,11 +175,12 @@ impl Memory {
         }
         // What the queues of the channels do not hold waits in front of the level above.
         let seen = Span { from: accepted.from + period, to: accepted.to + period };
+        let came = seen.from;
         let seen = self.dram.admits(&head, count, seen);
         accepted = Span { from: seen.from - period, to: seen.to - period };
         fetched.moved = fetched.moved.max(seen.to);
         for line in head.moved() {
-            let moved = self.dram.transfer(line, count, turn, seen);
+            let moved = self.dram.transfer(line, count, turn, came, seen);
             fetched.moved = fetched.moved.max(moved);
             if head.fetched() == Some(line) {
                 let latency = self.dram.latency() + latency + self.latency;
@@ -221,6 +224,11 @@ impl Memory {
     /// Row time of the busiest bank.
     pub fn rows(&self) -> Time {
         self.dram.rows()
+    }
+
+    /// Time of the bank with most of it for rows that may not have to be opened.
+    pub fn disputed(&self) -> Time {
+        self.dram.disputed()
     }
 
     /// Bus calendars of all channels.
@@ -270,6 +278,10 @@ impl OpenRow {
 struct Bank {
     time: Calendar,
     rows: Box<[OpenRow]>,
+    /// When the last line of each row before these was issued.
+    former: HashMap<u32, Time>,
+    /// Time for rows that may not have to be opened.
+    disputed: Time,
 }
 
 #[derive(Clone, Debug)]
@@ -361,20 +373,24 @@ pub(super) struct Dram {
     precharge: Time,
     latency: Time,
     queue: u64,
-    /// Time of a full queue of lines of one bank, each of another row.
+    /// Time of a full queue of lines of one bank, each of another row, and of all lines that can wait in front of a channel.
     longest_wait: Time,
+    longest_way: Time,
     end: Time,
 }
 
 impl Dram {
-    pub fn new(spec: &DramSpec, clocks: &Clocks) -> Self {
+    pub fn new(machine: &MachineSpec, clocks: &Clocks) -> Self {
+        let spec = &machine.dram;
         let period = clocks.period(spec.clock);
         let cycles = |count: u32| period * Time::from(count);
         let burst = cycles(spec.burst_cycles.get());
         let [bus, time] =
             [BUS_SLOT_LINES, BANK_SLOT_LINES].map(|lines| Calendar::new(burst * Time::from(lines), 1));
         let rows = MAX_REMEMBERED_ROWS.min(spec.queue.get() as usize);
-        let bank = Bank { time, rows: vec![OpenRow::NONE; rows].into() };
+        let bank = Bank::new(time, rows);
+        let longest_line = burst.max(cycles(spec.activate_cycles.get() + spec.precharge_cycles.get()));
+        let in_ports = CLIENTS.len() as Time * Time::from(machine.l2.queue.get());
         let remembered = (RECENT_GROUPS * spec.queue.get() as usize).min(MAX_RECENT_GROUPS);
         let channel = Channel {
             bus,
@@ -396,8 +412,8 @@ impl Dram {
             precharge: cycles(spec.precharge_cycles.get()),
             latency: cycles(spec.latency_cycles.get()),
             queue: spec.queue.into(),
-            longest_wait: burst.max(cycles(spec.activate_cycles.get() + spec.precharge_cycles.get()))
-                * Time::from(spec.queue),
+            longest_wait: longest_line * Time::from(spec.queue),
+            longest_way: longest_line * (Time::from(spec.queue) + in_ports),
             end: 0,
         }
     }
@@ -428,9 +444,9 @@ impl Dram {
         Span { from: enters.from, to: enters.to.max(enters.from) }
     }
 
-    /// Transfer `count` lines of one group over the bus of their channel. The first enters its queue at `seen.from`, the
-    /// last at `seen.to`. Returns when the last is transferred.
-    pub fn transfer(&mut self, line: u32, count: u32, turn: Turn, seen: Span) -> Time {
+    /// Transfer `count` lines of one group over the bus of their channel. The first comes to memory at `came` and enters the queue
+    /// at `seen.from`, the last at `seen.to`. Returns when the last is transferred.
+    pub fn transfer(&mut self, line: u32, count: u32, turn: Turn, came: Time, seen: Span) -> Time {
         let address = self.map.locate(line);
         let channel = &mut self.channels[address.channel];
         let is_alone = channel.is_of(address.bank, self.queue);
@@ -448,6 +464,7 @@ impl Dram {
                 if open.since <= seen.from { open.opened } else { seen.from }
             }
             None => {
+                bank.dispute(address.row, came, self.longest_way, self.activate + self.precharge);
                 let before = &mut bank.rows[bank.place(seen.from)];
                 let opens = self.activate + if *before == OpenRow::NONE { 0 } else { self.precharge };
                 // The next row can open once the last line is issued, at the latest when a full queue has left.
@@ -497,6 +514,12 @@ impl Dram {
         banks.map(busy).max().unwrap_or(0)
     }
 
+    /// Time of the bank with most of it for rows that may not have to be opened.
+    pub fn disputed(&self) -> Time {
+        let banks = self.channels.iter().flat_map(|channel| &channel.banks);
+        banks.map(|bank| bank.disputed).max().unwrap_or(0)
+    }
+
     /// Bus calendars of all channels.
     pub fn buses(&self) -> impl Iterator<Item = &Calendar> {
         self.channels.iter().map(|channel| &channel.bus)
@@ -504,6 +527,22 @@ impl Dram {
 }
 
 impl Bank {
+    /// A bank that remembers `rows` rows.
+    fn new(time: Calendar, rows: usize) -> Self {
+        Self { time, rows: vec![OpenRow::NONE; rows].into(), former: HashMap::new(), disputed: 0 }
+    }
+
+    /// Count the time `opens` of a row that lines open again which came at `came`, if these and the lines before of that row may
+    /// have waited side by side. In what order lines leave that wait at ports and in the queue of the channel is not known here,
+    /// as those of a client ahead of others come late in the stream. So two lines may meet if the second comes no later after the
+    /// first than all those take, `longest_way`.
+    fn dispute(&mut self, row: u32, came: Time, longest_way: Time, opens: Time) {
+        let known = self.rows.iter().find(|open| open.row == row).map(|open| open.until);
+        if known.or_else(|| self.former.get(&row).copied()).is_some_and(|last| came < last + longest_way) {
+            self.disputed += opens;
+        }
+    }
+
     /// The rows that open after that at place `at` do so later, as more lines of it go first.
     fn delay(&mut self, at: usize, by: Time) {
         for open in &mut self.rows[..at] {
@@ -542,6 +581,11 @@ impl Bank {
         let closes = at.checked_sub(1).map_or(Time::MAX, |next| self.rows[next].opened);
         let known = self.rows.iter().skip(at).position(|open| open.row == row).map(|after| at + after);
         let until = known.map_or(issued, |known| self.rows[known].until.max(issued));
+        if known.is_none()
+            && let Some(oldest) = self.rows.last().filter(|oldest| **oldest != OpenRow::NONE)
+        {
+            self.former.insert(oldest.row, oldest.until);
+        }
         self.rows.copy_within(at..known.unwrap_or(self.rows.len() - 1), at + 1);
         self.rows[at] = OpenRow { row, since: seen, opened, until, closes, last: lines, joined: 0 };
     }
@@ -554,7 +598,7 @@ mod tests {
     #[test]
     fn a_line_joins_others_of_its_row_until_the_next_opens() {
         let used = |row, [seen, opened, issued]: [Time; 3]| RowUse { row, seen, opened, issued, work: 1 };
-        let mut bank = Bank { time: Calendar::new(16, 1), rows: vec![OpenRow::NONE; 4].into() };
+        let mut bank = Bank::new(Calendar::new(16, 1), 4);
         let joins = |bank: &Bank, row, seen| bank.joins(row, seen).map(|at| bank.rows[at].opened);
         assert_eq!(joins(&bank, 7, 0), None);
         bank.note(used(7, [0, 4, 10]), None);

@@ -342,6 +342,7 @@ impl PacketClock {
         }
         let timeline = recorder.finish();
         let rows = crate::ratio_to_busiest(clocks.ps(memory.rows()), &timeline);
+        let disputed = clocks.ps(memory.disputed()) as f64 / timeline.duration_ps.max(1) as f64;
         let (parts, spans) = draws.finish(&clocks, timeline.duration_ps);
         Timed {
             passes: passes.finish(&machine, &clocks, timeline.duration_ps, &parts),
@@ -352,6 +353,7 @@ impl PacketClock {
             unit_cycles: 0,
             packets,
             rows: Some(rows),
+            disputed: Some(disputed),
         }
     }
 }
