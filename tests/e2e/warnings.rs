@@ -56,6 +56,14 @@ const NOT_PROVOKED: [(&str, &str); 27] = [
         "it takes a larger GPU than those that come with the program; a unit test in `timing` has a stream of such packets",
     ),
     (
+        "memory-order",
+        "it takes memory that is busy for most of a frame, but not all; a unit test in `run` has streams on built-in GPUs",
+    ),
+    (
+        "batch-overlap",
+        "it takes a frame of many short batches or passes; a unit test in `run` has streams of them",
+    ),
+    (
         "start-error",
         "it takes a start that counts as found and is off by more than half of its frame; a unit test in `run` makes one up",
     ),

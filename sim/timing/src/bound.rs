@@ -42,10 +42,12 @@ pub fn bound(machine: &MachineSpec, clocks: Clocks, totals: &Totals, mut recorde
     let rows = totals.rows();
     let mut times = Vec::with_capacity(lengths.len());
     let mut now: Time = 0;
+    let mut overlap: Time = 0;
     // Barriers come last in their phase.
     for ((phase, length), rows) in totals.phases.iter().zip(&lengths).zip(&rows) {
         let busy = speeds.times(&length.work);
         let end = now + length.of(phase, &busy, *rows);
+        overlap += phase.longest_overlap().min(end - now);
         write(&mut recorder, &clocks, &phase.counts, &busy, [now, end]);
         times.push([now, end - length.barriers, end]);
         now = end;
@@ -67,6 +69,7 @@ pub fn bound(machine: &MachineSpec, clocks: Clocks, totals: &Totals, mut recorde
         packets: totals.segments().map(|segment| u64::from(segment.packets)).sum(),
         rows: Some(share),
         disputed: None,
+        overlap: Some(overlap as f64 / now.max(1) as f64),
         passes: passes.finish(machine, &clocks, timeline.duration_ps, &totals.parts()),
         spans: Vec::new(),
         timeline,
@@ -201,6 +204,12 @@ struct Phase {
 }
 
 impl Phase {
+    /// The longest packet alone, if both paths have packets: for so long the phase may overlap the one before, or leave off.
+    fn longest_overlap(&self) -> Time {
+        let [front, tiles] = self.longest.map(|longest| longest.alone);
+        if front > 0 && tiles > 0 { front.max(tiles) } else { 0 }
+    }
+
     /// The least time of each path. Between other batches each path works on two batches at once, unless it was
     /// empty or is emptied.
     fn floors(&self, is_emptied: bool) -> [Time; 2] {
@@ -372,8 +381,10 @@ impl Totals {
 struct Uncontended {
     period: [Time; Station::COUNT],
     latency: [Time; Station::COUNT],
-    /// Time of one operation of a warp.
+    /// Time of one operation of a full warp, its cycles on the lanes, and a cycle of the cores.
     operation: Time,
+    wide: Time,
+    cycle: Time,
     warp_lanes: u32,
     machine: MachineSpec,
     /// Packets or warps of each client that can wait for their lines.
@@ -390,8 +401,8 @@ impl Uncontended {
         let period = common.map(|common| clocks.period(common.clock));
         let (shader, dram) = (&machine.shader, &machine.dram);
         // A warp wider than a core takes more than one cycle of its lanes.
-        let cycles =
-            shader.alu_latency_cycles.get() + shader.warp_lanes.get().div_ceil(shader.lanes.get()) - 1;
+        let wide = shader.warp_lanes.get().div_ceil(shader.lanes.get());
+        let cycles = shader.alu_latency_cycles.get() + wide - 1;
         let row = dram.latency_cycles.get()
             + dram.activate_cycles.get()
             + dram.cas_cycles.get()
@@ -404,6 +415,8 @@ impl Uncontended {
             period,
             latency: std::array::from_fn(|at| period[at] * Time::from(common[at].latency_cycles)),
             operation: clocks.period(shader.clock) * Time::from(cycles),
+            wide: wide.into(),
+            cycle: clocks.period(shader.clock),
             warp_lanes: shader.warp_lanes.get(),
             machine: machine.clone(),
             in_flight: CLIENTS.map(|unit| f64::from(machine.common(unit).in_flight.max(1))),
@@ -416,9 +429,15 @@ impl Uncontended {
         }
     }
 
-    /// Program time of a packet; all its warps run the same program.
+    /// Program time of a packet; all its warps run the same program. One of a group has operations in some of its steps only.
     pub fn program(&self, demand: &ServiceDemand) -> Time {
-        Time::from(demand.steps()) * self.operation
+        let steps = Time::from(demand.steps());
+        let Some(_) = demand.group else { return steps * self.operation };
+        let all = u64::from(demand.threads) * u64::from(demand.ops);
+        let warps = u64::from(demand.warps(self.warp_lanes)).max(1);
+        let lanes = all.div_ceil(steps.max(1) * warps);
+        let cycles = lanes.div_ceil(self.machine.shader.lanes.get().into()).max(1);
+        steps * (self.operation - self.cycle * (self.wide - cycles.min(self.wide)))
     }
 
     /// Time for which the packet fills the cores, by packets and by warps or, for a group, by groups, and each client. Warps hold

@@ -127,11 +127,13 @@ pub enum AccuracyWarning {
     MemoryRows(f64),
     /// Utilization of memory. At `packet`, no unit is busy all the time, so what counts is which line waits for which.
     MemoryOrder(f64),
+    /// Share of the frame that batches and passes may overlap. `bound` does not know for how much of it they do.
+    BatchOverlap(f64),
     /// Core cycles per packet. At `bound`, short packets wait for one unit each, so no unit is busy for long.
     ShortPackets(f64),
 }
 
-/// The error in cycles beyond which a warning of `packet` is due: what the level promises.
+/// The error in cycles beyond which a warning is due: what the level `packet` promises.
 const MAX_ERROR: f64 = 0.08;
 /// Smallest row time over busy time that gives a warning at `bound`.
 const MIN_ROW_RATIO: f64 = 0.2;
@@ -152,8 +154,10 @@ impl AccuracyWarning {
         let cycles = timed.cycles as f64 / timed.packets.max(1) as f64;
         let short =
             (level == Level::Bound && cycles < MIN_PACKET_CYCLES).then_some(Self::ShortPackets(cycles));
+        // Half of it is what `bound` takes, and any part may be right.
+        let overlap = timed.overlap.filter(|&share| share >= 2.0 * MAX_ERROR).map(Self::BatchOverlap);
         let memory = rows.map(Self::MemoryRows).into_iter().chain(order.map(Self::MemoryOrder));
-        memory.chain(short).collect()
+        memory.chain(overlap).chain(short).collect()
     }
 
     /// Warning code.
@@ -161,6 +165,7 @@ impl AccuracyWarning {
         match self {
             Self::MemoryRows(_) => Code::MemoryRows,
             Self::MemoryOrder(_) => Code::MemoryOrder,
+            Self::BatchOverlap(_) => Code::BatchOverlap,
             Self::ShortPackets(_) => Code::ShortPackets,
         }
     }
@@ -168,7 +173,7 @@ impl AccuracyWarning {
     /// Severity, comparable among warnings of one kind; larger is worse.
     pub fn extent(self) -> f64 {
         match self {
-            Self::MemoryRows(share) | Self::MemoryOrder(share) => share,
+            Self::MemoryRows(share) | Self::MemoryOrder(share) | Self::BatchOverlap(share) => share,
             Self::ShortPackets(cycles) => -cycles,
         }
     }
@@ -192,6 +197,15 @@ impl AccuracyWarning {
                 format!(
                     "memory is busy for {:.0} % of frame {frame} and no unit for all of it: times at `{name}` may be off by a \
                      fifth, as what counts is which line waits for which; use --timing stepped, or let --accuracy choose",
+                    100.0 * share,
+                ),
+            ),
+            Self::BatchOverlap(share) => Warning::new(
+                Code::BatchOverlap,
+                format!(
+                    "the longest packets of the batches and passes of frame {frame} take {:.0} % of it: times at `{name}` may be \
+                     off by half of that, as it does not know how far batches overlap; use --timing packet, or let --accuracy \
+                     choose",
                     100.0 * share,
                 ),
             ),

@@ -105,6 +105,8 @@ codes! {
     MemoryRows = "memory-rows" in Simulator,
     /// At `packet`: memory is busy for half of the time or more, and no unit for all of it.
     MemoryOrder = "memory-order" in Simulator,
+    /// At `bound`: the longest packets of batches and passes take 16 % of the frame or more.
+    BatchOverlap = "batch-overlap" in Simulator,
     /// At `bound`: a packet arrives every two cycles or faster.
     ShortPackets = "short-packets" in Simulator,
     /// An interval of `--timing sampled` is wider than 5 % of its value either way.

@@ -242,7 +242,9 @@ impl Drain {
 
     /// Let the oldest packet leave. Returns when it leaves the cores.
     fn leave(&mut self) -> f64 {
-        while self.packets.front().is_some_and(|packet| packet.remaining > 0) && self.end_next(f64::INFINITY) {}
+        while self.packets.front().is_some_and(|packet| packet.remaining > 0) && self.end_next(f64::INFINITY)
+        {
+        }
         let Some(InTurn { packet, done, .. }) = self.packets.pop_front() else { return self.departed };
         self.left += 1;
         self.departed = self.departed.max(done);

@@ -557,10 +557,11 @@ impl Bank {
         self.rows.iter().position(|open| open.since <= seen).unwrap_or(self.rows.len() - 1)
     }
 
-    /// Place of the opening of `row` that a line joins which enters the queue at `seen`; `None` if it has to open its row.
+    /// Place of the opening of `row` that a line joins which enters the queue at `seen`, after `lines` lines of its channel; `None`
+    /// if it has to open its row.
     ///
     /// First ready first come (Rixner et al. 2000): a line joins pending lines of its row, ahead of older requests to other
-    /// rows, until the next row opens. Lines that the queue has no room for enter it later.
+    /// rows, until the next row opens. The exception is a queue full of other lines since the last of its row.
     fn joins(&self, row: u32, seen: Time, lines: u64, queue: u64) -> Option<usize> {
         let latest = self.place(seen);
         let is_pending = |open: &OpenRow| open.row == row && seen < open.closes && lines - open.last < queue;
@@ -596,22 +597,44 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_row_that_opens_again_is_disputed_if_its_lines_may_have_met() {
+        let mut bank = Bank::new(Calendar::new(16, 1), 2);
+        let used = |row, issued| RowUse { row, seen: issued, opened: issued, issued, lines: 0, work: 1 };
+        [(7, 10), (8, 20), (9, 30)].into_iter().for_each(|(row, issued)| bank.note(used(row, issued), None));
+        // Row 7 is not among the two remembered any more; row 6 never was open.
+        for (row, came, disputed) in [(7, 59, 5), (7, 60, 5), (9, 60, 10), (6, 0, 10)] {
+            bank.dispute(row, came, 50, 5);
+            assert_eq!(bank.disputed, disputed, "row {row} at {came}");
+        }
+    }
+
+    #[test]
     fn a_line_joins_others_of_its_row_until_the_next_opens() {
-        let used = |row, [seen, opened, issued]: [Time; 3]| RowUse { row, seen, opened, issued, work: 1 };
+        let used = |row, [seen, opened, issued]: [Time; 3], lines| RowUse {
+            row,
+            seen,
+            opened,
+            issued,
+            lines,
+            work: 1,
+        };
         let mut bank = Bank::new(Calendar::new(16, 1), 4);
-        let joins = |bank: &Bank, row, seen| bank.joins(row, seen).map(|at| bank.rows[at].opened);
-        assert_eq!(joins(&bank, 7, 0), None);
-        bank.note(used(7, [0, 4, 10]), None);
-        assert_eq!((joins(&bank, 7, 50), joins(&bank, 8, 5)), (Some(4), None));
+        let joins =
+            |bank: &Bank, row, seen, lines| bank.joins(row, seen, lines, 4).map(|at| bank.rows[at].opened);
+        assert_eq!(joins(&bank, 7, 0, 0), None);
+        bank.note(used(7, [0, 4, 10], 1), None);
+        assert_eq!((joins(&bank, 7, 50, 9), joins(&bank, 8, 5, 1)), (Some(4), None));
         bank.rows[0].closes = 12;
-        bank.note(used(8, [5, 16, 20]), None);
-        assert_eq!([11, 12].map(|seen| joins(&bank, 7, seen)), [Some(4), None]);
-        bank.note(used(7, [9, 4, 30]), Some(1));
+        bank.note(used(8, [5, 16, 20], 2), None);
+        assert_eq!([11, 12].map(|seen| joins(&bank, 7, seen, 2)), [Some(4), None]);
+        bank.note(used(7, [9, 4, 30], 3), Some(1));
         let rows = |bank: &Bank| [0, 1, 2].map(|at: usize| (bank.rows[at].row, bank.rows[at].until));
         assert_eq!(rows(&bank)[..2], [(8, 20), (7, 30)]);
-        bank.note(used(8, [40, 16, 60]), Some(0));
+        // Four lines of other rows came in between.
+        bank.note(used(8, [40, 16, 60], 6), Some(0));
+        assert_eq!([6, 7].map(|lines| joins(&bank, 7, 9, lines)), [Some(4), None]);
         // A row that comes earlier in time, and later in the stream.
-        bank.note(used(9, [3, 12, 13]), None);
+        bank.note(used(9, [3, 12, 13], 7), None);
         assert_eq!((rows(&bank), bank.rows[1].closes), ([(8, 60), (9, 13), (7, 30)], 16));
     }
 }

@@ -354,6 +354,7 @@ impl PacketClock {
             packets,
             rows: Some(rows),
             disputed: Some(disputed),
+            overlap: None,
         }
     }
 }

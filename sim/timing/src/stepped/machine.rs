@@ -171,6 +171,7 @@ impl<'a> Machine<'a> {
             packets: stream.demands.len() as u64,
             rows: None,
             disputed: None,
+            overlap: None,
         })
     }
 
