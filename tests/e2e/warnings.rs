@@ -15,7 +15,7 @@ const TESTED: &str = "tests of the workload bring it about, each in a run of its
 const COMMAND: &str = "a run does not give it; tests of `quintile trace` bring it about";
 
 /// Codes without a test here, with the reason.
-const NOT_PROVOKED: [(&str, &str); 27] = [
+const NOT_PROVOKED: [(&str, &str); 29] = [
     ("ambiguous-alignment", COMMAND),
     ("anchors-off", COMMAND),
     ("clipped", COMMAND),
@@ -54,6 +54,14 @@ const NOT_PROVOKED: [(&str, &str); 27] = [
     (
         "short-packets",
         "it takes a larger GPU than those that come with the program; a unit test in `timing` has a stream of such packets",
+    ),
+    (
+        "memory-order",
+        "it takes memory that is busy for most of a frame, but not all; a unit test in `run` has streams on built-in GPUs",
+    ),
+    (
+        "batch-overlap",
+        "it takes a frame of many short batches or passes; a unit test in `run` has streams of them",
     ),
     (
         "start-error",
