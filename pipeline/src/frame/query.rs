@@ -208,7 +208,7 @@ impl Gpu<'_> {
     /// Gathers the farthest depths of `stored`, the result of a pass over depth, in a pass of its own. It needs no wait, as the
     /// unit of depth works in order: every stored depth is read and compared once, and the farthest of each box of a tile are compared for the next level. They are kept in fast
     /// memory.
-    pub fn gather(&mut self, name: &str, pyramid: &Pyramid, stored: MemoryRange) {
+    pub fn gather_farthest_depths(&mut self, name: &str, pyramid: &Pyramid, stored: MemoryRange) {
         self.open(name, None);
         self.note_read(stored.address());
         let first = pyramid.size(0);
@@ -237,7 +237,7 @@ impl Gpu<'_> {
     }
 
     /// Asks about boxes in a pass of its own. A query ends at its first tile that may see the box.
-    pub fn ask(
+    pub fn query_boxes(
         &mut self,
         name: &str,
         queries: &IntervalQueries<'_>,

@@ -17,10 +17,10 @@ fn primitive(corners: [[[f64; 3]; 3]; 2], body: u32) -> Primitive {
     Primitive {
         triangle: MovingTriangle::new(corners[0], corners[1]).unwrap(),
         rasterizer: Rasterizer::new(View::orthographic()),
-        part: [0..GRID.columns, 0..GRID.rows],
+        scissor: [0..GRID.columns, 0..GRID.rows],
         body,
-        again: false,
-        back_only: false,
+        reuses_vertices: false,
+        keeps_back_faces_only: false,
     }
 }
 
@@ -31,7 +31,7 @@ struct Merge {
 }
 
 impl TileShader for Merge {
-    type Body = u32;
+    type BodyState = u32;
     type Output = [f64; 2];
 
     fn run(&self, tiles_of_body: &mut u32, lanes: &Lanes, tile: &TileIntervals<'_>) -> Option<[f64; 2]> {
@@ -101,7 +101,7 @@ fn a_moving_triangle_counts_the_differences_of_its_vertices_once() {
     let moving = primitive([open, close], 0);
     let (_, _, counts) = drawn(std::slice::from_ref(&moving), 8);
     assert_eq!(counts[Event::SetupMadds], 9);
-    let again = Primitive { again: true, ..moving.clone() };
+    let again = Primitive { reuses_vertices: true, ..moving.clone() };
     let (found, _, both) = drawn(&[moving, again], 8);
     assert_eq!((both[Event::VerticesFetched], both[Event::SetupMadds]), (3, 9));
     assert_eq!(both[Event::TileMadds], 2 * counts[Event::TileMadds]);
@@ -111,9 +111,9 @@ fn a_moving_triangle_counts_the_differences_of_its_vertices_once() {
 #[test]
 fn set_up_drops_front_faces_where_only_backs_are_drawn() {
     let corners = [[0.5, 0.5, 2.0], [3.5, 0.5, 2.0], [0.5, 1.5, 4.0]];
-    let back = Primitive { back_only: true, ..primitive([corners; 2], 0) };
+    let back = Primitive { keeps_back_faces_only: true, ..primitive([corners; 2], 0) };
     let [a, b, c] = corners;
-    let front = Primitive { back_only: true, ..primitive([[a, c, b]; 2], 1) };
+    let front = Primitive { keeps_back_faces_only: true, ..primitive([[a, c, b]; 2], 1) };
     let (found, _, counts) = drawn(&[back, front], 8);
     assert_eq!(found.len(), 7);
     assert_eq!((counts[Event::TrianglesSetUp], counts[Event::TrianglesFaceCulled]), (1, 1));

@@ -76,8 +76,16 @@ fn primitives(seen: &[Option<Seen>], method: Method, grid: &Grid) -> (Vec<Primit
     let mut add = |beam: usize, ends: [[DVec3; 3]; 2], corners: Option<[DVec3; 3]>| {
         let [open, close] = ends.map(|end| end.map(|p| p.to_array()));
         let Some(triangle) = MovingTriangle::new(open, close) else { return };
-        let (part, body, back_only) = ([0..grid.columns, 0..grid.rows], beam as u32, corners.is_some());
-        primitives.push(Primitive { triangle, rasterizer: whole, part, body, again: false, back_only });
+        let (scissor, body, keeps_back_faces_only) =
+            ([0..grid.columns, 0..grid.rows], beam as u32, corners.is_some());
+        primitives.push(Primitive {
+            triangle,
+            rasterizer: whole,
+            scissor,
+            body,
+            reuses_vertices: false,
+            keeps_back_faces_only,
+        });
         faces.push(Face { beam, corners });
     };
     for (beam, seen) in seen.iter().enumerate() {
@@ -126,7 +134,7 @@ impl Masks {
 }
 
 impl TileShader for LightShader<'_> {
-    type Body = Masks;
+    type BodyState = Masks;
     type Output = Shaded;
 
     fn run(&self, masks: &mut Masks, lanes: &Lanes, tile: &TileIntervals<'_>) -> Option<Shaded> {

@@ -112,7 +112,7 @@ struct BoxShader<'a> {
 }
 
 impl TileShader for BoxShader<'_> {
-    type Body = ();
+    type BodyState = ();
     type Output = Fragment;
 
     fn run(&self, (): &mut (), lanes: &Lanes, tile: &TileIntervals<'_>) -> Option<Fragment> {

@@ -134,11 +134,11 @@ impl Draws for Occlusion {
         let occluders = RasterPass::new(camera, &walls, &settings).named("occluders");
         let occluders = gpu.draw(&occluders.onto(Target::Depth).with_visible())?;
         let pyramid = self.pyramid(&depths_of(&occluders.visible), viewport)?;
-        gpu.gather("farthest depths", &pyramid, occluders.surface);
+        gpu.gather_farthest_depths("farthest depths", &pyramid, occluders.surface);
         let projection = Projection::new(camera, viewport);
         let queries = IntervalQueries::new(&pyramid, &projection);
         let (answers, half_covered) =
-            (gpu.ask("queries", &queries, &self.wall_scene.boxes), pyramid.half_covered());
+            (gpu.query_boxes("queries", &queries, &self.wall_scene.boxes), pyramid.half_covered());
         // The host draws what is not hidden.
         gpu.wait();
         let seen = self.wall_scene.boxes.iter().zip(&answers).filter(|(_, answer)| !answer.hidden);
