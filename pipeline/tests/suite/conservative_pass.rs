@@ -63,7 +63,7 @@ fn drawn(primitives: &[Primitive], block: u32) -> (Vec<Tile>, Vec<PacketKind>, C
     pass.draw(&mut gpu, &draw, &shader, |tile, z| found.push((tile, z)));
     let report = gpu.finish();
     assert_eq!(report.counts(), sum);
-    assert_eq!(report.triangles(), primitives.iter().filter(|primitive| !primitive.again).count());
+    assert_eq!(report.triangles(), primitives.iter().filter(|primitive| !primitive.reuses_vertices).count());
     assert_eq!(shader.runs.into_inner() as usize, found.len());
     (found, kinds, sum)
 }
