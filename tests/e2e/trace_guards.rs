@@ -172,8 +172,41 @@ fn the_recorder_of_a_small_trace_has_a_range_that_fits_it() {
     assert!(error.abs() < bound && warnings.is_empty(), "{error}: {warnings}");
     let (_, warnings) = sample(&["--bits", "8", "--current-range", "30A"]);
     assert!(warnings.contains("[range-unused]") && warnings.contains("--current-range"), "{warnings}");
-    let (_, warnings) = sample(&["--current-range", "100mA"]);
+    let (found, warnings) = sample(&["--current-range", "100mA"]);
     assert!(warnings.contains("[clipped]"), "{warnings}");
+    assert_eq!(found["warnings"][0]["code"], "clipped");
+}
+
+/// Without a voltage of its own, a trace is drawn from a rail at the specified one.
+#[test]
+fn a_specified_voltage_keeps_the_energy_of_a_trace_of_power_alone() {
+    let inputs = Inputs::new();
+    let (power, out) = (inputs.put("t.csv", recording()), inputs.path("coarse.csv"));
+    let sample = |trace: &str, args: &[&str]| {
+        let ended = quintile().call(["trace", "sample", trace, "--out", &out].iter().chain(args));
+        assert_eq!(ended.code, Some(0), "{}", ended.stderr);
+        ended
+    };
+    let at_12_v = ["--specified-voltage", "12V", "--device-rate", "100Hz", "--bits", "8", "--json"];
+    let ended = sample(&power, &at_12_v);
+    let found: Value = serde_json::from_str(&ended.stdout).unwrap_or_default();
+    assert_eq!((&found["device"]["rail_v"], &found["warnings"]), (&12.0.into(), &serde_json::json!([])));
+    let error = found["relative_error"].as_f64().unwrap_or(f64::NAN);
+    assert!(error.abs() < 0.03, "{found}: {}", ended.stderr);
+    let trace = small_currents(&inputs);
+    let ended = sample(&trace, &["--specified-voltage", "5V"]);
+    assert!(ended.stderr.contains("warning: [energy-changed] the device records "), "{}", ended.stderr);
+}
+
+#[test]
+fn samples_that_are_lost_are_not_counted_as_written() {
+    let inputs = Inputs::new();
+    let (power, out) = (inputs.put("t.csv", recording()), inputs.path("gaps.csv"));
+    let loss = ["--packet-samples", "50", "--packet-loss", "0.3"];
+    let ended = quintile().call(["trace", "sample", &power, "--out", &out].iter().chain(&loss));
+    let rows = String::from_utf8_lossy(&read(&out)).lines().count() - 1;
+    let whole = ended.stdout.replace(',', "");
+    assert!(rows < 2350 && whole.contains(&format!(": {rows} samples and {} lost", 2350 - rows)), "{whole}");
 }
 
 #[test]

@@ -186,6 +186,8 @@ codes! {
     Clipped = "clipped" in Trace,
     /// The largest current uses less than 5 % of the range of the device.
     RangeUnused = "range-unused" in Trace,
+    /// The device changes the energy by more than 3 %.
+    EnergyChanged = "energy-changed" in Trace,
     /// A texture file cannot be read.
     MissingImage = "missing-image" in Scene,
     /// A `.mtl` file cannot be read, or lacks a material of an OBJ file.
