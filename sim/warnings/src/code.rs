@@ -174,7 +174,7 @@ codes! {
     RailCountedTwice = "rail-counted-twice" in Trace,
     /// The anchors of an alignment contradict the stamps or the trace.
     AnchorsOff = "anchors-off" in Trace,
-    /// Without anchors, another pairing of stamps and frames fits about as well.
+    /// Without anchors, another pairing of stamps and frames fits about as well, or may do so by chance.
     AmbiguousAlignment = "ambiguous-alignment" in Trace,
     /// Frames or pixels per joule are computed, which cannot be averaged.
     InverseUnits = "inverse-units" in Trace,

@@ -50,6 +50,9 @@ pub struct AlignArgs {
     pub piped: bool,
 }
 
+/// Root mean square of rounding to whole samples, in sample periods, as 1 / sqrt 12: starts are at best known to half a sample.
+const ROUNDING_PERIODS: f64 = 0.289;
+
 impl From<AlignError> for Failure {
     fn from(error: AlignError) -> Self {
         Self { message: error.to_string(), code: 2 }
@@ -81,16 +84,16 @@ pub(super) fn run(args: &AlignArgs, terminal: &Terminal) -> Result<(), Failure> 
             alignment
         }
         [] => {
-            let found = args.find.frames(&args.input, &args.input.trace, terminal)?.set.found;
-            let starts: Vec<f64> = found.starts.iter().map(|start| start.time_s).collect();
-            Alignment::by_fit(&stamps, &starts)?
+            let set = args.find.frames(&args.input, &args.input.trace, terminal)?.set;
+            let starts: Vec<f64> = set.found.starts.iter().map(|start| start.time_s).collect();
+            Alignment::by_fit(&stamps, &starts, ROUNDING_PERIODS / set.rate_hz)?
         }
         _ => return Err(wrong("--anchor is given twice, or not at all for a fit to the frames found")),
     };
     if alignment.ambiguous {
         terminal.warn_of(
             Code::AmbiguousAlignment,
-            "another pairing fits about as well, as frame times are even; give two anchors",
+            "another pairing fits about as well, or this one may fit by chance, as frame times are even or stamps few; give two anchors",
         );
     }
     if let Some(out) = &args.out {
