@@ -210,6 +210,8 @@ fn too_short(error: IdleTooShort) -> Failure {
 struct Run {
     run: RunEnergy,
     passes: Vec<(String, Spread)>,
+    /// Whether the last frame is left out, as it is cut.
+    without_last: bool,
 }
 
 /// One recording: its frames, its repairs, and the pixels of its frames if it states them.
@@ -221,7 +223,8 @@ fn one_run(
 ) -> Result<(Run, Vec<Repair>, Option<u64>), Failure> {
     let (Frames { set, repairs }, trace) = args.find.frames_and_samples(&args.input, path, terminal)?;
     warn_of_frames(&set, terminal);
-    let (trace, frames) = (&*trace, whole(&set.energies).to_vec());
+    let (trace, frames) = (&*trace, whole(&set.energies, set.ends_with_trace).to_vec());
+    let without_last = frames.len() < set.energies.len();
     let idle = idle(args, trace, recording)?;
     let options = RunEnergyOptions {
         discard: match args.discard {
@@ -237,7 +240,7 @@ fn one_run(
         warning.iter().for_each(|warning| terminal.warn_of(warning.code, &warning.message));
     }
     let passes = parts_j(trace, &run.frames, passes, idle.as_ref())?;
-    Ok((Run { run, passes }, repairs, set.metadata.pixels))
+    Ok((Run { run, passes, without_last }, repairs, set.metadata.pixels))
 }
 
 fn run_failure(error: RunEnergyError) -> Failure {
@@ -273,10 +276,11 @@ impl Run {
         let run = &self.run;
         let spread = Spread::of(&run.energies_j()).unwrap_or_default();
         let mut text = format!(
-            "{} ({} discarded, {}): {:.4} mJ/frame start to start (deviation {:.4}), {:.4} mJ begin to finish\n",
+            "{} ({} discarded, {}{}): {:.4} mJ/frame start to start (deviation {:.4}), {:.4} mJ begin to finish\n",
             counted(run.frames.len(), "frame"),
             run.discarded,
             counted(run.outliers, "outlier"),
+            if self.without_last { ", without the last, which is cut" } else { "" },
             spread.mean * 1e3,
             spread.deviation * 1e3,
             run.begin_to_finish_j.mean * 1e3
