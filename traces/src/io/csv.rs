@@ -11,7 +11,7 @@ use flate2::read::MultiGzDecoder;
 use flate2::write::GzEncoder;
 use rayon::prelude::*;
 
-use super::columns::{Layout, Opened, Picked, RowBatch, RowSource, layout};
+use super::columns::{Layout, Opened, Picked, RowBatch, RowSource, layout, layout_of_unnamed, numbered};
 use super::recording;
 use super::rows::Rows;
 use super::samples::{Description, TraceChunk, TraceHeader, TraceReader, TraceWriter, to_json};
@@ -261,15 +261,12 @@ impl CsvRows {
         }
         let numbers = record.iter().all(|field| number::<f64>(field).is_some());
         let held = !options.header.unwrap_or(!numbers);
-        let names: Vec<String> = if held {
-            unnamed(record.len())
-        } else {
-            record
-                .iter()
-                .map(|name| String::from_utf8_lossy(name).trim_start_matches('\u{feff}').to_owned())
-                .collect()
+        let name = |name: &[u8]| String::from_utf8_lossy(name).trim_start_matches('\u{feff}').to_owned();
+        let names = if held { numbered(record.len()) } else { record.iter().map(name).collect() };
+        let layout = match held {
+            true => layout_of_unnamed(path, names.len(), options)?,
+            false => layout(path, &names, options)?,
         };
-        let layout = layout(path, &names, options)?;
         let (path, repair) = (path.to_owned(), options.repair);
         Ok((Self { path, repair, reader, record, names, row: 0, held, uneven: None, surplus: 0 }, layout))
     }
@@ -387,14 +384,6 @@ impl RowSource for CsvRows {
         );
         Some(Repair { code: RepairKind::UnevenRows, row, time_s, count, message })
     }
-}
-
-/// Names for columns that have none: time, voltage, current; two columns are voltage and current.
-fn unnamed(columns: usize) -> Vec<String> {
-    let usual: &[&str] = if columns == 2 { &[VOLTAGE_V, CURRENT_A] } else { &[TIME_S, VOLTAGE_V, CURRENT_A] };
-    (0..columns)
-        .map(|i| usual.get(i).map_or_else(|| format!("column {}", i + 1), |name| (*name).to_owned()))
-        .collect()
 }
 
 /// Whether there is something in a field that is no number, not even one that is not finite.

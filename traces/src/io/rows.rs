@@ -1,7 +1,7 @@
 //! Rows of a file of any format, in pieces, so that no file has to fit into memory; and rails among their columns that are
 //! the sum of others and would count twice.
 
-use super::columns::{Layout, Open, Opened, Rail, RowBatch, RowSource};
+use super::columns::{Layout, Open, Opened, Rail, RowBatch, RowSource, no_names};
 use super::samples::Description;
 use super::time_base::{max_offset_periods, mean_rate_hz};
 use super::{FORMATS, ReadError, ReadOptions, Repair, TraceFormat, VOLTAGE_V, readable};
@@ -80,6 +80,9 @@ impl Rows {
         description.rate_hz = options.rate_hz.or(description.rate_hz);
         description.start_s = options.start_s.or(description.start_s);
         if layout.time.is_none() && description.rate_hz.is_none() {
+            if layout.guess.is_some() {
+                return Err(no_names(path, time, source.names().len()));
+            }
             let found = source.names().join(", ");
             return Err(ReadError::MissingColumn { path: path.to_owned(), column: time.to_owned(), found });
         }
@@ -142,6 +145,11 @@ impl Rows {
     pub fn without_unit(&self) -> impl Iterator<Item = &str> {
         let columns = self.layout.time.iter().chain(&self.layout.values);
         columns.filter(|column| !column.has_unit).map(|column| column.name.as_str())
+    }
+
+    /// What columns without names are taken for, such as `column 1 as times`; absent where all is stated.
+    pub fn guess(&self) -> Option<&str> {
+        self.layout.guess.as_deref()
     }
 
     /// Columns of power that are not read: the power is their rail's voltage times its current.
@@ -410,6 +418,43 @@ mod tests {
         std::fs::write(&path, format!("time_s,{names}\n{rows}")).unwrap();
         let found = rail_of_sums(&path, &ReadOptions::default()).unwrap();
         found.map(|sum| (sum.rail, sum.by_values))
+    }
+
+    /// The columns that a file without names is read from, and what was guessed, or the error.
+    fn unnamed(rows: &str, options: &ReadOptions) -> Result<(Vec<usize>, Option<String>), String> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("t.csv");
+        std::fs::write(&path, rows).unwrap();
+        let rows = Rows::open(&path, options).map_err(|error| error.to_string())?;
+        let columns = rows.layout.time.iter().chain(&rows.layout.values);
+        Ok((columns.map(|column| column.index + 1).collect(), rows.guess().map(str::to_owned)))
+    }
+
+    #[test]
+    fn columns_without_names_are_chosen_by_number_and_a_guess_is_said() {
+        let (two, three) = ("0,1.5\n1,1.6\n2,1.7\n", "0,12,1.5\n1,12,1.6\n");
+        let plain = ReadOptions::default();
+        let refused = unnamed(two, &plain).unwrap_err();
+        assert!(
+            refused.contains("2 columns without names") && refused.contains("--time-column 1"),
+            "{refused}"
+        );
+        let at = |time: Option<&str>, power: Option<&str>, rate_hz| ReadOptions {
+            time: time.map(str::to_owned),
+            power: power.map(str::to_owned),
+            rate_hz,
+            ..ReadOptions::default()
+        };
+        assert_eq!(unnamed(two, &at(Some("1"), Some("2"), None)), Ok((vec![1, 2], None)));
+        let first = Some("column 1 as times".to_owned());
+        assert_eq!(unnamed(two, &at(None, Some("2"), None)), Ok((vec![1, 2], first)));
+        assert_eq!(unnamed(two, &at(None, Some("2"), Some(1.0))), Ok((vec![2], None)));
+        assert_eq!(unnamed(two, &at(None, Some("1"), Some(1.0))), Ok((vec![1], None)));
+        let both = Some("column 1 as voltages, column 2 as currents".to_owned());
+        assert_eq!(unnamed(two, &at(None, None, Some(1.0))), Ok((vec![1, 2], both)));
+        assert!(unnamed(two, &at(Some("1"), None, None)).unwrap_err().contains("without names"));
+        let all = Some("column 1 as times, column 2 as voltages, column 3 as currents".to_owned());
+        assert_eq!(unnamed(three, &plain), Ok((vec![1, 2, 3], all)));
     }
 
     #[test]

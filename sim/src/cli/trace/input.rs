@@ -204,6 +204,12 @@ impl InputArgs {
     /// Warns of a rail that is added to those that it is the sum of, and notes how columns are read.
     pub(super) fn warn_of_columns(&self, path: &Path, terminal: &Terminal) -> Result<(), Failure> {
         let rows = Rows::open(path, &self.options()?)?;
+        if let Some(guess) = rows.guess() {
+            terminal.note(&format!(
+                "{}: columns without names: {guess}; --time-column 1 and the like choose others",
+                shown(path)
+            ));
+        }
         let without_unit: Vec<&str> = rows.without_unit().collect();
         if !without_unit.is_empty() {
             let columns = without_unit.join(", ");
