@@ -320,6 +320,22 @@ fn a_pass_that_begins_after_the_end_of_some_frames_is_warned_about() {
 }
 
 #[test]
+fn idle_that_is_none_and_a_current_in_reverse_are_warned_about() {
+    let inputs = Inputs::new();
+    let trace = inputs.put("t.csv", recording());
+    let energy = ["trace", "energy", &trace, "--mark", "0.2"];
+    let with = |args: &[&'static str]| warned(&[&energy[..], args].concat(), "idle-busy");
+    assert!(with(&["--idle", "0.151..0.199"]).contains("overlaps 5 of 29 frames"));
+    assert!(with(&["--idle-w", "25"]).contains("is above that of the frames"));
+    let ended = quintile().call(energy.iter().chain(&["--idle", "0..0.09", "--json"]));
+    let report: Value = serde_json::from_str(&ended.stdout).unwrap_or_default();
+    assert_eq!(report["warnings"], serde_json::json!([]), "{}", ended.stderr);
+    let reversed = recording().replace(',', ",-").replacen("time_s,-power_W", "time_s,power_W", 1);
+    let reversed = inputs.put("r.csv", reversed);
+    warned(&["trace", "energy", &reversed, "--from", "0.1", "--to", "0.2"], "negative-power");
+}
+
+#[test]
 fn an_alignment_of_even_frames_without_anchors_is_ambiguous() {
     let inputs = Inputs::new();
     let stamps: String = (0..20).map(|frame| format!("{}\n", 7.0 + 0.01 * f64::from(frame))).collect();

@@ -1,6 +1,6 @@
 //! Frames of a recording with their energies: in memory, or in pieces where the file is long.
 
-use crate::energy::{FrameEnergy, PowerIntegral};
+use crate::energy::{FrameEnergy, PowerIntegral, negative_power};
 use crate::frames::{FinderMethod, Found, MarkError, Marks, Options, Proposal, Window, find_with, propose};
 use crate::io::{ReadError, ReadOptions, Rows};
 use crate::stream::{self, StreamError};
@@ -124,11 +124,12 @@ impl Search {
         let marked_end_s = self.end_s.or_else(|| trace.metadata.end_mark_s());
         let end_s = marked_end_s.unwrap_or(trace.end_s());
         let marks = Marks { starts_s, window: self.window, end_s };
-        let found = find_with(trace, &marks, &Options { method: self.method })?;
+        let mut found = find_with(trace, &marks, &Options { method: self.method })?;
         if let Some(Proposal { mark_s, .. }) = proposal.filter(|_| found.starts.len() < 2) {
             return Err(SearchError::NoRepetition { mark_s });
         }
         let integral = PowerIntegral::new(trace);
+        found.warnings.extend(negative_power(integral.total_j()));
         Ok(FrameSet {
             energies: integral.frames(&found),
             found,
@@ -155,7 +156,8 @@ impl Search {
         let marked_end_s = self.end_s.or_else(|| rows.metadata().end_mark_s());
         let end_s = marked_end_s.unwrap_or(f64::INFINITY);
         let marks = Marks { starts_s, window: self.window, end_s };
-        let streamed = stream::find(path, options, &marks)?;
+        let mut streamed = stream::find(path, options, &marks)?;
+        streamed.found.warnings.extend(negative_power(streamed.total_j));
         let clock = streamed.clock;
         Ok(FrameSet {
             found: streamed.found,
@@ -225,6 +227,19 @@ mod tests {
         assert_eq!(given.marked(&Metadata::default()).unwrap(), [0.11, 0.12]);
         assert_eq!(given.marked(&trace(marks).metadata).unwrap(), [0.11, 0.12]);
         assert!(matches!(search().of_trace(&trace(Vec::new())), Err(SearchError::Unmarked)));
+    }
+
+    #[test]
+    fn a_reversed_current_is_warned_about() {
+        let all = trace(Vec::new());
+        let reversed = all.current_a().iter().map(|amperes| -amperes).collect();
+        let reversed = Trace::new(vec![1.0; 1600], reversed, 5e3, 0.0, Metadata::default()).unwrap();
+        let marked = Search { starts_s: vec![0.15], ..search() };
+        let negative = |trace: &Trace| {
+            let set = marked.of_trace(trace).unwrap();
+            set.found.warnings.iter().any(|warning| warning.code == "negative-power")
+        };
+        assert!(negative(&reversed) && !negative(&all));
     }
 
     #[test]

@@ -186,6 +186,10 @@ codes! {
     Clipped = "clipped" in Trace,
     /// The largest current uses less than 5 % of the range of the device.
     RangeUnused = "range-unused" in Trace,
+    /// The idle segment overlaps frames, or idle power is above the mean power of frames.
+    IdleBusy = "idle-busy" in Trace,
+    /// Power is negative on average.
+    NegativePower = "negative-power" in Trace,
     /// The device changes the energy by more than 3 %.
     EnergyChanged = "energy-changed" in Trace,
     /// A texture file cannot be read.

@@ -20,7 +20,7 @@ use traces::io::{
 use traces::search::{FrameSet, Search};
 use traces::times::read_times;
 use traces::trace::RATE_LIMITS_HZ;
-use warnings::Code;
+use warnings::{Code, Warning};
 
 use super::PlotFormat;
 use super::wrong;
@@ -251,7 +251,12 @@ fn note_repairs(path: &Path, repairs: &[Repair], terminal: &Terminal) {
 
 /// Prints the warnings of a search.
 pub(super) fn warn_of_frames(set: &FrameSet, terminal: &Terminal) {
-    set.found.warnings.iter().for_each(|warning| terminal.warn_of(warning.code, &warning.message));
+    warn_of(&set.found.warnings, terminal);
+}
+
+/// Prints warnings.
+pub(super) fn warn_of(warnings: &[Warning], terminal: &Terminal) {
+    warnings.iter().for_each(|warning| terminal.warn_of(warning.code, &warning.message));
 }
 
 /// Frames, with the repairs of the trace they were found in.
