@@ -320,6 +320,15 @@ fn a_pass_that_begins_after_the_end_of_some_frames_is_warned_about() {
 }
 
 #[test]
+fn a_power_that_differs_from_voltage_times_current_is_warned_about() {
+    let inputs = Inputs::new();
+    let rows: String = (0..100).map(|i| format!("{},12,1,24\n", f64::from(i) / 5000.0)).collect();
+    let trace = inputs.put("t.csv", format!("time_s,voltage_V,current_A,power_W\n{rows}"));
+    let segment = ["trace", "energy", &trace, "--from", "0.001", "--to", "0.002"];
+    assert!(warned(&segment, "power-differs").contains("power_W is 2.0000 times voltage times current"));
+}
+
+#[test]
 fn idle_that_is_none_and_a_current_in_reverse_are_warned_about() {
     let inputs = Inputs::new();
     let trace = inputs.put("t.csv", recording());

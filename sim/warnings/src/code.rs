@@ -172,6 +172,8 @@ codes! {
     FewSamples = "few-samples" in Trace,
     /// Several rails are added up and one of them is the sum of the others.
     RailCountedTwice = "rail-counted-twice" in Trace,
+    /// A column of power that is not read differs by more than 2 % from voltage times current.
+    PowerDiffers = "power-differs" in Trace,
     /// The anchors of an alignment contradict the stamps or the trace.
     AnchorsOff = "anchors-off" in Trace,
     /// Without anchors, another pairing of stamps and frames fits about as well, or may do so by chance.

@@ -15,7 +15,7 @@ use traces::Trace;
 use traces::frames::{FinderMethod, Window};
 use traces::io::{
     FORMATS, ReadOptions, Recording, Repair, Rows, TraceFormat, TraceReader, open, rail_of_sums, read,
-    readable,
+    readable, unread_power_ratio,
 };
 use traces::search::{FrameSet, Search};
 use traces::times::read_times;
@@ -218,6 +218,16 @@ impl InputArgs {
         if !rows.unread().is_empty() {
             let columns = rows.unread().join(", ");
             terminal.note(&format!("{}: {columns} is not read: power is voltage times current", shown(path)));
+        }
+        if let Some(ratio) = unread_power_ratio(path, &self.options()?)? {
+            terminal.warn_of(
+                Code::PowerDiffers,
+                &format!(
+                    "{}: {} is {ratio:.4} times voltage times current, which is read; --power-column reads it instead",
+                    shown(path),
+                    rows.unread().join(", ")
+                ),
+            );
         }
         if self.rail.is_empty() { self.warn_of_sums(&rows, terminal) } else { Ok(()) }
     }
