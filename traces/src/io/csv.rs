@@ -305,11 +305,11 @@ impl CsvRows {
                 path: self.path.clone(),
                 row: self.row,
                 column: column.name.clone(),
-                value: String::from_utf8_lossy(field).chars().take(40).collect(),
+                value: shown(field),
             }),
             None if self.repair => Ok(none),
             None => {
-                let shown: String = String::from_utf8_lossy(field).chars().take(40).collect();
+                let shown = shown(field);
                 let value = match number::<f64>(field) {
                     Some(_) => format!("{shown:?}, which is beyond 3.4e38"),
                     None if shown.is_empty() => "empty".to_owned(),
@@ -352,6 +352,17 @@ impl RowSource for CsvRows {
                 let reason = format!("{} fields instead of {}", self.record.len(), self.names.len());
                 return Err(ReadError::Row { path: self.path.clone(), row: self.row, reason });
             }
+            let time = layout.time.as_ref();
+            if let Some((column, field)) = time.and_then(|time| Some((time, self.record.get(time.index)?)))
+                && is_date(field)
+            {
+                return Err(ReadError::Date {
+                    path: self.path.clone(),
+                    row: self.row,
+                    column: column.name.clone(),
+                    value: shown(field),
+                });
+            }
             if self.row == 1 && self.record.iter().all(is_word) {
                 return Err(ReadError::Words { path: self.path.clone() });
             }
@@ -384,6 +395,20 @@ impl RowSource for CsvRows {
         );
         Some(Repair { code: RepairKind::UnevenRows, row, time_s, count, message })
     }
+}
+
+/// The begin of a field, for messages.
+fn shown(field: &[u8]) -> String {
+    String::from_utf8_lossy(field).chars().take(40).collect()
+}
+
+/// Whether a field is a date or a time of day: figures in at least three parts between `-`, `/` or `:`, such as `2026-01-31` and
+/// `12:00:00.5`.
+fn is_date(field: &[u8]) -> bool {
+    let text = std::str::from_utf8(field).unwrap_or_default();
+    let figures = |part: &str| part.starts_with(|c: char| c.is_ascii_digit());
+    let mut parts = text.split(['-', '/', ':']);
+    number::<f64>(field).is_none() && parts.clone().count() > 2 && parts.all(figures)
 }
 
 /// Whether there is something in a field that is no number, not even one that is not finite.
@@ -473,6 +498,22 @@ mod tests {
         let mut out = Vec::new();
         push_decimal(&mut out, value);
         String::from_utf8(out).unwrap()
+    }
+
+    #[test]
+    fn dates_are_refused_with_the_remedy_and_numbers_are_none() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("t.csv");
+        for stamp in ["2026-01-01T00:00:00.000000Z", "2026/01/01 00:00:00.001", "12:00:00.5"] {
+            for power in ["1.5", "1.5 W"] {
+                fs::write(&path, format!("time,power_W\n{stamp},{power}\n")).unwrap();
+                let message = read(&path).unwrap_err().to_string();
+                assert!(message.contains("dates are not read; write times in seconds"), "{message}");
+            }
+        }
+        for other in ["1e-5", "-1e-5", "1-2", "a-b-c", "", "2026", "--"] {
+            assert!(!is_date(other.as_bytes()), "{other}");
+        }
     }
 
     #[test]
