@@ -349,7 +349,30 @@ fn an_alignment_of_even_frames_without_anchors_is_ambiguous() {
     let inputs = Inputs::new();
     let stamps: String = (0..20).map(|frame| format!("{}\n", 7.0 + 0.01 * f64::from(frame))).collect();
     let (trace, stamps) = (inputs.put("t.csv", recording()), inputs.put("stamps.txt", stamps));
-    warned(&["trace", "align", &trace, &stamps, "--mark", "0.1"], "ambiguous-alignment");
+    let align = ["trace", "align", &trace, &stamps, "--mark", "0.1"];
+    warned(&align, "ambiguous-alignment");
+    let ended = quintile().call(align.iter().chain(&["--json"]));
+    let report: Value = serde_json::from_str(&ended.stdout).unwrap_or_default();
+    let codes = report["warnings"]
+        .as_array()
+        .map_or(0, |all| all.iter().filter(|warning| warning["code"] == "ambiguous-alignment").count());
+    assert_eq!(codes, 1, "{report}");
+}
+
+#[test]
+fn what_columns_without_names_are_taken_for_is_noted() {
+    let inputs = Inputs::new();
+    let rows: String = (0..100).map(|i| format!("{},1.5\n", f64::from(i) / 1000.0)).collect();
+    let trace = inputs.put("t.csv", rows);
+    let energy = |args: &[&str]| {
+        quintile().call(["trace", "energy", &trace, "--from", "0", "--to", "0.01"].iter().chain(args))
+    };
+    let ended = energy(&[]);
+    assert!(ended.code == Some(2) && ended.stderr.contains("columns without names"), "{}", ended.stderr);
+    let ended = energy(&["--time-column", "1", "--power-column", "2"]);
+    assert!(ended.code == Some(0) && ended.stdout.contains("0.015000 J"), "{}{}", ended.stdout, ended.stderr);
+    let ended = energy(&["--rate", "1000"]);
+    assert!(ended.stderr.contains("column 1 as voltages, column 2 as currents"), "{}", ended.stderr);
 }
 
 #[test]
