@@ -101,7 +101,7 @@ pub(super) fn numbered(columns: usize) -> Vec<String> {
     (1..=columns).map(|number| format!("column {number}")).collect()
 }
 
-/// Chooses among columns without names: those asked for by number; else times, voltages and currents in this order, without times where
+/// Chooses among columns without names: those requested by number; else times, voltages and currents in this order, without times where
 /// there are two.
 pub(super) fn layout_of_unnamed(
     path: &Path,

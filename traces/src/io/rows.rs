@@ -398,27 +398,21 @@ pub fn rail_of_sums(path: &Path, options: &ReadOptions) -> Result<Option<SumOfRa
 const MIN_POWER_DIFFERENCE: f64 = 0.02;
 
 /// How many times voltage times current, on average over the first rows, a column of power is that is beside them and not read; `None`
-/// if they agree, and unless there is one rail with one such column.
-///
-/// # Errors
-/// [`ReadError`] if the file cannot be read.
-pub fn unread_power_ratio(path: &Path, options: &ReadOptions) -> Result<Option<f64>, ReadError> {
-    let mut rows = Rows::open(path, options)?;
-    let ([_], [power]) = (rows.rails(), rows.unread()) else { return Ok(None) };
-    let by_power = ReadOptions {
-        rails: Vec::new(),
-        power: Some(power.clone()),
-        fixed_voltage_v: None,
-        ..options.clone()
-    };
-    let total_w = |rows: &mut Rows| -> Result<f64, ReadError> {
-        let mut batch = RowBatch::default();
-        rows.next(COMPARED_ROWS, &mut batch)?;
-        let powers_w = rows.powers_w(&mut batch);
-        Ok(powers_w.iter().flatten().filter(|power_w| power_w.is_finite()).sum())
-    };
-    let ratio = total_w(&mut Rows::open(path, &by_power)?)? / total_w(&mut rows)?;
-    Ok((ratio.is_finite() && (ratio - 1.0).abs() > MIN_POWER_DIFFERENCE).then_some(ratio))
+/// if they agree, if either cannot be read, and unless there is one rail with one such column.
+pub fn unread_power_ratio(path: &Path, options: &ReadOptions) -> Option<f64> {
+    let rows = Rows::open(path, options).ok()?;
+    let ([_], [power]) = (rows.rails(), rows.unread()) else { return None };
+    let power = Some(power.clone());
+    let by_power = ReadOptions { rails: Vec::new(), power, fixed_voltage_v: None, ..options.clone() };
+    let ratio = total_w(Rows::open(path, &by_power).ok()?)? / total_w(rows)?;
+    (ratio.is_finite() && (ratio - 1.0).abs() > MIN_POWER_DIFFERENCE).then_some(ratio)
+}
+
+/// The sum of the powers of the first rows, W; `None` if they cannot be read.
+fn total_w(mut rows: Rows) -> Option<f64> {
+    let mut batch = RowBatch::default();
+    rows.next(COMPARED_ROWS, &mut batch).ok()?;
+    Some(rows.powers_w(&mut batch).iter().flatten().filter(|power_w| power_w.is_finite()).sum())
 }
 
 /// Whether a rail's power is that of all others together, in every row that has all.
@@ -457,12 +451,14 @@ mod tests {
                 format!("{},12,{},{}\n", f64::from(i) / 100.0, 1 + i % 3, factor * f64::from(1 + i % 3))
             };
             std::fs::write(&path, format!("{names}\n{}", (0..100).map(row).collect::<String>())).unwrap();
-            unread_power_ratio(&path, &ReadOptions::default()).unwrap()
+            unread_power_ratio(&path, &ReadOptions::default())
         };
         let names = "time_s,voltage_V,current_A,power_W";
         assert!((ratio(names, 24.0).unwrap() - 2.0).abs() < 1e-6);
         assert!((ratio("time_s,voltage_V,current_A,power_mW", 12.0).unwrap() - 1e-3).abs() < 1e-9);
         assert_eq!((ratio(names, 12.1), ratio("time_s,voltage_V,current_A,note", 24.0)), (None, None));
+        std::fs::write(&path, format!("{names}\n0,12,1,12\n0.01,12,1,N/A\n")).unwrap();
+        assert_eq!(unread_power_ratio(&path, &ReadOptions::default()), None);
     }
 
     /// The columns that a file without names is read from, and what was guessed, or the error.

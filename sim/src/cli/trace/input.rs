@@ -219,7 +219,7 @@ impl InputArgs {
             let columns = rows.unread().join(", ");
             terminal.note(&format!("{}: {columns} is not read: power is voltage times current", shown(path)));
         }
-        if let Some(ratio) = unread_power_ratio(path, &self.options()?)? {
+        if let Some(ratio) = unread_power_ratio(path, &self.options()?) {
             terminal.warn_of(
                 Code::PowerDiffers,
                 &format!(
