@@ -15,12 +15,16 @@ const TESTED: &str = "tests of the workload bring it about, each in a run of its
 const COMMAND: &str = "a run does not give it; tests of `quintile trace` bring it about";
 
 /// Codes without a test here, with the reason.
-const NOT_PROVOKED: [(&str, &str); 29] = [
+const NOT_PROVOKED: [(&str, &str); 33] = [
     ("ambiguous-alignment", COMMAND),
     ("anchors-off", COMMAND),
     ("clipped", COMMAND),
+    ("energy-changed", COMMAND),
+    ("idle-busy", COMMAND),
+    ("negative-power", COMMAND),
     ("inverse-units", COMMAND),
     ("pass-beyond", COMMAND),
+    ("power-differs", COMMAND),
     ("rail-counted-twice", COMMAND),
     ("range-unused", COMMAND),
     ("uneven-runs", COMMAND),

@@ -180,9 +180,11 @@ codes! {
     FewSamples = "few-samples" in Trace,
     /// Several rails are added up and one of them is the sum of the others.
     RailCountedTwice = "rail-counted-twice" in Trace,
+    /// A column of power that is not read differs by more than 2 % from voltage times current.
+    PowerDiffers = "power-differs" in Trace,
     /// The anchors of an alignment contradict the stamps or the trace.
     AnchorsOff = "anchors-off" in Trace,
-    /// Without anchors, another pairing of stamps and frames fits about as well.
+    /// Without anchors, another pairing of stamps and frames fits about as well, or may do so by chance.
     AmbiguousAlignment = "ambiguous-alignment" in Trace,
     /// Frames or pixels per joule are computed, which cannot be averaged.
     InverseUnits = "inverse-units" in Trace,
@@ -194,6 +196,12 @@ codes! {
     Clipped = "clipped" in Trace,
     /// The largest current uses less than 5 % of the range of the device.
     RangeUnused = "range-unused" in Trace,
+    /// The idle segment overlaps frames, or idle power is above the mean power of frames.
+    IdleBusy = "idle-busy" in Trace,
+    /// Power is negative on average.
+    NegativePower = "negative-power" in Trace,
+    /// The device changes the energy by more than 3 %.
+    EnergyChanged = "energy-changed" in Trace,
     /// A texture file cannot be read.
     MissingImage = "missing-image" in Scene,
     /// A `.mtl` file cannot be read, or lacks a material of an OBJ file.
