@@ -100,7 +100,8 @@ pub(crate) fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<d
     }
     if !known.contains(&options.dimensions) {
         let range = format!("{} to {}", known.start(), known.end());
-        return refused("dimensions", format!("{}: such points have {range}", options.dimensions));
+        let kind = format!("{:?}", options.points).to_lowercase();
+        return refused("points", format!("{kind} has {range} dimensions, not {}", options.dimensions));
     }
     let in_space = options.dimensions == 3 && options.points == Kind::Darts;
     if options.radius == 0.0 {
