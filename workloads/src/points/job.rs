@@ -101,7 +101,7 @@ pub(crate) fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<d
     if !known.contains(&options.dimensions) {
         let range = format!("{} to {}", known.start(), known.end());
         let kind = format!("{:?}", options.points).to_lowercase();
-        return refused("points", format!("{kind} has {range} dimensions, not {}", options.dimensions));
+        return refused("points", format!("`{kind}` has {range} dimensions, not {}", options.dimensions));
     }
     let in_space = options.dimensions == 3 && options.points == Kind::Darts;
     if options.radius == 0.0 {
