@@ -222,7 +222,7 @@ impl AccuracyWarning {
 
 /// Utilization of memory, if it is high and no unit decides the time.
 ///
-/// A unit that is busy all the time takes that long in any order. Waits for memory that is seldom busy are short. Between the two
+/// A unit that is busy all the time takes that long in any order. Waits for memory that is rarely busy are short. Between the two
 /// they depend on the order of lines, which the calendars do not know. The busiest bank counts as a unit.
 fn memory_order(timed: &Timed) -> Option<f64> {
     let share = |busy_ps: u64| busy_ps as f64 / timed.timeline.duration_ps.max(1) as f64;
