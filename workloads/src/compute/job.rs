@@ -106,7 +106,7 @@ impl Compute {
         prepass: Option<SurfaceId>,
         gpu: &mut Gpu<'_>,
     ) -> Result<SurfaceId, JobError> {
-        let levels = if self.is_chained() && self.samples.per_pixel() == 1 { u32::MAX } else { 1 };
+        let levels = if self.is_chained() { u32::MAX } else { 1 };
         let image = gpu.create_surface(&self.surface_spec("image", Format::Rgba16f)?.with_levels(levels));
         let depth = match prepass {
             Some(depth) => Attachment::loaded(depth),
@@ -152,11 +152,7 @@ impl Compute {
     pub fn chain(&self, frame: &Frame, gpu: &mut Gpu<'_>) -> Result<Chain, JobError> {
         let image = self.image(frame, None, gpu)?;
         let spec = SurfaceSpec::new("pixels", self.viewport()?, Format::Rgba16f).mipmapped();
-        let pixels = if self.is_chained() && self.samples.per_pixel() == 1 {
-            image
-        } else {
-            gpu.create_surface(&spec)
-        };
+        let pixels = if self.is_chained() { image } else { gpu.create_surface(&spec) };
         if pixels != image {
             gpu.resolve(&ResolvePass::new("resolve", image).dropping(), pixels)?;
         }
@@ -166,8 +162,9 @@ impl Compute {
         Ok(Chain { pixels, last, mean: mean.unwrap_or_default().dot(LUMINANCE) })
     }
 
+    /// Whether the image itself has a mip chain: samples of a pixel have to be resolved first.
     fn is_chained(&self) -> bool {
-        self.options.kernel == Kernel::MipChain
+        self.options.kernel == Kernel::MipChain && self.samples.per_pixel() == 1
     }
 
     fn surface(&self, gpu: &mut Gpu<'_>, name: &str, format: Format) -> Result<SurfaceId, JobError> {

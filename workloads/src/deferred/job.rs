@@ -186,11 +186,11 @@ impl DrawsScene for Deferred {
             Method::Forward => 0,
             Method::Deferred => GBuffer::bytes(self.options.normals) * u64::from(samples),
         };
-        let facts = vec![
-            Fact { name: "point_lights", value: self.lights.len() as f64 },
-            Fact { name: "g_buffer_bytes_per_pixel", value: bytes as f64 },
-            Fact { name: "lighting_invocations", value: lit_runs as f64 },
-        ];
+        let facts = Fact::all([
+            ("point_lights", self.lights.len() as f64),
+            ("g_buffer_bytes_per_pixel", bytes as f64),
+            ("lighting_invocations", lit_runs as f64),
+        ]);
         let mut warnings = self.regime_warnings(frame);
         let moving = frame.is_moving();
         warnings.extend(blur_warning(&*self.samples, moving, false));

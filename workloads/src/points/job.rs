@@ -164,8 +164,7 @@ pub fn darts<const D: usize>(
         passes += 1;
         Ok::<_, JobError>(points.iter().map(|point| std::array::from_fn(|k| point[k])).collect())
     };
-    let (found, drawn) =
-        poisson_disk_drawn(spec, rounds, draw)?.map_err(|error| JobError::Setting(error.to_string()))?;
+    let (found, drawn) = poisson_disk_drawn(spec, rounds, draw)?.map_err(JobError::setting)?;
     let [kept, candidates, fragments] = sums;
     Ok(Rasterized { found, drawn, kept, candidates, fragments, passes })
 }
@@ -288,8 +287,7 @@ impl Sampling {
 
     fn noise<const D: usize>(&self, seed: u64, gpu: &mut Gpu<'_>) -> Result<Drawn, JobError> {
         let spec = NoiseSpec { count: self.options.count, seed, across: columns_for(D) };
-        let found: DrawnNoise<D> =
-            draw_noise(&Named::Gauss, &spec, gpu).map_err(|error| JobError::Setting(error.to_string()))?;
+        let found: DrawnNoise<D> = draw_noise(&Named::Gauss, &spec, gpu).map_err(JobError::setting)?;
         let facts = Fact::all([
             ("points", found.points.len() as f64),
             ("candidates", found.candidates as f64),
@@ -364,7 +362,7 @@ mod tests {
     }
 
     #[test]
-    fn most_points_come_from_samples_and_packets_add_up() {
+    fn most_points_come_from_passes_and_packets_add_up() {
         let job = made(&[("radius", "0.05")], (128, 128)).unwrap();
         let (mut sum, mut passes) = (Counts::default(), 0);
         let hardware = hardware();
@@ -377,7 +375,7 @@ mod tests {
         let report = gpu.finish();
         assert_eq!((report.counts(), passes), (sum, 5));
         let fact = |name: &str| drawn.facts.iter().find(|fact| fact.name == name).unwrap().value;
-        assert!(fact("points_from_passes") > 0.5 * fact("points"), "{:?}", drawn.facts);
+        assert!(fact("points_from_passes") > 0.9 * fact("points"), "{:?}", drawn.facts);
         assert!(drawn.image.contains(&Vec3::ONE) && report.triangles() > 1600);
     }
 
