@@ -2,7 +2,7 @@
 
 use std::sync::LazyLock;
 
-use glam::{Vec2, Vec4};
+use glam::{Vec2, Vec3, Vec4};
 
 use crate::memory::LINE_BYTES;
 
@@ -167,6 +167,9 @@ pub fn srgb8_to_linear(code: u8) -> f32 {
 /// Linear values half way between neighbouring codes.
 static BORDERS: LazyLock<[f32; 255]> =
     LazyLock::new(|| std::array::from_fn(|code| decode(code as f64 + 0.5)));
+
+/// Weights of the channels of linear sRGB in its luminance (IEC 61966-2-1).
+pub const LUMINANCE: Vec3 = Vec3::new(0.2126, 0.7152, 0.0722);
 
 /// Nearest 8-bit sRGB code of a linear value. Values outside [0, 1] are clamped, NaN becomes 0.
 pub fn linear_to_srgb8(linear: f32) -> u8 {

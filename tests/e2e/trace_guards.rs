@@ -172,8 +172,41 @@ fn the_recorder_of_a_small_trace_has_a_range_that_fits_it() {
     assert!(error.abs() < bound && warnings.is_empty(), "{error}: {warnings}");
     let (_, warnings) = sample(&["--bits", "8", "--current-range", "30A"]);
     assert!(warnings.contains("[range-unused]") && warnings.contains("--current-range"), "{warnings}");
-    let (_, warnings) = sample(&["--current-range", "100mA"]);
+    let (found, warnings) = sample(&["--current-range", "100mA"]);
     assert!(warnings.contains("[clipped]"), "{warnings}");
+    assert_eq!(found["warnings"][0]["code"], "clipped");
+}
+
+/// Without a voltage of its own, a trace is drawn from a rail at the specified one.
+#[test]
+fn a_specified_voltage_keeps_the_energy_of_a_trace_of_power_alone() {
+    let inputs = Inputs::new();
+    let (power, out) = (inputs.put("t.csv", recording()), inputs.path("coarse.csv"));
+    let sample = |trace: &str, args: &[&str]| {
+        let ended = quintile().call(["trace", "sample", trace, "--out", &out].iter().chain(args));
+        assert_eq!(ended.code, Some(0), "{}", ended.stderr);
+        ended
+    };
+    let at_12_v = ["--specified-voltage", "12V", "--device-rate", "100Hz", "--bits", "8", "--json"];
+    let ended = sample(&power, &at_12_v);
+    let found: Value = serde_json::from_str(&ended.stdout).unwrap_or_default();
+    assert_eq!((&found["device"]["rail_v"], &found["warnings"]), (&12.0.into(), &serde_json::json!([])));
+    let error = found["relative_error"].as_f64().unwrap_or(f64::NAN);
+    assert!(error.abs() < 0.03, "{found}: {}", ended.stderr);
+    let trace = small_currents(&inputs);
+    let ended = sample(&trace, &["--specified-voltage", "5V"]);
+    assert!(ended.stderr.contains("warning: [energy-changed] the device records "), "{}", ended.stderr);
+}
+
+#[test]
+fn samples_that_are_lost_are_not_counted_as_written() {
+    let inputs = Inputs::new();
+    let (power, out) = (inputs.put("t.csv", recording()), inputs.path("gaps.csv"));
+    let loss = ["--packet-samples", "50", "--packet-loss", "0.3"];
+    let ended = quintile().call(["trace", "sample", &power, "--out", &out].iter().chain(&loss));
+    let rows = String::from_utf8_lossy(&read(&out)).lines().count() - 1;
+    let whole = ended.stdout.replace(',', "");
+    assert!(rows < 2350 && whole.contains(&format!(": {rows} samples and {} lost", 2350 - rows)), "{whole}");
 }
 
 #[test]
@@ -287,11 +320,59 @@ fn a_pass_that_begins_after_the_end_of_some_frames_is_warned_about() {
 }
 
 #[test]
+fn a_power_that_differs_from_voltage_times_current_is_warned_about() {
+    let inputs = Inputs::new();
+    let rows: String = (0..100).map(|i| format!("{},12,1,24\n", f64::from(i) / 5000.0)).collect();
+    let trace = inputs.put("t.csv", format!("time_s,voltage_V,current_A,power_W\n{rows}"));
+    let segment = ["trace", "energy", &trace, "--from", "0.001", "--to", "0.002"];
+    assert!(warned(&segment, "power-differs").contains("power_W is 2.0000 times voltage times current"));
+}
+
+#[test]
+fn idle_that_is_none_and_a_current_in_reverse_are_warned_about() {
+    let inputs = Inputs::new();
+    let trace = inputs.put("t.csv", recording());
+    let energy = ["trace", "energy", &trace, "--mark", "0.2"];
+    let with = |args: &[&'static str]| warned(&[&energy[..], args].concat(), "idle-busy");
+    assert!(with(&["--idle", "0.151..0.199"]).contains("overlaps 5 of 29 frames"));
+    assert!(with(&["--idle-w", "25"]).contains("is above that of the frames"));
+    let ended = quintile().call(energy.iter().chain(&["--idle", "0..0.09", "--json"]));
+    let report: Value = serde_json::from_str(&ended.stdout).unwrap_or_default();
+    assert_eq!(report["warnings"], serde_json::json!([]), "{}", ended.stderr);
+    let reversed = recording().replace(',', ",-").replacen("time_s,-power_W", "time_s,power_W", 1);
+    let reversed = inputs.put("r.csv", reversed);
+    warned(&["trace", "energy", &reversed, "--from", "0.1", "--to", "0.2"], "negative-power");
+}
+
+#[test]
 fn an_alignment_of_even_frames_without_anchors_is_ambiguous() {
     let inputs = Inputs::new();
     let stamps: String = (0..20).map(|frame| format!("{}\n", 7.0 + 0.01 * f64::from(frame))).collect();
     let (trace, stamps) = (inputs.put("t.csv", recording()), inputs.put("stamps.txt", stamps));
-    warned(&["trace", "align", &trace, &stamps, "--mark", "0.1"], "ambiguous-alignment");
+    let align = ["trace", "align", &trace, &stamps, "--mark", "0.1"];
+    warned(&align, "ambiguous-alignment");
+    let ended = quintile().call(align.iter().chain(&["--json"]));
+    let report: Value = serde_json::from_str(&ended.stdout).unwrap_or_default();
+    let codes = report["warnings"]
+        .as_array()
+        .map_or(0, |all| all.iter().filter(|warning| warning["code"] == "ambiguous-alignment").count());
+    assert_eq!(codes, 1, "{report}");
+}
+
+#[test]
+fn what_columns_without_names_are_taken_for_is_noted() {
+    let inputs = Inputs::new();
+    let rows: String = (0..100).map(|i| format!("{},1.5\n", f64::from(i) / 1000.0)).collect();
+    let trace = inputs.put("t.csv", rows);
+    let energy = |args: &[&str]| {
+        quintile().call(["trace", "energy", &trace, "--from", "0", "--to", "0.01"].iter().chain(args))
+    };
+    let ended = energy(&[]);
+    assert!(ended.code == Some(2) && ended.stderr.contains("columns without names"), "{}", ended.stderr);
+    let ended = energy(&["--time-column", "1", "--power-column", "2"]);
+    assert!(ended.code == Some(0) && ended.stdout.contains("0.015000 J"), "{}{}", ended.stdout, ended.stderr);
+    let ended = energy(&["--rate", "1000"]);
+    assert!(ended.stderr.contains("column 1 as voltages, column 2 as currents"), "{}", ended.stderr);
 }
 
 #[test]

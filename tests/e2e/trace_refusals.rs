@@ -72,12 +72,19 @@ fn a_file_that_cannot_be_read_ends_every_command_with_1() {
 }
 
 #[test]
-fn the_summary_of_a_run_is_no_trace() {
+fn files_that_hold_no_trace_are_named_with_what_to_do() {
     let inputs = Inputs::new();
-    let summary = inputs.put("summary.json", "{\"schema\": 3}");
-    let ended = quintile().call(["trace", "frames", &summary, "--mark", "0.1"]);
-    assert_eq!(ended.code, Some(2), "{}", ended.stderr);
-    assert!(ended.stderr.contains("that of a run is trace.parquet beside"), "{}", ended.stderr);
+    let utf_16: Vec<u8> = "\u{feff}time_s,power_W\n0,1\n".encode_utf16().flat_map(u16::to_le_bytes).collect();
+    for (name, bytes, says) in [
+        ("summary.json", &b"{\"schema\": 3}"[..], "that of a run is trace.parquet beside"),
+        ("excel.csv", &utf_16, "excel.csv: this is a text in UTF-16"),
+        ("excel.csv", &utf_16, "save it as UTF-8"),
+    ] {
+        let file = inputs.put(name, bytes);
+        let ended = quintile().call(["trace", "frames", &file, "--mark", "0.1"]);
+        assert_eq!(ended.code, Some(2), "{}", ended.stderr);
+        assert!(ended.stderr.contains(says), "{}", ended.stderr);
+    }
 }
 
 #[test]

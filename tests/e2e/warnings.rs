@@ -15,12 +15,16 @@ const TESTED: &str = "tests of the workload bring it about, each in a run of its
 const COMMAND: &str = "a run does not give it; tests of `quintile trace` bring it about";
 
 /// Codes without a test here, with the reason.
-const NOT_PROVOKED: [(&str, &str); 27] = [
+const NOT_PROVOKED: [(&str, &str); 33] = [
     ("ambiguous-alignment", COMMAND),
     ("anchors-off", COMMAND),
     ("clipped", COMMAND),
+    ("energy-changed", COMMAND),
+    ("idle-busy", COMMAND),
+    ("negative-power", COMMAND),
     ("inverse-units", COMMAND),
     ("pass-beyond", COMMAND),
+    ("power-differs", COMMAND),
     ("rail-counted-twice", COMMAND),
     ("range-unused", COMMAND),
     ("uneven-runs", COMMAND),
@@ -56,6 +60,14 @@ const NOT_PROVOKED: [(&str, &str); 27] = [
         "it takes a larger GPU than those that come with the program; a unit test in `timing` has a stream of such packets",
     ),
     (
+        "memory-order",
+        "it takes memory that is busy for most of a frame, but not all; a unit test in `run` has streams on built-in GPUs",
+    ),
+    (
+        "batch-overlap",
+        "it takes a frame of many short batches or passes; a unit test in `run` has streams of them",
+    ),
+    (
         "start-error",
         "it takes a start that counts as found and is off by more than half of its frame; a unit test in `run` makes one up",
     ),
@@ -67,9 +79,7 @@ const NOT_PROVOKED: [(&str, &str); 27] = [
 ];
 
 /// Codes that the tests below produce, and `orthographic-view`, which `visibility_inputs` tests.
-const PROVOKED: [&str; 57] = [
-    "points-from-host",
-    "points-rejected",
+const PROVOKED: [&str; 59] = [
     "accuracy-missed",
     "alpha-ignored",
     "behind-camera",
@@ -102,6 +112,7 @@ const PROVOKED: [&str; 57] = [
     "light-ignored",
     "memory-rows",
     "metallic-ignored",
+    "mip-chain-odd",
     "missed-vsync",
     "missing-image",
     "missing-material",
@@ -114,9 +125,12 @@ const PROVOKED: [&str; 57] = [
     "orthographic-view",
     "packets-lost",
     "platform-mismatch",
+    "points-from-host",
+    "points-rejected",
     "points-thin-regions",
     "primitive-dropped",
     "reflection-ignored",
+    "samples-without-blur",
     "short-frame",
     "sliver-triangles",
     "sub-sample-triangles",
@@ -585,12 +599,28 @@ fn without_margins(inputs: &Inputs) -> String {
 }
 
 #[test]
-fn points_that_passes_do_not_make_and_candidates_in_vain() {
+fn points_that_passes_do_not_make_and_rejected_candidates() {
     let frame = ["--frames", "0..1", "--size", "64x64"];
     let run = |set: &[&str]| quintile().run("sampling", &[&frame[..], set].concat());
     assert_warns(&run(&["--set", "rounds=1", "--set", "radius=0.1"]), "points-from-host");
     let loose = ["--set", "points=noise", "--set", "dimensions=4", "--set", "count=100"];
     assert_warns(&run(&loose), "points-rejected");
+}
+
+#[test]
+fn samples_of_one_time_and_odd_mip_chains() {
+    let frame = ["--frames", "18..19", "--size", "80x45"];
+    let sharp = ["--table", "msaa", "--samples", "4", "--lens", "0"];
+    assert_warns(&quintile().run("default", &[&frame[..], &sharp].concat()), "samples-without-blur");
+    let blurred = quintile().run("deferred", &[&frame[..], &["--samples", "4", "--shutter", "0.5"]].concat());
+    assert!(
+        !blurred.warning_codes().contains(&"samples-without-blur".to_owned()),
+        "samples spread over the open shutter"
+    );
+    assert_warns(
+        &quintile().run("compute", &[&frame[..], &["--set", "kernel=mip_chain"]].concat()),
+        "mip-chain-odd",
+    );
 }
 
 #[test]

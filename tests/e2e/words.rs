@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use crate::support::{Inputs, root};
 
 /// Refused words and phrases, each with its replacement. They are compared as whole words, in any case.
-const REFUSED: [(&str, &str); 66] = [
+const REFUSED: [(&str, &str); 68] = [
     ("a fault of the program", "internal error"),
     ("alike", "in the same way, likewise"),
     ("are told", "are reported; are distinguished"),
@@ -16,6 +16,8 @@ const REFUSED: [(&str, &str); 66] = [
     ("beams and bodies", "light volumes, bounding volumes"),
     ("beaten by", "dominated by"),
     ("bodies and beams", "bounding volumes, light volumes"),
+    ("const least ", "const MIN_"),
+    ("const most ", "const MAX_"),
     ("doubt", "warning, low confidence"),
     ("doubted", "flagged"),
     ("doubts", "warnings"),

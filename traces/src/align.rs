@@ -16,6 +16,9 @@ use warnings::{Code, Warning};
 const MIN_PAIRS: usize = 4;
 /// A fit is ambiguous if the second best leaves at most this many times the residual of the best.
 const MAX_RIVAL_RATIO: f64 = 2.0;
+/// A fit is ambiguous if chance alone leaves as little in more than this many other places: one in a hundred times, a fit by chance
+/// is not known as such.
+const MAX_CHANCE_FITS: f64 = 0.01;
 
 /// Largest residual of a fit, as a share of the median gap of the starts.
 const MAX_RESIDUAL_SHARE: f64 = 0.1;
@@ -116,13 +119,13 @@ impl Alignment {
     }
 
     /// The pairing of stamps with starts of the least residual: one after another from some shift on or, if
-    /// that does not fit, with gaps in either. Both sorted, s.
+    /// that does not fit, with gaps in either. Both sorted, s. Starts are known to `resolution_s` rms: residuals below that say nothing.
     ///
     /// # Errors
     /// [`AlignError::Few`] for fewer than four of either, [`AlignError::Equal`] for stamps of which too many are the same,
     /// [`AlignError::Unlike`] where nothing fits.
-    pub fn by_fit(stamps_s: &[f64], starts_s: &[f64]) -> Result<Self, AlignError> {
-        let in_step = Self::in_step(stamps_s, starts_s)?;
+    pub fn by_fit(stamps_s: &[f64], starts_s: &[f64], resolution_s: f64) -> Result<Self, AlignError> {
+        let in_step = Self::in_step(stamps_s, starts_s, resolution_s.max(EXACT_S))?;
         let gap_s = usual_gap(starts_s).unwrap_or(0.0);
         if in_step.residual_s <= EXACT_S.max(MAX_RESIDUAL_SHARE * MAX_RESIDUAL_SHARE * gap_s) {
             return Ok(in_step);
@@ -137,7 +140,7 @@ impl Alignment {
     }
 
     /// The shift by which one after another leaves least.
-    fn in_step(stamps_s: &[f64], starts_s: &[f64]) -> Result<Self, AlignError> {
+    fn in_step(stamps_s: &[f64], starts_s: &[f64], least_s: f64) -> Result<Self, AlignError> {
         let fewer = stamps_s.len().min(starts_s.len());
         if fewer < MIN_PAIRS {
             return Err(AlignError::Few { stamps: stamps_s.len(), starts: starts_s.len() });
@@ -151,13 +154,28 @@ impl Alignment {
             return Err(AlignError::Equal { stamps: stamps_s.len() });
         }
         fits.sort_by(|a, b| a.residual_s.total_cmp(&b.residual_s));
+        let by_chance = chance_fits(&fits, least_s) > MAX_CHANCE_FITS;
         // Of all that fit about as well, the one that pairs most.
-        let limit_s = MAX_RIVAL_RATIO * fits[0].residual_s.max(EXACT_S);
+        let limit_s = MAX_RIVAL_RATIO * fits[0].residual_s.max(least_s);
         fits.retain(|fit| fit.residual_s <= limit_s);
-        let ambiguous = fits.len() > 1;
+        let ambiguous = by_chance || fits.len() > 1;
         fits.sort_by_key(|fit| core::cmp::Reverse(fit.pairs));
         Ok(Self { ambiguous, ..fits[0] })
     }
+}
+
+/// In how many other places chance leaves as little as in the best, at most, where the places are no better than each other: with
+/// few pairs one of many residuals is small. `fits` are in order of their residuals, of which those below `least_s` say nothing.
+///
+/// `n` pairs leave `n - 2` degrees of freedom `k`; chi-square is at most a share `x` of `k` with a probability of at most
+/// `(x e^(1 - x))^(k / 2)` (Chernoff 1952). The median of the residuals stands for the usual one.
+fn chance_fits(fits: &[Alignment], least_s: f64) -> f64 {
+    let Some((best, others)) = fits.split_first().filter(|(_, others)| !others.is_empty()) else {
+        return 0.0;
+    };
+    let ratio = best.residual_s.max(least_s) / others[others.len() / 2].residual_s.max(least_s);
+    let (share, freedom) = (ratio * ratio, (best.pairs - 2) as f64);
+    others.len() as f64 * libm::pow(share * libm::exp(1.0 - share), 0.5 * freedom)
 }
 
 /// Least squares of the first stamp with the first start, the second with the second, and so on.
@@ -295,7 +313,7 @@ mod tests {
         let anchors = Alignment::by_anchors((stamp(3.0), 3.0), (stamp(9.0), 9.0)).unwrap();
         assert!((anchors.time_s(stamp(5.0)) - 5.0).abs() < 1e-12);
         let stamps: Vec<f64> = starts[7..30].iter().map(|&t| stamp(t)).collect();
-        let fit = Alignment::by_fit(&stamps, &starts).unwrap();
+        let fit = Alignment::by_fit(&stamps, &starts, 1e-5).unwrap();
         assert!((fit.scale - 1.0001).abs() < 1e-9 && fit.residual_s < 1e-12 && fit.pairs == 23, "{fit:?}");
         assert!(!fit.ambiguous);
     }
@@ -311,7 +329,7 @@ mod tests {
         let mut extra = all.clone();
         extra.insert(20, 0.5 * (all[19] + all[20]));
         for stamps in [without(17), without(5), extra] {
-            let fit = Alignment::by_fit(&stamps, &starts).unwrap();
+            let fit = Alignment::by_fit(&stamps, &starts, 1e-5).unwrap();
             assert!((fit.scale - 1.0001).abs() < 1e-9 && !fit.ambiguous, "{fit:?}");
             assert_eq!(fit.pairs, stamps.len().min(40));
         }
@@ -321,16 +339,46 @@ mod tests {
     fn stamps_of_something_else_are_refused() {
         let others: Vec<f64> =
             (0..40).map(|i| 0.01 * f64::from(i) + 0.009 * f64::from(i * 37 % 11) / 11.0).collect();
-        let fit = Alignment::by_fit(&others, &uneven());
+        let fit = Alignment::by_fit(&others, &uneven(), 1e-5);
         assert!(matches!(fit, Err(AlignError::Unlike { .. })), "{fit:?}");
+    }
+
+    /// 138 starts 40 ms apart, each off by at most `most_s` either way, on a grid of that if `whole`.
+    fn even(seed: u64, most_s: f64, whole: bool) -> Vec<f64> {
+        let random = crate::random::Random::new(seed, 0);
+        let off = |index| random.between(index, [-1.0, 1.0]);
+        let off = |index| if whole { libm::round(1.5 * off(index)) } else { off(index) };
+        (0..138_u32).map(|index| 0.04 * f64::from(index) + most_s * off(index.into())).collect()
+    }
+
+    #[test]
+    fn a_few_even_stamps_fit_an_even_beat_by_chance_and_are_ambiguous() {
+        let resolution_s = 2e-5 / 12_f64.sqrt();
+        for (most_s, whole) in [(2e-5, false), (2e-5, true), (1e-3, false)] {
+            for count in [4, 5, 8, 20] {
+                let stamps: Vec<f64> = (0..count).map(|index| 0.04 * f64::from(index)).collect();
+                let fit =
+                    |seed| Alignment::by_fit(&stamps, &even(seed, most_s, whole), resolution_s).unwrap();
+                let sure = (0..200).filter(|seed| !fit(*seed).ambiguous).count();
+                assert!(sure as f64 <= 200.0 * MAX_CHANCE_FITS, "{sure} of 200: {most_s} s, {count} stamps");
+            }
+        }
+    }
+
+    #[test]
+    fn four_stamps_of_uneven_frames_decide() {
+        let starts = uneven();
+        let stamps: Vec<f64> = starts[11..15].iter().map(|time_s| time_s - 1.5).collect();
+        let fit = Alignment::by_fit(&stamps, &starts, 1e-5).unwrap();
+        assert!(!fit.ambiguous && (fit.offset_s - 1.5).abs() < 1e-9, "{fit:?}");
     }
 
     #[test]
     fn an_even_beat_is_ambiguous_and_bad_input_refused() {
         let beat: Vec<f64> = (0..20).map(|i| f64::from(i) / 30.0).collect();
-        assert!(Alignment::by_fit(&beat[..10], &beat).unwrap().ambiguous);
-        assert!(Alignment::by_fit(&beat[..2], &beat).unwrap_err().to_string().contains("2 stamps"));
+        assert!(Alignment::by_fit(&beat[..10], &beat, 0.0).unwrap().ambiguous);
+        assert!(Alignment::by_fit(&beat[..2], &beat, 0.0).unwrap_err().to_string().contains("2 stamps"));
         assert!(Alignment::by_anchors((1.0, 2.0), (1.0, 3.0)).is_err());
-        assert_eq!(Alignment::by_fit(&[5.0; 6], &beat), Err(AlignError::Equal { stamps: 6 }));
+        assert_eq!(Alignment::by_fit(&[5.0; 6], &beat, 0.0), Err(AlignError::Equal { stamps: 6 }));
     }
 }

@@ -1,6 +1,6 @@
 //! Frames of a recording with their energies: in memory, or in pieces where the file is long.
 
-use crate::energy::{FrameEnergy, PowerIntegral};
+use crate::energy::{FrameEnergy, PowerIntegral, negative_power};
 use crate::frames::{FinderMethod, Found, MarkError, Marks, Options, Proposal, Window, find_with, propose};
 use crate::io::{ReadError, ReadOptions, Rows};
 use crate::stream::{self, StreamError};
@@ -49,6 +49,8 @@ pub struct FrameSet {
     pub total_j: f64,
     /// The proposed start, where one was to be proposed.
     pub proposal: Option<Proposal>,
+    /// Whether the last frame ends with the trace, not at an end mark.
+    pub ends_with_trace: bool,
 }
 
 /// Reason why no frames were found.
@@ -119,13 +121,15 @@ impl Search {
             Some(proposal) => vec![proposal.mark_s],
             None => self.marked(&trace.metadata)?,
         };
-        let end_s = self.end_s.or_else(|| trace.metadata.end_mark_s()).unwrap_or(trace.end_s());
+        let marked_end_s = self.end_s.or_else(|| trace.metadata.end_mark_s());
+        let end_s = marked_end_s.unwrap_or(trace.end_s());
         let marks = Marks { starts_s, window: self.window, end_s };
-        let found = find_with(trace, &marks, &Options { method: self.method })?;
+        let mut found = find_with(trace, &marks, &Options { method: self.method })?;
         if let Some(Proposal { mark_s, .. }) = proposal.filter(|_| found.starts.len() < 2) {
             return Err(SearchError::NoRepetition { mark_s });
         }
         let integral = PowerIntegral::new(trace);
+        found.warnings.extend(negative_power(integral.total_j()));
         Ok(FrameSet {
             energies: integral.frames(&found),
             found,
@@ -135,6 +139,7 @@ impl Search {
             start_s: trace.start_s(),
             total_j: integral.total_j(),
             proposal,
+            ends_with_trace: marked_end_s.is_none(),
         })
     }
 
@@ -148,9 +153,11 @@ impl Search {
         }
         let rows = Rows::open(path, options)?;
         let starts_s = self.marked(rows.metadata())?;
-        let end_s = self.end_s.or_else(|| rows.metadata().end_mark_s()).unwrap_or(f64::INFINITY);
+        let marked_end_s = self.end_s.or_else(|| rows.metadata().end_mark_s());
+        let end_s = marked_end_s.unwrap_or(f64::INFINITY);
         let marks = Marks { starts_s, window: self.window, end_s };
-        let streamed = stream::find(path, options, &marks)?;
+        let mut streamed = stream::find(path, options, &marks)?;
+        streamed.found.warnings.extend(negative_power(streamed.total_j));
         let clock = streamed.clock;
         Ok(FrameSet {
             found: streamed.found,
@@ -161,6 +168,7 @@ impl Search {
             start_s: clock.start_s,
             total_j: streamed.total_j,
             proposal: None,
+            ends_with_trace: marked_end_s.is_none(),
         })
     }
 
@@ -182,6 +190,7 @@ impl Search {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::energy::whole;
     use crate::io::parquet;
     use crate::trace::{Mark, MarkKind};
 
@@ -218,6 +227,33 @@ mod tests {
         assert_eq!(given.marked(&Metadata::default()).unwrap(), [0.11, 0.12]);
         assert_eq!(given.marked(&trace(marks).metadata).unwrap(), [0.11, 0.12]);
         assert!(matches!(search().of_trace(&trace(Vec::new())), Err(SearchError::Unmarked)));
+    }
+
+    #[test]
+    fn a_reversed_current_is_warned_about() {
+        let all = trace(Vec::new());
+        let reversed = all.current_a().iter().map(|amperes| -amperes).collect();
+        let reversed = Trace::new(vec![1.0; 1600], reversed, 5e3, 0.0, Metadata::default()).unwrap();
+        let marked = Search { starts_s: vec![0.15], ..search() };
+        let negative = |trace: &Trace| {
+            let set = marked.of_trace(trace).unwrap();
+            set.found.warnings.iter().any(|warning| warning.code == "negative-power")
+        };
+        assert!(negative(&reversed) && !negative(&all));
+    }
+
+    #[test]
+    fn a_last_frame_that_the_recording_cuts_is_not_whole_and_one_before_an_end_mark_is() {
+        // The trace without what follows 27 of the 50 samples of its last frame.
+        let all = trace(Vec::new());
+        let cut =
+            Trace::new(vec![1.0; 1477], all.current_a()[..1477].to_vec(), 5e3, 0.0, Metadata::default())
+                .unwrap();
+        let marked = Search { starts_s: vec![0.15], ..search() };
+        let set = marked.of_trace(&cut).unwrap();
+        assert_eq!((set.energies.len(), whole(&set.energies, set.ends_with_trace).len()), (20, 19));
+        let set = Search { end_s: Some(0.2954), ..marked }.of_trace(&cut).unwrap();
+        assert_eq!((set.energies.len(), whole(&set.energies, set.ends_with_trace).len()), (20, 20));
     }
 
     #[test]

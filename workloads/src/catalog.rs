@@ -65,7 +65,7 @@ const JOBS: &[Entry] = &[
     },
     Entry {
         name: "sampling",
-        what: "maximal Poisson-disk points: darts thrown at rasterized uncovered regions",
+        what: "points by rasterization: Poisson-disk darts, noise that follows a bell, samples in a volume",
         flags: crate::points::job::FLAGS,
         make: crate::points::job::job,
     },

@@ -9,7 +9,7 @@ use warnings::Warning;
 use crate::error::LoadError;
 use crate::job::{Drawn, Draws, IMAGE_SIZE, Job, JobError, Reduction, Request};
 use crate::regime::Regime;
-use crate::samples::SampleChoice;
+use crate::samples::{SampleChoice, blur_warning};
 use crate::scene::{Frame, FrameMesh, Scene, Settings};
 
 /// Renderings of a scene in one pass per frame.
@@ -92,12 +92,9 @@ impl Draws for Rendering {
         let settings = pipeline::Settings { spec: gpu.spec(), viewport, samples, background };
         let pass = RasterPass::new(&frame.camera, &draws, &settings).named("scene");
         let rendered = gpu.draw(&pass)?;
-        Ok(Drawn {
-            image: rendered.into_image(),
-            moving: frame.is_moving(),
-            lens: frame.camera.lens().is_some(),
-            ..Drawn::default()
-        })
+        let (moving, lens) = (frame.is_moving(), frame.camera.lens().is_some());
+        let warnings = blur_warning(samples, moving, lens).into_iter().collect();
+        Ok(Drawn { image: rendered.into_image(), moving, lens, warnings, ..Drawn::default() })
     }
 
     fn regime(&self, frame: &Frame) -> Result<Regime, JobError> {

@@ -7,6 +7,7 @@ use std::path::Path;
 use activity::spec::suggestion;
 use pipeline::sampling::{Sample, SampleSource};
 use pipeline::{SampleSpec, SampleTable, Viewport};
+use warnings::{Code, Warning};
 
 use crate::error::{LoadError, Source};
 use crate::import::reader::Bytes;
@@ -66,6 +67,24 @@ impl SampleChoice {
             },
         }
     }
+}
+
+/// Warns if the samples of a pixel do not spread over a dimension that is drawn: time, or the lens. One sample has no spread
+/// and is left out.
+pub(crate) fn blur_warning(samples: &dyn SampleSource, moving: bool, lens: bool) -> Option<Warning> {
+    let mut pixel = vec![Sample::default(); samples.per_pixel() as usize];
+    samples.pixel_into(0, 0, &mut pixel);
+    let one = |of: fn(&Sample) -> [f32; 2]| pixel.len() > 1 && pixel.iter().all(|at| of(at) == of(&pixel[0]));
+    let what = match (moving && one(|at| [at.t, 0.0]), lens && one(|at| [at.u, at.v])) {
+        (true, true) => "one time and one lens position",
+        (true, false) => "one time",
+        (false, true) => "one lens position",
+        (false, false) => return None,
+    };
+    let message = format!(
+        "all samples of a pixel have {what}: the image has no such blur, and its dimensions are paid for; --table owen spreads them"
+    );
+    Some(Warning::new(Code::SamplesWithoutBlur, message))
 }
 
 fn unknown(name: &str) -> LoadError {

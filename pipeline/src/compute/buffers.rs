@@ -2,7 +2,7 @@
 
 use std::marker::PhantomData;
 
-use crate::memory::Surface;
+use crate::memory::MemoryRange;
 
 /// An atomic operation on a word, an unsigned integer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -63,7 +63,7 @@ impl Word for f32 {
 pub struct Buffer<T> {
     pub(super) number: u32,
     words: u32,
-    surface: Surface,
+    region: MemoryRange,
     of: PhantomData<fn() -> T>,
 }
 
@@ -87,13 +87,13 @@ impl<T> Buffer<T> {
     }
 
     /// Where it is in memory.
-    pub fn surface(&self) -> Surface {
-        self.surface
+    pub fn region(&self) -> MemoryRange {
+        self.region
     }
 
     /// The buffer, for a pass that reads it.
     pub fn reads(&self) -> BufferBinding {
-        BufferBinding { number: self.number, surface: self.surface, access: Access::Read }
+        BufferBinding { number: self.number, region: self.region, access: Access::Read }
     }
 
     /// The buffer, for a pass that writes it.
@@ -115,7 +115,7 @@ pub enum Access {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BufferBinding {
     pub(super) number: u32,
-    pub(crate) surface: Surface,
+    pub(crate) region: MemoryRange,
     pub(crate) access: Access,
 }
 
@@ -130,7 +130,7 @@ impl BufferBinding {
 #[derive(Clone, Debug)]
 struct Data {
     name: String,
-    surface: Surface,
+    region: MemoryRange,
     words: Vec<u32>,
 }
 
@@ -150,11 +150,11 @@ pub(crate) struct Stored {
 
 impl Buffers {
     /// Adds a buffer of `data` in `surface`.
-    pub fn add<T: Word>(&mut self, name: &str, surface: Surface, data: &[T]) -> Buffer<T> {
+    pub fn add<T: Word>(&mut self, name: &str, region: MemoryRange, data: &[T]) -> Buffer<T> {
         let words = data.iter().map(|value| value.bits()).collect();
-        self.0.push(Data { name: name.to_owned(), surface, words });
+        self.0.push(Data { name: name.to_owned(), region, words });
         let number = self.0.len() as u32 - 1;
-        Buffer { number, words: data.len() as u32, surface, of: PhantomData }
+        Buffer { number, words: data.len() as u32, region, of: PhantomData }
     }
 
     /// The values of a buffer.
@@ -177,7 +177,7 @@ impl Buffers {
 
     /// Address of a word.
     pub fn address(&self, buffer: u32, index: u32) -> u64 {
-        self.0[buffer as usize].surface.address() + 4 * u64::from(index)
+        self.0[buffer as usize].region.address() + 4 * u64::from(index)
     }
 
     /// A word of a buffer that has it.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::Vec4;
 
 use super::error::{PassError, SurfaceProblem};
-use crate::memory::{AddressSpace, Surface};
+use crate::memory::{AddressSpace, MemoryRange};
 use crate::state::Clear;
 use crate::surface::{Layout, SurfaceSpec, Texels};
 use crate::texture::Texture;
@@ -109,7 +109,7 @@ pub enum Binding<'a> {
 pub(super) struct SurfaceState {
     name: String,
     spec: SurfaceSpec<'static>,
-    pub region: Surface,
+    pub region: MemoryRange,
     pub layout: Layout,
     /// `None` while nothing is stored in it.
     pub texels: Option<Arc<Texels>>,

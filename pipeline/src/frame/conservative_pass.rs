@@ -14,7 +14,7 @@ use super::lanes::{LaneWork, Lanes};
 use crate::conservative::{Grid, MovingTriangle, Rasterizer, TileLoop, Touch};
 use crate::depth::{Numbers, Real};
 use crate::geometry::{Cull, Projection, Viewport};
-use crate::memory::Surface;
+use crate::memory::MemoryRange;
 use crate::setup;
 use crate::tally::{Costs, Kernel};
 
@@ -31,20 +31,20 @@ pub struct Primitive {
     /// View, clip planes in lens and time, and halvings of time.
     pub rasterizer: Rasterizer,
     /// Columns and rows of tiles that are tested (scissor).
-    pub part: [Range<u32>; 2],
+    pub scissor: [Range<u32>; 2],
     /// Number of the body that the triangle belongs to, such as the bounding volume of which it is a face. Triangles of a
     /// body follow each other and share the state of the shader.
     pub body: u32,
     /// Whether it is the triangle before it in another clip region, so that its vertices are there.
-    pub again: bool,
+    pub reuses_vertices: bool,
     /// Whether it is dropped in set-up unless it shows its back: its vertices then appear in the order of x, y.
-    pub back_only: bool,
+    pub keeps_back_faces_only: bool,
 }
 
 impl Primitive {
     /// Whether set-up drops the triangle because of the face it shows, and its multiply-adds.
     fn is_culled(&self, costs: &Costs) -> (bool, u32) {
-        if !self.back_only {
+        if !self.keeps_back_faces_only {
             return (false, 0);
         }
         let corners = self.triangle.open();
@@ -69,7 +69,7 @@ pub struct ConservativeDraw<'a> {
     /// Tiles along a side of a block whose tiles of one triangle make one packet: those of a tile of the image.
     pub block: u32,
     /// The vertices in memory, three of each triangle.
-    pub vertices: Surface,
+    pub vertices: MemoryRange,
     /// Bytes of a vertex, at both ends of the shutter if it moves.
     pub vertex_bytes: u32,
     /// What moved the vertices to the image plane, at both ends; `None` if they are there in memory.
@@ -91,12 +91,17 @@ pub struct TileIntervals<'a> {
 /// arguments alone, and on what was stored before the draw.
 pub trait TileShader: Sync {
     /// State that the triangles of a body share.
-    type Body: Default;
+    type BodyState: Default;
     /// Result for a tile, which is stored in the order of triangles.
     type Output: Send;
 
     /// Runs on a tile; `None` discards it. What it does is counted as it does it.
-    fn run(&self, body: &mut Self::Body, lanes: &Lanes, tile: &TileIntervals<'_>) -> Option<Self::Output>;
+    fn run(
+        &self,
+        state: &mut Self::BodyState,
+        lanes: &Lanes,
+        tile: &TileIntervals<'_>,
+    ) -> Option<Self::Output>;
 }
 
 /// A pass in conservative mode. Its targets are cleared when it begins.
@@ -228,7 +233,7 @@ impl ConservativePass {
 /// Number of each primitive's triangle in the pass.
 fn numbered(primitives: &[Primitive], first: u32) -> Vec<u32> {
     let next = primitives.iter().scan(first, |next, primitive| {
-        *next += u32::from(!primitive.again);
+        *next += u32::from(!primitive.reuses_vertices);
         Some(next.saturating_sub(1).max(first))
     });
     next.collect()
@@ -256,12 +261,12 @@ fn log<S: TileShader>(
     shader: &S,
     lanes: &Lanes,
 ) -> BodyLog<S::Output> {
-    let (mut tiles, mut rest, mut state) = (Vec::new(), Vec::new(), S::Body::default());
+    let (mut tiles, mut rest, mut state) = (Vec::new(), Vec::new(), S::BodyState::default());
     for (item, primitive) in body.iter().zip(start..).filter(|(item, _)| !item.is_culled(lanes.costs()).0) {
         let after = item.rasterizer.rasterize_counted(
             &item.triangle,
             draw.grid,
-            item.part.clone(),
+            item.scissor.clone(),
             |tile, touch, work: &mut TileLoop| {
                 let output = shader.run(&mut state, lanes, &TileIntervals { primitive, tile, touch });
                 let tests = std::mem::take(work);
@@ -281,7 +286,8 @@ fn vertices(gpu: &mut Gpu<'_>, draw: &ConservativeDraw<'_>, costs: &Costs) {
     start.counts[Event::Draws] = 1;
     gpu.push(&start, 0);
     let vertex_ops = 2 * draw.projection.map_or(0, Projection::vertex_ops);
-    let new: Vec<&Primitive> = draw.primitives.iter().filter(|primitive| !primitive.again).collect();
+    let new: Vec<&Primitive> =
+        draw.primitives.iter().filter(|primitive| !primitive.reuses_vertices).collect();
     let bytes = u64::from(draw.vertex_bytes);
     for (number, batch) in (0_u64..).zip(new.chunks(BATCH)) {
         let (vertices, triangles) = (3 * batch.len() as u32, batch.len() as u32);

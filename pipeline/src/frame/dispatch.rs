@@ -10,7 +10,7 @@ use crate::compute::{
     self, Access, Buffer, ComputeError, ComputePass, ComputeSpec, GroupLog, GroupPlace, Stored, SurfaceView,
     Touched, View, Word,
 };
-use crate::memory::{MemorySystem, Surface};
+use crate::memory::{MemoryRange, MemorySystem};
 
 /// Groups that run before their packets are emitted.
 const CHUNK: u64 = 1024;
@@ -18,12 +18,12 @@ const CHUNK: u64 = 1024;
 impl Gpu<'_> {
     /// A new buffer with `data`.
     pub fn buffer<T: Word>(&mut self, name: &str, data: &[T]) -> Buffer<T> {
-        let surface = self.surface(4 * data.len() as u64);
+        let surface = self.allocate(4 * data.len() as u64);
         self.buffers.add(name, surface, data)
     }
 
     /// What a pass wrote to `surface`, as a buffer of `data` in their order; `None` if they do not fit in it.
-    pub fn view<T: Word>(&mut self, name: &str, surface: Surface, data: &[T]) -> Option<Buffer<T>> {
+    pub fn view<T: Word>(&mut self, name: &str, surface: MemoryRange, data: &[T]) -> Option<Buffer<T>> {
         let fits = 4 * data.len() as u64 <= surface.bytes();
         fits.then(|| self.buffers.add(name, surface, data))
     }
@@ -52,10 +52,7 @@ impl Gpu<'_> {
         self.check_memory(pass.name)?;
         let (name, draws, others) = (pass.name.to_owned(), vec![Counts::default()], Counts::default());
         self.start(PassReport { name, triangles: 0, draws, others });
-        if pass
-            .bindings
-            .iter()
-            .any(|binding| self.conflicts(binding.surface, binding.access == Access::Write))
+        if pass.bindings.iter().any(|binding| self.conflicts(binding.region, binding.access == Access::Write))
         {
             self.barrier(Waits::Tiles);
         }
@@ -66,8 +63,8 @@ impl Gpu<'_> {
         self.groups(pass, &spec, group).map_err(failed)?;
         for binding in pass.bindings {
             match binding.access {
-                Access::Read => self.note_read(binding.surface.address()),
-                Access::Write => self.keep(binding.surface),
+                Access::Read => self.note_read(binding.region.address()),
+                Access::Write => self.keep(binding.region),
             }
         }
         Ok(self.counts_of_pass())

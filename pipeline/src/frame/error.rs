@@ -57,7 +57,7 @@ pub enum PassError {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SurfaceProblem {
     /// It is of another GPU.
-    #[error("the frame has no such surface; use one that `Gpu::create` returned in this frame")]
+    #[error("the frame has no such surface; use one that `Gpu::create_surface` returned in this frame")]
     Unknown,
     /// It is read and written.
     #[error("it is read and written in the same pass; draw to another surface")]

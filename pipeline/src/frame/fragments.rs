@@ -5,7 +5,7 @@ use glam::Vec4;
 
 use super::pass::Pass;
 use super::resolve::ByCell;
-use super::surface::{Grid, SampleView, Surface, own_pixel};
+use super::shaded::{Grid, SampleView, ShadedTriangle, own_pixel};
 use super::{Settings, Shading};
 use crate::depth::DepthTile;
 use crate::sample_test::{Covered, Hits};
@@ -54,7 +54,7 @@ pub(super) struct FragmentTests<'a> {
     samples: &'a TileSamples,
     /// First pixel of the tile.
     origin: [u32; 2],
-    surface: Surface<'a>,
+    surface: ShadedTriangle<'a>,
     grid: Grid<'a>,
     /// Outputs of cells shaded so far, without any where the shader discards.
     shaded: ByCell<Option<Outputs>>,
@@ -77,7 +77,7 @@ impl<'a> FragmentTests<'a> {
             may_discard: draw.shader.may_discard(),
             samples,
             origin,
-            surface: Surface::new(pass, triangle.id),
+            surface: ShadedTriangle::new(pass, triangle.id),
             grid: Grid::new(pass, &triangle.corners, triangle.moving),
             shaded: ByCell::default(),
         }

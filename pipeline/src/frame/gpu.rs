@@ -13,7 +13,7 @@ use super::replay::Replay;
 use super::{Finished, PipelineSpec, rasterize, resolve};
 use crate::compute::Buffers;
 use crate::geometry::Viewport;
-use crate::memory::{AddressSpace, MemorySystem, Surface};
+use crate::memory::{AddressSpace, MemoryRange, MemorySystem};
 use crate::surface::{SurfaceSpec, Texels};
 
 /// Receiver of packets, each with the lines it requests from the L2.
@@ -30,9 +30,9 @@ pub struct Gpu<'e> {
     /// Last batch of the last pass.
     last_batch: u32,
     /// Results of passes, which are in memory when the frame ends.
-    results: Vec<Surface>,
+    results: Vec<MemoryRange>,
     /// Results since the last barrier: other units cannot read them yet.
-    pending: Vec<Surface>,
+    pending: Vec<MemoryRange>,
     /// Surfaces that passes may write and read.
     pub(super) surfaces: Surfaces,
     /// First addresses of what passes since the last barrier read: the reads may still be going on.
@@ -62,7 +62,7 @@ pub struct Rendered {
     /// Count of every event of the pass.
     pub counts: Counts,
     /// Images or depths in memory.
-    pub surface: Surface,
+    pub surface: MemoryRange,
 }
 
 impl Rendered {
@@ -198,13 +198,13 @@ impl<'e> Gpu<'e> {
         draws.iter().zip(at).map(|(draw, resident)| Draw { resident, ..*draw }).collect()
     }
 
-    /// A new surface of `bytes`.
-    pub fn surface(&mut self, bytes: u64) -> Surface {
+    /// A new region of memory.
+    pub fn allocate(&mut self, bytes: u64) -> MemoryRange {
         self.space.take(bytes)
     }
 
     /// A new surface that passes may write and read. Nothing is stored in it yet.
-    pub fn create(&mut self, spec: &SurfaceSpec<'_>) -> SurfaceId {
+    pub fn create_surface(&mut self, spec: &SurfaceSpec<'_>) -> SurfaceId {
         self.surfaces.create(spec, self.spec.tile_px, &mut self.space)
     }
 
@@ -230,7 +230,7 @@ impl<'e> Gpu<'e> {
     }
 
     /// Whether a pass that reads or writes `surface` has to wait for earlier ones.
-    pub(super) fn conflicts(&self, surface: Surface, writes: bool) -> bool {
+    pub(super) fn conflicts(&self, surface: MemoryRange, writes: bool) -> bool {
         self.is_pending(surface.address()) || (writes && self.is_read(surface))
     }
 
@@ -240,7 +240,7 @@ impl<'e> Gpu<'e> {
     }
 
     /// Whether a pass since the last barrier reads `surface`.
-    pub(super) fn is_read(&self, surface: Surface) -> bool {
+    pub(super) fn is_read(&self, surface: MemoryRange) -> bool {
         self.reads.iter().any(|&address| surface.contains(address))
     }
 
@@ -285,7 +285,7 @@ impl<'e> Gpu<'e> {
     }
 
     /// Marks a surface as a result of the last pass.
-    pub fn keep(&mut self, surface: Surface) {
+    pub fn keep(&mut self, surface: MemoryRange) {
         self.results.push(surface);
         self.pending.push(surface);
     }

@@ -7,7 +7,7 @@ use activity::{Event, PacketCounts};
 
 use crate::depth::{Numbers, Real};
 use crate::geometry::Shear;
-use crate::memory::{LINE_BYTES, MemorySystem, Surface};
+use crate::memory::{LINE_BYTES, MemoryRange, MemorySystem};
 use crate::setup::Triangle;
 use crate::shader::Lane;
 use crate::tally::{Costs, Kernel};
@@ -77,14 +77,14 @@ impl Lanes {
     }
 
     /// Reads what is stored at the tile, through the depth unit, which works in the order of triangles.
-    pub fn read(&self, target: Surface, offset: u64, bytes: u64) {
+    pub fn read(&self, target: MemoryRange, offset: u64, bytes: u64) {
         self.count(Event::DepthReads, bytes.div_ceil(WORD_BYTES) as u32);
         let address = target.address() + offset;
         self.touch(Touch { client: Client::Depth, address, bytes, write: false, whole: false });
     }
 
     /// Combines a result with what is stored at the tile, through the depth unit.
-    pub fn merge(&self, target: Surface, offset: u64, bytes: u64) {
+    pub fn merge(&self, target: MemoryRange, offset: u64, bytes: u64) {
         let words = bytes.div_ceil(WORD_BYTES) as u32;
         self.count(Event::DepthReads, words);
         self.count(Event::DepthWrites, words);
@@ -93,7 +93,7 @@ impl Lanes {
     }
 
     /// Adds a colour of `bytes` to the stored one.
-    pub fn blend(&self, target: Surface, offset: u64, bytes: u64) {
+    pub fn blend(&self, target: MemoryRange, offset: u64, bytes: u64) {
         self.count(Event::ColourWrites, 1);
         self.count(Event::SamplesBlended, 1);
         let address = target.address() + offset;
@@ -101,7 +101,7 @@ impl Lanes {
     }
 
     /// Writes a pixel of `bytes` of an image.
-    pub fn write(&self, image: Surface, offset: u64, bytes: u64) {
+    pub fn write(&self, image: MemoryRange, offset: u64, bytes: u64) {
         self.count(Event::PixelsResolved, 1);
         let address = image.address() + offset;
         self.touch(Touch { client: Client::Colour, address, bytes, write: true, whole: true });

@@ -17,7 +17,7 @@ mod resolve;
 mod resolve_pass;
 mod screen_pass;
 mod settings;
-mod surface;
+mod shaded;
 mod target_checks;
 mod test_selection;
 mod tile_tests;

@@ -9,7 +9,7 @@ use super::attachments::{Attachment, Attachments, Binding, Load, Store, Surfaces
 use super::{Features, Settings, Shading};
 use crate::depth::{BoxGrid, DepthBoxes, DepthTile};
 use crate::geometry::{Camera, Clip, Cull, Geometry, MovingVertex, Projection, Viewport};
-use crate::memory::{AddressSpace, LINE_BYTES, Surface};
+use crate::memory::{AddressSpace, LINE_BYTES, MemoryRange};
 use crate::sampling::TileSamples;
 use crate::setup::Corner;
 use crate::shader::{Program, Shader};
@@ -230,8 +230,8 @@ impl<'a> Pass<'a> {
         self.colours.iter().enumerate().filter(move |(number, _)| writes(*number))
     }
 
-    /// What is left of the pass: its images, or the depths of a depth pass.
-    pub fn result(&self) -> Surface {
+    /// Result of the pass: its images, or the depths of a depth pass.
+    pub fn result(&self) -> MemoryRange {
         if self.addresses.image.bytes() > 0 { self.addresses.image } else { self.depth.place }
     }
 
@@ -254,7 +254,7 @@ impl<'a> Pass<'a> {
 
 /// Values of all samples of a pass: depths, or the colours of a target.
 pub(super) struct Plane {
-    pub place: Surface,
+    pub place: MemoryRange,
     pub sample_bytes: u64,
     /// Format in a surface of the frame; others keep values as they were computed.
     pub format: Option<Format>,
@@ -272,7 +272,7 @@ pub(super) enum First {
 
 impl Plane {
     /// Values that end with the pass, or with the frame.
-    fn inner(place: Surface, value: Vec4) -> Self {
+    fn inner(place: MemoryRange, value: Vec4) -> Self {
         let first = First::Cleared(value);
         Self { place, sample_bytes: SAMPLE_BYTES, format: None, first, is_stored: false }
     }
@@ -306,7 +306,7 @@ impl Plane {
         matches!(self.first, First::Loaded(_))
     }
 
-    /// What is left of a value after it was stored.
+    /// A value as its format stores it.
     pub fn round(&self, value: Vec4) -> Vec4 {
         self.format.map_or(value, |format| format.round(value))
     }
@@ -328,7 +328,7 @@ fn planes(
     if let Target::Surfaces(targets) = pass.target {
         let colour = |to| Plane::attached(to, |value| value, surfaces);
         let depth = targets.depth.as_ref().and_then(|to| Plane::attached(to, depth_of, surfaces));
-        let depth = depth.unwrap_or_else(|| Plane::inner(Surface::NOWHERE, depth_of(pass.clear)));
+        let depth = depth.unwrap_or_else(|| Plane::inner(MemoryRange::NOWHERE, depth_of(pass.clear)));
         return (depth, targets.colours.iter().filter_map(colour).collect());
     }
     let bytes = pass.padded_pixels() * u64::from(pass.settings.samples.per_pixel()) * SAMPLE_BYTES;
@@ -341,7 +341,21 @@ fn planes(
     (depth(depths), vec![Plane::inner(colours, pass.settings.background.extend(1.0))])
 }
 
-/// What the shader of each draw reads. A texture bound to several draws has one address.
+/// Addresses of textures; one that several draws use has one.
+#[derive(Default)]
+struct TextureAddresses(Vec<(*const Texture, u64)>);
+
+impl TextureAddresses {
+    /// The address that is known, `given`, or new.
+    fn of(&mut self, texture: &Texture, given: Option<u64>, space: &mut AddressSpace) -> u64 {
+        let known = self.0.iter().find(|(seen, _)| std::ptr::eq(*seen, texture)).map(|known| known.1);
+        let address = given.or(known).unwrap_or_else(|| space.take(texture.bytes()).address());
+        self.0.push((texture, address));
+        address
+    }
+}
+
+/// What the shader of each draw reads.
 fn bound<'a>(
     draws: &[Draw<'a>],
     addresses: &AddressMap,
@@ -351,13 +365,10 @@ fn bound<'a>(
     let own = draws.iter().map(|draw| draw.shader.texture());
     let own =
         own.zip(&addresses.textures).filter_map(|(texture, at)| Some((std::ptr::from_ref(texture?), (*at)?)));
-    let mut known: Vec<(*const Texture, u64)> = own.collect();
+    let mut known = TextureAddresses(own.collect());
     let mut bind = |binding: &Binding<'a>| match *binding {
         Binding::Texture(texture) => {
-            let place = known.iter().find(|(seen, _)| std::ptr::eq(*seen, texture)).map(|known| known.1);
-            let address = place.unwrap_or_else(|| space.take(texture.bytes()).address());
-            known.push((texture, address));
-            Some(Bound::texture(Sampler::new(texture, address)))
+            Some(Bound::texture(Sampler::new(texture, known.of(texture, None, space))))
         }
         Binding::Surface(_) | Binding::Levels(_) => {
             let stored = |id| {
@@ -375,7 +386,7 @@ fn bound<'a>(
 #[derive(Clone, Debug)]
 pub(super) struct AddressMap {
     /// Images, one after the other.
-    pub image: Surface,
+    pub image: MemoryRange,
     /// Vertices of each draw.
     pub vertices: Vec<VertexBuffer>,
     /// First byte of the texture of each draw, if it has any; draws with the same texture have the same address.
@@ -408,15 +419,9 @@ pub(super) fn resident<'s>(
             draw.resident.vertices.unwrap_or_else(new)
         })
         .collect();
-    let mut known: Vec<(*const Texture, u64)> = Vec::new();
+    let mut known = TextureAddresses::default();
     draws.iter().zip(vertices).map(move |(draw, vertices)| {
-        let texture = draw.shader.texture().map(|texture| {
-            let shared = known.iter().find(|(seen, _)| std::ptr::eq(*seen, texture)).map(|known| known.1);
-            let address = draw.resident.texture.or(shared);
-            let address = address.unwrap_or_else(|| space.take(texture.bytes()).address());
-            known.push((texture, address));
-            address
-        });
+        let texture = draw.shader.texture().map(|texture| known.of(texture, draw.resident.texture, space));
         (vertices, texture)
     })
 }
@@ -463,7 +468,7 @@ impl<'a> Draw<'a> {
 
     /// The draw with the texture of its shader in `surface`, as an earlier pass wrote it.
     #[must_use]
-    pub fn reading(self, surface: Surface) -> Self {
+    pub fn reading(self, surface: MemoryRange) -> Self {
         Self { resident: Resident { texture: Some(surface.address()), ..self.resident }, ..self }
     }
 }

@@ -8,7 +8,7 @@ use glam::{Vec3, Vec4};
 use super::{Draw, FrameReport, Gpu, PassError, RasterPass};
 use crate::depth::{Bounder, DepthBound, Pyramid, interval_madds, set_up_madds};
 use crate::geometry::{Cull, Geometry, MovingVertex, Projection};
-use crate::memory::{LINE_BYTES, Surface};
+use crate::memory::{LINE_BYTES, MemoryRange};
 use crate::setup::{SetupResult, Triangle, bounds, madds, set_up};
 use crate::shader::{Lane, Shader, ShadingPoint};
 use crate::state::{Compare, DepthState, DrawState};
@@ -208,7 +208,7 @@ impl Gpu<'_> {
     /// Gathers the farthest depths of `stored`, the result of a pass over depth, in a pass of its own. It needs no wait, as the
     /// unit of depth works in order: every stored depth is read and compared once, and the farthest of each box of a tile are compared for the next level. They are kept in fast
     /// memory.
-    pub fn gather(&mut self, name: &str, pyramid: &Pyramid, stored: Surface) {
+    pub fn gather_farthest_depths(&mut self, name: &str, pyramid: &Pyramid, stored: MemoryRange) {
         self.open(name, None);
         self.note_read(stored.address());
         let first = pyramid.size(0);
@@ -237,13 +237,13 @@ impl Gpu<'_> {
     }
 
     /// Asks about boxes in a pass of its own. A query ends at its first tile that may see the box.
-    pub fn ask(
+    pub fn query_boxes(
         &mut self,
         name: &str,
         queries: &IntervalQueries<'_>,
         objects: &[MovingBox],
     ) -> Vec<IntervalAnswer> {
-        let corners = self.surface(objects.len() as u64 * u64::from(CORNERS * CORNER_BYTES));
+        let corners = self.allocate(objects.len() as u64 * u64::from(CORNERS * CORNER_BYTES));
         self.open(name, None);
         let asked = (0..).zip(objects).map(|(number, object)| {
             let answer = queries.ask(object);
@@ -268,7 +268,7 @@ impl Gpu<'_> {
         number: u32,
         projection: &Projection,
         answer: &IntervalAnswer,
-        corners: Surface,
+        corners: MemoryRange,
     ) {
         let mut start = self.packet(PacketKind::Draw, Packet::NONE, None);
         start.counts[Event::Draws] = 1;

@@ -7,7 +7,7 @@ use super::bin::Bin;
 use super::bin::{BinLog, Work};
 use super::pass::{Pass, Plane, SAMPLE_BYTES, VertexBuffer};
 use super::resolve::{SampleLine, TileResolve, tile_lines};
-use super::surface::{QuadWork, Surface};
+use super::shaded::{QuadWork, ShadedTriangle};
 use crate::memory::{Access, Cache, CacheError, LINE_BYTES, MemorySystem};
 use crate::random::mix;
 use crate::sampling::Sample;
@@ -189,7 +189,7 @@ impl<'a> Replay<'a> {
 
     /// Look up the quads of a packet in the shading cache, and shade those that miss.
     fn shade(&mut self, triangle: u32, quads: &[QuadAccess], counts: &mut PacketCounts) {
-        let surface = Surface::new(self.pass, triangle);
+        let surface = ShadedTriangle::new(self.pass, triangle);
         for access in quads {
             counts[Event::ShadingLookups] += u32::from(access.lookups);
             let hit = self.shading.access(quad_key(triangle, access.quad), false) == Access::Hit;
@@ -205,7 +205,7 @@ impl<'a> Replay<'a> {
 
     /// Shade the quads of a packet at every sample, without a shading cache.
     fn shade_samples(&mut self, triangle: u32, quads: &[QuadAccess], counts: &mut PacketCounts) {
-        let surface = Surface::new(self.pass, triangle);
+        let surface = ShadedTriangle::new(self.pass, triangle);
         let source = self.pass.settings.samples;
         let mut samples: [Vec<Sample>; 4] =
             std::array::from_fn(|_| vec![Sample::default(); source.per_pixel() as usize]);
@@ -219,7 +219,7 @@ impl<'a> Replay<'a> {
             for access in pixels {
                 let memory = &mut self.memory;
                 let line = |line| memory.texture(line, counts);
-                let work = surface.quad_at(self.pass, access, &samples, line);
+                let work = surface.quad_at(access, &samples, line);
                 count_quad(access, work, counts);
             }
         }

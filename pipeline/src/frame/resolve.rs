@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::bin::Bin;
 use super::pass::{First, Pass, Plane};
-use super::surface::{Grid, SampleView, Surface, own_pixel};
+use super::shaded::{Grid, SampleView, ShadedTriangle, own_pixel};
 use super::{Settings, Shading};
 use crate::depth::DepthTile;
 use crate::memory::{LINE_BYTES, MemorySystem};
@@ -164,7 +164,7 @@ fn resolve_tile(
         }
         let (corners, moving) = pass.moving_corners(triangle);
         let grid = Grid::new(pass, &corners, moving);
-        let surface = Surface::new(pass, triangle);
+        let surface = ShadedTriangle::new(pass, triangle);
         let lane = surface.lane();
         scratch.shaded.clear();
         for slot in group.iter().map(|&slot| slot as usize) {

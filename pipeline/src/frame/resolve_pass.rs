@@ -94,7 +94,7 @@ impl Gpu<'_> {
         let (texels, from) = self.samples_of(pass)?;
         let spec = SurfaceSpec::new("", texels.viewport(), Format::Rgba8Srgb);
         let tile_px = self.spec().tile_px;
-        let surface = self.surface(Layout::new(&spec, tile_px, 0).1);
+        let surface = self.allocate(Layout::new(&spec, tile_px, 0).1);
         self.check_memory(pass.name)?;
         let to = Layout::new(&spec, tile_px, surface.address()).0;
         let shown = |mean: Vec4| Vec3::splat(1.0 - mean.w) * background + mean.truncate();

@@ -21,7 +21,7 @@ impl Gpu<'_> {
         viewport: Viewport,
         pixel: impl Fn(&Lanes, [u32; 2]) -> Vec3 + Sync,
     ) -> Rendered {
-        let image = self.surface(viewport.pixels() as u64 * PIXEL_BYTES);
+        let image = self.allocate(viewport.pixels() as u64 * PIXEL_BYTES);
         self.open(name, Some(viewport));
         let (side, width) = (self.spec().tile_px, viewport.width());
         let mut colours = vec![Vec3::ZERO; viewport.pixels()];
@@ -72,7 +72,7 @@ impl Gpu<'_> {
 
     /// Writes the pixels of an image of `viewport` in a pass of its own, in tiles.
     pub fn write_image(&mut self, name: &str, viewport: Viewport) {
-        let image = self.surface(viewport.pixels() as u64 * PIXEL_BYTES);
+        let image = self.allocate(viewport.pixels() as u64 * PIXEL_BYTES);
         self.open(name, Some(viewport));
         let (pixels, tile_pixels) = (viewport.pixels() as u64, u64::from(self.spec().tile_px.pow(2)));
         for (tile, first) in (0..).zip((0..pixels).step_by(tile_pixels as usize)) {

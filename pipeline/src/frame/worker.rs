@@ -6,7 +6,7 @@ use super::bin::Bin;
 use super::bin::{BinLog, SamplesHere, TestsHere, TileWork, Work};
 use super::fragments::{FragmentTests, Fragments};
 use super::pass::Pass;
-use super::surface::{Grid, own_pixel};
+use super::shaded::{Grid, own_pixel};
 use super::test_selection::TestSelector;
 use super::tile_tests::{Remaining, Subject, TestContext, TestTile};
 use super::vertices::Ready;

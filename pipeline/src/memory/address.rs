@@ -5,12 +5,12 @@ pub const LINE_BYTES: u64 = 64;
 
 /// A region of memory that passes write to and later ones may read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Surface {
+pub struct MemoryRange {
     first: u64,
     bytes: u64,
 }
 
-impl Surface {
+impl MemoryRange {
     /// Without bytes.
     pub(crate) const NOWHERE: Self = Self { first: 0, bytes: 0 };
 
@@ -35,7 +35,7 @@ impl Surface {
 pub struct AddressSpace {
     next: u64,
     /// Depths and colours of samples that no pass keeps; passes of one size share them.
-    samples: Vec<[Surface; 2]>,
+    samples: Vec<[MemoryRange; 2]>,
 }
 
 impl AddressSpace {
@@ -43,14 +43,14 @@ impl AddressSpace {
     pub const END: u64 = LINE_BYTES << 32;
 
     /// A new surface of `bytes`.
-    pub fn take(&mut self, bytes: u64) -> Surface {
+    pub fn take(&mut self, bytes: u64) -> MemoryRange {
         let first = self.next;
         self.next += bytes.next_multiple_of(LINE_BYTES);
-        Surface { first, bytes }
+        MemoryRange { first, bytes }
     }
 
     /// Depths and colours of samples, `bytes` each, whose values end with the pass.
-    pub fn samples(&mut self, bytes: u64) -> [Surface; 2] {
+    pub fn samples(&mut self, bytes: u64) -> [MemoryRange; 2] {
         if let Some(known) = self.samples.iter().find(|[depth, _]| depth.bytes == bytes) {
             return *known;
         }

@@ -5,7 +5,7 @@ mod cache;
 mod shared;
 mod system;
 
-pub use address::{AddressSpace, LINE_BYTES, Surface};
+pub use address::{AddressSpace, LINE_BYTES, MemoryRange};
 pub use cache::{Access, Cache, CacheError, CacheSpec, Replacement};
 pub(crate) use system::depths_fit;
 pub use system::{Compression, MemorySpec, MemorySystem};

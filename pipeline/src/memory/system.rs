@@ -4,7 +4,7 @@
 use activity::{Event, LEVELS, LineAccess, PacketCounts, Unit};
 use serde::Deserialize;
 
-use super::address::{LINE_BYTES, Surface};
+use super::address::{LINE_BYTES, MemoryRange};
 use super::shared::SharedCaches;
 use super::{Access, Cache, CacheError, CacheSpec};
 
@@ -146,7 +146,7 @@ impl MemorySystem {
     }
 
     /// End the frame: lines in `kept` (images and depths) are written back, all others are dropped.
-    pub fn finish(&mut self, kept: &[Surface], counts: &mut PacketCounts) {
+    pub fn finish(&mut self, kept: &[MemoryRange], counts: &mut PacketCounts) {
         let is_kept = |line: u64| kept.iter().any(|surface| surface.contains(line * LINE_BYTES));
         let mut unit = Unit::Colour;
         for client in [&mut self.colour, &mut self.depth] {

@@ -73,7 +73,7 @@ fn drawn(of: &Triangles, per_pixel: u32, (centroid, moves): (bool, bool), image:
         Settings { spec: &spec, viewport: stage.viewport, samples: &stage.table, background: Vec3::ZERO };
     let mut gpu = Gpu::quiet(&spec).unwrap();
     let surface = |gpu: &mut Gpu<'_>, name, format| {
-        gpu.create(&SurfaceSpec::new(name, stage.viewport, format).sampled(per_pixel))
+        gpu.create_surface(&SurfaceSpec::new(name, stage.viewport, format).sampled(per_pixel))
     };
     let [colour, depth] =
         [("uv", Format::Rg32f), ("depth", Format::D32)].map(|(name, format)| surface(&mut gpu, name, format));

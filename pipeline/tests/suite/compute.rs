@@ -320,7 +320,7 @@ fn a_pass_waits_for_the_groups_that_read_what_it_overwrites() {
     let barriers = |is_read: bool| {
         let mut packets = Vec::new();
         let mut gpu = Gpu::new(&spec, |packet, _| packets.push(*packet)).unwrap();
-        let target = gpu.create(&SurfaceSpec::new("target", viewport, Format::R32f));
+        let target = gpu.create_surface(&SurfaceSpec::new("target", viewport, Format::R32f));
         let colours = vec![Attachment::cleared(target, Vec4::ZERO)];
         let targets = Attachments { colours, depth: None };
         let pass_onto = RasterPass::new(&camera, &draws, &settings).onto(Target::Surfaces(&targets));
@@ -426,7 +426,7 @@ fn groups_read_a_surface_as_a_pass_stored_it() {
     let mut kinds = Vec::new();
     let mut gpu = Gpu::new(&spec, |packet, _| kinds.push((packet.kind, packet.pass))).unwrap();
     let surfaces = [Format::Rgba16f, Format::D32]
-        .map(|format| gpu.create(&SurfaceSpec::new("surface", viewport, format).sampled(2)));
+        .map(|format| gpu.create_surface(&SurfaceSpec::new("surface", viewport, format).sampled(2)));
     let corners = rectangle([-9.0, -5.0], [11.0, 6.0], 2.0);
     let geometry = Geometry::new(&corners, &corners, &QUAD).unwrap();
     let draws = [Draw::new(geometry, &Plain, Cull::None)];

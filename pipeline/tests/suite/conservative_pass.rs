@@ -7,7 +7,7 @@ use crate::common::*;
 use activity::{Counts, Event, PacketKind};
 use glam::Vec3;
 use pipeline::conservative::{Grid, MovingTriangle, Rasterizer, View};
-use pipeline::memory::Surface;
+use pipeline::memory::MemoryRange;
 use pipeline::random::{mix, unit};
 use pipeline::*;
 
@@ -17,21 +17,21 @@ fn primitive(corners: [[[f64; 3]; 3]; 2], body: u32) -> Primitive {
     Primitive {
         triangle: MovingTriangle::new(corners[0], corners[1]).unwrap(),
         rasterizer: Rasterizer::new(View::orthographic()),
-        part: [0..GRID.columns, 0..GRID.rows],
+        scissor: [0..GRID.columns, 0..GRID.rows],
         body,
-        again: false,
-        back_only: false,
+        reuses_vertices: false,
+        keeps_back_faces_only: false,
     }
 }
 
 /// Merges a word at each tile, with two operations.
 struct Merge {
-    target: Surface,
+    target: MemoryRange,
     runs: AtomicU32,
 }
 
 impl TileShader for Merge {
-    type Body = u32;
+    type BodyState = u32;
     type Output = [f64; 2];
 
     fn run(&self, tiles_of_body: &mut u32, lanes: &Lanes, tile: &TileIntervals<'_>) -> Option<[f64; 2]> {
@@ -55,7 +55,7 @@ fn drawn(primitives: &[Primitive], block: u32) -> (Vec<Tile>, Vec<PacketKind>, C
         kinds.push(packet.kind);
     })
     .unwrap();
-    let [target, vertices] = [64 * 4, 3 * 24 * primitives.len() as u64].map(|bytes| gpu.surface(bytes));
+    let [target, vertices] = [64 * 4, 3 * 24 * primitives.len() as u64].map(|bytes| gpu.allocate(bytes));
     let shader = Merge { target, runs: AtomicU32::new(0) };
     let mut pass = gpu.begin_conservative("boxes", None);
     let draw =
@@ -63,7 +63,7 @@ fn drawn(primitives: &[Primitive], block: u32) -> (Vec<Tile>, Vec<PacketKind>, C
     pass.draw(&mut gpu, &draw, &shader, |tile, z| found.push((tile, z)));
     let report = gpu.finish();
     assert_eq!(report.counts(), sum);
-    assert_eq!(report.triangles(), primitives.iter().filter(|primitive| !primitive.again).count());
+    assert_eq!(report.triangles(), primitives.iter().filter(|primitive| !primitive.reuses_vertices).count());
     assert_eq!(shader.runs.into_inner() as usize, found.len());
     (found, kinds, sum)
 }
@@ -101,7 +101,7 @@ fn a_moving_triangle_counts_the_differences_of_its_vertices_once() {
     let moving = primitive([open, close], 0);
     let (_, _, counts) = drawn(std::slice::from_ref(&moving), 8);
     assert_eq!(counts[Event::SetupMadds], 9);
-    let again = Primitive { again: true, ..moving.clone() };
+    let again = Primitive { reuses_vertices: true, ..moving.clone() };
     let (found, _, both) = drawn(&[moving, again], 8);
     assert_eq!((both[Event::VerticesFetched], both[Event::SetupMadds]), (3, 9));
     assert_eq!(both[Event::TileMadds], 2 * counts[Event::TileMadds]);
@@ -111,9 +111,9 @@ fn a_moving_triangle_counts_the_differences_of_its_vertices_once() {
 #[test]
 fn set_up_drops_front_faces_where_only_backs_are_drawn() {
     let corners = [[0.5, 0.5, 2.0], [3.5, 0.5, 2.0], [0.5, 1.5, 4.0]];
-    let back = Primitive { back_only: true, ..primitive([corners; 2], 0) };
+    let back = Primitive { keeps_back_faces_only: true, ..primitive([corners; 2], 0) };
     let [a, b, c] = corners;
-    let front = Primitive { back_only: true, ..primitive([[a, c, b]; 2], 1) };
+    let front = Primitive { keeps_back_faces_only: true, ..primitive([[a, c, b]; 2], 1) };
     let (found, _, counts) = drawn(&[back, front], 8);
     assert_eq!(found.len(), 7);
     assert_eq!((counts[Event::TrianglesSetUp], counts[Event::TrianglesFaceCulled]), (1, 1));
@@ -151,7 +151,7 @@ fn a_full_screen_pass_runs_every_pixel() {
     let spec = spec(Features::ALL);
     let viewport = Viewport::new(21, 13).unwrap();
     let mut gpu = Gpu::quiet(&spec).unwrap();
-    let source = gpu.surface(4096);
+    let source = gpu.allocate(4096);
     let drawn = gpu.shade_pixels("grey", viewport, |lanes, [x, y]| {
         lanes.fetch(source.address(), 4);
         lanes.run(|lane| Vec3::splat(lane.add(x as f32, y as f32)))

@@ -95,7 +95,7 @@ fn painted<T>(
     let settings =
         Settings { spec: &spec, viewport: stage.viewport, samples: &stage.table, background: Vec3::ZERO };
     let mut gpu = Gpu::quiet(&spec).unwrap();
-    let id = gpu.create(&SurfaceSpec::new("bloom", stage.viewport, format).mipmapped());
+    let id = gpu.create_surface(&SurfaceSpec::new("bloom", stage.viewport, format).mipmapped());
     let shader = Painted(paint);
     let geometry = Geometry::new(&SCREEN, &SCREEN, &[[0, 1, 2]]).unwrap();
     let state = DrawState { depth: FLAT, ..DrawState::default() };
@@ -174,7 +174,7 @@ fn every_level_is_a_pass_that_waits_for_the_one_before() {
     let (stage, spec) = (Stage::sampled(16, 16, 1), spec(Features::ALL));
     let mut packets = Vec::new();
     let mut gpu = Gpu::new(&spec, |packet, _| packets.push(*packet)).unwrap();
-    let id = gpu.create(&SurfaceSpec::new("s", stage.viewport, Format::R32f).mipmapped());
+    let id = gpu.create_surface(&SurfaceSpec::new("s", stage.viewport, Format::R32f).mipmapped());
     let settings =
         Settings { spec: &spec, viewport: stage.viewport, samples: &stage.table, background: Vec3::ZERO };
     let targets = Attachments { colours: vec![Attachment::cleared(id, Vec4::ONE)], depth: None };
@@ -216,7 +216,7 @@ fn fetches_between_levels_are_trilinear_and_count_twice() {
         gpu.make_levels("chain", id).unwrap();
         let levels: Vec<PlainLevel> =
             (0..5).map_while(|level| PlainLevel::of(gpu, id, stage.viewport, level)).collect();
-        let to = gpu.create(&SurfaceSpec::new("to", stage.viewport, Format::R32f));
+        let to = gpu.create_surface(&SurfaceSpec::new("to", stage.viewport, Format::R32f));
         let targets = Attachments { colours: vec![Attachment::cleared(to, Vec4::ZERO)], depth: None };
         let (all, one) = ([Binding::Levels(id)], [Binding::Surface(id.level(1))]);
         let geometry = Geometry::new(&SCREEN, &SCREEN, &[[0, 1, 2]]).unwrap();
@@ -287,12 +287,12 @@ fn levels_are_refused_by_name() {
                 message,
                 "pass `chain level 1`, surface `bloom`: its format R32u is not one of those of colours",
             );
-            let new = gpu.create(&SurfaceSpec::new("new", stage.viewport, Format::R32f).mipmapped());
+            let new = gpu.create_surface(&SurfaceSpec::new("new", stage.viewport, Format::R32f).mipmapped());
             let message = gpu.make_levels("chain", new).unwrap_err().to_string();
             starts(message, "pass `chain level 1`, surface `new`: it is read, but no earlier pass");
             let both = SurfaceSpec::new("both", stage.viewport, Format::R32f).sampled(4).with_levels(2);
             let targets = Attachments {
-                colours: vec![Attachment::cleared(gpu.create(&both), Vec4::ZERO)],
+                colours: vec![Attachment::cleared(gpu.create_surface(&both), Vec4::ZERO)],
                 depth: None,
             };
             let pass =

@@ -150,7 +150,7 @@ fn a_frame_that_is_too_large_names_its_pass() {
     let draws = [soup.draw(&Plain, Cull::None)];
     with(|settings| {
         let mut gpu = Gpu::quiet(settings.spec).unwrap();
-        gpu.surface(memory::AddressSpace::END);
+        gpu.allocate(memory::AddressSpace::END);
         let camera = camera(false);
         let error = gpu.draw(&RasterPass::new(&camera, &draws, settings).named("shadow")).unwrap_err();
         assert!(error.to_string().starts_with("pass `shadow`: the surfaces of the frame take "), "{error}");

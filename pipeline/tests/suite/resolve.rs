@@ -22,7 +22,7 @@ fn with<T>(run: impl FnOnce(&Stage, &Settings<'_>) -> T) -> T {
 }
 
 fn samples(gpu: &mut Gpu<'_>, viewport: Viewport, format: Format) -> SurfaceId {
-    gpu.create(&SurfaceSpec::new("samples", viewport, format).sampled(4))
+    gpu.create_surface(&SurfaceSpec::new("samples", viewport, format).sampled(4))
 }
 
 /// Draws a rectangle over a part of `to`, whose other samples have no colour.
@@ -43,7 +43,7 @@ fn samples_pixels_and_lines_are_counted() {
             let mut packets = Vec::new();
             let mut gpu = Gpu::new(settings.spec, |packet, _| packets.push(*packet)).unwrap();
             let from = samples(&mut gpu, stage.viewport, Format::Rgba16f);
-            let to = gpu.create(&SurfaceSpec::new("pixels", stage.viewport, Format::Rgba8Srgb));
+            let to = gpu.create_surface(&SurfaceSpec::new("pixels", stage.viewport, Format::Rgba8Srgb));
             draw(&mut gpu, stage, settings, from);
             let pass = ResolvePass::new("average", from);
             let counts = gpu.resolve(&if drops { pass.dropping() } else { pass }, to).unwrap();
@@ -107,7 +107,7 @@ fn a_resolve_waits_for_those_that_read_what_it_writes() {
         let mut packets = Vec::new();
         let mut gpu = Gpu::new(settings.spec, |packet, _| packets.push(*packet)).unwrap();
         let [from, other] = [(); 2].map(|()| samples(&mut gpu, stage.viewport, Format::Rgba8));
-        let to = gpu.create(&SurfaceSpec::new("pixels", stage.viewport, Format::Rgba8));
+        let to = gpu.create_surface(&SurfaceSpec::new("pixels", stage.viewport, Format::Rgba8));
         draw(&mut gpu, stage, settings, from);
         gpu.resolve(&ResolvePass::new("first", from), to).unwrap();
         let bindings = [Binding::Surface(to)];
@@ -134,7 +134,7 @@ fn what_has_no_mean_is_refused_by_name() {
             assert!(message.starts_with(&format!("pass `average`, surface `{start}")), "{message}");
         };
         let new = |gpu: &mut Gpu<'_>, name, size, format, samples| {
-            gpu.create(&SurfaceSpec::new(name, size, format).sampled(samples))
+            gpu.create_surface(&SurfaceSpec::new(name, size, format).sampled(samples))
         };
         let to = new(&mut gpu, "pixels", stage.viewport, Format::Rgba8, 1);
         refused(
@@ -185,12 +185,12 @@ fn sixty_four_passes_and_a_target_larger_than_memory() {
             gpu.draw(&RasterPass::new(&stage.camera, &draws, settings).onto(Target::Surfaces(&targets)))
                 .unwrap();
         }
-        let to = gpu.create(&SurfaceSpec::new("sum", stage.viewport, Format::R32f));
+        let to = gpu.create_surface(&SurfaceSpec::new("sum", stage.viewport, Format::R32f));
         gpu.resolve(&ResolvePass::new("resolve", from), to).unwrap();
         assert!(gpu.contents(to).unwrap().iter().all(|value| value.x == 64.0));
         let large = Viewport::new(16_384, 16_384).unwrap();
         (0..129).for_each(|_| {
-            gpu.create(&SurfaceSpec::new("huge", large, Format::Rg32f).sampled(256));
+            gpu.create_surface(&SurfaceSpec::new("huge", large, Format::Rg32f).sampled(256));
         });
         for message in [
             gpu.resolve(&ResolvePass::new("resolve", from), to).unwrap_err(),

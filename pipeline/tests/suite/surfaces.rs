@@ -145,11 +145,11 @@ impl Story {
         let mut gpu = Gpu::quiet(spec).unwrap();
         let samples = self.table.per_pixel();
         let surface = |gpu: &mut Gpu<'_>, format: Format| {
-            gpu.create(&SurfaceSpec::new("any", viewport(), format).sampled(samples))
+            gpu.create_surface(&SurfaceSpec::new("any", viewport(), format).sampled(samples))
         };
         let ids: Vec<SurfaceId> = self.formats.iter().map(|format| surface(&mut gpu, *format)).collect();
         let mipped = |format| SurfaceSpec::new("levels", viewport(), format).mipmapped();
-        let chains = self.resolved.map(|format| gpu.create(&mipped(format)));
+        let chains = self.resolved.map(|format| gpu.create_surface(&mipped(format)));
         let camera = camera(self.optics);
         for step in &self.steps {
             let targets = step.attachments(&ids);
@@ -510,8 +510,9 @@ fn loads_stores_and_clears_are_counted() {
         let tile = rectangle([-8.0, 0.0], [0.0, 8.0], 1.0);
         let count = |load: bool, store: Store| {
             let mut gpu = Gpu::quiet(settings.spec).unwrap();
-            let surface =
-                |gpu: &mut Gpu<'_>, format| gpu.create(&SurfaceSpec::new("s", stage.viewport, format));
+            let surface = |gpu: &mut Gpu<'_>, format| {
+                gpu.create_surface(&SurfaceSpec::new("s", stage.viewport, format))
+            };
             let [wide, narrow, depth] =
                 [Format::Rgba16f, Format::Rgba8, Format::D32].map(|format| surface(&mut gpu, format));
             let targets = |load: bool, store| {
@@ -593,8 +594,8 @@ fn fetches_are_counted_as_lanes_execute_them() {
         let drawn = |shader: &Twice| {
             let mut packets = Vec::new();
             let mut gpu = Gpu::new(settings.spec, |packet, _| packets.push(*packet)).unwrap();
-            let [from, to] =
-                ["from", "to"].map(|name| gpu.create(&SurfaceSpec::new(name, stage.viewport, Format::R32f)));
+            let [from, to] = ["from", "to"]
+                .map(|name| gpu.create_surface(&SurfaceSpec::new(name, stage.viewport, Format::R32f)));
             let targets = |surface| Attachments {
                 colours: vec![Attachment::cleared(surface, Vec4::ZERO)],
                 depth: None,
@@ -672,8 +673,9 @@ fn to(colours: &[SurfaceId]) -> Attachments {
 
 #[test]
 fn what_surfaces_cannot_do_is_refused_by_name() {
-    let named =
-        |name, format| move |gpu: &mut Gpu<'_>, size| gpu.create(&SurfaceSpec::new(name, size, format));
+    let named = |name, format| {
+        move |gpu: &mut Gpu<'_>, size| gpu.create_surface(&SurfaceSpec::new(name, size, format))
+    };
     let albedo = named("albedo", Format::Rgba8);
     let starts = |message: String, start: &str| {
         assert!(message.starts_with(&format!("pass `light`, surface `{start}")), "{message}");
@@ -702,7 +704,8 @@ fn what_surfaces_cannot_do_is_refused_by_name() {
     starts(size, "albedo`: it has 8 x 4 pixels, but the pass has 16 x 16");
     let samples = refusal(
         |gpu, size| {
-            let ids = [1, 4].map(|n| gpu.create(&SurfaceSpec::new("albedo", size, Format::Rgba8).sampled(n)));
+            let ids = [1, 4]
+                .map(|n| gpu.create_surface(&SurfaceSpec::new("albedo", size, Format::Rgba8).sampled(n)));
             (to(&ids), vec![])
         },
         flat(),
@@ -767,7 +770,7 @@ fn what_surfaces_cannot_do_is_refused_by_name() {
     let memory = refusal(
         |gpu, size| {
             (0..129).for_each(|_| {
-                gpu.create(&SurfaceSpec::new("huge", large, Format::Rg32f).sampled(256));
+                gpu.create_surface(&SurfaceSpec::new("huge", large, Format::Rg32f).sampled(256));
             });
             (to(&[albedo(gpu, size)]), vec![])
         },
@@ -781,7 +784,7 @@ fn what_surfaces_cannot_do_is_refused_by_name() {
 fn dropped_contents_are_gone() {
     with(|stage, settings| {
         let mut gpu = Gpu::quiet(settings.spec).unwrap();
-        let id = gpu.create(&SurfaceSpec::new("s", stage.viewport, Format::Rgba8));
+        let id = gpu.create_surface(&SurfaceSpec::new("s", stage.viewport, Format::Rgba8));
         let corners = screen(1.0);
         let draws = [still(&corners, &RED).with_state(flat())];
         let stored = to(&[id]);

@@ -1,8 +1,9 @@
 //! Heat maps: counts of an event over the image, or the energy of all events, as files.
 
 use activity::Event;
-use glam::{Vec3, vec3};
+use glam::Vec3;
 use pipeline::frame::{HeatMap, TileHeat};
+use pipeline::texture::LUMINANCE;
 
 use super::{HeatQuantity, Plan, RunError};
 use output::OutDir;
@@ -221,7 +222,7 @@ impl Heat {
 
 /// Displayed brightness of each pixel, 0 to 1.
 fn brightness(image: &[Vec3]) -> Vec<f32> {
-    let luminance = |pixel: &Vec3| pixel.dot(vec3(0.2126, 0.7152, 0.0722)).clamp(0.0, 1.0);
+    let luminance = |pixel: &Vec3| pixel.dot(LUMINANCE).clamp(0.0, 1.0);
     image.iter().map(|pixel| libm::powf(luminance(pixel), 1.0 / 2.2)).collect()
 }
 

@@ -287,6 +287,17 @@ mod tests {
     fn untimed() -> Timed {
         let timeline = Timeline { bin_ps: 1, duration_ps: 1, bins: Vec::new() };
         let (passes, spans) = Default::default();
-        Timed { timeline, cycles: 0, stalls: None, unit_cycles: 0, packets: 0, rows: None, passes, spans }
+        Timed {
+            timeline,
+            cycles: 0,
+            stalls: None,
+            unit_cycles: 0,
+            packets: 0,
+            rows: None,
+            disputed: None,
+            overlap: None,
+            passes,
+            spans,
+        }
     }
 }

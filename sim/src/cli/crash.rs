@@ -107,7 +107,8 @@ pub(super) fn handle(terminal: Terminal) {
             // Leave the line of the progress bar.
             let _ = writeln!(stderr());
         }
-        terminal.error("interrupted: unfinished results were removed, earlier ones are as they were");
+        terminal
+            .error("interrupted: files that are not finished were removed, earlier ones are as they were");
         std::process::exit(EXIT_CODE);
     };
     // Signals that are already ignored or handled (nohup) stay so. The next process with the same folder then

@@ -368,8 +368,8 @@ const OPTIONS: &[WorkloadOptions] = &[
             ),
             Doc(
                 "radius",
-                Numbers(0.005, 0.5),
-                "least distance of darts in the unit square, in 3D from 0.03 on",
+                Numbers(0.0, 0.5),
+                "least distance of darts in the unit square, from 0.005 on, in 3D from 0.03 on; 0 for 0.02, in 3D 0.06",
             ),
             Doc("rounds", Numbers(1.0, 8.0), "rounds of darts that are rasterized"),
             Doc("periodic", SWITCH, "whether the domain of darts is a torus instead of a box"),

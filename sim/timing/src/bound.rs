@@ -18,10 +18,11 @@
 //!
 //! Totals accumulated from a stream of packets.
 
-use activity::{Counts, Event, LineAccess, Packet, PacketCounts, Unit, Waits};
+use activity::{Counts, Event, LineAccess, LineKind, Packet, PacketCounts, Unit, Waits};
 
 use crate::address::AddressMap;
 use crate::clock::{Clocks, Time};
+use crate::data_unit::DataUnit;
 use crate::demand::{CLIENTS, DemandBuilder, ServiceDemand, Station, port};
 use crate::draws::{ByDraw, PassParts};
 use crate::passes::Passes;
@@ -41,10 +42,12 @@ pub fn bound(machine: &MachineSpec, clocks: Clocks, totals: &Totals, mut recorde
     let rows = totals.rows();
     let mut times = Vec::with_capacity(lengths.len());
     let mut now: Time = 0;
+    let mut overlap: Time = 0;
     // Barriers come last in their phase.
     for ((phase, length), rows) in totals.phases.iter().zip(&lengths).zip(&rows) {
         let busy = speeds.times(&length.work);
         let end = now + length.of(phase, &busy, *rows);
+        overlap += phase.longest_overlap().min(end - now);
         write(&mut recorder, &clocks, &phase.counts, &busy, [now, end]);
         times.push([now, end - length.barriers, end]);
         now = end;
@@ -65,6 +68,8 @@ pub fn bound(machine: &MachineSpec, clocks: Clocks, totals: &Totals, mut recorde
         unit_cycles: 0,
         packets: totals.segments().map(|segment| u64::from(segment.packets)).sum(),
         rows: Some(share),
+        disputed: None,
+        overlap: Some(overlap as f64 / now.max(1) as f64),
         passes: passes.finish(machine, &clocks, timeline.duration_ps, &totals.parts()),
         spans: Vec::new(),
         timeline,
@@ -160,6 +165,9 @@ impl BoundClock {
     }
 }
 
+/// What can be full: the cores, twice, and the clients.
+const FULL: usize = 2 + CLIENTS.len();
+
 /// Consecutive packets of one path that fit in its queues together, or a barrier.
 #[derive(Clone, Debug, Default)]
 struct Segment {
@@ -169,8 +177,9 @@ struct Segment {
     /// Time of a barrier without contention; `None` for other packets.
     pub barrier: Option<Time>,
     pub work: UnitWork,
-    /// Grains for which the cores are full if no packet waits, by packets and by warps.
-    pub full: [f64; 2],
+    /// Grains for which the cores are full if no packet waits, by packets and by warps, and those for which clients are full of
+    /// lines under way.
+    pub full: [f64; FULL],
     pub packets: u32,
 }
 
@@ -195,6 +204,12 @@ struct Phase {
 }
 
 impl Phase {
+    /// The longest packet alone, if both paths have packets: for so long the phase may overlap the one before, or leave off.
+    fn longest_overlap(&self) -> Time {
+        let [front, tiles] = self.longest.map(|longest| longest.alone);
+        if front > 0 && tiles > 0 { front.max(tiles) } else { 0 }
+    }
+
     /// The least time of each path. Between other batches each path works on two batches at once, unless it was
     /// empty or is emptied.
     fn floors(&self, is_emptied: bool) -> [Time; 2] {
@@ -292,7 +307,7 @@ impl Totals {
         if let Some(waits) = demand.barrier {
             return self.barrier(waits, demand, alone);
         }
-        let full = self.uncontended.full(demand, program, counts);
+        let full = self.uncontended.full(demand, program, counts, lines);
         self.open[path].full.iter_mut().zip(full).for_each(|(sum, part)| *sum += part);
         let at = &mut self.phases[phase];
         at.fills[path] |= std::mem::take(&mut self.empty[path]);
@@ -366,10 +381,14 @@ impl Totals {
 struct Uncontended {
     period: [Time; Station::COUNT],
     latency: [Time; Station::COUNT],
-    /// Time of one operation of a warp.
+    /// Time of one operation of a full warp, its cycles on the lanes, and a cycle of the cores.
     operation: Time,
+    wide: Time,
+    cycle: Time,
     warp_lanes: u32,
     machine: MachineSpec,
+    /// Packets or warps of each client that can wait for their lines.
+    in_flight: [f64; CLIENTS.len()],
     /// Latency of a line in the L2.
     line: Time,
     /// The extra latency of a line that is read from further below, with the event that counts such lines.
@@ -382,8 +401,8 @@ impl Uncontended {
         let period = common.map(|common| clocks.period(common.clock));
         let (shader, dram) = (&machine.shader, &machine.dram);
         // A warp wider than a core takes more than one cycle of its lanes.
-        let cycles =
-            shader.alu_latency_cycles.get() + shader.warp_lanes.get().div_ceil(shader.lanes.get()) - 1;
+        let wide = shader.warp_lanes.get().div_ceil(shader.lanes.get());
+        let cycles = shader.alu_latency_cycles.get() + wide - 1;
         let row = dram.latency_cycles.get()
             + dram.activate_cycles.get()
             + dram.cas_cycles.get()
@@ -396,8 +415,11 @@ impl Uncontended {
             period,
             latency: std::array::from_fn(|at| period[at] * Time::from(common[at].latency_cycles)),
             operation: clocks.period(shader.clock) * Time::from(cycles),
+            wide: wide.into(),
+            cycle: clocks.period(shader.clock),
             warp_lanes: shader.warp_lanes.get(),
             machine: machine.clone(),
+            in_flight: CLIENTS.map(|unit| f64::from(machine.common(unit).in_flight.max(1))),
             line: latency(Unit::L2),
             below: [
                 (Event::LlcReads, latency(Unit::Llc)),
@@ -407,24 +429,54 @@ impl Uncontended {
         }
     }
 
-    /// Program time of a packet; all its warps run the same program.
+    /// Program time of a packet; all its warps run the same program. One of a group has operations in some of its steps only.
     pub fn program(&self, demand: &ServiceDemand) -> Time {
-        Time::from(demand.steps()) * self.operation
+        let steps = Time::from(demand.steps());
+        let Some(_) = demand.group else { return steps * self.operation };
+        let all = u64::from(demand.threads) * u64::from(demand.ops);
+        let warps = u64::from(demand.warps(self.warp_lanes)).max(1);
+        let lanes = all.div_ceil(steps.max(1) * warps);
+        let cycles = lanes.div_ceil(self.machine.shader.lanes.get().into()).max(1);
+        steps * (self.operation - self.cycle * (self.wide - cycles.min(self.wide)))
     }
 
-    /// Time for which the packet fills the cores, by packets and by warps or, for a group, by groups. A group holds its
-    /// place while it waits for its lines, too.
-    pub fn full(&self, demand: &ServiceDemand, program: Time, counts: &PacketCounts) -> [f64; 2] {
+    /// Time for which the packet fills the cores, by packets and by warps or, for a group, by groups, and each client. Warps hold
+    /// their places while they wait for their lines, too.
+    fn full(
+        &self,
+        demand: &ServiceDemand,
+        program: Time,
+        counts: &PacketCounts,
+        lines: &[LineAccess],
+    ) -> [f64; FULL] {
         let shader = &self.machine.shader;
         let (packets, cores) = (f64::from(shader.in_flight), f64::from(shader.cores));
         let warps = demand.warps(self.warp_lanes);
-        let Some(group) = demand.group else {
-            let places = cores * f64::from(shader.warps);
-            return [program as f64 / packets, program as f64 * f64::from(warps) / places];
-        };
-        let held = (program + self.answer(demand, counts)) as f64;
-        let groups = cores * f64::from(self.machine.groups_per_core(warps, group.shared_bytes).max(1));
-        [held / packets, held / groups]
+        let answer = self.answer(demand, counts) as f64;
+        let reads = self.reads(lines);
+        let waits = demand.uses_data() && reads[demand.data_unit().port()];
+        let held = program as f64 + if waits { answer } else { 0.0 };
+        let places = demand.group.map_or(cores * f64::from(shader.warps), |group| {
+            cores * f64::from(self.machine.groups_per_core(warps, group.shared_bytes).max(1))
+        });
+        let needed = if demand.group.is_some() { 1.0 } else { f64::from(warps) };
+        let mut full = [0.0; FULL];
+        (full[0], full[1]) = (held / packets, held * needed / places);
+        for port in (0..CLIENTS.len()).filter(|&port| reads[port]) {
+            // At data units warps wait.
+            let is_of_warps = DataUnit::ALL.iter().any(|unit| unit.port() == port);
+            let waiting = if is_of_warps { warps.min(demand.lines[port]) } else { 1 };
+            full[2 + port] = answer * f64::from(waiting) / self.in_flight[port];
+        }
+        full
+    }
+
+    /// Whether each client waits for a line from below the L2, which is the slowest kind.
+    fn reads(&self, lines: &[LineAccess]) -> [bool; CLIENTS.len()] {
+        let mut reads = [false; CLIENTS.len()];
+        let slow = lines.iter().filter(|line| matches!(line.kind, LineKind::Fetch | LineKind::Below));
+        slow.filter_map(|line| port(line.client)).for_each(|port| reads[port] = true);
+        reads
     }
 
     /// Latency of the slowest kind of lines of a packet.

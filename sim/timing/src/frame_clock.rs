@@ -1,6 +1,6 @@
 //! Timing levels, a clock for any of them, and warnings about inaccuracies detected in their results.
 
-use activity::{LineAccess, Packet};
+use activity::{LineAccess, Packet, Unit};
 use serde::{Deserialize, Serialize};
 use warnings::{Code, Warning};
 
@@ -122,32 +122,50 @@ impl<'a> FrameClock<'a> {
 /// Reason why the time of a frame may be inaccurate at its level.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum AccuracyWarning {
-    /// Row time of the busiest memory bank over the busy time of the busiest unit. `packet` and `bound` order
-    /// its lines differently from `stepped`.
+    /// Share of the frame for which a memory bank opens rows in an order that `packet` and `bound` do not know: those that other
+    /// lines may have open at `packet`, all at `bound`, there over the busy time of the busiest unit.
     MemoryRows(f64),
+    /// Utilization of memory. At `packet`, no unit is busy all the time, so what counts is which line waits for which.
+    MemoryOrder(f64),
+    /// Share of the frame that batches and passes may overlap. `bound` does not know for how much of it they do.
+    BatchOverlap(f64),
     /// Core cycles per packet. At `bound`, short packets wait for one unit each, so no unit is busy for long.
     ShortPackets(f64),
 }
 
-/// Smallest row time over busy time that gives a warning.
+/// The error in cycles beyond which a warning is due: what the level `packet` promises.
+const MAX_ERROR: f64 = 0.08;
+/// Smallest row time over busy time that gives a warning at `bound`.
 const MIN_ROW_RATIO: f64 = 0.2;
+/// Least utilization of memory that gives a warning if nothing else is busy.
+const MIN_MEMORY: f64 = 0.5;
 /// Packets with fewer cycles than this give a warning.
 const MIN_PACKET_CYCLES: f64 = 2.0;
 
 impl AccuracyWarning {
     /// All warnings about a frame at `level`.
     pub fn all(level: Level, timed: &Timed) -> Vec<Self> {
-        let rows = timed.rows.filter(|&share| share >= MIN_ROW_RATIO).map(Self::MemoryRows);
+        // Time that is not at stake for more than the error promised cannot break the promise.
+        let rows = match level {
+            Level::Packet => timed.disputed.filter(|&share| share >= MAX_ERROR),
+            _ => timed.rows.filter(|&share| share >= MIN_ROW_RATIO),
+        };
+        let order = if level == Level::Packet { memory_order(timed) } else { None };
         let cycles = timed.cycles as f64 / timed.packets.max(1) as f64;
         let short =
             (level == Level::Bound && cycles < MIN_PACKET_CYCLES).then_some(Self::ShortPackets(cycles));
-        rows.into_iter().chain(short).collect()
+        // Half of it is what `bound` takes, and any part may be right.
+        let overlap = timed.overlap.filter(|&share| share >= 2.0 * MAX_ERROR).map(Self::BatchOverlap);
+        let memory = rows.map(Self::MemoryRows).into_iter().chain(order.map(Self::MemoryOrder));
+        memory.chain(overlap).chain(short).collect()
     }
 
     /// Warning code.
     pub const fn code(self) -> Code {
         match self {
             Self::MemoryRows(_) => Code::MemoryRows,
+            Self::MemoryOrder(_) => Code::MemoryOrder,
+            Self::BatchOverlap(_) => Code::BatchOverlap,
             Self::ShortPackets(_) => Code::ShortPackets,
         }
     }
@@ -155,7 +173,7 @@ impl AccuracyWarning {
     /// Severity, comparable among warnings of one kind; larger is worse.
     pub fn extent(self) -> f64 {
         match self {
-            Self::MemoryRows(share) => share,
+            Self::MemoryRows(share) | Self::MemoryOrder(share) | Self::BatchOverlap(share) => share,
             Self::ShortPackets(cycles) => -cycles,
         }
     }
@@ -167,9 +185,28 @@ impl AccuracyWarning {
             Self::MemoryRows(share) => Warning::new(
                 Code::MemoryRows,
                 format!(
-                    "a bank of memory opens and closes rows for {share:.1} times as long as any unit works in frame {frame}: \
+                    "a bank of memory opens rows for {:.0} % of {} in frame {frame} that lines of the same row may have open: \
                      times at `{name}` may be far off, as what counts is which lines wait side by side; use --timing \
-                     stepped, or let --accuracy choose"
+                     stepped, or let --accuracy choose",
+                    100.0 * share,
+                    if level == Level::Bound { "the busy time" } else { "the time" },
+                ),
+            ),
+            Self::MemoryOrder(share) => Warning::new(
+                Code::MemoryOrder,
+                format!(
+                    "memory is busy for {:.0} % of frame {frame} and no unit for all of it: times at `{name}` may be off by a \
+                     fifth, as what counts is which line waits for which; use --timing stepped, or let --accuracy choose",
+                    100.0 * share,
+                ),
+            ),
+            Self::BatchOverlap(share) => Warning::new(
+                Code::BatchOverlap,
+                format!(
+                    "the longest packets of the batches and passes of frame {frame} take {:.0} % of it: times at `{name}` may be \
+                     off by half of that, as it does not know how far batches overlap; use --timing packet, or let --accuracy \
+                     choose",
+                    100.0 * share,
                 ),
             ),
             Self::ShortPackets(cycles) => Warning::new(
@@ -181,4 +218,17 @@ impl AccuracyWarning {
             ),
         }
     }
+}
+
+/// Utilization of memory, if it is high and no unit decides the time.
+///
+/// A unit that is busy all the time takes that long in any order. Waits for memory that is rarely busy are short. Between the two
+/// they depend on the order of lines, which the calendars do not know. The busiest bank counts as a unit.
+fn memory_order(timed: &Timed) -> Option<f64> {
+    let share = |busy_ps: u64| busy_ps as f64 / timed.timeline.duration_ps.max(1) as f64;
+    let busy_ps = timed.timeline.busy_ps();
+    let busiest = busy_ps.iter().copied().max().map_or(0.0, share);
+    let busiest = busiest * timed.rows.unwrap_or(0.0).max(1.0);
+    let memory = share(busy_ps[Unit::Dram as usize]);
+    (memory >= MIN_MEMORY && busiest < 1.0 / (1.0 + MAX_ERROR)).then_some(memory)
 }

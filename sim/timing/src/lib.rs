@@ -80,6 +80,11 @@ pub struct Timed {
     /// Row time of the busiest memory bank over the busy time of the busiest unit; `None` at the level
     /// `stepped`. Levels differ most where it is large, as they order lines differently.
     pub rows: Option<f64>,
+    /// Share of the frame for which a memory bank opens rows that it may not have to: lines of the same row that may wait side by
+    /// side, in an order that is not known; only at the level `packet`.
+    pub disputed: Option<f64>,
+    /// Share of the frame that batches and passes may overlap, the longest packet of each; only at the level `bound`.
+    pub overlap: Option<f64>,
     /// The passes of the frame, by number.
     pub passes: Vec<PassTime>,
     /// When the frame spent its time on which draw, in order; empty at the level `bound`, and at `packet` if draws take turns

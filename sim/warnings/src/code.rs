@@ -100,9 +100,13 @@ codes! {
     CoordinatesCoarse = "coordinates-coarse" in Simulator,
     /// Triangles in view and in front of the camera are nearer than its near plane, as a whole or in part.
     NearPlaneCuts = "near-plane-cuts" in Simulator,
-    /// At `packet` and `bound`: a memory bank opens and closes rows for at least a fifth of the busiest unit's
-    /// time.
+    /// A memory bank opens rows in an order that the level does not know: at `packet` for at least 8 % of the time rows that other
+    /// lines may have open, at `bound` any rows for at least a fifth of the busiest unit's time.
     MemoryRows = "memory-rows" in Simulator,
+    /// At `packet`: memory is busy for half of the time or more, and no unit for all of it.
+    MemoryOrder = "memory-order" in Simulator,
+    /// At `bound`: the longest packets of batches and passes take 16 % of the frame or more.
+    BatchOverlap = "batch-overlap" in Simulator,
     /// At `bound`: a packet arrives every two cycles or faster.
     ShortPackets = "short-packets" in Simulator,
     /// An interval of `--timing sampled` is wider than 5 % of its value either way.
@@ -115,6 +119,8 @@ codes! {
     BudgetMissed = "budget-missed" in Simulator,
     /// A frame takes longer than a display period.
     MissedVsync = "missed-vsync" in Simulator,
+    /// All samples of a pixel have one time while something moves, or one lens position behind a lens.
+    SamplesWithoutBlur = "samples-without-blur" in Simulator,
     /// The shortest wave is under four squares of generator triangles long.
     CausticsCoarse = "caustics-coarse" in Workload,
     /// The sides of light volumes cross for more than a tenth of their length on average.
@@ -129,6 +135,8 @@ codes! {
     AtomicContention = "atomic-contention" in Workload,
     /// A tile of `compute` has more lights than its list takes.
     LightListsFull = "light-lists-full" in Workload,
+    /// The mip chain of `compute` leaves out a row or column of the image.
+    MipChainOdd = "mip-chain-odd" in Workload,
     /// `quintile sample poisson`: more than one uncovered region per 100 points is thinner than the float
     /// spacing.
     PointsThinRegions = "points-thin-regions" in Workload,
@@ -172,9 +180,11 @@ codes! {
     FewSamples = "few-samples" in Trace,
     /// Several rails are added up and one of them is the sum of the others.
     RailCountedTwice = "rail-counted-twice" in Trace,
+    /// A column of power that is not read differs by more than 2 % from voltage times current.
+    PowerDiffers = "power-differs" in Trace,
     /// The anchors of an alignment contradict the stamps or the trace.
     AnchorsOff = "anchors-off" in Trace,
-    /// Without anchors, another pairing of stamps and frames fits about as well.
+    /// Without anchors, another pairing of stamps and frames fits about as well, or may do so by chance.
     AmbiguousAlignment = "ambiguous-alignment" in Trace,
     /// Frames or pixels per joule are computed, which cannot be averaged.
     InverseUnits = "inverse-units" in Trace,
@@ -186,6 +196,12 @@ codes! {
     Clipped = "clipped" in Trace,
     /// The largest current uses less than 5 % of the range of the device.
     RangeUnused = "range-unused" in Trace,
+    /// The idle segment overlaps frames, or idle power is above the mean power of frames.
+    IdleBusy = "idle-busy" in Trace,
+    /// Power is negative on average.
+    NegativePower = "negative-power" in Trace,
+    /// The device changes the energy by more than 3 %.
+    EnergyChanged = "energy-changed" in Trace,
     /// A texture file cannot be read.
     MissingImage = "missing-image" in Scene,
     /// A `.mtl` file cannot be read, or lacks a material of an OBJ file.

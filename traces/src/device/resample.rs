@@ -17,6 +17,9 @@ const PIECE_SAMPLES: usize = 1 << 16;
 const TASK_SAMPLES: usize = 1 << 12;
 /// Most samples: they are not held in memory, but take time.
 const MAX_SAMPLES: f64 = (1_u64 << 36) as f64;
+/// Largest change of the energy without a warning, as a share. On a rail as assumed by default, a specified voltage misses at most
+/// 0.1 V of 12 V, and gain and offset of a meter are a percent or so: several times that is another voltage, or too few codes.
+const MAX_ENERGY_CHANGE: f64 = 0.03;
 
 /// A trace as a coarser device would have recorded it: the original is read again whenever samples are
 /// needed, and neither is in memory. The samples are those of [`Device::resample`], to the last bit.
@@ -73,6 +76,20 @@ impl Resampled<'_> {
     /// [`WriteError::Read`] if it cannot be read.
     pub fn original_energy_j(&self) -> Result<f64, WriteError> {
         Ok(energies_j(self.trace, &[(self.header.start_s, self.header.end_s())])?[0])
+    }
+
+    /// Warning about an energy that is not that of the original, `original_j`.
+    pub fn energy_change(&self, original_j: f64) -> Option<Warning> {
+        let change = self.energy_j - original_j;
+        let message = || {
+            format!(
+                "the device records {:.6} J of {original_j:.6} J ({:+.1} %)",
+                self.energy_j,
+                100.0 * change / original_j
+            )
+        };
+        (change.abs() > MAX_ENERGY_CHANGE * original_j.abs() && original_j != 0.0)
+            .then(|| Warning::new(Code::EnergyChanged, message()))
     }
 
     /// Warning about samples beyond the range of the device.
@@ -245,6 +262,26 @@ mod tests {
     use crate::trace::Metadata;
     use crate::trace::Trace;
     use proptest::prelude::*;
+
+    /// 10 W on a rail of 12 V, for a second.
+    fn at_12_v() -> Trace {
+        Trace::new(vec![12.0; 1000], vec![10.0 / 12.0; 1000], 1e3, 0.0, Metadata::default()).unwrap()
+    }
+
+    #[test]
+    fn a_voltage_of_another_rail_and_too_few_codes_change_the_energy_with_a_warning() {
+        let trace = at_12_v();
+        let warned = |change: fn(&mut DeviceSpec)| {
+            let mut spec = DeviceSpec { rate_hz: 100.0, ..DeviceSpec::fitting(12.0, 10.0) };
+            change(&mut spec);
+            let device = Device::new(spec).unwrap();
+            let sampled = device.resample_in_pieces(&trace).unwrap();
+            sampled.energy_change(sampled.original_energy_j().unwrap()).map(|warning| warning.message)
+        };
+        assert_eq!(warned(|spec| spec.specified_voltage_v = Some(12.0)), None);
+        assert!(warned(|spec| spec.specified_voltage_v = Some(5.0)).unwrap().contains("(-58.3 %)"));
+        assert!(warned(|spec| spec.bits = 2).is_some());
+    }
 
     /// Joins pieces.
     #[derive(Default)]

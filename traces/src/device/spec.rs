@@ -151,6 +151,8 @@ pub struct Peaks {
     pub current_a: f64,
     /// W.
     pub power_w: f64,
+    /// Whether there is a voltage at all: traces of power alone have 1 V throughout.
+    pub has_voltage: bool,
 }
 
 impl Peaks {
@@ -171,6 +173,7 @@ impl TraceWriter for Peaks {
             numbers.iter().map(|number| f64::from(number.abs())).fold(most, f64::max)
         };
         self.voltage_v = largest(self.voltage_v, chunk.voltage_v);
+        self.has_voltage |= chunk.voltage_v.iter().any(|volts| *volts != 1.0);
         self.current_a = largest(self.current_a, chunk.current_a);
         self.power_w = chunk.powers_w().map(f64::abs).fold(self.power_w, f64::max);
         Ok(())
@@ -233,9 +236,14 @@ impl DeviceSpec {
         Self { name: format!("daq-{rate}-{}bit", self.bits), ..self }
     }
 
+    /// The largest current that a trace with these peaks brings, A: that of its power on the rail where it has no voltage.
+    fn peak_a(&self, peaks: &Peaks) -> f64 {
+        if peaks.has_voltage { peaks.current_a } else { peaks.power_w / self.rail_v }
+    }
+
     /// Share of the codes of the current's converter that a trace with these peaks reaches.
     pub fn share_of_current_codes(&self, peaks: &Peaks) -> f64 {
-        peaks.current_a / self.current_range_a.map(f64::abs).into_iter().fold(0.0, f64::max)
+        self.peak_a(peaks) / self.current_range_a.map(f64::abs).into_iter().fold(0.0, f64::max)
     }
 
     /// Warning if a trace with these peaks uses few codes.
@@ -245,7 +253,7 @@ impl DeviceSpec {
             format!(
                 "the largest current, {:.3e} A, uses {:.2} % of the device's range of {low_a} to {high_a} A: its energy is rounded \
                  to few codes",
-                peaks.current_a,
+                self.peak_a(peaks),
                 share * 100.0
             )
         };
@@ -322,5 +330,9 @@ mod tests {
         assert!(DeviceSpec::default().warning(&peaks).is_none());
         let small = Peaks { current_a: 1.0, ..peaks };
         assert!(DeviceSpec::default().warning(&small).unwrap().message.contains("uses 3.33 % of"));
+        let power = Trace::new(vec![1.0; 2], vec![3.0, 24.0], 1e3, 0.0, crate::Metadata::default()).unwrap();
+        let power = Peaks::of(&power).unwrap();
+        assert!(peaks.has_voltage && !power.has_voltage);
+        assert_eq!(DeviceSpec::default().share_of_current_codes(&power), 2.0 / 30.0);
     }
 }

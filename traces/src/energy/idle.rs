@@ -1,6 +1,7 @@
 //! Idle power, measured and subtracted, and the energy between two times without it.
 
 use thiserror::Error;
+use warnings::{Code, Warning};
 
 use super::{FrameEnergy, PowerIntegral, energies_j};
 use crate::io::{TraceHeader, TraceReader, WriteError};
@@ -63,12 +64,46 @@ impl<'a> Idle<'a> {
         }
     }
 
+    /// Warning if frames of a trace that starts at `start_s`, from which nothing is taken off yet, draw less than idle power.
+    pub fn above_frames(&self, start_s: f64, frames: &[FrameEnergy]) -> Option<Warning> {
+        let idle_j: f64 = frames.iter().map(|frame| self.energy_j(start_s, frame.start_s, frame.end_s)).sum();
+        let total_j: f64 = frames.iter().map(|frame| frame.energy_j).sum();
+        let total_s: f64 = frames.iter().map(FrameEnergy::duration_s).sum();
+        let message = || {
+            format!(
+                "idle power, {:.4} W, is above that of the frames, {:.4} W on average: their energies without it are negative",
+                idle_j / total_s,
+                total_j / total_s
+            )
+        };
+        (idle_j > total_j && total_s > 0.0).then(|| Warning::new(Code::IdleBusy, message()))
+    }
+
     /// Subtracts the idle energy from every frame.
     pub fn take_off(&self, start_s: f64, frames: &mut [FrameEnergy]) {
         for frame in frames {
             frame.energy_j -= self.energy_j(start_s, frame.start_s, frame.end_s);
         }
     }
+}
+
+/// Warning if a segment that is taken for idle, s, has a part of some frames.
+pub fn idle_in_frames((from_s, to_s): (f64, f64), frames: &[FrameEnergy]) -> Option<Warning> {
+    let overlapping = frames.iter().filter(|frame| frame.start_s < to_s && frame.end_s > from_s).count();
+    let message = || {
+        let all = frames.len();
+        format!(
+            "the idle segment, {from_s} s to {to_s} s, overlaps {overlapping} of {all} frames: its mean is no idle power unless it \
+             lies in a gap between draws"
+        )
+    };
+    (overlapping > 0).then(|| Warning::new(Code::IdleBusy, message()))
+}
+
+/// Warning about a trace, or a part of it, with less than no energy, J.
+pub fn negative_power(total_j: f64) -> Option<Warning> {
+    let message = "power is negative on average: the current is most likely measured in reverse; swap the leads, or its sign";
+    (total_j < 0.0).then(|| Warning::new(Code::NegativePower, message))
 }
 
 /// Energy of the recording, repeated, from its start on, J.
@@ -144,6 +179,22 @@ mod tests {
             let by_instant = Idle::Instant(PowerIntegral::new(&recording)).energy_j(0.0, a_s, b_s);
             assert!((by_instant - Idle::Mean(2.0).energy_j(0.0, a_s, b_s)).abs() < 1e-12);
         }
+    }
+
+    #[test]
+    fn idle_that_is_none_is_warned_about() {
+        let frames = [frame(1.0, 1.5, 1.5), frame(1.5, 2.0, 1.7)];
+        assert!(
+            idle_in_frames((0.2, 1.0), &frames).is_none() && idle_in_frames((2.0, 3.0), &frames).is_none()
+        );
+        let warning = idle_in_frames((0.9, 1.1), &frames).unwrap();
+        assert!(warning.code == "idle-busy" && warning.message.contains("overlaps 1 of 2 frames"));
+        assert!(Idle::Mean(3.1).above_frames(0.0, &frames).is_none());
+        let warning = Idle::Mean(5.0).above_frames(0.0, &frames).unwrap();
+        assert!(warning.message.contains("5.0000 W, is above that of the frames, 3.2000 W"), "{warning}");
+        let recording = trace(vec![4.0; 7]);
+        assert!(Idle::Instant(PowerIntegral::new(&recording)).above_frames(0.0, &frames).is_some());
+        assert!(negative_power(-1e-3).is_some() && negative_power(0.0).is_none());
     }
 
     #[test]

@@ -44,15 +44,27 @@ impl FrameSummary {
 }
 
 /// The frames without an incomplete last one, which ends with the trace or at an end mark and is much longer
-/// or shorter than the others.
-pub fn whole(frames: &[FrameEnergy]) -> &[FrameEnergy] {
-    let cut = |flags: Flags| {
-        flags.contains(Flag::Last) && (flags.contains(Flag::Long) || flags.contains(Flag::Short))
+/// or shorter than the others; or, where it `ends_with_trace`, which may be anywhere in it, shorter than their spread allows.
+pub fn whole(frames: &[FrameEnergy], ends_with_trace: bool) -> &[FrameEnergy] {
+    let odd = |flags: Flags| flags.contains(Flag::Long) || flags.contains(Flag::Short);
+    let cut = |last: &FrameEnergy| {
+        last.flags.contains(Flag::Last) && (odd(last.flags) || ends_with_trace && is_shorter(frames))
     };
     match frames.split_last() {
-        Some((last, others)) if cut(last.flags) && !others.is_empty() => others,
+        Some((last, others)) if cut(last) && !others.is_empty() => others,
         _ => frames,
     }
+}
+
+/// Fewest frames with a usual length: of two, either may be the odd one.
+const MIN_FRAMES: usize = 3;
+
+/// Whether the last frame is shorter than those before it by as much as makes an outlier: a whole frame that is left out by mistake
+/// shifts the mean by nothing, a part of one that is not does.
+fn is_shorter(frames: &[FrameEnergy]) -> bool {
+    let lengths_s: Vec<f64> = frames.iter().map(FrameEnergy::duration_s).collect();
+    lengths_s.len() >= MIN_FRAMES
+        && deviations(&lengths_s, lengths_s.len() - 1).any(|length| length < -OUTLIER_DEVIATIONS[0])
 }
 
 /// Several runs, pooled.
@@ -315,6 +327,29 @@ mod tests {
         assert_eq!(Spread::of(&[3.0]), Some(Spread { mean: 3.0, deviation: 0.0, median: 3.0 }));
         assert_eq!(Spread::of(&[]), None);
         assert_eq!(FrameSummary::of(&[]), None);
+    }
+
+    #[test]
+    fn a_last_frame_cut_by_the_end_of_the_trace_is_left_out_and_one_within_the_spread_is_not() {
+        let frames = |lengths_s: &[f64]| -> Vec<FrameEnergy> {
+            let mut frames: Vec<FrameEnergy> = lengths_s
+                .iter()
+                .scan(0.0, |end_s, length_s| {
+                    let start_s = *end_s;
+                    *end_s += length_s;
+                    let flags = Flags::default();
+                    Some(FrameEnergy { start_s, end_s: *end_s, energy_j: *length_s, confidence: 1.0, flags })
+                })
+                .collect();
+            frames[lengths_s.len() - 1].flags.insert(Flag::Last);
+            frames
+        };
+        let even = frames(&[0.04, 0.0401, 0.0399, 0.04, 0.0401, 0.0216]);
+        assert_eq!((whole(&even, true).len(), whole(&even, false).len()), (5, 6));
+        for lengths_s in [&[0.04, 0.03, 0.05, 0.045, 0.035, 0.029][..], &[1.0, 1.0, 1.001], &[1.0, 0.6]] {
+            assert_eq!(whole(&frames(lengths_s), true).len(), lengths_s.len(), "{lengths_s:?}");
+        }
+        assert_eq!(whole(&frames(&[1.0, 1.0, 0.6]), true).len(), 2);
     }
 
     #[test]

@@ -211,8 +211,7 @@ mod tests {
         let warned = |flagged: usize| {
             let mut starts = starts(&[1.0; 20], 1.0);
             starts[..flagged].iter_mut().for_each(|start| start.confidence = 0.2);
-            let nothing = super::super::threshold::choose(&[], 0.0, 0.0, 0.0, |_| 0.0);
-            let found = conclude_at(100.0, &marks, &placement, starts, nothing);
+            let found = conclude_at(100.0, &marks, &placement, starts, Threshold::none());
             found.warnings.iter().any(|warning| warning.code == "low-confidence")
         };
         assert!(!warned(0) && !warned(2) && warned(3));

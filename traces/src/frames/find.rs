@@ -6,7 +6,7 @@ use super::matched::{find_matched, noise_variance};
 use super::register::register;
 use super::split_frames::SplitFrames;
 use super::start_refinement::refine_starts;
-use super::threshold::{Rule, Threshold, choose};
+use super::threshold::{Rule, Threshold};
 use super::track::{Start, track};
 use super::vsync::{Snapped, snap_to_ticks};
 use super::{FinderMethod, Found, FrameStart, SUSPECT_CONFIDENCE, marked_starts, spacing};
@@ -54,8 +54,7 @@ pub fn find_with(trace: &Trace, marks: &Marks, options: &Options) -> Result<Foun
 /// [`MarkError`] if the marks do not fit the trace.
 pub fn marked_only(trace: &Trace, marks: &Marks) -> Result<Found, MarkError> {
     let placement = marks.place(trace)?;
-    let nothing = choose(&[], 0.0, 0.0, 0.0, |_| 0.0);
-    Ok(assess::conclude(trace, marks, &placement, marked_starts(&placement, &[]), nothing))
+    Ok(assess::conclude(trace, marks, &placement, marked_starts(&placement, &[]), Threshold::none()))
 }
 
 /// With fewer starts there is too little to learn from: the sum of squares is kept, unless tracking gives a
@@ -64,9 +63,10 @@ const MIN_TRACKED_STARTS: usize = 16;
 /// Fewest starts of a plainly good sequence where the sum of squares found more and warns: three gaps can
 /// just be tested for evenness.
 const MIN_STARTS: usize = 4;
-/// Least share of the sequence at an even period, and least correlation of neighbours, of a plainly good one.
-/// In noise the correlation is 0.05, in frames at 0 dB 0.3 to 0.5.
-const PLAIN_COVERAGE_AND_SIMILARITY: [f64; 2] = [0.9, 0.5];
+/// Least share at an even period of a plainly good sequence.
+const MIN_TRACKED_COVERAGE: f64 = 0.9;
+/// Least correlation of neighbours in it. In noise it is 0.05, in frames at 0 dB 0.3 to 0.5.
+const MIN_TRACKED_SIMILARITY: f64 = 0.5;
 /// In windows of fewer samples shapes are too coarse to track: the method with the most even period is taken.
 const COARSE_WINDOW_SAMPLES: usize = 20;
 /// In windows of fewer samples the sum of squares is kept: any period can be found among so many similar
@@ -117,15 +117,15 @@ fn is_unsure(found: &Found) -> bool {
 fn enough_starts(tracked: &Found, squares: &Found) -> bool {
     let count = tracked.starts.len();
     let last_s = span_s(tracked) / count.max(2).saturating_sub(1) as f64;
-    let over = span_s(tracked) + last_s >= PLAIN_COVERAGE_AND_SIMILARITY[0] * span_s(squares);
+    let over = span_s(tracked) + last_s >= MIN_TRACKED_COVERAGE * span_s(squares);
     count >= MIN_TRACKED_STARTS
         || (squares.threshold.clarity() < 1.0 && (MIN_STARTS..squares.starts.len()).contains(&count) && over)
 }
 
 /// Whether starts keep the period, and frames are similar to their neighbours.
 fn even_and_similar(trace: &Trace, found: &Found) -> bool {
-    let [even, similar] = PLAIN_COVERAGE_AND_SIMILARITY;
-    covered_s(found) >= even * span_s(found) && neighbour_similarity(trace, found) >= similar
+    covered_s(found) >= MIN_TRACKED_COVERAGE * span_s(found)
+        && neighbour_similarity(trace, found) >= MIN_TRACKED_SIMILARITY
 }
 
 /// The result that covers most time at an even period.
@@ -274,7 +274,7 @@ fn find_tracked(trace: &Trace, marks: &Marks) -> Result<Found, MarkError> {
     starts.dedup_by(|later, earlier| later.time_s <= earlier.time_s && !later.marked);
     let end_tolerance_s = 0.5 * spacing(placement.samples) as f64 * trace.period_s();
     starts.retain(|start| start.marked || start.time_s < marks.end_s - end_tolerance_s);
-    let nothing = Threshold { rule: Rule::Sequence, ..choose(&[], 0.0, 0.0, 0.0, |_| 0.0) };
+    let nothing = Threshold { rule: Rule::Sequence, ..Threshold::none() };
     let mut found = assess::conclude(trace, marks, &placement, starts, nothing);
     let places: Vec<f64> = found.starts.iter().map(|start| trace.position(start.time_s)).collect();
     let end = (trace.position(marks.end_s).max(0.0) as usize).min(power.len());

@@ -180,7 +180,7 @@ pub(super) fn missing_gap_confidence(power: &[f64], starts: &[f64], width: usize
 /// The dip of power at a start.
 #[derive(Clone, Copy, Debug)]
 struct Depth {
-    /// Least mean of a gap_samples segment, W.
+    /// Lowest mean power over `gap_samples` samples, W.
     lowest_w: f64,
     /// Median of the power around, W.
     usual_w: f64,

@@ -94,14 +94,15 @@ fn differences(power: &[f64], starts: &[f64], width: usize, apart: usize) -> Vec
 }
 
 /// The segments of suspect starts.
-fn segments(left: &[f64]) -> Vec<Range<usize>> {
-    let ends = |place: usize| place == 0 || (left[place] < 1.0) != (left[place - 1] < 1.0);
-    let mut bounds: Vec<usize> = (0..left.len()).filter(|place| ends(*place)).collect();
-    bounds.push(left.len());
+fn segments(confidence_factors: &[f64]) -> Vec<Range<usize>> {
+    let is_suspect = |place: usize| confidence_factors[place] < 1.0;
+    let ends = |place: usize| place == 0 || is_suspect(place) != is_suspect(place - 1);
+    let mut bounds: Vec<usize> = (0..confidence_factors.len()).filter(|place| ends(*place)).collect();
+    bounds.push(confidence_factors.len());
     bounds
         .windows(2)
         .map(|two| two[0]..two[1])
-        .filter(|segment| left.get(segment.start) < Some(&1.0))
+        .filter(|segment| confidence_factors[segment.start] < 1.0)
         .collect()
 }
 
@@ -113,7 +114,7 @@ struct Dips<'a> {
 }
 
 impl Dips<'_> {
-    /// Least mean of a gap_samples segment at a start, W.
+    /// Lowest mean power over `gap_samples` samples at a start, W.
     fn lowest_w(&self, start: usize) -> Option<f64> {
         let gap_samples = ((IDLE_SHARE * self.width as f64) as usize).max(1);
         lowest_w(self.power, self.starts[start], self.width, gap_samples)

@@ -108,6 +108,11 @@ impl Threshold {
             floor_w2.max(self.alignment_w2.min(MAX_SINGLE_SHARE * self.background_w2)).max(f64::MIN_POSITIVE);
         (distance_w2 - self.noise_w2).max(floor_w2)
     }
+
+    /// The threshold that lets nothing in, where there is no candidate.
+    pub(crate) fn none() -> Self {
+        nothing(&[], 0.0, 0.0)
+    }
 }
 
 /// Chooses the threshold. `distances` are those of the spaced minima, the marks left out; `background_w2` is

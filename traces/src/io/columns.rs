@@ -27,7 +27,7 @@ pub(super) enum Rail {
 }
 
 /// The columns that make up a trace.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Layout {
     pub time: Option<Picked>,
     pub values: Vec<Picked>,
@@ -36,6 +36,8 @@ pub(super) struct Layout {
     pub names: Vec<String>,
     /// Columns of power that are not read, as their rails have voltage and current.
     pub unread: Vec<String>,
+    /// What columns without names are taken for, in words; absent where all is stated.
+    pub guess: Option<String>,
 }
 
 impl Layout {
@@ -92,6 +94,59 @@ type Rails = BTreeMap<String, BTreeMap<Quantity, Picked>>;
 /// Chooses the columns of a trace.
 pub(super) fn layout(path: &Path, names: &[String], options: &ReadOptions) -> Result<Layout, ReadError> {
     if options.by_hand() { by_hand(path, names, options) } else { by_name(path, names, options) }
+}
+
+/// Names of columns that have none.
+pub(super) fn numbered(columns: usize) -> Vec<String> {
+    (1..=columns).map(|number| format!("column {number}")).collect()
+}
+
+/// Chooses among columns without names: those requested by number; else times, voltages and currents in this order, without times where
+/// there are two.
+pub(super) fn layout_of_unnamed(
+    path: &Path,
+    columns: usize,
+    options: &ReadOptions,
+) -> Result<Layout, ReadError> {
+    let names = numbered(columns);
+    let usual: &[&str] = if columns == 2 { &[VOLTAGE_V, CURRENT_A] } else { &[TIME_S, VOLTAGE_V, CURRENT_A] };
+    let by_number = options.by_hand() || options.time.is_some();
+    let guessed =
+        names.iter().enumerate().map(|(index, name)| match usual.get(index).filter(|_| !by_number) {
+            Some(usual) => (*usual).to_owned(),
+            None => name.clone(),
+        });
+    let guessed: Vec<String> = guessed.collect();
+    let mut layout = layout(path, &guessed, options).map_err(|error| match error {
+        ReadError::MissingColumn { column, .. } => no_names(path, &column, columns),
+        other => other,
+    })?;
+    let is_free = layout.values.iter().all(|column| column.index > 0);
+    if by_number && layout.time.is_none() && is_free && (columns > 2 || options.rate_hz.is_none()) {
+        layout.time = Some(Picked { index: 0, name: String::new(), scale: 1.0, has_unit: false });
+    }
+    let mut guess = Vec::new();
+    let time = layout.time.iter_mut().filter(|_| options.time.is_none()).map(|time| (time, Quantity::Time));
+    let rail = layout.rails.first().copied().filter(|_| !by_number);
+    let values = layout.values.iter_mut().enumerate().filter_map(|(index, column)| match rail? {
+        Rail::Measured { voltage, .. } if voltage == index => Some((column, Quantity::Voltage)),
+        _ => Some((column, Quantity::Current)),
+    });
+    for (column, of) in time.chain(values) {
+        (column.name, column.has_unit) = (names[column.index].clone(), false);
+        guess.push(format!("{} as {}", column.name, of.name()));
+    }
+    layout.guess = (!guess.is_empty()).then(|| guess.join(", "));
+    Ok(layout)
+}
+
+/// The error of columns without names, of which none is known to be `column`.
+pub(super) fn no_names(path: &Path, column: &str, columns: usize) -> ReadError {
+    let reason = format!(
+        "no column {column}: the file has {columns} columns without names; choose them by number, such as --time-column 1 \
+         --power-column 2, or add a line of names"
+    );
+    ReadError::Conflict { path: path.to_owned(), reason }
 }
 
 fn missing(path: &Path, names: &[String], column: &str) -> ReadError {
@@ -154,6 +209,7 @@ fn by_hand(path: &Path, names: &[String], options: &ReadOptions) -> Result<Layou
             rails: vec![Rail::Power { power: 0 }],
             names: vec![String::new()],
             unread: Vec::new(),
+            guess: None,
         });
     }
     let current =
@@ -163,7 +219,8 @@ fn by_hand(path: &Path, names: &[String], options: &ReadOptions) -> Result<Layou
         (None, Some(voltage)) => (vec![voltage, current], Rail::Measured { voltage: 0, current: 1 }),
         (None, None) => return Err(missing(path, names, VOLTAGE_V)),
     };
-    Ok(Layout { time, values, rails: vec![rail], names: vec![String::new()], unread: Vec::new() })
+    let names = vec![String::new()];
+    Ok(Layout { time, values, rails: vec![rail], names, unread: Vec::new(), guess: None })
 }
 
 fn time_column(path: &Path, names: &[String]) -> Result<Option<Picked>, ReadError> {
@@ -203,8 +260,7 @@ fn by_name(path: &Path, names: &[String], options: &ReadOptions) -> Result<Layou
         Some(column) => Some(pick(path, names, column, Quantity::Time)?),
         None => time_column(path, names)?,
     };
-    let mut layout =
-        Layout { time, values: Vec::new(), rails: Vec::new(), names: Vec::new(), unread: Vec::new() };
+    let mut layout = Layout { time, ..Layout::default() };
     for (name, columns) in chosen(path, names, options, rails)? {
         layout.add(path, names, options, &name, columns)?;
     }

@@ -11,7 +11,7 @@ use flate2::read::MultiGzDecoder;
 use flate2::write::GzEncoder;
 use rayon::prelude::*;
 
-use super::columns::{Layout, Opened, Picked, RowBatch, RowSource, layout};
+use super::columns::{Layout, Opened, Picked, RowBatch, RowSource, layout, layout_of_unnamed, numbered};
 use super::recording;
 use super::rows::Rows;
 use super::samples::{Description, TraceChunk, TraceHeader, TraceReader, TraceWriter, to_json};
@@ -261,15 +261,12 @@ impl CsvRows {
         }
         let numbers = record.iter().all(|field| number::<f64>(field).is_some());
         let held = !options.header.unwrap_or(!numbers);
-        let names: Vec<String> = if held {
-            unnamed(record.len())
-        } else {
-            record
-                .iter()
-                .map(|name| String::from_utf8_lossy(name).trim_start_matches('\u{feff}').to_owned())
-                .collect()
+        let name = |name: &[u8]| String::from_utf8_lossy(name).trim_start_matches('\u{feff}').to_owned();
+        let names = if held { numbered(record.len()) } else { record.iter().map(name).collect() };
+        let layout = match held {
+            true => layout_of_unnamed(path, names.len(), options)?,
+            false => layout(path, &names, options)?,
         };
-        let layout = layout(path, &names, options)?;
         let (path, repair) = (path.to_owned(), options.repair);
         Ok((Self { path, repair, reader, record, names, row: 0, held, uneven: None, surplus: 0 }, layout))
     }
@@ -308,11 +305,11 @@ impl CsvRows {
                 path: self.path.clone(),
                 row: self.row,
                 column: column.name.clone(),
-                value: String::from_utf8_lossy(field).chars().take(40).collect(),
+                value: shown(field),
             }),
             None if self.repair => Ok(none),
             None => {
-                let shown: String = String::from_utf8_lossy(field).chars().take(40).collect();
+                let shown = shown(field);
                 let value = match number::<f64>(field) {
                     Some(_) => format!("{shown:?}, which is beyond 3.4e38"),
                     None if shown.is_empty() => "empty".to_owned(),
@@ -355,6 +352,17 @@ impl RowSource for CsvRows {
                 let reason = format!("{} fields instead of {}", self.record.len(), self.names.len());
                 return Err(ReadError::Row { path: self.path.clone(), row: self.row, reason });
             }
+            let time = layout.time.as_ref();
+            if let Some((column, field)) = time.and_then(|time| Some((time, self.record.get(time.index)?)))
+                && is_date(field)
+            {
+                return Err(ReadError::Date {
+                    path: self.path.clone(),
+                    row: self.row,
+                    column: column.name.clone(),
+                    value: shown(field),
+                });
+            }
             if self.row == 1 && self.record.iter().all(is_word) {
                 return Err(ReadError::Words { path: self.path.clone() });
             }
@@ -389,12 +397,18 @@ impl RowSource for CsvRows {
     }
 }
 
-/// Names for columns that have none: time, voltage, current; two columns are voltage and current.
-fn unnamed(columns: usize) -> Vec<String> {
-    let usual: &[&str] = if columns == 2 { &[VOLTAGE_V, CURRENT_A] } else { &[TIME_S, VOLTAGE_V, CURRENT_A] };
-    (0..columns)
-        .map(|i| usual.get(i).map_or_else(|| format!("column {}", i + 1), |name| (*name).to_owned()))
-        .collect()
+/// The begin of a field, for messages.
+fn shown(field: &[u8]) -> String {
+    String::from_utf8_lossy(field).chars().take(40).collect()
+}
+
+/// Whether a field is a date or a time of day: figures in at least three parts between `-`, `/` or `:`, such as `2026-01-31` and
+/// `12:00:00.5`.
+fn is_date(field: &[u8]) -> bool {
+    let text = std::str::from_utf8(field).unwrap_or_default();
+    let figures = |part: &str| part.starts_with(|c: char| c.is_ascii_digit());
+    let mut parts = text.split(['-', '/', ':']);
+    number::<f64>(field).is_none() && parts.clone().count() > 2 && parts.all(figures)
 }
 
 /// Whether there is something in a field that is no number, not even one that is not finite.
@@ -484,6 +498,22 @@ mod tests {
         let mut out = Vec::new();
         push_decimal(&mut out, value);
         String::from_utf8(out).unwrap()
+    }
+
+    #[test]
+    fn dates_are_refused_with_the_remedy_and_numbers_are_none() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("t.csv");
+        for stamp in ["2026-01-01T00:00:00.000000Z", "2026/01/01 00:00:00.001", "12:00:00.5"] {
+            for power in ["1.5", "1.5 W"] {
+                fs::write(&path, format!("time,power_W\n{stamp},{power}\n")).unwrap();
+                let message = read(&path).unwrap_err().to_string();
+                assert!(message.contains("dates are not read; write times in seconds"), "{message}");
+            }
+        }
+        for other in ["1e-5", "-1e-5", "1-2", "a-b-c", "", "2026", "--"] {
+            assert!(!is_date(other.as_bytes()), "{other}");
+        }
     }
 
     #[test]

@@ -186,6 +186,18 @@ pub enum ReadError {
         /// The value found.
         value: String,
     },
+    /// A date where seconds have to be.
+    #[error("{path}: row {row}: {column} is {value:?}: dates are not read; write times in seconds, for example since the first row, or leave them out and give --rate", path = path.display())]
+    Date {
+        /// The file.
+        path: PathBuf,
+        /// The row.
+        row: u64,
+        /// The column.
+        column: String,
+        /// The value found.
+        value: String,
+    },
     /// A time stamp is not later than the one before it.
     #[error(
         "{path}: row {row}: time {time_s} s is not after {before_s} s: sort the rows and drop repeats, or give --rate if \

@@ -23,7 +23,7 @@ use std::path::{Path, PathBuf};
 pub use error::{ReadError, WriteError};
 pub use recording::{Loaded, Recording, open, read};
 pub use repair::{Repair, RepairKind};
-pub use rows::{Rows, SumOfRails, rail_of_sums};
+pub use rows::{Rows, SumOfRails, rail_of_sums, unread_power_ratio};
 #[cfg(test)]
 pub(crate) use samples::SplitTrace;
 pub use samples::{TraceChunk, TraceHeader, TraceReader, TraceWriter};

@@ -1,7 +1,7 @@
 //! Rows of a file of any format, in pieces, so that no file has to fit into memory; and rails among their columns that are
 //! the sum of others and would count twice.
 
-use super::columns::{Layout, Open, Opened, Rail, RowBatch, RowSource};
+use super::columns::{Layout, Open, Opened, Rail, RowBatch, RowSource, no_names};
 use super::samples::Description;
 use super::time_base::{max_offset_periods, mean_rate_hz};
 use super::{FORMATS, ReadError, ReadOptions, Repair, TraceFormat, VOLTAGE_V, readable};
@@ -80,6 +80,9 @@ impl Rows {
         description.rate_hz = options.rate_hz.or(description.rate_hz);
         description.start_s = options.start_s.or(description.start_s);
         if layout.time.is_none() && description.rate_hz.is_none() {
+            if layout.guess.is_some() {
+                return Err(no_names(path, time, source.names().len()));
+            }
             let found = source.names().join(", ");
             return Err(ReadError::MissingColumn { path: path.to_owned(), column: time.to_owned(), found });
         }
@@ -142,6 +145,11 @@ impl Rows {
     pub fn without_unit(&self) -> impl Iterator<Item = &str> {
         let columns = self.layout.time.iter().chain(&self.layout.values);
         columns.filter(|column| !column.has_unit).map(|column| column.name.as_str())
+    }
+
+    /// What columns without names are taken for, such as `column 1 as times`; absent where all is stated.
+    pub fn guess(&self) -> Option<&str> {
+        self.layout.guess.as_deref()
     }
 
     /// Columns of power that are not read: the power is their rail's voltage times its current.
@@ -385,6 +393,28 @@ pub fn rail_of_sums(path: &Path, options: &ReadOptions) -> Result<Option<SumOfRa
     }))
 }
 
+/// Least difference of a power that is not read from voltage times current that is said, as a share: that of means of products from
+/// products of means, and of the gains of two meters, is a percent or so.
+const MIN_POWER_DIFFERENCE: f64 = 0.02;
+
+/// How many times voltage times current, on average over the first rows, a column of power is that is beside them and not read; `None`
+/// if they agree, if either cannot be read, and unless there is one rail with one such column.
+pub fn unread_power_ratio(path: &Path, options: &ReadOptions) -> Option<f64> {
+    let rows = Rows::open(path, options).ok()?;
+    let ([_], [power]) = (rows.rails(), rows.unread()) else { return None };
+    let power = Some(power.clone());
+    let by_power = ReadOptions { rails: Vec::new(), power, fixed_voltage_v: None, ..options.clone() };
+    let ratio = total_w(Rows::open(path, &by_power).ok()?)? / total_w(rows)?;
+    (ratio.is_finite() && (ratio - 1.0).abs() > MIN_POWER_DIFFERENCE).then_some(ratio)
+}
+
+/// The sum of the powers of the first rows, W; `None` if they cannot be read.
+fn total_w(mut rows: Rows) -> Option<f64> {
+    let mut batch = RowBatch::default();
+    rows.next(COMPARED_ROWS, &mut batch).ok()?;
+    Some(rows.powers_w(&mut batch).iter().flatten().filter(|power_w| power_w.is_finite()).sum())
+}
+
 /// Whether a rail's power is that of all others together, in every row that has all.
 fn is_sum(rail: usize, powers_w: &[Vec<f64>]) -> bool {
     let rows = powers_w[rail].len();
@@ -410,6 +440,62 @@ mod tests {
         std::fs::write(&path, format!("time_s,{names}\n{rows}")).unwrap();
         let found = rail_of_sums(&path, &ReadOptions::default()).unwrap();
         found.map(|sum| (sum.rail, sum.by_values))
+    }
+
+    #[test]
+    fn a_power_that_is_not_read_is_compared_with_voltage_times_current() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("t.csv");
+        let ratio = |names: &str, factor: f64| {
+            let row = |i: u32| {
+                format!("{},12,{},{}\n", f64::from(i) / 100.0, 1 + i % 3, factor * f64::from(1 + i % 3))
+            };
+            std::fs::write(&path, format!("{names}\n{}", (0..100).map(row).collect::<String>())).unwrap();
+            unread_power_ratio(&path, &ReadOptions::default())
+        };
+        let names = "time_s,voltage_V,current_A,power_W";
+        assert!((ratio(names, 24.0).unwrap() - 2.0).abs() < 1e-6);
+        assert!((ratio("time_s,voltage_V,current_A,power_mW", 12.0).unwrap() - 1e-3).abs() < 1e-9);
+        assert_eq!((ratio(names, 12.1), ratio("time_s,voltage_V,current_A,note", 24.0)), (None, None));
+        std::fs::write(&path, format!("{names}\n0,12,1,12\n0.01,12,1,N/A\n")).unwrap();
+        assert_eq!(unread_power_ratio(&path, &ReadOptions::default()), None);
+    }
+
+    /// The columns that a file without names is read from, and what was guessed, or the error.
+    fn unnamed(rows: &str, options: &ReadOptions) -> Result<(Vec<usize>, Option<String>), String> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("t.csv");
+        std::fs::write(&path, rows).unwrap();
+        let rows = Rows::open(&path, options).map_err(|error| error.to_string())?;
+        let columns = rows.layout.time.iter().chain(&rows.layout.values);
+        Ok((columns.map(|column| column.index + 1).collect(), rows.guess().map(str::to_owned)))
+    }
+
+    #[test]
+    fn columns_without_names_are_chosen_by_number_and_a_guess_is_said() {
+        let (two, three) = ("0,1.5\n1,1.6\n2,1.7\n", "0,12,1.5\n1,12,1.6\n");
+        let plain = ReadOptions::default();
+        let refused = unnamed(two, &plain).unwrap_err();
+        assert!(
+            refused.contains("2 columns without names") && refused.contains("--time-column 1"),
+            "{refused}"
+        );
+        let at = |time: Option<&str>, power: Option<&str>, rate_hz| ReadOptions {
+            time: time.map(str::to_owned),
+            power: power.map(str::to_owned),
+            rate_hz,
+            ..ReadOptions::default()
+        };
+        assert_eq!(unnamed(two, &at(Some("1"), Some("2"), None)), Ok((vec![1, 2], None)));
+        let first = Some("column 1 as times".to_owned());
+        assert_eq!(unnamed(two, &at(None, Some("2"), None)), Ok((vec![1, 2], first)));
+        assert_eq!(unnamed(two, &at(None, Some("2"), Some(1.0))), Ok((vec![2], None)));
+        assert_eq!(unnamed(two, &at(None, Some("1"), Some(1.0))), Ok((vec![1], None)));
+        let both = Some("column 1 as voltages, column 2 as currents".to_owned());
+        assert_eq!(unnamed(two, &at(None, None, Some(1.0))), Ok((vec![1, 2], both)));
+        assert!(unnamed(two, &at(Some("1"), None, None)).unwrap_err().contains("without names"));
+        let all = Some("column 1 as times, column 2 as voltages, column 3 as currents".to_owned());
+        assert_eq!(unnamed(three, &plain), Ok((vec![1, 2, 3], all)));
     }
 
     #[test]

@@ -40,7 +40,7 @@ const TOUCH_FRAMES: [f64; 2] = [8.0, 55.0];
 const LONE: f64 = 0.45;
 /// Mean pause, s.
 const PAUSE_S: f64 = 0.25;
-const LEAST_PAUSE_S: f64 = 5e-3;
+const MIN_PAUSE_S: f64 = 5e-3;
 /// From frame to frame of a touch the filled area changes by so much.
 const SCROLL: f64 = 0.15;
 const AROUND_S: f64 = 0.4;
@@ -113,7 +113,7 @@ pub(super) fn frames(count: usize, seed: u64) -> Drawn {
             let ticks = libm::ceil((interface.idle_s + 0.05e-3 - now_s) / tick_s);
             now_s += ticks * tick_s;
         }
-        now_s += LEAST_PAUSE_S + interface.dice.waiting(PAUSE_S);
+        now_s += MIN_PAUSE_S + interface.dice.waiting(PAUSE_S);
     }
     let end_s = now_s.max(interface.idle_s);
     let until_s = end_s + AROUND_S;

@@ -1,6 +1,6 @@
 //! Every way a file can be wrong gives one error that names the file, the place and the remedy, and no panic.
 
-use ::parquet::basic::{Repetition, Type as Physical};
+use ::parquet::basic::{LogicalType, Repetition, TimeUnit, Type as Physical};
 use ::parquet::data_type::{DoubleType, FloatType, Int64Type};
 use ::parquet::file::properties::WriterProperties;
 use ::parquet::file::writer::SerializedFileWriter;
@@ -162,6 +162,8 @@ fn descriptions_are_compared_with_the_rows() {
 /// Writes a Parquet file of the given columns.
 enum Values {
     Int(Vec<i64>),
+    /// Microseconds since 1970.
+    Stamp(Vec<i64>),
     Float(Vec<f32>),
     /// Optional doubles: `None` is a null.
     Maybe(Vec<Option<f64>>),
@@ -174,11 +176,14 @@ fn parquet_file(columns: Vec<(&str, Values)>) -> (TempDir, PathBuf) {
 fn parquet_bytes(columns: Vec<(&str, Values)>) -> Vec<u8> {
     let field = |(name, values): &(&str, Values)| {
         let (physical, repetition) = match values {
-            Values::Int(_) => (Physical::INT64, Repetition::REQUIRED),
+            Values::Int(_) | Values::Stamp(_) => (Physical::INT64, Repetition::REQUIRED),
             Values::Float(_) => (Physical::FLOAT, Repetition::REQUIRED),
             Values::Maybe(_) => (Physical::DOUBLE, Repetition::OPTIONAL),
         };
-        Arc::new(Type::primitive_type_builder(name, physical).with_repetition(repetition).build().unwrap())
+        let stamp =
+            matches!(values, Values::Stamp(_)).then(|| LogicalType::timestamp(true, TimeUnit::MICROS));
+        let field = Type::primitive_type_builder(name, physical).with_repetition(repetition);
+        Arc::new(field.with_logical_type(stamp).build().unwrap())
     };
     let fields = columns.iter().map(field).collect();
     let schema = Arc::new(Type::group_type_builder("t").with_fields(fields).build().unwrap());
@@ -189,7 +194,9 @@ fn parquet_bytes(columns: Vec<(&str, Values)>) -> Vec<u8> {
     for (_, values) in &columns {
         let mut column = group.next_column().unwrap().unwrap();
         match values {
-            Values::Int(values) => column.typed::<Int64Type>().write_batch(values, None, None),
+            Values::Int(values) | Values::Stamp(values) => {
+                column.typed::<Int64Type>().write_batch(values, None, None)
+            }
             Values::Float(values) => column.typed::<FloatType>().write_batch(values, None, None),
             Values::Maybe(values) => {
                 let present: Vec<f64> = values.iter().flatten().copied().collect();
@@ -212,7 +219,7 @@ fn parquet_error(columns: Vec<(&str, Values)>) -> ReadError {
 
 #[test]
 fn parquet_errors_name_file_row_and_column() {
-    use Values::{Float, Int, Maybe};
+    use Values::{Float, Int, Maybe, Stamp};
     let ones = || Float(vec![1.0; 3]);
     let times = || Int(vec![0, 1000, 2000]);
     says(
@@ -221,8 +228,8 @@ fn parquet_errors_name_file_row_and_column() {
     );
     says(&parquet_error(vec![("voltage_V", ones()), ("current_A", ones())]), &["no column time_ns"]);
     says(
-        &parquet_error(vec![("time_ns", times()), ("voltage_V", times()), ("current_A", ones())]),
-        &["column voltage_V is INT64", "FLOAT"],
+        &parquet_error(vec![("time_ns", times()), ("voltage_V", Stamp(vec![0; 3])), ("current_A", ones())]),
+        &["column voltage_V is INT64", "FLOAT", "write it as"],
     );
     says(
         &parquet_error(vec![("time_ns", ones()), ("voltage_V", ones()), ("current_A", ones())]),
@@ -252,6 +259,17 @@ fn parquet_errors_name_file_row_and_column() {
         &parquet_error(vec![("time_ns", Int(vec![])), ("voltage_V", empty()), ("current_A", empty())]),
         &["no samples"],
     );
+}
+
+#[test]
+fn whole_numbers_are_read_as_in_text_and_stamps_of_a_file_have_their_unit() {
+    use Values::{Int, Stamp};
+    let stamps = Stamp(vec![0, 1000, 2000]);
+    let (_folder, path) = parquet_file(vec![("timestamp", stamps), ("power_mW", Int(vec![1500, -2, 7]))]);
+    let trace = parquet::read(&path).unwrap();
+    assert_eq!((trace.rate_hz(), trace.current_a()), (1000.0, &[1.5, -2e-3, 7e-3][..]));
+    let rows = io::Rows::open(&path, &ReadOptions::default()).unwrap();
+    assert_eq!(rows.without_unit().count(), 0);
 }
 
 #[test]

@@ -9,7 +9,7 @@ use super::generator::Ocean;
 use super::shader::draw_on;
 use super::{Beam, Eye, Floor, Light, Method, Picture};
 use crate::error::LoadError;
-use crate::job::{Drawn, Draws, Fact, Flag, Flags, Job, JobError, OptionSource, Request};
+use crate::job::{Drawn, Draws, Fact, Flag, Flags, Job, JobError, OptionSource, Request, must_hold};
 use crate::scene::Settings;
 
 /// View of the light.
@@ -64,23 +64,15 @@ impl Default for Options {
 
 impl Options {
     fn check(&self) -> Result<(), LoadError> {
-        let refuse = |setting, message: String| Err(LoadError::Setting { setting, message });
-        if !(1..=1024).contains(&self.cells) {
-            return refuse("cells", format!("{}: a side takes 1 to 1024 squares", self.cells));
-        }
-        for (setting, value) in [("side_m", self.side_m), ("depth_m", self.depth_m), ("wave_m", self.wave_m)]
-        {
-            if !(1e-3..=1e4).contains(&value) {
-                return refuse(setting, format!("{value:?}: it has to be 0.001 to 10000 metres"));
-            }
-        }
-        if !(0.0..=1.0).contains(&self.slope) {
-            return refuse("slope", format!("{:?}: it has to be 0 to 1", self.slope));
-        }
-        if !(0.0..=0.9).contains(&self.pleat) {
-            return refuse("pleat", format!("{:?}: it has to be 0 to 0.9", self.pleat));
-        }
-        Ok(())
+        let (is_length, length) = (|value: f64| (1e-3..=1e4).contains(&value), "0.001 to 10000 metres");
+        must_hold([
+            ("cells", &self.cells, (1..=1024).contains(&self.cells), "1 to 1024 squares along a side"),
+            ("side_m", &self.side_m, is_length(self.side_m), length),
+            ("depth_m", &self.depth_m, is_length(self.depth_m), length),
+            ("wave_m", &self.wave_m, is_length(self.wave_m), length),
+            ("slope", &self.slope, (0.0..=1.0).contains(&self.slope), "0 to 1"),
+            ("pleat", &self.pleat, (0.0..=0.9).contains(&self.pleat), "0 to 0.9"),
+        ])
     }
 }
 
@@ -169,7 +161,7 @@ impl Caustics {
 
 fn facts(picture: &Picture, beams: &[Beam]) -> Vec<Fact> {
     let runs = picture.total_runs() as f64;
-    let facts = [
+    Fact::all([
         ("beams", beams.len() as f64),
         ("flux_W", beams.iter().map(|beam| beam.flux_w).sum()),
         ("shader_executions", runs),
@@ -178,8 +170,7 @@ fn facts(picture: &Picture, beams: &[Beam]) -> Vec<Fact> {
         ("pixels_tested", picture.tests as f64),
         ("crossed_share_of_length", crossing(beams)),
         ("beams_left_out", picture.skipped as f64),
-    ];
-    facts.into_iter().map(|(name, value)| Fact { name, value }).collect()
+    ])
 }
 
 /// Tone-maps light to colours; one lit pixel in a hundred is white.

@@ -3,7 +3,7 @@
 
 use glam::DVec3;
 use pipeline::conservative::{Grid, MovingTriangle, Rasterizer, View};
-use pipeline::memory::Surface;
+use pipeline::memory::MemoryRange;
 use pipeline::{ConservativeDraw, Gpu, Lanes, Primitive, TileIntervals, TileShader};
 
 use super::bound::BoundingVolume;
@@ -28,9 +28,9 @@ pub(super) fn draw_on(gpu: &mut Gpu<'_>, beams: &[Beam], eye: &Eye, method: Meth
     let [columns, rows] = [viewport.width(), viewport.height()].map(|side| side.div_ceil(TILE_PX));
     let side = f64::from(TILE_PX);
     let grid = Grid { origin: [-half_width, -half_height], tile: [side; 2], columns, rows };
-    let target = gpu.surface(u64::from(columns * rows) * TILE_PIXELS * LIGHT_BYTES);
+    let target = gpu.allocate(u64::from(columns * rows) * TILE_PIXELS * LIGHT_BYTES);
     let (primitives, faces) = primitives(&seen, method, &grid);
-    let vertices = gpu.surface(3 * primitives.len() as u64 * u64::from(VERTEX_BYTES));
+    let vertices = gpu.allocate(3 * primitives.len() as u64 * u64::from(VERTEX_BYTES));
     // The maps of a GPU with other tiles cannot show these.
     let of_image = (gpu.spec().tile_px == TILE_PX).then_some(viewport);
     let mut picture = Picture {
@@ -76,8 +76,16 @@ fn primitives(seen: &[Option<Seen>], method: Method, grid: &Grid) -> (Vec<Primit
     let mut add = |beam: usize, ends: [[DVec3; 3]; 2], corners: Option<[DVec3; 3]>| {
         let [open, close] = ends.map(|end| end.map(|p| p.to_array()));
         let Some(triangle) = MovingTriangle::new(open, close) else { return };
-        let (part, body, back_only) = ([0..grid.columns, 0..grid.rows], beam as u32, corners.is_some());
-        primitives.push(Primitive { triangle, rasterizer: whole, part, body, again: false, back_only });
+        let (scissor, body, keeps_back_faces_only) =
+            ([0..grid.columns, 0..grid.rows], beam as u32, corners.is_some());
+        primitives.push(Primitive {
+            triangle,
+            rasterizer: whole,
+            scissor,
+            body,
+            reuses_vertices: false,
+            keeps_back_faces_only,
+        });
         faces.push(Face { beam, corners });
     };
     for (beam, seen) in seen.iter().enumerate() {
@@ -98,7 +106,7 @@ struct LightShader<'a> {
     seen: &'a [Option<Seen>],
     faces: &'a [Face],
     light: Light,
-    target: Surface,
+    target: MemoryRange,
     /// Tiles in a row of the image.
     columns: u32,
 }
@@ -126,7 +134,7 @@ impl Masks {
 }
 
 impl TileShader for LightShader<'_> {
-    type Body = Masks;
+    type BodyState = Masks;
     type Output = Shaded;
 
     fn run(&self, masks: &mut Masks, lanes: &Lanes, tile: &TileIntervals<'_>) -> Option<Shaded> {
@@ -139,8 +147,9 @@ impl TileShader for LightShader<'_> {
         };
         let flat = corners.map(|face| face.map(|p| [p.x, p.y]));
         let mask = masks.at(tile.tile);
+        let covered = *mask;
         let mut shaded = Shaded { tests: 0, lit: Vec::new() };
-        for bit in (0..TILE_PX * TILE_PX).filter(|bit| *mask >> bit & 1 == 0).collect::<Vec<u32>>() {
+        for bit in (0..TILE_PX * TILE_PX).filter(|bit| covered >> bit & 1 == 0) {
             let [x, y] = [tile.tile[0] * TILE_PX + bit % TILE_PX, tile.tile[1] * TILE_PX + bit / TILE_PX];
             let at = eye.pixel_centre([x, y]);
             let near = (0..2).all(|axis| (reach[axis][0]..=reach[axis][1]).contains(&at[axis]));

@@ -1,7 +1,7 @@
 //! The passes of collision detection on the modelled hardware, in conservative mode, and their image.
 
 use glam::Vec3;
-use pipeline::memory::Surface;
+use pipeline::memory::MemoryRange;
 use pipeline::{
     ConservativeDraw, ConservativePass, Gpu, Lane, Lanes, Primitive, TileIntervals, TileShader, Viewport,
 };
@@ -16,16 +16,45 @@ const VERTEX_BYTES: u32 = 24;
 /// Bytes of a box of time and depth: four numbers of 64 bits, as conservative mode has them.
 const BOX_BYTES: u64 = 32;
 
+/// Places of boxes in a buffer: tile by tile of the hardware, the boxes of a pixel side by side.
+#[derive(Clone, Copy)]
+struct BoxLayout {
+    /// Pixels along a side of a tile.
+    side: u32,
+    /// Tiles in a row.
+    across: u32,
+    /// Boxes of a pixel.
+    bins: u64,
+}
+
+impl BoxLayout {
+    fn new(viewport: Viewport, tile_px: u32, bins: u32) -> Self {
+        Self { side: tile_px, across: viewport.width().div_ceil(tile_px), bins: u64::from(bins) }
+    }
+
+    /// Bytes of the boxes of all pixels of a square image.
+    fn bytes(&self) -> u64 {
+        u64::from(self.across * self.side).pow(2) * self.bins * BOX_BYTES
+    }
+
+    /// Where the box of a pixel and a time bin begins.
+    fn offset(&self, [x, y]: [u32; 2], bin: usize) -> u64 {
+        let Self { side, across, bins } = *self;
+        let pixel = u64::from((y / side * across + x / side) * side * side + y % side * side + x % side);
+        (pixel * bins + bin as u64) * BOX_BYTES
+    }
+}
+
 /// Draws the passes on a GPU, and their image.
 pub(super) struct PassesOnGpu<'a, 'e> {
     gpu: &'a mut Gpu<'e>,
     pass: ConservativePass,
-    vertices: Surface,
+    vertices: MemoryRange,
     picture: Picture,
     viewport: Viewport,
-    bins: u64,
+    layout: BoxLayout,
     /// Boxes of the first and of the second object.
-    boxes: [Surface; 2],
+    boxes: [MemoryRange; 2],
     method: Method,
     fragments: u64,
 }
@@ -43,14 +72,13 @@ impl<'a, 'e> PassesOnGpu<'a, 'e> {
         objects: &[Object],
         gpu: &'a mut Gpu<'e>,
     ) -> Self {
-        let bins = u64::from(bins);
+        let layout = BoxLayout::new(viewport, gpu.spec().tile_px, bins);
         let most = objects.iter().map(Object::len).max().unwrap_or(0) as u64;
-        let vertices = gpu.surface(3 * most * u64::from(VERTEX_BYTES));
-        let side = viewport.width().next_multiple_of(gpu.spec().tile_px);
-        let boxes = [(); 2].map(|()| gpu.surface(u64::from(side).pow(2) * bins * BOX_BYTES));
+        let vertices = gpu.allocate(3 * most * u64::from(VERTEX_BYTES));
+        let boxes = [(); 2].map(|()| gpu.allocate(layout.bytes()));
         let picture = Picture::new(objects, viewport.width() as usize);
         let (pass, fragments) = Default::default();
-        Self { gpu, pass, vertices, picture, viewport, bins, boxes, method, fragments }
+        Self { gpu, pass, vertices, picture, viewport, layout, boxes, method, fragments }
     }
 
     /// Writes the image and returns the totals.
@@ -63,7 +91,7 @@ impl<'a, 'e> PassesOnGpu<'a, 'e> {
     }
 
     /// Where the boxes of a part are. The second part only reads those of the first unless boxes are compared.
-    fn target(&self, which: usize, is_test: bool) -> Surface {
+    fn target(&self, which: usize, is_test: bool) -> MemoryRange {
         self.boxes[if is_test || self.method == Method::FragmentBox { 0 } else { which }]
     }
 }
@@ -78,22 +106,18 @@ fn meets(lane: &Lane, known: &TzBox, t: [f64; 2], z: [f64; 2]) -> bool {
 struct BoxShader<'a> {
     primitives: &'a [BinnedPrimitive],
     pass: &'a Pass,
-    target: Surface,
+    target: MemoryRange,
     known: Option<&'a TzBuffer>,
-    /// Tiles of the hardware in a row, and their side.
-    hardware: [u32; 2],
-    bins: u64,
+    layout: BoxLayout,
 }
 
 impl TileShader for BoxShader<'_> {
-    type Body = ();
+    type BodyState = ();
     type Output = Fragment;
 
     fn run(&self, (): &mut (), lanes: &Lanes, tile: &TileIntervals<'_>) -> Option<Fragment> {
         let fragment = self.primitives[tile.primitive].fragment(tile.tile, tile.touch);
-        let ([x, y], [across, side]) = (tile.tile, self.hardware);
-        let pixel = u64::from((y / side * across + x / side) * side * side + y % side * side + x % side);
-        let offset = (pixel * self.bins + fragment.bin as u64) * BOX_BYTES;
+        let offset = self.layout.offset(tile.tile, fragment.bin);
         let Some(known) = self.known else {
             lanes.run(|_| ());
             lanes.merge(self.target, offset, BOX_BYTES);
@@ -122,11 +146,10 @@ impl Observer for PassesOnGpu<'_, '_> {
     ) -> bool {
         let binned = pass.primitives(part, bins);
         let primitives: Vec<Primitive> = binned.iter().map(|binned| binned.primitive.clone()).collect();
-        let side = self.gpu.spec().tile_px;
         let draw = ConservativeDraw {
             primitives: &primitives,
             grid: pass.grid(),
-            block: side,
+            block: self.layout.side,
             vertices: self.vertices,
             vertex_bytes: VERTEX_BYTES,
             projection: None,
@@ -136,8 +159,7 @@ impl Observer for PassesOnGpu<'_, '_> {
             pass,
             target: self.target(which, known.is_some()),
             known,
-            hardware: [self.viewport.width().div_ceil(side), side],
-            bins: self.bins,
+            layout: self.layout,
         };
         let (picture, fragments) = (&mut self.picture, &mut self.fragments);
         self.pass.draw(self.gpu, &draw, &shader, |tile, fragment| {
@@ -151,11 +173,11 @@ impl Observer for PassesOnGpu<'_, '_> {
     fn compare(&mut self, pass: &Pass, bins: usize, [first, second]: [&TzBuffer; 2], merges: bool) {
         let [columns, rows] = [pass.grid().columns, pass.grid().rows];
         let Some(viewport) = Viewport::new(columns, rows) else { return };
-        let targets = self.boxes;
+        let (targets, layout) = (self.boxes, self.layout);
         self.gpu.run_pixels(viewport, |lanes, tile| {
             for bin in 0..bins {
                 let place = pass.place(tile, bin);
-                let offset = u64::from(place) * BOX_BYTES;
+                let offset = layout.offset(tile, bin);
                 targets.iter().for_each(|target| lanes.read(*target, offset, BOX_BYTES));
                 let (one, other) = (first.at(place), second.at(place));
                 lanes.run(|lane| meets(lane, one, other.t, other.z));
@@ -233,6 +255,17 @@ impl Picture {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn every_box_has_a_place_of_its_own_in_the_buffer() {
+        let layout = BoxLayout::new(Viewport::new(19, 19).unwrap(), 8, 3);
+        let places = (0..19 * 19 * 3).map(|n| layout.offset([n % 19, n / 19 % 19], (n / (19 * 19)) as usize));
+        let mut places: Vec<u64> = places.collect();
+        assert_eq!(layout.offset([8, 0], 1), (64 * 3 + 1) * BOX_BYTES);
+        places.sort_unstable();
+        assert!(places.windows(2).all(|pair| pair[1] - pair[0] >= BOX_BYTES));
+        assert!(places[places.len() - 1] + BOX_BYTES <= layout.bytes());
+    }
 
     #[test]
     fn counts_become_colours() {

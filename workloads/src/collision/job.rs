@@ -1,7 +1,7 @@
 //! The job `quintile run ccd`: collision detection on the modelled hardware, in two sweeps over all objects along each
 //! axis, or narrowed pair by pair.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use pipeline::{Gpu, Viewport};
 use serde::{Deserialize, Serialize};
@@ -46,12 +46,13 @@ impl Options {
         must_hold([
             (
                 "file",
+                &self.file.as_deref().unwrap_or(Path::new("")),
                 self.file.as_deref().is_none_or(|file| !file.as_os_str().is_empty()),
                 "the path of a file; leave it out for balls",
             ),
-            ("balls", (2..=100).contains(&self.balls), "2 to 100"),
-            ("resolution", (1..=1024).contains(&self.resolution), "1 to 1024 pixels"),
-            ("bins", (1..=256).contains(&self.bins), "1 to 256"),
+            ("balls", &self.balls, (2..=100).contains(&self.balls), "2 to 100"),
+            ("resolution", &self.resolution, (1..=1024).contains(&self.resolution), "1 to 1024 pixels"),
+            ("bins", &self.bins, (1..=256).contains(&self.bins), "1 to 256"),
         ])
     }
 
@@ -140,14 +141,13 @@ impl Draws for Collision {
         };
         let kept = kept.len() as u32;
         let Emitted { image, fragments } = passes.finish();
-        let fact = |name, value| Fact { name, value };
-        let facts = vec![
-            fact("objects", self.objects.len() as f64),
-            fact("objects_that_may_collide", may_collide as f64),
-            fact("pairs_whose_boxes_touch", pairs.len() as f64),
-            fact("pairs_that_may_collide", f64::from(kept)),
-            fact("fragments", fragments as f64),
-        ];
+        let facts = Fact::all([
+            ("objects", self.objects.len() as f64),
+            ("objects_that_may_collide", may_collide as f64),
+            ("pairs_whose_boxes_touch", pairs.len() as f64),
+            ("pairs_that_may_collide", f64::from(kept)),
+            ("fragments", fragments as f64),
+        ]);
         let warnings = near_everywhere(pairs.len(), kept).into_iter().collect();
         Ok(Drawn { image, moving: true, lens: false, facts, warnings })
     }

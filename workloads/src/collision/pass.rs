@@ -289,14 +289,21 @@ impl Drawing<'_> {
         self.turned.as_ref()
     }
 
-    /// The triangle in a time bin, `again` or not; `None` if it is not there.
-    fn primitive(&self, in_bin: &InBin<'_>, again: bool) -> Option<BinnedPrimitive> {
+    /// The triangle in a time bin; `None` if it is not there.
+    fn primitive(&self, in_bin: &InBin<'_>, reuses_vertices: bool) -> Option<BinnedPrimitive> {
         let (pass, item, triangle, bin) = (self.pass, self.item, self.triangle, in_bin.bin);
-        let part = pass.tiles_of(&near(self.object, triangle, in_bin.t, in_bin.bounds)?);
+        let scissor = pass.tiles_of(&near(self.object, triangle, in_bin.t, in_bin.bounds)?);
         let ends = &self.object.triangles[triangle as usize];
         let turned = pass.turned(ends, self.object.uncertainty)?;
         let (rasterizer, body) = (rasterizer(in_bin.t), item);
-        let primitive = Primitive { triangle: turned, rasterizer, part, body, again, back_only: false };
+        let primitive = Primitive {
+            triangle: turned,
+            rasterizer,
+            scissor,
+            body,
+            reuses_vertices,
+            keeps_back_faces_only: false,
+        };
         Some(BinnedPrimitive { primitive, item, triangle, bin })
     }
 }

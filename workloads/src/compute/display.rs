@@ -2,6 +2,7 @@
 
 use glam::{Vec3, Vec4};
 use pipeline::surface::Format;
+use pipeline::texture::LUMINANCE;
 use pipeline::{Buffer, Group, GroupLane, GroupShader, SurfaceView};
 
 use super::block::Blocks;
@@ -23,9 +24,6 @@ pub(super) enum Show {
 const KEY: f32 = 0.18;
 /// Least luminance that is exposed.
 const DARKEST: f32 = 1e-4;
-
-/// Weights of the channels of linear sRGB in its luminance (IEC 61966-2-1).
-pub(super) const LUMINANCE: Vec3 = Vec3::new(0.2126, 0.7152, 0.0722);
 
 /// Writes the image.
 pub(super) struct Display {

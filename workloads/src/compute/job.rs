@@ -3,13 +3,14 @@
 use glam::{Vec3, Vec4};
 use pipeline::random::mix;
 use pipeline::surface::{Format, SurfaceSpec};
+use pipeline::texture::LUMINANCE;
 use pipeline::{
     Attachment, Attachments, Clear, Compare, DepthState, Draw, DrawState, Gpu, Lane, LensShape, RasterPass,
     ResolvePass, SampleTable, Shader, ShadingPoint, SurfaceId, SurfaceView, Target, Texture, Viewport,
 };
 use warnings::{Code, Warning};
 
-use super::display::{LUMINANCE, Show};
+use super::display::Show;
 use super::kernels::Kernels;
 use super::light_culling::LightSphere;
 use super::options::{Kernel, Options};
@@ -105,8 +106,8 @@ impl Compute {
         prepass: Option<SurfaceId>,
         gpu: &mut Gpu<'_>,
     ) -> Result<SurfaceId, JobError> {
-        let levels = if self.is_chained() && self.samples.per_pixel() == 1 { u32::MAX } else { 1 };
-        let image = gpu.create(&self.surface_spec("image", Format::Rgba16f)?.with_levels(levels));
+        let levels = if self.is_chained() { u32::MAX } else { 1 };
+        let image = gpu.create_surface(&self.surface_spec("image", Format::Rgba16f)?.with_levels(levels));
         let depth = match prepass {
             Some(depth) => Attachment::loaded(depth),
             None => Attachment::cleared(self.surface(gpu, "depth", Format::D32)?, Clear::default()).dropped(),
@@ -151,8 +152,7 @@ impl Compute {
     pub fn chain(&self, frame: &Frame, gpu: &mut Gpu<'_>) -> Result<Chain, JobError> {
         let image = self.image(frame, None, gpu)?;
         let spec = SurfaceSpec::new("pixels", self.viewport()?, Format::Rgba16f).mipmapped();
-        let pixels =
-            if self.is_chained() && self.samples.per_pixel() == 1 { image } else { gpu.create(&spec) };
+        let pixels = if self.is_chained() { image } else { gpu.create_surface(&spec) };
         if pixels != image {
             gpu.resolve(&ResolvePass::new("resolve", image).dropping(), pixels)?;
         }
@@ -162,12 +162,13 @@ impl Compute {
         Ok(Chain { pixels, last, mean: mean.unwrap_or_default().dot(LUMINANCE) })
     }
 
+    /// Whether the image itself has a mip chain: samples of a pixel have to be resolved first.
     fn is_chained(&self) -> bool {
-        self.options.kernel == Kernel::MipChain
+        self.options.kernel == Kernel::MipChain && self.samples.per_pixel() == 1
     }
 
     fn surface(&self, gpu: &mut Gpu<'_>, name: &str, format: Format) -> Result<SurfaceId, JobError> {
-        Ok(gpu.create(&self.surface_spec(name, format)?))
+        Ok(gpu.create_surface(&self.surface_spec(name, format)?))
     }
 
     fn surface_spec<'n>(&self, name: &'n str, format: Format) -> Result<SurfaceSpec<'n>, JobError> {
@@ -239,27 +240,33 @@ pub struct Chain {
     pub mean: f32,
 }
 
-/// What groups made of a frame.
-struct Made {
-    image: Vec<Vec3>,
-    facts: Vec<Fact>,
-    warnings: Vec<Warning>,
-}
-
 impl DrawsScene for Compute {
     fn scene(&self) -> &Scene {
         &self.scene
     }
 
     fn draw_frame(&self, frame: &Frame, gpu: &mut Gpu<'_>) -> Result<Drawn, JobError> {
-        let Made { image, facts, warnings } = match self.options.kernel {
-            Kernel::Reduction => self.expose(frame, gpu)?,
-            Kernel::MipChain => self.expose_by_chain(frame, gpu)?,
-            Kernel::Histogram => self.equalise(frame, gpu)?,
-            Kernel::LightCulling => self.heat(frame, gpu)?,
-        };
-        Ok(Drawn { image, moving: false, lens: false, facts, warnings })
+        match self.options.kernel {
+            Kernel::Reduction => self.expose(frame, gpu),
+            Kernel::MipChain => self.expose_by_chain(frame, gpu),
+            Kernel::Histogram => self.equalise(frame, gpu),
+            Kernel::LightCulling => self.heat(frame, gpu),
+        }
     }
+}
+
+/// Warns if the chain leaves out pixels. Each level halves a side and drops the rest, so a power of two is left of it.
+fn left_out(viewport: Viewport) -> Option<Warning> {
+    let [columns, rows] = [viewport.width(), viewport.height()].map(|side| 1_usize << side.ilog2());
+    let share = (columns * rows) as f64 / viewport.pixels() as f64;
+    (share < 1.0).then(|| {
+        let message = format!(
+            "levels of odd size leave out their last row or column: the mean is that of {columns} x {rows} pixels, {:.0} % of the image; \
+             --set kernel=reduction takes all",
+            100.0 * share
+        );
+        Warning::new(Code::MipChainOdd, message)
+    })
 }
 
 fn view(gpu: &mut Gpu<'_>, id: SurfaceId) -> Result<SurfaceView, JobError> {
@@ -267,7 +274,7 @@ fn view(gpu: &mut Gpu<'_>, id: SurfaceId) -> Result<SurfaceView, JobError> {
 }
 
 impl Compute {
-    fn expose(&self, frame: &Frame, gpu: &mut Gpu<'_>) -> Result<Made, JobError> {
+    fn expose(&self, frame: &Frame, gpu: &mut Gpu<'_>) -> Result<Drawn, JobError> {
         let image = self.image(frame, None, gpu)?;
         let image = view(gpu, image)?;
         let mut kernels = Kernels::new(gpu, &self.options)?;
@@ -275,26 +282,30 @@ impl Compute {
         let cycles = kernels.cycles_per_shared_access();
         let facts =
             [("mean_luminance", f64::from(kernels.values(mean)[0])), ("cycles_per_shared_access", cycles)];
+        let padding = if self.options.padded || !kernels.padding_fits() { "" } else { ", or padded=true," };
         let message = || {
             format!(
                 "an access of a warp to shared memory takes {cycles:.1} cycles on average (a warning from {CYCLES_PER_ACCESS} on): lanes ask a bank \
-                 for several words; order=sequential with stride=1, or padded=true, avoids it"
+                 for several words; order=sequential with stride=1{padding} avoids it"
             )
         };
         let warning = (cycles >= CYCLES_PER_ACCESS).then(|| Warning::new(Code::BankConflicts, message()));
         let shown = kernels.display(&image, Show::Exposed(mean), &[mean.reads()])?;
-        Ok(Made { image: shown, facts: named(facts), warnings: warning.into_iter().collect() })
+        let (facts, warnings) = (Fact::all(facts), warning.into_iter().collect());
+        Ok(Drawn { image: shown, facts, warnings, ..Drawn::default() })
     }
 
-    fn expose_by_chain(&self, frame: &Frame, gpu: &mut Gpu<'_>) -> Result<Made, JobError> {
+    fn expose_by_chain(&self, frame: &Frame, gpu: &mut Gpu<'_>) -> Result<Drawn, JobError> {
         let Chain { pixels, last, mean } = self.chain(frame, gpu)?;
         let (image, level) = (view(gpu, pixels)?, view(gpu, last)?);
         let mut kernels = Kernels::new(gpu, &self.options)?;
         let shown = kernels.display(&image, Show::ExposedBy(level), &[level.reads()])?;
-        Ok(Made { image: shown, facts: named([("mean_luminance", f64::from(mean))]), warnings: Vec::new() })
+        let facts = Fact::all([("mean_luminance", f64::from(mean))]);
+        let warnings = left_out(self.viewport()?).into_iter().collect();
+        Ok(Drawn { image: shown, facts, warnings, ..Drawn::default() })
     }
 
-    fn equalise(&self, frame: &Frame, gpu: &mut Gpu<'_>) -> Result<Made, JobError> {
+    fn equalise(&self, frame: &Frame, gpu: &mut Gpu<'_>) -> Result<Drawn, JobError> {
         let image = self.image(frame, None, gpu)?;
         let image = view(gpu, image)?;
         let mut kernels = Kernels::new(gpu, &self.options)?;
@@ -319,10 +330,11 @@ impl Compute {
         };
         let warning = (in_line >= ATOMICS_PER_WORD).then(|| Warning::new(Code::AtomicContention, message()));
         let shown = kernels.display(&image, Show::Equalised(sums), &[sums.reads()])?;
-        Ok(Made { image: shown, facts: named(facts), warnings: warning.into_iter().collect() })
+        let (facts, warnings) = (Fact::all(facts), warning.into_iter().collect());
+        Ok(Drawn { image: shown, facts, warnings, ..Drawn::default() })
     }
 
-    fn heat(&self, frame: &Frame, gpu: &mut Gpu<'_>) -> Result<Made, JobError> {
+    fn heat(&self, frame: &Frame, gpu: &mut Gpu<'_>) -> Result<Drawn, JobError> {
         let (lights, viewport) = (self.lights(frame)?, self.viewport()?);
         let depth = self.depths(frame, gpu)?;
         let stored = view(gpu, depth)?;
@@ -351,10 +363,7 @@ impl Compute {
             )
         };
         let warning = (full > 0).then(|| Warning::new(Code::LightListsFull, message()));
-        Ok(Made { image: shown, facts: named(facts), warnings: warning.into_iter().collect() })
+        let (facts, warnings) = (Fact::all(facts), warning.into_iter().collect());
+        Ok(Drawn { image: shown, facts, warnings, ..Drawn::default() })
     }
-}
-
-fn named<const N: usize>(facts: [(&'static str, f64); N]) -> Vec<Fact> {
-    facts.into_iter().map(|(name, value)| Fact { name, value }).collect()
 }

@@ -195,6 +195,12 @@ impl<'a, 'e> Kernels<'a, 'e> {
         &self.counts
     }
 
+    /// Whether the sums of a group fit into shared memory with padding.
+    pub fn padding_fits(&self) -> bool {
+        let padded = Slots { pad_log2: Some(self.banks.ilog2()), ..self.slots() };
+        self.gpu.spec().compute.is_some_and(|unit| 4 * padded.words(self.options.group) <= unit.shared_bytes)
+    }
+
     fn slots(&self) -> Slots {
         let pad_log2 = self.options.padded.then(|| self.banks.ilog2());
         Slots { first: 0, stride: self.options.stride, pad_log2 }

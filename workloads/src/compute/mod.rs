@@ -15,6 +15,7 @@ mod light_culling;
 mod options;
 mod reduction;
 
+use pipeline::texture::LUMINANCE;
 use pipeline::{GroupLane, SurfaceView};
 
 pub use block::{Blocks, Order};
@@ -27,5 +28,5 @@ pub use options::{Kernel, Options};
 
 /// Luminance of a sample of an image in linear RGB: loads and a dot product.
 fn luminance(lane: &GroupLane<'_, '_>, image: &SurfaceView, pixel: [u32; 2], sample: u32) -> f32 {
-    lane.dot(lane.texel(image, pixel, sample).truncate(), display::LUMINANCE)
+    lane.dot(lane.texel(image, pixel, sample).truncate(), LUMINANCE)
 }

@@ -93,17 +93,17 @@ impl Options {
     pub(super) fn check(&self) -> Result<(), LoadError> {
         let power = |value: u32, from: u32, to: u32| value.is_power_of_two() && (from..=to).contains(&value);
         must_hold([
-            ("group", power(self.group, 16, 1024), "a power of two, 16 to 1024"),
-            ("per_lane", (1..=64).contains(&self.per_lane), "1 to 64"),
-            ("step", (1..=16).contains(&self.step), "1 to 16"),
-            ("stride", (1..=64).contains(&self.stride), "1 to 64"),
-            ("bins", power(self.bins, 16, 256), "a power of two, 16 to 256"),
-            ("copies", (1..=32).contains(&self.copies), "1 to 32"),
-            ("contrast", (0.0..=1.0).contains(&self.contrast), "0 to 1"),
-            ("lights", (1..=65_536).contains(&self.lights), "1 to 65536"),
-            ("light_radius", (0.0..=1.0).contains(&self.light_radius), "0 to 1"),
-            ("tile_px", power(self.tile_px, 4, 64), "a power of two, 4 to 64"),
-            ("list", (1..=65_536).contains(&self.list), "1 to 65536"),
+            ("group", &self.group, power(self.group, 16, 1024), "a power of two, 16 to 1024"),
+            ("per_lane", &self.per_lane, (1..=64).contains(&self.per_lane), "1 to 64"),
+            ("step", &self.step, (1..=16).contains(&self.step), "1 to 16"),
+            ("stride", &self.stride, (1..=64).contains(&self.stride), "1 to 64"),
+            ("bins", &self.bins, power(self.bins, 16, 256), "a power of two, 16 to 256"),
+            ("copies", &self.copies, (1..=32).contains(&self.copies), "1 to 32"),
+            ("contrast", &self.contrast, (0.0..=1.0).contains(&self.contrast), "0 to 1"),
+            ("lights", &self.lights, (1..=65_536).contains(&self.lights), "1 to 65536"),
+            ("light_radius", &self.light_radius, (0.0..=1.0).contains(&self.light_radius), "0 to 1"),
+            ("tile_px", &self.tile_px, power(self.tile_px, 4, 64), "a power of two, 4 to 64"),
+            ("list", &self.list, (1..=65_536).contains(&self.list), "1 to 65536"),
         ])
     }
 }

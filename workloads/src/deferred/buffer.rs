@@ -70,7 +70,7 @@ const DEPTH_SLOT: usize = 2;
 impl GBuffer {
     pub fn new(gpu: &mut Gpu<'_>, viewport: Viewport, samples: u32, normals: NormalFormat) -> Self {
         let mut surface =
-            |name, format| gpu.create(&SurfaceSpec::new(name, viewport, format).sampled(samples));
+            |name, format| gpu.create_surface(&SurfaceSpec::new(name, viewport, format).sampled(samples));
         let (base, normal) = (surface("base colours", BASE), surface("normals", normals.format()));
         Self { base, normal, depth: surface("depths", DEPTH), normals }
     }

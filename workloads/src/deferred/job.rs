@@ -2,11 +2,10 @@
 
 use activity::Event;
 use glam::{Vec2, Vec3, Vec4};
-use pipeline::sampling::{Pattern, SampleSource};
+use pipeline::sampling::SampleSource;
 use pipeline::{
     Attachment, Attachments, Binding, Blend, Camera, Clear, Cull, DepthState, Draw, DrawState, Format,
-    Geometry, Gpu, RasterPass, Rendered, ResolvePass, SampleSpec, Shader, SurfaceId, SurfaceSpec, Target,
-    Viewport,
+    Geometry, Gpu, RasterPass, Rendered, ResolvePass, Shader, SurfaceId, SurfaceSpec, Target, Viewport,
 };
 use serde::{Deserialize, Serialize};
 use warnings::{Code, Warning};
@@ -20,7 +19,7 @@ use crate::job::{
 };
 use crate::lighting::PointLight;
 use crate::material::SurfaceShader;
-use crate::samples::SampleChoice;
+use crate::samples::{SampleChoice, blur_warning};
 use crate::scene::{Frame, Overrides, Scene};
 use crate::shapes;
 
@@ -87,12 +86,14 @@ impl Default for Options {
 impl Options {
     fn check(&self) -> Result<(), LoadError> {
         must_hold([
-            ("lights", self.lights <= 4096, "0 to 4096"),
-            ("range", (1e-15..=1e15).contains(&self.range), "1e-15 to 1e15 scene units"),
+            ("lights", &self.lights, self.lights <= 4096, "0 to 4096"),
+            ("range", &self.range, (1e-15..=1e15).contains(&self.range), "1e-15 to 1e15 scene units"),
         ])
     }
 }
 
+/// Name of the sample table without a shutter.
+const MULTISAMPLE: &str = "msaa";
 /// Radiance of lit samples.
 const LIT: Format = Format::Rgba16f;
 /// State of what is drawn over the image, without depths.
@@ -117,25 +118,25 @@ impl Deferred {
         Self::of(crate::load(&options.scene)?, options, overrides, seed)
     }
 
-    /// The same in a given scene. Unless `overrides` change them, pixels have one sample in the middle, and the shutter has no length.
+    /// The same in a given scene. Unless `overrides` change them, pixels have one sample in the middle, and the shutter has no length;
+    /// without a shutter, several samples of a pixel are those of multisampling.
     ///
     /// # Errors
     /// [`LoadError`] for an invalid option.
     pub fn of(scene: Scene, options: Options, overrides: &Overrides, seed: u64) -> Result<Self, LoadError> {
         options.check()?;
+        let shutter = overrides.shutter.unwrap_or(0.0);
+        let multisample = || (shutter == 0.0).then(|| MULTISAMPLE.to_owned());
         let overrides = Overrides {
             samples: overrides.samples.or(Some(1)),
-            shutter: overrides.shutter.or(Some(0.0)),
+            shutter: Some(shutter),
             lens_radius: Some(0.0),
+            table: overrides.table.clone().or_else(multisample),
             ..overrides.clone()
         };
         let scene = scene.with_overrides(&overrides)?;
         let wrong = |setting, message: String| LoadError::Setting { setting, message };
-        let multisample = SampleSpec { pattern: Pattern::Multisample, ..SampleSpec::default() };
-        let table = match &overrides.table {
-            Some(table) => SampleChoice::load(table)?,
-            None => SampleChoice::Described(multisample),
-        };
+        let table = SampleChoice::load(&scene.settings().table)?;
         let first = scene.frame(0).map_err(|error| wrong("frames", error.to_string()))?;
         let lights = point_lights(bounds(&first), options.lights, options.range);
         let samples = table.source(scene.settings().samples, seed)?;
@@ -173,7 +174,7 @@ impl DrawsScene for Deferred {
         let viewport = Viewport::new(settings.width, settings.height)
             .ok_or_else(|| JobError::Setting(IMAGE_SIZE.to_owned()))?;
         let samples = self.samples.per_pixel();
-        let lit = gpu.create(&SurfaceSpec::new("lit samples", viewport, LIT).sampled(samples));
+        let lit = gpu.create_surface(&SurfaceSpec::new("lit samples", viewport, LIT).sampled(samples));
         let stage = Stage { job: self, frame, viewport, lit, screen: Corners::of(frame, viewport) };
         let surfaces = stage.surfaces(gpu)?;
         let lit_runs = match self.options.method {
@@ -185,13 +186,15 @@ impl DrawsScene for Deferred {
             Method::Forward => 0,
             Method::Deferred => GBuffer::bytes(self.options.normals) * u64::from(samples),
         };
-        let facts = vec![
-            Fact { name: "point_lights", value: self.lights.len() as f64 },
-            Fact { name: "g_buffer_bytes_per_pixel", value: bytes as f64 },
-            Fact { name: "lighting_invocations", value: lit_runs as f64 },
-        ];
-        let warnings = self.regime_warnings(frame);
-        Ok(Drawn { image, moving: frame.is_moving(), lens: false, facts, warnings })
+        let facts = Fact::all([
+            ("point_lights", self.lights.len() as f64),
+            ("g_buffer_bytes_per_pixel", bytes as f64),
+            ("lighting_invocations", lit_runs as f64),
+        ]);
+        let mut warnings = self.regime_warnings(frame);
+        let moving = frame.is_moving();
+        warnings.extend(blur_warning(&*self.samples, moving, false));
+        Ok(Drawn { image, moving, lens: false, facts, warnings })
     }
 }
 
@@ -277,7 +280,7 @@ impl<'a> Stage<'a> {
     /// Surfaces lit as they are drawn, onto cleared samples.
     fn forward(&self, surfaces: &[Surfaced<'a>], gpu: &mut Gpu<'_>) -> Result<u64, JobError> {
         let spec = SurfaceSpec::new("depths", self.viewport, Format::D32);
-        let depth = gpu.create(&spec.sampled(self.job.samples.per_pixel()));
+        let depth = gpu.create_surface(&spec.sampled(self.job.samples.per_pixel()));
         let colours = vec![Attachment::cleared(self.lit, Vec4::ZERO)];
         let depth = Some(Attachment::cleared(depth, Clear::default()).dropped());
         self.lit_forward("forward", surfaces.iter().collect(), &Attachments { colours, depth }, gpu)

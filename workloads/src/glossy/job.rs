@@ -3,7 +3,7 @@
 
 use activity::Event;
 use glam::{DVec3, Vec3};
-use pipeline::memory::Surface;
+use pipeline::memory::MemoryRange;
 use pipeline::{Camera, Cull, Draw, Geometry, Gpu, RasterPass, Rendered, SampleSpec, SampleTable, Viewport};
 use serde::{Deserialize, Serialize};
 use warnings::{Code, Warning};
@@ -98,10 +98,6 @@ pub struct Glossy {
     seed: u64,
 }
 
-fn refused(error: impl std::fmt::Display) -> JobError {
-    JobError::Setting(error.to_string())
-}
-
 /// Largest lens radius relative to the receiver's smaller half side, far beyond any surface.
 const MAX_RADIUS_PER_HALF_SIDE: f64 = 100.0;
 /// Least length, in scene units, whose products single precision represents.
@@ -145,7 +141,7 @@ impl Glossy {
     }
 
     fn table(&self, samples: u32) -> Result<SampleTable, JobError> {
-        SampleTable::new(&SampleSpec::default(), samples, self.seed).map_err(refused)
+        SampleTable::new(&SampleSpec::default(), samples, self.seed).map_err(JobError::setting)
     }
 
     /// Renders the scene with the map on its receiver.
@@ -155,14 +151,14 @@ impl Glossy {
         texels: &[Vec3],
         camera: &Camera,
         mut draws: Vec<Draw<'_>>,
-        memory: Surface,
+        memory: MemoryRange,
         gpu: &mut Gpu<'_>,
     ) -> Result<Rendered, JobError> {
-        let shader =
-            ReceiverShader::new(texels, map.viewport, BASE, self.options.fresnel).map_err(refused)?;
+        let shader = ReceiverShader::new(texels, map.viewport, BASE, self.options.fresnel)
+            .map_err(JobError::setting)?;
         let (corners, uvs) = (self.receiver.corners(), map.uvs());
         let geometry = Geometry::new(&corners, &corners, &[[0, 1, 2], [0, 2, 3]]);
-        let geometry = geometry.and_then(|geometry| geometry.with_uvs(&uvs)).map_err(refused)?;
+        let geometry = geometry.and_then(|geometry| geometry.with_uvs(&uvs)).map_err(JobError::setting)?;
         let settings = self.scene.settings();
         let viewport = Viewport::new(settings.width, settings.height)
             .ok_or_else(|| JobError::Setting(crate::job::IMAGE_SIZE.to_owned()))?;
@@ -190,7 +186,7 @@ impl DrawsScene for Glossy {
     }
 
     fn draw_frame(&self, frame: &Frame, gpu: &mut Gpu<'_>) -> Result<Drawn, JobError> {
-        let map = self.map(frame).map_err(refused)?;
+        let map = self.map(frame).map_err(JobError::setting)?;
         let draws: Vec<_> =
             frame.draws(&self.scene)?.into_iter().map(|draw| draw.culling(Cull::None)).collect();
         let draws = gpu.resident(&draws);

@@ -60,7 +60,7 @@ impl Format {
 const STILL_FRAMES: u32 = 4;
 
 /// Most frames of an animated file that says nothing of frames.
-const MOST_FRAMES: u32 = 36;
+const MAX_FRAMES: u32 = 36;
 
 /// Reads the file at `path`.
 pub(crate) fn import(path: &Path, format: Format) -> Result<Parts, LoadError> {
@@ -71,7 +71,7 @@ pub(crate) fn import(path: &Path, format: Format) -> Result<Parts, LoadError> {
     };
     let frames = libm::ceil(parts.graph.last_key_s() * parts.settings.frame_rate_hz);
     parts.settings.frames =
-        if frames >= 1.0 { 0..frames.min(f64::from(MOST_FRAMES)) as u32 } else { 0..STILL_FRAMES };
+        if frames >= 1.0 { 0..frames.min(f64::from(MAX_FRAMES)) as u32 } else { 0..STILL_FRAMES };
     Ok(parts)
 }
 

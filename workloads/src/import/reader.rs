@@ -20,7 +20,7 @@ const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 pub(super) const MAX_ELEMENTS: usize = 100_000_000;
 
 /// Most bytes of an unpacked file.
-const MOST_UNPACKED: u64 = 2 << 30;
+const MAX_UNPACKED: u64 = 2 << 30;
 
 /// The contents of `path` after a byte order mark, unpacked where they begin as gzip does, whatever the name.
 pub(crate) fn open(path: &Path) -> Result<Box<dyn BufRead>, LoadError> {
@@ -33,7 +33,7 @@ pub(crate) fn open(path: &Path) -> Result<Box<dyn BufRead>, LoadError> {
     let mut file = BufReader::new(file);
     let zipped = file.fill_buf().map_err(|error| source.unreadable(error))?.starts_with(GZIP);
     let mut contents: Box<dyn BufRead> = if zipped {
-        Box::new(BufReader::new(Limited { inner: MultiGzDecoder::new(file), left: MOST_UNPACKED }))
+        Box::new(BufReader::new(Limited { inner: MultiGzDecoder::new(file), left: MAX_UNPACKED }))
     } else {
         Box::new(file)
     };
@@ -91,10 +91,10 @@ pub(super) fn damaged(path: &Path, error: &std::io::Error) -> LoadError {
 }
 
 /// Largest side of a texture in texels.
-const MOST_TEXELS: u32 = 16_384;
+const MAX_TEXELS: u32 = 16_384;
 
 /// Most memory of an image decoder, in bytes.
-const MOST_BYTES: u64 = 512 << 20;
+const MAX_BYTES: u64 = 512 << 20;
 
 /// A PNG or JPEG image as a texture, or in words why it is none.
 pub(super) fn decode_texture(bytes: &[u8], wrap: [Wrap; 2]) -> Result<Texture, String> {
@@ -104,9 +104,9 @@ pub(super) fn decode_texture(bytes: &[u8], wrap: [Wrap; 2]) -> Result<Texture, S
 
 fn texture(mut reader: ImageReader<Cursor<&[u8]>>, wrap: [Wrap; 2]) -> Result<Texture, String> {
     let mut limits = Limits::default();
-    limits.max_image_width = Some(MOST_TEXELS);
-    limits.max_image_height = Some(MOST_TEXELS);
-    limits.max_alloc = Some(MOST_BYTES);
+    limits.max_image_width = Some(MAX_TEXELS);
+    limits.max_image_height = Some(MAX_TEXELS);
+    limits.max_alloc = Some(MAX_BYTES);
     reader.limits(limits);
     let image = reader.decode().map_err(|error| error.to_string())?.into_rgba8();
     let (width, height) = image.dimensions();

@@ -26,6 +26,13 @@ pub struct Fact {
     pub value: f64,
 }
 
+impl Fact {
+    /// Results with these names and values.
+    pub(crate) fn all<const N: usize>(facts: [(&'static str, f64); N]) -> Vec<Self> {
+        facts.map(|(name, value)| Self { name, value }).into()
+    }
+}
+
 /// Result of one frame of a job.
 #[derive(Clone, Debug, Default)]
 pub struct Drawn {

@@ -1,6 +1,7 @@
 //! Options of a job, from a RON file and then single values, and the run options (flags) that a job uses.
 
 use std::borrow::Cow;
+use std::fmt::Debug;
 use std::path::PathBuf;
 
 use activity::spec::{self, suggestion};
@@ -36,13 +37,13 @@ impl OptionSource {
     }
 }
 
-/// Refuses the first check that fails; each has an option name, a condition, and the allowed values.
+/// Refuses the first check that fails; each has an option name and value, a condition, and the allowed values.
 pub(crate) fn must_hold<const N: usize>(
-    checks: [(&'static str, bool, &'static str); N],
+    checks: [(&'static str, &dyn Debug, bool, &'static str); N],
 ) -> Result<(), LoadError> {
-    match checks.into_iter().find(|(_, holds, _)| !holds) {
-        Some((setting, _, allowed)) => {
-            Err(LoadError::Setting { setting, message: format!("it has to be {allowed}") })
+    match checks.into_iter().find(|(_, _, holds, _)| !holds) {
+        Some((setting, value, _, allowed)) => {
+            Err(LoadError::Setting { setting, message: format!("{value:?}: it has to be {allowed}") })
         }
         None => Ok(()),
     }

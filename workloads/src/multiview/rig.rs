@@ -229,18 +229,17 @@ impl Rig {
         to: &Target<'_>,
         gpu: &mut Gpu<'_>,
     ) -> Result<Views, JobError> {
-        let refused = |error: &dyn std::fmt::Display| JobError::Setting(error.to_string());
         // The samples of one pixel of the table serve all pixels.
         let set = SharedSamples::new(self.table.pixel(0, 0).to_vec())
             .ok_or_else(|| JobError::Setting("too many samples".to_owned()))?;
         let mut views = Views { images: Vec::new(), counts: Counts::default(), passes: 0 };
         let resident = gpu.resident(draws);
         for (number, at) in set.samples().iter().enumerate() {
-            let camera = pinhole(&self.camera, [at.u, at.v]).map_err(|e| refused(&e))?;
-            let camera = frozen(&camera, at.t).map_err(|e| refused(&e))?;
+            let camera = pinhole(&self.camera, [at.u, at.v]).map_err(JobError::setting)?;
+            let camera = frozen(&camera, at.t).map_err(JobError::setting)?;
             let stills: Vec<Vec<Vec3>> = resident.iter().map(|draw| still(draw, at)).collect();
             let draws = resident.iter().zip(&stills).map(|(draw, at)| with_positions(draw, at));
-            let draws = draws.collect::<Result<Vec<_>, _>>().map_err(|e| refused(&e))?;
+            let draws = draws.collect::<Result<Vec<_>, _>>().map_err(JobError::setting)?;
             let one = set.still(number);
             let settings = settings(to, &one);
             views.add(gpu.draw(&RasterPass::new(&camera, &draws, &settings).named("sample"))?);
@@ -258,7 +257,6 @@ impl Rig {
     /// # Errors
     /// [`JobError`] if the hardware cannot be built.
     pub fn own_cameras(&self, draws: &[Draw<'_>], to: &Target<'_>) -> Result<Vec<Vec<Vec3>>, JobError> {
-        let refused = |error: &dyn std::fmt::Display| JobError::Setting(error.to_string());
         let spec = PipelineSpec { shading: Shading::PerSample, ..*to.spec };
         let to = Target { spec: &spec, ..*to };
         let focus = self.camera.lens().map_or(1.0, |lens| lens.focus());
@@ -270,8 +268,8 @@ impl Rig {
         let half = along.max(self.layout.aperture) / radius;
         let image = |(view, run): (u32, &Range<u32>)| {
             let middle = self.layout.middle(view) as f32;
-            let camera = pinhole(&self.camera, [middle, 0.0]).map_err(|e| refused(&e))?;
-            let lens = Lens::new((half * radius) as f32, focus).map_err(|e| refused(&e))?;
+            let camera = pinhole(&self.camera, [middle, 0.0]).map_err(JobError::setting)?;
+            let lens = Lens::new((half * radius) as f32, focus).map_err(JobError::setting)?;
             let run = Run { table: &self.table, run: run.clone() };
             let samples = OwnLens { run, middle, half: half as f32 };
             let settings = settings(&to, &samples);

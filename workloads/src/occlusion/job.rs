@@ -59,14 +59,19 @@ impl Default for Options {
 impl Options {
     fn check(&self) -> Result<(), LoadError> {
         must_hold([
-            ("walls", self.walls <= 1000, "0 to 1000"),
-            ("slats", (1..=1000).contains(&self.slats), "1 to 1000"),
-            ("gaps", (0.0..=1.0).contains(&self.gaps), "0 to 1"),
-            ("objects", self.objects <= 100_000, "0 to 100000"),
-            ("motion", (0.0..=100.0).contains(&self.motion), "0 to 100 metres"),
-            ("lens", (0.0..=1.0).contains(&self.lens), "0 to 1 metre"),
-            ("tile_px", (1..=256).contains(&self.tile_px), "1 to 256 pixels"),
-            ("boxes", BoxGrid::new(self.boxes, true).is_some(), "1 to 16 along each of u, v and t"),
+            ("walls", &self.walls, self.walls <= 1000, "0 to 1000"),
+            ("slats", &self.slats, (1..=1000).contains(&self.slats), "1 to 1000"),
+            ("gaps", &self.gaps, (0.0..=1.0).contains(&self.gaps), "0 to 1"),
+            ("objects", &self.objects, self.objects <= 100_000, "0 to 100000"),
+            ("motion", &self.motion, (0.0..=100.0).contains(&self.motion), "0 to 100 metres"),
+            ("lens", &self.lens, (0.0..=1.0).contains(&self.lens), "0 to 1 metre"),
+            ("tile_px", &self.tile_px, (1..=256).contains(&self.tile_px), "1 to 256 pixels"),
+            (
+                "boxes",
+                &self.boxes,
+                BoxGrid::new(self.boxes, true).is_some(),
+                "1 to 16 along each of u, v and t",
+            ),
         ])
     }
 }
@@ -129,11 +134,11 @@ impl Draws for Occlusion {
         let occluders = RasterPass::new(camera, &walls, &settings).named("occluders");
         let occluders = gpu.draw(&occluders.onto(Target::Depth).with_visible())?;
         let pyramid = self.pyramid(&depths_of(&occluders.visible), viewport)?;
-        gpu.gather("farthest depths", &pyramid, occluders.surface);
+        gpu.gather_farthest_depths("farthest depths", &pyramid, occluders.surface);
         let projection = Projection::new(camera, viewport);
         let queries = IntervalQueries::new(&pyramid, &projection);
         let (answers, half_covered) =
-            (gpu.ask("queries", &queries, &self.wall_scene.boxes), pyramid.half_covered());
+            (gpu.query_boxes("queries", &queries, &self.wall_scene.boxes), pyramid.half_covered());
         // The host draws what is not hidden.
         gpu.wait();
         let seen = self.wall_scene.boxes.iter().zip(&answers).filter(|(_, answer)| !answer.hidden);
@@ -178,13 +183,12 @@ fn mesh(boxes: &[&MovingBox]) -> Mesh {
 
 fn facts(answers: &[IntervalAnswer]) -> Vec<Fact> {
     let sum = |of: fn(&IntervalAnswer) -> u64| answers.iter().map(of).sum::<u64>() as f64;
-    let facts = [
+    Fact::all([
         ("objects", answers.len() as f64),
         ("objects_hidden", sum(|answer| u64::from(answer.hidden))),
         ("tests", sum(IntervalAnswer::tests)),
         ("depth_bytes", sum(IntervalAnswer::bytes)),
-    ];
-    facts.into_iter().map(|(name, value)| Fact { name, value }).collect()
+    ])
 }
 
 fn warnings(answers: &[IntervalAnswer], half_covered: f64) -> Vec<Warning> {

@@ -12,7 +12,7 @@
 use std::ops::Range;
 
 use pipeline::conservative::{Grid, MovingTriangle, Rasterizer, Region, View};
-use pipeline::memory::Surface;
+use pipeline::memory::MemoryRange;
 use pipeline::random::mix;
 use pipeline::{ConservativeDraw, Gpu, Lane, Lanes, Primitive, TileIntervals, TileShader};
 
@@ -163,7 +163,7 @@ struct Candidates<'a> {
     cells: &'a [Cell],
     lattice: &'a Lattice,
     within: &'a dyn Within,
-    results: Surface,
+    results: MemoryRange,
     point_bytes: u64,
 }
 
@@ -176,7 +176,7 @@ struct Tried {
 
 impl TileShader for Candidates<'_> {
     /// Results of the box so far.
-    type Body = u64;
+    type BodyState = u64;
     type Output = Tried;
 
     fn run(&self, stored: &mut u64, lanes: &Lanes, tile: &TileIntervals<'_>) -> Option<Tried> {
@@ -236,13 +236,20 @@ fn primitives(cells: &[Cell], grid: &Grid) -> Vec<Primitive> {
         halves.into_iter().filter_map(move |corners| {
             let triangle = MovingTriangle::new(corners, corners)?;
             // Tiles of the bounding box, and those that meet it at a border.
-            let part = [(left, right, 0, grid.columns), (bottom, top, 1, grid.rows)].map(
+            let scissor = [(left, right, 0, grid.columns), (bottom, top, 1, grid.rows)].map(
                 |(low, high, axis, count)| {
                     let at = |end: f64| (end / grid.tile[axis]) as u32;
                     at(low).saturating_sub(1)..(at(high) + 2).min(count)
                 },
             );
-            Some(Primitive { triangle, rasterizer, part, body, again: false, back_only: false })
+            Some(Primitive {
+                triangle,
+                rasterizer,
+                scissor,
+                body,
+                reuses_vertices: false,
+                keeps_back_faces_only: false,
+            })
         })
     };
     (0..).zip(cells).flat_map(of).collect()
@@ -262,8 +269,8 @@ pub(super) fn draw(
     let primitives = primitives(cells, &grid);
     let axes = lattice.used.iter().filter(|used| **used).count() as u64;
     let point_bytes = axes * COORDINATE_BYTES;
-    let results = gpu.surface(cells.len() as u64 * PLACES * point_bytes);
-    let vertices = gpu.surface(3 * primitives.len() as u64 * u64::from(VERTEX_BYTES));
+    let results = gpu.allocate(cells.len() as u64 * PLACES * point_bytes);
+    let vertices = gpu.allocate(3 * primitives.len() as u64 * u64::from(VERTEX_BYTES));
     let draw = ConservativeDraw {
         primitives: &primitives,
         grid: &grid,

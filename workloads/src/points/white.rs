@@ -8,7 +8,9 @@
 use std::f64::consts::TAU;
 use std::path::Path;
 
+use glam::Vec3;
 use pipeline::Lane;
+use pipeline::texture::{LUMINANCE, srgb8_to_linear};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -318,8 +320,7 @@ impl ImageDensity {
             image::ImageReader::open(path).map_err(unread)?.with_guessed_format().map_err(unread)?;
         let picture = picture.decode().map_err(unknown)?.into_rgb8();
         let (width, height) = (picture.width() as usize, picture.height() as usize);
-        let linear = |byte: u8| libm::pow(f64::from(byte) / 255.0, 2.2);
-        let luminance = |[r, g, b]: [u8; 3]| 0.2126 * linear(r) + 0.7152 * linear(g) + 0.0722 * linear(b);
+        let luminance = |rgb: [u8; 3]| f64::from(Vec3::from(rgb.map(srgb8_to_linear)).dot(LUMINANCE));
         Self::new(width, height, picture.pixels().map(|pixel| luminance(pixel.0)).collect()).ok_or_else(
             || {
                 refused(

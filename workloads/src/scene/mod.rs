@@ -87,7 +87,7 @@ const MAX_ELEMENTS: usize = 100_000_000;
 const NEAR: f64 = 1e-3;
 
 /// Least near depth for objects in view, relative to the automatic near depth.
-const LEAST_NEAR: f64 = 1e-3;
+const MIN_NEAR: f64 = 1e-3;
 
 impl Scene {
     /// Makes `parts` renderable: checks the settings, fits the camera, places the light. The first clip plays
@@ -280,7 +280,7 @@ impl Scene {
             .iter()
             .filter_map(|mesh| mesh.nearest(&space))
             .fold(standing.near, |near, depth| near.min(0.5 * depth));
-        Ok(Standing { near: near.max(LEAST_NEAR * standing.near), ..standing })
+        Ok(Standing { near: near.max(MIN_NEAR * standing.near), ..standing })
     }
 
     /// View of the camera.

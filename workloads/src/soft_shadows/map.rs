@@ -2,7 +2,7 @@
 
 use activity::Counts;
 use glam::Vec3;
-use pipeline::memory::Surface;
+use pipeline::memory::MemoryRange;
 use pipeline::sampling::Sample;
 use pipeline::{Camera, Draw, Gpu, Lane, RasterPass, Rendered, Settings, Target, Viewport};
 
@@ -22,7 +22,7 @@ pub struct ShadowMap {
     depths: Vec<f32>,
     /// Event counts.
     pub counts: Counts,
-    surfaces: Vec<Surface>,
+    surfaces: Vec<MemoryRange>,
 }
 
 impl ShadowMap {
@@ -131,7 +131,7 @@ pub struct DepthPass {
     /// Event counts.
     pub counts: Counts,
     /// The depths in memory, of all samples or sample by sample.
-    pub surfaces: Vec<Surface>,
+    pub surfaces: Vec<MemoryRange>,
 }
 
 /// Renders the depths of `draws` in `camera`, at the samples of `set`.

@@ -432,6 +432,6 @@ fn an_unwritten_surface_has_no_view() {
     let depth: SurfaceId = job.depths(&first_frame(&job), &mut gpu).unwrap();
     assert!(gpu.surface_view(depth).is_some());
     let empty = SurfaceSpec::new("empty", job.viewport().unwrap(), Format::D32);
-    let empty = gpu.create(&empty);
+    let empty = gpu.create_surface(&empty);
     assert!(gpu.surface_view(empty).is_none());
 }

@@ -21,7 +21,7 @@ use workloads::{Frame, Scene};
 use crate::chart::statistics::{White, errors, mean_square};
 use crate::study::table::{Sheet, Table, count, fixed, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
-use crate::study::{Gallery, Study, StudyError};
+use crate::study::{Gallery, Ran, Study, StudyError};
 
 /// Effort of the measurement.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -237,6 +237,9 @@ pub struct GlossyRow {
     pub samples_tested: u64,
     /// Those of accumulation.
     pub accumulated_samples_tested: u64,
+    /// Passes, draws and fragments of both.
+    #[serde(skip)]
+    pub ran: Ran,
     /// Seconds of the host for one pass.
     pub host_s: f64,
     /// Those for accumulation.
@@ -400,6 +403,10 @@ impl Bench {
             accumulated_vertices: many_counts[Event::VertexInvocations],
             samples_tested: counts[Event::SamplesTested],
             accumulated_samples_tested: many_counts[Event::SamplesTested],
+            ran: [(1, &counts), (u64::from(samples), &many_counts)]
+                .map(|(n, c)| Ran::counted(n, c))
+                .into_iter()
+                .sum(),
             host_s,
             accumulated_host_s,
             traced: Traced::new(rmse(&traced), work, traced_host_s),

@@ -24,7 +24,7 @@ const SWEEPS: [(Unit, &[f64]); 2] =
     [(Unit::Llc, &[0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0]), (Unit::Edram, &[0.0, 8.0, 16.0, 32.0, 64.0, 128.0])];
 const BYTES_PER_MB: f64 = 1_048_576.0;
 /// Saving of energy below which a larger level does not pay, as a share.
-const LEAST_SAVING: f64 = 0.01;
+const MIN_SAVING: f64 = 0.01;
 
 /// Effort.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -190,10 +190,10 @@ fn row(work: &'static str, level: Unit, size_mb: f64, frame: &RunFrame, core_hz:
     }
 }
 
-/// The smallest size from which no larger one saves more than [`LEAST_SAVING`] of the energy of a frame.
+/// The smallest size from which no larger one saves more than [`MIN_SAVING`] of the energy of a frame.
 fn pays_up_to(rows: &[MemoryRow]) -> f64 {
     let least = |rows: &[MemoryRow]| rows.iter().map(|row| row.frame_j).fold(f64::INFINITY, f64::min);
-    let pays = |at: usize| least(&rows[at..]) > (1.0 - LEAST_SAVING) * rows[at].frame_j;
+    let pays = |at: usize| least(&rows[at..]) > (1.0 - MIN_SAVING) * rows[at].frame_j;
     (0..rows.len()).find(|&at| pays(at)).map_or(0.0, |at| rows[at].size_mb)
 }
 

@@ -336,7 +336,7 @@ pub(crate) struct Drawn {
 }
 
 /// Answers of interval queries, and the farthest depths that they were asked against.
-pub(crate) struct Asked {
+pub(crate) struct QueryAnswers {
     /// By box.
     pub answers: Vec<IntervalAnswer>,
     /// Share of tiles in which most, but not all, samples are covered.
@@ -376,17 +376,17 @@ impl Drawn {
     ///
     /// # Errors
     /// When the caches of the GPU cannot be built.
-    pub fn ask(&self, boxes: [u32; 3], tile_px: u32) -> Result<Asked, StudyError> {
+    pub fn ask(&self, boxes: [u32; 3], tile_px: u32) -> Result<QueryAnswers, StudyError> {
         let grid = BoxGrid::new(boxes, self.scene.camera.lens().is_some()).unwrap_or_default();
         let pyramid = Pyramid::new(self.viewport, &self.table, &self.depths, tile_px, grid);
         let projection = Projection::new(&self.scene.camera, self.viewport);
         let queries = IntervalQueries::new(&pyramid, &projection);
         let mut gpu = Gpu::quiet(&self.spec)?;
-        let stored = gpu.surface(DEPTH_BYTES * self.depths.len() as u64);
-        gpu.gather("farthest depths", &pyramid, stored);
+        let stored = gpu.allocate(DEPTH_BYTES * self.depths.len() as u64);
+        gpu.gather_farthest_depths("farthest depths", &pyramid, stored);
         let gathering = gpu.counts_of_pass();
-        let answers = gpu.ask("queries", &queries, &self.scene.boxes);
-        Ok(Asked {
+        let answers = gpu.query_boxes("queries", &queries, &self.scene.boxes);
+        Ok(QueryAnswers {
             answers,
             half_covered: pyramid.half_covered(),
             gathered: gathering[Event::ZCullTests],

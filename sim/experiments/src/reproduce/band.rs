@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::verdict::Verdict;
+use run::RunError;
 
 /// Result of one combination of settings.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -97,16 +98,21 @@ impl Cases {
         own.for_each(|case| case.base = case.value == value);
     }
 
-    /// The band, or `None` without a case; the full form tries `full` cases.
-    pub fn band(self, full: usize) -> Option<Band> {
+    /// The band; the full form tries `full` cases.
+    ///
+    /// # Errors
+    /// [`RunError`] if the settings have no case.
+    pub fn band(self, full: usize) -> Result<Band, RunError> {
         let numbers = || self.cases.iter().map(|case| case.number);
-        let (min, max) = (numbers().reduce(f64::min)?, numbers().reduce(f64::max)?);
+        let least_and_most = numbers().reduce(f64::min).zip(numbers().reduce(f64::max));
+        let nothing = || RunError::setting(format!("{}: the settings have no value to try", self.of));
+        let (min, max) = least_and_most.ok_or_else(nothing)?;
         let mut counted = false;
         let mut first = |case: &&Case| !case.base || !std::mem::replace(&mut counted, true);
         let different: Vec<&Case> = self.cases.iter().filter(&mut first).collect();
         let (tried, held) = (different.len(), different.iter().filter(|case| case.holds).count());
         let Self { of, varied, cases, turns } = self;
-        Some(Band { of, varied, min, max, tried, full, held, turns, cases })
+        Ok(Band { of, varied, min, max, tried, full, held, turns, cases })
     }
 }
 
@@ -169,7 +175,7 @@ mod tests {
         assert_eq!(band(&[true, true]).verdict(), Verdict::Holds);
         assert_eq!(band(&[false, false]).verdict(), Verdict::Differs);
         assert_eq!(band(&[true, false, true]).verdict(), Verdict::Depends);
-        assert!(Cases::new("x", "y alone").band(0).is_none());
+        assert!(Cases::new("x", "y alone").band(0).is_err());
     }
 
     #[test]

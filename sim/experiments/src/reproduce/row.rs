@@ -216,7 +216,7 @@ pub(super) mod tests {
         let mut cases = Cases::new("share", "tiles alone");
         cases.along("tiles", [(4, 0.5, true), (8, 0.2, true)]);
         let less_work = vec!["yards".to_owned()];
-        let banded = Row { band: cases.band(6), less_work, ..quick };
+        let banded = Row { band: cases.band(6).ok(), less_work, ..quick };
         let text = "holds at 2 of 6 settings (quick form, less work)";
         assert_eq!(banded.clone().judged().verdict_text, text);
         assert_eq!(Row { form: Form::Full, ..banded.clone() }.judged().verdict_text, "holds");

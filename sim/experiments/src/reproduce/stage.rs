@@ -47,7 +47,7 @@ impl Sensor {
 }
 
 /// Largest number of bins of a frame: finer than the recorder for frames of up to 0.1 s.
-const MOST_BINS: usize = 4096;
+const MAX_BINS: usize = 4096;
 
 impl Stage {
     fn new(gpu: &str, platform: &str, sensor: Sensor) -> Result<Self, RunError> {
@@ -142,7 +142,7 @@ impl Stage {
         let draws: Vec<Draw<'_>> =
             draws.iter().zip(&shaders).map(|(draw, shader)| Draw { shader: &**shader, ..*draw }).collect();
         let mut clock =
-            FrameClock::new(Level::default(), self.gpu.machine()?, Recorder::new(BIN_PS, MOST_BINS));
+            FrameClock::new(Level::default(), self.gpu.machine()?, Recorder::new(BIN_PS, MAX_BINS));
         RasterPass::new(&frame.camera, &draws, &settings)
             .without_image()
             .render(|packet, lines| clock.push(packet, lines))

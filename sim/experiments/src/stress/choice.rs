@@ -40,7 +40,7 @@ pub struct Choice {
 }
 
 /// The most that `auto` may take over the best fixed choice.
-pub const MOST_OVER_BEST: f64 = 1.05;
+pub const MAX_OVER_BEST: f64 = 1.05;
 
 /// `auto` and every fixed choice on `family` at `value`.
 ///
@@ -126,7 +126,7 @@ impl Choices {
         }
     }
 
-    /// The families on which `auto` takes more than [`MOST_OVER_BEST`] of the best fixed choice.
+    /// The families on which `auto` takes more than [`MAX_OVER_BEST`] of the best fixed choice.
     pub fn families_over(&self) -> usize {
         over(&self.families)
     }
@@ -142,8 +142,8 @@ impl Choices {
             return String::new();
         };
         format!(
-            "auto takes at most {:.3} of the best fixed choice on a family ({}), {} of {} families over {MOST_OVER_BEST}\n\
-             and at most {:.3} of the best choice for a single value ({} at {}), {} of {} values over {MOST_OVER_BEST}\n",
+            "auto takes at most {:.3} of the best fixed choice on a family ({}), {} of {} families over {MAX_OVER_BEST}\n\
+             and at most {:.3} of the best choice for a single value ({} at {}), {} of {} values over {MAX_OVER_BEST}\n",
             family.over_best,
             family.family,
             self.families_over(),
@@ -158,7 +158,7 @@ impl Choices {
 }
 
 fn over(choices: &[Choice]) -> usize {
-    choices.iter().filter(|choice| choice.over_best > MOST_OVER_BEST).count()
+    choices.iter().filter(|choice| choice.over_best > MAX_OVER_BEST).count()
 }
 
 fn worst(choices: &[Choice]) -> Option<&Choice> {

@@ -430,7 +430,7 @@ pub fn on_subject<T>(
 pub type Seen = Vec<(u32, u32)>;
 
 /// The most tests of a sample against a triangle that brute force may take.
-const MOST_TESTS: u64 = 200_000_000;
+const MAX_TESTS: u64 = 200_000_000;
 
 impl Subject<'_> {
     /// Triangles that are drawn.
@@ -454,7 +454,7 @@ impl Subject<'_> {
     /// with every test off. Also returns whether it was brute force.
     pub fn reference(&self) -> Result<(Seen, bool), PassError> {
         let samples = self.viewport.pixels() as u64 * u64::from(self.samples.per_pixel());
-        if samples * self.triangles() <= MOST_TESTS {
+        if samples * self.triangles() <= MAX_TESTS {
             Ok((brute_force(self.camera, self.draws, self.viewport, self.samples), true))
         } else {
             Ok((self.seen(Features::NONE)?, false))

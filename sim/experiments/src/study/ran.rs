@@ -2,7 +2,7 @@
 
 use std::ops::AddAssign;
 
-use activity::Event;
+use activity::{Counts, Event};
 use pipeline::FrameReport;
 
 /// Counts of what ran.
@@ -19,12 +19,12 @@ pub struct Ran {
 impl Ran {
     /// Work of a frame.
     pub fn of(report: &FrameReport) -> Self {
-        let counts = report.counts();
-        Self {
-            passes: report.passes.len() as u64,
-            draws: counts[Event::Draws],
-            fragments: counts[Event::SamplesHit],
-        }
+        Self::counted(report.passes.len() as u64, &report.counts())
+    }
+
+    /// Work of so many passes with these counts.
+    pub fn counted(passes: u64, counts: &Counts) -> Self {
+        Self { passes, draws: counts[Event::Draws], fragments: counts[Event::SamplesHit] }
     }
 }
 

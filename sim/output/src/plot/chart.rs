@@ -27,7 +27,7 @@ const MIN_PANEL_PX: [f64; 2] = [290.0, 120.0];
 /// Room for the key of a series in a legend below a panel.
 const NAME_ASIDE: f64 = 44.0;
 /// Largest number of panels in a row, unless they are small.
-const MOST_ACROSS: usize = 3;
+const MAX_ACROSS: usize = 3;
 
 impl<'a> Chart<'a> {
     /// Panels with a title and a line below it.
@@ -118,7 +118,7 @@ impl<'a> Chart<'a> {
             Some(_) => (room / MIN_PANEL_PX[1]) as usize,
             None => (room / MIN_PANEL_PX[0].max(widest)) as usize,
         };
-        let most = self.small.unwrap_or(MOST_ACROSS).min(fitting.max(1)).min(self.panels.len());
+        let most = self.small.unwrap_or(MAX_ACROSS).min(fitting.max(1)).min(self.panels.len());
         // As even rows as there are: four panels in two rows of two.
         let rows = self.panels.len().div_ceil(most);
         if self.small.is_some() { most } else { self.panels.len().div_ceil(rows) }

@@ -172,7 +172,7 @@ pub(super) const RIGHT: f64 = 18.0;
 /// Distance of small panels.
 pub(super) const SMALL_GAP: f64 = 16.0;
 /// Largest height of a panel with equal axes.
-const MOST_HIGH: f64 = 640.0;
+const MAX_HIGH: f64 = 640.0;
 
 /// Position of a panel, and what it shares with others.
 pub(super) struct Cell<'a> {
@@ -262,7 +262,7 @@ impl Cell<'_> {
             return Some(Panel { left, top, right, bottom: top + self.height, x, y });
         }
         let (wide, high) = (across.high - across.low, up.high - up.low);
-        let px = ((right - left) / wide).min(MOST_HIGH / high);
+        let px = ((right - left) / wide).min(MAX_HIGH / high);
         let [x, y]: [Axis; 2] = [(0, across, Along::across(px * wide)), (1, up, Along::up(px * high))]
             .map(|(axis, extent, along)| self.panel.axes[axis].axis(extent, along));
         Some(Panel { left, top, right: left + px * wide, bottom: top + px * high, x, y })

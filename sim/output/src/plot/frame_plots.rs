@@ -39,9 +39,9 @@ pub struct FramePowerPlot<'a> {
 }
 
 /// Largest number of columns.
-const MOST_COLUMNS: usize = 480;
+const MAX_COLUMNS: usize = 480;
 /// Largest number of bins with a line for the total; with more, it would be a black band.
-const MOST_BINS_OUTLINED: usize = 160;
+const MAX_BINS_OUTLINED: usize = 160;
 /// Width of the legend, and the smallest width of a picture with room for it beside the panel.
 const LEGEND: f64 = 240.0;
 const BESIDE: f64 = 760.0;
@@ -63,7 +63,7 @@ impl FramePowerPlot<'_> {
         };
         panel.grid(&mut picture);
         draw_layers(&layers, &panel, duration_s, &mut picture);
-        if bins <= MOST_BINS_OUTLINED {
+        if bins <= MAX_BINS_OUTLINED {
             let total = layers.last().map(|layer| steps(&panel, duration_s, &layer.top));
             picture.polyline(total.unwrap_or_default(), INK, 1.0);
         }
@@ -92,7 +92,7 @@ impl FramePowerPlot<'_> {
     /// Layers from bottom to top, power without activity first. Each has its mean power over the frame, its mean power per column
     /// and the top of the layer below.
     fn layers(&self, bins: usize) -> Vec<Layer> {
-        let columns = bins.min(MOST_COLUMNS);
+        let columns = bins.min(MAX_COLUMNS);
         let mut floor = vec![0.0; columns];
         let mut layers = Vec::new();
         for overhead in [true, false] {

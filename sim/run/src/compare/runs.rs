@@ -50,7 +50,8 @@ const SETTINGS: [&str; 10] = [
 ];
 
 /// Keys within [`SETTINGS`] that are results.
-const RESULTS: [&str; 4] = ["modelled.units", "modelled.units_not_modelled", "modelled.limits", "camera.ron"];
+const RESULTS: [&str; 5] =
+    ["modelled.units", "modelled.units_not_modelled", "modelled.limits", "camera.ron", "settings.triangles"];
 
 /// Keys of numbers: key, name of the group, and unit if the key's name does not end in one.
 const GROUPS: [(&str, &str, &str); 12] = [
@@ -153,7 +154,18 @@ fn settings(runs: &[Value; 2]) -> Vec<Setting> {
         a != b && !RESULTS.iter().any(|result| name.starts_with(result))
     };
     let made = |(name, [a, b]): (String, [&Value; 2])| Setting { name, a: a.clone(), b: b.clone() };
-    pairs.filter(differs).map(made).collect()
+    let [a, b] = runs.each_ref().map(options);
+    let options = (a != b).then(|| Setting { name: "options".to_owned(), a, b });
+    pairs.filter(differs).map(made).chain(options).collect()
+}
+
+/// Options of a workload as on the command line, or null.
+fn options(run: &Value) -> Value {
+    let options = &run["request"]["options"];
+    let pair = |pair: &Value| Some(format!("{}={}", pair[0].as_str()?, pair[1].as_str()?));
+    let set = options["set"].as_array().into_iter().flatten().filter_map(pair);
+    let all: Vec<String> = options["file"].as_str().map(str::to_owned).into_iter().chain(set).collect();
+    if all.is_empty() { Value::Null } else { Value::String(all.join(" ")) }
 }
 
 fn values(runs: &[Value; 2]) -> Vec<Change> {
@@ -239,6 +251,17 @@ mod tests {
         let cycles = values.iter().find(|change| change.name == "cycles").unwrap();
         assert_eq!((cycles.a, cycles.is_equal()), (Some(20.0), true));
         assert!(warnings(&runs).is_empty());
+    }
+
+    #[test]
+    fn options_of_a_workload_are_shown_as_given() {
+        let mut runs = [run("a", 4, 2.0), run("a", 4, 2.0)];
+        runs[1]["request"] =
+            json!({"options": {"file": null, "set": [["method", "forward"], ["lights", "3"]]}});
+        let differ = settings(&runs);
+        let options =
+            Setting { name: "options".to_owned(), a: Value::Null, b: json!("method=forward lights=3") };
+        assert_eq!(differ, [options]);
     }
 
     #[test]

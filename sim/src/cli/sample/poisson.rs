@@ -34,6 +34,12 @@ pub struct PoissonArgs {
     pub common: Common,
 }
 
+impl PoissonArgs {
+    fn domain(&self) -> Domain {
+        if self.boxed { Domain::Box } else { Domain::Torus }
+    }
+}
+
 /// Facts about the points.
 #[derive(Serialize)]
 struct Facts {
@@ -63,7 +69,11 @@ pub(super) fn run(args: &PoissonArgs, terminal: &Terminal) -> Result<(), Failure
 
 /// Distance r that gives about `count` points, at most 0.5.
 fn radius(count: u32, dimensions: usize, domain: Domain) -> f64 {
-    if count == 1 { span(dimensions, domain) } else { radius_for(f64::from(count), dimensions).min(0.5) }
+    if count == 1 {
+        span(dimensions, domain)
+    } else {
+        radius_for(f64::from(count), dimensions, domain).min(0.5)
+    }
 }
 
 /// Points per second by number of dimensions, on two cores; an order of magnitude.
@@ -99,7 +109,7 @@ fn make<const D: usize>(
 /// Note if r cannot be large enough for the requested number of points.
 fn shortfall(args: &PoissonArgs, made: usize) -> String {
     match args.count {
-        Some(count @ 2..) if radius_for(f64::from(count), args.dim.into()) > 0.5 => {
+        Some(count @ 2..) if radius_for(f64::from(count), args.dim.into(), args.domain()) > 0.5 => {
             format!(" ({count} requested; r is at most 0.5, which gave {made})")
         }
         _ => String::new(),
@@ -107,7 +117,7 @@ fn shortfall(args: &PoissonArgs, made: usize) -> String {
 }
 
 fn sample<const D: usize>(args: &PoissonArgs, terminal: &Terminal) -> Result<(), Failure> {
-    let domain = if args.boxed { Domain::Box } else { Domain::Torus };
+    let domain = args.domain();
     let spec = PoissonSpec {
         radius: args.r.unwrap_or_else(|| radius(args.count.unwrap_or(1), D, domain)),
         domain,

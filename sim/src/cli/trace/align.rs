@@ -11,7 +11,7 @@ use traces::io::TraceHeader;
 use traces::io::atomic::write_file;
 use traces::times::read_times;
 use traces::trace::is_within;
-use warnings::Code;
+use warnings::{Code, Warning};
 
 use super::report;
 use super::warn_with;
@@ -19,7 +19,7 @@ use super::wrong;
 use crate::cli::Failure;
 use crate::cli::outputs::may_hold_results;
 use crate::cli::outputs::print_json;
-use crate::cli::trace::input::{FindArgs, InputArgs, anchor};
+use crate::cli::trace::input::{FindArgs, InputArgs, anchor, warn_of_frames};
 
 /// Arguments of `trace align`.
 #[derive(Clone, Debug, Args)]
@@ -50,6 +50,9 @@ pub struct AlignArgs {
     pub piped: bool,
 }
 
+/// Root mean square of rounding to whole samples, in sample periods, as 1 / sqrt 12: starts are at best known to half a sample.
+const ROUNDING_PERIODS: f64 = 0.289;
+
 impl From<AlignError> for Failure {
     fn from(error: AlignError) -> Self {
         Self { message: error.to_string(), code: 2 }
@@ -71,27 +74,30 @@ pub(super) fn run(args: &AlignArgs, terminal: &Terminal) -> Result<(), Failure> 
     may_hold_results("--out", args.out.as_deref(), [args.stamps.as_path(), &args.input.trace])?;
     let mut stamps = read_times(&args.stamps)?;
     stamps.sort_by(f64::total_cmp);
-    let alignment = match args.anchor[..] {
+    let (alignment, mut warnings) = match args.anchor[..] {
         [a, b] => {
             let trace = args.input.source(terminal)?.0.header();
             [a, b].iter().try_for_each(|anchor| check_anchor(*anchor, &trace))?;
             let alignment = Alignment::by_anchors(a, b)?;
             let warnings = alignment.warnings([a, b], &stamps);
             warnings.iter().for_each(|warning| warn_with(warning, "look at --anchor STAMP=TIME", terminal));
-            alignment
+            (alignment, warnings)
         }
         [] => {
-            let found = args.find.frames(&args.input, &args.input.trace, terminal)?.set.found;
-            let starts: Vec<f64> = found.starts.iter().map(|start| start.time_s).collect();
-            Alignment::by_fit(&stamps, &starts)?
+            let set = args.find.frames(&args.input, &args.input.trace, terminal)?.set;
+            let starts: Vec<f64> = set.found.starts.iter().map(|start| start.time_s).collect();
+            warn_of_frames(&set, terminal);
+            (Alignment::by_fit(&stamps, &starts, ROUNDING_PERIODS / set.rate_hz)?, set.found.warnings)
         }
         _ => return Err(wrong("--anchor is given twice, or not at all for a fit to the frames found")),
     };
     if alignment.ambiguous {
-        terminal.warn_of(
+        let warning = Warning::new(
             Code::AmbiguousAlignment,
-            "another pairing fits about as well, as frame times are even; give two anchors",
+            "another pairing fits about as well, or this one may fit by chance, as frame times are even or stamps few",
         );
+        warn_with(&warning, "give two anchors", terminal);
+        warnings.push(warning);
     }
     if let Some(out) = &args.out {
         write_file(out, |file| {
@@ -101,7 +107,10 @@ pub(super) fn run(args: &AlignArgs, terminal: &Terminal) -> Result<(), Failure> 
     }
     if args.json {
         let aligned: Vec<f64> = stamps.iter().map(|stamp| alignment.time_s(*stamp)).collect();
-        return print_json(&json!({ "alignment": alignment, "times_s": aligned }), true);
+        return print_json(
+            &json!({ "alignment": alignment, "times_s": aligned, "warnings": warnings }),
+            true,
+        );
     }
     let line = format!(
         "time = {} s + {} x stamp ({} pairs, {:.3e} s left)",

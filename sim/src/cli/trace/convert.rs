@@ -8,7 +8,7 @@ use output::terminal::Terminal;
 use serde_json::json;
 use traces::device::{Device, DeviceSpec, MAX_PACKET_SAMPLES, Peaks, RATES_HZ};
 use traces::io::{self, TraceFormat, TraceHeader, TraceReader, csv, endings};
-use warnings::Code;
+use warnings::{Code, Warning};
 
 use super::{report, warn_with, wrong};
 use crate::cli::Failure;
@@ -138,7 +138,7 @@ pub struct SampleArgs {
     /// Highest voltage, the lowest is its negative (default: 1.5 times the rail's)
     #[arg(long, value_name = "V", allow_hyphen_values = true, value_parser = positive_voltage)]
     pub voltage_range: Option<f64>,
-    /// Voltage of the rail without load (default: the trace's highest)
+    /// Voltage of the rail without load (default: the trace's highest, or the specified one for a trace of power alone)
     #[arg(long, value_name = "V", allow_hyphen_values = true, value_parser = positive_voltage)]
     pub rail_voltage: Option<f64>,
     /// Resistance of the rail (default: 4mOhm, less where the range is above 25 A)
@@ -201,15 +201,19 @@ pub(super) fn sample(args: &SampleArgs, terminal: &Terminal) -> Result<(), Failu
     let device =
         Device::new(args.spec(&peaks, trace.header().rate_hz)?).map_err(|error| wrong(error.to_string()))?;
     let sampled = device.resample_in_pieces(&*trace)?;
-    if let Some(warning) = sampled.clipping() {
-        warn_with(&warning, "widen it with --current-range or --voltage-range", terminal);
-    }
-    if let Some(warning) = device.spec().warning(&peaks) {
-        warn_with(&warning, "narrow the range with --current-range", terminal);
-    }
-    if let Some(losses) = sampled.losses() {
-        terminal.warn_of(Code::PacketsLost, &format!("{losses}; --repair fills them"));
-    }
+    let (before_j, after_j) = (sampled.original_energy_j()?, sampled.energy_j);
+    let warnings = [
+        (sampled.clipping(), "widen it with --current-range or --voltage-range"),
+        (device.spec().warning(&peaks), "narrow the range with --current-range"),
+        (sampled.losses().map(|losses| Warning::new(Code::PacketsLost, losses)), "--repair fills them"),
+        (sampled.energy_change(before_j), "look at --specified-voltage, --bits, ranges, gains and offsets"),
+    ];
+    let warnings = warnings.into_iter().filter_map(|(warning, remedy)| {
+        let warning = warning?;
+        warn_with(&warning, remedy, terminal);
+        Some(warning)
+    });
+    let warnings: Vec<Warning> = warnings.collect();
     let (from_hz, to_hz) = (trace.header().rate_hz, device.spec().rate_hz);
     if to_hz > from_hz {
         terminal.note(&format!(
@@ -218,24 +222,24 @@ pub(super) fn sample(args: &SampleArgs, terminal: &Terminal) -> Result<(), Failu
     }
     save(&sampled, &args.out, terminal)?;
     let header = sampled.header();
-    let (before_j, after_j) = (sampled.original_energy_j()?, sampled.energy_j);
     // A trace of no energy has no relative error.
     let error = (before_j != 0.0).then(|| after_j / before_j - 1.0);
-    let samples = header.samples;
+    let TraceHeader { samples, lost_samples, .. } = header;
     if args.json {
         return print_json(
             &json!({ "samples": samples, "device": device.spec(), "energy_J": before_j, "sampled_energy_J": after_j,
-                "relative_error": error, "lost_samples": header.lost_samples, "clipped_currents": sampled.clipped_currents,
-                "clipped_voltages": sampled.clipped_voltages }),
+                "relative_error": error, "lost_samples": lost_samples, "clipped_currents": sampled.clipped_currents,
+                "clipped_voltages": sampled.clipped_voltages, "warnings": warnings }),
             true,
         );
     }
     let DeviceSpec { rate_hz, bits, current_range_a, .. } = device.spec();
     let relative = error.map_or(String::new(), |error| format!(" ({:+.3} %)", 100.0 * error));
+    let lost = if lost_samples > 0 { format!(" and {} lost", grouped(lost_samples)) } else { String::new() };
     let line = format!(
-        "{}: {} at {rate_hz} Hz, {bits} bits of {} to {}; {before_j:.6} J became {after_j:.6} J{relative}",
+        "{}: {}{lost} at {rate_hz} Hz, {bits} bits of {} to {}; {before_j:.6} J became {after_j:.6} J{relative}",
         args.out.display(),
-        counted(samples as usize, "sample"),
+        counted((samples - lost_samples) as usize, "sample"),
         si(current_range_a[0], "A"),
         si(current_range_a[1], "A"),
     );
@@ -268,7 +272,9 @@ impl SampleArgs {
     /// The device before options change it.
     fn base(&self, peaks: &Peaks, trace_rate_hz: f64) -> Result<DeviceSpec, Failure> {
         let Some(path) = &self.device else {
-            let rail_v = self.rail_voltage.unwrap_or(peaks.voltage_v);
+            // Power alone is drawn from a rail at the specified voltage.
+            let specified_v = self.specified_voltage.filter(|_| !peaks.has_voltage);
+            let rail_v = self.rail_voltage.or(specified_v).unwrap_or(peaks.voltage_v);
             let fitting = DeviceSpec::fitting(rail_v, peaks.power_w);
             return Ok(DeviceSpec { rate_hz: fitting.rate_hz.min(trace_rate_hz), ..fitting });
         };

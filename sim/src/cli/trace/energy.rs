@@ -8,12 +8,13 @@ use output::terminal::Terminal;
 use serde_json::json;
 use traces::energy::{
     FramePart, Idle, IdleTooShort, Pooled, PowerIntegral, RunEnergy, RunEnergyError, RunEnergyOptions,
-    SegmentEnergy, SegmentError, Spread, check_parts, parts_j, pooled, whole,
+    SegmentEnergy, SegmentError, Spread, check_parts, idle_in_frames, negative_power, parts_j, pooled, whole,
 };
 use traces::io::{Repair, TraceReader};
 use traces::trace::check_span;
+use warnings::Warning;
 
-use super::input::{Frames, warn_of_frames};
+use super::input::{Frames, warn_of};
 use super::wrong;
 use crate::cli::Failure;
 use crate::cli::outputs::{print, print_json};
@@ -121,7 +122,7 @@ pub(super) fn run(args: &EnergyArgs, terminal: &Terminal) -> Result<(), Failure>
     let recording = recording.as_ref().map(|(recording, _)| PowerIntegral::new(recording));
     if args.from.is_some() || args.to.is_some() {
         let (trace, repairs) = args.input.source(terminal)?;
-        return segment_energy(args, &*trace, &repairs, recording.as_ref());
+        return segment_energy(args, &*trace, &repairs, recording.as_ref(), terminal);
     }
     let (first, repairs, of_file) =
         one_run(args, &args.input.trace, (&passes, recording.as_ref()), terminal)?;
@@ -133,8 +134,9 @@ pub(super) fn run(args: &EnergyArgs, terminal: &Terminal) -> Result<(), Failure>
     let energies: Vec<Vec<f64>> = runs.iter().map(|run| run.run.energies_j()).collect();
     let pool = pooled(&energies).ok_or_else(|| wrong("no frame is left; discard fewer"))?;
     if args.json {
+        let warnings: Vec<&Warning> = runs.iter().flat_map(|run| &run.warnings).collect();
         let runs: Vec<_> = runs.iter().map(Run::json).collect();
-        let report = json!({ "runs": runs, "pooled": pool, "pixels": pixels, "repairs": repairs });
+        let report = json!({ "runs": runs, "pooled": pool, "pixels": pixels, "repairs": repairs, "warnings": warnings });
         return print_json(&report, true);
     }
     let text: String = runs.iter().map(Run::text).collect();
@@ -159,16 +161,19 @@ fn segment_energy(
     trace: &dyn TraceReader,
     repairs: &[Repair],
     recording: Option<&PowerIntegral<'_>>,
+    terminal: &Terminal,
 ) -> Result<(), Failure> {
     let header = trace.header();
     let idle = idle(args, trace, recording)?;
     let (from_s, to_s) = (args.from.unwrap_or(header.start_s), args.to.unwrap_or(header.end_s()));
     let segment = SegmentEnergy::of(trace, from_s, to_s, idle.as_ref());
     let SegmentEnergy { energy_j, power_w, idle_j } = segment.map_err(segment_failure)?;
+    let warnings: Vec<Warning> = negative_power(energy_j + idle_j).into_iter().collect();
+    warn_of(&warnings, terminal);
     if args.json {
         return print_json(
             &json!({ "from_s": from_s, "to_s": to_s, "energy_J": energy_j, "power_W": power_w, "idle_J": idle_j,
-                "repairs": repairs }),
+                "repairs": repairs, "warnings": warnings }),
             true,
         );
     }
@@ -210,6 +215,9 @@ fn too_short(error: IdleTooShort) -> Failure {
 struct Run {
     run: RunEnergy,
     passes: Vec<(String, Spread)>,
+    /// Whether the last frame is left out, as it is cut.
+    without_last: bool,
+    warnings: Vec<Warning>,
 }
 
 /// One recording: its frames, its repairs, and the pixels of its frames if it states them.
@@ -220,9 +228,12 @@ fn one_run(
     terminal: &Terminal,
 ) -> Result<(Run, Vec<Repair>, Option<u64>), Failure> {
     let (Frames { set, repairs }, trace) = args.find.frames_and_samples(&args.input, path, terminal)?;
-    warn_of_frames(&set, terminal);
-    let (trace, frames) = (&*trace, whole(&set.energies).to_vec());
+    let (trace, frames) = (&*trace, whole(&set.energies, set.ends_with_trace).to_vec());
+    let without_last = frames.len() < set.energies.len();
     let idle = idle(args, trace, recording)?;
+    let mut warnings = set.found.warnings;
+    warnings.extend(args.idle.and_then(|segment| idle_in_frames(segment, &frames)));
+    warnings.extend(idle.as_ref().and_then(|idle| idle.above_frames(trace.header().start_s, &frames)));
     let options = RunEnergyOptions {
         discard: match args.discard {
             Discard::Count(count) => Some(count),
@@ -233,11 +244,11 @@ fn one_run(
     };
     let run = RunEnergy::of(trace, frames, idle.as_ref(), &options).map_err(run_failure)?;
     for pass in passes {
-        let warning = pass.check(&run.frames).map_err(|error| wrong(format!("--{error}")))?;
-        warning.iter().for_each(|warning| terminal.warn_of(warning.code, &warning.message));
+        warnings.extend(pass.check(&run.frames).map_err(|error| wrong(format!("--{error}")))?);
     }
+    warn_of(&warnings, terminal);
     let passes = parts_j(trace, &run.frames, passes, idle.as_ref())?;
-    Ok((Run { run, passes }, repairs, set.metadata.pixels))
+    Ok((Run { run, passes, without_last, warnings }, repairs, set.metadata.pixels))
 }
 
 fn run_failure(error: RunEnergyError) -> Failure {
@@ -273,10 +284,11 @@ impl Run {
         let run = &self.run;
         let spread = Spread::of(&run.energies_j()).unwrap_or_default();
         let mut text = format!(
-            "{} ({} discarded, {}): {:.4} mJ/frame start to start (deviation {:.4}), {:.4} mJ begin to finish\n",
+            "{} ({} discarded, {}{}): {:.4} mJ/frame start to start (deviation {:.4}), {:.4} mJ begin to finish\n",
             counted(run.frames.len(), "frame"),
             run.discarded,
             counted(run.outliers, "outlier"),
+            if self.without_last { ", without the last, which is cut" } else { "" },
             spread.mean * 1e3,
             spread.deviation * 1e3,
             run.begin_to_finish_j.mean * 1e3

@@ -65,7 +65,7 @@ pub(super) fn run(args: &FramesArgs, terminal: &Terminal) -> Result<(), Failure>
         let write = |out| traces::io::atomic::write_file(out, |file| table.write_csv(file));
         let (written, summary) = rayon::join(
             || args.out.as_deref().map_or(Ok(()), write),
-            || FrameSummary::of(whole(table.frames())),
+            || FrameSummary::of(whole(table.frames(), frames.set.ends_with_trace)),
         );
         written?;
         Ok::<_, Failure>((frames, table, summary, pixels))

@@ -15,12 +15,12 @@ use traces::Trace;
 use traces::frames::{FinderMethod, Window};
 use traces::io::{
     FORMATS, ReadOptions, Recording, Repair, Rows, TraceFormat, TraceReader, open, rail_of_sums, read,
-    readable,
+    readable, unread_power_ratio,
 };
 use traces::search::{FrameSet, Search};
 use traces::times::read_times;
 use traces::trace::RATE_LIMITS_HZ;
-use warnings::Code;
+use warnings::{Code, Warning};
 
 use super::PlotFormat;
 use super::wrong;
@@ -204,6 +204,12 @@ impl InputArgs {
     /// Warns of a rail that is added to those that it is the sum of, and notes how columns are read.
     pub(super) fn warn_of_columns(&self, path: &Path, terminal: &Terminal) -> Result<(), Failure> {
         let rows = Rows::open(path, &self.options()?)?;
+        if let Some(guess) = rows.guess() {
+            terminal.note(&format!(
+                "{}: columns without names: {guess}; --time-column 1 and the like choose others",
+                shown(path)
+            ));
+        }
         let without_unit: Vec<&str> = rows.without_unit().collect();
         if !without_unit.is_empty() {
             let columns = without_unit.join(", ");
@@ -212,6 +218,16 @@ impl InputArgs {
         if !rows.unread().is_empty() {
             let columns = rows.unread().join(", ");
             terminal.note(&format!("{}: {columns} is not read: power is voltage times current", shown(path)));
+        }
+        if let Some(ratio) = unread_power_ratio(path, &self.options()?) {
+            terminal.warn_of(
+                Code::PowerDiffers,
+                &format!(
+                    "{}: {} is {ratio:.4} times voltage times current, which is read; --power-column reads it instead",
+                    shown(path),
+                    rows.unread().join(", ")
+                ),
+            );
         }
         if self.rail.is_empty() { self.warn_of_sums(&rows, terminal) } else { Ok(()) }
     }
@@ -245,7 +261,12 @@ fn note_repairs(path: &Path, repairs: &[Repair], terminal: &Terminal) {
 
 /// Prints the warnings of a search.
 pub(super) fn warn_of_frames(set: &FrameSet, terminal: &Terminal) {
-    set.found.warnings.iter().for_each(|warning| terminal.warn_of(warning.code, &warning.message));
+    warn_of(&set.found.warnings, terminal);
+}
+
+/// Prints warnings.
+pub(super) fn warn_of(warnings: &[Warning], terminal: &Terminal) {
+    warnings.iter().for_each(|warning| terminal.warn_of(warning.code, &warning.message));
 }
 
 /// Frames, with the repairs of the trace they were found in.

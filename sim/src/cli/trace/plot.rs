@@ -202,7 +202,8 @@ fn samples(args: &PlotArgs, terminal: &Terminal) -> Result<(usize, Drawn), Failu
 fn energies_of(args: &PlotArgs, path: &Path, terminal: &Terminal) -> Result<Vec<f64>, Failure> {
     let frames = args.find.frames(&args.input, path, terminal)?.set;
     // A last frame that is cut has no energy that belongs into a distribution.
-    let shown = if args.kind == PlotKind::Histogram { whole(&frames.energies) } else { &frames.energies };
+    let all = &frames.energies;
+    let shown = if args.kind == PlotKind::Histogram { whole(all, frames.ends_with_trace) } else { all };
     Ok(shown.iter().map(|frame| frame.energy_j).collect())
 }
 

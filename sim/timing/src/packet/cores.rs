@@ -1,8 +1,5 @@
 //! Shader cores and data units of the level `packet`.
 
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
-
 use super::calendar::{Calendar, QueueTimes};
 use super::drain::{Drain, OnCores};
 use super::memory::Memory;
@@ -39,8 +36,8 @@ pub(super) struct Run {
     pub departed: Time,
     /// How long its last warps wait for their data.
     pub waited: Time,
-    /// When they have them.
-    pub ready: Time,
+    /// When the first and the last warp have them.
+    pub ready: Span,
     /// When its data unit works on it.
     pub data: Span,
     /// When its lines pass the L2 and memory.
@@ -88,40 +85,6 @@ impl DataState {
     }
 }
 
-/// Room for groups on the cores, as if all groups under way needed as much as the next.
-#[derive(Clone, Debug)]
-struct GroupRoom {
-    machine: MachineSpec,
-    /// When the groups under way end.
-    ends: BinaryHeap<Reverse<Time>>,
-}
-
-impl GroupRoom {
-    fn new(machine: &MachineSpec) -> Self {
-        Self { machine: machine.clone(), ends: BinaryHeap::new() }
-    }
-
-    /// Groups like that of `demand` that have room at once; all packets of other kinds have.
-    fn most(&self, demand: &ServiceDemand, warps: u32) -> usize {
-        demand.group.map_or(usize::MAX, |group| {
-            let per_core = self.machine.groups_per_core(warps, group.shared_bytes).max(1);
-            self.machine.shader.cores.get() as usize * per_core as usize
-        })
-    }
-
-    /// When there is room for the group of `demand`; 0 for other packets.
-    fn at(&mut self, demand: &ServiceDemand, warps: u32) -> Time {
-        let most = self.most(demand, warps);
-        let mut room = 0;
-        while self.ends.len() >= most
-            && let Some(Reverse(end)) = self.ends.pop()
-        {
-            room = end;
-        }
-        room
-    }
-}
-
 /// All cores and data units.
 #[derive(Clone, Debug)]
 pub(super) struct Cores {
@@ -136,7 +99,7 @@ pub(super) struct Cores {
     alu: Time,
     lanes_of_core: u32,
     warp_lanes: u32,
-    groups: GroupRoom,
+    machine: MachineSpec,
     drain: Drain,
     data: [DataState; DataUnit::ALL.len()],
 }
@@ -155,7 +118,7 @@ impl Cores {
             cores: spec.cores.get(),
             period,
             alu: period * Time::from(spec.alu_latency_cycles),
-            groups: GroupRoom::new(machine),
+            machine: machine.clone(),
             drain: Drain::new(machine, clocks),
             lanes_of_core: spec.lanes.get(),
             warp_lanes: spec.warp_lanes.get(),
@@ -180,13 +143,17 @@ impl Cores {
         let warps = demand.warps(self.warp_lanes);
         let fifo = &mut self.fifos[kind];
         let taken = visit.arrive.max(fifo.sent).max(fifo.flights.room_at());
-        let room = taken.max(self.groups.at(demand, warps));
+        let mut room = taken;
+        if kind == 1 {
+            let admitted = self.drain.admits(visit.arrive, self.most(demand, warps));
+            room = room.max(aligned(admitted.round() as Time, self.period));
+        }
         let mut run = Run {
             taken,
             done: taken,
             departed: taken,
             waited: 0,
-            ready: 0,
+            ready: Span::NONE,
             data: Span::NONE,
             memory: Span::NONE,
         };
@@ -200,14 +167,11 @@ impl Cores {
             if uses_data {
                 ready = self.data(visit, &chunk, ready, builder, memory, &mut run);
             }
-            run.ready = ready.to;
+            run.ready = run.ready.with(ready.from, ready.to);
             run.waited = ready.to - (sent.to + self.period).min(ready.to);
             let done = self.operate(visit, &chunk, sent.from, ready);
             self.fifos[kind].slots.note_all(chunk.count, done.from, done.to);
             run.done = run.done.max(done.to);
-        }
-        if demand.group.is_some() {
-            self.groups.ends.push(Reverse(run.done));
         }
         if kind == 1 {
             self.drain.note(demand, self.on_cores(visit, warps, &run));
@@ -219,17 +183,26 @@ impl Cores {
         run
     }
 
+    /// Packets like that of `demand` that have room on the cores at once. Only groups need room but for their warps; all groups
+    /// under way are taken to need as much.
+    fn most(&self, demand: &ServiceDemand, warps: u32) -> usize {
+        demand.group.map_or(usize::MAX, |group| {
+            let per_core = self.machine.groups_per_core(warps, group.shared_bytes).max(1);
+            self.machine.shader.cores.get() as usize * per_core as usize
+        })
+    }
+
     fn on_cores(&self, visit: &Visit<'_>, warps: u32, run: &Run) -> OnCores {
         let demand = visit.demand;
         OnCores {
             arrive: visit.arrive,
             data: run.waited,
-            ready: run.ready,
+            ready: if warps > 0 { run.ready } else { Span { from: 0, to: 0 } },
             warps,
             threads: demand.threads,
             ops: demand.ops,
             steps: demand.steps(),
-            room: self.groups.most(demand, warps),
+            room: self.most(demand, warps),
             behind: 0,
             latency: 0,
         }
@@ -238,6 +211,11 @@ impl Cores {
     /// When the last packets of pixels and groups have left, if none comes any more; in the calendars they have left at `calendar`.
     pub fn drain(&mut self, calendar: Time) -> Option<Left> {
         self.drain.end(calendar)
+    }
+
+    /// When the last packets of pixels and groups of the batches up to `batch` have left; in the calendars they have at `calendar`.
+    pub fn left(&mut self, batch: u32, calendar: Time) -> Time {
+        self.drain.left(batch, calendar)
     }
 
     /// Send warps, one per cycle, as slots on the cores and in front of the data unit become free. Returns when the

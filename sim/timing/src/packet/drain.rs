@@ -14,13 +14,15 @@ use crate::demand::{ServiceDemand, Station};
 use crate::draws::Left;
 use crate::spec::MachineSpec;
 
+use super::Span;
+
 /// A packet of pixels or a group on the cores.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct OnCores {
     pub arrive: Time,
-    /// How long its warps wait for their data, and when the last have them.
+    /// How long its last warps wait for their data, and when the first and the last have them.
     pub data: Time,
-    pub ready: Time,
+    pub ready: Span,
     pub warps: u32,
     pub threads: u32,
     pub ops: u32,
@@ -42,26 +44,27 @@ pub(super) struct Drain {
     /// The last packet; its time is not known.
     last: Option<Left>,
     /// When the last warp is sent, when the last packet begins, when the last leaves the cores and when the unit behind.
+    admitted: f64,
     sent: f64,
     started: f64,
     departed: f64,
     gone: f64,
     /// When the last has left the machine.
-    ended: f64,
+    last_end: f64,
     /// The least wait for data.
     least_data: Time,
     /// The longest program of a packet alone, and the longest service behind.
     longest: Time,
     longest_behind: Time,
-    /// Warp slots taken.
-    held: u64,
+    /// Free warp slots, by the time when they become free.
+    slots: VecDeque<(f64, u32)>,
     now: f64,
     /// Steps so far of a packet that was there from the beginning.
     steps: f64,
     /// Lanes of a step of all active packets.
     lanes: f64,
-    /// Active packets: the steps at which each ends, in parts of [`PARTS`], and its number.
-    active: BinaryHeap<Reverse<(u64, usize)>>,
+    /// Active warps: the steps at which they end, in parts of [`PARTS`], the number of their packet, and how many there are.
+    active: BinaryHeap<Reverse<(u64, usize, u32)>>,
     cores: CoreSizes,
 }
 
@@ -71,7 +74,10 @@ const PARTS: f64 = 1024.0;
 #[derive(Clone, Copy, Debug)]
 struct InTurn {
     packet: OnCores,
-    done: Option<f64>,
+    batch: u32,
+    /// Warps not done, and when the last so far was.
+    remaining: u32,
+    done: f64,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -81,7 +87,6 @@ struct CoreSizes {
     alu: Time,
     lanes: f64,
     lanes_of_core: u64,
-    slots: u64,
     /// Latency of the cores and of the unit behind, and its cycle.
     latencies: [Time; 2],
     behind_period: Time,
@@ -101,7 +106,6 @@ impl Drain {
             alu: period * Time::from(spec.alu_latency_cycles),
             lanes: f64::from(spec.cores.get()) * f64::from(spec.lanes.get()),
             lanes_of_core: spec.lanes.get().into(),
-            slots: u64::from(spec.cores.get()) * u64::from(spec.warps.get()),
             latencies: [Station::Pixel, Station::Colour].map(latency),
             behind_period: clocks.period(machine.common(Station::Colour.unit()).clock),
         };
@@ -109,15 +113,16 @@ impl Drain {
             packets: VecDeque::new(),
             left: 0,
             last: None,
+            admitted: 0.0,
             sent: 0.0,
             started: 0.0,
             departed: 0.0,
             gone: 0.0,
-            ended: 0.0,
+            last_end: 0.0,
             least_data: Time::MAX,
             longest: 0,
             longest_behind: 0,
-            held: 0,
+            slots: VecDeque::from([(0.0, spec.cores.get() * spec.warps.get())]),
             now: 0.0,
             steps: 0.0,
             lanes: 0.0,
@@ -133,34 +138,92 @@ impl Drain {
         self.last = Some(Left { pass: demand.pass, draw: demand.draw, batch: demand.batch, at: 0 });
         self.longest = self.longest.max(Time::from(packet.steps) * self.cores.alu);
         self.longest_behind = self.longest_behind.max(packet.behind);
-        let warps = u64::from(packet.warps);
-        let mut admitted = self.sent.max(packet.arrive as f64);
-        let room = self.cores.in_flight.min(packet.room);
+        // Waits are longer where packets before it delay its lines; those come no later in turn.
+        self.least_data = self.least_data.min(packet.data);
+        self.sent = self.admits(packet.arrive, packet.room);
+        self.packets.push_back(InTurn { packet, batch: demand.batch, remaining: packet.warps, done: 0.0 });
+        let mut remaining = packet.warps;
+        while remaining > 0
+            && let Some(count) = self.send(remaining)
+        {
+            remaining -= count;
+            self.start(&packet, count, remaining);
+        }
+        if packet.warps == 0 {
+            // What has no warp, as a resolve, passes the cores without a step.
+            self.start(&packet, 0, 0);
+        }
+    }
+
+    /// Send up to `most` warps, one a cycle, to slots that become free together. Returns their number; `None` if no warp is there
+    /// to free a slot.
+    fn send(&mut self, most: u32) -> Option<u32> {
+        let free = self.slot()?;
+        let (_, slots) = self.slots.front_mut()?;
+        let count = most.min(*slots);
+        *slots -= count;
+        if *slots == 0 {
+            self.slots.pop_front();
+        }
+        self.sent = self.sent.max(free) + (Time::from(count) * self.cores.period) as f64;
+        Some(count)
+    }
+
+    /// Begin with `warps` warps of the last packet, of which `remaining` remain.
+    fn start(&mut self, packet: &OnCores, warps: u32, remaining: u32) {
+        let Span { from, to } = packet.ready;
+        let before = (to - from) / Time::from(packet.warps.max(2) - 1) * Time::from(remaining);
+        let ready = (to - before) as f64;
+        self.started = self.started.max(self.sent + self.least_data as f64).max(ready);
+        self.advance(self.started);
+        let number = self.left + self.packets.len() - 1;
+        let lanes = packet.lanes_of_warp() * f64::from(warps);
+        if lanes > 0.0 {
+            self.lanes += lanes;
+            let ends = self.steps + f64::from(packet.steps);
+            self.active.push(Reverse(((ends * PARTS).round() as u64, number, warps)));
+        } else {
+            self.ended(number, warps, self.started + if warps > 0 { self.cores.alu as f64 } else { 0.0 });
+        }
+    }
+
+    /// Warps of a packet end at `at`.
+    fn ended(&mut self, number: usize, warps: u32, at: f64) {
+        let packet = &mut self.packets[number - self.left];
+        packet.remaining -= warps;
+        packet.done = at;
+        if warps > 0 {
+            self.slots.push_back((at, warps));
+        }
+    }
+
+    /// When the next packet, which arrives at `arrive`, has room on the cores. They have room for `room` packets like it.
+    pub fn admits(&mut self, arrive: Time, room: usize) -> f64 {
+        let mut admitted = self.sent.max(arrive as f64);
+        let room = self.cores.in_flight.min(room);
         while !self.packets.is_empty() && self.packets.len() >= room {
             admitted = admitted.max(self.leave());
         }
-        // Its first warp needs a slot.
-        while self.held >= self.cores.slots && self.end_next(f64::INFINITY) {
-            admitted = admitted.max(self.now);
+        self.admitted = self.admitted.max(admitted).max(self.slot().unwrap_or(0.0));
+        self.admitted
+    }
+
+    /// When the next free slot for a warp becomes free; `None` if no warp is there to free one.
+    fn slot(&mut self) -> Option<f64> {
+        while self.slots.is_empty() && self.end_next(f64::INFINITY) {}
+        self.slots.front().map(|&(free, _)| free)
+    }
+
+    /// When the last packet of the batches up to `batch` has left; in the calendars they have at `calendar`.
+    pub fn left(&mut self, batch: u32, calendar: Time) -> Time {
+        let most = calendar + self.longest + self.longest_behind * self.packets.len() as Time;
+        if self.packets.front().is_none_or(|packet| packet.batch > batch) {
+            return calendar;
         }
-        self.sent = admitted + (warps * self.cores.period) as f64;
-        // Waits are longer where packets before it delay its lines; those come no later in turn.
-        self.least_data = self.least_data.min(packet.data);
-        self.started = self.started.max(self.sent + self.least_data as f64).max(packet.ready as f64);
-        self.advance(self.started);
-        let number = self.left + self.packets.len();
-        let work = packet.lanes();
-        let is_idle = work == 0.0;
-        // What has no warp, as a resolve, passes the cores without a step.
-        let alone = if warps > 0 { self.cores.alu as f64 } else { 0.0 };
-        let done = is_idle.then_some(self.started + alone);
-        self.packets.push_back(InTurn { packet, done });
-        if !is_idle {
-            self.held += warps;
-            self.lanes += work;
-            let ends = self.steps + f64::from(packet.steps);
-            self.active.push(Reverse(((ends * PARTS) as u64, number)));
+        while self.packets.front().is_some_and(|packet| packet.batch <= batch) {
+            self.leave();
         }
+        most.min(self.last_end as Time).max(calendar)
     }
 
     /// When the last packet has left, if none comes any more; `None` if there was none. In the calendars they have left at `calendar`.
@@ -174,20 +237,20 @@ impl Drain {
         }
         (self.steps, self.lanes, self.least_data) = (0.0, 0.0, Time::MAX);
         (self.longest, self.longest_behind) = (0, 0);
-        self.last.take().map(|last| Left { at: most.min(self.ended as Time), ..last })
+        self.last.take().map(|last| Left { at: most.min(self.last_end as Time), ..last })
     }
 
     /// Let the oldest packet leave. Returns when it leaves the cores.
     fn leave(&mut self) -> f64 {
-        while self.packets.front().is_some_and(|packet| packet.done.is_none()) && self.end_next(f64::INFINITY)
+        while self.packets.front().is_some_and(|packet| packet.remaining > 0) && self.end_next(f64::INFINITY)
         {
         }
-        let Some(InTurn { packet, done }) = self.packets.pop_front() else { return self.departed };
+        let Some(InTurn { packet, done, .. }) = self.packets.pop_front() else { return self.departed };
         self.left += 1;
-        self.departed = self.departed.max(done.unwrap_or(self.now));
+        self.departed = self.departed.max(done);
         let arrived = self.departed + self.cores.latencies[0] as f64;
         self.gone = self.gone.max(arrived) + packet.behind as f64;
-        self.ended = self.ended.max(self.gone + packet.latency as f64);
+        self.last_end = self.last_end.max(self.gone + packet.latency as f64);
         self.departed
     }
 
@@ -197,9 +260,9 @@ impl Drain {
         self.now = self.now.max(to);
     }
 
-    /// Serve until a packet ends, or until `to`. Returns whether one ended.
+    /// Serve until warps end, or until `to`. Returns whether some ended.
     fn end_next(&mut self, to: f64) -> bool {
-        let Some(&Reverse((ends, number))) = self.active.peek() else { return false };
+        let Some(&Reverse((ends, number, warps))) = self.active.peek() else { return false };
         let packet = self.packets[number - self.left].packet;
         let ends = ends as f64 / PARTS;
         let step = self.cores.step(self.lanes, &packet);
@@ -211,25 +274,24 @@ impl Drain {
         }
         (self.steps, self.now) = (self.steps.max(ends), until);
         self.active.pop();
-        self.lanes -= packet.lanes();
-        self.held -= u64::from(packet.warps);
-        self.packets[number - self.left].done = Some(until);
+        self.lanes -= packet.lanes_of_warp() * f64::from(warps);
+        self.ended(number, warps, until);
         true
     }
 }
 
 impl CoreSizes {
-    /// Time of a step of all packets, of which `lanes` are active and `packet` ends first.
+    /// Time of a step of all warps, of which `lanes` lanes are active and those of `packet` end first.
     fn step(&self, lanes: f64, packet: &OnCores) -> f64 {
-        let of_warp = (packet.lanes() / f64::from(packet.warps)).ceil() as u64;
+        let of_warp = packet.lanes_of_warp().ceil() as u64;
         let wide = of_warp.div_ceil(self.lanes_of_core).saturating_sub(1) * self.period;
         (lanes * self.period as f64 / self.lanes).max((self.alu + wide) as f64)
     }
 }
 
 impl OnCores {
-    /// Lanes of a step.
-    fn lanes(&self) -> f64 {
-        f64::from(self.threads) * f64::from(self.ops) / f64::from(self.steps.max(1))
+    /// Lanes of a step of a warp.
+    fn lanes_of_warp(&self) -> f64 {
+        f64::from(self.threads) * f64::from(self.ops) / f64::from(self.steps.max(1) * self.warps.max(1))
     }
 }

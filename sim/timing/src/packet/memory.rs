@@ -1,6 +1,8 @@
 //! L2, levels below it and memory of the level `packet`: runs of lines enter calendars. Memory has a calendar per bus, and the latest rows of
 //! each bank.
 
+use std::collections::HashMap;
+
 use activity::{LEVELS, LevelRequests, LineAccess, LineKind, Unit};
 
 use super::Span;
@@ -9,7 +11,7 @@ use super::levels::{Levels, Passed};
 use crate::address::AddressMap;
 use crate::clock::{Clocks, Time};
 use crate::demand::CLIENTS;
-use crate::spec::{DramSpec, MachineSpec};
+use crate::spec::MachineSpec;
 
 /// Times of a group of line requests.
 #[derive(Clone, Copy, Debug)]
@@ -97,7 +99,7 @@ impl Memory {
         let spec = &machine.l2;
         let period = clocks.period(spec.clock);
         Self {
-            dram: Dram::new(&machine.dram, clocks),
+            dram: Dram::new(machine, clocks),
             levels: Levels::new(machine, clocks),
             l2: Calendar::new(Time::from(SLOT_CYCLES) * period, spec.lines_per_cycle.get()),
             ports: std::array::from_fn(|_| QueueTimes::new(spec.queue.get())),
@@ -173,11 +175,12 @@ impl Memory {
         }
         // What the queues of the channels do not hold waits in front of the level above.
         let seen = Span { from: accepted.from + period, to: accepted.to + period };
+        let came = seen.from;
         let seen = self.dram.admits(&head, count, seen);
         accepted = Span { from: seen.from - period, to: seen.to - period };
         fetched.moved = fetched.moved.max(seen.to);
         for line in head.moved() {
-            let moved = self.dram.transfer(line, count, turn, seen);
+            let moved = self.dram.transfer(line, count, turn, came, seen);
             fetched.moved = fetched.moved.max(moved);
             if head.fetched() == Some(line) {
                 let latency = self.dram.latency() + latency + self.latency;
@@ -223,6 +226,11 @@ impl Memory {
         self.dram.rows()
     }
 
+    /// Time of the bank with most of it for rows that may not have to be opened.
+    pub fn disputed(&self) -> Time {
+        self.dram.disputed()
+    }
+
     /// Bus calendars of all channels.
     pub fn buses(&self) -> impl Iterator<Item = &Calendar> {
         self.dram.buses()
@@ -241,7 +249,7 @@ const RECENT_GROUPS: usize = 4;
 const MAX_RECENT_GROUPS: usize = 256;
 
 /// Most rows that are remembered per bank; the queue of a channel may hold lines of as many rows as it has places.
-const MAX_REMEMBERED_ROWS: usize = 32;
+const MAX_REMEMBERED_ROWS: usize = 256;
 
 /// An opened row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -255,14 +263,14 @@ struct OpenRow {
     until: Time,
     /// When the next row begins to open.
     closes: Time,
-    /// Lines of the channel before it was opened, plus its own lines.
-    own: u64,
+    /// Lines of the channel up to its last line so far.
+    last: u64,
     /// Time on the bus of lines that joined it.
     joined: Time,
 }
 
 impl OpenRow {
-    const NONE: Self = Self { row: u32::MAX, since: 0, opened: 0, until: 0, closes: 0, own: 0, joined: 0 };
+    const NONE: Self = Self { row: u32::MAX, since: 0, opened: 0, until: 0, closes: 0, last: 0, joined: 0 };
 }
 
 /// A bank: calendar of its row activations, and its latest rows, the newest first.
@@ -270,6 +278,10 @@ impl OpenRow {
 struct Bank {
     time: Calendar,
     rows: Box<[OpenRow]>,
+    /// When the last line of each row before these was issued.
+    former: HashMap<u32, Time>,
+    /// Time for rows that may not have to be opened.
+    disputed: Time,
 }
 
 #[derive(Clone, Debug)]
@@ -345,10 +357,8 @@ struct RowUse {
     seen: Time,
     opened: Time,
     issued: Time,
-    /// Lines of the channel before them.
+    /// Lines of the channel up to them, and their time on the bus.
     lines: u64,
-    /// Their number, and their time on the bus.
-    count: u64,
     work: Time,
 }
 
@@ -363,20 +373,24 @@ pub(super) struct Dram {
     precharge: Time,
     latency: Time,
     queue: u64,
-    /// Time of a full queue of lines of one bank, each of another row.
+    /// Time of a full queue of lines of one bank, each of another row, and of all lines that can wait in front of a channel.
     longest_wait: Time,
+    longest_way: Time,
     end: Time,
 }
 
 impl Dram {
-    pub fn new(spec: &DramSpec, clocks: &Clocks) -> Self {
+    pub fn new(machine: &MachineSpec, clocks: &Clocks) -> Self {
+        let spec = &machine.dram;
         let period = clocks.period(spec.clock);
         let cycles = |count: u32| period * Time::from(count);
         let burst = cycles(spec.burst_cycles.get());
         let [bus, time] =
             [BUS_SLOT_LINES, BANK_SLOT_LINES].map(|lines| Calendar::new(burst * Time::from(lines), 1));
         let rows = MAX_REMEMBERED_ROWS.min(spec.queue.get() as usize);
-        let bank = Bank { time, rows: vec![OpenRow::NONE; rows].into() };
+        let bank = Bank::new(time, rows);
+        let longest_line = burst.max(cycles(spec.activate_cycles.get() + spec.precharge_cycles.get()));
+        let in_ports = CLIENTS.len() as Time * Time::from(machine.l2.queue.get());
         let remembered = (RECENT_GROUPS * spec.queue.get() as usize).min(MAX_RECENT_GROUPS);
         let channel = Channel {
             bus,
@@ -398,8 +412,8 @@ impl Dram {
             precharge: cycles(spec.precharge_cycles.get()),
             latency: cycles(spec.latency_cycles.get()),
             queue: spec.queue.into(),
-            longest_wait: burst.max(cycles(spec.activate_cycles.get() + spec.precharge_cycles.get()))
-                * Time::from(spec.queue),
+            longest_wait: longest_line * Time::from(spec.queue),
+            longest_way: longest_line * (Time::from(spec.queue) + in_ports),
             end: 0,
         }
     }
@@ -430,9 +444,9 @@ impl Dram {
         Span { from: enters.from, to: enters.to.max(enters.from) }
     }
 
-    /// Transfer `count` lines of one group over the bus of their channel. The first enters its queue at `seen.from`, the
-    /// last at `seen.to`. Returns when the last is transferred.
-    pub fn transfer(&mut self, line: u32, count: u32, turn: Turn, seen: Span) -> Time {
+    /// Transfer `count` lines of one group over the bus of their channel. The first comes to memory at `came` and enters the queue
+    /// at `seen.from`, the last at `seen.to`. Returns when the last is transferred.
+    pub fn transfer(&mut self, line: u32, count: u32, turn: Turn, came: Time, seen: Span) -> Time {
         let address = self.map.locate(line);
         let channel = &mut self.channels[address.channel];
         let is_alone = channel.is_of(address.bank, self.queue);
@@ -450,6 +464,7 @@ impl Dram {
                 if open.since <= seen.from { open.opened } else { seen.from }
             }
             None => {
+                bank.dispute(address.row, came, self.longest_way, self.activate + self.precharge);
                 let before = &mut bank.rows[bank.place(seen.from)];
                 let opens = self.activate + if *before == OpenRow::NONE { 0 } else { self.precharge };
                 // The next row can open once the last line is issued, at the latest when a full queue has left.
@@ -469,21 +484,20 @@ impl Dram {
         };
         let ready = opened.max(seen.from);
         let end = channel.bus.reserve_as(turn, ready, work).1.max(seen.to + self.burst);
+        channel.lines += u64::from(count);
         let used = RowUse {
             row: address.row,
             seen: seen.from,
             opened,
             issued: end - self.burst,
             lines: channel.lines,
-            count: count.into(),
             work,
         };
         if let Some(at) = open.filter(|&at| used.issued >= bank.rows[at].closes) {
             bank.delay(at, work);
         }
         bank.note(used, open);
-        channel.lines += u64::from(count);
-        channel.note(address.bank, Waiting { seen: seen.from, issued: used.issued, count: used.count });
+        channel.note(address.bank, Waiting { seen: seen.from, issued: used.issued, count: count.into() });
         self.end = self.end.max(end);
         end + self.cas
     }
@@ -500,6 +514,12 @@ impl Dram {
         banks.map(busy).max().unwrap_or(0)
     }
 
+    /// Time of the bank with most of it for rows that may not have to be opened.
+    pub fn disputed(&self) -> Time {
+        let banks = self.channels.iter().flat_map(|channel| &channel.banks);
+        banks.map(|bank| bank.disputed).max().unwrap_or(0)
+    }
+
     /// Bus calendars of all channels.
     pub fn buses(&self) -> impl Iterator<Item = &Calendar> {
         self.channels.iter().map(|channel| &channel.bus)
@@ -507,6 +527,22 @@ impl Dram {
 }
 
 impl Bank {
+    /// A bank that remembers `rows` rows.
+    fn new(time: Calendar, rows: usize) -> Self {
+        Self { time, rows: vec![OpenRow::NONE; rows].into(), former: HashMap::new(), disputed: 0 }
+    }
+
+    /// Count the time `opens` of a row that lines open again which came at `came`, if these and the lines before of that row may
+    /// have waited side by side. In what order lines leave that wait at ports and in the queue of the channel is not known here,
+    /// as those of a client ahead of others come late in the stream. So two lines may meet if the second comes no later after the
+    /// first than all those take, `longest_way`.
+    fn dispute(&mut self, row: u32, came: Time, longest_way: Time, opens: Time) {
+        let known = self.rows.iter().find(|open| open.row == row).map(|open| open.until);
+        if known.or_else(|| self.former.get(&row).copied()).is_some_and(|last| came < last + longest_way) {
+            self.disputed += opens;
+        }
+    }
+
     /// The rows that open after that at place `at` do so later, as more lines of it go first.
     fn delay(&mut self, at: usize, by: Time) {
         for open in &mut self.rows[..at] {
@@ -521,24 +557,24 @@ impl Bank {
         self.rows.iter().position(|open| open.since <= seen).unwrap_or(self.rows.len() - 1)
     }
 
-    /// Place of the opening of `row` that a line joins which arrives at `seen`, after `lines` lines of its channel; `None` if
-    /// it has to open its row.
+    /// Place of the opening of `row` that a line joins which enters the queue at `seen`, after `lines` lines of its channel; `None`
+    /// if it has to open its row.
     ///
     /// First ready first come (Rixner et al. 2000): a line joins pending lines of its row, ahead of older requests to other
-    /// rows, until the next row opens. The exception is a queue full of other lines, which hides the line from the scheduler.
+    /// rows, until the next row opens. The exception is a queue full of other lines since the last of its row.
     fn joins(&self, row: u32, seen: Time, lines: u64, queue: u64) -> Option<usize> {
         let latest = self.place(seen);
-        let is_pending = |open: &OpenRow| open.row == row && seen < open.closes && lines - open.own < queue;
+        let is_pending = |open: &OpenRow| open.row == row && seen < open.closes && lines - open.last < queue;
         let latest = Some(latest).filter(|&at| self.rows[at].row == row);
         latest.or_else(|| self.rows.iter().position(is_pending))
     }
 
     /// Record lines of a row: those that joined the row at `joined`, or opened theirs.
     fn note(&mut self, used: RowUse, joined: Option<usize>) {
-        let RowUse { row, seen, opened, issued, lines, count, work } = used;
+        let RowUse { row, seen, opened, issued, lines, work } = used;
         if let Some(open) = joined.map(|at| &mut self.rows[at]) {
             open.until = open.until.max(issued);
-            open.own += count;
+            open.last = lines;
             open.joined += work;
             return;
         }
@@ -546,8 +582,13 @@ impl Bank {
         let closes = at.checked_sub(1).map_or(Time::MAX, |next| self.rows[next].opened);
         let known = self.rows.iter().skip(at).position(|open| open.row == row).map(|after| at + after);
         let until = known.map_or(issued, |known| self.rows[known].until.max(issued));
+        if known.is_none()
+            && let Some(oldest) = self.rows.last().filter(|oldest| **oldest != OpenRow::NONE)
+        {
+            self.former.insert(oldest.row, oldest.until);
+        }
         self.rows.copy_within(at..known.unwrap_or(self.rows.len() - 1), at + 1);
-        self.rows[at] = OpenRow { row, since: seen, opened, until, closes, own: lines + count, joined: 0 };
+        self.rows[at] = OpenRow { row, since: seen, opened, until, closes, last: lines, joined: 0 };
     }
 }
 
@@ -556,33 +597,44 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_row_that_opens_again_is_disputed_if_its_lines_may_have_met() {
+        let mut bank = Bank::new(Calendar::new(16, 1), 2);
+        let used = |row, issued| RowUse { row, seen: issued, opened: issued, issued, lines: 0, work: 1 };
+        [(7, 10), (8, 20), (9, 30)].into_iter().for_each(|(row, issued)| bank.note(used(row, issued), None));
+        // Row 7 is not among the two remembered any more; row 6 never was open.
+        for (row, came, disputed) in [(7, 59, 5), (7, 60, 5), (9, 60, 10), (6, 0, 10)] {
+            bank.dispute(row, came, 50, 5);
+            assert_eq!(bank.disputed, disputed, "row {row} at {came}");
+        }
+    }
+
+    #[test]
     fn a_line_joins_others_of_its_row_until_the_next_opens() {
-        let used = |row, [seen, opened, issued]: [Time; 3], [lines, count]: [u64; 2]| RowUse {
+        let used = |row, [seen, opened, issued]: [Time; 3], lines| RowUse {
             row,
             seen,
             opened,
             issued,
             lines,
-            count,
-            work: count,
+            work: 1,
         };
-        let mut bank = Bank { time: Calendar::new(16, 1), rows: vec![OpenRow::NONE; 4].into() };
+        let mut bank = Bank::new(Calendar::new(16, 1), 4);
         let joins =
             |bank: &Bank, row, seen, lines| bank.joins(row, seen, lines, 4).map(|at| bank.rows[at].opened);
         assert_eq!(joins(&bank, 7, 0, 0), None);
-        bank.note(used(7, [0, 4, 10], [0, 1]), None);
+        bank.note(used(7, [0, 4, 10], 1), None);
         assert_eq!((joins(&bank, 7, 50, 9), joins(&bank, 8, 5, 1)), (Some(4), None));
         bank.rows[0].closes = 12;
-        bank.note(used(8, [5, 16, 20], [1, 1]), None);
+        bank.note(used(8, [5, 16, 20], 2), None);
         assert_eq!([11, 12].map(|seen| joins(&bank, 7, seen, 2)), [Some(4), None]);
-        bank.note(used(7, [9, 4, 30], [2, 1]), Some(1));
+        bank.note(used(7, [9, 4, 30], 3), Some(1));
         let rows = |bank: &Bank| [0, 1, 2].map(|at: usize| (bank.rows[at].row, bank.rows[at].until));
         assert_eq!(rows(&bank)[..2], [(8, 20), (7, 30)]);
         // Four lines of other rows came in between.
-        bank.note(used(8, [40, 16, 60], [3, 3]), Some(0));
-        assert_eq!([5, 6].map(|lines| joins(&bank, 7, 9, lines)), [Some(4), None]);
+        bank.note(used(8, [40, 16, 60], 6), Some(0));
+        assert_eq!([6, 7].map(|lines| joins(&bank, 7, 9, lines)), [Some(4), None]);
         // A row that comes earlier in time, and later in the stream.
-        bank.note(used(9, [3, 12, 13], [6, 1]), None);
+        bank.note(used(9, [3, 12, 13], 7), None);
         assert_eq!((rows(&bank), bank.rows[1].closes), ([(8, 60), (9, 13), (7, 30)], 16));
     }
 }

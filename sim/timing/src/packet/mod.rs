@@ -231,6 +231,11 @@ impl PacketClock {
                 return;
             }
             if let Some((demand, counts, lines)) = self.ahead.pop_front() {
+                if let Some(before) = demand.batch.checked_sub(2)
+                    && let Some(at) = self.gates.traversed.get_mut(before as usize)
+                {
+                    *at = self.cores.left(before, *at);
+                }
                 self.walk(&demand, &counts, &lines);
             }
         }
@@ -337,6 +342,7 @@ impl PacketClock {
         }
         let timeline = recorder.finish();
         let rows = crate::ratio_to_busiest(clocks.ps(memory.rows()), &timeline);
+        let disputed = clocks.ps(memory.disputed()) as f64 / timeline.duration_ps.max(1) as f64;
         let (parts, spans) = draws.finish(&clocks, timeline.duration_ps);
         Timed {
             passes: passes.finish(&machine, &clocks, timeline.duration_ps, &parts),
@@ -347,6 +353,8 @@ impl PacketClock {
             unit_cycles: 0,
             packets,
             rows: Some(rows),
+            disputed: Some(disputed),
+            overlap: None,
         }
     }
 }

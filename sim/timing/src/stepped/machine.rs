@@ -170,6 +170,8 @@ impl<'a> Machine<'a> {
             unit_cycles: self.visited,
             packets: stream.demands.len() as u64,
             rows: None,
+            disputed: None,
+            overlap: None,
         })
     }
 

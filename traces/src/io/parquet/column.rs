@@ -4,7 +4,7 @@ use super::{PagedFile, damaged, open};
 use crate::io::ReadError;
 use crate::io::columns::Picked;
 use crate::io::time_base::{NO_TIME_NS, Stamps};
-use parquet::basic::{LogicalType, TimeUnit, Type as Physical};
+use parquet::basic::{ConvertedType, LogicalType, TimeUnit, Type as Physical};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use parquet::data_type::DataType;
 use parquet::errors::ParquetError;
@@ -13,6 +13,9 @@ use std::path::{Path, PathBuf};
 
 /// Values decoded at once. No length that a file states is allocated on trust.
 const BATCH_VALUES: usize = 1 << 16;
+
+/// Types of values that are read.
+const NUMBERS: &str = "FLOAT, DOUBLE, or whole numbers with a sign: write it as one of these";
 
 /// One column, over all row groups.
 pub(super) struct Column {
@@ -106,6 +109,7 @@ impl Column {
                 Some(ColumnReader::FloatColumnReader(reader)) => reader.skip_records(count),
                 Some(ColumnReader::DoubleColumnReader(reader)) => reader.skip_records(count),
                 Some(ColumnReader::Int64ColumnReader(reader)) => reader.skip_records(count),
+                Some(ColumnReader::Int32ColumnReader(reader)) => reader.skip_records(count),
                 _ => return Err(self.wrong_type("a number")),
             }
             .map_err(|error| self.damaged(&error))? as u64;
@@ -119,8 +123,11 @@ impl Column {
 
     /// Appends up to `limit` values; how many there were.
     pub fn values(&mut self, limit: usize, into: &mut Vec<f32>) -> Result<usize, ReadError> {
-        let mut doubles: Vec<f64> = Vec::new();
+        let (mut doubles, mut long, mut short) = (Vec::<f64>::new(), Vec::<i64>::new(), Vec::<i32>::new());
         let from = into.len();
+        if !self.is_number() {
+            return Err(self.wrong_type(NUMBERS));
+        }
         while into.len() - from < limit && self.open_group()? {
             let want = (limit - (into.len() - from)).min(BATCH_VALUES);
             let mut places = Places { max: self.max_definition, levels: &mut self.levels, fill: self.repair };
@@ -134,7 +141,23 @@ impl Column {
                     into.extend(doubles.iter().map(|&value| value as f32));
                     got
                 }
-                _ => return Err(self.wrong_type("FLOAT or DOUBLE")),
+                Some(ColumnReader::Int64ColumnReader(reader)) => {
+                    long.clear();
+                    let got = batch(reader, want, &mut places, i64::MIN, &mut long);
+                    into.extend(
+                        long.iter().map(|&value| if value == i64::MIN { f32::NAN } else { value as f32 }),
+                    );
+                    got
+                }
+                Some(ColumnReader::Int32ColumnReader(reader)) => {
+                    short.clear();
+                    let got = batch(reader, want, &mut places, i32::MIN, &mut short);
+                    into.extend(
+                        short.iter().map(|&value| if value == i32::MIN { f32::NAN } else { value as f32 }),
+                    );
+                    got
+                }
+                _ => return Err(self.wrong_type(NUMBERS)),
             };
             self.account(got)?;
         }
@@ -208,6 +231,21 @@ impl Column {
             self.reader = None;
         }
         Ok(records)
+    }
+
+    /// Whether whole numbers, if it has these, are just that: not times, decimals or without a sign.
+    fn is_number(&self) -> bool {
+        let described = self.file.metadata().file_metadata().schema_descr().column(self.index);
+        let logical = match described.logical_type_ref() {
+            None => true,
+            Some(LogicalType::Integer(integer)) => integer.is_signed,
+            Some(_) => false,
+        };
+        let converted = described.converted_type();
+        let signed =
+            [ConvertedType::INT_8, ConvertedType::INT_16, ConvertedType::INT_32, ConvertedType::INT_64];
+        let is_whole = [Physical::INT32, Physical::INT64].contains(&described.physical_type());
+        !is_whole || logical && (converted == ConvertedType::NONE || signed.contains(&converted))
     }
 
     fn physical(&self) -> Physical {

@@ -12,7 +12,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use parquet::basic::{Compression, Encoding, Repetition, Type as Physical};
+use parquet::basic::{Compression, Encoding, LogicalType, Repetition, Type as Physical};
 use parquet::data_type::{DataType, FloatType, Int64Type};
 use parquet::errors::ParquetError;
 use parquet::file::metadata::KeyValue;
@@ -81,6 +81,12 @@ impl ParquetRows {
         let header = description(path, &file)?;
         let mut layout = layout(path, &names, options)?;
         layout.with_units(path, &field_units(&file))?;
+        let is_stamp = |column: usize| {
+            matches!(schema.column(column).logical_type_ref(), Some(LogicalType::Timestamp(_)))
+        };
+        if let Some(time) = layout.time.as_mut() {
+            time.has_unit |= is_stamp(time.index);
+        }
         check_chunks(path, &file, size_bytes, &layout)?;
         let rows = file.metadata().row_groups().iter().map(|group| group.num_rows().max(0) as u64).sum();
         let column = |picked| Column::open(path, picked, options.repair);

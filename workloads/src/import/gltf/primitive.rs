@@ -253,10 +253,10 @@ pub(super) struct Values {
 }
 
 /// Most elements of a sparse accessor without a base, which needs no bytes for its zeros.
-const MOST_ZEROS: u64 = 1 << 22;
+const MAX_ZEROS: u64 = 1 << 22;
 
 /// Most numbers in one accessor.
-const MOST_NUMBERS: u64 = 1 << 28;
+const MAX_NUMBERS: u64 = 1 << 28;
 
 impl Values {
     pub fn count(&self) -> usize {
@@ -293,7 +293,7 @@ impl Document<'_> {
             return Err(format!("it has the type {kind:?} instead of {kinds:?}"));
         }
         let (width, count) = (kind.multiplicity(), accessor.count.0);
-        if count.saturating_mul(width as u64) > MOST_NUMBERS {
+        if count.saturating_mul(width as u64) > MAX_NUMBERS {
             return Err(format!("{count} elements are too many"));
         }
         let layout = Layout { width, component: component.0, normalized: accessor.normalized };
@@ -302,7 +302,7 @@ impl Document<'_> {
                 let offset = accessor.byte_offset.map_or(0, |offset| offset.0);
                 layout.read(self.bytes(view.value(), offset, count, layout.size())?)
             }
-            None if count <= MOST_ZEROS => vec![0.0; count as usize * width],
+            None if count <= MAX_ZEROS => vec![0.0; count as usize * width],
             None => return Err(format!("{count} elements without a buffer are too many")),
         };
         if let Some(sparse) = &accessor.sparse {

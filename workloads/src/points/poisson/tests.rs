@@ -131,12 +131,29 @@ fn invalid_radii_are_refused() {
 }
 
 #[test]
+fn a_requested_number_is_met_on_average_with_borders_and_without() {
+    fn mean<const D: usize>(count: f64, domain: Domain) -> f64 {
+        let radius = radius_for(count, D, domain);
+        let points = |seed| poisson_disk::<D>(&spec(radius, domain, seed)).unwrap().points.len() as f64;
+        (1..=8).map(points).sum::<f64>() / 8.0
+    }
+    for domain in [Domain::Torus, Domain::Box] {
+        for (dimensions, mean) in [(2, mean::<2>(200.0, domain)), (3, mean::<3>(200.0, domain))] {
+            assert!((mean / 200.0 - 1.0).abs() < 0.05, "{dimensions}D, {domain:?}: {mean}");
+        }
+    }
+}
+
+#[test]
 fn too_many_points_are_refused_with_a_radius_that_works() {
     fn least<const D: usize>(radius: f64) -> f64 {
         let PoissonError::TooMany { least, most, .. } = check::<D>(radius).unwrap_err() else {
             panic!("{radius}")
         };
-        assert!(check::<D>(least).is_ok() && check::<D>(radius_for(most, D)).is_ok(), "{D} {least} {most}");
+        assert!(
+            check::<D>(least).is_ok() && check::<D>(radius_for(most, D, Domain::Torus)).is_ok(),
+            "{D} {least} {most}"
+        );
         least
     }
     fn check<const D: usize>(radius: f64) -> Result<(), PoissonError> {

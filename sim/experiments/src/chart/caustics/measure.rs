@@ -8,7 +8,7 @@ use output::progress::{Bar, Progress};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use run::{Plan, RunOptions, frames_of};
 use serde::Serialize;
-use workloads::caustics::generator::Ocean as Water;
+use workloads::caustics::generator::Ocean;
 use workloads::caustics::{
     Beam, Eye, Floor, Light, MIN_SQUARES_PER_WAVE, Method, Picture, Squares, accuracy_warnings, crossing,
     draw, error,
@@ -25,7 +25,7 @@ const COARSE_SLOPES: [f64; 5] = [0.05, 0.15, 0.4, 0.7, 1.0];
 
 /// Results of every method for one ocean seen from the side.
 #[derive(Clone, Debug, Serialize)]
-pub struct Ocean {
+pub struct OceanCounts {
     /// Generator triangles.
     pub volumes: usize,
     /// Pixels of the image.
@@ -50,8 +50,8 @@ pub fn ocean(
     [slope, depth_m]: [f64; 2],
     size: [u32; 2],
     progress: &Progress,
-) -> Result<Ocean, StudyError> {
-    let water = Water { depth_m, ..water(cells, slope) };
+) -> Result<OceanCounts, StudyError> {
+    let water = Ocean { depth_m, ..water(cells, slope) };
     let (beams, eye) = (water.beams(0.0), aside_of(depth_m, size)?);
     let bar = progress.bar("ocean", 4);
     let pictures = Method::ALL.map(|method| {
@@ -59,7 +59,7 @@ pub fn ocean(
         bar.inc();
         picture
     });
-    Ok(Ocean {
+    Ok(OceanCounts {
         volumes: beams.len(),
         size,
         executions: pictures.each_ref().map(Picture::total_runs),
@@ -179,7 +179,7 @@ fn by_cells(effort: &CausticsEffort, slope: f64, bar: &Bar) -> Result<Vec<Coarse
     let eye = above(effort.floor_px)?;
     let squares = Squares { eye: &eye, side_px: SQUARE_PX };
     let floor = Floor { height_m: -DEPTH_M };
-    let surface = |cells: u32| Water { overshoot: 0.02, ..water(cells, slope) };
+    let surface = |cells: u32| Ocean { overshoot: 0.02, ..water(cells, slope) };
     let photons = |seed: u32| squares.on_floor(&surface(1), 0.0, &floor, [effort.rays, seed]);
     let known = photons(1);
     let noise = error(&photons(2), &known);
@@ -240,7 +240,7 @@ pub struct Crossed {
 
 /// Surfaces, views and photons of one number of triangles.
 struct Bench {
-    surface: Water,
+    surface: Ocean,
     above: Eye,
     aside: Eye,
     /// Light on the floor, and by other photons.
@@ -266,7 +266,7 @@ fn floor() -> Floor {
 
 impl Bench {
     fn new(effort: &CausticsEffort, cells: u32) -> Result<Self, StudyError> {
-        let surface = Water { overshoot: OVERSHOOT, depth_m: FOLDED_DEPTH_M, ..water(cells, FOLDED_SLOPE) };
+        let surface = Ocean { overshoot: OVERSHOOT, depth_m: FOLDED_DEPTH_M, ..water(cells, FOLDED_SLOPE) };
         let middle = DVec3::new(1.5, -0.6 * FOLDED_DEPTH_M, 1.0);
         let aside = from_the_side(middle, FOLDED_DEPTH_M, effort.sweep_px)?;
         let above = above(effort.floor_px)?;
@@ -276,7 +276,7 @@ impl Bench {
     }
 
     fn row(&self, pleat: f64) -> Crossed {
-        let surface = Water { pleat, ..self.surface.clone() };
+        let surface = Ocean { pleat, ..self.surface.clone() };
         let beams = surface.beams(0.0);
         let pictures = Method::ALL.map(|method| draw(&beams, &self.aside, method, Some(Light::Volume)));
         let ours = &pictures[0];

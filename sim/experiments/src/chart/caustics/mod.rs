@@ -13,7 +13,7 @@ use workloads::caustics::{MAX_CROSSED_SHARE, Method};
 use crate::study::table::{Sheet, Table, count, fixed, millis, plain};
 use crate::study::{Gallery, Study, StudyError};
 
-pub use measure::{Crossed, MethodFrame, Ocean, ocean};
+pub use measure::{Crossed, MethodFrame, OceanCounts, ocean};
 
 /// How much is measured.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -90,7 +90,7 @@ pub struct CausticsChart {
     /// How much was measured.
     pub effort: CausticsEffort,
     /// The ocean of the paper's figure.
-    pub ocean: Ocean,
+    pub ocean: OceanCounts,
     /// Squares along a side of the coarser oceans from which on a run does not warn that they are too few.
     pub resolved_cells: f64,
     /// By slope and method.
@@ -356,7 +356,7 @@ impl CausticsChart {
 /// Pixels along a side of a rectangle of a map.
 const MAP_PX: u32 = 4;
 
-impl Ocean {
+impl OceanCounts {
     /// Executions of a method at every pixel (Fig. 8), in colours that are the same for all methods.
     pub fn map(&self, method: Method, look: &Look) -> Picture {
         let place = Method::ALL.iter().position(|known| *known == method).unwrap_or(0);

@@ -18,7 +18,7 @@ use workloads::points::white::{Density, Named, Numbers, WhiteError, WhiteSpec, c
 use crate::study::table::{Sheet, Table, count, fixed, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
 use crate::study::{Gallery, Study, StudyError};
-use workloads::points::job::{LEAST_DRAWN_SHARE, MAX_CANDIDATES_PER_POINT};
+use workloads::points::job::{MAX_CANDIDATES_PER_POINT, MIN_DRAWN_SHARE};
 
 mod drawn;
 pub use drawn::{DrawnRow, Weak};
@@ -227,7 +227,7 @@ impl PointsChart {
         let cost = ["darts", "noise", "volume"].into_iter().flat_map(pair).collect();
         let over =
             |weak: &[Weak], name: &str| Series::curve(name, weak.iter().map(|weak| (weak.at, weak.value)));
-        let few = self.rounds.iter().rfind(|weak| weak.value < LEAST_DRAWN_SHARE);
+        let few = self.rounds.iter().rfind(|weak| weak.value < MIN_DRAWN_SHARE);
         let loose = self.rejected.iter().rfind(|weak| weak.value > MAX_CANDIDATES_PER_POINT);
         vec![
             ChartPanel::new("cost of a point", ["dimensions", "time a point (s)"], cost)

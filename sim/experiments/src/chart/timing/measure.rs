@@ -16,7 +16,7 @@ use super::animations::{Packets, Subject, SubjectKind};
 
 /// Bins of a microsecond, as in a run.
 pub(super) const BIN_PS: u64 = 1_000_000;
-pub(super) const MOST_BINS: usize = 1 << 20;
+pub(super) const MAX_BINS: usize = 1 << 20;
 /// Fast levels are timed several times, and the fastest counts.
 const TIMES: usize = 5;
 
@@ -158,7 +158,7 @@ impl Written {
 pub(super) fn timed(level: Level, gpu: &GpuSpec, written: &Written) -> Result<(Timed, f64), RunError> {
     let Written { clocks, builder, stream, totals, .. } = written;
     let started = ThreadTime::now();
-    let recorder = Recorder::new(BIN_PS, MOST_BINS);
+    let recorder = Recorder::new(BIN_PS, MAX_BINS);
     let timed = match level {
         Level::Stepped => {
             stepped::run(&gpu.units, *clocks, builder, stream, recorder, &StepOptions::default())
@@ -240,7 +240,7 @@ pub(super) fn added(subject: &Subject, gpu: &GpuSpec) -> Result<Vec<AddedRow>, R
     let drawn_s = fastest(|| subject.render(gpu, |_, _| {}))?;
     let row = |level| {
         let timed_s = fastest(|| {
-            let mut clock = FrameClock::new(level, gpu.machine()?, Recorder::new(BIN_PS, MOST_BINS));
+            let mut clock = FrameClock::new(level, gpu.machine()?, Recorder::new(BIN_PS, MAX_BINS));
             subject.render(gpu, |packet, lines| clock.push(packet, lines))?;
             clock.finish()?;
             Ok(())

@@ -232,8 +232,7 @@ pub(super) fn row(with: &With<'_, Passes>, bench: &Bench<'_>, progress: &Progres
     let [lights, lighting] = [row.lights.values(), row.lighting.values()];
     let full = [lights, lighting, row.range.values(), row.normals.values(), row.size_px.values()];
     let Tried { cases, errors, invocations, .. } = tried;
-    let band = cases.band(one_at_a_time(full));
-    let band = band.ok_or_else(|| RunError::setting("II-1: no open setting has two values"))?;
+    let band = cases.band(one_at_a_time(full))?;
     let made = with.banded(&row.about, ours(&base.split, row, form), band);
     let largest = errors.iter().copied().fold(base.split.error(), f64::max);
     let ran = numbers([

@@ -91,7 +91,7 @@ pub(super) fn phone(bench: &Bench<'_>) -> Result<Done, RunError> {
     tried.along("idle_w", over_idle(bench, row, waiting_w)?).with_base(idle_w);
     tried.along("edge", over_edge(bench, row, &base_stage)?).with_base(edge);
     let full = one_at_a_time([row.waiting_w.values(), row.idle_w.values(), row.edge.values()]);
-    let band = tried.band(full).ok_or_else(|| RunError::setting("III-4 has nothing to try"))?;
+    let band = tried.band(full)?;
     let base = Methods::of(bench, &base_stage, &bench.phone_frames)?;
     let (least, most) = (base.gain_mj(f64::min), base.gain_mj(f64::max));
     let ours = format!(
@@ -272,7 +272,7 @@ pub(super) fn pc(bench: &Bench<'_>) -> Result<Done, RunError> {
         tried.along("background_w", at.collect::<Result<Vec<_>, RunError>>()?).with_base(background_w);
     }
     let full = one_at_a_time([row.waiting_w.values(), row.background_w.values()]);
-    let band = tried.band(full).ok_or_else(|| RunError::setting("III-5 has nothing to try"))?;
+    let band = tried.band(full)?;
     let Both { with, without } = &base;
     let ours = format!(
         "with {waiting_w} W waiting and {background_w} W of services: {} with, {} without, {} and {} frames",

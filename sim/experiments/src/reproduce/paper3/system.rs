@@ -89,8 +89,8 @@ pub(super) fn warm_up(bench: &Bench<'_>) -> Result<Done, RunError> {
         }
     }
     tried.along("planted_s", at);
-    let nothing = || RunError::setting("III-3 has nothing to try");
-    let (band, base) = (tried.band(row.planted_s.values()).ok_or_else(nothing)?, base.ok_or_else(nothing)?);
+    let band = tried.band(row.planted_s.values())?;
+    let base = base.ok_or_else(|| RunError::setting("planted_s: its own value is not among those to try"))?;
     let recorded = *row.recorded.get(form);
     let pc_shown = looped(&bench.pc_frames[..1], recorded);
     let pc = bench.on(&bench.pc, &pc_shown, launched(1))?;
@@ -279,8 +279,7 @@ pub(super) fn five_seconds(bench: &Bench<'_>) -> Result<Done, RunError> {
     });
     let mut tried = Cases::new("share of the frames touched or flagged that are both", "extra_w alone");
     tried.along("extra_w", at.collect::<Result<Vec<_>, RunError>>()?);
-    let band =
-        tried.band(row.extra_w.values()).ok_or_else(|| RunError::setting("III-6 has nothing to try"))?;
+    let band = tried.band(row.extra_w.values())?;
     let Tally { touched, flagged: flags, both, frames: [fewest, most], disturbances } = base.tally;
     let [all_mj, without_mj] = base.deviations_mj;
     let ours = format!(

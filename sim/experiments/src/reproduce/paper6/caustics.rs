@@ -12,14 +12,14 @@ use super::Task;
 use super::caustics_figures::{light, warped};
 use super::settings::{Lost, Size};
 use crate::chart::caustics::view::{DEPTH_M, SIDE_M, WAVE_M};
-use crate::chart::caustics::{Ocean as Counted, ocean};
+use crate::chart::caustics::{OceanCounts, ocean};
 use crate::reproduce::settings::Form;
 use crate::study::Ran;
 use output::plot::{Look, Series};
 use run::RunError;
 
 /// Executions of the moving triangles over those of the bounding volume with fewer.
-fn over_fewer(counted: &Counted) -> f64 {
+fn over_fewer(counted: &OceanCounts) -> f64 {
     let [moving, refined, _, prism] = counted.executions;
     moving as f64 / refined.min(prism) as f64
 }
@@ -38,7 +38,7 @@ pub(super) fn executions(task: &Task<'_>) -> Result<Done, RunError> {
     let mut slopes = row.slope.all(form).to_vec();
     slopes.sort_by(f64::total_cmp);
     let counted = |at: f64| if at == slope { Ok(base.clone()) } else { count(at, depth_m) };
-    let slopes: Vec<(f64, Counted)> =
+    let slopes: Vec<(f64, OceanCounts)> =
         slopes.into_iter().map(|at| Ok((at, counted(at)?))).collect::<Result<_, RunError>>()?;
     let mut depths = Vec::new();
     for &at in row.depth_m.all(form) {
@@ -49,11 +49,11 @@ pub(super) fn executions(task: &Task<'_>) -> Result<Done, RunError> {
         "executions over those of the bounding volume with fewer",
         "slope and depth_m one at a time about the values given",
     );
-    let judged = |(at, counted): &(f64, Counted)| (*at, over_fewer(counted), over_fewer(counted) < 1.0);
+    let judged = |(at, counted): &(f64, OceanCounts)| (*at, over_fewer(counted), over_fewer(counted) < 1.0);
     tried.along("slope", slopes.iter().map(judged)).with_base(slope);
     tried.along("depth_m", depths.iter().map(judged)).with_base(depth_m);
     let full = one_at_a_time([row.slope.values(), row.depth_m.values()]);
-    let band = tried.band(full).ok_or_else(|| RunError::setting("VI-6 has nothing to try"))?;
+    let band = tried.band(full)?;
     let [moving, refined, hull, prism] = base.executions;
     let part = |total: u64| total as f64 / prism as f64;
     let ours = format!(
@@ -76,7 +76,7 @@ pub(super) fn executions(task: &Task<'_>) -> Result<Done, RunError> {
     ]);
     // The ocean of the values given is in both sweeps and was drawn once.
     let others = depths.iter().filter(|(at, _)| *at != depth_m).chain(&slopes).map(|(_, counted)| counted);
-    let drawn: Vec<&Counted> = others.collect();
+    let drawn: Vec<&OceanCounts> = others.collect();
     let draws = drawn.iter().map(|counted| counted.draws).sum();
     let fragments = drawn.iter().flat_map(|counted| counted.executions).sum();
     let mut ran = ran(&Ran { passes: draws, draws, fragments });
@@ -85,7 +85,7 @@ pub(super) fn executions(task: &Task<'_>) -> Result<Done, RunError> {
     Ok(Done { row, figures: figures(&base, &slopes, form)? })
 }
 
-fn figures(base: &Counted, slopes: &[(f64, Counted)], form: Form) -> Result<Vec<Figure>, RunError> {
+fn figures(base: &OceanCounts, slopes: &[(f64, OceanCounts)], form: Form) -> Result<Vec<Figure>, RunError> {
     let maps = [
         ("VI_fig8_moving", Method::Moving),
         ("VI_fig8_refined", Method::Refined),
@@ -98,9 +98,9 @@ fn figures(base: &Counted, slopes: &[(f64, Counted)], form: Form) -> Result<Vec<
 }
 
 /// The sweep of slopes: executions over those of the prism.
-fn over_slopes(slopes: &[(f64, Counted)]) -> Figure {
+fn over_slopes(slopes: &[(f64, OceanCounts)]) -> Figure {
     let of = |(place, method): (usize, Method)| -> Series {
-        let part = |counted: &Counted| counted.executions[place] as f64 / counted.executions[3] as f64;
+        let part = |counted: &OceanCounts| counted.executions[place] as f64 / counted.executions[3] as f64;
         line(method.name(), slopes.iter().map(|(slope, counted)| (*slope, part(counted))).collect())
     };
     Figure::lines(
@@ -141,7 +141,7 @@ pub(super) fn no_light_is_lost(task: &Task<'_>) -> Result<Done, RunError> {
     }
     tried.along("floor of turned beams", at);
     let full = row.slope.values() * row.pleat.values() + row.turned_floors.get(Form::Full).len();
-    let band = tried.band(full).ok_or_else(|| RunError::setting("VI-7 has nothing to try"))?;
+    let band = tried.band(full)?;
     let [once, twice, thrice] = all.by_hits;
     let ours = format!(
         "{} missed of {} pairs of a pixel and a beam; {once} of them are hit once, {twice} twice and {thrice} three times",

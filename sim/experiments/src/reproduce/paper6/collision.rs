@@ -171,7 +171,7 @@ pub(super) fn missed(task: &Task<'_>) -> Result<Done, RunError> {
         looks.text_of_others(&public)
     );
     let full = row.methods.get(Form::Full).len() * row.resolution_px.values() + 1;
-    let band = tried.band(full).ok_or_else(|| RunError::setting("VI-1 has nothing to try"))?;
+    let band = tried.band(full)?;
     let made = with.banded(&row.about, ours, band);
     let note = match public.collide.len() + public.known {
         0 => format!("no public case that collides was tested; {}", made.note),
@@ -302,7 +302,7 @@ pub(super) fn dodged(task: &Task<'_>) -> Result<Done, RunError> {
         }
     }
     let full = row.cases.values() * row.methods.get(Form::Full).len() * row.resolution_px.values();
-    let band = tried.band(full).ok_or_else(|| RunError::setting("VI-2 has no case to try"))?;
+    let band = tried.band(full)?;
     let made = with.banded(&row.about, said.join("; "), band);
     let shown = row.objects.get(form).iter().find(|case| case.name == *row.cases.get(form));
     let figure = |case: &TwoObjects| {
@@ -360,8 +360,7 @@ pub(super) fn tighter(task: &Task<'_>) -> Result<Done, RunError> {
         (*at, better as f64 - worse as f64, worse == 0 && better > 0)
     };
     tried.along("resolution_px", resolutions.iter().zip(fragments.iter().zip(&boxes)).map(judged));
-    let band =
-        tried.band(row.resolution_px.values()).ok_or_else(|| RunError::setting("VI-3 has nothing to try"))?;
+    let band = tried.band(row.resolution_px.values())?;
     let each = || fragments.iter().flatten().zip(boxes.iter().flatten());
     let (worse, better) = (each().filter(|(f, b)| f > b).count(), each().filter(|(f, b)| f < b).count());
     let sums =

@@ -11,8 +11,9 @@ use workloads::visibility::Unshaded;
 use super::settings::{Bound, Hardware};
 use super::{Task, catalogue};
 use crate::reproduce::Done;
-use crate::reproduce::row::{Row, numbers};
+use crate::reproduce::row::{Row, numbers, ran};
 use crate::reproduce::verdict::Verdict;
+use crate::study::Ran;
 use run::GpuSpec;
 use run::RunError;
 
@@ -35,6 +36,7 @@ impl Hardware {
 struct Compared {
     samples: u64,
     differ: u64,
+    passes: u64,
     counts: Counts,
 }
 
@@ -54,6 +56,7 @@ impl Compared {
             let missing = seen.len().abs_diff(truth.len());
             all.differ +=
                 seen.iter().zip(&truth).filter(|(one, other)| one != other).count() as u64 + missing as u64;
+            all.passes += 1;
             all.counts += &counts;
         }
         Ok(all)
@@ -62,6 +65,7 @@ impl Compared {
     fn and(mut self, other: &Self) -> Self {
         self.samples += other.samples;
         self.differ += other.differ;
+        self.passes += other.passes;
         self.counts += &other.counts;
         self
     }
@@ -202,10 +206,9 @@ pub(super) fn unchanged(task: &Task<'_>) -> Result<Done, RunError> {
         machines.by_lens_lines[1]
     );
     let counted = |event: Event| total.counts[event] as f64;
-    let ran = numbers([
+    let mut ran = ran(&Ran::counted(total.passes, &total.counts));
+    ran.extend(numbers([
         ("samples", total.samples as f64),
-        ("draws", counted(Event::Draws)),
-        ("samples_hit", counted(Event::SamplesHit)),
         ("tiles_culled_by_side_planes", counted(Event::TilesCulledSides)),
         ("samples_spared_by_lens_lines_alone", machines.by_lens_lines[0] as f64),
         ("tiles_culled_by_facing", counted(Event::TilesCulledFacing)),
@@ -214,7 +217,7 @@ pub(super) fn unchanged(task: &Task<'_>) -> Result<Done, RunError> {
         ("boxes_culled_by_z_max_in_other_tiles", machines.by_boxes as f64),
         ("boxes_culled_by_planes_beyond_vertices", machines.by_planes as f64),
         ("depth_reads_spared_by_z_min", counted(Event::DepthReadsSkipped)),
-    ]);
+    ]));
     let facts = numbers([
         ("machines", machines.all.len() as f64),
         ("samples", total.samples as f64),

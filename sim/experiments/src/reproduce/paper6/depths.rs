@@ -179,7 +179,7 @@ pub(super) fn tighter(task: &Task<'_>) -> Result<Done, RunError> {
         }
     }
     let full = row.triangles.values() * (row.tile_px.values() + row.mode.values() - 1);
-    let band = tried.band(full).ok_or_else(|| RunError::setting("VI-15 has nothing to try"))?;
+    let band = tried.band(full)?;
     let ours = format!(
         "{}; by the planes at the ends of the tile's own time, in standard mode: {}",
         said.join("; "),

@@ -8,7 +8,7 @@ use super::settings::Glossy;
 use crate::chart::glossy::{Bench, Blur, GlossyEffort as Size, GlossyRow as Measured};
 use crate::reproduce::band::{Cases, one_at_a_time};
 use crate::reproduce::figure::line;
-use crate::reproduce::row::{Row, numbers};
+use crate::reproduce::row::{Row, numbers, ran};
 use crate::reproduce::settings::Form;
 use crate::reproduce::{Done, Figure};
 use crate::study::StudyError;
@@ -89,7 +89,7 @@ pub(super) fn row(task: &Task<'_>) -> Result<Done, RunError> {
     }
     tried.along("index", at).with_base(index);
     let full = one_at_a_time([row.lens_radius.values(), row.index.values()]);
-    let band = tried.band(full).ok_or_else(|| RunError::setting("VI-11 has nothing to try"))?;
+    let band = tried.band(full)?;
     let [reflected, refracted] = base.errors.map(|both| both.map(|row| row.rmse));
     let (first, last) = (&base.blurs[0], &base.blurs[base.blurs.len() - 1]);
     let ours = format!(
@@ -111,11 +111,12 @@ pub(super) fn row(task: &Task<'_>) -> Result<Done, RunError> {
         ("refraction_rmse_many", refracted[1]),
     ]);
     let measured = || base.errors.iter().flatten();
-    let ran = numbers([
+    let mut ran = ran(&measured().map(|row| row.ran).sum());
+    ran.extend(numbers([
         ("settings_drawn", f64::from(runs)),
         ("vertices", measured().map(|row| row.vertices as f64).sum()),
         ("samples_tested", measured().map(|row| row.samples_tested as f64).sum()),
-    ]);
+    ]));
     let pictures = image_figures::glossy(*row.texels.get(form), radius, index, *row.samples.get(form))?;
     Ok(Done {
         row: Row { numbers: facts, ran, ..with.banded(&row.about, ours, band) },

@@ -8,8 +8,8 @@ use super::super::band::{Cases, one_at_a_time, short};
 use super::super::figure::over_doublings;
 use super::super::row::{Row, numbers, ran};
 use super::Task;
-use super::settings::Asked;
-use crate::chart::occlusion::{Asked as Answered, Drawn, Kind};
+use super::settings::QueriedObjects;
+use crate::chart::occlusion::{Drawn, Kind, QueryAnswers};
 use crate::study::Ran;
 use output::plot::Series;
 use run::RunError;
@@ -105,7 +105,7 @@ pub(super) fn rate(task: &Task<'_>) -> Result<Done, RunError> {
     let at = motions.into_iter().map(|(motion, gain, grows)| (motion, gain, grows && wrong == 0));
     tried.along("motion_m", at).with_base(motion);
     let full = one_at_a_time([row.tile_px.values(), row.motion_m.values()]);
-    let band = tried.band(full).ok_or_else(|| RunError::setting("VI-4 has nothing to try"))?;
+    let band = tried.band(full)?;
     let base = curves.iter().find(|(name, _)| *name == format!("{tile_px}-pixel tiles"));
     let listed: Vec<String> =
         base.iter().flat_map(|(_, rates)| rates).map(|(boxes, rate)| format!("{boxes}: {rate:.3}")).collect();
@@ -155,13 +155,13 @@ struct Costs {
 impl Costs {
     /// Over the queried objects; `charged` is the share of gathering the farthest depths that queries pay for. Of the two
     /// sampled queries, that which ends early costs less.
-    fn of(scenes: &[(Drawn, Answered)], asked: Asked, charged: f64) -> Self {
+    fn of(scenes: &[(Drawn, QueryAnswers)], asked: QueriedObjects, charged: f64) -> Self {
         let mut costs = Self::default();
         for (scene, answered) in scenes {
             let share = charged / answered.answers.len().max(1) as f64;
             let gathered = [answered.gathered, answered.gathered_bytes].map(|count| share * count as f64);
             for (answer, seen) in answered.answers.iter().zip(&scene.seen) {
-                if asked == Asked::All || seen.passed == 0 {
+                if asked == QueriedObjects::All || seen.passed == 0 {
                     costs.add(seen, answer, gathered);
                 }
             }
@@ -217,11 +217,11 @@ pub(super) fn cost(task: &Task<'_>) -> Result<Done, RunError> {
             let [tests, bytes, _] = least(&costs(objects, charged));
             (charged, tests.min(bytes), tests > far && bytes > far)
         });
-        let which = if objects == Asked::All { "all objects" } else { "hidden objects" };
+        let which = if objects == QueriedObjects::All { "all objects" } else { "hidden objects" };
         tried.along(&format!("boxes_charged ({which})"), at.collect::<Vec<_>>());
     }
     let full = row.objects.values() * row.boxes_charged.values();
-    let band = tried.band(full).ok_or_else(|| RunError::setting("VI-5 has nothing to try"))?;
+    let band = tried.band(full)?;
     let base = costs(*row.objects.get(form), *row.boxes_charged.get(form));
     let [tests, bytes, madds] = least(&base);
     let charged = least(&costs(*row.objects.get(form), 1.0));

@@ -85,7 +85,7 @@ impl<const D: usize> Thrown<D> {
         format!(
             "{D}D, {} of the points from {} candidates in rasterized uncovered regions in {} passes: {}; the CPU sampler alone has {} points",
             self.darts.drawn,
-            self.darts.candidates,
+            self.darts.kept,
             self.darts.passes,
             checked.text(),
             self.cpu_points
@@ -128,7 +128,7 @@ pub(super) fn darts(task: &Task<'_>) -> Result<Done, RunError> {
         ("thin_regions", (in_plane.thin_regions + in_space.thin_regions) as f64),
     ]);
     let mut ran = row::ran(&[flat.ran, deep.ran].into_iter().sum());
-    let made = [flat.darts.made + deep.darts.made, flat.darts.candidates + deep.darts.candidates];
+    let made = [flat.darts.candidates + deep.darts.candidates, flat.darts.kept + deep.darts.kept];
     ran.extend(numbers([("candidates", made[0] as f64), ("candidates_in_regions", made[1] as f64)]));
     let radius = *row.radius_2d.get(form);
     let shown = flat.darts.found.points.iter().filter(|[x, y]| *x < 40.0 * radius && *y < 20.0 * radius);
@@ -250,7 +250,7 @@ pub(super) fn densities(task: &Task<'_>) -> Result<Done, RunError> {
         (sets, farthest(p).unwrap_or(f64::NAN), p.iter().all(|p| fits.contains(p)))
     };
     tried.along("sets", all.iter().map(judged));
-    let band = tried.band(row.sets.values()).ok_or_else(|| failed("no set"))?;
+    let band = tried.band(row.sets.values())?;
     let tests = 4 * most;
     let ours = format!(
         "chi-square of some {points} points of a bell a set, from drawn columns, 1D to 4D: p = {} for {base} sets together, {} for one; {} of the {tests} sets alone are \

@@ -72,7 +72,7 @@ row_settings! {
     /// VI-5.
     Cost {
         samples: Vec<u32>, must(|list| !list.is_empty() && counts(list, 256), "counts of 1 to 256");
-        objects: Asked, must(|_| true, "all or hidden");
+        objects: QueriedObjects, must(|_| true, "all or hidden");
         boxes_charged: f64, within(0.0..=1.0);
         far_fewer: f64, within(1.0..=1e6);
         tile_px: u32, must(tile, TILE);
@@ -254,7 +254,7 @@ pub(super) enum Shape {
 /// The objects over which costs are averaged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub(super) enum Asked {
+pub(super) enum QueriedObjects {
     All,
     /// Those that no sample sees.
     Hidden,

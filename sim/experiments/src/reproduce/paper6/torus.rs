@@ -245,7 +245,7 @@ pub(super) fn row(task: &Task<'_>) -> Result<Done, RunError> {
     };
     tried.along("seed", row.seed.all(form).iter().zip(&filled).map(judged));
     tried.along("scatter", [("octants", scatter.rms(), scatter.is_of_independent(most))]);
-    let band = tried.band(row.seed.values() + 1).ok_or_else(|| failed("no seed"))?;
+    let band = tried.band(row.seed.values() + 1)?;
     let first = &filled[0];
     let made = with.banded(&about(&row.about), ours(first, &torus), band);
     let disks = [Disk::new(4, row.seed.all(form)[0], size)?, Disk::new(5, row.seed.all(form)[0], size)?];

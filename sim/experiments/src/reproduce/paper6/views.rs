@@ -244,7 +244,7 @@ fn done(with: &With<'_, Views>, figures: [&'static str; 3]) -> Result<Done, RunE
     let ours = tried.increase(&base)?;
     let entries = entries(row, form, &base)?;
     let Tried { cases, ran: work, .. } = tried;
-    let band = cases.band(full(row)).ok_or_else(|| RunError::setting("no setting of the views is varied"))?;
+    let band = cases.band(full(row))?;
     let at = |quads: u32| {
         entries.iter().find(|(count, ..)| *count == quads).map(|(_, all, one)| 100.0 * (all / one - 1.0))
     };

@@ -1,4 +1,4 @@
-//! Surfaces: the shading cell of a sample, and shading at cells and at samples.
+//! Shaded triangles: the shading cell of a sample, and shading at cells and at samples.
 
 use std::cell::RefCell;
 
@@ -76,7 +76,7 @@ pub(super) fn own_pixel(samples: &TileSamples, slot: usize, tile: [u32; 2], side
 }
 
 /// One triangle as a surface for shading.
-pub(super) struct Surface<'a> {
+pub(super) struct ShadedTriangle<'a> {
     pass: &'a Pass<'a>,
     draw: usize,
     vertices: [usize; 3],
@@ -87,7 +87,7 @@ pub(super) struct Surface<'a> {
     covering: Option<[Corner; 3]>,
 }
 
-impl<'a> Surface<'a> {
+impl<'a> ShadedTriangle<'a> {
     pub fn new(pass: &'a Pass<'a>, triangle: u32) -> Self {
         let (draw, vertices) = pass.corners(triangle);
         let corners = vertices.map(|vertex| Corner::new(&pass.vertices[draw][vertex]));
@@ -344,7 +344,7 @@ impl SampleView {
     }
 }
 
-impl Surface<'_> {
+impl ShadedTriangle<'_> {
     /// Linear RGB radiance and opacity at the sample's own point.
     pub fn shade_at(&self, lane: &Lane, view: &SampleView) -> Vec4 {
         let (at, texel) = self.of_view(view);
@@ -371,27 +371,20 @@ impl Surface<'_> {
     /// texture cache. `samples` has the samples of each pixel of the quad. A helper lane uses the sample of its own pixel.
     pub fn quad_at(
         &self,
-        pass: &Pass<'_>,
         access: &QuadAccess,
         samples: &[Vec<Sample>; 4],
         mut line: impl FnMut(u64),
     ) -> QuadWork {
-        let fetches = self.fetch_at(pass, access, samples, &mut line);
-        let views = self.views_of(pass, access, samples);
+        let fetches = self.fetch_at(access, samples, &mut line);
+        let views = self.views_of(access, samples);
         let of_view = |view: SampleView, lane: &Lane| self.run_all(lane, self.of_view(&view));
         self.work(views, of_view, line).fetching(fetches)
     }
 
     /// Bilinear fetches of the texture; arguments as for [`Self::quad_at`].
-    fn fetch_at(
-        &self,
-        pass: &Pass<'_>,
-        access: &QuadAccess,
-        samples: &[Vec<Sample>; 4],
-        mut line: impl FnMut(u64),
-    ) -> u32 {
+    fn fetch_at(&self, access: &QuadAccess, samples: &[Vec<Sample>; 4], mut line: impl FnMut(u64)) -> u32 {
         let Some(sampler) = self.sampler else { return 0 };
-        self.views_of(pass, access, samples).fold(0, |fetches, view| {
+        self.views_of(access, samples).fold(0, |fetches, view| {
             let footprint = self.footprint_at(&sampler, &view);
             sampler.lines(self.uv(view.weights(0.0, 0.0)), &footprint, &mut line);
             fetches + Sampler::fetches(&footprint)
@@ -399,15 +392,11 @@ impl Surface<'_> {
     }
 
     /// Views of the four lanes of a quad.
-    fn views_of(
-        &self,
-        pass: &Pass<'_>,
-        access: &QuadAccess,
-        samples: &[Vec<Sample>; 4],
-    ) -> impl Iterator<Item = SampleView> {
+    fn views_of(&self, access: &QuadAccess, samples: &[Vec<Sample>; 4]) -> impl Iterator<Item = SampleView> {
         LANES.into_iter().zip(samples).map(|(offset, of_pixel)| {
             let pixel = [0, 1].map(|axis| (2 * access.quad[axis] + offset[axis]) as u32);
-            let view = SampleView::of_sample(&self.corners, pass, pixel, &of_pixel[access.sample as usize]);
+            let view =
+                SampleView::of_sample(&self.corners, self.pass, pixel, &of_pixel[access.sample as usize]);
             SampleView { pixel: pixel.map(|part| part as i32), sample: u32::from(access.sample), ..view }
         })
     }
