@@ -264,12 +264,12 @@ impl<'a, C: Precision> Tests<'a, C> {
     fn edges(&mut self, tile: &TileRect<C>, within: &Box5<C>) -> Option<[C; 2]> {
         let Rounded { triangle, shear, .. } = &self.rounded;
         let corner = |i: usize, j: usize| Box5 { u: [within.u[i]; 2], v: [within.v[j]; 2], ..*within };
-        let from = |corner: &Box5<C>| Edges::<f64, C>::new(Seen::new(triangle, shear, tile, corner));
-        let first = from(&corner(0, 0));
+        let first = Edges::<f64, C>::new(Seen::new(triangle, shear, tile, &corner(0, 0)));
         let (mut bounds, mut views) = (EdgeBounds::new(&first), 1);
         if within.lens {
             for (i, j) in [(1, 0), (0, 1), (1, 1)] {
-                bounds = bounds.hull(&EdgeBounds::new(&from(&corner(i, j))));
+                let other = Edges::<f64, C>::new(Seen::new(triangle, shear, tile, &corner(i, j)));
+                bounds = bounds.hull(&EdgeBounds::new(&other));
                 views += 1;
             }
         }

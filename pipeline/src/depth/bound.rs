@@ -182,7 +182,13 @@ impl Facts<f64> {
 
 impl<R: Real> Facts<R> {
     fn at(&self, t: R) -> Points<R> {
-        [0, 1, 2].map(|k| [0, 1, 2].map(|axis| t.madd(self.delta[k][axis], self.open[k][axis])))
+        let mut points = self.open;
+        for (point, delta) in points.iter_mut().zip(&self.delta) {
+            for (coordinate, delta) in point.iter_mut().zip(delta) {
+                *coordinate = t.madd(*delta, *coordinate);
+            }
+        }
+        points
     }
 
     /// Planes through the triangle at each end of the shutter; equal for a still triangle.
@@ -195,7 +201,8 @@ impl<R: Real> Facts<R> {
     }
 
     fn through(&self, ends: &[Points<R>; 2]) -> [MovingPlane<R>; 2] {
-        [0, 1].map(|end| MovingPlane::new(normal(&ends[end]), [&ends[0], &ends[1]], self.size))
+        let plane = |end: &Points<R>| MovingPlane::new(normal(end), [&ends[0], &ends[1]], self.size);
+        [plane(&ends[0]), plane(&ends[1])]
     }
 
     /// Depths allowed by the planes of set-up or, without these, by planes through the triangle at the ends
@@ -210,8 +217,8 @@ impl<R: Real> Facts<R> {
     fn exact(&self, shutter: Option<&[MovingPlane<R>; 2]>, region: &Region<R>, depth: R) -> [R; 2] {
         let margin = Margin { off: self.slack.map(|slack| R::new(0.5) * slack), depth };
         let ends = self.ends(region);
-        let [first, last] = ends.map(|points| range(points.map(|p| p[2])));
-        let [lo, hi] = hull(first, last);
+        let depths = |points: &Points<R>| range([points[0][2], points[1][2], points[2][2]]);
+        let [lo, hi] = hull(depths(&ends[0]), depths(&ends[1]));
         let vertices = [lo - depth, hi + depth];
         let planes = self.planes(shutter, region, &self.beam(region), &ends, &margin);
         planes.map_or(vertices, |planes| both(vertices, planes))
@@ -228,7 +235,7 @@ impl<R: Real> Facts<R> {
 
     /// Vertices at the ends of the time.
     fn ends(&self, region: &Region<R>) -> [Points<R>; 2] {
-        if self.moving { region.t.map(|t| self.at(t)) } else { [self.open; 2] }
+        if self.moving { [self.at(region.t[0]), self.at(region.t[1])] } else { [self.open; 2] }
     }
 
     fn different(&self) -> usize {

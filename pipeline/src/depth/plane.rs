@@ -113,13 +113,13 @@ impl<R: Real> MovingPlane<R> {
     /// magnitudes by axis.
     pub fn new(normal: [R; 3], ends: [&Points<R>; 2], size: [R; 3]) -> Self {
         let noise = R::new(ROUNDING) * dot(normal.map(R::magnitude), size);
-        Self { normal, ends: ends.map(|points| range(points.map(|p| dot(normal, p)))), noise }
+        Self { normal, ends: [along(normal, ends[0]), along(normal, ends[1])], noise }
     }
 
     /// The plane for a triangle that does not move.
     pub fn still(normal: [R; 3], points: &Points<R>, size: [R; 3]) -> Self {
         let noise = R::new(ROUNDING) * dot(normal.map(R::magnitude), size);
-        Self { normal, ends: [range(points.map(|p| dot(normal, p))); 2], noise }
+        Self { normal, ends: [along(normal, points); 2], noise }
     }
 
     /// Range of `n . p` over the whole motion.
@@ -174,6 +174,11 @@ impl<R: Real> MovingPlane<R> {
         let noise = R::new(ROUNDING) * nx.magnitude().madd(size(base[0]), ny.magnitude() * size(base[1]));
         [nx.madd(x[0], ny * y[0]) - noise, nx.madd(x[1], ny * y[1]) + noise]
     }
+}
+
+/// Range of `n . p` over some vertices.
+fn along<R: Real>(n: [R; 3], points: &Points<R>) -> [R; 2] {
+    range([dot(n, points[0]), dot(n, points[1]), dot(n, points[2])])
 }
 
 /// The ends of `range`, ordered so that `factor` times them rises.

@@ -44,7 +44,7 @@ pub(super) struct Edge<N> {
 
 impl<N: Number, C: Coordinate> Edges<N, C> {
     /// Edges of the triangle in `view`.
-    #[inline]
+    #[inline(always)]
     pub fn new(view: View<N, C>) -> Self {
         let edge = |i: usize, j: usize| Edge::new(&view, i, j);
         let edges = [edge(1, 2), edge(2, 0), edge(0, 1)];
@@ -166,8 +166,8 @@ impl<N: Number> EdgeBounds<N> {
     /// Bounds of each of `edges` over the whole box.
     pub fn new<C: Coordinate>(edges: &Edges<N, C>) -> Self {
         let skew = edges.skew();
-        let ranges = edges.edges.map(|edge| edge.range(&edges.view, skew));
-        Self { ranges, moving: edges.view.moving }
+        let range = |k: usize| edges.edges[k].range(&edges.view, skew);
+        Self { ranges: [range(0), range(1), range(2)], moving: edges.view.moving }
     }
 
     /// Bounds that hold where either of two does.
@@ -239,7 +239,7 @@ impl<N: Number> EdgeBounds<N> {
     /// The part of `part` in which every edge can have the sign of `face`.
     fn reaching(&self, face: usize, part: [N; 2], solved: &mut u32) -> Option<[N; 2]> {
         let mut left = part;
-        for tallest in self.tallest([face == 0, face == 1]) {
+        for tallest in &self.tallest([face == 0, face == 1]) {
             if !self.moving {
                 if tallest.0[0] < N::zero() {
                     return None;

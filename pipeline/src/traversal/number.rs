@@ -266,7 +266,8 @@ impl<N: Number> Quadratic<N> {
         }
         let root = discriminant.max(zero).sqrt();
         let q = if b1 < zero { root - b1 } else { -(b1 + root) };
-        let [by_end, by_start] = [q / (q + b2), b0 / (b0 + q)].map(|s| s.max(zero).min(one));
+        let clamp = |s: N| s.max(zero).min(one);
+        let (by_end, by_start) = (clamp(q / (q + b2)), clamp(b0 / (b0 + q)));
         match (starts_below, ends_below) {
             (true, true) => Pieces::One([by_start, by_end]),
             (false, false) => Pieces::Two([zero, by_start], [by_end, one]),

@@ -116,12 +116,13 @@ impl<N: Number, C: Coordinate> Side<'_, N, C> {
     fn through_pinhole(&self, within: &mut Box5<C>) -> (bool, u32) {
         let (slack, mut times, mut roots) = (self.slack(), None, 0);
         for &edge in self.edges() {
-            let d = self.triangle.corners.each_ref().map(|corner| {
-                self.at_ends(|end| {
+            let mut d = [[N::zero(); 2]; 3];
+            for (d, corner) in d.iter_mut().zip(&self.triangle.corners) {
+                *d = self.at_ends(|end| {
                     let w = if self.parallel { N::zero() } else { self.at(corner, 2, within.t[end]) };
                     self.inward(self.flat(self.at(corner, self.axis, within.t[end]), edge, w), slack)
-                })
-            });
+                });
+            }
             times = union(times, above(within.t, &d, &mut roots));
         }
         (times.map(|t| within.t = t).is_some(), roots)
