@@ -1,6 +1,6 @@
 //! Conservative rasterizer: from a triangle to the tiles it may touch.
 
-use std::ops::Range;
+use std::ops::{AddAssign, Range};
 
 use super::triangle::{Precision, Rounded, recentring_madds};
 use super::{MovingTriangle, Rect, Region, Touch, View};
@@ -53,6 +53,19 @@ pub struct TileLoop {
     pub edge_madds: u32,
     /// Multiply-adds of depth intervals.
     pub depth_madds: u32,
+}
+
+impl AddAssign for TileLoop {
+    fn add_assign(&mut self, other: Self) {
+        self.blocks += other.blocks;
+        self.tiles += other.tiles;
+        self.culled_sides += other.culled_sides;
+        self.culled_edges += other.culled_edges;
+        self.place_madds += other.place_madds;
+        self.side_madds += other.side_madds;
+        self.edge_madds += other.edge_madds;
+        self.depth_madds += other.depth_madds;
+    }
 }
 
 /// Conservative rasterizer.

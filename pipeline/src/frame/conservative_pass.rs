@@ -137,19 +137,45 @@ impl Drop for Worker<'_> {
     }
 }
 
-/// Tiles of one body, in order.
+/// What happened on the tiles of one body, in order.
 struct BodyLog<T> {
-    tiles: Vec<TileLog<T>>,
+    packets: Vec<PacketLog>,
+    /// Results with the columns and rows of their tiles.
+    outputs: Vec<([u32; 2], T)>,
     /// Work of the tile loop after the last tile of each triangle, with the triangle.
     rest: Vec<(usize, TileLoop)>,
 }
 
-struct TileLog<T> {
+/// Tiles of a triangle that follow each other in one block.
+struct PacketLog {
     primitive: usize,
-    tile: [u32; 2],
+    block: u32,
     tests: TileLoop,
     lanes: LaneWork,
-    output: Option<T>,
+}
+
+impl<T> BodyLog<T> {
+    fn new() -> Self {
+        Self { packets: Vec::new(), outputs: Vec::new(), rest: Vec::new() }
+    }
+
+    /// Work of the tile loop in the packet of a tile of `block`. The packet before it ends with what `lanes` did.
+    fn tests(&mut self, primitive: usize, block: u32, lanes: &Lanes) -> &mut TileLoop {
+        if self.packets.last().is_none_or(|last| last.block != block || last.primitive != primitive) {
+            self.end_packet(lanes);
+            let packet =
+                PacketLog { primitive, block, tests: TileLoop::default(), lanes: LaneWork::default() };
+            self.packets.push(packet);
+        }
+        let last = self.packets.len() - 1;
+        &mut self.packets[last].tests
+    }
+
+    fn end_packet(&mut self, lanes: &Lanes) {
+        if let Some(last) = self.packets.last_mut() {
+            last.lanes = lanes.finish();
+        }
+    }
 }
 
 impl Gpu<'_> {
@@ -187,7 +213,7 @@ impl ConservativePass {
             let logs: Vec<BodyLog<S::Output>> =
                 bodies.par_iter().zip(&starts).map_init(workers, log).collect();
             for log in logs {
-                self.body(gpu, draw, &numbers, log, &mut store);
+                self.body(gpu, &numbers, log, &mut store);
             }
         }
     }
@@ -196,33 +222,23 @@ impl ConservativePass {
     fn body<T>(
         &mut self,
         gpu: &mut Gpu<'_>,
-        draw: &ConservativeDraw<'_>,
         numbers: &[u32],
         log: BodyLog<T>,
         store: &mut impl FnMut([u32; 2], T),
     ) {
-        let across = draw.grid.columns.div_ceil(draw.block);
-        let block_of = |tile: [u32; 2]| tile[1] / draw.block * across + tile[0] / draw.block;
         let mut rest = log.rest.into_iter().peekable();
-        let mut tiles = log.tiles.into_iter().peekable();
-        while let Some(tile) = tiles.next() {
-            while let Some((primitive, tests)) = rest.next_if(|(primitive, _)| *primitive < tile.primitive) {
+        for PacketLog { primitive, block, tests, lanes } in log.packets {
+            while let Some((primitive, tests)) = rest.next_if(|(before, _)| *before < primitive) {
                 emit_tests(gpu, numbers[primitive], &tests);
             }
-            let (block, primitive) = (block_of(tile.tile), tile.primitive);
-            let number = numbers[primitive];
-            let mut packet = gpu.packet(PacketKind::Tile, block, Some(number));
-            let mut next = Some(tile);
-            while let Some(TileLog { tile, tests, lanes, output, .. }) = next {
-                add(&tests, &mut packet.counts);
-                let written = &mut self.written;
-                lanes.add_to(&mut packet.counts, gpu.memory(), |line| written.insert(line));
-                if let Some(output) = output {
-                    store(tile, output);
-                }
-                next = tiles.next_if(|next| block_of(next.tile) == block && next.primitive == primitive);
-            }
+            let mut packet = gpu.packet(PacketKind::Tile, block, Some(numbers[primitive]));
+            add(&tests, &mut packet.counts);
+            let written = &mut self.written;
+            lanes.add_to(&mut packet.counts, gpu.memory(), |line| written.insert(line));
             gpu.push(&packet, 0);
+        }
+        for (tile, output) in log.outputs {
+            store(tile, output);
         }
         for (primitive, tests) in rest {
             emit_tests(gpu, numbers[primitive], &tests);
@@ -261,23 +277,26 @@ fn log<S: TileShader>(
     shader: &S,
     lanes: &Lanes,
 ) -> BodyLog<S::Output> {
-    let (mut tiles, mut rest, mut state) = (Vec::new(), Vec::new(), S::BodyState::default());
+    let across = draw.grid.columns.div_ceil(draw.block);
+    let (mut log, mut state) = (BodyLog::new(), S::BodyState::default());
     for (item, primitive) in body.iter().zip(start..).filter(|(item, _)| !item.is_culled(lanes.costs()).0) {
         let after = item.rasterizer.rasterize_counted(
             &item.triangle,
             draw.grid,
             item.scissor.clone(),
             |tile, touch, work: &mut TileLoop| {
+                let block = tile[1] / draw.block * across + tile[0] / draw.block;
+                *log.tests(primitive, block, lanes) += std::mem::take(work);
                 let output = shader.run(&mut state, lanes, &TileIntervals { primitive, tile, touch });
-                let tests = std::mem::take(work);
-                tiles.push(TileLog { primitive, tile, tests, lanes: lanes.finish(), output });
+                log.outputs.extend(output.map(|output| (tile, output)));
             },
         );
         if after != TileLoop::default() {
-            rest.push((primitive, after));
+            log.rest.push((primitive, after));
         }
     }
-    BodyLog { tiles, rest }
+    log.end_packet(lanes);
+    log
 }
 
 /// Emits the packets of the vertices and of set-up.

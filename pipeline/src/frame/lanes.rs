@@ -140,7 +140,7 @@ impl Lanes {
         self.touches.borrow_mut().push(touch);
     }
 
-    /// Ends the lanes of the tile; those of another one may follow.
+    /// What the lanes did since they were last asked.
     pub(super) fn finish(&self) -> LaneWork {
         LaneWork { counts: self.counts.take(), touches: self.touches.take() }
     }
@@ -159,8 +159,8 @@ fn is_inside<N: Numbers>(numbers: N, corners: &[[f64; 2]; 3], at: [f64; 2], slac
     })
 }
 
-/// What the lanes of a tile did.
-#[derive(Clone, Debug)]
+/// What the lanes of some tiles did.
+#[derive(Clone, Debug, Default)]
 pub(super) struct LaneWork {
     counts: PacketCounts,
     touches: Vec<Touch>,

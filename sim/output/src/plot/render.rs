@@ -5,6 +5,7 @@
 
 use std::convert::Infallible;
 use std::fmt::Display;
+use std::ops::Range;
 
 use plotters::backend::SVGBackend;
 use plotters::style::{FontTransform, RGBAColor, TextStyle};
@@ -206,13 +207,26 @@ impl Raster {
     }
 
     fn blend(&mut self, x: i32, y: i32, colour: BackendColor) {
-        if x < 0 || y < 0 || x >= self.width as i32 || y >= self.height as i32 {
+        if x < 0 || x >= self.width as i32 {
             return;
         }
-        let at = (y as usize * self.width as usize + x as usize) * 3;
+        self.blend_row(y, x..x + 1, colour);
+    }
+
+    /// Blends the pixels of columns inside the picture in one row.
+    fn blend_row(&mut self, y: i32, columns: Range<i32>, colour: BackendColor) {
+        if y < 0 || y >= self.height as i32 || columns.is_empty() {
+            return;
+        }
         let (r, g, b) = colour.rgb;
-        for (old, new) in self.rgb[at..at + 3].iter_mut().zip([r, g, b]) {
-            let mixed = f64::from(*old) + (f64::from(new) - f64::from(*old)) * colour.alpha.clamp(0.0, 1.0);
+        let (row, pixel) = (y as usize * self.width as usize, [r, g, b]);
+        let bytes = &mut self.rgb[(row + columns.start as usize) * 3..(row + columns.end as usize) * 3];
+        if colour.alpha >= 1.0 {
+            bytes.chunks_exact_mut(3).for_each(|old| old.copy_from_slice(&pixel));
+            return;
+        }
+        for (old, new) in bytes.iter_mut().zip(pixel.into_iter().cycle()) {
+            let mixed = f64::from(*old) + (f64::from(new) - f64::from(*old)) * colour.alpha.max(0.0);
             *old = (mixed + 0.5) as u8;
         }
     }
@@ -248,10 +262,8 @@ impl DrawingBackend for Raster {
         if !fill {
             return rasterizer::draw_rect(self, a, b, style, fill);
         }
-        for y in a.1.max(0)..b.1.min(self.height as i32) {
-            for x in a.0.max(0)..b.0.min(self.width as i32) {
-                self.blend(x, y, style.color());
-            }
+        for y in a.1.max(0)..b.1 {
+            self.blend_row(y, a.0.max(0)..b.0.min(self.width as i32), style.color());
         }
         Ok(())
     }
