@@ -86,11 +86,6 @@ impl<T> Buffer<T> {
         self.words == 0
     }
 
-    /// Where it is in memory.
-    pub fn region(&self) -> MemoryRange {
-        self.region
-    }
-
     /// The buffer, for a pass that reads it.
     pub fn reads(&self) -> BufferBinding {
         BufferBinding { number: self.number, region: self.region, access: Access::Read }

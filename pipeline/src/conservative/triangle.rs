@@ -31,11 +31,6 @@ impl MovingTriangle {
     pub fn open(&self) -> &[[f64; 3]; 3] {
         &self.open
     }
-
-    /// Vertices when the shutter closes.
-    pub fn close(&self) -> &[[f64; 3]; 3] {
-        &self.close
-    }
 }
 
 /// Smallest uncertainty of a coordinate. Products of three such errors do not underflow, so values that

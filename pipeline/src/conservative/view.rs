@@ -1,8 +1,6 @@
 //! Views, tiles, and boxes of lens and time of conservative mode.
 
-use crate::depth::{round_down, round_up};
 use crate::geometry::Shear;
-use crate::traversal::Box5;
 
 /// A projection of points `[x, y, depth]`, in units of the tile borders (such as pixels).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,11 +29,6 @@ pub enum View {
 }
 
 impl View {
-    /// Perspective through a pinhole.
-    pub fn pinhole(near: f64) -> Self {
-        Self::Perspective { s: [0.0; 2], a: [0.0; 2], near }
-    }
-
     /// Orthographic, for all depths and without a lens.
     pub fn orthographic() -> Self {
         Self::Orthographic { s: [0.0; 2], a: [0.0; 2], near: f64::NEG_INFINITY }
@@ -129,20 +122,4 @@ impl Touch {
             z: hull(self.z, other.z),
         }
     }
-
-    /// Its box of lens and time.
-    pub fn region(&self) -> Region {
-        Region { u: self.u, v: self.v, t: self.t }
-    }
-
-    /// The box and the depth range rounded outward to `f32`, for [`DepthBoxes`](crate::depth::DepthBoxes).
-    /// `lens` says whether the camera has a lens.
-    pub fn outward(&self, lens: bool) -> (Box5, [f32; 2]) {
-        (Box5 { u: outward(self.u), v: outward(self.v), t: outward(self.t), lens }, outward(self.z))
-    }
-}
-
-/// Narrowest `f32` range that contains the `f64` range.
-fn outward([lo, hi]: [f64; 2]) -> [f32; 2] {
-    [round_down(lo), round_up(hi)]
 }

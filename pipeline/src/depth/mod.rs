@@ -18,5 +18,5 @@ pub use bound::{Bounder, DepthBound, interval_madds, set_up_madds, vertex_range}
 pub use boxes::{DepthBoxes, DepthTile, Visible};
 pub use grid::{BoxGrid, DepthSpec};
 pub use number::Real;
-pub(crate) use number::{Numbers, cross, round_down, round_up};
+pub(crate) use number::{Numbers, cross};
 pub use pyramid::Pyramid;

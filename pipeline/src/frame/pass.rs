@@ -559,12 +559,6 @@ impl<'a> RasterPass<'a> {
         Self { target, ..self }
     }
 
-    /// The pass with samples cleared to other values.
-    #[must_use]
-    pub fn cleared(self, clear: Clear) -> Self {
-        Self { clear, ..self }
-    }
-
     /// The pass without pixels in its result. Its work is the same.
     #[must_use]
     pub fn without_image(self) -> Self {

@@ -30,4 +30,4 @@ pub use number::{Number, Pieces, Quadratic};
 pub use region::{Box5, Faces, Piece, TileRect, TimePieces, View};
 pub use screen::{SCREEN_GAIN_MADDS, Screen, screen_madds};
 pub use side_planes::{narrow, narrow_counted};
-pub use time_interval::{TimeIntervals, time_interval, time_interval_counted, time_interval_over};
+pub use time_interval::{TimeIntervals, time_interval, time_interval_counted};

@@ -73,11 +73,6 @@ impl Map {
         Ok(Self { camera: camera.with_lens(lens), stand, receiver: *receiver, radius, viewport })
     }
 
-    /// The camera.
-    pub fn camera(&self) -> &Camera {
-        &self.camera
-    }
-
     /// Distance of the map's camera from the plane, scene units.
     pub fn distance(&self) -> f64 {
         (self.receiver.centre - self.stand.eye).dot(self.stand.forward)

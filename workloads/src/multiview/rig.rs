@@ -94,11 +94,6 @@ impl Rig {
         })
     }
 
-    /// The camera with its wide lens.
-    pub fn camera(&self) -> &Camera {
-        &self.camera
-    }
-
     /// Angle of the whole lens seen from a point in focus, in degrees.
     pub fn degrees(&self) -> f64 {
         let half = |lens: Lens| libm::atan2(f64::from(lens.radius()), f64::from(lens.focus()));

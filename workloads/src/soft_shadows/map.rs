@@ -55,11 +55,6 @@ impl ShadowMap {
         self.side
     }
 
-    /// Samples of light and time.
-    pub fn set(&self) -> &[Sample] {
-        self.set.samples()
-    }
-
     /// All depths.
     pub fn depths(&self) -> &[f32] {
         &self.depths

@@ -83,11 +83,6 @@ impl Bounds {
         self.grid.tile[0] * self.grid.tile[1] * self.sums.last().copied().unwrap_or(0.0)
     }
 
-    /// Number of tiles that the solid may touch.
-    pub fn tiles(&self) -> usize {
-        self.columns.iter().flatten().count()
-    }
-
     /// `count` uniform points of the solid; fewer if it is too thin for random points to hit.
     pub fn sample(&self, solid: &dyn Inside, count: usize, seed: u64) -> Sampled {
         let stream = Stream::new(seed, 0x7015);
