@@ -466,10 +466,10 @@ impl<'a> Draw<'a> {
         Self { bindings, ..self }
     }
 
-    /// The draw with the texture of its shader in `surface`, as an earlier pass wrote it.
+    /// The draw with the texture of its shader in `region`, as an earlier pass wrote it.
     #[must_use]
-    pub fn reading(self, surface: MemoryRange) -> Self {
-        Self { resident: Resident { texture: Some(surface.address()), ..self.resident }, ..self }
+    pub fn reading(self, region: MemoryRange) -> Self {
+        Self { resident: Resident { texture: Some(region.address()), ..self.resident }, ..self }
     }
 }
 

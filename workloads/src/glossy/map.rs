@@ -132,7 +132,7 @@ impl Map {
         let mut counts = Counts::default();
         for (index, at) in set.samples().iter().enumerate() {
             let camera = pinhole(&self.camera, [at.u, at.v]);
-            let camera = camera.map_err(|error| JobError::Setting(error.to_string()))?;
+            let camera = camera.map_err(JobError::setting)?;
             let samples = set.still(index);
             let settings =
                 Settings { spec: gpu.spec(), viewport: self.viewport, samples: &samples, background };

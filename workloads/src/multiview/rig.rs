@@ -226,7 +226,7 @@ impl Rig {
     ) -> Result<Views, JobError> {
         // The samples of one pixel of the table serve all pixels.
         let set = SharedSamples::new(self.table.pixel(0, 0).to_vec())
-            .ok_or_else(|| JobError::Setting("too many samples".to_owned()))?;
+            .ok_or_else(|| JobError::setting("too many samples"))?;
         let mut views = Views { images: Vec::new(), counts: Counts::default(), passes: 0 };
         let resident = gpu.resident(draws);
         for (number, at) in set.samples().iter().enumerate() {

@@ -370,7 +370,7 @@ impl Inside for Torus {
     }
 }
 
-impl Domain for Torus {
+impl Volume for Torus {
     fn has(&self, lane: &Lane, &[x, y, t, ..]: &Point) -> bool {
         let [x, y, t] = [x, y, t].map(|at| lane.sub(at, 0.5));
         let from_ring = lane.sub(lane.root(lane.madd(y, y, lane.mul(x, x))), self.ring);
@@ -424,4 +424,4 @@ impl Prisms {
 pub type Point = [f64; 5];
 
 mod standard;
-pub use standard::{Blurred, Covered, Domain, every_sample, fill, standard_mode};
+pub use standard::{Blurred, Covered, Volume, every_sample, fill, standard_mode};
