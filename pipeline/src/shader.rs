@@ -3,7 +3,7 @@
 use std::cell::{Cell, RefCell};
 use std::ops::{Add, Mul, Sub};
 
-use glam::{Affine3A, DAffine3, DVec3, Mat4, Vec2, Vec3, Vec4};
+use glam::{DAffine3, DVec3, Mat4, Vec2, Vec3, Vec4};
 
 use crate::surface::{Bound, MAX_TARGETS};
 use crate::tally::Costs;
@@ -172,12 +172,6 @@ impl<'a> Lane<'a> {
         let (texel, fetches) = bound.fetch(uv, lod, |line| self.note(line));
         self.fetches.set(self.fetches.get() + fetches);
         texel
-    }
-
-    /// Unfiltered first sample of a pixel of the surface bound to `slot`. Zero outside of it, and for a slot without a
-    /// surface. It counts as a fetch.
-    pub fn load(&self, slot: usize, pixel: [i32; 2]) -> Vec4 {
-        self.load_sample(slot, pixel, 0)
     }
 
     /// The same for another sample.
@@ -402,13 +396,6 @@ impl<'a> Lane<'a> {
     pub fn normalize<T: Vector>(&self, a: T) -> T {
         self.count(8);
         a.unit()
-    }
-
-    /// `point` moved by `pose`: nine multiply-adds.
-    #[inline(always)]
-    pub fn transform(&self, pose: &Affine3A, point: Vec3) -> Vec3 {
-        self.count(9);
-        pose.transform_point3(point)
     }
 
     /// The same in double precision, which stands for the fixed-point arithmetic of the hardware.

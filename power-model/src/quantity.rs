@@ -108,16 +108,7 @@ pub enum Basis {
     Assumed,
 }
 
-impl Basis {
-    /// Word used in tables.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Published => "published",
-            Self::Derived => "derived",
-            Self::Assumed => "assumed",
-        }
-    }
-}
+impl Basis {}
 
 /// Source of a number: a citation or a reasoning. Never empty.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]

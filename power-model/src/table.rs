@@ -137,11 +137,6 @@ impl EnergyTable {
         self.valid_v.map(Volts::value)
     }
 
-    /// Entry of every event, in the order of [`Event::ALL`].
-    pub fn entries(&self) -> impl Iterator<Item = (Event, &Entry)> {
-        Event::ALL.into_iter().zip(&self.entries)
-    }
-
     /// Rows with energies, in the order of [`Event::ALL`].
     pub fn rows(&self) -> impl Iterator<Item = &EnergyRow> {
         self.entries.iter().filter_map(|entry| match entry {
@@ -248,24 +243,9 @@ impl EnergyRow {
         self.pj[2] * J_PER_PJ
     }
 
-    /// Operation or access width that the energy refers to.
-    pub fn per(&self) -> &str {
-        &self.per
-    }
-
     /// Supply.
     pub const fn supply(&self) -> Supply {
         self.supply
-    }
-
-    /// Kind of source.
-    pub const fn basis(&self) -> Basis {
-        self.basis
-    }
-
-    /// Source in words.
-    pub fn source(&self) -> &str {
-        self.source.text()
     }
 }
 
@@ -331,10 +311,9 @@ mod tests {
     #[test]
     fn every_event_costs_or_is_free_for_a_stated_reason() {
         let table = EnergyTable::builtin("28nm").unwrap();
-        assert_eq!(table.entries().count(), Event::COUNT);
-        for (event, entry) in table.entries() {
+        for (event, entry) in Event::ALL.into_iter().zip(&table.entries) {
             let text = match entry {
-                Entry::Costs(row) => row.source(),
+                Entry::Costs(row) => row.source.text(),
                 Entry::Free(reason) => reason.text(),
             };
             assert!(text.len() > 20, "{event:?}: `{text}` is no source");

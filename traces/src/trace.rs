@@ -159,11 +159,6 @@ impl Trace {
         self.start_s + index as f64 / self.rate_hz
     }
 
-    /// Left edge of sample `index` to the nearest nanosecond, as trace files store it. Saturates beyond i64.
-    pub fn time_ns(&self, index: usize) -> i64 {
-        time_ns(self.start_s, self.rate_hz, index as u64)
-    }
-
     /// Position of a time in samples, fractional, not limited to the trace.
     pub fn position(&self, time_s: f64) -> f64 {
         (time_s - self.start_s) * self.rate_hz
@@ -363,7 +358,10 @@ mod tests {
     #[test]
     fn times_are_left_edges_and_nanoseconds_are_exact_at_50_khz() {
         let trace = build(vec![1.0; 4], vec![2.0; 4], 50e3, 0.25).unwrap();
-        assert_eq!((trace.time_ns(0), trace.time_ns(3)), (250_000_000, 250_060_000));
+        assert_eq!(
+            [0, 3].map(|index| time_ns(trace.start_s, trace.rate_hz, index)),
+            [250_000_000, 250_060_000]
+        );
         assert_eq!(trace.end_s(), 0.25 + 4.0 / 50e3);
         assert_eq!(trace.power_w(3), 2.0);
     }

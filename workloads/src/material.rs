@@ -81,12 +81,6 @@ impl Material {
             }
         }
     }
-
-    /// The same surface with a texture.
-    #[must_use]
-    pub fn textured(self, texture: Arc<Texture>) -> Self {
-        Self { texture: Some(texture), ..self }
-    }
 }
 
 /// Colours a material under a scene's light.

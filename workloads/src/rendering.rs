@@ -42,8 +42,7 @@ impl Rendering {
     }
 
     fn viewport(&self) -> Result<Viewport, JobError> {
-        Viewport::new(self.settings.width, self.settings.height)
-            .ok_or_else(|| JobError::Setting(IMAGE_SIZE.to_owned()))
+        Viewport::new(self.settings.width, self.settings.height).ok_or_else(|| JobError::setting(IMAGE_SIZE))
     }
 }
 

@@ -110,11 +110,6 @@ pub struct Timeline {
 }
 
 impl Timeline {
-    /// Length of a bin in seconds.
-    pub fn bin_s(&self) -> f64 {
-        self.bin_ps as f64 * 1e-12
-    }
-
     /// Length of the frame in seconds.
     pub fn duration_s(&self) -> f64 {
         self.duration_ps as f64 * 1e-12

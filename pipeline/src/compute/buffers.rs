@@ -86,11 +86,6 @@ impl<T> Buffer<T> {
         self.words == 0
     }
 
-    /// Where it is in memory.
-    pub fn region(&self) -> MemoryRange {
-        self.region
-    }
-
     /// The buffer, for a pass that reads it.
     pub fn reads(&self) -> BufferBinding {
         BufferBinding { number: self.number, region: self.region, access: Access::Read }
@@ -149,7 +144,7 @@ pub(crate) struct Stored {
 }
 
 impl Buffers {
-    /// Adds a buffer of `data` in `surface`.
+    /// Adds a buffer of `data` in `region`.
     pub fn add<T: Word>(&mut self, name: &str, region: MemoryRange, data: &[T]) -> Buffer<T> {
         let words = data.iter().map(|value| value.bits()).collect();
         self.0.push(Data { name: name.to_owned(), region, words });
@@ -185,11 +180,9 @@ impl Buffers {
         self.0[buffer as usize].words[index as usize]
     }
 
-    /// Lets a store or an atomic take effect. Returns the word before.
-    pub fn apply(&mut self, stored: &Stored) -> u32 {
+    /// Lets a store or an atomic take effect.
+    pub fn apply(&mut self, stored: &Stored) {
         let word = &mut self.0[stored.buffer as usize].words[stored.index as usize];
-        let before = *word;
-        *word = stored.atomic.map_or(stored.bits, |atomic| atomic.of(before, stored.bits));
-        before
+        *word = stored.atomic.map_or(stored.bits, |atomic| atomic.of(*word, stored.bits));
     }
 }

@@ -40,26 +40,6 @@ pub enum Fault {
         "word {0} of the shared memory is used by another lane, too, and written; put a barrier between them"
     )]
     Race(u32),
-    /// The value of an atomic is used by groups that run in parallel.
-    #[error("the program uses what an atomic on buffer `{0}` returns, so it has to be serial")]
-    Returned(String),
-}
-
-/// Buffers as groups see them.
-pub(crate) enum View<'a> {
-    /// As they were before the pass.
-    Before(&'a Buffers),
-    /// As they are.
-    Live(&'a mut Buffers),
-}
-
-impl View<'_> {
-    fn buffers(&self) -> &Buffers {
-        match self {
-            Self::Before(buffers) => buffers,
-            Self::Live(buffers) => buffers,
-        }
-    }
 }
 
 /// What a group did.
@@ -74,24 +54,10 @@ pub(crate) struct GroupLog {
     pub fault: Option<(u32, Fault)>,
 }
 
-/// Place of a group in its pass.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct GroupPlace {
-    /// Along x, y and z.
-    pub id: [u32; 3],
-}
-
-impl GroupPlace {
-    /// Place of group `number` of a pass.
-    pub fn of(number: u64, groups: [u32; 3]) -> Self {
-        let [x, y] = [u64::from(groups[0]), u64::from(groups[1])];
-        Self { id: [number % x, number / x % y, number / x / y].map(|at| at as u32) }
-    }
-}
-
 /// State of a running group.
 struct State<'a> {
-    view: View<'a>,
+    /// As they were before the pass.
+    buffers: &'a Buffers,
     /// What the pass does with each buffer.
     access: &'a [Option<Access>],
     shared: SharedMemory,
@@ -118,11 +84,11 @@ pub struct GroupLane<'g, 'a> {
     state: &'g RefCell<State<'a>>,
 }
 
-/// Runs a group.
+/// Runs the group at `id`. `buffers` are as they were before the pass.
 pub(crate) fn run<'a>(
     (pass, spec): (&'a ComputePass<'a>, &'a ComputeSpec),
-    place: GroupPlace,
-    view: View<'a>,
+    id: [u32; 3],
+    buffers: &'a Buffers,
     access: &'a [Option<Access>],
 ) -> GroupLog {
     let warps = pass.group_size.div_ceil(spec.warp_lanes);
@@ -133,9 +99,9 @@ pub(crate) fn run<'a>(
     counts[Event::SharedBytes] = pass.shared_bytes;
     let log = GroupLog { counts, lines: Vec::new(), stored: Vec::new(), fault: None };
     let shared = SharedMemory::new(pass.shared_bytes);
-    let state = State { view, access, shared, log, warp: Vec::new(), made: Vec::new() };
+    let state = State { buffers, access, shared, log, warp: Vec::new(), made: Vec::new() };
     let since_barrier = vec![0; warps as usize];
-    let mut group = Group { spec, pass, id: place.id, state: RefCell::new(state), since_barrier };
+    let mut group = Group { spec, pass, id, state: RefCell::new(state), since_barrier };
     pass.shader.run(&mut group);
     group.meet();
     group.state.into_inner().log
@@ -213,7 +179,7 @@ impl GroupLane<'_, '_> {
         self.lane.count(1);
         let mut state = self.state.borrow_mut();
         let is_there = state.reach(self.index, (buffer.number, index), Kind::Load);
-        T::of(if is_there { state.view.buffers().word(buffer.number, index) } else { 0 })
+        T::of(if is_there { state.buffers.word(buffer.number, index) } else { 0 })
     }
 
     /// Stores a value in a buffer. Of stores of several lanes to one word the last lane's stays.
@@ -227,31 +193,11 @@ impl GroupLane<'_, '_> {
         self.write(Stored { buffer: buffer.number, index, atomic: Some(atomic), bits: value }, Kind::Atomic);
     }
 
-    /// Changes a word of a buffer and returns what it was, in a [serial](super::GroupShader::is_serial) program.
-    pub fn atomic_returning(&self, buffer: Buffer<u32>, index: u32, atomic: Atomic, value: u32) -> u32 {
-        let stored = Stored { buffer: buffer.number, index, atomic: Some(atomic), bits: value };
-        let before = self.write(stored, Kind::Atomic);
-        before.unwrap_or_else(|| {
-            let mut state = self.state.borrow_mut();
-            let name = state.view.buffers().name(buffer.number).to_owned();
-            state.fault(self.index, Fault::Returned(name));
-            0
-        })
-    }
-
-    /// Returns the word before, in serial programs.
-    fn write(&self, stored: Stored, kind: Kind) -> Option<u32> {
+    fn write(&self, stored: Stored, kind: Kind) {
         self.lane.count(1);
         let mut state = self.state.borrow_mut();
-        if !state.reach(self.index, (stored.buffer, stored.index), kind) {
-            return Some(0);
-        }
-        match &mut state.view {
-            View::Live(buffers) => Some(buffers.apply(&stored)),
-            View::Before(_) => {
-                state.log.stored.push(stored);
-                None
-            }
+        if state.reach(self.index, (stored.buffer, stored.index), kind) {
+            state.log.stored.push(stored);
         }
     }
 
@@ -292,7 +238,7 @@ impl GroupLane<'_, '_> {
 impl State<'_> {
     /// Notes an access of `lane` to a word of a buffer, if the pass may make it.
     fn reach(&mut self, lane: u32, (buffer, index): (u32, u32), kind: Kind) -> bool {
-        let buffers = self.view.buffers();
+        let buffers = self.buffers;
         let bound = self.access.get(buffer as usize).copied().flatten();
         let fault = match bound {
             Some(access) if kind == Kind::Load || access == Access::Write => {

@@ -10,9 +10,7 @@
 //!
 //! - A group sees the buffers as they were before the pass. Stores and atomics of all groups take effect in the order of
 //!   the groups when the pass ends. So groups run in parallel, and results are the same for any number of threads.
-//! - A shader that needs what atomics return, or what earlier groups stored, says that it is
-//!   [serial](GroupShader::is_serial): its groups then run one after another, and see everything at once. The modelled
-//!   hardware runs them in parallel all the same; it would return the values in an order of its own.
+//! - For the same reason no atomic on a buffer returns the word before it.
 //! - Caches see the lines in the order of the groups.
 
 mod buffers;
@@ -26,7 +24,7 @@ use serde::Deserialize;
 pub use buffers::{Access, Atomic, Buffer, BufferBinding, Word};
 pub(crate) use buffers::{Buffers, Stored};
 pub use group::{Fault, Group, GroupLane};
-pub(crate) use group::{GroupLog, GroupPlace, View, run};
+pub(crate) use group::{GroupLog, run};
 pub use view::SurfaceView;
 pub(crate) use warp::Touched;
 
@@ -66,11 +64,6 @@ impl ComputeSpec {
 pub trait GroupShader: Sync {
     /// Runs the group: lanes with [`Group::lanes`], and barriers between them.
     fn run(&self, group: &mut Group<'_>);
-
-    /// Whether it needs what atomics return or what earlier groups stored.
-    fn is_serial(&self) -> bool {
-        false
-    }
 }
 
 /// A dispatch of groups.
@@ -137,6 +130,12 @@ impl ComputePass<'_> {
     /// Number of groups.
     pub fn count(&self) -> u64 {
         self.groups.iter().map(|&count| u64::from(count)).product()
+    }
+
+    /// Place of group `number` along x, y and z.
+    pub(crate) fn group(&self, number: u64) -> [u32; 3] {
+        let [x, y] = [u64::from(self.groups[0]), u64::from(self.groups[1])];
+        [number % x, number / x % y, number / x / y].map(|at| at as u32)
     }
 
     /// Checks the sizes against the hardware.

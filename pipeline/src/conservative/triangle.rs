@@ -41,11 +41,6 @@ impl MovingTriangle {
         &self.open
     }
 
-    /// Vertices when the shutter closes.
-    pub fn close(&self) -> &[[f64; 3]; 3] {
-        &self.close
-    }
-
     /// Whether its ends differ.
     pub(crate) fn is_moving(&self) -> bool {
         self.open != self.close

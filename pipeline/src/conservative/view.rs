@@ -30,11 +30,6 @@ pub enum View {
 }
 
 impl View {
-    /// Perspective through a pinhole.
-    pub fn pinhole(near: f64) -> Self {
-        Self::Perspective { s: [0.0; 2], a: [0.0; 2], near }
-    }
-
     /// Orthographic, for all depths and without a lens.
     pub fn orthographic() -> Self {
         Self::Orthographic { s: [0.0; 2], a: [0.0; 2], near: f64::NEG_INFINITY }
@@ -131,17 +126,6 @@ impl Touch {
             t: hull(self.t, other.t),
             z: hull(self.z, other.z),
         }
-    }
-
-    /// Its box of lens and time.
-    pub fn region(&self) -> Region {
-        Region { u: self.u, v: self.v, t: self.t }
-    }
-
-    /// The box and the depth range rounded outward to `f32`, for [`DepthBoxes`](crate::depth::DepthBoxes).
-    /// `lens` says whether the camera has a lens.
-    pub fn outward(&self, lens: bool) -> (Box5, [f32; 2]) {
-        (self.region().outward(lens), outward(self.z))
     }
 }
 

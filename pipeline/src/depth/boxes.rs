@@ -131,23 +131,6 @@ impl DepthBoxes {
         boxes
     }
 
-    /// Division of lens and time.
-    pub fn grid(&self) -> &BoxGrid {
-        &self.grid
-    }
-
-    /// Upper bound of the stored depths in `within`.
-    pub fn farthest(&self, within: &Box5) -> f32 {
-        let boxes = self.grid.overlapping(within).map(|(index, _)| self.boxes[index].farthest);
-        boxes.fold(f32::NEG_INFINITY, f32::max)
-    }
-
-    /// Lower bound of the stored depths in `within`.
-    pub fn nearest(&self, within: &Box5) -> f32 {
-        let boxes = self.grid.overlapping(within).map(|(index, _)| self.boxes[index].nearest);
-        boxes.fold(f32::INFINITY, f32::min)
-    }
-
     /// Part of `within` in which a triangle may pass `test`; everything if it `culls` nothing. `depth(part)` gives its
     /// nearest and farthest depth in a part. It is compared with the stored depths of every overlapping box.
     pub fn compare(
@@ -261,6 +244,18 @@ mod tests {
     use crate::depth::grid::tests::{holds, samples};
     use crate::traversal::Box5;
 
+    impl DepthBoxes {
+        fn farthest(&self, within: &Box5) -> f32 {
+            let boxes = self.grid.overlapping(within).map(|(index, _)| self.boxes[index].farthest);
+            boxes.fold(f32::NEG_INFINITY, f32::max)
+        }
+
+        fn nearest(&self, within: &Box5) -> f32 {
+            let boxes = self.grid.overlapping(within).map(|(index, _)| self.boxes[index].nearest);
+            boxes.fold(f32::INFINITY, f32::min)
+        }
+    }
+
     fn boxes() -> Vec<Box5> {
         let ranges = [[-1.0, 1.0], [-0.3, 0.2], [0.5, 1.0], [0.25, 0.25], [-1.0, -0.5]];
         let all = ranges.iter().flat_map(|&u| ranges.iter().map(move |&v| (u, v)));
@@ -304,7 +299,7 @@ mod tests {
             let whole = Box5::whole(true);
             assert_eq!(depths.farthest(&whole), depth.iter().copied().fold(f32::NEG_INFINITY, f32::max));
             assert_eq!(depths.update(&depth), 0);
-            let anew = DepthBoxes::of(*depths.grid(), &samples, &depth);
+            let anew = DepthBoxes::of(depths.grid, &samples, &depth);
             assert!(boxes().iter().all(|within| anew.farthest(within) == depths.farthest(within)));
         }
     }

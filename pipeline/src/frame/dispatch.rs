@@ -7,10 +7,10 @@ use super::attachments::SurfaceId;
 use super::error::PassError;
 use super::gpu::{Gpu, PassReport};
 use crate::compute::{
-    self, Access, Buffer, ComputeError, ComputePass, ComputeSpec, GroupLog, GroupPlace, Stored, SurfaceView,
-    Touched, View, Word,
+    self, Access, Buffer, ComputeError, ComputePass, ComputeSpec, GroupLog, Stored, SurfaceView, Touched,
+    Word,
 };
-use crate::memory::{MemoryRange, MemorySystem};
+use crate::memory::MemorySystem;
 
 /// Groups that run before their packets are emitted.
 const CHUNK: u64 = 1024;
@@ -18,14 +18,8 @@ const CHUNK: u64 = 1024;
 impl Gpu<'_> {
     /// A new buffer with `data`.
     pub fn buffer<T: Word>(&mut self, name: &str, data: &[T]) -> Buffer<T> {
-        let surface = self.allocate(4 * data.len() as u64);
-        self.buffers.add(name, surface, data)
-    }
-
-    /// What a pass wrote to `surface`, as a buffer of `data` in their order; `None` if they do not fit in it.
-    pub fn view<T: Word>(&mut self, name: &str, surface: MemoryRange, data: &[T]) -> Option<Buffer<T>> {
-        let fits = 4 * data.len() as u64 <= surface.bytes();
-        fits.then(|| self.buffers.add(name, surface, data))
+        let region = self.allocate(4 * data.len() as u64);
+        self.buffers.add(name, region, data)
     }
 
     /// What a pass stored in a surface; `None` while nothing is stored in it.
@@ -84,21 +78,12 @@ impl Gpu<'_> {
         let mut stored: Vec<Stored> = Vec::new();
         for first in (0..pass.count()).step_by(CHUNK as usize) {
             let numbers = first..pass.count().min(first + CHUNK);
-            let place = |number| GroupPlace::of(number, pass.groups);
-            let logs: Vec<GroupLog> = if pass.shader.is_serial() {
-                let live = |number| {
-                    compute::run((pass, spec), place(number), View::Live(&mut self.buffers), &access)
-                };
-                numbers.clone().map(live).collect()
-            } else {
-                let buffers = &self.buffers;
-                let before =
-                    |number| compute::run((pass, spec), place(number), View::Before(buffers), &access);
-                numbers.clone().into_par_iter().map(before).collect()
-            };
+            let buffers = &self.buffers;
+            let run = |number| compute::run((pass, spec), pass.group(number), buffers, &access);
+            let logs: Vec<GroupLog> = numbers.clone().into_par_iter().map(run).collect();
             for (number, log) in numbers.zip(logs) {
                 if let Some((lane, fault)) = log.fault {
-                    return Err(ComputeError::Fault { group: place(number).id, lane, fault });
+                    return Err(ComputeError::Fault { group: pass.group(number), lane, fault });
                 }
                 let mut packet = Packet { counts: log.counts, ..packet };
                 log.lines
@@ -108,9 +93,7 @@ impl Gpu<'_> {
                 stored.extend(log.stored);
             }
         }
-        stored.iter().for_each(|stored| {
-            self.buffers.apply(stored);
-        });
+        stored.iter().for_each(|stored| self.buffers.apply(stored));
         Ok(())
     }
 }

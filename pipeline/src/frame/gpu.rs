@@ -62,7 +62,7 @@ pub struct Rendered {
     /// Count of every event of the pass.
     pub counts: Counts,
     /// Images or depths in memory.
-    pub surface: MemoryRange,
+    pub region: MemoryRange,
 }
 
 impl Rendered {
@@ -229,19 +229,19 @@ impl<'e> Gpu<'e> {
         self.is_on_map = false;
     }
 
-    /// Whether a pass that reads or writes `surface` has to wait for earlier ones.
-    pub(super) fn conflicts(&self, surface: MemoryRange, writes: bool) -> bool {
-        self.is_pending(surface.address()) || (writes && self.is_read(surface))
+    /// Whether a pass that reads or writes `region` has to wait for earlier ones.
+    pub(super) fn conflicts(&self, region: MemoryRange, writes: bool) -> bool {
+        self.is_pending(region.address()) || (writes && self.is_read(region))
     }
 
     /// Whether what is at `address` was written since the last barrier.
     fn is_pending(&self, address: u64) -> bool {
-        self.pending.iter().any(|surface| surface.contains(address))
+        self.pending.iter().any(|region| region.contains(address))
     }
 
-    /// Whether a pass since the last barrier reads `surface`.
-    pub(super) fn is_read(&self, surface: MemoryRange) -> bool {
-        self.reads.iter().any(|&address| surface.contains(address))
+    /// Whether a pass since the last barrier reads `region`.
+    pub(super) fn is_read(&self, region: MemoryRange) -> bool {
+        self.reads.iter().any(|&address| region.contains(address))
     }
 
     /// Records that the last pass reads what is at `address`.
@@ -284,10 +284,10 @@ impl<'e> Gpu<'e> {
         self.memory.clear_log();
     }
 
-    /// Marks a surface as a result of the last pass.
-    pub fn keep(&mut self, surface: MemoryRange) {
-        self.results.push(surface);
-        self.pending.push(surface);
+    /// Marks a region as a result of the last pass.
+    pub fn keep(&mut self, region: MemoryRange) {
+        self.results.push(region);
+        self.pending.push(region);
     }
 
     /// Lets all later work wait for the work so far, and makes its results readable.
@@ -315,7 +315,7 @@ impl<'e> Gpu<'e> {
         let drawn = self.pass(&prepared, pass)?;
         self.last_batch = prepared.batches().len().max(1) as u32 - 1;
         if !prepared.is_attached {
-            self.keep(drawn.surface);
+            self.keep(drawn.region);
         }
         self.reads.extend(reads.vertices.iter().chain(&reads.tiles));
         Ok(drawn)
@@ -345,7 +345,7 @@ impl<'e> Gpu<'e> {
             images: if pass.image { resolve::resolve(prepared, &bins) } else { Vec::new() },
             visible,
             counts: report,
-            surface: prepared.result(),
+            region: prepared.result(),
         })
     }
 

@@ -466,10 +466,10 @@ impl<'a> Draw<'a> {
         Self { bindings, ..self }
     }
 
-    /// The draw with the texture of its shader in `surface`, as an earlier pass wrote it.
+    /// The draw with the texture of its shader in `region`, as an earlier pass wrote it.
     #[must_use]
-    pub fn reading(self, surface: MemoryRange) -> Self {
-        Self { resident: Resident { texture: Some(surface.address()), ..self.resident }, ..self }
+    pub fn reading(self, region: MemoryRange) -> Self {
+        Self { resident: Resident { texture: Some(region.address()), ..self.resident }, ..self }
     }
 }
 
@@ -557,12 +557,6 @@ impl<'a> RasterPass<'a> {
     #[must_use]
     pub fn onto(self, target: Target<'a>) -> Self {
         Self { target, ..self }
-    }
-
-    /// The pass with samples cleared to other values.
-    #[must_use]
-    pub fn cleared(self, clear: Clear) -> Self {
-        Self { clear, ..self }
     }
 
     /// The pass without pixels in its result. Its work is the same.

@@ -94,15 +94,15 @@ impl Gpu<'_> {
         let (texels, from) = self.samples_of(pass)?;
         let spec = SurfaceSpec::new("", texels.viewport(), Format::Rgba8Srgb);
         let tile_px = self.spec().tile_px;
-        let surface = self.allocate(Layout::new(&spec, tile_px, 0).1);
+        let region = self.allocate(Layout::new(&spec, tile_px, 0).1);
         self.check_memory(pass.name)?;
-        let to = Layout::new(&spec, tile_px, surface.address()).0;
+        let to = Layout::new(&spec, tile_px, region.address()).0;
         let shown = |mean: Vec4| Vec3::splat(1.0 - mean.w) * background + mean.truncate();
         let image = mean_values(&texels).into_iter().map(shown).collect();
         self.open(pass.name, Some(spec.viewport));
         self.resolve_tiles(pass, &Places { spec, from, to, words: spec.format.words() });
-        self.keep(surface);
-        Ok(Rendered { images: vec![image], visible: Vec::new(), counts: self.counts_of_pass(), surface })
+        self.keep(region);
+        Ok(Rendered { images: vec![image], visible: Vec::new(), counts: self.counts_of_pass(), region })
     }
 
     /// The stored samples of a pass, and where they are.

@@ -23,51 +23,42 @@ impl Gpu<'_> {
     ) -> Rendered {
         let image = self.allocate(viewport.pixels() as u64 * PIXEL_BYTES);
         self.open(name, Some(viewport));
-        let (side, width) = (self.spec().tile_px, viewport.width());
-        let mut colours = vec![Vec3::ZERO; viewport.pixels()];
-        for (row, y0) in (0..).zip((0..viewport.height()).step_by(side as usize)) {
-            let columns: Vec<u32> = (0..width).step_by(side as usize).collect();
-            let shade = |&x0: &u32| {
-                let lanes = Lanes::default();
-                let shaded = pixels([x0, y0], side, viewport).map(|[x, y]| {
-                    let colour = pixel(&lanes, [x, y]);
-                    lanes.write(image, u64::from(y * width + x) * PIXEL_BYTES, PIXEL_BYTES);
-                    colour
-                });
-                (shaded.collect::<Vec<Vec3>>(), lanes.finish())
-            };
-            let tiles: Vec<(Vec<Vec3>, LaneWork)> = columns.par_iter().map(shade).collect();
-            for ((x0, (shaded, work)), column) in columns.iter().zip(tiles).zip(0..) {
-                for ([x, y], colour) in pixels([*x0, y0], side, viewport).zip(shaded) {
-                    colours[(y * width + x) as usize] = colour;
-                }
-                let mut packet = self.packet(PacketKind::Tile, row * columns.len() as u32 + column, None);
-                work.add_to(&mut packet.counts, self.memory(), |_| false);
-                self.push(&packet, 0);
-            }
-        }
+        let colours = self.run_pixels(viewport, |lanes, [x, y]| {
+            let colour = pixel(lanes, [x, y]);
+            lanes.write(image, u64::from(y * viewport.width() + x) * PIXEL_BYTES, PIXEL_BYTES);
+            colour
+        });
         self.keep(image);
-        Rendered { images: vec![colours], visible: Vec::new(), counts: self.counts_of_pass(), surface: image }
+        Rendered { images: vec![colours], visible: Vec::new(), counts: self.counts_of_pass(), region: image }
     }
 
-    /// Runs a program for the pixel at every column and row, in the pass that was begun.
-    pub fn run_pixels(&mut self, viewport: Viewport, pixel: impl Fn(&Lanes, [u32; 2]) + Sync) {
+    /// Runs a program for the pixel at every column and row, in the pass that was begun. Returns its values, row by row.
+    pub fn run_pixels<T: Clone + Default + Send>(
+        &mut self,
+        viewport: Viewport,
+        pixel: impl Fn(&Lanes, [u32; 2]) -> T + Sync,
+    ) -> Vec<T> {
         let side = self.spec().tile_px;
         let columns: Vec<u32> = (0..viewport.width()).step_by(side as usize).collect();
+        let mut values = vec![T::default(); viewport.pixels()];
         for y0 in (0..viewport.height()).step_by(side as usize) {
             let run = |&x0: &u32| {
                 let lanes = Lanes::default();
-                pixels([x0, y0], side, viewport).for_each(|at| pixel(&lanes, at));
-                lanes.finish()
+                let values: Vec<T> = pixels([x0, y0], side, viewport).map(|at| pixel(&lanes, at)).collect();
+                (values, lanes.finish())
             };
-            let tiles: Vec<LaneWork> = columns.par_iter().map(run).collect();
-            for (work, column) in tiles.iter().zip(0..) {
+            let tiles: Vec<(Vec<T>, LaneWork)> = columns.par_iter().map(run).collect();
+            for ((x0, (of_tile, work)), column) in columns.iter().zip(tiles).zip(0..) {
+                for ([x, y], value) in pixels([*x0, y0], side, viewport).zip(of_tile) {
+                    values[(y * viewport.width() + x) as usize] = value;
+                }
                 let tile = y0 / side * columns.len() as u32 + column;
                 let mut packet = self.packet(PacketKind::Tile, tile, None);
                 work.add_to(&mut packet.counts, self.memory(), |_| false);
                 self.push(&packet, 0);
             }
         }
+        values
     }
 
     /// Writes the pixels of an image of `viewport` in a pass of its own, in tiles.

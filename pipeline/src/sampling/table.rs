@@ -181,11 +181,6 @@ impl SampleTable {
         &self.regions
     }
 
-    /// Region of sample `index` of any pixel, as an index of [`Self::regions`].
-    pub fn region_of(&self, index: u32) -> usize {
-        (index * self.regions.len() as u32 / self.per_pixel) as usize
-    }
-
     /// Pixel of the block for pixel (`px`, `py`) of the image.
     fn block_pixel(&self, px: u32, py: u32) -> (u32, u32) {
         let copy = word(self.seed, u64::from(px / Self::SIDE_PX), u64::from(py / Self::SIDE_PX));
@@ -322,8 +317,7 @@ mod tests {
                 let each = 16 / table.regions().len();
                 for (px, py) in [(0, 0), (70, 9)] {
                     for (index, s) in (0_u32..).zip(table.pixel(px, py)) {
-                        let region = table.region_of(index);
-                        assert_eq!(region, index as usize / each);
+                        let region = index as usize / each;
                         let holds = table.regions().iter().map(|r| r.contains([s.u, s.v]));
                         assert_eq!(holds.clone().position(|h| h), Some(region), "{s:?} of {regions:?}");
                     }

@@ -34,4 +34,4 @@ pub use number::{Coordinate, Number, Pieces, Quadratic};
 pub use region::{Box5, Faces, Piece, TileRect, TimePieces, View};
 pub use screen::{SCREEN_GAIN_MADDS, Screen, screen_madds};
 pub use side_planes::{narrow, narrow_by_sides, narrow_counted, narrow_near};
-pub use time_interval::{TimeIntervals, time_interval, time_interval_counted, time_interval_over};
+pub use time_interval::{TimeIntervals, time_interval, time_interval_counted};

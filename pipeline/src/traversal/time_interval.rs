@@ -4,19 +4,15 @@
 //!
 //! At a fixed point each edge, `e = (p_i x p_j) . (X, Y, 1)` in perspective, is a quadratic in time. The
 //! point is inside if all three edges are non-negative (it sees the clockwise face) or all are non-positive
-//! (the other face). Both sets are intersections of intervals between roots. Over a rectangle the same holds
-//! for the largest or smallest values of the edges; then a point of it *may* be inside.
+//! (the other face). Both sets are intersections of intervals between roots.
 //!
 //! A homogeneous triangle also covers its mirror image behind the camera. If vertices have depths of both
 //! signs, the caller has to check the depth at the times found.
 
 use super::number::{Number, Pieces, Quadratic};
-use super::{EdgeBounds, Edges, Faces, TileRect, View};
 use crate::geometry::Shear;
 use crate::setup::Triangle;
 use crate::tally::{Branches, Costs, Counting, Kernel};
-
-use super::Box5;
 
 /// Closed intervals of time in order, within [0, 1].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,16 +30,6 @@ impl TimeIntervals {
     /// The intervals.
     pub fn as_slice(&self) -> &[[f64; 2]] {
         &self.intervals[..self.len]
-    }
-
-    /// Whether `t` is in one of them.
-    pub fn contains(&self, t: f64) -> bool {
-        self.as_slice().iter().any(|[lo, hi]| (lo..=hi).contains(&&t))
-    }
-
-    /// Total length.
-    pub fn length(&self) -> f64 {
-        self.as_slice().iter().map(|[lo, hi]| hi - lo).sum()
     }
 
     fn intersect<N: Number>(&self, pieces: Pieces<N>, path: impl Branches) -> Self {
@@ -152,15 +138,6 @@ fn largest<N: Number>(
     (0..3).map(|k| places[k] + at.abs() * weight(k)).fold(N::zero(), N::max)
 }
 
-/// Times at which some point of `rect` may be inside `triangle`, by visible face; conservative. For a
-/// rectangle without extent these are the times of its point, plus an allowance for the rounding of the
-/// sample test.
-pub fn time_interval_over(triangle: &Triangle, shear: &Shear, rect: &TileRect) -> [TimeIntervals; 2] {
-    let moving = Triangle { moving: true, ..*triangle };
-    let edges = Edges::<f64>::new(View::new(&moving, &shear.sharp(), rect, &Box5::whole(false)));
-    [[true, false], [false, true]].map(|face: Faces| inside(EdgeBounds::new(&edges).tallest(face), ()))
-}
-
 fn inside<N: Number>(edges: [Quadratic<N>; 3], path: impl Branches) -> TimeIntervals {
     edges.iter().fold(TimeIntervals::WHOLE, |left, edge| left.intersect(edge.pieces(path), path))
 }
@@ -180,6 +157,10 @@ mod tests {
         });
         [(1, 2), (2, 0), (0, 1)]
             .map(|(i, j): (usize, usize)| seen[i][0] * seen[j][1] - seen[j][0] * seen[i][1])
+    }
+
+    fn contains(set: &TimeIntervals, t: f64) -> bool {
+        set.as_slice().iter().any(|[lo, hi]| (lo..=hi).contains(&&t))
     }
 
     fn whole_number_triangle(r: &mut Uniform) -> Triangle {
@@ -208,7 +189,7 @@ mod tests {
                     found[face] += u32::from(inside[face]);
                     // Away from the roots both agree; on a root, and only there, they may differ by rounding.
                     let on_a_root = e.contains(&0);
-                    let says = sets[face].contains(t);
+                    let says = contains(&sets[face], t);
                     assert!(says == inside[face] || (on_a_root && says), "{face} {t} {e:?} {sets:?}");
                 }
             }
@@ -246,35 +227,15 @@ mod tests {
                 for face in [0, 1] {
                     let sign = if face == 0 { 1.0 } else { -1.0 };
                     let inside = e.iter().all(|&e| sign * e >= 0.0);
-                    assert!(!inside || sets[face].contains(t), "{seed}: {t} {e:?} {sets:?}");
+                    assert!(!inside || contains(&sets[face], t), "{seed}: {t} {e:?} {sets:?}");
                     lasted[face] += if inside { 1.0 / 4000.0 } else { 0.0 };
                 }
             }
             for face in [0, 1] {
-                assert!((sets[face].length() - lasted[face]).abs() < 3e-3, "{seed}: {lasted:?} {sets:?}");
+                let length: f64 = sets[face].as_slice().iter().map(|[lo, hi]| hi - lo).sum();
+                assert!((length - lasted[face]).abs() < 3e-3, "{seed}: {lasted:?} {sets:?}");
             }
         }
-    }
-
-    #[test]
-    fn over_a_rectangle_every_time_of_every_point_is_there() {
-        let (mut r, mut short) = (Uniform::new(11), 0);
-        for (seed, case) in cases(300).filter(|(_, case)| case.triangle.moving && !case.within.lens) {
-            let over = time_interval_over(&case.triangle, &case.shear, &case.tile);
-            short += u32::from(over.iter().any(|set| set.length() < 0.9));
-            for _ in 0..40 {
-                let place = case.position(&mut r);
-                let point = time_interval(&case.triangle, &case.shear, place[0], place[1]);
-                for face in [0, 1] {
-                    for [lo, hi] in point[face].as_slice() {
-                        for t in [*lo, 0.5 * (lo + hi), *hi] {
-                            assert!(over[face].contains(t), "{seed}: {t} {over:?} {point:?}");
-                        }
-                    }
-                }
-            }
-        }
-        assert!(short > 100, "{short}");
     }
 
     #[test]

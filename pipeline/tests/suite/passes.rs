@@ -127,7 +127,7 @@ fn a_pass_waits_for_the_one_it_reads_and_finds_its_result_in_the_l2() {
             let first = gpu.draw(&RasterPass::new(&camera, &first, settings).onto(Target::Texture)).unwrap();
             let geometry = Geometry::new(&corners, &corners, &QUAD).unwrap().with_uvs(&uvs).unwrap();
             let draw = Draw::new(geometry, &shader, Cull::None);
-            let draws = [if written { draw.reading(first.surface) } else { draw }];
+            let draws = [if written { draw.reading(first.region) } else { draw }];
             let second = gpu.draw(&RasterPass::new(&camera, &draws, settings)).unwrap();
             drop(gpu);
             (second, packets)

@@ -96,7 +96,7 @@ fn a_raster_pass_and_a_resolve_give_the_same_image() {
         assert!(drawn.images[0].iter().any(|pixel| pixel.x > 0.0 && pixel.y > 0.0), "some pixels are mixed");
         assert_eq!(resolved.counts[Event::PixelsResolved], drawn.counts[Event::PixelsResolved]);
         assert_eq!(resolved.counts[Event::SamplesResolved], 2 * drawn.counts[Event::SamplesResolved]);
-        assert_eq!(resolved.surface.bytes(), drawn.surface.bytes());
+        assert_eq!(resolved.region.bytes(), drawn.region.bytes());
     });
 }
 

@@ -102,8 +102,8 @@ impl Scene {
         let settings = Settings { spec, viewport: viewport(), samples: &self.table, background: BACKGROUND };
         let draws: Vec<Draw<'_>> = self.parts.iter().map(|part| self.draw(part)).collect();
         let camera = camera(self.optics);
-        let pass = RasterPass::new(&camera, &draws, &settings).cleared(self.clear).with_visible();
-        pass.render(|_, _| ()).unwrap()
+        let pass = RasterPass { clear: self.clear, ..RasterPass::new(&camera, &draws, &settings) };
+        pass.with_visible().render(|_, _| ()).unwrap()
     }
 
     fn draw<'a>(&'a self, part: &'a Part) -> Draw<'a> {
@@ -420,7 +420,7 @@ fn hi_z_serves_other_depth_tests() {
         let draws = order.map(|index| still(&cards[index], &RED).with_state(state));
         let is_reversed = matches!(test, Compare::Greater | Compare::GreaterEqual);
         let clear = Clear { depth: if is_reversed { 0.0 } else { f32::INFINITY }, stencil: 0 };
-        let pass = RasterPass::new(&stage.camera, &draws, &settings).cleared(clear);
+        let pass = RasterPass { clear, ..RasterPass::new(&stage.camera, &draws, &settings) };
         pass.render(|_, _| ()).unwrap().counts
     };
     let hits = |test, order| counts(test, order)[Event::SamplesHit];

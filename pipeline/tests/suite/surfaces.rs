@@ -580,7 +580,7 @@ fn fetches_are_counted_as_lanes_execute_them() {
     struct Twice(bool);
     impl Shader for Twice {
         fn shade(&self, lane: &Lane, at: &ShadingPoint, _: Vec4) -> Vec4 {
-            let one = lane.load(0, at.pixel);
+            let one = lane.load_sample(0, at.pixel, 0);
             if lane.branch(self.0 && at.pixel[0] >= 8) {
                 return lane.add(
                     one,

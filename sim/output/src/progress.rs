@@ -73,11 +73,6 @@ impl Bar {
     pub fn set(&self, position: u64) {
         self.bar.set_position(position);
     }
-
-    /// Number of finished steps.
-    pub fn position(&self) -> u64 {
-        self.bar.position()
-    }
 }
 
 impl Drop for Bar {
@@ -106,6 +101,6 @@ mod tests {
                 scope.spawn(|| (0..100).for_each(|_| bar.inc()));
             }
         });
-        assert_eq!(bar.position(), 400);
+        assert_eq!(bar.bar.position(), 400);
     }
 }

@@ -235,11 +235,6 @@ impl MeanSd {
         let sd = if values.len() > 1 { (squares / (values.len() - 1) as f64).sqrt() } else { 0.0 };
         Some(Self { mean, sd })
     }
-
-    /// Scales both by a positive `factor`, for example to convert units.
-    pub fn scaled(self, factor: f64) -> Self {
-        Self { mean: self.mean * factor, sd: self.sd * factor }
-    }
 }
 
 #[cfg(test)]

@@ -145,7 +145,8 @@ const MIN_PACKET_CYCLES: f64 = 2.0;
 impl AccuracyWarning {
     /// All warnings about a frame at `level`.
     pub fn all(level: Level, timed: &Timed) -> Vec<Self> {
-        // Time that is not at stake for more than the error promised cannot break the promise.
+        // The order of lines makes `packet` wrong by at most the disputed share of the frame: below the error that the level
+        // promises, no warning is due.
         let rows = match level {
             Level::Packet => timed.disputed.filter(|&share| share >= MAX_ERROR),
             _ => timed.rows.filter(|&share| share >= MIN_ROW_RATIO),

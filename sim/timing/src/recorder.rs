@@ -43,13 +43,6 @@ impl Recorder {
         Self { bin_ps: bin_ps.max(2), bins: Vec::new(), max_bins: max_bins.max(2), end_ps: 0 }
     }
 
-    /// Record that `unit` did its part of `counts` evenly from `start_ps` to `end_ps`, and was busy
-    /// meanwhile.
-    pub fn record(&mut self, unit: Unit, counts: &PacketCounts, start_ps: u64, end_ps: u64) {
-        self.count(unit, counts, start_ps, end_ps);
-        self.busy(unit, start_ps, end_ps, 1, 1);
-    }
-
     /// Record the events of `unit` evenly from `start_ps` to `end_ps`, without busy time.
     pub fn count(&mut self, unit: Unit, counts: &PacketCounts, start_ps: u64, end_ps: u64) {
         let counts = counts.of(unit);
@@ -252,10 +245,16 @@ mod tests {
         counts
     }
 
+    /// Work of a unit that is busy meanwhile.
+    fn record(recorder: &mut Recorder, counts: &PacketCounts, start_ps: u64, end_ps: u64) {
+        recorder.count(Unit::SampleTest, counts, start_ps, end_ps);
+        recorder.busy(Unit::SampleTest, start_ps, end_ps, 1, 1);
+    }
+
     #[test]
     fn shares_add_up_to_the_whole() {
         let mut recorder = Recorder::new(100, 1000);
-        recorder.record(Unit::SampleTest, &counts(1001), 50, 377);
+        record(&mut recorder, &counts(1001), 50, 377);
         let timeline = recorder.finish();
         assert_eq!(timeline.bins.len(), 4);
         assert_eq!(timeline.total()[Event::SamplesTested], 1001);
@@ -268,7 +267,7 @@ mod tests {
     #[test]
     fn events_without_duration_are_counted() {
         let mut recorder = Recorder::new(100, 1000);
-        recorder.record(Unit::SampleTest, &counts(7), 200, 200);
+        record(&mut recorder, &counts(7), 200, 200);
         let timeline = recorder.finish();
         assert_eq!(timeline.total()[Event::SamplesTested], 7);
         assert_eq!(timeline.busy_ps(), [0; Unit::COUNT]);
@@ -278,7 +277,7 @@ mod tests {
     fn long_frames_merge_bins_and_lose_nothing() {
         let mut recorder = Recorder::new(10, 8);
         for step in 0..100 {
-            recorder.record(Unit::SampleTest, &counts(3), step * 10, step * 10 + 10);
+            record(&mut recorder, &counts(3), step * 10, step * 10 + 10);
         }
         let timeline = recorder.finish();
         assert!(

@@ -123,11 +123,6 @@ pub struct Interval {
 }
 
 impl Interval {
-    /// Whether `truth` is in the interval, ends included.
-    pub fn holds(&self, truth: f64) -> bool {
-        (self.low..=self.high).contains(&truth)
-    }
-
     /// Half the width over the value.
     pub fn relative(&self) -> f64 {
         let half = 0.5 * (self.high - self.low);

@@ -170,11 +170,6 @@ impl Timestamp {
         // A float-to-int cast saturates, far beyond i64.
         i64::try_from(ticks(start_s) + ticks(after_s) - (i128::from(EPOCH_S) << 30)).ok().map(Self)
     }
-
-    /// Units of 2^-30 s since 2018-01-01 UTC.
-    pub fn ticks(self) -> i64 {
-        self.0
-    }
 }
 
 /// Why a JLS file could not be read.
@@ -250,7 +245,7 @@ mod tests {
     }
 
     fn ticks(start_s: f64, after_s: f64) -> Option<i64> {
-        Timestamp::from_unix_s(start_s, after_s).map(Timestamp::ticks)
+        Timestamp::from_unix_s(start_s, after_s).map(|time| time.0)
     }
 
     #[test]

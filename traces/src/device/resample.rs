@@ -22,7 +22,8 @@ const MAX_SAMPLES: f64 = (1_u64 << 36) as f64;
 const MAX_ENERGY_CHANGE: f64 = 0.03;
 
 /// A trace as a coarser device would have recorded it: the original is read again whenever samples are
-/// needed, and neither is in memory. The samples are those of [`Device::resample`], to the last bit.
+/// needed, and neither is in memory. The samples are those of [`Device::sample`] for the power
+/// of the trace, to the last bit.
 pub struct Resampled<'a> {
     device: &'a Device,
     trace: &'a dyn TraceReader,
@@ -41,7 +42,7 @@ impl Device {
     /// whatever is wrong is known before the first sample.
     ///
     /// # Errors
-    /// [`WriteError::Source`] as [`Device::resample`], and [`WriteError::Read`] if the trace cannot be read.
+    /// [`WriteError::Source`] as [`Device::sample`], and [`WriteError::Read`] if the trace cannot be read.
     pub fn resample_in_pieces<'a>(&'a self, trace: &'a dyn TraceReader) -> Result<Resampled<'a>, WriteError> {
         let TraceHeader { start_s, metadata, .. } = trace.header();
         let end_s = trace.header().end_s();
@@ -257,11 +258,21 @@ impl TraceWriter for Pass<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::device::DeviceSpec;
+    use crate::curve::Curve;
+    use crate::device::{DeviceSpec, Sampled};
     use crate::io::SplitTrace;
     use crate::trace::Metadata;
     use crate::trace::Trace;
     use proptest::prelude::*;
+
+    /// The whole trace at once, as if its power were drawn from the device's rail.
+    fn resample(device: &Device, trace: &Trace) -> Result<Sampled, SampleError> {
+        let edges_s = (0..=trace.samples()).map(|index| trace.time_s(index)).collect();
+        let curve = Curve::recorded(edges_s, trace.powers_w().collect())?;
+        let mut sampled = device.sample(&curve, trace.start_s(), curve.end_s())?;
+        sampled.trace.metadata = device.metadata(trace.metadata.clone());
+        Ok(sampled)
+    }
 
     /// 10 W on a rail of 12 V, for a second.
     fn at_12_v() -> Trace {
@@ -327,7 +338,7 @@ mod tests {
                 current_range_a: [-4.0, 4.0], ..DeviceSpec::default()
             }).unwrap();
             let cut = SplitTrace(&trace, piece);
-            match (device.resample(&trace), device.resample_in_pieces(&cut)) {
+            match (resample(&device, &trace), device.resample_in_pieces(&cut)) {
                 (Ok(whole), Ok(pieces)) => {
                     let mut all = All::default();
                     pieces.read_into(&mut all).unwrap();

@@ -128,19 +128,6 @@ impl Device {
         })
     }
 
-    /// Samples a trace as if its power were drawn from the device's rail: what a coarser recorder would have
-    /// shown.
-    ///
-    /// # Errors
-    /// [`SampleError`] as [`Device::sample`].
-    pub fn resample(&self, trace: &Trace) -> Result<Sampled, SampleError> {
-        let edges_s = (0..=trace.samples()).map(|index| trace.time_s(index)).collect();
-        let curve = Curve::recorded(edges_s, trace.powers_w().collect())?;
-        let mut sampled = self.sample(&curve, trace.start_s(), curve.end_s())?;
-        sampled.trace.metadata = self.metadata(trace.metadata.clone());
-        Ok(sampled)
-    }
-
     /// The metadata of a trace recorded by this device.
     pub(super) fn metadata(&self, of: Metadata) -> Metadata {
         Metadata { device: self.spec.name.clone(), seed: self.spec.seed, ..of }

@@ -46,14 +46,6 @@ impl Method {
         }
     }
 
-    /// Triangles set up per beam: itself, or the faces of its bounding volume if it does not fold.
-    pub const fn triangles(self) -> usize {
-        match self {
-            Self::Moving => 1,
-            _ => 8,
-        }
-    }
-
     /// Faces of the bounding volumes of a beam; none for the moving triangle.
     pub(super) fn bounding_volumes(self, beam: &Beam, into: &mut BoundingVolume) {
         into.clear();

@@ -185,7 +185,9 @@ mod tests {
                 let hit = random.hit();
                 let point = seen.image.point(&hit);
                 let found = times(&eye, &seen, [point.x, point.y]);
-                let near = |t: f64| found.iter().any(|set| set.contains(t));
+                let near = |t: f64| {
+                    found.iter().any(|set| set.as_slice().iter().any(|[lo, hi]| (lo..=hi).contains(&&t)))
+                };
                 assert!(
                     near(hit.t) || near(hit.t - 1e-9) || near(hit.t + 1e-9),
                     "{round}: {hit:?} {found:?}"

@@ -119,7 +119,7 @@ impl Draws for Caustics {
 
     fn draw(&self, time_s: &f64, gpu: &mut Gpu<'_>) -> Result<Drawn, JobError> {
         let beams = self.ocean.beams(*time_s);
-        let eye = self.eye().ok_or_else(|| JobError::Setting("the view has no extent".to_owned()))?;
+        let eye = self.eye().ok_or_else(|| JobError::setting("the view has no extent"))?;
         let method = self.options.method;
         let picture = draw_on(gpu, &beams, &eye, method, self.light());
         gpu.write_image("tone", eye.viewport());

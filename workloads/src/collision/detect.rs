@@ -6,7 +6,7 @@ use super::bounds::Bounds;
 use super::contact_probe;
 use super::object::Object;
 use super::pair::{Method, Pair, Search, Verdict};
-use super::pass::{Observer, Part, Scratch};
+use super::pass::{Part, PassBackend, Scratch};
 
 /// Verdict on objects `a` and `b`, `a < b`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,51 +60,51 @@ impl Search {
         self.pair_observed(a, b, scratch, &mut ())
     }
 
-    /// The same, with an `observer` of the passes.
+    /// The same, with a `backend` of the passes.
     pub(super) fn pair_observed(
         &self,
         a: &Object,
         b: &Object,
         scratch: &mut Scratch,
-        observer: &mut impl Observer,
+        backend: &mut impl PassBackend,
     ) -> Verdict {
         let largest = a.largest().max(b.largest());
         if largest > 0.0 && largest < MAX_SCALED_COORDINATE {
             let factor = upscale_factor(largest);
             let [one, other] = [a, b].map(|object| object.scaled(factor));
-            return self.searched([&one, &other], scratch, observer).scaled(1.0 / factor);
+            return self.searched([&one, &other], scratch, backend).scaled(1.0 / factor);
         }
-        self.searched([a, b], scratch, observer)
+        self.searched([a, b], scratch, backend)
     }
 
     fn searched(
         &self,
         objects: [&Object; 2],
         scratch: &mut Scratch,
-        observer: &mut impl Observer,
+        backend: &mut impl PassBackend,
     ) -> Verdict {
         let Some(mut pair) = Pair::new(objects, [0.0, 1.0], self) else { return Verdict::Apart };
         let by_depth = self.method == Method::DepthOnly;
         if by_depth && !self.zoom {
-            return pair.by_depth(scratch, observer);
+            return pair.by_depth(scratch, backend);
         }
         if !pair.tighten() {
             return Verdict::Apart;
         }
         if !self.zoom {
-            return pair.once(scratch, observer);
+            return pair.once(scratch, backend);
         }
         if contact_probe::finds_contact(pair.parts(), &pair.window) {
             return pair.maybe(0, true);
         }
         if by_depth {
-            return pair.refine_by_depth(scratch, observer);
+            return pair.refine_by_depth(scratch, backend);
         }
         let Some(seen) = InFrame::new(pair.parts(), &pair.window) else {
-            return pair.refine(scratch, observer);
+            return pair.refine(scratch, backend);
         };
         let in_frame = Pair::new(seen.objects.each_ref(), pair.window.time, self);
-        in_frame.map_or(Verdict::Apart, |mut in_frame| seen.to_world(in_frame.refine(scratch, observer)))
+        in_frame.map_or(Verdict::Apart, |mut in_frame| seen.to_world(in_frame.refine(scratch, backend)))
     }
 }
 

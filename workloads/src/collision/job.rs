@@ -7,9 +7,9 @@ use pipeline::{Gpu, Viewport};
 use serde::{Deserialize, Serialize};
 use warnings::{Code, Warning};
 
-use super::emitter::{Emitted, PassesOnGpu};
 use super::families::swarm_of;
 use super::object::load_objects;
+use super::on_gpu::{Emitted, PassesOnGpu};
 use super::pass::Scratch;
 use super::{Method, Object, Search, Sweeps, candidates};
 use crate::error::LoadError;

@@ -23,10 +23,10 @@
 mod bounds;
 mod contact_probe;
 mod detect;
-mod emitter;
 pub mod families;
 mod job;
 mod object;
+mod on_gpu;
 mod pair;
 mod pass;
 mod plain;

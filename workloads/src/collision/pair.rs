@@ -6,7 +6,7 @@ use super::bounds::Bounds;
 use super::contact_probe::cross;
 use super::object::Object;
 use super::pass::{
-    Comparison, Fit, FragmentBudget, Observer, Part, Pass, Resources, Scratch, Survivors, Tiling,
+    Comparison, Fit, FragmentBudget, Part, Pass, PassBackend, Resources, Scratch, Survivors, Tiling,
 };
 
 /// What a pass compares in a tile.
@@ -125,10 +125,10 @@ impl<'a> Pair<'a> {
     }
 
     /// Searches by depths alone, without time bins.
-    pub fn by_depth(&self, scratch: &mut Scratch, observer: &mut impl Observer) -> Verdict {
+    pub fn by_depth(&self, scratch: &mut Scratch, backend: &mut impl PassBackend) -> Verdict {
         let resolution = self.search.resolution;
         let budget = FragmentBudget::unlimited();
-        match self.depths(resolution, &mut Resources { scratch, budget, observer }) {
+        match self.depths(resolution, &mut Resources { scratch, budget, backend }) {
             Some(0) => Verdict::Apart,
             tiles => self.maybe(tiles.unwrap_or(0), false),
         }
@@ -136,7 +136,7 @@ impl<'a> Pair<'a> {
 
     /// Fewest overlapping tiles of the six passes by depths alone; 0 means apart. `None` if the fragments
     /// exceed the budget.
-    pub fn depths(&self, resolution: u32, resources: &mut Resources<'_, impl Observer>) -> Option<u64> {
+    pub fn depths(&self, resolution: u32, resources: &mut Resources<'_, impl PassBackend>) -> Option<u64> {
         let tiling = Tiling { resolution, min_width: self.min_tile_width() };
         let mut fewest = u64::MAX;
         for axis in 0..3 {
@@ -149,11 +149,11 @@ impl<'a> Pair<'a> {
     }
 
     /// Searches once, at the requested resolution.
-    pub fn once(&mut self, scratch: &mut Scratch, observer: &mut impl Observer) -> Verdict {
+    pub fn once(&mut self, scratch: &mut Scratch, backend: &mut impl PassBackend) -> Verdict {
         let Search { resolution, bins, .. } = *self.search;
         let params = PassParams { resolution, bins, fit: Fit::Edges };
         let budget = FragmentBudget::unlimited();
-        match self.round(params, &mut Resources { scratch, budget, observer }) {
+        match self.round(params, &mut Resources { scratch, budget, backend }) {
             PairResult::Apart => Verdict::Apart,
             PairResult::BudgetExceeded => self.maybe(0, false),
             PairResult::Overlap(Round { window, tiles, seen }) => {
@@ -203,7 +203,11 @@ impl<'a> Pair<'a> {
     }
 
     /// Runs three passes. When refining, drops triangles that touch nothing after each pass.
-    pub fn round(&mut self, params: PassParams, resources: &mut Resources<'_, impl Observer>) -> PairResult {
+    pub fn round(
+        &mut self,
+        params: PassParams,
+        resources: &mut Resources<'_, impl PassBackend>,
+    ) -> PairResult {
         let mut remaining = time_bins(&self.window, params.bins);
         let (mut tiles, mut seen) = (0, false);
         for axis in 0..3 {
@@ -233,7 +237,7 @@ impl<'a> Pair<'a> {
         &self,
         pass: &Pass,
         remaining: &[Option<Bounds>],
-        resources: &mut Resources<'_, impl Observer>,
+        resources: &mut Resources<'_, impl PassBackend>,
     ) -> Option<Survivors> {
         let mut all = Survivors::none(0, self.parts());
         for bins in remaining.chunks((MAX_TILES_IN_MEMORY / pass.tiles()).max(1)) {
@@ -306,12 +310,12 @@ const SAMPLED_TRIANGLES: usize = 64;
 impl Pair<'_> {
     /// Searches with few tiles, then with more; smaller windows give smaller tiles. Many triangles are tested
     /// by their boxes until that no longer helps, the remaining ones by their edges.
-    pub fn refine(&mut self, scratch: &mut Scratch, observer: &mut impl Observer) -> Verdict {
+    pub fn refine(&mut self, scratch: &mut Scratch, backend: &mut impl PassBackend) -> Verdict {
         if !self.tighten() {
             return Verdict::Apart;
         }
         let most = self.search.resolution;
-        let mut resources = Resources { scratch, budget: self.budget(), observer };
+        let mut resources = Resources { scratch, budget: self.budget(), backend };
         let mut fit = if self.triangles() > MIN_TRIANGLES_FOR_BOXES { Fit::Boxes } else { Fit::Edges };
         let first = (self.triangles() as f64 / TRIANGLES_PER_TILE).sqrt() as u32;
         let (mut resolution, mut last) = (first.max(MIN_FIRST_TILES).min(most), self.maybe(0, false));
@@ -353,9 +357,9 @@ impl Pair<'_> {
 
     /// Searches by depths alone, with few tiles, then with more. Objects that few tiles separate are apart. A
     /// pair that exceeds its budget stays.
-    pub fn refine_by_depth(&self, scratch: &mut Scratch, observer: &mut impl Observer) -> Verdict {
+    pub fn refine_by_depth(&self, scratch: &mut Scratch, backend: &mut impl PassBackend) -> Verdict {
         let most = self.search.resolution;
-        let mut resources = Resources { scratch, budget: self.budget(), observer };
+        let mut resources = Resources { scratch, budget: self.budget(), backend };
         let (mut resolution, mut last) = (MIN_FIRST_TILES.min(most), 0);
         while let Some(tiles) = self.depths(resolution, &mut resources) {
             if tiles == 0 {
@@ -412,7 +416,7 @@ mod tests {
     /// Counts fragments.
     struct Drawn(u64);
 
-    impl Observer for Drawn {
+    impl PassBackend for Drawn {
         fn fragment(&mut self, _: &Pass, _: usize, _: &Fragment) {
             self.0 += 1;
         }

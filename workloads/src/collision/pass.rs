@@ -344,11 +344,11 @@ pub(super) struct Scratch {
     fragments: [Vec<StoredFragment>; 2],
 }
 
-/// Buffers, remaining fragments and observer of a search.
-pub(super) struct Resources<'a, O> {
+/// Buffers, remaining fragments and backend of a search.
+pub(super) struct Resources<'a, B> {
     pub scratch: &'a mut Scratch,
     pub budget: FragmentBudget,
-    pub observer: &'a mut O,
+    pub backend: &'a mut B,
 }
 
 /// A fragment that is compared with the overlapping tiles after the pass.
@@ -358,8 +358,8 @@ struct StoredFragment {
     inside: TzBox,
 }
 
-/// What draws the passes, or observes their work.
-pub(super) trait Observer {
+/// What draws the passes: the host, or the modelled hardware. It may record their work.
+pub(super) trait PassBackend {
     /// Begins a pass, whose boxes are empty.
     fn begin(&mut self, _name: &str) {}
 
@@ -393,8 +393,8 @@ pub(super) trait Observer {
     fn overlap(&mut self, _pass: &Pass, _tile: [u32; 2]) {}
 }
 
-/// No observer.
-impl Observer for () {}
+/// Passes that are drawn on the host alone, without reports.
+impl PassBackend for () {}
 
 /// Result of a pass.
 pub(super) struct Survivors {
@@ -461,11 +461,11 @@ pub(super) struct Comparison<'a> {
 
 impl Comparison<'_> {
     /// Draws part `which` into its boxes and stores its fragments; `None` if they exceed the budget.
-    fn fill(&self, which: usize, resources: &mut Resources<'_, impl Observer>) -> Option<()> {
-        let Resources { scratch, budget, observer } = resources;
+    fn fill(&self, which: usize, resources: &mut Resources<'_, impl PassBackend>) -> Option<()> {
+        let Resources { scratch, budget, backend } = resources;
         let (boxes, stored) = (&mut scratch.boxes[which], &mut scratch.fragments[which]);
         stored.clear();
-        self.boxed(which, boxes, budget, *observer, |fragment| stored.push(fragment))
+        self.boxed(which, boxes, budget, *backend, |fragment| stored.push(fragment))
     }
 
     /// Draws part `which` into its boxes and passes its fragments to `each`; `None` if they exceed the budget.
@@ -474,15 +474,15 @@ impl Comparison<'_> {
         which: usize,
         boxes: &mut TzBuffer,
         budget: &mut FragmentBudget,
-        observer: &mut impl Observer,
+        backend: &mut impl PassBackend,
         mut each: impl FnMut(StoredFragment),
     ) -> Option<()> {
         boxes.clear(self.pass.tiles() * self.bins.len());
         if which == 0 {
-            observer.begin("pair");
+            backend.begin("pair");
         }
         let part = (which, self.parts[which]);
-        let all = observer.draw(self.pass, part, self.bins, budget, None, &mut |fragment| {
+        let all = backend.draw(self.pass, part, self.bins, budget, None, &mut |fragment| {
             let place = self.pass.place(fragment.tile, fragment.bin);
             boxes.add(place, &fragment.inside);
             each(StoredFragment { place, item: fragment.item, inside: fragment.inside });
@@ -497,15 +497,18 @@ impl Comparison<'_> {
 
     /// Compares the first part's box in each tile with each fragment of the second, per time bin (thesis,
     /// Paper VI, Fig. 5, right). `None` if the fragments exceed the budget.
-    pub fn fragments_against_boxes(&self, resources: &mut Resources<'_, impl Observer>) -> Option<Survivors> {
+    pub fn fragments_against_boxes(
+        &self,
+        resources: &mut Resources<'_, impl PassBackend>,
+    ) -> Option<Survivors> {
         let mut result = Survivors::none(self.bins.len(), self.parts);
         self.fill(0, resources)?;
-        let Resources { scratch, budget, observer } = resources;
+        let Resources { scratch, budget, backend } = resources;
         let [boxes, met] = &mut scratch.boxes;
         met.clear(self.pass.tiles() * self.bins.len());
         let (known_boxes, mut overlaps) = (&*boxes, Vec::new());
         let part = (1, self.parts[1]);
-        let all = observer.draw(self.pass, part, self.bins, budget, Some(known_boxes), &mut |fragment| {
+        let all = backend.draw(self.pass, part, self.bins, budget, Some(known_boxes), &mut |fragment| {
             let Fragment { tile, bin, item, inside } = *fragment;
             let place = self.pass.place(tile, bin);
             let known = known_boxes.at(place);
@@ -516,27 +519,27 @@ impl Comparison<'_> {
             met.add(place, &TzBox { t: both[0], z: both[1], triangle: inside.triangle });
             overlaps.push(tile);
         });
-        overlaps.into_iter().for_each(|tile| observer.overlap(self.pass, tile));
+        overlaps.into_iter().for_each(|tile| backend.overlap(self.pass, tile));
         mark(&mut result.alive[0], &scratch.fragments[0], met);
         all.then_some(result)
     }
 
     /// Compares the boxes of both parts in each tile, per time bin (Fig. 5, left). `None` if the fragments
     /// exceed `budget`.
-    pub fn boxes_against_boxes(&self, resources: &mut Resources<'_, impl Observer>) -> Option<Survivors> {
+    pub fn boxes_against_boxes(&self, resources: &mut Resources<'_, impl PassBackend>) -> Option<Survivors> {
         let mut result = Survivors::none(self.bins.len(), self.parts);
         self.fill(0, resources)?;
         self.fill(1, resources)?;
-        let Resources { scratch, observer, .. } = resources;
+        let Resources { scratch, backend, .. } = resources;
         let [first, second] = &scratch.boxes;
-        observer.compare(self.pass, self.bins.len(), [first, second], false);
+        backend.compare(self.pass, self.bins.len(), [first, second], false);
         for (place, one) in first.used() {
             let other = second.at(place);
             let (tile, bin) = self.pass.at(place);
             let Some(both) = one.meet(other.t, other.z) else { continue };
             if let Some(found) = self.remaining(tile, bin, both) {
                 result.add(bin, &found, [one.triangle, other.triangle]);
-                observer.overlap(self.pass, tile);
+                backend.overlap(self.pass, tile);
             }
         }
         for (which, alive) in result.alive.iter_mut().enumerate() {
@@ -547,13 +550,13 @@ impl Comparison<'_> {
 
     /// Overlapping tiles by depths alone: where the second part is in front of the first's farthest depth,
     /// and where it is behind the nearest. `None` if the fragments exceed the budget.
-    pub fn depths(&self, resources: &mut Resources<'_, impl Observer>) -> Option<[u64; 2]> {
-        let Resources { scratch, budget, observer } = resources;
+    pub fn depths(&self, resources: &mut Resources<'_, impl PassBackend>) -> Option<[u64; 2]> {
+        let Resources { scratch, budget, backend } = resources;
         for which in [0, 1] {
-            self.boxed(which, &mut scratch.boxes[which], budget, *observer, |_| ())?;
+            self.boxed(which, &mut scratch.boxes[which], budget, *backend, |_| ())?;
         }
         let [first, second] = &scratch.boxes;
-        observer.compare(self.pass, self.bins.len(), [first, second], false);
+        backend.compare(self.pass, self.bins.len(), [first, second], false);
         let both = || {
             let shared = first.used().map(|(place, one)| (one.z, second.at(place).z));
             shared.filter(|(_, other)| other[0] <= other[1])

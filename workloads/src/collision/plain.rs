@@ -7,7 +7,7 @@ use super::detect::{MAX_SCALED_COORDINATE, upscale_factor};
 use super::object::Object;
 use super::pair::Method;
 use super::pass::{
-    Comparison, Fit, Fragment, FragmentBudget, Observer, Part, Pass, Resources, Scratch, Tiling,
+    Comparison, Fit, Fragment, FragmentBudget, Part, Pass, PassBackend, Resources, Scratch, Tiling,
 };
 
 /// Work of the passes, and the overlapping pixels of a pair.
@@ -45,7 +45,7 @@ impl PlainResult {
     }
 }
 
-impl Observer for PlainResult {
+impl PassBackend for PlainResult {
     fn begin(&mut self, _: &str) {
         self.passes += 1;
     }
@@ -106,7 +106,7 @@ impl PlainPasses {
     /// Pixels of a pass in which both objects may touch.
     fn overlaps(&mut self, comparison: &Comparison<'_>, result: &mut PlainResult) -> u64 {
         let (scratch, budget) = (&mut self.scratch, FragmentBudget::unlimited());
-        let resources = &mut Resources { scratch, budget, observer: result };
+        let resources = &mut Resources { scratch, budget, backend: result };
         // The budget is unlimited, so there always is a result. Without one, the pair would have to stay.
         match self.method {
             Method::DepthOnly => comparison.depths(resources).map_or(1, |[front, behind]| front.min(behind)),

@@ -10,7 +10,7 @@ use super::bounds::{Bounds, TzBox, TzBuffer};
 use super::detect::{MAX_SCALED_COORDINATE, candidates, upscale_factor};
 use super::object::Object;
 use super::pair::{Method, time_bins};
-use super::pass::{Fit, FragmentBudget, Observer, Part, Pass, Tiling};
+use super::pass::{Fit, FragmentBudget, Part, Pass, PassBackend, Tiling};
 use super::plain::PlainResult;
 
 /// Parameters of the sweeps.
@@ -49,24 +49,24 @@ impl Sweeps {
         CollidingSet { objects, work }
     }
 
-    /// The same, drawn by `observer`.
-    pub(super) fn detect_on(&self, objects: &[Object], observer: &mut impl Observer) -> Vec<usize> {
+    /// The same, drawn by `backend`.
+    pub(super) fn detect_on(&self, objects: &[Object], backend: &mut impl PassBackend) -> Vec<usize> {
         let largest = objects.iter().map(Object::largest).fold(0.0, f64::max);
         if largest > 0.0 && largest < MAX_SCALED_COORDINATE {
             let factor = upscale_factor(largest);
             let scaled: Vec<Object> = objects.iter().map(|object| object.scaled(factor)).collect();
-            return self.all_axes(&scaled, observer);
+            return self.all_axes(&scaled, backend);
         }
-        self.all_axes(objects, observer)
+        self.all_axes(objects, backend)
     }
 
-    fn all_axes(&self, objects: &[Object], observer: &mut impl Observer) -> Vec<usize> {
+    fn all_axes(&self, objects: &[Object], backend: &mut impl PassBackend) -> Vec<usize> {
         let mut set: Vec<usize> = (0..objects.len()).filter(|&object| !objects[object].is_empty()).collect();
         for axis in 0..3 {
             if set.len() < 2 {
                 return Vec::new();
             }
-            set = self.along(axis, objects, &set, observer);
+            set = self.along(axis, objects, &set, backend);
         }
         set
     }
@@ -77,7 +77,7 @@ impl Sweeps {
         axis: usize,
         objects: &[Object],
         set: &[usize],
-        observer: &mut impl Observer,
+        backend: &mut impl PassBackend,
     ) -> Vec<usize> {
         let hull = set.iter().fold(Bounds::NOTHING, |hull, &object| hull.hull(objects[object].bounds()));
         let uncertainty = set.iter().map(|&object| objects[object].uncertainty);
@@ -95,10 +95,10 @@ impl Sweeps {
         let mut meets = vec![[false; 2]; objects.len()];
         let backward: Vec<usize> = set.iter().rev().copied().collect();
         for (order, name) in [(set, NAMES[axis][0]), (&backward, NAMES[axis][1])] {
-            observer.begin(name);
+            backend.begin(name);
             sweep.known.clear(pass.tiles() * bins.len());
             for &object in order {
-                let found = sweep.object(&objects[object], observer);
+                let found = sweep.object(&objects[object], backend);
                 (0..2).for_each(|direction| meets[object][direction] |= found[direction]);
             }
         }
@@ -124,18 +124,18 @@ struct Sweep<'a> {
 impl Sweep<'_> {
     /// Whether an object meets those before it, seen from either direction of the axis; then it is added to them. Boxes of
     /// time and depth need no second direction.
-    fn object(&mut self, object: &Object, observer: &mut impl Observer) -> [bool; 2] {
+    fn object(&mut self, object: &Object, backend: &mut impl PassBackend) -> [bool; 2] {
         let list: Vec<u32> = (0..object.len() as u32).collect();
         let part = Part { object, list: &list };
         let found = match self.method {
-            Method::FragmentBox => self.fragments(part, observer),
-            _ => self.boxes(part, observer),
+            Method::FragmentBox => self.fragments(part, backend),
+            _ => self.boxes(part, backend),
         };
         match self.method {
             Method::FragmentBox => {
                 let (pass, known) = (self.pass, &mut self.known);
                 let budget = &mut FragmentBudget::unlimited();
-                observer.draw(pass, (0, part), self.bins, budget, None, &mut |fragment| {
+                backend.draw(pass, (0, part), self.bins, budget, None, &mut |fragment| {
                     known.add(pass.place(fragment.tile, fragment.bin), &fragment.inside);
                 });
             }
@@ -145,34 +145,34 @@ impl Sweep<'_> {
     }
 
     /// Compares each fragment with the boxes so far.
-    fn fragments(&self, part: Part<'_>, observer: &mut impl Observer) -> [bool; 2] {
+    fn fragments(&self, part: Part<'_>, backend: &mut impl PassBackend) -> [bool; 2] {
         let (pass, mut overlaps) = (self.pass, Vec::new());
         let budget = &mut FragmentBudget::unlimited();
-        observer.draw(pass, (1, part), self.bins, budget, Some(&self.known), &mut |fragment| {
+        backend.draw(pass, (1, part), self.bins, budget, Some(&self.known), &mut |fragment| {
             let known = self.known.at(pass.place(fragment.tile, fragment.bin));
             if known.meet(fragment.inside.t, fragment.inside.z).is_some() {
                 overlaps.push(fragment.tile);
             }
         });
-        overlaps.iter().for_each(|tile| observer.overlap(pass, *tile));
+        overlaps.iter().for_each(|tile| backend.overlap(pass, *tile));
         [!overlaps.is_empty(); 2]
     }
 
     /// Draws the object into boxes of its own, and compares these with the boxes so far.
-    fn boxes(&mut self, part: Part<'_>, observer: &mut impl Observer) -> [bool; 2] {
+    fn boxes(&mut self, part: Part<'_>, backend: &mut impl PassBackend) -> [bool; 2] {
         let (pass, own) = (self.pass, &mut self.own);
         own.clear(pass.tiles() * self.bins.len());
         let budget = &mut FragmentBudget::unlimited();
-        observer.draw(pass, (1, part), self.bins, budget, None, &mut |fragment| {
+        backend.draw(pass, (1, part), self.bins, budget, None, &mut |fragment| {
             own.add(pass.place(fragment.tile, fragment.bin), &fragment.inside);
         });
-        observer.compare(pass, self.bins.len(), [&self.known, &self.own], true);
+        backend.compare(pass, self.bins.len(), [&self.known, &self.own], true);
         let mut found = [false; 2];
         for (place, own) in self.own.used() {
             let directions = overlaps(self.method, self.known.at(place), own);
             (0..2).for_each(|direction| found[direction] |= directions[direction]);
             if directions == [true; 2] {
-                observer.overlap(pass, pass.at(place).0);
+                backend.overlap(pass, pass.at(place).0);
             }
         }
         found

@@ -74,7 +74,7 @@ impl Compute {
     /// [`JobError`] if it has no pixels, or too many.
     pub fn viewport(&self) -> Result<Viewport, JobError> {
         let settings = self.scene.settings();
-        Viewport::new(settings.width, settings.height).ok_or_else(|| JobError::Setting(IMAGE_SIZE.to_owned()))
+        Viewport::new(settings.width, settings.height).ok_or_else(|| JobError::setting(IMAGE_SIZE))
     }
 
     /// Samples of the pixels.
@@ -270,7 +270,7 @@ fn left_out(viewport: Viewport) -> Option<Warning> {
 }
 
 fn view(gpu: &mut Gpu<'_>, id: SurfaceId) -> Result<SurfaceView, JobError> {
-    gpu.surface_view(id).ok_or_else(|| JobError::Setting("a pass stored nothing".to_owned()))
+    gpu.surface_view(id).ok_or_else(|| JobError::setting("a pass stored nothing"))
 }
 
 impl Compute {

@@ -2,8 +2,7 @@
 
 use activity::{Counts, Event};
 use pipeline::{
-    Buffer, BufferBinding, Camera, ComputeError, ComputePass, Gpu, GroupShader, PassError, SurfaceView,
-    Viewport,
+    Buffer, BufferBinding, Camera, ComputeError, ComputePass, Gpu, PassError, SurfaceView, Viewport,
 };
 
 use super::block::{Blocks, Slots};
@@ -59,10 +58,24 @@ impl<'a, 'e> Kernels<'a, 'e> {
         let mean = self.gpu.buffer("mean", &[0.0_f32]);
         let shader = BlockSums { image: *image, blocks, slots, order, sums };
         let bindings = [image.reads(), sums.writes()];
-        self.dispatch("block sums", (groups, group, shared_bytes), &bindings, &shader)?;
+        self.dispatch(&ComputePass {
+            name: "block sums",
+            groups,
+            group_size: group,
+            shared_bytes,
+            bindings: &bindings,
+            shader: &shader,
+        })?;
         let count = (blocks.count() * u64::from(image.samples())) as f32;
         let shader = Mean { sums, slots, order, count, mean };
-        self.dispatch("mean", ([1; 3], group, shared_bytes), &[sums.reads(), mean.writes()], &shader)?;
+        self.dispatch(&ComputePass {
+            name: "mean",
+            groups: [1; 3],
+            group_size: group,
+            shared_bytes,
+            bindings: &[sums.reads(), mean.writes()],
+            shader: &shader,
+        })?;
         Ok(mean)
     }
 
@@ -76,8 +89,14 @@ impl<'a, 'e> Kernels<'a, 'e> {
         let counts = self.gpu.buffer("histogram", &vec![0_u32; bins as usize]);
         let copy_words = bins + u32::from(padded);
         let shader = Count { image: *image, blocks, atomics, copies, copy_words, counts };
-        let sizes = (blocks.groups(), group, 4 * shader.words());
-        self.dispatch("histogram", sizes, &[image.reads(), counts.writes()], &shader)?;
+        self.dispatch(&ComputePass {
+            name: "histogram",
+            groups: blocks.groups(),
+            group_size: group,
+            shared_bytes: 4 * shader.words(),
+            bindings: &[image.reads(), counts.writes()],
+            shader: &shader,
+        })?;
         Ok(counts)
     }
 
@@ -88,8 +107,14 @@ impl<'a, 'e> Kernels<'a, 'e> {
     pub fn sums(&mut self, counts: Buffer<u32>) -> Result<Buffer<u32>, PassError> {
         let bins = counts.len();
         let sums = self.gpu.buffer("sums", &vec![0_u32; bins as usize]);
-        let sizes = ([1; 3], bins, 8 * bins);
-        self.dispatch("sums", sizes, &[counts.reads(), sums.writes()], &Scan { counts, sums })?;
+        self.dispatch(&ComputePass {
+            name: "sums",
+            groups: [1; 3],
+            group_size: bins,
+            shared_bytes: 8 * bins,
+            bindings: &[counts.reads(), sums.writes()],
+            shader: &Scan { counts, sums },
+        })?;
         Ok(sums)
     }
 
@@ -118,8 +143,14 @@ impl<'a, 'e> Kernels<'a, 'e> {
         let shader = Cull { depth: *depth, depth_bounds, blocks, plane, lights, lists };
         let written = [lists.counts.writes(), lists.lights.writes(), lists.most.writes()];
         let bindings = [&[depth.reads(), words.reads()][..], &written].concat();
-        let sizes = (blocks.groups(), group, 4 * Cull::words(group));
-        self.dispatch("light culling", sizes, &bindings, &shader)?;
+        self.dispatch(&ComputePass {
+            name: "light culling",
+            groups: blocks.groups(),
+            group_size: group,
+            shared_bytes: 4 * Cull::words(group),
+            bindings: &bindings,
+            shader: &shader,
+        })?;
         Ok((lists, blocks))
     }
 
@@ -157,10 +188,15 @@ impl<'a, 'e> Kernels<'a, 'e> {
         let out = self.gpu.buffer("image", &vec![0_u32; width as usize * height as usize]);
         let blocks = Blocks::new(image.size(), group, 1, 1);
         let bindings = [&[image.reads(), out.writes()], reads].concat();
-        let before = self.counts;
         let shader = Display { image: *image, blocks, show, out };
-        self.dispatch("display", (blocks.groups(), group, 0), &bindings, &shader)?;
-        self.counts = before;
+        self.gpu.dispatch(&ComputePass {
+            name: "display",
+            groups: blocks.groups(),
+            group_size: group,
+            shared_bytes: 0,
+            bindings: &bindings,
+            shader: &shader,
+        })?;
         Ok(decoded(&self.gpu.values(out)))
     }
 
@@ -211,15 +247,8 @@ impl<'a, 'e> Kernels<'a, 'e> {
         Blocks::new(image.size(), group, per_lane, step)
     }
 
-    fn dispatch(
-        &mut self,
-        name: &str,
-        (groups, group_size, shared_bytes): ([u32; 3], u32, u32),
-        bindings: &[BufferBinding],
-        shader: &dyn GroupShader,
-    ) -> Result<(), PassError> {
-        let pass = ComputePass { name, groups, group_size, shared_bytes, bindings, shader };
-        self.counts += &self.gpu.dispatch(&pass)?;
+    fn dispatch(&mut self, pass: &ComputePass<'_>) -> Result<(), PassError> {
+        self.counts += &self.gpu.dispatch(pass)?;
         Ok(())
     }
 }

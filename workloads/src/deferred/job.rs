@@ -171,8 +171,8 @@ impl DrawsScene for Deferred {
 
     fn draw_frame(&self, frame: &Frame, gpu: &mut Gpu<'_>) -> Result<Drawn, JobError> {
         let settings = self.scene.settings();
-        let viewport = Viewport::new(settings.width, settings.height)
-            .ok_or_else(|| JobError::Setting(IMAGE_SIZE.to_owned()))?;
+        let viewport =
+            Viewport::new(settings.width, settings.height).ok_or_else(|| JobError::setting(IMAGE_SIZE))?;
         let samples = self.samples.per_pixel();
         let lit = gpu.create_surface(&SurfaceSpec::new("lit samples", viewport, LIT).sampled(samples));
         let stage = Stage { job: self, frame, viewport, lit, screen: Corners::of(frame, viewport) };
@@ -254,7 +254,7 @@ impl<'a> Stage<'a> {
         let draws = gpu.resident(&frame.draws(scene)?);
         let shaders = frame.drawn(scene).into_iter().map(|mesh| {
             let shader = scene.shader(mesh.material, !mesh.colors.is_empty());
-            shader.ok_or_else(|| JobError::Setting(format!("there is no material {}", mesh.material)))
+            shader.ok_or_else(|| JobError::setting(format_args!("there is no material {}", mesh.material)))
         });
         draws.into_iter().zip(shaders).map(|(draw, shader)| Ok(Surfaced { draw, shader: shader? })).collect()
     }

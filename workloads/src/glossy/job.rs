@@ -161,7 +161,7 @@ impl Glossy {
         let geometry = geometry.and_then(|geometry| geometry.with_uvs(&uvs)).map_err(JobError::setting)?;
         let settings = self.scene.settings();
         let viewport = Viewport::new(settings.width, settings.height)
-            .ok_or_else(|| JobError::Setting(crate::job::IMAGE_SIZE.to_owned()))?;
+            .ok_or_else(|| JobError::setting(crate::job::IMAGE_SIZE))?;
         let samples = self.table(settings.samples)?;
         let background = self.scene.background();
         let settings = pipeline::Settings { spec: gpu.spec(), viewport, samples: &samples, background };
@@ -192,12 +192,12 @@ impl DrawsScene for Glossy {
         let draws = gpu.resident(&draws);
         let samples = self.table(self.options.map_samples)?;
         let drawn = map.one_pass(&draws, &samples, self.scene.background(), gpu)?;
-        let facts = vec![
-            Fact { name: "map_texels", value: map.viewport.pixels() as f64 },
-            Fact { name: "map_samples_tested", value: drawn.counts[Event::SamplesTested] as f64 },
-            Fact { name: "blur_at_height_1", value: map.blur(1.0) },
-        ];
-        let (memory, texels) = (drawn.surface, drawn.into_image());
+        let facts = Fact::all([
+            ("map_texels", map.viewport.pixels() as f64),
+            ("map_samples_tested", drawn.counts[Event::SamplesTested] as f64),
+            ("blur_at_height_1", map.blur(1.0)),
+        ]);
+        let (memory, texels) = (drawn.region, drawn.into_image());
         let image = self.show(&map, &texels, &frame.camera, draws, memory, gpu)?.into_image();
         let (moving, warnings) = (frame.is_moving(), self.regime_warnings());
         Ok(Drawn { image, moving, lens: true, facts, warnings })

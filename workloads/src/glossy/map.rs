@@ -73,11 +73,6 @@ impl Map {
         Ok(Self { camera: camera.with_lens(lens), stand, receiver: *receiver, radius, viewport })
     }
 
-    /// The camera.
-    pub fn camera(&self) -> &Camera {
-        &self.camera
-    }
-
     /// Distance of the map's camera from the plane, scene units.
     pub fn distance(&self) -> f64 {
         (self.receiver.centre - self.stand.eye).dot(self.stand.forward)
@@ -137,7 +132,7 @@ impl Map {
         let mut counts = Counts::default();
         for (index, at) in set.samples().iter().enumerate() {
             let camera = pinhole(&self.camera, [at.u, at.v]);
-            let camera = camera.map_err(|error| JobError::Setting(error.to_string()))?;
+            let camera = camera.map_err(JobError::setting)?;
             let samples = set.still(index);
             let settings =
                 Settings { spec: gpu.spec(), viewport: self.viewport, samples: &samples, background };

@@ -175,17 +175,17 @@ impl DrawsScene for MultiView {
 
     fn draw_frame(&self, frame: &Frame, gpu: &mut Gpu<'_>) -> Result<Drawn, JobError> {
         let draws = frame.draws(&self.scene)?;
-        let rig = self.rig(frame).map_err(|error| JobError::Setting(error.to_string()))?;
+        let rig = self.rig(frame).map_err(JobError::setting)?;
         let to = Target { viewport: self.view, spec: gpu.spec(), background: self.scene.background() };
         let views = if self.options.view_by_view {
             rig.view_by_view(&draws, &to, gpu)?
         } else {
             rig.one_pass(&draws, &to, gpu)?
         };
-        let mut facts = vec![
-            Fact { name: "pixel_invocations", value: views.counts[Event::PixelInvocations] as f64 },
-            Fact { name: "invocations_per_pixel_and_view", value: per_pixel(&views, self.view) },
-        ];
+        let mut facts = Fact::all([
+            ("pixel_invocations", views.counts[Event::PixelInvocations] as f64),
+            ("invocations_per_pixel_and_view", per_pixel(&views, self.view)),
+        ]);
         let mut warnings: Vec<_> = self.angle_warning(&rig).into_iter().collect();
         if self.options.check_cache {
             let value = runs_over_infinite_cache(&rig, &draws, &to, &views)?;

@@ -94,11 +94,6 @@ impl Rig {
         })
     }
 
-    /// The camera with its wide lens.
-    pub fn camera(&self) -> &Camera {
-        &self.camera
-    }
-
     /// Angle of the whole lens seen from a point in focus, in degrees.
     pub fn degrees(&self) -> f64 {
         let half = |lens: Lens| libm::atan2(f64::from(lens.radius()), f64::from(lens.focus()));
@@ -231,7 +226,7 @@ impl Rig {
     ) -> Result<Views, JobError> {
         // The samples of one pixel of the table serve all pixels.
         let set = SharedSamples::new(self.table.pixel(0, 0).to_vec())
-            .ok_or_else(|| JobError::Setting("too many samples".to_owned()))?;
+            .ok_or_else(|| JobError::setting("too many samples"))?;
         let mut views = Views { images: Vec::new(), counts: Counts::default(), passes: 0 };
         let resident = gpu.resident(draws);
         for (number, at) in set.samples().iter().enumerate() {

@@ -126,7 +126,7 @@ impl Draws for Occlusion {
 
     fn draw(&self, (): &(), gpu: &mut Gpu<'_>) -> Result<Drawn, JobError> {
         let viewport = Viewport::new(self.settings.width, self.settings.height)
-            .ok_or_else(|| JobError::Setting("the image has no area".to_owned()))?;
+            .ok_or_else(|| JobError::setting("the image has no area"))?;
         let background = Vec3::new(0.02, 0.03, 0.05);
         let settings = pipeline::Settings { spec: gpu.spec(), viewport, samples: &*self.samples, background };
         let walls = gpu.resident(&[self.wall_scene.walls(&WALL).map_err(JobError::setting)?]);
@@ -134,7 +134,7 @@ impl Draws for Occlusion {
         let occluders = RasterPass::new(camera, &walls, &settings).named("occluders");
         let occluders = gpu.draw(&occluders.onto(Target::Depth).with_visible())?;
         let pyramid = self.pyramid(&depths_of(&occluders.visible), viewport)?;
-        gpu.gather_farthest_depths("farthest depths", &pyramid, occluders.surface);
+        gpu.gather_farthest_depths("farthest depths", &pyramid, occluders.region);
         let projection = Projection::new(camera, viewport);
         let queries = IntervalQueries::new(&pyramid, &projection);
         let (answers, half_covered) =
@@ -159,7 +159,7 @@ impl Draws for Occlusion {
 impl Occlusion {
     fn pyramid(&self, depths: &[f32], viewport: Viewport) -> Result<Pyramid, JobError> {
         let grid = BoxGrid::new(self.options.boxes, self.wall_scene.camera.lens().is_some())
-            .ok_or_else(|| JobError::Setting("boxes: 1 to 16 along each axis".to_owned()))?;
+            .ok_or_else(|| JobError::setting("boxes: 1 to 16 along each axis"))?;
         Ok(Pyramid::new(viewport, &*self.samples, depths, self.options.tile_px, grid))
     }
 }

@@ -293,6 +293,7 @@ pub(super) fn draw(
 }
 
 /// The same points without a rasterizer: the candidates of all cells, each compared with all boxes.
+#[cfg(test)]
 pub(super) fn on_host(cells: &[Cell], lattice: &Lattice, within: &dyn Within) -> Vec<[f64; AXES]> {
     let (lane, mut found) = (Lane::default(), Vec::new());
     let is_in = |cell: &Cell, point: &[f64; AXES]| {

@@ -19,7 +19,7 @@ use super::poisson::{
     Cube, DARTS_PER_FIRST_CELL, DARTS_PER_LATER_CELL, Domain, PoissonDisk, PoissonSpec, Spacing,
     poisson_disk_drawn,
 };
-use super::volume::{Blurred, Domain as Volume, Torus, fill};
+use super::volume::{Blurred, Torus, Volume, fill};
 use super::white::{Named, columns_for};
 use crate::error::LoadError;
 use crate::job::{Drawn, Draws, Fact, Flag, Flags, Job, JobError, OptionSource, Request};
@@ -209,7 +209,7 @@ fn round<const D: usize>(
     gpu: &mut Gpu<'_>,
 ) -> Result<Kept, JobError> {
     let regions = regions(cubes, number, seed);
-    let (cells, lattice) = regions.ok_or_else(|| JobError::Setting("no region to draw".to_owned()))?;
+    let (cells, lattice) = regions.ok_or_else(|| JobError::setting("no region to draw"))?;
     if number > 0 {
         // The host has read the candidates of the round before.
         gpu.wait();
@@ -301,7 +301,7 @@ impl Sampling {
 
     fn volume(&self, seed: u64, gpu: &mut Gpu<'_>) -> Result<Drawn, JobError> {
         let (side, samples) = (self.settings.height, self.settings.samples);
-        let invalid = || JobError::Setting(format!("{side} pixels, {samples} samples"));
+        let invalid = || JobError::setting(format_args!("{side} pixels, {samples} samples"));
         let source = HashedSamples::new(seed, side, samples, LensShape::Square).ok_or_else(invalid)?;
         let (domain, share): (&dyn Volume, f64) = match self.options.dimensions {
             4 => (&Blurred::FOUR, Blurred::FOUR.volume()),

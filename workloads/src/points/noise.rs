@@ -13,7 +13,7 @@
 
 use pipeline::{Gpu, Lane};
 
-use super::drawn::{AXES, Cell, Kept, Lattice, MAX_MEAN, Within, draw, on_host};
+use super::drawn::{AXES, Cell, Kept, Lattice, MAX_MEAN, Within, draw};
 use super::white::{Columns, Shaded, WhiteError, low, shares};
 
 /// Parameters of drawn noise.
@@ -138,20 +138,9 @@ pub fn draw_noise<const D: usize>(
     Ok(DrawnNoise { points: Lifted::<D>::projected(&points), candidates, fragments, columns })
 }
 
-/// The same points without a rasterizer: every candidate is compared with every column.
-///
-/// # Errors
-/// [`WhiteError`].
-pub fn noise_on_host<const D: usize>(
-    density: &dyn Shaded<D>,
-    spec: &NoiseSpec,
-) -> Result<Vec<[f64; D]>, WhiteError> {
-    let lifted = Lifted::new(density, spec)?;
-    Ok(Lifted::<D>::projected(&on_host(&lifted.cells, &lifted.lattice, &lifted)))
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::drawn;
     use super::super::quality::chi_square;
     use super::super::white::{Named, counts};
     use super::*;
@@ -162,11 +151,16 @@ mod tests {
         draw_noise(&density, spec, &mut Gpu::quiet(&hardware).unwrap()).unwrap()
     }
 
+    fn on_host<const D: usize>(density: &Named, spec: &NoiseSpec) -> Vec<[f64; D]> {
+        let lifted: Lifted<D> = Lifted::new(density, spec).unwrap();
+        Lifted::<D>::projected(&drawn::on_host(&lifted.cells, &lifted.lattice, &lifted))
+    }
+
     fn same<const D: usize>(across: u32, cells: u64) {
         for density in [Named::Constant, Named::Ramp, Named::Gauss, Named::Waves] {
             let spec = NoiseSpec { count: 3000.0, seed: 7, across };
             let found = drawn::<D>(density, &spec);
-            assert_eq!(found.points, noise_on_host::<D>(&density, &spec).unwrap(), "{D} {density:?}");
+            assert_eq!(found.points, on_host::<D>(&density, &spec), "{D} {density:?}");
             // The number is Poisson distributed: five standard deviations.
             assert!(
                 (found.points.len() as f64 - 3000.0).abs() < 280.0,

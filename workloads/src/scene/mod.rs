@@ -339,11 +339,6 @@ impl Scene {
         &self.graph.materials
     }
 
-    /// Names of the animation clips; the first plays unless another is chosen.
-    pub fn clip_names(&self) -> impl Iterator<Item = &str> {
-        self.clips.iter().map(|clip| clip.name.as_str())
-    }
-
     /// The name of the animation clip that plays.
     pub fn clip(&self) -> Option<&str> {
         Some(self.clips.get(self.playing?)?.name.as_str())

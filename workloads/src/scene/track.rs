@@ -90,11 +90,6 @@ impl Track {
         self.times_s.last().copied().unwrap_or(0.0)
     }
 
-    /// Numbers at each key.
-    pub fn width(&self) -> usize {
-        self.width
-    }
-
     /// Times of the keys in seconds.
     pub(super) fn times_s(&self) -> &[f64] {
         &self.times_s

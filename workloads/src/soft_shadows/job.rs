@@ -107,12 +107,12 @@ impl SoftShadows {
     }
 
     fn facts(&self, map: &ShadowMap, look_ups: u64) -> Vec<Fact> {
-        vec![
-            Fact { name: "shadow_map_bytes", value: map.bytes() as f64 },
-            Fact { name: "shadow_map_passes", value: f64::from(self.passes()) },
-            Fact { name: "shadow_map_samples_tested", value: map.counts[Event::SamplesTested] as f64 },
-            Fact { name: "look_ups", value: look_ups as f64 },
-        ]
+        Fact::all([
+            ("shadow_map_bytes", map.bytes() as f64),
+            ("shadow_map_passes", f64::from(self.passes())),
+            ("shadow_map_samples_tested", map.counts[Event::SamplesTested] as f64),
+            ("look_ups", look_ups as f64),
+        ])
     }
 
     /// Warnings about too few samples and an unsuitable bias.
@@ -180,7 +180,7 @@ impl DrawsScene for SoftShadows {
         let settings = self.scene.settings();
         let (draws, albedos) = parts(&self.scene, frame)?;
         let viewport = Viewport::new(settings.width, settings.height)
-            .ok_or_else(|| JobError::Setting(crate::job::IMAGE_SIZE.to_owned()))?;
+            .ok_or_else(|| JobError::setting(crate::job::IMAGE_SIZE))?;
         let (camera, draws) = (frame.camera.with_lens(None), gpu.resident(&draws));
         let view = SceneView { camera: &camera, draws: &draws };
         let map = ShadowMap::new(&self.light, &draws, self.options.map_px, &self.set, self.method(), gpu)?;

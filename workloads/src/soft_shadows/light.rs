@@ -1,6 +1,6 @@
 //! An area light as a camera with a lens.
 
-use glam::{DAffine3, DVec3, Vec3};
+use glam::{DVec3, Vec3};
 use pipeline::{Camera, Lane, Lens};
 use serde::{Deserialize, Serialize};
 
@@ -123,11 +123,6 @@ impl AreaLight {
     /// Width of a texel at the light's target, scene units.
     pub fn texel_width(&self, target: DVec3, side: u32) -> f64 {
         2.0 * self.tan_half * self.stand.depth(target).max(0.0) / f64::from(side)
-    }
-
-    /// Transformation from world to camera space.
-    pub fn pose(&self) -> DAffine3 {
-        DAffine3::from_cols_array(&self.camera.open().to_cols_array().map(f64::from))
     }
 }
 

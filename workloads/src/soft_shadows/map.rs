@@ -7,7 +7,7 @@ use pipeline::sampling::Sample;
 use pipeline::{Camera, Draw, Gpu, Lane, RasterPass, Rendered, Settings, Target, Viewport};
 
 use super::light::AreaLight;
-use crate::accumulation::{SharedSamples, Snapshot, SnapshotError};
+use crate::accumulation::{SharedSamples, Snapshot};
 use crate::job::JobError;
 
 /// Bytes of a stored depth.
@@ -42,7 +42,7 @@ impl ShadowMap {
     ) -> Result<Self, JobError> {
         let viewport = Viewport::new(side, side).filter(|_| side.is_multiple_of(2));
         let refused =
-            || JobError::Setting(format!("map_px {side}: a shadow map has an even number of texels"));
+            || JobError::setting(format_args!("map_px {side}: a shadow map has an even number of texels"));
         let viewport = viewport.ok_or_else(refused)?;
         let set = set.centred();
         let seen = depth_pass(&SceneView { camera: light.camera(), draws }, viewport, &set, method, gpu)?;
@@ -53,11 +53,6 @@ impl ShadowMap {
     /// Texels across and down.
     pub fn side(&self) -> u32 {
         self.side
-    }
-
-    /// Samples of light and time.
-    pub fn set(&self) -> &[Sample] {
-        self.set.samples()
     }
 
     /// All depths.
@@ -149,8 +144,8 @@ pub fn depth_pass(
     let spec = gpu.spec();
     if method == Method::OnePass {
         let settings = Settings { spec, viewport, samples: set, background: Vec3::ZERO };
-        let Rendered { visible, counts, surface, .. } = gpu.draw(&depths(camera, draws, &settings))?;
-        return Ok(DepthPass { samples: visible, counts, surfaces: vec![surface] });
+        let Rendered { visible, counts, region, .. } = gpu.draw(&depths(camera, draws, &settings))?;
+        return Ok(DepthPass { samples: visible, counts, surfaces: vec![region] });
     }
     let per_pixel = set.samples().len();
     let mut seen = DepthPass {
@@ -160,14 +155,13 @@ pub fn depth_pass(
     };
     let draws = gpu.resident(draws);
     for (index, at) in set.samples().iter().enumerate() {
-        let failed = |error: SnapshotError| JobError::Setting(error.to_string());
-        let snapshot = Snapshot::new(camera, &draws, viewport, at).map_err(failed)?;
-        let still = snapshot.draws().map_err(failed)?;
+        let snapshot = Snapshot::new(camera, &draws, viewport, at).map_err(JobError::setting)?;
+        let still = snapshot.draws().map_err(JobError::setting)?;
         let samples = set.still(index);
         let settings = Settings { spec, viewport, samples: &samples, background: Vec3::ZERO };
         let one = gpu.draw(&depths(&snapshot.camera, &still, &settings))?;
         seen.counts += &one.counts;
-        seen.surfaces.push(one.surface);
+        seen.surfaces.push(one.region);
         let of_sample = seen.samples.iter_mut().skip(index).step_by(per_pixel);
         of_sample.zip(one.visible).for_each(|(into, from)| *into = from);
     }

@@ -50,8 +50,6 @@ impl Size {
     pub const FULL: Self = Self { side_px: 128, triangles: 300 };
     /// Size of a quick run.
     pub const QUICK: Self = Self { side_px: 64, triangles: 100 };
-    /// Size for tests.
-    pub const SMALL: Self = Self { side_px: 32, triangles: 30 };
 }
 
 /// Samples per pixel.
@@ -219,8 +217,8 @@ mod tests {
         for family in families() {
             assert!(family.values.len() > family.slow + 1, "{}", family.name);
             for &value in family.sweep(true) {
-                let [once, again, other] =
-                    [1, 1, 2].map(|seed| family.scene(value, Size::SMALL, seed).unwrap());
+                let [once, again, other] = [1, 1, 2]
+                    .map(|seed| family.scene(value, Size { side_px: 32, triangles: 30 }, seed).unwrap());
                 assert!(!once.triangles.is_empty(), "{} at {value}", family.name);
                 assert_eq!(
                     (&once.open, &once.close),

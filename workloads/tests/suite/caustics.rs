@@ -2,9 +2,10 @@
 
 use std::f64::consts::TAU;
 
+use crate::curved::BallLens;
 use glam::{DVec2, DVec3};
 use pipeline::random::{mix, unit};
-use workloads::caustics::generator::{BallLens, Ocean, Wave};
+use workloads::caustics::generator::{Ocean, Wave};
 use workloads::caustics::{Beam, Eye, Floor, Light, Method, Squares, crossing, draw, error, receivers};
 
 const DEPTH: f64 = 4.0;

@@ -8,6 +8,7 @@ mod caustics;
 mod collision;
 mod common;
 mod compute;
+mod curved;
 mod deferred;
 mod failure;
 mod flags;

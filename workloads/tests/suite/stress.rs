@@ -10,6 +10,7 @@ use workloads::stress::{Family, Size, StressScene, brute_force, families, family
 use workloads::visibility::Unshaded;
 
 const NO_TRIANGLE: u32 = u32::MAX;
+const SMALL: Size = Size { side_px: 32, triangles: 30 };
 
 /// No test, each test alone, all but each, all, and all that pay off.
 fn combinations() -> impl Iterator<Item = Features> {
@@ -56,7 +57,7 @@ fn differ(a: &[(u32, u32)], b: &[(u32, u32)]) -> usize {
 fn compare(family: &Family) -> usize {
     let mut hits = 0;
     for (&value, seed) in family.sweep(true).iter().zip(1..) {
-        let scene = family.scene(value, Size::SMALL, seed).unwrap();
+        let scene = family.scene(value, SMALL, seed).unwrap();
         let truth = truth(&scene);
         hits += truth.iter().filter(|(triangle, _)| *triangle != NO_TRIANGLE).count();
         for features in combinations() {
@@ -85,7 +86,7 @@ type Mutant = fn(Box5) -> Option<Box5>;
 
 fn lost_to(mutant: Mutant, name: &str) -> usize {
     let family = family(name).unwrap();
-    let scene = family.scene(family.values[2], Size::SMALL, 1).unwrap();
+    let scene = family.scene(family.values[2], SMALL, 1).unwrap();
     let shear = Projection::new(&scene.camera, scene.viewport).shear;
     let bound = |triangle: &Triangle, tile: &TileRect| {
         narrow(triangle, &shear, tile, &Box5::whole(!shear.is_none())).and_then(mutant)
@@ -118,7 +119,7 @@ fn results_do_not_depend_on_threads() {
         pool.install(|| seen(scene, Features::ALL))
     };
     for family in families() {
-        let scene = family.scene(family.values[family.values.len() / 2], Size::SMALL, 3).unwrap();
+        let scene = family.scene(family.values[family.values.len() / 2], SMALL, 3).unwrap();
         assert_eq!(at(1, &scene), at(3, &scene), "{}", family.name);
     }
 }
@@ -143,7 +144,7 @@ fn no_sample_escapes_a_closed_surface() {
 fn samples_on_shared_edges_and_vertices_have_one_owner() {
     let family = family("shared-edges").unwrap();
     for &cell_px in family.values {
-        let scene = family.scene(cell_px, Size::SMALL, 1).unwrap();
+        let scene = family.scene(cell_px, SMALL, 1).unwrap();
         let mut owners = vec![0; seen(&scene, Features::ALL).len()];
         for corners in &scene.triangles {
             let alone = StressScene { triangles: vec![*corners], ..scene.clone() };

@@ -294,7 +294,7 @@ mod tests {
     use workloads::stress::StressScene;
     use workloads::visibility::Unshaded;
 
-    const SIZE: Size = Size::SMALL;
+    const SIZE: Size = Size { side_px: 32, triangles: 30 };
 
     fn with<T>(scene: &StressScene, run: impl FnOnce(&Subject<'_>) -> T) -> T {
         let gpu = GpuSpec::load("reference").unwrap();

@@ -76,6 +76,14 @@ impl Span {
     }
 }
 
+/// A front-end packet that is not simulated yet.
+#[derive(Debug)]
+struct WaitingPacket {
+    demand: ServiceDemand,
+    counts: PacketCounts,
+    lines: Vec<LineAccess>,
+}
+
 /// Clock that advances by packets.
 #[derive(Debug)]
 pub struct PacketClock {
@@ -92,7 +100,7 @@ pub struct PacketClock {
     passes: Passes,
     draws: DrawTimes,
     /// Front-end packets not yet simulated; the tiles have not reached them.
-    ahead: VecDeque<(ServiceDemand, PacketCounts, Vec<LineAccess>)>,
+    ahead: VecDeque<WaitingPacket>,
     lines: Vec<LineAccess>,
     /// Packets so far.
     packets: u64,
@@ -211,7 +219,11 @@ impl PacketClock {
     fn next(&mut self, demand: &ServiceDemand, counts: &PacketCounts, lines: &[LineAccess]) {
         self.packets += 1;
         if demand.front {
-            self.ahead.push_back((demand.clone(), *counts, lines.to_vec()));
+            self.ahead.push_back(WaitingPacket {
+                demand: demand.clone(),
+                counts: *counts,
+                lines: lines.to_vec(),
+            });
             return;
         }
         if !self.ahead.is_empty() {
@@ -223,14 +235,14 @@ impl PacketClock {
     /// Simulate the front end up to the batch that the tiles need (all of it before a barrier), and as far as it
     /// is behind the tiles in time.
     fn catch_up(&mut self, batch: Option<u32>) {
-        while let Some((demand, ..)) = self.ahead.front() {
+        while let Some(WaitingPacket { demand, .. }) = self.ahead.front() {
             let needed = batch.is_none_or(|batch| demand.batch <= batch);
             let behind = self.stations[0].free().max(self.gates.opens(demand))
                 <= self.stations[Station::Traversal as usize].free();
             if !(needed || behind) {
                 return;
             }
-            if let Some((demand, counts, lines)) = self.ahead.pop_front() {
+            if let Some(WaitingPacket { demand, counts, lines }) = self.ahead.pop_front() {
                 if let Some(before) = demand.batch.checked_sub(2)
                     && let Some(at) = self.gates.traversed.get_mut(before as usize)
                 {

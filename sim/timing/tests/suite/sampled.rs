@@ -1,7 +1,7 @@
 //! Frames estimated from few: closed forms, and coverage of the intervals.
 
 use proptest::prelude::*;
-use timing::sampled::{Design, Estimate};
+use timing::sampled::{Design, Estimate, Interval};
 
 /// SplitMix64 (Steele, Lea and Flood 2014): a random word for each counter.
 fn word(seed: u64, counter: u64) -> u64 {
@@ -60,6 +60,10 @@ fn animation(of: Animation, seed: u64, n: usize) -> (Vec<f64>, Vec<f64>) {
     (0..n).map(|k| of(seed, k, n)).unzip()
 }
 
+fn holds(interval: &Interval, truth: f64) -> bool {
+    (interval.low..=interval.high).contains(&truth)
+}
+
 /// Coverage of the 95 % interval is 91 to 99 %, over 6000 trials. That many trials would show an error of one
 /// percent.
 #[test]
@@ -71,7 +75,7 @@ fn the_coverage_of_intervals_is_nominal() {
             for seed in 0..400_u64 {
                 let (x, y) = animation(of, seed % 20, 300);
                 let (_, found) = estimate(&x, &y, count, 1000 + seed);
-                held += u32::from(found.total(0.95).holds(y.iter().sum()));
+                held += u32::from(holds(&found.total(0.95), y.iter().sum()));
             }
             let share = f64::from(held) / 400.0;
             assert!((0.88..=0.995).contains(&share), "{name}, {count} frames: {share}");
@@ -95,7 +99,7 @@ fn the_coverage_of_ratios_and_single_frames_is_nominal() {
         let (design, below) = estimate(&x, &time, 10, 77 + seed);
         let above = Estimate::new(&design, &x, |unit| energy[unit]);
         let truth = energy.iter().sum::<f64>() / time.iter().sum::<f64>();
-        ratios += u32::from(above.ratio(&below, 0.95).holds(truth));
+        ratios += u32::from(holds(&above.ratio(&below, 0.95), truth));
         let chosen = design.chosen();
         for unit in (0..300).filter(|unit| !chosen.contains(unit)) {
             let half = below.half_width_of_one(design.stratum_of(unit), 0.95);

@@ -2,14 +2,10 @@
 //!
 //! - [`Ocean`]: light refracted into water by waves; a single wave is a sinusoidal surface with a known
 //!   solution.
-//! - [`MirrorRing`]: light reflected inside a ring, whose caustic is a nephroid or a cardioid.
-//! - [`BallLens`]: light through a ball of glass.
 //! - [`turned_beams`]: beams that twist around their axis.
 
-mod curved;
 mod ocean;
 
-pub use curved::{BallLens, MirrorRing, Source};
 pub use ocean::{Ocean, Wave};
 
 use glam::DVec3;

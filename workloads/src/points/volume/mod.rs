@@ -83,11 +83,6 @@ impl Bounds {
         self.grid.tile[0] * self.grid.tile[1] * self.sums.last().copied().unwrap_or(0.0)
     }
 
-    /// Number of tiles that the solid may touch.
-    pub fn tiles(&self) -> usize {
-        self.columns.iter().flatten().count()
-    }
-
     /// `count` uniform points of the solid; fewer if it is too thin for random points to hit.
     pub fn sample(&self, solid: &dyn Inside, count: usize, seed: u64) -> Sampled {
         let stream = Stream::new(seed, 0x7015);
@@ -375,7 +370,7 @@ impl Inside for Torus {
     }
 }
 
-impl Domain for Torus {
+impl Volume for Torus {
     fn has(&self, lane: &Lane, &[x, y, t, ..]: &Point) -> bool {
         let [x, y, t] = [x, y, t].map(|at| lane.sub(at, 0.5));
         let from_ring = lane.sub(lane.root(lane.madd(y, y, lane.mul(x, x))), self.ring);
@@ -429,4 +424,4 @@ impl Prisms {
 pub type Point = [f64; 5];
 
 mod standard;
-pub use standard::{Blurred, Covered, Domain, every_sample, fill, standard_mode};
+pub use standard::{Blurred, Covered, Volume, every_sample, fill, standard_mode};

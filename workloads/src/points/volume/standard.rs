@@ -12,7 +12,7 @@ use pipeline::{
 use super::{DEPTH, Layer, MARGIN, Point, Prisms};
 
 /// A volume in the space of samples.
-pub trait Domain: Sync {
+pub trait Volume: Sync {
     /// Whether a sample is inside, with operations that the lane counts.
     fn has(&self, lane: &Lane, point: &Point) -> bool;
 
@@ -71,7 +71,7 @@ impl Blurred {
 /// Corners of the polygon around a disk.
 const CORNERS: u32 = 32;
 
-impl Domain for Blurred {
+impl Volume for Blurred {
     fn has(&self, lane: &Lane, point: &Point) -> bool {
         let radius = lane.madd(point[2], self.radius[1] - self.radius[0], self.radius[0]);
         lane.branch(self.from_axis(lane, point) <= lane.mul(radius, radius))
@@ -128,7 +128,7 @@ fn place(sample: &Sample, pixel: [u32; 2], side: u32) -> Point {
 
 /// Shader that discards samples outside of a volume, and returns x, y and t of the others.
 struct Reject<'a> {
-    domain: &'a dyn Domain,
+    domain: &'a dyn Volume,
     samples: &'a dyn SampleSource,
     side: u32,
 }
@@ -158,7 +158,7 @@ impl Shader for Reject<'_> {
 /// # Errors
 /// [`PassError`] if a cache of the GPU cannot be built, or if the surfaces are too large.
 pub fn fill(
-    domain: &dyn Domain,
+    domain: &dyn Volume,
     side: u32,
     samples: &dyn SampleSource,
     gpu: &mut Gpu<'_>,
@@ -184,7 +184,7 @@ pub fn fill(
 /// # Errors
 /// As [`fill`].
 pub fn standard_mode(
-    domain: &dyn Domain,
+    domain: &dyn Volume,
     side: u32,
     samples: &dyn SampleSource,
     spec: &PipelineSpec,
@@ -195,7 +195,7 @@ pub fn standard_mode(
 }
 
 /// The samples inside a volume, by testing every one: the reference without a rasterizer.
-pub fn every_sample(domain: &dyn Domain, side: u32, samples: &dyn SampleSource) -> Vec<Point> {
+pub fn every_sample(domain: &dyn Volume, side: u32, samples: &dyn SampleSource) -> Vec<Point> {
     let (lane, mut found) = (Lane::default(), Vec::new());
     each_sample(side, samples, |_, point| found.extend(domain.has(&lane, &point).then_some(point)));
     found

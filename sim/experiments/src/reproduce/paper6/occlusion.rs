@@ -5,8 +5,8 @@ use workloads::occlusion::WallSceneSpec;
 
 use super::super::Done;
 use super::super::band::{Cases, one_at_a_time, short};
-use super::super::figure::over_doublings;
-use super::super::row::{Row, numbers, ran};
+use super::super::figure::{Figure, over_doublings};
+use super::super::row::{Number, Row, numbers, ran};
 use super::Task;
 use super::settings::QueriedObjects;
 use crate::chart::occlusion::{Drawn, Kind, QueryAnswers};
@@ -60,6 +60,12 @@ impl Share {
     }
 }
 
+/// Share of the hidden objects found over the number of boxes in time, with tiles of `tile_px`.
+struct Rates {
+    tile_px: u32,
+    found: Vec<(f64, f64)>,
+}
+
 /// VI-4: the rate grows with the boxes in time.
 pub(super) fn rate(task: &Task<'_>) -> Result<Done, RunError> {
     let with = task.with(|settings| &settings.vi_4);
@@ -88,7 +94,7 @@ pub(super) fn rate(task: &Task<'_>) -> Result<Done, RunError> {
     for side in sides {
         let rates = measure(motion, side)?;
         tiles.push((side, gain(&rates), grows(&rates)));
-        curves.push((format!("{side}-pixel tiles"), rates));
+        curves.push(Rates { tile_px: side, found: rates });
     }
     let mut motions = Vec::new();
     for &motion in row.motion_m.all(form) {
@@ -106,33 +112,42 @@ pub(super) fn rate(task: &Task<'_>) -> Result<Done, RunError> {
     tried.along("motion_m", at).with_base(motion);
     let full = one_at_a_time([row.tile_px.values(), row.motion_m.values()]);
     let band = tried.band(full)?;
-    let base = curves.iter().find(|(name, _)| *name == format!("{tile_px}-pixel tiles"));
+    let (ours, facts) = rates_found(&curves, tile_px, wrong);
+    let mut ran = ran(&total.ran);
+    let queried = [("hidden_objects_queried", total.hidden as f64), ("tiles", total.tiles as f64)];
+    ran.extend(numbers(queried));
+    let row = Row { numbers: facts, ran, ..with.banded(&row.about, ours, band) };
+    Ok(Done { row, figures: vec![rate_figure(curves)] })
+}
+
+/// The result in words and in numbers, with tiles of `tile_px`.
+fn rates_found(curves: &[Rates], tile_px: u32, wrong: u64) -> (String, Vec<Number>) {
+    let base = curves.iter().find(|rates| rates.tile_px == tile_px).map(|rates| &rates.found);
     let listed: Vec<String> =
-        base.iter().flat_map(|(_, rates)| rates).map(|(boxes, rate)| format!("{boxes}: {rate:.3}")).collect();
+        base.into_iter().flatten().map(|(boxes, rate)| format!("{boxes}: {rate:.3}")).collect();
     let ours = format!(
         "share of hidden objects found by boxes in t, {tile_px}-pixel tiles: {}; {wrong} seen objects called hidden",
         listed.join(", ")
     );
-    let ends = base.and_then(|(_, rates)| rates.first().zip(rates.last()));
+    let ends = base.and_then(|found| found.first().zip(found.last()));
     let facts = numbers([
         ("share_fewest_boxes", ends.map_or(f64::NAN, |(first, _)| first.1)),
         ("share_most_boxes", ends.map_or(f64::NAN, |(_, last)| last.1)),
         ("wrong", wrong as f64),
     ]);
-    let mut ran = ran(&total.ran);
-    let queried = [("hidden_objects_queried", total.hidden as f64), ("tiles", total.tiles as f64)];
-    ran.extend(numbers(queried));
-    let figure = over_doublings(
+    (ours, facts)
+}
+
+fn rate_figure(curves: Vec<Rates>) -> Figure {
+    over_doublings(
         "VI_occlusion",
         [
             "Occlusion rate over boxes in time (Paper VI, section 3)",
             "share of the objects hidden from every sample that a query by intervals finds",
         ],
         ["boxes in t", "share found"],
-        curves.into_iter().map(|(name, rates)| Series::curve(name, rates)).collect(),
-    );
-    let row = Row { numbers: facts, ran, ..with.banded(&row.about, ours, band) };
-    Ok(Done { row, figures: vec![figure] })
+        curves.into_iter().map(|of| Series::curve(format!("{}-pixel tiles", of.tile_px), of.found)).collect(),
+    )
 }
 
 fn gain(rates: &[(f64, f64)]) -> f64 {

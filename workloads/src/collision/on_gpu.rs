@@ -9,7 +9,7 @@ use pipeline::{
 use super::Method;
 use super::bounds::{Bounds, TzBox, TzBuffer};
 use super::object::Object;
-use super::pass::{BinnedPrimitive, Fragment, FragmentBudget, Observer, Part, Pass};
+use super::pass::{BinnedPrimitive, Fragment, FragmentBudget, Part, Pass, PassBackend};
 
 /// Bytes of a vertex at both times.
 const VERTEX_BYTES: u32 = 24;
@@ -130,7 +130,7 @@ impl TileShader for BoxShader<'_> {
     }
 }
 
-impl Observer for PassesOnGpu<'_, '_> {
+impl PassBackend for PassesOnGpu<'_, '_> {
     fn begin(&mut self, name: &str) {
         self.pass = self.gpu.begin_conservative(name, None);
     }
