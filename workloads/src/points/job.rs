@@ -22,7 +22,7 @@ use super::poisson::{
 use super::volume::{Blurred, Domain as Volume, Torus, fill};
 use super::white::{Named, columns_for};
 use crate::error::LoadError;
-use crate::job::{Drawn, Draws, Fact, Flag, Flags, Job, JobError, OptionSource, Request};
+use crate::job::{Drawn, Draws, Fact, Flag, Flags, Job, JobError, JobOptions, Need, OptionSource, Request};
 use crate::scene::Settings;
 
 /// Kind of points.
@@ -65,6 +65,15 @@ pub struct Options {
     pub periodic: bool,
     /// Points of noise on average, 100 to 2,000,000.
     pub count: f64,
+}
+
+impl JobOptions for Options {
+    const NEEDS: &'static [Need] = &[
+        Need::new("radius", "points", &["darts"]),
+        Need::new("rounds", "points", &["darts"]),
+        Need::new("periodic", "points", &["darts"]),
+        Need::new("count", "points", &["noise"]),
+    ];
 }
 
 impl Default for Options {
