@@ -39,6 +39,14 @@ pub enum Kind {
 }
 
 impl Kind {
+    /// What summaries name in place of a sample table: darts and noise have candidates instead of samples.
+    fn samples(self) -> &'static str {
+        match self {
+            Self::Darts | Self::Noise => "none",
+            Self::Volume => "hashed",
+        }
+    }
+
     /// Dimensions in which there are such points.
     fn dimensions(self) -> std::ops::RangeInclusive<u32> {
         match self {
@@ -134,6 +142,7 @@ pub(crate) fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<d
     }
     let usual = Settings { width: 512, height: 512, samples: 4, ..Settings::default() };
     let settings = usual.with(request.overrides)?;
+    let settings = Settings { table: options.points.samples().to_owned(), ..settings };
     if settings.width != settings.height {
         return refused("size", "width and height have to be equal, as the unit square is drawn".to_owned());
     }
@@ -407,6 +416,13 @@ mod tests {
         }
         let hole = super::super::quality::largest_hole(&found.points, Domain::Torus);
         assert!(hole.radius <= 0.07 * (1.0 + 1e-12), "{hole:?}");
+    }
+
+    #[test]
+    fn settings_name_the_samples_in_use() {
+        for (kind, table) in [("darts", "none"), ("noise", "none"), ("volume", "hashed")] {
+            assert_eq!(made(&[("points", kind)], (64, 64)).unwrap().settings().table, table);
+        }
     }
 
     #[test]
