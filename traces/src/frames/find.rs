@@ -11,10 +11,12 @@ use super::track::{Start, track};
 use super::vsync::{Snapped, snap_to_ticks};
 use super::{FinderMethod, Found, FrameStart, SUSPECT_CONFIDENCE, marked_starts, spacing};
 use super::{assess, idle_gap, periodicity};
+use crate::score::{TOLERANCE_S, true_beside_found};
 use crate::stats::upper_median;
 use crate::trace::{Metadata, Trace};
 use rayon::prelude::*;
 use serde::Serialize;
+use warnings::Code;
 
 /// Finds every frame start like the marked ones, anywhere the window fits into the trace and before the end
 /// mark, by [`FinderMethod::Auto`].
@@ -104,7 +106,22 @@ pub(super) fn find_auto(trace: &Trace, marks: &Marks) -> Result<Found, MarkError
     }
     let tracked = find_tracked(trace, marks)?;
     let is_clear = squares.threshold.clarity() >= 1.0 && !is_unsure(&squares);
-    Ok(if is_clear && is_unsure(&tracked) { squares } else { tracked })
+    if is_clear && is_unsure(&tracked) { where_agreed(trace, marks, squares, &tracked) } else { Ok(tracked) }
+}
+
+/// The result of one method, with low confidence in frames that another does not find: methods that disagree cannot both be sure.
+fn where_agreed(trace: &Trace, marks: &Marks, found: Found, other: &Found) -> Result<Found, MarkError> {
+    let times_s = |of: &Found| -> Vec<f64> { of.starts.iter().map(|start| start.time_s).collect() };
+    let beside = true_beside_found(&times_s(&found), &times_s(other), TOLERANCE_S);
+    let mut starts = found.starts;
+    for (start, ends) in starts.iter_mut().zip(beside.windows(2)) {
+        if !matches!(ends, [Some(a), Some(b)] if *b == a + 1) {
+            start.confidence *= SUSPECT_CONFIDENCE;
+        }
+    }
+    let mut agreed = assess::conclude(trace, marks, &marks.place(trace)?, starts, found.threshold);
+    agreed.warnings.extend(found.warnings.into_iter().filter(|warning| warning.code == Code::FlatMark));
+    Ok(agreed)
 }
 
 /// Whether every start but the marks has a confidence below one half.
