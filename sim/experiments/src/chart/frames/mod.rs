@@ -169,7 +169,7 @@ impl Study for FramesChart {
         snrs_db: &[40.0, 30.0, 20.0, 10.0, 5.0, 0.0],
         bits: &[4, 6, 8, 10, 12, 14, 16],
         seeds: &[1, 2],
-        witness_seeds: &[104, 105, 106, 107, 108, 109],
+        witness_seeds: &[104, 105, 106],
     };
     const QUICK: FramesEffort = FramesEffort {
         frames: 60,
