@@ -363,7 +363,7 @@ fn product(a: impl IntoIterator<Item = f64>, b: Vec<f64>) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::frames::Window;
+    use crate::frames::{Flag, Window};
     use crate::random::Random;
     use crate::trace::Metadata;
 
@@ -418,6 +418,24 @@ mod tests {
             let found = found(|sample| 2.0 + level * noise(sample), 100_000, 50_000);
             assert_eq!((found.method, found.starts.len()), (FinderMethod::SumOfSquares, 1));
         }
+    }
+
+    #[test]
+    fn frames_that_another_method_does_not_find_have_low_confidence() {
+        let watts =
+            |i: usize| if i % 400 < 300 { 3.0 + (i % 400 * 7 % 11) as f32 } else { 0.5 } + 0.1 * noise(i);
+        let power: Vec<f32> = (0..400 * 40).map(watts).collect();
+        let trace = Trace::new(vec![1.0; power.len()], power, RATE_HZ, 0.0, Metadata::default()).unwrap();
+        let marks = Marks::one(0.24, default_window(0.0, RATE_HZ), trace.end_s());
+        let found = find_matched(&trace, &marks, FinderMethod::SumOfSquares).unwrap();
+        let mut other = found.clone();
+        other.starts.remove(10);
+        let agreed = where_agreed(&trace, &marks, found.clone(), &other).unwrap();
+        assert!(found.frames.len() > 30 && agreed.frames.len() == found.frames.len());
+        for (index, (now, before)) in agreed.starts.iter().zip(&found.starts).enumerate() {
+            assert_eq!(now.confidence < before.confidence, index == 9 || index == 10, "{index}");
+        }
+        assert!(agreed.frames[9].flags.contains(Flag::LowConfidence));
     }
 
     #[test]
