@@ -38,17 +38,22 @@ pub struct WitnessRow {
 /// How many frames are wrong and right, and how many of each carry a flag.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct FlagCount {
+    /// Frames with an end that is not a true one, or a start missed within.
     pub wrong: usize,
+    /// Number of them with a flag.
     pub wrong_flagged: usize,
+    /// The other frames.
     pub right: usize,
+    /// Number of them with a flag all the same.
     pub right_flagged: usize,
 }
 
 impl FlagCount {
     fn add(&mut self, right: bool, flagged: bool) {
-        let (all, some) = match right {
-            true => (&mut self.right, &mut self.right_flagged),
-            false => (&mut self.wrong, &mut self.wrong_flagged),
+        let (all, some) = if right {
+            (&mut self.right, &mut self.right_flagged)
+        } else {
+            (&mut self.wrong, &mut self.wrong_flagged)
         };
         *all += 1;
         *some += usize::from(flagged);
@@ -67,17 +72,22 @@ impl FlagCount {
 /// How many searches fail ([`FAILS_BELOW`]) and how many do not, and how many of each warn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct WarningCount {
+    /// Searches that fail.
     pub failed: usize,
+    /// Number of them with a warning.
     pub failed_warned: usize,
+    /// The other searches.
     pub good: usize,
+    /// Number of them with a warning all the same.
     pub good_warned: usize,
 }
 
 impl WarningCount {
     fn add(&mut self, f1: f64, warned: bool) {
-        let (all, some) = match f1 < FAILS_BELOW {
-            true => (&mut self.failed, &mut self.failed_warned),
-            false => (&mut self.good, &mut self.good_warned),
+        let (all, some) = if f1 < FAILS_BELOW {
+            (&mut self.failed, &mut self.failed_warned)
+        } else {
+            (&mut self.good, &mut self.good_warned)
         };
         *all += 1;
         *some += usize::from(warned);
