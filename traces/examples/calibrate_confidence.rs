@@ -1,4 +1,4 @@
-//! Whether what a trace shows of its frames tells how likely they are right: fits a logistic map (Platt 1999) of the finder's
+//! Whether the chance that a frame is right can be estimated from the trace: fits a logistic map (Platt 1999) of the finder's
 //! confidence, of how far methods agree and of how even gaps are, on all kinds of devices but one, and judges it on that one.
 //!
 //! `calibrate_confidence FIRST_SEED LAST_SEED`
@@ -14,8 +14,8 @@ use traces::synth::{Recording, SCENARIOS, Scene, WITNESSES};
 const FRAMES: usize = 200;
 /// Places of the marks, as shares of the frames.
 const MARKED: [f64; 5] = [0.4, 0.1, 0.25, 0.6, 0.85];
-/// A constant, the logit of the confidence, the share of frames that squares, normalized and squares with five of the found starts as
-/// marks find as well, and the share of even gaps.
+/// A constant, the logit of the confidence, the share of frames that squares, normalized and squares with five of the found
+/// starts as marks find as well, and the share of even gaps.
 const FEATURES: usize = 6;
 /// Bins of confidence.
 const BINS: usize = 10;

@@ -146,7 +146,7 @@ fn window_too_long(found: &Found, median_s: f64) -> Option<Warning> {
 }
 
 impl Found {
-    /// Adds the warning about a window that is longer than the time after which power repeats, where frames found do not tell it:
+    /// Adds the warning about a window that is longer than the time after which power repeats, where the frames found do not show it:
     /// starts nearer than half the window are never found.
     pub(crate) fn warn_of_long_window(&mut self, repetition_s: Option<f64>) {
         let warned = self.warnings.iter().any(|warning| warning.code == Code::WindowLongerThanFrame);

@@ -11,7 +11,7 @@ use super::track::{Start, track};
 use super::vsync::{Snapped, snap_to_ticks};
 use super::{FinderMethod, Found, FrameStart, SUSPECT_CONFIDENCE, marked_starts, spacing};
 use super::{assess, idle_gap, periodicity};
-use crate::score::{TOLERANCE_S, true_beside_found};
+use crate::pairing::{TOLERANCE_S, true_beside_found};
 use crate::stats::upper_median;
 use crate::trace::{Metadata, Trace};
 use rayon::prelude::*;

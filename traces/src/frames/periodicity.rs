@@ -83,13 +83,13 @@ pub(crate) fn repetition_samples(power: &[f64]) -> Option<usize> {
     let profile = normalized(segment, &segment[..lags]);
     let similarity = |distance: &f64| 1.0 - distance / most.max(f64::MIN_POSITIVE);
     let correlation: Vec<f64> = profile.iter().map(similarity).collect();
-    // A peak is the highest of its positive stretch; that around no lag at all does not count.
+    // A peak is the highest of its positive segment; that around no lag at all does not count.
     let mut lag = correlation.iter().position(|r| *r < 0.0)?;
     let mut peaks: Vec<(usize, f64)> = Vec::new();
-    for stretch in correlation[lag..].chunk_by(|a, b| (*a < 0.0) == (*b < 0.0)) {
-        let highest = stretch.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1));
+    for part in correlation[lag..].chunk_by(|a, b| (*a < 0.0) == (*b < 0.0)) {
+        let highest = part.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1));
         peaks.extend(highest.map(|(place, r)| (lag + place, r)));
-        lag += stretch.len();
+        lag += part.len();
     }
     let highest = peaks.iter().map(|(_, r)| *r).fold(MIN_REPETITION / FIRST_PEAK_SHARE, f64::max);
     peaks.into_iter().find(|(_, r)| *r >= FIRST_PEAK_SHARE * highest).map(|(lag, _)| lag)
