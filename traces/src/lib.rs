@@ -53,6 +53,7 @@ pub mod energy;
 pub mod frames;
 pub mod io;
 mod overlap;
+mod pairing;
 pub mod pareto;
 pub mod pyramid;
 pub mod random;

@@ -1,7 +1,10 @@
 //! Frames of a recording with their energies: in memory, or in pieces where the file is long.
 
-use crate::energy::{FrameEnergy, PowerIntegral, negative_power};
-use crate::frames::{FinderMethod, Found, MarkError, Marks, Options, Proposal, Window, find_with, propose};
+use crate::energy::{FrameEnergy, PowerIntegral, clipped_current, negative_power};
+use crate::frames::{
+    FinderMethod, Found, MarkError, Marks, Options, Proposal, Window, default_window, find_with, propose,
+    repetition_samples,
+};
 use crate::io::{ReadError, ReadOptions, Rows};
 use crate::stream::{self, StreamError};
 use crate::trace::{Metadata, Trace};
@@ -20,8 +23,9 @@ pub struct Search {
     pub starts_s: Vec<f64>,
     /// Whether to [propose](propose()) a start instead.
     pub propose: bool,
-    /// The window around a mark.
-    pub window: Window,
+    /// The window around a mark; by default the usual one, no longer than the time after which power repeats. Files that are read in
+    /// pieces have the usual one.
+    pub window: Option<Window>,
     /// Where the last frame ends, s; by default the end mark of the metadata, or the end of the trace.
     pub end_s: Option<f64>,
     /// The method.
@@ -123,13 +127,19 @@ impl Search {
         };
         let marked_end_s = self.end_s.or_else(|| trace.metadata.end_mark_s());
         let end_s = marked_end_s.unwrap_or(trace.end_s());
-        let marks = Marks { starts_s, window: self.window, end_s };
+        let power: Vec<f64> = trace.powers_w().collect();
+        let repetition_s = repetition_samples(&power).map(|samples| samples as f64 * trace.period_s());
+        let window =
+            self.window.unwrap_or_else(|| default_window(repetition_s.unwrap_or(0.0), trace.rate_hz()));
+        let marks = Marks { starts_s, window, end_s };
         let mut found = find_with(trace, &marks, &Options { method: self.method })?;
         if let Some(Proposal { mark_s, .. }) = proposal.filter(|_| found.starts.len() < 2) {
             return Err(SearchError::NoRepetition { mark_s });
         }
         let integral = PowerIntegral::new(trace);
         found.warnings.extend(negative_power(integral.total_j()));
+        found.warnings.extend(clipped_current(trace));
+        found.warn_of_long_window(repetition_s);
         Ok(FrameSet {
             energies: integral.frames(&found),
             found,
@@ -155,7 +165,8 @@ impl Search {
         let starts_s = self.marked(rows.metadata())?;
         let marked_end_s = self.end_s.or_else(|| rows.metadata().end_mark_s());
         let end_s = marked_end_s.unwrap_or(f64::INFINITY);
-        let marks = Marks { starts_s, window: self.window, end_s };
+        let window = self.window.unwrap_or_else(|| default_window(0.0, f64::INFINITY));
+        let marks = Marks { starts_s, window, end_s };
         let mut streamed = stream::find(path, options, &marks)?;
         streamed.found.warnings.extend(negative_power(streamed.total_j));
         let clock = streamed.clock;
@@ -210,7 +221,7 @@ mod tests {
         Search {
             starts_s: Vec::new(),
             propose: false,
-            window: Window { pre_s: 1e-3, post_s: 4e-3 },
+            window: Some(Window { pre_s: 1e-3, post_s: 4e-3 }),
             end_s: None,
             method: FinderMethod::SumOfSquares,
             in_pieces: false,

@@ -247,6 +247,55 @@ fn relative(a: f64, b: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{PacingChoice, RunOptions};
+    use output::Destination;
+    use output::progress::Progress;
+    use workloads::Overrides;
+
+    /// Energy error of each frame of a run, as a share, in a trace without noise by a recorder of a rate and a resolution, and the
+    /// place of the marked frame.
+    fn errors_without_noise(measurement: &Measurement, rate_hz: f64, bits: u32) -> (Vec<f64>, usize) {
+        let spec = DeviceSpec { rate_hz, bits, ..measurement.device.spec().clone() };
+        let device = Device::new(spec).unwrap().noise_free();
+        let curve = &measurement.run.curve;
+        let trace = device.sample(curve, 0.0, curve.end_s()).unwrap().trace;
+        let marks = marks(&measurement.run, &trace);
+        let found = find(&trace, &marks).unwrap();
+        let frames = PowerIntegral::new(&trace).frames(&found);
+        assert_eq!(frames.len(), measurement.truth.len());
+        let errors =
+            frames.iter().zip(&measurement.truth).map(|(frame, truth)| frame.energy_j / truth.energy_j - 1.0);
+        (errors.collect(), measurement.run.frames.len() / 2)
+    }
+
+    /// Below this share an error counts as none.
+    const NO_ERROR: f64 = 1e-3;
+
+    #[test]
+    fn without_noise_the_marked_frame_and_the_one_before_are_as_right_as_all_others() {
+        for pacing in [PacingChoice::Vsync, PacingChoice::Free] {
+            let overrides = Overrides { size: Some((160, 90)), frames: Some(0..24), ..Overrides::default() };
+            let folder = tempfile::tempdir().unwrap();
+            let options = RunOptions { pacing, overrides, ..RunOptions::default() };
+            let out = Destination::new(folder.path());
+            let finished = crate::run(options, &out, &Progress::new(true)).unwrap();
+            for (rate_hz, bits) in [(20e3, 12), (50e3, 14), (200e3, 16)] {
+                let (errors, mark) = errors_without_noise(&finished.measurement, rate_hz, bits);
+                let beside = |index: usize| index == mark || index + 1 == mark;
+                let worst = |wanted: bool| {
+                    let of = errors.iter().enumerate().filter(|(index, _)| beside(*index) == wanted);
+                    of.map(|(_, error)| error.abs()).fold(0.0, f64::max)
+                };
+                let text = format!(
+                    "{pacing:?}, {rate_hz} Hz, {bits} bits: {:.5} beside the mark, {:.5} elsewhere",
+                    worst(true),
+                    worst(false)
+                );
+                println!("{text}");
+                assert!(worst(true) <= worst(false).max(NO_ERROR), "{text}");
+            }
+        }
+    }
 
     #[test]
     fn short_frames_are_recorded_faster() {

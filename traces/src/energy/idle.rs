@@ -4,8 +4,10 @@ use thiserror::Error;
 use warnings::{Code, Warning};
 
 use super::{FrameEnergy, PowerIntegral, energies_j};
+use crate::frames::noise_deviation;
 use crate::io::{TraceHeader, TraceReader, WriteError};
-use crate::trace::{SpanError, check_span};
+use crate::stats::upper_median;
+use crate::trace::{SpanError, Trace, check_span};
 
 /// Idle power to subtract.
 #[derive(Clone, Debug)]
@@ -106,6 +108,58 @@ pub fn negative_power(total_j: f64) -> Option<Warning> {
     (total_j < 0.0).then(|| Warning::new(Code::NegativePower, message))
 }
 
+/// Least share of clipped samples, and their least number.
+const MIN_CLIPPED: (f64, usize) = (1e-3, 8);
+/// A range ends where its last value occurs more often than this many times the value next to it.
+const MIN_CLIPPED_RATIO: usize = 4;
+
+/// Warning about a trace whose current was clipped: its greatest or least value occurs far more often than the next one, which noise
+/// would reach as often. Noise below a step of the converter leaves steady power on one value as well, and says nothing.
+pub fn clipped_current(trace: &Trace) -> Option<Warning> {
+    let current_a = trace.current_a();
+    let mut steps_a: Vec<f64> = current_a.windows(2).map(|two| f64::from((two[1] - two[0]).abs())).collect();
+    let noise_a = noise_deviation(upper_median(&mut steps_a));
+    let at_end = |sign: f32| {
+        let [last, next] = last_two_values(current_a.iter().map(|amperes| sign * amperes));
+        let often = last.count > MIN_CLIPPED_RATIO * next.count && last.count >= MIN_CLIPPED.1;
+        let close = f64::from(last.value - next.value) <= noise_a;
+        (often && close).then_some(last.count)
+    };
+    let count = at_end(1.0).unwrap_or(0) + at_end(-1.0).unwrap_or(0);
+    let share = count as f64 / current_a.len().max(1) as f64;
+    (share >= MIN_CLIPPED.0).then(|| {
+        Warning::new(Code::Clipped, format!(
+            "{:.2} % of the samples lie at the greatest or least current, which was clipped there: energies are too low or too high; \
+             record with a wider range", 100.0 * share))
+    })
+}
+
+/// A value and how often it occurs.
+#[derive(Clone, Copy)]
+struct Occurrence {
+    value: f32,
+    count: usize,
+}
+
+/// The greatest value and the next one below it.
+fn last_two_values(values: impl Iterator<Item = f32>) -> [Occurrence; 2] {
+    let none = Occurrence { value: f32::NEG_INFINITY, count: 0 };
+    let [mut last, mut next] = [none; 2];
+    for value in values {
+        let one = Occurrence { value, count: 1 };
+        if value > last.value {
+            (last, next) = (one, last);
+        } else if value == last.value {
+            last.count += 1;
+        } else if value > next.value {
+            next = one;
+        } else if value == next.value {
+            next.count += 1;
+        }
+    }
+    [last, next]
+}
+
 /// Energy of the recording, repeated, from its start on, J.
 fn since(integral: &PowerIntegral<'_>, time_s: f64) -> f64 {
     let trace = integral.trace();
@@ -161,8 +215,8 @@ impl SegmentEnergy {
 mod tests {
     use super::*;
     use crate::frames::Flags;
+    use crate::random::Random;
     use crate::trace::Metadata;
-    use crate::trace::Trace;
 
     fn trace(power: Vec<f32>) -> Trace {
         Trace::new(vec![1.0; power.len()], power, 10.0, 0.0, Metadata::default()).unwrap()
@@ -195,6 +249,21 @@ mod tests {
         let recording = trace(vec![4.0; 7]);
         assert!(Idle::Instant(PowerIntegral::new(&recording)).above_frames(0.0, &frames).is_some());
         assert!(negative_power(-1e-3).is_some() && negative_power(0.0).is_none());
+    }
+
+    #[test]
+    fn a_current_that_ends_at_one_value_is_clipped_and_noise_or_a_coarse_converter_is_not() {
+        let random = Random::new(7, 0);
+        let current = |i: u64| 2.0 + (0.01 * i as f64).sin() + 0.02 * random.normals(i).0;
+        let warned = |of: &dyn Fn(f64) -> f64| {
+            let amperes = (0..5000).map(|i| of(current(i)) as f32).collect();
+            clipped_current(&trace(amperes)).is_some()
+        };
+        assert!(warned(&|a| a.min(2.8)) && warned(&|a| a.max(1.1)));
+        assert!(
+            !warned(&|a| a) && !warned(&|a| (a * 1000.0).round() / 1000.0) && !warned(&|a| (2.0 * a).round())
+        );
+        assert!(clipped_current(&trace(vec![1.0; 100])).is_none());
     }
 
     #[test]

@@ -7,7 +7,9 @@ mod statistics;
 mod table;
 
 pub use crate::stats::Spread;
-pub use idle::{Idle, IdleTooShort, SegmentEnergy, SegmentError, idle_in_frames, negative_power};
+pub use idle::{
+    Idle, IdleTooShort, SegmentEnergy, SegmentError, clipped_current, idle_in_frames, negative_power,
+};
 pub(crate) use integral::Sums;
 pub use integral::{FrameEnergy, PowerIntegral, TrueFrame, energies_j, finishes_s, levels_w};
 pub use run::{

@@ -145,6 +145,22 @@ fn window_too_long(found: &Found, median_s: f64) -> Option<Warning> {
     })
 }
 
+impl Found {
+    /// Adds the warning about a window that is longer than the time after which power repeats, where the frames found do not show it:
+    /// starts nearer than half the window are never found.
+    pub(crate) fn warn_of_long_window(&mut self, repetition_s: Option<f64>) {
+        let warned = self.warnings.iter().any(|warning| warning.code == Code::WindowLongerThanFrame);
+        let window_s = self.window.pre_s + self.window.post_s;
+        if let Some(repetition_s) =
+            repetition_s.filter(|repetition_s| !warned && window_s > 1.1 * repetition_s)
+        {
+            self.warnings.push(Warning::new(Code::WindowLongerThanFrame, format!(
+                "the window of {:.3} ms is longer than the {:.3} ms after which power repeats: frames may be as short; shrink it",
+                window_s * 1e3, repetition_s * 1e3)));
+        }
+    }
+}
+
 fn few_samples(median_s: f64, rate_hz: f64) -> Option<Warning> {
     let samples = median_s * rate_hz;
     (samples < MIN_FRAME_SAMPLES).then(|| {

@@ -11,10 +11,12 @@ use super::track::{Start, track};
 use super::vsync::{Snapped, snap_to_ticks};
 use super::{FinderMethod, Found, FrameStart, SUSPECT_CONFIDENCE, marked_starts, spacing};
 use super::{assess, idle_gap, periodicity};
+use crate::pairing::{TOLERANCE_S, true_beside_found};
 use crate::stats::upper_median;
 use crate::trace::{Metadata, Trace};
 use rayon::prelude::*;
 use serde::Serialize;
+use warnings::Code;
 
 /// Finds every frame start like the marked ones, anywhere the window fits into the trace and before the end
 /// mark, by [`FinderMethod::Auto`].
@@ -104,7 +106,22 @@ pub(super) fn find_auto(trace: &Trace, marks: &Marks) -> Result<Found, MarkError
     }
     let tracked = find_tracked(trace, marks)?;
     let is_clear = squares.threshold.clarity() >= 1.0 && !is_unsure(&squares);
-    Ok(if is_clear && is_unsure(&tracked) { squares } else { tracked })
+    if is_clear && is_unsure(&tracked) { where_agreed(trace, marks, squares, &tracked) } else { Ok(tracked) }
+}
+
+/// The result of one method, with low confidence in frames that another does not find: methods that disagree cannot both be sure.
+fn where_agreed(trace: &Trace, marks: &Marks, found: Found, other: &Found) -> Result<Found, MarkError> {
+    let times_s = |of: &Found| -> Vec<f64> { of.starts.iter().map(|start| start.time_s).collect() };
+    let beside = true_beside_found(&times_s(&found), &times_s(other), TOLERANCE_S);
+    let mut starts = found.starts;
+    for (start, ends) in starts.iter_mut().zip(beside.windows(2)) {
+        if !matches!(ends, [Some(a), Some(b)] if *b == a + 1) {
+            start.confidence *= SUSPECT_CONFIDENCE;
+        }
+    }
+    let mut agreed = assess::conclude(trace, marks, &marks.place(trace)?, starts, found.threshold);
+    agreed.warnings.extend(found.warnings.into_iter().filter(|warning| warning.code == Code::FlatMark));
+    Ok(agreed)
 }
 
 /// Whether every start but the marks has a confidence below one half.
@@ -346,7 +363,7 @@ fn product(a: impl IntoIterator<Item = f64>, b: Vec<f64>) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::frames::Window;
+    use crate::frames::{Flag, Window};
     use crate::random::Random;
     use crate::trace::Metadata;
 
@@ -401,6 +418,24 @@ mod tests {
             let found = found(|sample| 2.0 + level * noise(sample), 100_000, 50_000);
             assert_eq!((found.method, found.starts.len()), (FinderMethod::SumOfSquares, 1));
         }
+    }
+
+    #[test]
+    fn frames_that_another_method_does_not_find_have_low_confidence() {
+        let watts =
+            |i: usize| if i % 400 < 300 { 3.0 + (i % 400 * 7 % 11) as f32 } else { 0.5 } + 0.1 * noise(i);
+        let power: Vec<f32> = (0..400 * 40).map(watts).collect();
+        let trace = Trace::new(vec![1.0; power.len()], power, RATE_HZ, 0.0, Metadata::default()).unwrap();
+        let marks = Marks::one(0.24, default_window(0.0, RATE_HZ), trace.end_s());
+        let found = find_matched(&trace, &marks, FinderMethod::SumOfSquares).unwrap();
+        let mut other = found.clone();
+        other.starts.remove(10);
+        let agreed = where_agreed(&trace, &marks, found.clone(), &other).unwrap();
+        assert!(found.frames.len() > 30 && agreed.frames.len() == found.frames.len());
+        for (index, (now, before)) in agreed.starts.iter().zip(&found.starts).enumerate() {
+            assert_eq!(now.confidence < before.confidence, index == 9 || index == 10, "{index}");
+        }
+        assert!(agreed.frames[9].flags.contains(Flag::LowConfidence));
     }
 
     #[test]

@@ -26,7 +26,7 @@ pub use find::{Options, Proposal, find, find_with, marked_only, propose};
 pub use marks::{MarkError, Marks, Window, default_window};
 pub(crate) use marks::{Placed, Placement, flat_mark};
 pub(crate) use matched::{misalignment_w2, noise_deviation, start_after_idle};
-pub(crate) use periodicity::regularity;
+pub(crate) use periodicity::{regularity, repetition_samples};
 pub(crate) use subsample::vertex;
 pub(crate) use threshold::choose;
 pub use threshold::{Population, Rule, Threshold};

@@ -88,9 +88,10 @@ pub struct FindArgs {
     /// Where the last frame ends, in seconds or with its unit; the end of the trace without it
     #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = time)]
     pub end: Option<f64>,
-    /// The window around a mark that is compared with the trace: times before and after it, in milliseconds or with their units
-    #[arg(long, value_name = "PRE,POST", value_parser = window, default_value = "1,4", allow_hyphen_values = true)]
-    pub window: (f64, f64),
+    /// The window around a mark that is compared with the trace: times before and after it, in milliseconds or with their units.
+    /// Without it 1,4, or less where power repeats sooner
+    #[arg(long, value_name = "PRE,POST", value_parser = window, allow_hyphen_values = true)]
+    pub window: Option<(f64, f64)>,
     /// How starts are found: `squares` (sum of squared differences to the marked window), `normalized` (the same, regardless of level
     /// and scale), `tracking` (the most likely sequence of starts), or `auto` (chosen by the length and the clarity of the trace)
     #[arg(long, value_name = "METHOD", default_value_t)]
@@ -320,11 +321,10 @@ impl FindArgs {
         if let Some(path) = &self.mark_file {
             starts_s.extend(read_times(path)?);
         }
-        let (pre_s, post_s) = self.window;
         Ok(Search {
             starts_s,
             propose: self.auto,
-            window: Window { pre_s, post_s },
+            window: self.window.map(|(pre_s, post_s)| Window { pre_s, post_s }),
             end_s: self.end,
             method: self.method,
             in_pieces: self.stream,

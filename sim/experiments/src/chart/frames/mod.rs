@@ -169,7 +169,7 @@ impl Study for FramesChart {
         snrs_db: &[40.0, 30.0, 20.0, 10.0, 5.0, 0.0],
         bits: &[4, 6, 8, 10, 12, 14, 16],
         seeds: &[1, 2],
-        witness_seeds: &[101, 102, 103],
+        witness_seeds: &[104, 105, 106],
     };
     const QUICK: FramesEffort = FramesEffort {
         frames: 60,
@@ -248,6 +248,14 @@ impl Study for FramesChart {
             .data("f1", |row| row.f1.first().copied())
             .data("f1_worst_mark", |row| row.f1.iter().copied().reduce(f64::min))
             .data("calibration_error", |row| row.calibration.error())
+            .data("wrong", |row| row.flags.wrong)
+            .data("wrong_flagged", |row| row.flags.wrong_flagged)
+            .data("right", |row| row.flags.right)
+            .data("right_flagged", |row| row.flags.right_flagged)
+            .data("failed", |row| row.warnings.failed)
+            .data("failed_warned", |row| row.warnings.failed_warned)
+            .data("good", |row| row.warnings.good)
+            .data("good_warned", |row| row.warnings.good_warned)
             .csv("frame_witnesses.csv");
         vec![self.by_scene(), self.by_value(), self.by_witness(), rows.sheet(), witnesses.sheet()]
     }
@@ -373,7 +381,8 @@ impl FramesChart {
 
     /// Every method on every kind of device.
     fn by_witness(&self) -> Sheet {
-        let below = |of: &WitnessSummary| format!("{} of {}", of.below_simple, of.devices);
+        let counted = |some: usize, all: usize| format!("{some} of {all}");
+        let below = |of: &WitnessSummary| counted(of.below_simple, of.devices);
         Table::of(witnesses::summaries(&self.witnesses))
             .detail("device", |of| of.witness, plain)
             .detail("method", |of| of.method, plain)
@@ -381,6 +390,14 @@ impl FramesChart {
             .detail("F1, worst of five marks", |of| of.worst, fixed(3))
             .detail("below the better simple method", below, plain)
             .detail("calibration error", |of| of.calibration.error(), optional(fixed(3)))
+            .detail("wrong frames flagged", |of| counted(of.flags.wrong_flagged, of.flags.wrong), plain)
+            .detail("right ones flagged", |of| counted(of.flags.right_flagged, of.flags.right), plain)
+            .detail(
+                "failed searches that warn",
+                |of| counted(of.warnings.failed_warned, of.warnings.failed),
+                plain,
+            )
+            .detail("good ones that warn", |of| counted(of.warnings.good_warned, of.warnings.good), plain)
             .sheet()
     }
 

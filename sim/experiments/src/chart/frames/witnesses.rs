@@ -7,7 +7,7 @@ use traces::frames::{FinderMethod, Marks, Options, default_window, find_with};
 use traces::score::{TOLERANCE_S, score, true_beside_found};
 use traces::synth::{Scene, WITNESSES, Witness};
 
-use super::{HAND_S, MARKED};
+use super::{FAILS_BELOW, HAND_S, MARKED};
 use crate::study::StudyError;
 
 /// Bins of confidence, of equal width.
@@ -29,6 +29,78 @@ pub struct WitnessRow {
     pub f1: Vec<f64>,
     /// Confidence of the frames found with any of the marks.
     pub calibration: Calibration,
+    /// Flags of these frames.
+    pub flags: FlagCount,
+    /// Warnings of the searches with each mark.
+    pub warnings: WarningCount,
+}
+
+/// How many frames are wrong and right, and how many of each carry a flag.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct FlagCount {
+    /// Frames with an end that is not a true one, or a start missed within.
+    pub wrong: usize,
+    /// Number of them with a flag.
+    pub wrong_flagged: usize,
+    /// The other frames.
+    pub right: usize,
+    /// Number of them with a flag all the same.
+    pub right_flagged: usize,
+}
+
+impl FlagCount {
+    fn add(&mut self, right: bool, flagged: bool) {
+        let (all, some) = if right {
+            (&mut self.right, &mut self.right_flagged)
+        } else {
+            (&mut self.wrong, &mut self.wrong_flagged)
+        };
+        *all += 1;
+        *some += usize::from(flagged);
+    }
+
+    fn join(self, other: &Self) -> Self {
+        Self {
+            wrong: self.wrong + other.wrong,
+            wrong_flagged: self.wrong_flagged + other.wrong_flagged,
+            right: self.right + other.right,
+            right_flagged: self.right_flagged + other.right_flagged,
+        }
+    }
+}
+
+/// How many searches fail ([`FAILS_BELOW`]) and how many do not, and how many of each warn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct WarningCount {
+    /// Searches that fail.
+    pub failed: usize,
+    /// Number of them with a warning.
+    pub failed_warned: usize,
+    /// The other searches.
+    pub good: usize,
+    /// Number of them with a warning all the same.
+    pub good_warned: usize,
+}
+
+impl WarningCount {
+    fn add(&mut self, f1: f64, warned: bool) {
+        let (all, some) = if f1 < FAILS_BELOW {
+            (&mut self.failed, &mut self.failed_warned)
+        } else {
+            (&mut self.good, &mut self.good_warned)
+        };
+        *all += 1;
+        *some += usize::from(warned);
+    }
+
+    fn join(self, other: &Self) -> Self {
+        Self {
+            failed: self.failed + other.failed,
+            failed_warned: self.failed_warned + other.failed_warned,
+            good: self.good + other.good,
+            good_warned: self.good_warned + other.good_warned,
+        }
+    }
 }
 
 /// How often frames of a confidence are right.
@@ -88,19 +160,23 @@ fn row(
     let truth_s: Vec<f64> = scene.truth.iter().map(|frame| frame.start_s).collect();
     let tolerance_s = tolerance_s(&truth_s);
     let (mut f1, mut calibration) = (Vec::new(), Calibration::default());
+    let (mut flags, mut warnings) = (FlagCount::default(), WarningCount::default());
     for (share, hand_s) in MARKED.into_iter().zip(HAND_S) {
         let mark_s = truth_s[(share * truth_s.len() as f64) as usize] + hand_s;
         let marks = Marks::one(mark_s, default_window(0.0, trace.rate_hz()), trace.end_s());
         let found = find_with(trace, &marks, &Options { method })?;
         let frames = PowerIntegral::new(trace).frames(&found);
         f1.push(score(&frames, &scene.truth, tolerance_s).f1());
+        warnings.add(f1[f1.len() - 1], !found.warnings.is_empty());
         let found_s: Vec<f64> = frames.iter().map(|frame| frame.start_s).collect();
         let partner = true_beside_found(&found_s, &truth_s, tolerance_s);
         for (two, frame) in partner.windows(2).zip(&frames) {
-            calibration.add(frame.confidence, matches!(two, [Some(a), Some(b)] if *b == a + 1));
+            let right = matches!(two, [Some(a), Some(b)] if *b == a + 1);
+            calibration.add(frame.confidence, right);
+            flags.add(right, frame.flags.has_low_confidence());
         }
     }
-    Ok(WitnessRow { witness: witness.name, seed, method: method.name(), f1, calibration })
+    Ok(WitnessRow { witness: witness.name, seed, method: method.name(), f1, calibration, flags, warnings })
 }
 
 fn tolerance_s(starts_s: &[f64]) -> f64 {
@@ -124,6 +200,8 @@ pub(super) struct WitnessSummary {
     pub below_simple: usize,
     pub devices: usize,
     pub calibration: Calibration,
+    pub flags: FlagCount,
+    pub warnings: WarningCount,
 }
 
 /// F1 that a method may be below the better simple one.
@@ -153,6 +231,8 @@ pub(super) fn summaries(rows: &[WitnessRow]) -> Vec<WitnessSummary> {
                 below_simple: of.iter().filter(|row| first(row) < better(row) - MAX_BELOW).count(),
                 devices: of.len(),
                 calibration: of.iter().fold(Calibration::default(), |sum, row| sum.join(&row.calibration)),
+                flags: of.iter().fold(FlagCount::default(), |sum, row| sum.join(&row.flags)),
+                warnings: of.iter().fold(WarningCount::default(), |sum, row| sum.join(&row.warnings)),
             });
         }
     }
