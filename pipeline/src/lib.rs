@@ -15,12 +15,15 @@
 //! - [`sampling`]: sample positions of every pixel,
 //! - [`depth`]: depth intervals and culling,
 //! - [`state`]: depth test, stencil test and blending of a draw,
-//! - [`shading`] and [`texture`]: the shading grid, shaders and textures,
+//! - [`shader`], [`shading`] and [`texture`]: shaders and the lanes that run them, the shading grid, and textures,
 //! - [`surface`]: images that passes write and read, and their formats,
 //! - [`memory`]: caches and addresses,
 //! - [`compute`]: groups of lanes with shared memory, buffers, atomics and barriers,
 //! - [`conservative`]: the tiles that a triangle may touch, without samples,
 //! - [`frame`]: all stages in order.
+//!
+//! Beside it: [`tally`], numbers that count their operations; [`visibility`], the visible triangle of every sample as fast as
+//! the host can, without the model; [`simd`], its vectors.
 //!
 //! ```
 //! use glam::Vec3;

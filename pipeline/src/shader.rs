@@ -165,8 +165,8 @@ impl<'a> Lane<'a> {
     }
 
     /// Filtered texel at `uv` of the texture or surface bound to `slot`, in linear RGBA, at a level of detail (0 for the
-    /// finest; a surface that is bound by one level has no others). An unbound slot reads as zero. The texture unit does the work: a fetch is no
-    /// operation of the lane.
+    /// finest; a surface that is bound by one level has no others). An unbound slot reads as zero. The texture unit does the
+    /// work: a fetch is no operation of the lane.
     pub fn fetch(&self, slot: usize, uv: Vec2, lod: f32) -> Vec4 {
         let Some(bound) = self.bound.get(slot) else { return Vec4::ZERO };
         let (texel, fetches) = bound.fetch(uv, lod, |line| self.note(line));
@@ -174,7 +174,8 @@ impl<'a> Lane<'a> {
         texel
     }
 
-    /// The same for another sample.
+    /// Value of a sample of a pixel of what is bound to `slot`, as it is stored: one fetch of the texture unit. An unbound slot reads as
+    /// zero.
     pub fn load_sample(&self, slot: usize, pixel: [i32; 2], sample: u32) -> Vec4 {
         let Some(bound) = self.bound.get(slot) else { return Vec4::ZERO };
         self.fetches.set(self.fetches.get() + 1);
@@ -398,7 +399,7 @@ impl<'a> Lane<'a> {
         a.unit()
     }
 
-    /// The same in double precision, which stands for the fixed-point arithmetic of the hardware.
+    /// `point` moved by `pose`: nine multiply-adds. Double precision stands for the fixed-point arithmetic of the hardware.
     #[inline(always)]
     pub(crate) fn transform_f64(&self, pose: &DAffine3, point: DVec3) -> DVec3 {
         self.count(9);

@@ -112,8 +112,8 @@ activity! {
     }
     ZCull "z_cull" "Drops tiles whose every sample is known to be hidden." {
         ZCullTests "z_cull_tests" "A depth interval compared with the farthest and nearest depth of a box of lens and time of a tile."
-        TilesCulledZMax "tiles_culled_z_max" "A tile culled because the triangle lies behind all of it."
-        BoxesCulledZMax "boxes_culled_z_max" "A box of lens and time of a tile in which the triangle lies behind all that is stored."
+        TilesCulledZMax "tiles_culled_z_max" "A tile culled because no sample of the triangle can pass the depth test in it."
+        BoxesCulledZMax "boxes_culled_z_max" "A box of lens and time of a tile in which no sample of the triangle can pass the depth test."
         ZMaxUpdates "z_max_updates" "The farthest depth of a box of lens and time written anew."
         ZMinUpdates "z_min_updates" "The nearest depth of a box of lens and time written anew."
         DepthIntervalMadds "depth_interval_madds" "A multiply-add spent on a depth interval."
@@ -128,8 +128,8 @@ activity! {
     }
     Depth "depth" "Compares and stores the depth of each sample." {
         DepthReads "depth_reads" "A stored sample depth read for a comparison."
-        DepthReadsSkipped "depth_reads_skipped" "A comparison spared because the triangle is nearer than all that is stored."
-        DepthWrites "depth_writes" "A sample depth written."
+        DepthReadsSkipped "depth_reads_skipped" "A comparison spared because its result is known for the tile, or for every depth."
+        DepthWrites "depth_writes" "A word of depth and stencil written."
         DepthLines "depth_lines" "A line of the depth cache accessed."
         DepthMisses "depth_misses" "A line that was not in the depth cache."
     }
@@ -144,12 +144,12 @@ activity! {
         TextureMisses "texture_misses" "A line that was not in the texture cache."
     }
     Colour "colour" "Stores sample colours and resolves them into pixels." {
-        ColourWrites "colour_writes" "A sample colour written."
+        ColourWrites "colour_writes" "A word of a sample colour written, in each target."
         SamplesBlended "samples_blended" "Of these: a colour that is combined with the stored one, or replaces a part of it."
         ColourLines "colour_lines" "A line of the colour cache accessed."
         ColourMisses "colour_misses" "A line that was not in the colour cache."
-        SamplesResolved "samples_resolved" "A sample colour read to resolve its pixel."
-        PixelsResolved "pixels_resolved" "A pixel of the final image written."
+        SamplesResolved "samples_resolved" "A word of a sample colour read to resolve its pixel."
+        PixelsResolved "pixels_resolved" "A word of a pixel of an image written."
     }
     L2 "l2" "The cache shared by all clients of memory." {
         L2Reads "l2_reads" "A line read by a client."

@@ -41,13 +41,13 @@ pub struct TileLoop {
     pub blocks: u32,
     /// Tiles tested.
     pub tiles: u32,
-    /// Blocks and tiles culled by their sides.
+    /// Blocks and tiles culled by their sides or by the near depth.
     pub culled_sides: u32,
     /// Blocks and tiles culled by the edges of the triangle or by its depths.
     pub culled_edges: u32,
-    /// Multiply-adds of bringing vertices to the tiles and their edges to a tile.
+    /// Multiply-adds of moving vertices to the tiles, and of finding their edges over a tile.
     pub place_madds: u32,
-    /// Multiply-adds of side tests and of the near depth.
+    /// Multiply-adds of tests against sides and the near depth.
     pub side_madds: u32,
     /// Multiply-adds of edge tests.
     pub edge_madds: u32,
@@ -103,8 +103,8 @@ impl Rasterizer {
         Self { halvings, ..self }
     }
 
-    /// Call `each` with every tile that `triangle` may touch (column and row) and its intervals, in rows of
-    /// blocks. Does not allocate.
+    /// Call `each` with every tile that `triangle` may touch (column and row) and its intervals, in the order of a Z-curve
+    /// over blocks. Does not allocate.
     pub fn rasterize(&self, triangle: &MovingTriangle, grid: &Grid, each: impl FnMut([u32; 2], &Touch)) {
         self.rasterize_part(triangle, grid, [0..grid.columns, 0..grid.rows], each);
     }

@@ -231,7 +231,7 @@ impl<'a> Recentred<'a> {
             + shift.abs()
             + bent * deepest
             + if perspective { reach * deepest } else { reach };
-        // Errors before anything is rounded to `f32`.
+        // Errors before anything is rounded to the type of the tests.
         let by_depth = if perspective { at + reach + bent } else { bent };
         let terms =
             self.triangle.largest(axis) + if perspective { at * self.triangle.largest(2) } else { at };

@@ -1,4 +1,4 @@
-//! Views, tiles, and boxes of lens and time of conservative mode.
+//! Views, rectangles of the image, boxes of lens and time, and the intervals of a tile in conservative mode.
 
 use crate::geometry::Shear;
 use crate::traversal::{Box5, Coordinate};

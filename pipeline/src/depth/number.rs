@@ -1,4 +1,4 @@
-//! Numbers of the depth bounds and of conservative mode: `f64`, or a number that counts its operations.
+//! Numbers of the depth bounds and of tests of points: `f64`, or a number that counts its operations.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 

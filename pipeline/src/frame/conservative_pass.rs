@@ -1,6 +1,6 @@
 //! Conservative mode as a mode of the pipeline: triangles stream through vertices, set-up and the tile loop, and every
-//! tile that a triangle may touch runs a [`TileShader`]. No sample is tested. The numbers of the tile loop and the lanes
-//! of the shader count what they do.
+//! tile that a triangle may touch runs a [`TileShader`]. No sample is tested. Tile tests have the costs of standard mode;
+//! the lanes of the shader count what they do.
 
 use std::collections::HashSet;
 use std::ops::Range;

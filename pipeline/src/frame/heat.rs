@@ -17,7 +17,8 @@ pub struct HeatMap {
     pub tiles: Vec<TileHeat>,
     /// Coarse tiles, row by row, with the events of the coarse tile as a whole.
     pub coarse: Vec<TileHeat>,
-    /// Events without a position: those of vertices, and those of emptying the caches at the end.
+    /// Events without a position: those of vertices, groups and barriers, of passes of another size, and of emptying the caches at
+    /// the end.
     pub elsewhere: u64,
     /// Count in every pixel, row by row, for events of samples; otherwise empty.
     pub samples: Vec<u32>,

@@ -109,7 +109,7 @@ pub(super) fn find_auto(trace: &Trace, marks: &Marks) -> Result<Found, MarkError
     if is_clear && is_unsure(&tracked) { where_agreed(trace, marks, squares, &tracked) } else { Ok(tracked) }
 }
 
-/// The result of one method, with low confidence in frames that another does not find: methods that disagree cannot both be sure.
+/// The result of one method, with low confidence in frames that another method does not find.
 fn where_agreed(trace: &Trace, marks: &Marks, found: Found, other: &Found) -> Result<Found, MarkError> {
     let times_s = |of: &Found| -> Vec<f64> { of.starts.iter().map(|start| start.time_s).collect() };
     let beside = true_beside_found(&times_s(&found), &times_s(other), TOLERANCE_S);

@@ -119,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn a_clock_step_keeps_the_beat_and_halves_that_alternate_do_not() {
+    fn gaps_stay_even_at_a_clock_step_and_those_of_alternating_halves_are_not() {
         let step: Vec<f64> = [vec![10.0; 8], vec![14.0; 8]].concat();
         assert!(even_gaps(&step, f64::INFINITY).iter().filter(|even| !**even).count() <= 2);
         let halves: Vec<f64> = (0..16).map(|i| if i % 2 == 0 { 6.0 } else { 4.0 }).collect();

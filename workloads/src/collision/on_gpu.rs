@@ -13,7 +13,7 @@ use super::pass::{BinnedPrimitive, Fragment, FragmentBudget, Part, Pass, PassBac
 
 /// Bytes of a vertex at both times.
 const VERTEX_BYTES: u32 = 24;
-/// Bytes of a box of time and depth: four numbers of 64 bits, as conservative mode has them.
+/// Bytes of a box of time and depth: four numbers of 64 bits, in which conservative mode clips its intervals.
 const BOX_BYTES: u64 = 32;
 
 /// Places of boxes in a buffer: tile by tile of the hardware, the boxes of a pixel side by side.

@@ -179,7 +179,7 @@ impl Sweep<'_> {
     }
 }
 
-/// Whether two boxes meet; by depth alone, whether the second is in front of the farthest depth of the first, and whether
+/// By direction, whether two boxes meet; by depth alone, whether the second is in front of the farthest depth of the first, and whether
 /// it is behind the nearest.
 fn overlaps(method: Method, known: &TzBox, own: &TzBox) -> [bool; 2] {
     if known.z[0] > known.z[1] {

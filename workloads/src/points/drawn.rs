@@ -7,7 +7,7 @@
 //! bounds `t^ u^ v^`, and keeps those that are in the simploid and in the domain. Candidates depend on the cell alone, so a
 //! candidate falls into one box at most, however bounds overlap, and together they are a Poisson process.
 //!
-//! [`on_host`] makes the candidates of all cells and compares each with all boxes: the reference without a rasterizer.
+//! In tests `on_host` makes the candidates of all cells and compares each with all boxes: the reference without a rasterizer.
 
 use std::ops::Range;
 
