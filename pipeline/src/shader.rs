@@ -447,10 +447,14 @@ pub(crate) struct Program {
 }
 
 impl Program {
-    /// Runs `shader` once. Without branches its cost is the same for all points.
-    pub fn of(shader: &dyn Shader) -> Self {
+    /// Runs `shader` once, as in a pass with so many colour targets. Without branches its cost is the same for all points.
+    pub fn of(shader: &dyn Shader, targets: usize) -> Self {
         let [pixel, vertex] = [Lane::default(), Lane::default()];
-        shader.shade(&pixel, &ShadingPoint::FACING, Vec4::ONE);
+        if targets > 1 {
+            shader.outputs(&pixel, &ShadingPoint::FACING, Vec4::ONE);
+        } else {
+            shader.shade(&pixel, &ShadingPoint::FACING, Vec4::ONE);
+        }
         shader.vertex(&vertex, Vec3::ZERO);
         let pixel_ops = (!pixel.has_branched()).then(|| pixel.ops());
         Self { pixel_ops, vertex_ops: vertex.ops() }
@@ -485,9 +489,29 @@ mod tests {
         }
     }
 
+    struct TwoTargets;
+
+    impl Shader for TwoTargets {
+        fn shade(&self, lane: &Lane, _: &ShadingPoint, texel: Vec4) -> Vec4 {
+            lane.scale(texel, 2.0)
+        }
+
+        fn outputs(&self, lane: &Lane, at: &ShadingPoint, texel: Vec4) -> Outputs {
+            let mut outputs = [self.shade(lane, at, texel); MAX_TARGETS];
+            outputs[1] = lane.scale(lane.scale(texel, 3.0), 4.0);
+            outputs
+        }
+    }
+
+    #[test]
+    fn a_program_costs_what_it_computes_for_the_targets_of_the_pass() {
+        let ops = |targets| Program::of(&TwoTargets, targets).pixel_ops;
+        assert_eq!([ops(1), ops(2)], [Some(4), Some(12)]);
+    }
+
     #[test]
     fn a_program_that_branches_has_no_single_cost() {
-        assert_eq!(Program::of(&Loop).pixel_ops, None);
+        assert_eq!(Program::of(&Loop, 1).pixel_ops, None);
         let ops = |x: f32| {
             let lane = Lane::default();
             Loop.shade(&lane, &ShadingPoint { position: Vec3::X * x, ..ShadingPoint::FACING }, Vec4::ONE);

@@ -106,7 +106,7 @@ impl<'a> Pass<'a> {
             first_triangle,
             bound: bound(draws, &addresses, surfaces, space),
             addresses,
-            programs: draws.iter().map(|draw| Program::of(draw.shader)).collect(),
+            programs: draws.iter().map(|draw| Program::of(draw.shader, colours.len())).collect(),
             origin: [Viewport::edge(0, viewport.width()), Viewport::edge(0, viewport.height())],
             lens: !projection.shear.is_none(),
             spans: features.lens_regions.then(|| LensSpans::new(settings.samples.lens_regions())).flatten(),

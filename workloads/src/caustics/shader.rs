@@ -1,7 +1,7 @@
 //! Caustics on the modelled hardware: beams in conservative mode, with a shader that tests the pixels of a tile and
 //! adds the light of those that are covered.
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use pipeline::conservative::{Grid, MovingTriangle, Rasterizer, View};
 use pipeline::memory::MemoryRange;
 use pipeline::{ConservativeDraw, Gpu, Lanes, Primitive, TileIntervals, TileShader};
@@ -17,18 +17,61 @@ use super::{Beam, Eye, Light, Method};
 const VERTEX_BYTES: u32 = 24;
 /// Bytes per pixel of the buffer that accumulates light.
 const LIGHT_BYTES: u64 = 4;
+/// Colour of light in water, linear RGB.
+const TINT: Vec3 = Vec3::new(0.55, 0.9, 1.0);
 /// Pixels of a tile.
 const TILE_PIXELS: u64 = (TILE_PX * TILE_PX) as u64;
 
+/// The buffer that accumulates light, tile by tile.
+#[derive(Clone, Copy)]
+pub(super) struct LightBuffer {
+    region: MemoryRange,
+    /// Tiles in a row of the image.
+    columns: u32,
+}
+
+impl LightBuffer {
+    /// Where the light of a pixel begins.
+    fn offset(&self, [x, y]: [u32; 2]) -> u64 {
+        let tile = u64::from(y / TILE_PX * self.columns + x / TILE_PX);
+        (tile * TILE_PIXELS + u64::from(y % TILE_PX * TILE_PX + x % TILE_PX)) * LIGHT_BYTES
+    }
+}
+
+/// Draws the light in colours, in a pass that reads it; `white` is white. The host has read the light to find that.
+pub(super) fn tone_on(
+    gpu: &mut Gpu<'_>,
+    eye: &Eye,
+    light: &[f64],
+    buffer: LightBuffer,
+    white: f64,
+) -> Vec<Vec3> {
+    gpu.wait();
+    let viewport = eye.viewport();
+    let mut drawn = gpu.shade_pixels("tone", viewport, |lanes, at @ [x, y]| {
+        lanes.fetch(buffer.region.address() + buffer.offset(at), LIGHT_BYTES);
+        let light = light[(y * viewport.width() + x) as usize];
+        lanes.run(|lane| lane.scale(TINT, lane.div(light, white) as f32))
+    });
+    drawn.images.swap_remove(0)
+}
+
 /// Draws beams in a pass of `gpu`. The picture is that of [`super::draw()`].
-pub(super) fn draw_on(gpu: &mut Gpu<'_>, beams: &[Beam], eye: &Eye, method: Method, light: Light) -> Picture {
+pub(super) fn draw_on(
+    gpu: &mut Gpu<'_>,
+    beams: &[Beam],
+    eye: &Eye,
+    method: Method,
+    light: Light,
+) -> (Picture, LightBuffer) {
     let seen: Vec<Option<Seen>> = beams.iter().map(|beam| eye.see(beam)).collect();
     let viewport = eye.viewport();
     let [half_width, half_height] = viewport.half_px().map(f64::from);
     let [columns, rows] = [viewport.width(), viewport.height()].map(|side| side.div_ceil(TILE_PX));
     let side = f64::from(TILE_PX);
     let grid = Grid { origin: [-half_width, -half_height], tile: [side; 2], columns, rows };
-    let target = gpu.allocate(u64::from(columns * rows) * TILE_PIXELS * LIGHT_BYTES);
+    let region = gpu.allocate(u64::from(columns * rows) * TILE_PIXELS * LIGHT_BYTES);
+    let buffer = LightBuffer { region, columns };
     let (primitives, faces) = primitives(&seen, method, &grid);
     let vertices = gpu.allocate(3 * primitives.len() as u64 * u64::from(VERTEX_BYTES));
     // The maps of a GPU with other tiles cannot show these.
@@ -49,7 +92,7 @@ pub(super) fn draw_on(gpu: &mut Gpu<'_>, beams: &[Beam], eye: &Eye, method: Meth
         vertex_bytes: VERTEX_BYTES,
         projection: Some(eye.projection()),
     };
-    let shader = LightShader { eye, seen: &seen, faces: &faces, light, target, columns };
+    let shader = LightShader { eye, seen: &seen, faces: &faces, light, buffer };
     let mut pass = gpu.begin_conservative("light", of_image);
     pass.draw(gpu, &draw, &shader, |_, shaded| {
         picture.tiles += 1;
@@ -60,7 +103,7 @@ pub(super) fn draw_on(gpu: &mut Gpu<'_>, beams: &[Beam], eye: &Eye, method: Meth
             picture.useful += u64::from(light > 0.0);
         }
     });
-    picture
+    (picture, buffer)
 }
 
 /// A face of a bounding volume, or none for a moving triangle, of a beam.
@@ -106,9 +149,7 @@ struct LightShader<'a> {
     seen: &'a [Option<Seen>],
     faces: &'a [Face],
     light: Light,
-    target: MemoryRange,
-    /// Tiles in a row of the image.
-    columns: u32,
+    buffer: LightBuffer,
 }
 
 /// Result for a tile.
@@ -167,8 +208,7 @@ impl TileShader for LightShader<'_> {
             let Some(times) = times else { continue };
             *mask |= 1 << bit;
             let light = lanes.run(|lane| self.light.shade(lane, &PixelInBeam { eye, seen, at, times }));
-            let tile = u64::from(tile.tile[1] * self.columns + tile.tile[0]);
-            lanes.blend(self.target, (tile * TILE_PIXELS + u64::from(bit)) * LIGHT_BYTES, LIGHT_BYTES);
+            lanes.blend(self.buffer.region, self.buffer.offset([x, y]), LIGHT_BYTES);
             shaded.lit.push(((y * viewport.width() + x) as usize, light));
         }
         Some(shaded)

@@ -188,7 +188,7 @@ fn near_everywhere(pairs: usize, kept: u32) -> Option<Warning> {
 
 #[cfg(test)]
 mod tests {
-    use activity::{Counts, Event, Packet};
+    use activity::{Counts, Event, Packet, PacketKind, Waits};
 
     use super::*;
     use crate::collision::detect;
@@ -235,6 +235,24 @@ mod tests {
                 assert!(kept > 0 && kept <= candidates(&objects).len());
             }
         }
+    }
+
+    #[test]
+    fn an_axis_waits_for_the_one_whose_results_the_host_has_read() {
+        let job = made(&[("resolution", "16"), ("balls", "6")]).unwrap();
+        let hardware = hardware();
+        let (mut waits, mut last) = (Vec::new(), 0);
+        let mut gpu = Gpu::new(&hardware, |packet: &Packet, _| {
+            if packet.kind == PacketKind::Barrier(Waits::All) {
+                waits.push(last);
+            }
+            last = packet.pass;
+        })
+        .unwrap();
+        job.frame(0, &mut gpu).unwrap();
+        gpu.finish();
+        // Passes 0 to 5 sweep along x, y and z, forward and backward.
+        assert_eq!(waits, [1, 3]);
     }
 
     #[test]

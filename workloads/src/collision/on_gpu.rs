@@ -131,7 +131,10 @@ impl TileShader for BoxShader<'_> {
 }
 
 impl PassBackend for PassesOnGpu<'_, '_> {
-    fn begin(&mut self, name: &str) {
+    fn begin(&mut self, name: &str, follows: bool) {
+        if follows {
+            self.gpu.wait();
+        }
         self.pass = self.gpu.begin_conservative(name, None);
     }
 

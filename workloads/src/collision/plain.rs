@@ -46,7 +46,7 @@ impl PlainResult {
 }
 
 impl PassBackend for PlainResult {
-    fn begin(&mut self, _: &str) {
+    fn begin(&mut self, _: &str, _: bool) {
         self.passes += 1;
     }
 

@@ -94,8 +94,8 @@ impl Sweeps {
         };
         let mut meets = vec![[false; 2]; objects.len()];
         let backward: Vec<usize> = set.iter().rev().copied().collect();
-        for (order, name) in [(set, NAMES[axis][0]), (&backward, NAMES[axis][1])] {
-            backend.begin(name);
+        for (order, name, follows) in [(set, NAMES[axis][0], axis > 0), (&backward, NAMES[axis][1], false)] {
+            backend.begin(name, follows);
             sweep.known.clear(pass.tiles() * bins.len());
             for &object in order {
                 let found = sweep.object(&objects[object], backend);
