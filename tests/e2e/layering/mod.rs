@@ -87,6 +87,11 @@ fn packets_are_built_in_the_pipeline_alone() {
     });
     let found: Vec<_> = found.collect();
     assert!(found.is_empty(), "{found:?}");
+    // The clocks are tested and measured with synthetic streams.
+    let timing = rust_files(&root().join("sim/timing/src"));
+    let builds = |file: &&PathBuf| fs::read_to_string(file).expect("a source file").contains("Packet::new");
+    let found: Vec<_> = timing.iter().filter(builds).filter_map(|file| file.file_name()).collect();
+    assert_eq!(found, ["streams.rs"]);
 }
 
 #[test]
