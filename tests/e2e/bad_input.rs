@@ -71,7 +71,12 @@ fn flags() {
 #[test]
 fn flags_without_effect_on_a_workload_are_refused() {
     let mut refusals = Refusals::default();
-    let cases: [(&[&str], &[&str], &str); 5] = [
+    let cases: [(&[&str], &[&str], &str); 6] = [
+        (
+            &["compute", "--set", "bins=64"],
+            &["`light_culling`", "`bins`"],
+            "it needs kernel=histogram, or leave it out",
+        ),
         (&["occlusion", "--lens", "0.3"], &["--lens", "`occlusion`"], "give --set lens=... instead"),
         (&["ccd", "--samples", "8"], &["--samples", "`ccd`"], "leave it out"),
         (&["ccd", "--size", "64x64"], &["--size", "`ccd`"], "give --set resolution=... instead"),

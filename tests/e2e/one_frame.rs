@@ -15,3 +15,17 @@ fn a_lone_frame_is_found_once_however_long_it_is() {
         assert!(!codes.iter().any(|code| **code == "frames-missed" || **code == "only-mark"), "{codes:?}");
     }
 }
+
+#[test]
+fn a_lone_frame_has_no_deviation() {
+    let [one, two] = ["0..1", "0..2"].map(|frames| {
+        let results = quintile().run("tiny", &["--frames", frames]);
+        ["report.html", "plots/frame_energy.svg"]
+            .map(|file| String::from_utf8(results.bytes(file)).expect("text"))
+            .concat()
+    });
+    let deviations =
+        |text: &str| text.split(" ± ").skip(1).filter(|rest| rest.starts_with(char::is_numeric)).count();
+    assert_eq!(deviations(&one), 0);
+    assert!(deviations(&two) > 4);
+}

@@ -151,10 +151,7 @@ impl Report<'_> {
 }
 
 fn mean_sd(mean: Option<f64>, sd: Option<f64>, unit: &str) -> String {
-    match (mean, sd) {
-        (Some(mean), Some(sd)) => si_mean_sd(MeanSd { mean, sd }, unit),
-        _ => "–".to_owned(),
-    }
+    mean.map_or("–".to_owned(), |mean| si_mean_sd(MeanSd { mean, sd: sd.unwrap_or(f64::NAN) }, unit))
 }
 
 fn percent(fraction: f64) -> String {

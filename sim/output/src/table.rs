@@ -81,10 +81,14 @@ pub fn si_digits(value: f64, unit: &str, digits: usize) -> String {
     format!("{text} {}{unit}", prefix.sign).trim_end().to_owned()
 }
 
-/// `12.3 ± 0.4 mJ`: mean and standard deviation with the prefix and the decimals of the mean.
+/// `12.3 ± 0.4 mJ`: mean and standard deviation with the prefix and the decimals of the mean; the mean alone if there is no deviation
+/// (NaN).
 pub fn si_mean_sd(stats: MeanSd, unit: &str) -> String {
-    if !stats.mean.is_finite() || !stats.sd.is_finite() {
+    if !stats.mean.is_finite() {
         return "n/a".to_owned();
+    }
+    if !stats.sd.is_finite() {
+        return si_digits(stats.mean, unit, 4);
     }
     let prefix = if unit.is_empty() { Prefix::NONE } else { Prefix::of(stats.mean) };
     let decimals =
@@ -288,6 +292,7 @@ mod tests {
     fn mean_and_deviation_share_a_prefix() {
         assert_eq!(si_mean_sd(MeanSd { mean: 0.012_34, sd: 0.000_4 }, "J"), "12.34 ± 0.40 mJ");
         assert_eq!(si_mean_sd(MeanSd { mean: f64::NAN, sd: 0.0 }, "J"), "n/a");
+        assert_eq!(si_mean_sd(MeanSd { mean: 0.012_34, sd: f64::NAN }, "J"), "12.34 mJ");
     }
 
     #[test]

@@ -4,7 +4,7 @@ use std::ffi::OsString;
 use std::ops::Range;
 
 use clap::{Args, ColorChoice, ValueEnum};
-use output::plot::{COLUMN_MM, Look};
+use output::plot::{COLUMN_MM, Look, undrawable};
 use output::terminal::{self, Terminal, Verbosity};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use workloads::Overrides;
@@ -37,7 +37,7 @@ pub struct LookArgs {
     pub width: Option<f64>,
     /// Title of pictures in place of their own; an empty one omits title and subtitle, for papers with
     /// captions
-    #[arg(long, value_name = "TEXT")]
+    #[arg(long, value_name = "TEXT", value_parser = title)]
     pub title: Option<String>,
     /// Font size of pictures in points, 4 to 32
     #[arg(long, value_name = "PT", allow_negative_numbers = true, value_parser = font_size)]
@@ -58,6 +58,22 @@ fn width(text: &str) -> Result<f64, String> {
     within(text.strip_suffix("mm").unwrap_or(text), 30.0..=400.0).ok_or_else(|| {
         format!("`{text}` is not a width; give 30 to 400 millimetres, or `column` for {COLUMN_MM}")
     })
+}
+
+fn title(text: &str) -> Result<String, String> {
+    match undrawable(text) {
+        None => Ok(text.to_owned()),
+        Some(letter) => Err(format!(
+            "the font of pictures has no `{}`: it has Latin letters and symbols of plots; write it in these, or give an empty title and \
+             a caption",
+            shown(letter)
+        )),
+    }
+}
+
+/// A letter, or its code if it would not be seen.
+fn shown(letter: char) -> String {
+    if letter.is_alphanumeric() { letter.to_string() } else { letter.escape_default().to_string() }
 }
 
 fn font_size(text: &str) -> Result<f64, String> {
@@ -179,6 +195,12 @@ mod tests {
             assert!(width(wrong).unwrap_err().contains("30 to 400"), "{wrong}");
             assert!(font_size(wrong).unwrap_err().contains("4 to 32"), "{wrong}");
         }
+    }
+
+    #[test]
+    fn titles_that_the_font_cannot_show_are_refused() {
+        assert_eq!([title(""), title("Łódź – 3 Ω")], [Ok(String::new()), Ok("Łódź – 3 Ω".to_owned())]);
+        assert!(title("дом").unwrap_err().contains("has no `д`"));
     }
 
     #[test]

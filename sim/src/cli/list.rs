@@ -8,6 +8,7 @@ use output::table::Table;
 use run::GpuSpec;
 use serde::Serialize;
 use serde_json::{Map, Value};
+use workloads::job::{JobOptions, Need};
 use workloads::{caustics, collision, compute, deferred, glossy, multiview, occlusion, points, soft_shadows};
 
 use super::outputs::{print, print_json};
@@ -94,9 +95,9 @@ fn workload(name: &str, json: bool) -> Result<(), Failure> {
     if json {
         return print_json(&listed, true);
     }
-    let mut table = Table::of_texts(["option", "default", "range", "meaning"]);
-    for option in &listed.options {
-        table.row([option.name, &as_set(&option.default), &option.range, option.meaning].map(str::to_owned));
+    let mut table = Table::of_texts(["option", "default", "range", "needs", "meaning"]);
+    for Listed { name, default, range, needs, meaning } in &listed.options {
+        table.row([name, &*as_set(default), range, needs, meaning].map(str::to_owned));
     }
     print(&format!("{name}: {what}\n\n{table}\nSet one with: quintile run {name} --set OPTION=VALUE"))
 }
@@ -164,6 +165,7 @@ fn charts() -> Vec<Entry> {
 struct WorkloadOptions {
     workload: &'static str,
     options: &'static [Doc],
+    needs: &'static [Need],
     defaults: fn() -> Result<String, serde_json::Error>,
 }
 
@@ -211,6 +213,7 @@ const OPTIONS: &[WorkloadOptions] = &[
                 "light in the water from the side, or on the floor from above",
             ),
         ],
+        needs: caustics::Options::NEEDS,
         defaults: || serde_json::to_string(&caustics::Options::default()),
     },
     WorkloadOptions {
@@ -223,6 +226,7 @@ const OPTIONS: &[WorkloadOptions] = &[
             Doc("method", Names(&["fragment_box", "box_box", "depth_only"]), "comparison in a tile"),
             Doc("narrow", SWITCH, "pairs one by one within the space that their swept boxes share"),
         ],
+        needs: collision::Options::NEEDS,
         defaults: || serde_json::to_string(&collision::Options::default()),
     },
     WorkloadOptions {
@@ -250,6 +254,7 @@ const OPTIONS: &[WorkloadOptions] = &[
             Doc("depth_bounds", SWITCH, "the depths of a tile bound its lights"),
             Doc("list", Numbers(1.0, 65536.0), "most lights of a tile"),
         ],
+        needs: compute::Options::NEEDS,
         defaults: || serde_json::to_string(&compute::Options::default()),
     },
     WorkloadOptions {
@@ -271,6 +276,7 @@ const OPTIONS: &[WorkloadOptions] = &[
                 "lighting for every sample, or for the first of a pixel",
             ),
         ],
+        needs: deferred::Options::NEEDS,
         defaults: || serde_json::to_string(&deferred::Options::default()),
     },
     WorkloadOptions {
@@ -301,6 +307,7 @@ const OPTIONS: &[WorkloadOptions] = &[
             Doc("map_samples", Numbers(1.0, 256.0), "samples per texel"),
             Doc("fresnel", Numbers(0.0, 1.0), "share of reflected light at normal incidence"),
         ],
+        needs: glossy::Options::NEEDS,
         defaults: || serde_json::to_string(&glossy::Options::default()),
     },
     WorkloadOptions {
@@ -337,6 +344,7 @@ const OPTIONS: &[WorkloadOptions] = &[
             Doc("view_by_view", SWITCH, "one pass for each view: the same images at another cost"),
             Doc("check_cache", SWITCH, "draw once more with an infinite cache, and warn of misses"),
         ],
+        needs: multiview::Options::NEEDS,
         defaults: || serde_json::to_string(&multiview::Options::default()),
     },
     WorkloadOptions {
@@ -355,6 +363,7 @@ const OPTIONS: &[WorkloadOptions] = &[
             Doc("tile_px", Numbers(1.0, 256.0), "side of a tile of the first level in pixels"),
             Doc("boxes", Numbers(1.0, 16.0), "boxes of lens and time in a tile, along u, v and t"),
         ],
+        needs: occlusion::Options::NEEDS,
         defaults: || serde_json::to_string(&occlusion::Options::default()),
     },
     WorkloadOptions {
@@ -375,6 +384,7 @@ const OPTIONS: &[WorkloadOptions] = &[
             Doc("periodic", SWITCH, "whether the domain of darts is a torus instead of a box"),
             Doc("count", Numbers(100.0, 2e6), "points of noise on average"),
         ],
+        needs: points::job::Options::NEEDS,
         defaults: || serde_json::to_string(&points::job::Options::default()),
     },
     WorkloadOptions {
@@ -399,6 +409,7 @@ const OPTIONS: &[WorkloadOptions] = &[
             ),
             Doc("accumulate", SWITCH, "accumulation instead of one pass: the same image at another cost"),
         ],
+        needs: soft_shadows::Options::NEEDS,
         defaults: || serde_json::to_string(&soft_shadows::Options::default()),
     },
 ];
@@ -409,6 +420,8 @@ struct Listed {
     pub name: &'static str,
     pub default: Value,
     pub range: String,
+    /// What it needs to have an effect, in words; empty if it always has one.
+    pub needs: String,
     pub meaning: &'static str,
 }
 
@@ -422,9 +435,15 @@ impl WorkloadOptions {
             name,
             default: defaults.get(*name).cloned().unwrap_or_default(),
             range: range.text(),
+            needs: self.needs_of(name).map(Need::text).collect::<Vec<_>>().join(", and "),
             meaning,
         };
         Ok(self.options.iter().map(listed).collect())
+    }
+
+    /// What an option needs to have an effect.
+    fn needs_of(&self, option: &str) -> impl Iterator<Item = &'static Need> {
+        self.needs.iter().filter(move |need| need.option == option)
     }
 }
 
@@ -466,8 +485,13 @@ mod tests {
 
     use super::*;
 
+    /// Whether a workload takes an option with what it needs.
     fn accepts(workload: &str, name: &str, value: &str) -> Result<(), String> {
-        let source = OptionSource { file: None, set: vec![(name.to_owned(), value.to_owned())] };
+        let options = OPTIONS.iter().find(|options| options.workload == workload).unwrap();
+        let needed = options.needs_of(name).map(|need| (need.choice, need.values[0]));
+        let set = needed.filter(|(_, value)| *value != "none").chain([(name, value)]);
+        let set = set.map(|(name, value)| (name.to_owned(), value.to_owned())).collect();
+        let source = OptionSource { file: None, set };
         let request = Request { overrides: &Overrides::default(), seed: 1 };
         catalog::find(workload, &source, &request).unwrap().map(drop).map_err(|error| error.to_string())
     }
@@ -511,6 +535,46 @@ mod tests {
                         let refused = check(number).err().filter(is_own);
                         assert_eq!(refused, None, "{} {name} {number}", options.workload);
                     }
+                }
+            }
+        }
+    }
+
+    /// A value that is not the default of an option.
+    fn another(range: &Range, default: &Value) -> String {
+        match range {
+            Numbers(low, high) if default.as_f64() == Some(*low) => plain(*high),
+            Numbers(low, _) => like(default, *low),
+            Names(names) => names.iter().find(|name| default != *name).unwrap().to_string(),
+            Words(_) if default.is_boolean() => (default == false).to_string(),
+            Words(_) if default.is_number() => "32".to_owned(),
+            Words(_) => "(pitch: 9)".to_owned(),
+        }
+    }
+
+    /// The error for an option whose other needs are met, and one is not.
+    fn refused(options: &WorkloadOptions, need: &Need, choice: &str, value: &str) -> String {
+        let others = options.needs_of(need.option).filter(|other| *other != need);
+        let others = others.map(|other| (other.choice, other.values[0]));
+        let set = others.chain([(need.choice, choice), (need.option, value)]);
+        let set = set.map(|(name, value)| (name.to_owned(), value.to_owned())).collect();
+        let request = Request { overrides: &Overrides::default(), seed: 1 };
+        let made = catalog::find(options.workload, &OptionSource { file: None, set }, &request).unwrap();
+        made.err().filter(workloads::LoadError::is_usage).unwrap().to_string()
+    }
+
+    #[test]
+    fn options_without_effect_are_refused_with_what_they_need() {
+        for options in OPTIONS {
+            let listed = options.listed().ok().unwrap();
+            let place = |name| options.options.iter().position(|Doc(known, ..)| *known == name).unwrap();
+            for need in options.needs {
+                let (Doc(_, range, _), default) =
+                    (&options.options[place(need.option)], &listed[place(need.option)].default);
+                let Doc(_, Names(choices), _) = options.options[place(need.choice)] else { continue };
+                for choice in choices.iter().filter(|choice| !need.values.contains(choice)) {
+                    let message = refused(options, need, choice, &another(range, default));
+                    assert!(message.contains(&need.text()) && message.contains(need.option), "{message}");
                 }
             }
         }

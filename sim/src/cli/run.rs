@@ -8,7 +8,7 @@ use activity::spec::suggestion;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use output::progress::Progress;
-use output::table::{Table, count_or_digits, counted, si, si_digits, si_mean_sd};
+use output::table::{Table, count_or_digits, counted, si, si_mean_sd};
 use output::terminal::{Terminal, Verbosity};
 use output::{Destination, MeanSd};
 use power_model::Bound;
@@ -321,12 +321,8 @@ fn found(summary: &Summary) -> String {
 /// Table of measured and true values, one row per quantity.
 fn figures(outcome: &FinishedRun) -> Table {
     let mut table = Table::new(["", "measured in the trace", "simulator's truth"]);
-    let is_single = outcome.summary.settings.frames == 1;
     for row in outcome.summary.headline() {
-        // A single frame has no deviation.
-        let text =
-            |n: MeanSd| if is_single { si_digits(n.mean, &row.unit, 4) } else { si_mean_sd(n, &row.unit) };
-        let cell = |number: Option<MeanSd>| number.map_or("-".to_owned(), text);
+        let cell = |number: Option<MeanSd>| number.map_or("-".to_owned(), |n| si_mean_sd(n, &row.unit));
         table.row([row.label.clone(), cell(row.measured), cell(row.truth)]);
     }
     table

@@ -6,6 +6,7 @@
 //! is taken from the best ratio.
 
 use super::profile::difference;
+use crate::overlap::{Buffers, OverlapSave};
 use core::ops::RangeInclusive;
 
 /// The best alignment near offset `near`, in samples, fractional: the minimum of the summed squared
@@ -126,7 +127,15 @@ impl ScaledPair<'_> {
         let own: f64 = template.iter().map(|x| x * x).sum();
         let unlike = |shift: usize| unexplained(&template, own, &segment[shift..shift + template.len()]);
         let last = (2 * self.reach).checked_sub(1)?;
-        let at = nearest(1..=last, COARSE_STEP_SAMPLES, unlike);
+        // Most shifts are ruled out by an estimate; what is left is compared as it would be without one.
+        let estimates = estimates(&template, own, segment);
+        let lowest = (1..=last).step_by(COARSE_STEP_SAMPLES).filter_map(|shift| estimates.get(shift));
+        let limit = lowest.copied().fold(f64::INFINITY, f64::min) + MAX_ESTIMATE_ERROR;
+        let judged = |shift: usize| match estimates.get(shift) {
+            Some(&estimate) if estimate > limit => estimate,
+            _ => unlike(shift),
+        };
+        let at = nearest(1..=last, COARSE_STEP_SAMPLES, judged);
         let [left, middle, right] = [at - 1, at, at + 1].map(unlike);
         let curvature = left - 2.0 * middle + right;
         (middle <= left.min(right) && curvature > 0.0).then(|| ScaledFit {
@@ -149,6 +158,43 @@ fn unexplained(template: &[f64], own: f64, segment: &[f64]) -> f64 {
     }
     let variance = squares - sum * sum / segment.len() as f64;
     if inner <= 0.0 || variance <= 0.0 || own <= 0.0 { 1.0 } else { 1.0 - inner * inner / (variance * own) }
+}
+
+/// Products of a direct search from which estimates are worth their transforms.
+const MIN_PRODUCTS: usize = 1 << 20;
+/// Least variance of a segment, as a share of the squares of all that is searched, for an estimate: rounding of a transform in f64,
+/// about 1e-13 of these, is then below 1e-6 of the share that is left unexplained.
+const MIN_VARIANCE_SHARE: f64 = 1e-6;
+/// Largest error of an estimate.
+const MAX_ESTIMATE_ERROR: f64 = 1e-4;
+
+/// [`unexplained`] at every shift from 0 on, by one correlation; NaN where rounding may be too large, and none if a direct search
+/// is cheap.
+fn estimates(template: &[f64], own: f64, segment: &[f64]) -> Vec<f64> {
+    let (width, shifts) = (template.len(), (segment.len() + 1).saturating_sub(template.len()));
+    if shifts * width < MIN_PRODUCTS {
+        return Vec::new();
+    }
+    let mean = segment.iter().sum::<f64>() / segment.len() as f64;
+    let segment: Vec<f64> = segment.iter().map(|watts| watts - mean).collect();
+    let correlator = OverlapSave::new(&[template.to_vec()], 1.0, segment.len().next_power_of_two());
+    let mut estimates = vec![f64::NAN; shifts];
+    correlator.pair(&segment, 0, &mut Buffers::default(), |_, inner| {
+        estimates.iter_mut().zip(inner).for_each(|(to, inner)| *to = inner.re);
+    });
+    let least = MIN_VARIANCE_SHARE * segment.iter().map(|x| x * x).sum::<f64>();
+    let (mut sum, mut squares) = segment[..width].iter().fold((0.0, 0.0), |(a, b), x| (a + x, b + x * x));
+    for (shift, estimate) in estimates.iter_mut().enumerate() {
+        let (inner, variance) = (*estimate, squares - sum * sum / width as f64);
+        *estimate = match variance >= least && own > 0.0 {
+            true if inner > 0.0 => 1.0 - inner * inner / (variance * own),
+            true => 1.0,
+            false => f64::NAN,
+        };
+        let (gone, next) = (segment[shift], segment.get(shift + width).copied().unwrap_or(0.0));
+        (sum, squares) = (sum + next - gone, squares + next * next - gone * gone);
+    }
+    estimates
 }
 
 #[cfg(test)]
@@ -233,6 +279,28 @@ mod tests {
                 assert!(off.abs() < 1.0 && fit.unexplained < 0.1, "{ratio} {thought}: {fit:?}");
             }
         }
+    }
+
+    #[test]
+    fn oracle_estimates_are_those_of_a_direct_search() {
+        let noise = crate::random::Random::new(5, 0);
+        let busy = |i: usize| if (900..1000).contains(&(i % 2500)) { 2.0 } else { 0.0 };
+        let power: Vec<f64> = (0..6000).map(|i| 5.0 + busy(i) + 0.01 * noise.normals(i as u64).0).collect();
+        let mean = power[700..2200].iter().sum::<f64>() / 1500.0;
+        let template: Vec<f64> = power[700..2200].iter().map(|watts| watts - mean).collect();
+        let own: f64 = template.iter().map(|x| x * x).sum();
+        let found = estimates(&template, own, &power);
+        assert_eq!(found.len(), 4501);
+        let error = |(shift, estimate): (usize, &f64)| {
+            (estimate - unexplained(&template, own, &power[shift..shift + 1500])).abs()
+        };
+        // `max` leaves NaN out.
+        let worst = found.iter().enumerate().map(error).fold(0.0, f64::max);
+        let known = found.iter().filter(|estimate| estimate.is_finite()).count();
+        assert!(worst < 0.01 * MAX_ESTIMATE_ERROR && known > 4000, "{worst} {known}");
+        let flat = estimates(&template, own, &[vec![5.0; 3000], power].concat());
+        assert!(flat[..1000].iter().all(|estimate| estimate.is_nan()));
+        assert!(estimates(&template[..10], own, &[1.0; 100]).is_empty());
     }
 
     #[test]

@@ -9,7 +9,9 @@ use super::generator::Ocean;
 use super::shader::draw_on;
 use super::{Beam, Eye, Floor, Light, Method, Picture};
 use crate::error::LoadError;
-use crate::job::{Drawn, Draws, Fact, Flag, Flags, Job, JobError, OptionSource, Request, must_hold};
+use crate::job::{
+    Drawn, Draws, Fact, Flag, Flags, Job, JobError, JobOptions, OptionSource, Request, must_hold,
+};
 use crate::scene::Settings;
 
 /// View of the light.
@@ -46,6 +48,8 @@ pub struct Options {
     /// View of the light.
     pub look: LightView,
 }
+
+impl JobOptions for Options {}
 
 impl Default for Options {
     fn default() -> Self {

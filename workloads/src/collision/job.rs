@@ -13,7 +13,9 @@ use super::object::load_objects;
 use super::pass::Scratch;
 use super::{Method, Object, Search, Sweeps, candidates};
 use crate::error::LoadError;
-use crate::job::{Drawn, Draws, Fact, Flag, Flags, Job, JobError, OptionSource, Request, must_hold};
+use crate::job::{
+    Drawn, Draws, Fact, Flag, Flags, Job, JobError, JobOptions, Need, OptionSource, Request, must_hold,
+};
 use crate::scene::Settings;
 
 /// Options of the job.
@@ -33,6 +35,10 @@ pub struct Options {
     /// Whether pairs whose swept boxes touch are drawn one by one within the space they share, of which the CPU narrows
     /// more from axis to axis, instead of two sweeps over all objects.
     pub narrow: bool,
+}
+
+impl JobOptions for Options {
+    const NEEDS: &'static [Need] = &[Need::new("balls", "file", &["none"])];
 }
 
 impl Default for Options {

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::block::Order;
 use super::histogram::Atomics;
 use crate::error::LoadError;
-use crate::job::must_hold;
+use crate::job::{JobOptions, Need, must_hold};
 
 /// What groups of lanes compute.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -59,6 +59,26 @@ pub struct Options {
     pub depth_bounds: bool,
     /// Longest list of a tile, 1 to 65536.
     pub list: u32,
+}
+
+impl JobOptions for Options {
+    const NEEDS: &'static [Need] = &[
+        Need::new("per_lane", "kernel", &["reduction", "histogram"]),
+        Need::new("step", "kernel", &["reduction", "histogram"]),
+        Need::new("order", "kernel", &["reduction"]),
+        Need::new("stride", "kernel", &["reduction"]),
+        Need::new("padded", "kernel", &["reduction", "histogram"]),
+        Need::new("padded", "atomics", &["shared"]),
+        Need::new("atomics", "kernel", &["histogram"]),
+        Need::new("bins", "kernel", &["histogram"]),
+        Need::new("copies", "kernel", &["histogram"]),
+        Need::new("copies", "atomics", &["shared"]),
+        Need::new("lights", "kernel", &["light_culling"]),
+        Need::new("light_radius", "kernel", &["light_culling"]),
+        Need::new("tile_px", "kernel", &["light_culling"]),
+        Need::new("depth_bounds", "kernel", &["light_culling"]),
+        Need::new("list", "kernel", &["light_culling"]),
+    ];
 }
 
 impl Default for Options {

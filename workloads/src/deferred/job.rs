@@ -15,7 +15,8 @@ use super::lights::{bounds, point_lights};
 use super::shaders::{CameraRays, Forward, Screen, Volume};
 use crate::error::LoadError;
 use crate::job::{
-    Drawn, DrawsScene, Fact, Flag, Flags, IMAGE_SIZE, Job, JobError, OptionSource, Request, must_hold,
+    Drawn, DrawsScene, Fact, Flag, Flags, IMAGE_SIZE, Job, JobError, JobOptions, Need, OptionSource, Request,
+    must_hold,
 };
 use crate::lighting::PointLight;
 use crate::material::SurfaceShader;
@@ -74,6 +75,14 @@ pub struct Options {
     pub normals: NormalFormat,
     /// How often it is lit.
     pub rate: Rate,
+}
+
+impl JobOptions for Options {
+    const NEEDS: &'static [Need] = &[
+        Need::new("lighting", "method", &["deferred"]),
+        Need::new("normals", "method", &["deferred"]),
+        Need::new("rate", "method", &["deferred"]),
+    ];
 }
 
 impl Default for Options {

@@ -11,7 +11,7 @@ use warnings::{Code, Warning};
 use super::map::Map;
 use super::receiver::{Effect, Receiver, ReceiverShader};
 use crate::error::LoadError;
-use crate::job::{Drawn, DrawsScene, Fact, Flag, Flags, Job, JobError, OptionSource, Request};
+use crate::job::{Drawn, DrawsScene, Fact, Flag, Flags, Job, JobError, JobOptions, OptionSource, Request};
 use crate::material::Material;
 use crate::scene::{
     Frame, Frustum, Graph, Local, Node, Overrides, Parts, Rig, Scene, SceneCamera, Settings, Trs, tan_half,
@@ -39,6 +39,8 @@ pub struct Options {
     /// Share of reflected light at normal incidence; the rest shows the surface's own colour.
     pub fresnel: f32,
 }
+
+impl JobOptions for Options {}
 
 impl Default for Options {
     fn default() -> Self {

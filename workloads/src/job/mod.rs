@@ -5,8 +5,8 @@
 
 mod options;
 
-pub use options::OptionSource;
 pub(crate) use options::{Flag, Flags, must_hold};
+pub use options::{JobOptions, Need, OptionSource};
 
 use glam::Vec3;
 use pipeline::{Gpu, PassError};

@@ -23,16 +23,73 @@ pub struct OptionSource {
     pub set: Vec<(String, String)>,
 }
 
+/// Options of a job.
+pub trait JobOptions: Default + Serialize + DeserializeOwned {
+    /// What options need of others; those without a row always have an effect.
+    const NEEDS: &'static [Need] = &[];
+}
+
+/// What an option needs to have an effect: a choice that another option makes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Need {
+    /// The option.
+    pub option: &'static str,
+    /// The option that makes the choice.
+    pub choice: &'static str,
+    /// Its values with which `option` has an effect, as they are set; `none` where it is left out.
+    pub values: &'static [&'static str],
+}
+
+impl Need {
+    /// `option` has an effect if `choice` is one of `values`.
+    pub(crate) const fn new(
+        option: &'static str,
+        choice: &'static str,
+        values: &'static [&'static str],
+    ) -> Self {
+        Self { option, choice, values }
+    }
+
+    /// The values in words: `kernel=reduction or kernel=histogram`.
+    pub fn text(&self) -> String {
+        let value = |value: &&str| match *value {
+            "none" => format!("no {}", self.choice),
+            value => format!("{}={value}", self.choice),
+        };
+        self.values.iter().map(value).collect::<Vec<_>>().join(" or ")
+    }
+
+    /// Refuses a value other than the default where it has no effect. A default may be given anywhere, so that settings of a
+    /// sweep can be written in full.
+    fn check(&self, given: &Value, defaults: &Value) -> Result<(), LoadError> {
+        let chosen = match &given[self.choice] {
+            Value::Null => "none".to_owned(),
+            Value::String(text) => text.clone(),
+            value => value.to_string(),
+        };
+        if given[self.option] == defaults[self.option] || self.values.contains(&&*chosen) {
+            return Ok(());
+        }
+        let Self { option, choice, .. } = self;
+        let message =
+            format!("`{chosen}` has no use for `{option}`: it needs {}, or leave it out", self.text());
+        Err(LoadError::Setting { setting: choice, message })
+    }
+}
+
 impl OptionSource {
     /// Reads the options.
     ///
     /// # Errors
-    /// [`LoadError::Spec`] with the place in the file, [`LoadError::Setting`] for a single value.
-    pub fn read<T: Default + Serialize + DeserializeOwned>(&self) -> Result<T, LoadError> {
+    /// [`LoadError::Spec`] with the place in the file, [`LoadError::Setting`] for a single value, or for one without effect.
+    pub fn read<T: JobOptions>(&self) -> Result<T, LoadError> {
         let mut options = self.file.as_deref().map(spec::load).transpose()?.unwrap_or_default();
         for (name, value) in &self.set {
             options = with(&options, name, value)?;
         }
+        let [given, defaults] =
+            [&options, &T::default()].map(|options| serde_json::to_value(options).unwrap_or_default());
+        T::NEEDS.iter().try_for_each(|need| need.check(&given, &defaults))?;
         Ok(options)
     }
 }
@@ -285,6 +342,11 @@ mod tests {
         }
     }
 
+    impl JobOptions for Options {
+        const NEEDS: &'static [Need] =
+            &[Need::new("boxes", "method", &["prism"]), Need::new("depth", "scene", &["none"])];
+    }
+
     fn set(pairs: &[(&str, &str)]) -> Result<Options, String> {
         let set = pairs.iter().map(|(name, value)| ((*name).to_owned(), (*value).to_owned())).collect();
         OptionSource { file: None, set }.read().map_err(|error| error.to_string())
@@ -293,11 +355,28 @@ mod tests {
     #[test]
     fn values_that_are_set_replace_defaults() {
         assert_eq!(set(&[]).unwrap(), Options::default());
-        let changed = set(&[("boxes", "8"), ("method", "convex_hull"), ("depth", "1.5")]).unwrap();
+        let changed = set(&[("light", "(radius: 8)"), ("method", "convex_hull"), ("depth", "1.5")]).unwrap();
+        let light = Light { radius: 8.0, ..Light::default() };
         assert_eq!(
             changed,
-            Options { method: Method::ConvexHull, boxes: 8, depth: Some(1.5), ..Options::default() }
+            Options { method: Method::ConvexHull, light, depth: Some(1.5), ..Options::default() }
         );
+    }
+
+    #[test]
+    fn options_without_effect_are_refused_unless_they_are_the_default() {
+        let refused = set(&[("boxes", "8"), ("method", "convex_hull")]).unwrap_err();
+        assert_eq!(
+            refused,
+            "method: `convex_hull` has no use for `boxes`: it needs method=prism, or leave it out"
+        );
+        assert!(set(&[("boxes", "4"), ("method", "convex_hull")]).is_ok());
+        let refused = set(&[("depth", "1"), ("scene", "fox")]).unwrap_err();
+        assert_eq!(refused, "scene: `fox` has no use for `depth`: it needs no scene, or leave it out");
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), "(boxes: 16, method: convex_hull)").unwrap();
+        let source = OptionSource { file: Some(file.path().to_owned()), set: Vec::new() };
+        assert!(source.read::<Options>().unwrap_err().to_string().contains("no use for `boxes`"));
     }
 
     #[test]
@@ -321,9 +400,10 @@ mod tests {
 
     #[test]
     fn values_that_look_like_numbers_may_be_short_or_names() {
-        let changed = set(&[("depth", ".5"), ("scene", "5"), ("light", "(radius: .25)")]).unwrap();
+        let changed = set(&[("depth", ".5"), ("light", "(radius: .25)")]).unwrap();
+        let named = set(&[("scene", "5")]).unwrap();
         assert_eq!(
-            (changed.depth, changed.scene.as_deref(), changed.light.radius),
+            (changed.depth, named.scene.as_deref(), changed.light.radius),
             (Some(0.5), Some("5"), 0.25)
         );
         let long = "9".repeat(400);
@@ -357,11 +437,11 @@ mod tests {
     #[test]
     fn a_file_comes_first() {
         let file = tempfile::NamedTempFile::new().unwrap();
-        std::fs::write(file.path(), "(boxes: 16, method: convex_hull)").unwrap();
+        std::fs::write(file.path(), "(boxes: 16, depth: Some(2))").unwrap();
         let set = vec![("boxes".to_owned(), "2".to_owned())];
         let read: Options =
             OptionSource { file: Some(file.path().to_owned()), set: set.clone() }.read().unwrap();
-        assert_eq!(read, Options { method: Method::ConvexHull, boxes: 2, ..Options::default() });
+        assert_eq!(read, Options { depth: Some(2.0), boxes: 2, ..Options::default() });
         std::fs::write(file.path(), "(boxs: 16)").unwrap();
         let error = OptionSource { file: Some(file.path().to_owned()), set }.read::<Options>().unwrap_err();
         assert!(error.to_string().contains(":1:"), "{error}");

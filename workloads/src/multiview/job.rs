@@ -8,7 +8,9 @@ use warnings::{Code, Warning};
 use super::layout::{Layout, Panel};
 use super::rig::{Rig, Target, Views};
 use crate::error::LoadError;
-use crate::job::{Drawn, DrawsScene, Fact, Flag, Flags, Job, JobError, OptionSource, Request};
+use crate::job::{
+    Drawn, DrawsScene, Fact, Flag, Flags, Job, JobError, JobOptions, Need, OptionSource, Request,
+};
 use crate::scene::{Frame, Overrides, Scene, Settings};
 
 /// Arrangement of the views in the image.
@@ -48,6 +50,10 @@ pub struct Options {
     pub view_by_view: bool,
     /// Whether to render the frame once more with an infinite cache, to measure the cache's misses.
     pub check_cache: bool,
+}
+
+impl JobOptions for Options {
+    const NEEDS: &'static [Need] = &[Need::new("panel", "show", &["interlaced"])];
 }
 
 impl Default for Options {

@@ -15,7 +15,9 @@ use serde::{Deserialize, Serialize};
 use warnings::{Code, Warning};
 
 use crate::error::LoadError;
-use crate::job::{Drawn, Draws, Fact, Flag, Flags, Job, JobError, OptionSource, Request, must_hold};
+use crate::job::{
+    Drawn, Draws, Fact, Flag, Flags, Job, JobError, JobOptions, OptionSource, Request, must_hold,
+};
 use crate::samples::SampleChoice;
 use crate::scene::Settings;
 
@@ -40,6 +42,8 @@ pub struct Options {
     /// Boxes of lens and time per tile, along u, v and t, 1 to 16 each.
     pub boxes: [u32; 3],
 }
+
+impl JobOptions for Options {}
 
 impl Default for Options {
     fn default() -> Self {

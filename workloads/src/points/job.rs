@@ -22,7 +22,7 @@ use super::poisson::{
 use super::volume::{Blurred, Domain as Volume, Torus, fill};
 use super::white::{Named, columns_for};
 use crate::error::LoadError;
-use crate::job::{Drawn, Draws, Fact, Flag, Flags, Job, JobError, OptionSource, Request};
+use crate::job::{Drawn, Draws, Fact, Flag, Flags, Job, JobError, JobOptions, Need, OptionSource, Request};
 use crate::scene::Settings;
 
 /// Kind of points.
@@ -39,6 +39,14 @@ pub enum Kind {
 }
 
 impl Kind {
+    /// What summaries name in place of a sample table: darts and noise have candidates instead of samples.
+    fn samples(self) -> &'static str {
+        match self {
+            Self::Darts | Self::Noise => "none",
+            Self::Volume => "hashed",
+        }
+    }
+
     /// Dimensions in which there are such points.
     fn dimensions(self) -> std::ops::RangeInclusive<u32> {
         match self {
@@ -65,6 +73,15 @@ pub struct Options {
     pub periodic: bool,
     /// Points of noise on average, 100 to 2,000,000.
     pub count: f64,
+}
+
+impl JobOptions for Options {
+    const NEEDS: &'static [Need] = &[
+        Need::new("radius", "points", &["darts"]),
+        Need::new("rounds", "points", &["darts"]),
+        Need::new("periodic", "points", &["darts"]),
+        Need::new("count", "points", &["noise"]),
+    ];
 }
 
 impl Default for Options {
@@ -125,6 +142,7 @@ pub(crate) fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<d
     }
     let usual = Settings { width: 512, height: 512, samples: 4, ..Settings::default() };
     let settings = usual.with(request.overrides)?;
+    let settings = Settings { table: options.points.samples().to_owned(), ..settings };
     if settings.width != settings.height {
         return refused("size", "width and height have to be equal, as the unit square is drawn".to_owned());
     }
@@ -398,6 +416,13 @@ mod tests {
         }
         let hole = super::super::quality::largest_hole(&found.points, Domain::Torus);
         assert!(hole.radius <= 0.07 * (1.0 + 1e-12), "{hole:?}");
+    }
+
+    #[test]
+    fn settings_name_the_samples_in_use() {
+        for (kind, table) in [("darts", "none"), ("noise", "none"), ("volume", "hashed")] {
+            assert_eq!(made(&[("points", kind)], (64, 64)).unwrap().settings().table, table);
+        }
     }
 
     #[test]

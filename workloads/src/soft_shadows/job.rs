@@ -15,7 +15,7 @@ use super::map::{Method, SceneView, ShadowMap, depth_pass};
 use super::shade::{Shadows, World, look_ups};
 use crate::accumulation::SharedSamples;
 use crate::error::LoadError;
-use crate::job::{Drawn, DrawsScene, Fact, Flag, Flags, Job, JobError, OptionSource, Request};
+use crate::job::{Drawn, DrawsScene, Fact, Flag, Flags, Job, JobError, JobOptions, OptionSource, Request};
 use crate::material::{Alpha, Material};
 use crate::scene::{
     self, Frame, FrameMesh, Graph, Local, Motion, Node, Overrides, Parts, Rig, Scene, SceneCamera, Settings,
@@ -41,6 +41,8 @@ pub struct Options {
     /// Whether to use accumulation instead of one pass: the same image at another cost.
     pub accumulate: bool,
 }
+
+impl JobOptions for Options {}
 
 impl Default for Options {
     fn default() -> Self {

@@ -137,7 +137,8 @@ fn options_out_of_range_give_the_valid_range() {
         ("soft-shadows", "light", "(1, 2)", "known: fov_deg, near, position, radius, target"),
         ("soft-shadows", "light", "(raduis: 1)", "did you mean `radius`?"),
     ] {
-        let set = vec![(name.to_owned(), value.to_owned())];
+        let shown = (name == "panel").then(|| ("show".to_owned(), "interlaced".to_owned()));
+        let set = shown.into_iter().chain([(name.to_owned(), value.to_owned())]).collect();
         let error = refusal(job, &OptionSource { file: None, set }).unwrap();
         assert!(error.is_usage(), "{job} {name}: {error}");
         expect(&error.to_string(), &[name, says]);

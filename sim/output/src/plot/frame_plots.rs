@@ -311,7 +311,7 @@ impl FrameEnergyPlot<'_> {
         if self.values(true).next().is_some() {
             entries.push((Key::Dot(TRUTH), "true, by the simulator".to_owned()));
         }
-        if let Some(stats) = self.measured_j {
+        if let Some(stats) = self.measured_j.filter(|_| self.values(false).nth(1).is_some()) {
             let label = format!("mean and deviation of the measured: {}", si_mean_sd(stats, "J"));
             entries.push((Key::Area(MEASURED.alpha(0.25)), label));
         }

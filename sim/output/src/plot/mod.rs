@@ -47,6 +47,7 @@ pub use picture::{COLUMN_MM, Look, Picture};
 pub use power_run::PowerRun;
 pub use render::PlotError;
 pub use series::{Mark, Paint, Series, Spread};
+pub use text::undrawable;
 
 #[cfg(test)]
 mod tests;

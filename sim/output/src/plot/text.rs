@@ -85,6 +85,11 @@ fn has(letter: char) -> bool {
     matches!(letter, ' '..='~' | '\u{a0}'..='\u{17f}') || SYMBOLS.contains(letter)
 }
 
+/// The first character of `text` that pictures cannot show.
+pub fn undrawable(text: &str) -> Option<char> {
+    text.chars().find(|letter| !has(*letter))
+}
+
 /// Replaces every character that the subset lacks with `?`.
 pub(super) fn drawable(text: &str) -> String {
     text.chars().map(|c| if has(c) { c } else { '?' }).collect()
@@ -106,5 +111,6 @@ mod tests {
             assert!(!has('\u{4e2d}') && !named('\u{4e2d}'));
         }
         assert_eq!(drawable("Größe Łódź 中"), "Größe Łódź ?");
+        assert_eq!([undrawable("Größe 中文"), undrawable("Größe")], [Some('中'), None]);
     }
 }

@@ -51,7 +51,8 @@ impl Case {
     /// All cases, sweep by sweep.
     pub fn all() -> Vec<Self> {
         let [reduction, histogram, culling] = [Kernel::Reduction, Kernel::Histogram, Kernel::LightCulling]
-            .map(|kernel| Options { kernel, list: LIST, ..Options::default() });
+            .map(|kernel| Options { kernel, ..Options::default() });
+        let culling = Options { list: LIST, ..culling };
         let mut cases = Vec::new();
         let mut add = |sweep, value: f64, method, options| cases.push(Self { sweep, value, method, options });
         for group in GROUPS {
@@ -228,20 +229,26 @@ fn job(options: &Options, size: (u32, u32)) -> Result<Compute, RunError> {
     Ok(Compute::new(options.clone(), &overrides, SEED)?)
 }
 
+/// Cycles of a time. Whole cycles stay whole: their product is exact up to some ten million cycles, and 1e-12 is no double.
+fn cycles(ps: u64, core_hz: f64) -> f64 {
+    ps as f64 * core_hz / 1e12
+}
+
 /// Cycles, energy of the events and conflicts of the passes of the program: those of groups but the one that writes the image, and
 /// those that draw a mip chain.
 fn cost(plan: &Plan, observed: &Observed) -> [f64; 3] {
-    let (mut all, mut before_ps) = ([0.0; 3], 0);
+    let (mut all, mut busy_ps, mut before_ps) = ([0.0; 3], 0, 0);
     for (pass, time) in observed.report.passes.iter().zip(&observed.times) {
         let counts = pass.counts();
         let is_of_groups = counts[Event::Groups] > 0 && pass.name != DISPLAY;
         if is_of_groups || pass.name.starts_with(&format!("{CHAIN} level ")) {
-            all[0] += (time.end_ps - before_ps) as f64 * 1e-12 * plan.gpu.core_hz;
+            busy_ps += time.end_ps - before_ps;
             all[1] += plan.model.counts_energy(&counts).total_j();
             all[2] += (counts[Event::BankConflicts] + counts[Event::AtomicConflicts]) as f64;
         }
         before_ps = time.end_ps;
     }
+    all[0] = cycles(busy_ps, plan.gpu.core_hz);
     all
 }
 
@@ -281,4 +288,22 @@ fn histogram(job: &Compute, gpu: &GpuSpec, frame: &Frame, options: &Options) -> 
         let counts = kernels.histogram(image)?;
         Ok(kernels.values(counts))
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn whole_cycles_stay_whole() {
+        // 400 MHz: 2500 ps a cycle.
+        assert!((1..1_000_000_u32).step_by(7).all(|n| cycles(2500 * u64::from(n), 400e6) == f64::from(n)));
+    }
+
+    #[test]
+    fn options_of_cases_have_an_effect() {
+        for case in Case::all() {
+            assert!(plan(&case.options, (64, 36)).is_ok(), "{case:?}");
+        }
+    }
 }
