@@ -7,7 +7,7 @@ use std::error::Error;
 use std::process::ExitCode;
 use traces::Trace;
 use traces::frames::{FinderMethod, Found, MarkError, Marks, Options, default_window, find_with};
-use traces::score::{TOLERANCE_S, true_beside_found};
+use traces::score::{TOLERANCE_S, true_frames};
 use traces::synth::{Recording, SCENARIOS, Scene, WITNESSES};
 
 /// Frames of each device.
@@ -91,15 +91,15 @@ fn cases_of(kind: &'static str, scene: &Scene, trace: &Trace) -> Result<Vec<Case
         ];
         let [squares, normalized, several] = others.map(|other| agreement(&found, &other));
         let even = even_share(&times_s(&found));
-        let partner = true_beside_found(&times_s(&found), &truth_s, tolerance_s);
-        cases.extend(partner.windows(2).zip(&found.frames).map(|(two, frame)| {
+        let right = true_frames(&times_s(&found), &truth_s, tolerance_s);
+        cases.extend(right.into_iter().zip(&found.frames).map(|(right, frame)| {
             let stated = frame.confidence.clamp(0.01, 0.99);
             let logit = (stated / (1.0 - stated)).ln();
             Case {
                 kind,
                 features: [1.0, logit, squares, normalized, several, even],
                 confidence: frame.confidence,
-                right: matches!(two, [Some(a), Some(b)] if *b == a + 1),
+                right,
             }
         }));
     }
@@ -118,9 +118,8 @@ fn five_of(found: &Found, mark_s: f64) -> Vec<f64> {
 
 /// Share of frames that another search found as well: both ends, and no start between.
 fn agreement(found: &Found, other: &Found) -> f64 {
-    let partner = true_beside_found(&times_s(found), &times_s(other), TOLERANCE_S);
-    let same = partner.windows(2).filter(|two| matches!(two, [Some(a), Some(b)] if *b == a + 1)).count();
-    same as f64 / partner.len().saturating_sub(1).max(1) as f64
+    let same = true_frames(&times_s(found), &times_s(other), TOLERANCE_S);
+    same.iter().filter(|same| **same).count() as f64 / same.len().max(1) as f64
 }
 
 /// Share of gaps within a tenth of the one before.

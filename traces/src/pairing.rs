@@ -46,3 +46,9 @@ pub fn found_beside_true(found_s: &[f64], truth_s: &[f64], tolerance_s: f64) -> 
     pairs(found_s, truth_s, tolerance_s).into_iter().for_each(|(found, truth)| beside[truth] = Some(found));
     beside
 }
+
+/// For each found frame, from a start to the next, whether both ends are true starts that follow each other.
+pub fn true_frames(found_s: &[f64], truth_s: &[f64], tolerance_s: f64) -> Vec<bool> {
+    let beside = true_beside_found(found_s, truth_s, tolerance_s);
+    beside.windows(2).map(|ends| matches!(ends, [Some(a), Some(b)] if *b == a + 1)).collect()
+}

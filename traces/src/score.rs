@@ -1,7 +1,7 @@
 //! Found frames compared with the ground truth.
 
 use crate::energy::{FrameEnergy, TrueFrame};
-pub use crate::pairing::{TOLERANCE_S, found_beside_true, pairs, true_beside_found};
+pub use crate::pairing::{TOLERANCE_S, found_beside_true, pairs, true_beside_found, true_frames};
 use serde::Serialize;
 
 /// How well found frames agree with true ones. Counts; the rates are functions of them.
@@ -105,6 +105,13 @@ mod tests {
 
     fn truth(start_s: f64, energy_j: f64) -> TrueFrame {
         TrueFrame { start_s, energy_j }
+    }
+
+    #[test]
+    fn a_frame_is_true_if_its_ends_follow_each_other() {
+        let found_s = [0.0, 1.0, 3.0, 3.5, 4.0];
+        assert_eq!(true_frames(&found_s, &[0.0, 1.0, 2.0, 3.0, 4.0], 0.1), [true, false, false, false]);
+        assert!(true_frames(&[], &[1.0], 0.1).is_empty());
     }
 
     #[test]

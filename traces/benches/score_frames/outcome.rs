@@ -4,7 +4,7 @@ use crate::case::Case;
 use std::error::Error;
 use traces::energy::{FrameEnergy, PowerIntegral};
 use traces::frames::{FinderMethod, Flags, Marks, Options, find_with};
-use traces::score::{TOLERANCE_S, pairs, score};
+use traces::score::{TOLERANCE_S, score, true_frames};
 
 /// Relative errors of energy.
 #[derive(Clone, Copy, Default)]
@@ -87,13 +87,8 @@ fn errors(relative: &[f64]) -> Errors {
 fn wrong(case: &Case, frames: &[FrameEnergy]) -> (usize, usize, usize) {
     let found_s: Vec<f64> = frames.iter().map(|frame| frame.start_s).collect();
     let truth_s: Vec<f64> = case.truth.iter().map(|frame| frame.start_s).collect();
-    let mut partner = vec![None; frames.len()];
-    for (f, t) in pairs(&found_s, &truth_s, TOLERANCE_S) {
-        partner[f] = Some(t);
-    }
     let mut counts = (0, 0, 0);
-    for (pair, frame) in partner.windows(2).zip(frames) {
-        let right = matches!(pair, [Some(a), Some(b)] if *b == a + 1);
+    for (right, frame) in true_frames(&found_s, &truth_s, TOLERANCE_S).into_iter().zip(frames) {
         let reported = usize::from(frame.flags.has_low_confidence());
         if right {
             counts.2 += reported;

@@ -11,7 +11,7 @@ use super::track::{Start, track};
 use super::vsync::{Snapped, snap_to_ticks};
 use super::{FinderMethod, Found, FrameStart, SUSPECT_CONFIDENCE, marked_starts, spacing};
 use super::{assess, idle_gap, periodicity};
-use crate::pairing::{TOLERANCE_S, true_beside_found};
+use crate::pairing::{TOLERANCE_S, true_frames};
 use crate::stats::upper_median;
 use crate::trace::{Metadata, Trace};
 use rayon::prelude::*;
@@ -112,12 +112,10 @@ pub(super) fn find_auto(trace: &Trace, marks: &Marks) -> Result<Found, MarkError
 /// The result of one method, with low confidence in frames that another method does not find.
 fn where_agreed(trace: &Trace, marks: &Marks, found: Found, other: &Found) -> Result<Found, MarkError> {
     let times_s = |of: &Found| -> Vec<f64> { of.starts.iter().map(|start| start.time_s).collect() };
-    let beside = true_beside_found(&times_s(&found), &times_s(other), TOLERANCE_S);
+    let agreed = true_frames(&times_s(&found), &times_s(other), TOLERANCE_S);
     let mut starts = found.starts;
-    for (start, ends) in starts.iter_mut().zip(beside.windows(2)) {
-        if !matches!(ends, [Some(a), Some(b)] if *b == a + 1) {
-            start.confidence *= SUSPECT_CONFIDENCE;
-        }
+    for (start, _) in starts.iter_mut().zip(agreed).filter(|(_, agreed)| !agreed) {
+        start.confidence *= SUSPECT_CONFIDENCE;
     }
     let mut agreed = assess::conclude(trace, marks, &marks.place(trace)?, starts, found.threshold);
     agreed.warnings.extend(found.warnings.into_iter().filter(|warning| warning.code == Code::FlatMark));

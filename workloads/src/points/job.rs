@@ -427,14 +427,15 @@ mod tests {
 
     #[test]
     fn options_out_of_range_are_refused() {
+        let small = (64, 64);
         for (set, size, part) in [
-            (("radius", "0.6"), (64, 64), "radius: 0.6"),
-            (("rounds", "0"), (64, 64), "rounds: 0"),
-            (("rounds", "2"), (64, 32), "width and height"),
-            (("dimensions", "5"), (64, 64), "2 to 3"),
-            (("count", "1"), (64, 64), "count: 1"),
+            (&[("radius", "0.6")][..], small, "radius: 0.6"),
+            (&[("rounds", "0")], small, "rounds: 0"),
+            (&[("rounds", "2")], (64, 32), "width and height"),
+            (&[("dimensions", "5")], small, "2 to 3"),
+            (&[("points", "noise"), ("count", "1")], small, "count: 1"),
         ] {
-            let message = made(&[set], size).err().unwrap();
+            let message = made(set, size).err().unwrap();
             assert!(message.contains(part), "{message}");
         }
     }

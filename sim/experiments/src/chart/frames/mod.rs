@@ -14,7 +14,7 @@ use serde::Serialize;
 use traces::Trace;
 use traces::energy::{FrameEnergy, PowerIntegral};
 use traces::frames::{FinderMethod, Marks, Options, default_window, find_with};
-use traces::score::{TOLERANCE_S, score, true_beside_found};
+use traces::score::{TOLERANCE_S, score, true_frames};
 use traces::synth::{Recording, SCENARIOS, Scenario, Scene};
 
 use self::witnesses::{WitnessRow, WitnessSummary};
@@ -249,13 +249,13 @@ impl Study for FramesChart {
             .data("f1_worst_mark", |row| row.f1.iter().copied().reduce(f64::min))
             .data("calibration_error", |row| row.calibration.error())
             .data("wrong", |row| row.flags.wrong)
-            .data("wrong_flagged", |row| row.flags.wrong_flagged)
+            .data("wrong_flagged", |row| row.flags.wrong_with)
             .data("right", |row| row.flags.right)
-            .data("right_flagged", |row| row.flags.right_flagged)
-            .data("failed", |row| row.warnings.failed)
-            .data("failed_warned", |row| row.warnings.failed_warned)
-            .data("good", |row| row.warnings.good)
-            .data("good_warned", |row| row.warnings.good_warned)
+            .data("right_flagged", |row| row.flags.right_with)
+            .data("failed", |row| row.warnings.wrong)
+            .data("failed_warned", |row| row.warnings.wrong_with)
+            .data("good", |row| row.warnings.right)
+            .data("good_warned", |row| row.warnings.right_with)
             .csv("frame_witnesses.csv");
         vec![self.by_scene(), self.by_value(), self.by_witness(), rows.sheet(), witnesses.sheet()]
     }
@@ -390,14 +390,14 @@ impl FramesChart {
             .detail("F1, worst of five marks", |of| of.worst, fixed(3))
             .detail("below the better simple method", below, plain)
             .detail("calibration error", |of| of.calibration.error(), optional(fixed(3)))
-            .detail("wrong frames flagged", |of| counted(of.flags.wrong_flagged, of.flags.wrong), plain)
-            .detail("right ones flagged", |of| counted(of.flags.right_flagged, of.flags.right), plain)
+            .detail("wrong frames flagged", |of| counted(of.flags.wrong_with, of.flags.wrong), plain)
+            .detail("right ones flagged", |of| counted(of.flags.right_with, of.flags.right), plain)
             .detail(
                 "failed searches that warn",
-                |of| counted(of.warnings.failed_warned, of.warnings.failed),
+                |of| counted(of.warnings.wrong_with, of.warnings.wrong),
                 plain,
             )
-            .detail("good ones that warn", |of| counted(of.warnings.good_warned, of.warnings.good), plain)
+            .detail("good ones that warn", |of| counted(of.warnings.right_with, of.warnings.right), plain)
             .sheet()
     }
 
@@ -510,10 +510,8 @@ fn analyse(trace: &Trace, scene: &Scene, way: Way) -> Result<FinderScore, StudyE
 fn flagged(frames: &[FrameEnergy], scene: &Scene) -> FinderScore {
     let found_s: Vec<f64> = frames.iter().map(|frame| frame.start_s).collect();
     let truth_s: Vec<f64> = scene.truth.iter().map(|frame| frame.start_s).collect();
-    let partner = true_beside_found(&found_s, &truth_s, TOLERANCE_S);
     let mut outcome = FinderScore::default();
-    for (two, frame) in partner.windows(2).zip(frames) {
-        let right = matches!(two, [Some(a), Some(b)] if *b == a + 1);
+    for (right, frame) in true_frames(&found_s, &truth_s, TOLERANCE_S).into_iter().zip(frames) {
         let flagged = usize::from(frame.flags.has_low_confidence());
         if right {
             (outcome.right, outcome.right_flagged) = (outcome.right + 1, outcome.right_flagged + flagged);

@@ -4,7 +4,7 @@ use serde::Serialize;
 use traces::Trace;
 use traces::energy::PowerIntegral;
 use traces::frames::{FinderMethod, Marks, Options, default_window, find_with};
-use traces::score::{TOLERANCE_S, score, true_beside_found};
+use traces::score::{TOLERANCE_S, score, true_frames};
 use traces::synth::{Scene, WITNESSES, Witness};
 
 use super::{FAILS_BELOW, HAND_S, MARKED};
@@ -30,75 +30,41 @@ pub struct WitnessRow {
     /// Confidence of the frames found with any of the marks.
     pub calibration: Calibration,
     /// Flags of these frames.
-    pub flags: FlagCount,
+    pub flags: AlarmCount,
     /// Warnings of the searches with each mark.
-    pub warnings: WarningCount,
+    pub warnings: AlarmCount,
 }
 
-/// How many frames are wrong and right, and how many of each carry a flag.
+/// How many frames or searches are wrong and right, and how many of each carry a flag or a warning.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct FlagCount {
-    /// Frames with an end that is not a true one, or a start missed within.
+pub struct AlarmCount {
+    /// Wrong ones: frames with an end that is not a true one, or a start missed within; searches that fail ([`FAILS_BELOW`]).
     pub wrong: usize,
-    /// Number of them with a flag.
-    pub wrong_flagged: usize,
-    /// The other frames.
+    /// Number of them with an alarm.
+    pub wrong_with: usize,
+    /// The others.
     pub right: usize,
-    /// Number of them with a flag all the same.
-    pub right_flagged: usize,
+    /// Number of them with an alarm all the same.
+    pub right_with: usize,
 }
 
-impl FlagCount {
-    fn add(&mut self, right: bool, flagged: bool) {
+impl AlarmCount {
+    fn add(&mut self, right: bool, alarm: bool) {
         let (all, some) = if right {
-            (&mut self.right, &mut self.right_flagged)
+            (&mut self.right, &mut self.right_with)
         } else {
-            (&mut self.wrong, &mut self.wrong_flagged)
+            (&mut self.wrong, &mut self.wrong_with)
         };
         *all += 1;
-        *some += usize::from(flagged);
+        *some += usize::from(alarm);
     }
 
     fn join(self, other: &Self) -> Self {
         Self {
             wrong: self.wrong + other.wrong,
-            wrong_flagged: self.wrong_flagged + other.wrong_flagged,
+            wrong_with: self.wrong_with + other.wrong_with,
             right: self.right + other.right,
-            right_flagged: self.right_flagged + other.right_flagged,
-        }
-    }
-}
-
-/// How many searches fail ([`FAILS_BELOW`]) and how many do not, and how many of each warn.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct WarningCount {
-    /// Searches that fail.
-    pub failed: usize,
-    /// Number of them with a warning.
-    pub failed_warned: usize,
-    /// The other searches.
-    pub good: usize,
-    /// Number of them with a warning all the same.
-    pub good_warned: usize,
-}
-
-impl WarningCount {
-    fn add(&mut self, f1: f64, warned: bool) {
-        let (all, some) = if f1 < FAILS_BELOW {
-            (&mut self.failed, &mut self.failed_warned)
-        } else {
-            (&mut self.good, &mut self.good_warned)
-        };
-        *all += 1;
-        *some += usize::from(warned);
-    }
-
-    fn join(self, other: &Self) -> Self {
-        Self {
-            failed: self.failed + other.failed,
-            failed_warned: self.failed_warned + other.failed_warned,
-            good: self.good + other.good,
-            good_warned: self.good_warned + other.good_warned,
+            right_with: self.right_with + other.right_with,
         }
     }
 }
@@ -160,18 +126,16 @@ fn row(
     let truth_s: Vec<f64> = scene.truth.iter().map(|frame| frame.start_s).collect();
     let tolerance_s = tolerance_s(&truth_s);
     let (mut f1, mut calibration) = (Vec::new(), Calibration::default());
-    let (mut flags, mut warnings) = (FlagCount::default(), WarningCount::default());
+    let [mut flags, mut warnings] = [AlarmCount::default(); 2];
     for (share, hand_s) in MARKED.into_iter().zip(HAND_S) {
         let mark_s = truth_s[(share * truth_s.len() as f64) as usize] + hand_s;
         let marks = Marks::one(mark_s, default_window(0.0, trace.rate_hz()), trace.end_s());
         let found = find_with(trace, &marks, &Options { method })?;
         let frames = PowerIntegral::new(trace).frames(&found);
         f1.push(score(&frames, &scene.truth, tolerance_s).f1());
-        warnings.add(f1[f1.len() - 1], !found.warnings.is_empty());
+        warnings.add(f1[f1.len() - 1] >= FAILS_BELOW, !found.warnings.is_empty());
         let found_s: Vec<f64> = frames.iter().map(|frame| frame.start_s).collect();
-        let partner = true_beside_found(&found_s, &truth_s, tolerance_s);
-        for (two, frame) in partner.windows(2).zip(&frames) {
-            let right = matches!(two, [Some(a), Some(b)] if *b == a + 1);
+        for (right, frame) in true_frames(&found_s, &truth_s, tolerance_s).into_iter().zip(&frames) {
             calibration.add(frame.confidence, right);
             flags.add(right, frame.flags.has_low_confidence());
         }
@@ -200,8 +164,8 @@ pub(super) struct WitnessSummary {
     pub below_simple: usize,
     pub devices: usize,
     pub calibration: Calibration,
-    pub flags: FlagCount,
-    pub warnings: WarningCount,
+    pub flags: AlarmCount,
+    pub warnings: AlarmCount,
 }
 
 /// F1 that a method may be below the better simple one.
@@ -231,8 +195,8 @@ pub(super) fn summaries(rows: &[WitnessRow]) -> Vec<WitnessSummary> {
                 below_simple: of.iter().filter(|row| first(row) < better(row) - MAX_BELOW).count(),
                 devices: of.len(),
                 calibration: of.iter().fold(Calibration::default(), |sum, row| sum.join(&row.calibration)),
-                flags: of.iter().fold(FlagCount::default(), |sum, row| sum.join(&row.flags)),
-                warnings: of.iter().fold(WarningCount::default(), |sum, row| sum.join(&row.warnings)),
+                flags: of.iter().fold(AlarmCount::default(), |sum, row| sum.join(&row.flags)),
+                warnings: of.iter().fold(AlarmCount::default(), |sum, row| sum.join(&row.warnings)),
             });
         }
     }
