@@ -117,10 +117,13 @@ impl Unit {
     }
 }
 
-/// The power of two that brings a size to between 1/2 and 1, for sizes of normal numbers.
+/// 2^-900, about 1e-271. Rounding is allowed for as if magnitudes were at least this large, as it is not relative to
+/// numbers that underflow.
+const MIN_SIZE: f64 = f64::from_bits(123 << 52);
+
+/// The power of two that brings a size to between 1/2 and 1, for sizes from [`MIN_SIZE`] to 2^1021.
 fn to_one(size: f64) -> f64 {
-    let exponent = (size.to_bits() >> 52).clamp(23, 2023);
-    f64::from_bits((2045 - exponent) << 52)
+    f64::from_bits((2045 - (size.to_bits() >> 52)) << 52)
 }
 
 impl<C: Precision> Rounded<C> {
@@ -218,7 +221,7 @@ impl<'a> Recentred<'a> {
     }
 
     fn depth(&self) -> Axis {
-        let size = self.largest[2];
+        let size = self.largest[2].max(MIN_SIZE);
         Axis { shift: 0.0, size, slack: 0.5 * self.rounded * size + self.depth_off }
     }
 
@@ -237,6 +240,7 @@ impl<'a> Recentred<'a> {
             self.triangle.largest(axis) + if perspective { at * self.triangle.largest(2) } else { at };
         let terms = terms + s[axis].abs() + bent * self.origin[2].abs();
         let off = self.triangle.uncertainty[axis] + by_depth * self.depth_off + MOVED * terms;
+        let size = size.max(MIN_SIZE);
         Axis { shift, size, slack: self.rounded * size + 2.0 * off }
     }
 }
@@ -271,10 +275,10 @@ mod tests {
 
     #[test]
     fn sizes_are_brought_to_one() {
-        for size in [1.0, 0.75, 3e-300, 7e300, 0.0, 1e-310] {
+        for size in [1.0, 0.75, MIN_SIZE, 3e-270, 7e300] {
             let scaled = size * to_one(size);
-            assert!((0.5..1.0).contains(&scaled) || size < 1e-300, "{size}: {scaled}");
-            assert!(scaled < 1.0 && to_one(size).log2().fract() == 0.0);
+            assert!((0.5..1.0).contains(&scaled), "{size}: {scaled}");
+            assert!(to_one(size).log2().fract() == 0.0);
         }
     }
 }

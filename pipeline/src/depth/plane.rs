@@ -108,18 +108,24 @@ pub struct MovingPlane<R> {
 /// Rounding of a few operations in `f64`, relative to the sum of magnitudes.
 const ROUNDING: f64 = 1.0 / (1_u64 << 48) as f64;
 
+/// Rounding of products that underflow, for coordinates up to 2^40: each is off by at most 2^-1075.
+const UNDERFLOW: f64 = f64::MIN_POSITIVE;
+
+/// Bound of the rounding error of `n . p` for a `normal` and points with magnitudes up to `size`.
+fn noise<R: Real>(normal: [R; 3], size: [R; 3]) -> R {
+    R::new(ROUNDING).madd(dot(normal.map(R::magnitude), size), R::new(UNDERFLOW))
+}
+
 impl<R: Real> MovingPlane<R> {
     /// The plane with `normal` for a triangle with the given vertices at the two ends; `size` bounds their
     /// magnitudes by axis.
     pub fn new(normal: [R; 3], ends: [&Points<R>; 2], size: [R; 3]) -> Self {
-        let noise = R::new(ROUNDING) * dot(normal.map(R::magnitude), size);
-        Self { normal, ends: [along(normal, ends[0]), along(normal, ends[1])], noise }
+        Self { normal, ends: [along(normal, ends[0]), along(normal, ends[1])], noise: noise(normal, size) }
     }
 
     /// The plane for a triangle that does not move.
     pub fn still(normal: [R; 3], points: &Points<R>, size: [R; 3]) -> Self {
-        let noise = R::new(ROUNDING) * dot(normal.map(R::magnitude), size);
-        Self { normal, ends: [along(normal, points); 2], noise }
+        Self { normal, ends: [along(normal, points); 2], noise: noise(normal, size) }
     }
 
     /// Range of `n . p` over the whole motion.
@@ -270,6 +276,20 @@ mod tests {
         let at = |x: f64, u: f64| (4.0 + x + 2.0 * u) / (1.0 + 0.5 * u);
         let corners = range([at(-0.5, -1.0), at(0.5, -1.0), at(-0.5, 0.5), at(0.5, 0.5)]);
         close_to(plane.depths(plane.whole(), &beam, [0.0; 2], ()).unwrap(), corners);
+    }
+
+    /// A bound that allowed only for rounding relative to the products would leave out a vertex.
+    #[test]
+    fn products_that_underflow_are_allowed_for() {
+        let units = [1e-271 / 3.0, 1e-44 / 3.0, 0.01 / 3.0];
+        let vertices = [[-22.0, 2.0, 82.0], [-20.0, 3.0, 81.0], [-24.0, 3.0, 84.0]];
+        let points: Points<f64> = vertices.map(|p: [f64; 3]| [0, 1, 2].map(|axis| p[axis] * units[axis]));
+        let size = [24.0 * units[0], 3.0 * units[1], 84.0 * units[2]];
+        let plane = MovingPlane::new(normal(&points), [&points, &points], size);
+        for [x, y, w] in points {
+            let found = plane.depths(plane.whole(), &Beam::orthographic([[x; 2], [y; 2]]), [0.0; 2], ());
+            assert!(found.is_none_or(|[lo, hi]| lo <= w && w <= hi), "{w} in {found:?}");
+        }
     }
 
     /// Front-facing from one end of the lens and back-facing from the other: edge-on from a point in between.

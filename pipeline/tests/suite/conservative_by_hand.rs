@@ -53,9 +53,9 @@ fn times_and_depths_are_those_of_the_passing() {
     }
 }
 
-/// Beside a border by 2^-30 of the tiles, which `f32` does not tell from touching it; beside it by 2^-19, which it does.
+/// A gap of 2^-30 of the tiles is below the precision of `f32`, one of 2^-19 is not.
 #[test]
-fn only_doubles_tell_a_gap_of_a_billionth() {
+fn only_doubles_separate_a_gap_of_a_billionth() {
     let touched = |gap: f64, rasterizer: Rasterizer| {
         let triangle = still([[0.5, 0.5, 1.0], [1.0 - gap, 0.5, 1.0], [0.5, 0.75, 1.0]]);
         all(&rasterizer, &triangle, &GRID).len()
@@ -67,7 +67,8 @@ fn only_doubles_tell_a_gap_of_a_billionth() {
     assert_eq!(gaps.map(|gap| touched(gap, double)), [1, 1]);
 }
 
-/// Whatever the depth and the distance, a triangle at one depth is there within the rounding of `f64`.
+/// Whatever the depth and the distance, a triangle at one depth is there within the rounding of its depth to `f64`, and that
+/// of 2^-900 to `f32`.
 #[test]
 fn a_triangle_at_one_depth_stays_there() {
     for z in [0.0, 1.0, 1e-30, -3.1e7, 1e40] {
@@ -75,7 +76,7 @@ fn a_triangle_at_one_depth_stays_there() {
         let touched = all(&Rasterizer::new(View::orthographic()), &flat, &GRID);
         assert!(touched.len() > 6);
         for (_, Touch { z: [lo, hi], .. }) in touched {
-            assert!(lo <= z && z <= hi && hi - lo <= 1e-13 * z.abs(), "{lo} {z} {hi}");
+            assert!(lo <= z && z <= hi && hi - lo <= 1e-13 * z.abs() + 2_f64.powi(-920), "{lo} {z} {hi}");
         }
     }
 }
