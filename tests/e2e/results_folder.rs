@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::support::{Inputs, Results, Running, quintile};
+use crate::support::{Inputs, Quintile, Results, Running, quintile};
 
 /// Frames that take longer than the test runs.
 const LONG: [&str; 8] = ["run", "default", "--timing", "stepped", "--size", "640x360", "--frames", "0..36"];
@@ -15,9 +15,13 @@ fn run(out: &str) -> Results {
 
 /// A long run into `out` that has rendered at least one frame.
 fn long_run(out: &str) -> Running {
+    quintile().spawn(LONG.iter().chain(&["--out", out])).once(|| has_begun(out))
+}
+
+/// Whether a run has drawn its first image.
+fn has_begun(out: &str) -> bool {
     let images = Path::new(out).join(".quintile/new/images");
-    let begun = || fs::read_dir(&images).is_ok_and(|mut images| images.next().is_some());
-    quintile().spawn(LONG.iter().chain(&["--out", out])).once(begun)
+    fs::read_dir(&images).is_ok_and(|mut images| images.next().is_some())
 }
 
 /// Contents of `out` without the folder of new results.
@@ -61,15 +65,28 @@ fn an_interrupt_ends_a_run_with_a_message_and_nothing_left() {
     let inputs = Inputs::new();
     let results = run(&inputs.path("out"));
     let before = results.files();
-    for (signal, out) in [("INT", inputs.path("out")), ("TERM", inputs.path("new"))] {
+    for (signal, code, out) in [("INT", 130, inputs.path("out")), ("TERM", 143, inputs.path("new"))] {
         let ended = long_run(&out).signal(signal).end();
-        assert_eq!(ended.code, Some(130), "{}", ended.stderr);
+        assert_eq!(ended.code, Some(code), "{}", ended.stderr);
         let lines: Vec<&str> = ended.stderr.lines().collect();
         assert!(lines[0].starts_with("note: expected time"), "{}", ended.stderr);
         assert!(lines[1].starts_with("error: interrupted") && lines.len() == 2, "{}", ended.stderr);
     }
     assert!(before == results.files());
     assert!(!Path::new(&inputs.path("new")).exists(), "a folder that was made for nothing");
+}
+
+/// Scripts start background jobs with interrupts ignored, and `nohup` ignores hang-ups.
+#[cfg(unix)]
+#[test]
+fn a_signal_that_the_caller_ignores_stays_ignored() {
+    let inputs = Inputs::new();
+    let out = inputs.path("out");
+    let start = ["-c", "trap '' INT HUP; exec \"$@\"", "sh", env!("CARGO_BIN_EXE_quintile")];
+    let running = Quintile::new("sh").spawn(start.iter().chain(&LONG).chain(&["--out", out.as_str()]));
+    let ended = running.once(|| has_begun(&out)).signal("INT").signal("HUP").signal("TERM").end();
+    assert_eq!(ended.code, Some(143), "{}", ended.stderr);
+    assert!(!Path::new(&out).exists(), "a folder that was made for nothing");
 }
 
 #[cfg(unix)]
@@ -188,7 +205,7 @@ fn a_full_disk_leaves_the_results_of_the_run_before() {
     let before = results.files();
     let program = env!("CARGO_BIN_EXE_quintile");
     let limited = ["-c", "trap '' XFSZ; ulimit -f 100; exec \"$0\" run tiny --out \"$1\"", program, &out];
-    let ended = crate::support::Quintile::new("sh").call(limited);
+    let ended = Quintile::new("sh").call(limited);
     assert_eq!(ended.code, Some(1), "{}", ended.stderr);
     assert!(ended.stderr.contains("cannot write it") && ended.stderr.contains(&out), "{}", ended.stderr);
     assert!(before == results.files());

@@ -94,26 +94,44 @@ fn alone(arguments: &[String], frame: u32) -> Vec<String> {
     kept
 }
 
-/// Exit code after an interrupt, as in shells: 128 plus the number of the signal.
-const EXIT_CODE: i32 = 130;
-
-/// Installs a handler for interrupt, termination and hang-up. It removes unfinished files, prints a message
-/// and ends the process.
+/// Handles interrupt, termination and hang-up: unfinished files are removed, a message is printed, and the process ends with
+/// 128 plus the number of the signal, as in shells. Signals that the caller ignores (`nohup`, background jobs of scripts)
+/// stay ignored.
+#[cfg(unix)]
 pub(super) fn handle(terminal: Terminal) {
-    let end = move || {
-        // No file is created while this guard is held.
-        let _held = atomic::remove_all();
-        if stderr().is_terminal() {
-            // Leave the line of the progress bar.
-            let _ = writeln!(stderr());
-        }
-        terminal
-            .error("interrupted: files that are not finished were removed, earlier ones are as they were");
-        std::process::exit(EXIT_CODE);
-    };
-    // Signals that are already ignored or handled (nohup) stay so. The next process with the same folder then
-    // removes unfinished files.
-    let _ = ctrlc::try_set_handler(end);
+    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+
+    let ignored = ignored_signals();
+    let handled = [SIGINT, SIGTERM, SIGHUP].into_iter().filter(|signal| ignored >> (signal - 1) & 1 == 0);
+    // Without a handler the next process with the same folder removes unfinished files.
+    if let Ok(mut signals) = signal_hook::iterator::Signals::new(handled) {
+        std::thread::spawn(move || signals.forever().for_each(|signal| end(&terminal, 128 + signal)));
+    }
+}
+
+/// Without signals the next process with the same folder removes unfinished files.
+#[cfg(not(unix))]
+pub(super) fn handle(_: Terminal) {}
+
+/// Signals that this process ignores, one bit each from signal 1 on; none where the system does not list them.
+#[cfg(unix)]
+fn ignored_signals() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    ignored.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).unwrap_or(0)
+}
+
+/// Removes unfinished files and ends the process.
+#[cfg(unix)]
+fn end(terminal: &Terminal, code: i32) {
+    // No file is created while this guard is held.
+    let _held = atomic::remove_all();
+    if stderr().is_terminal() {
+        // Leave the line of the progress bar.
+        let _ = writeln!(stderr());
+    }
+    terminal.error("interrupted: files that are not finished were removed, earlier ones are as they were");
+    std::process::exit(code);
 }
 
 #[cfg(test)]
