@@ -5,20 +5,45 @@
 //! a cell depends on the triangle and the cell alone. The alternative shades every sample at its own
 //! position, in quads of 2x2 pixels at one sample index.
 
+use crate::simd::{Lanes, Mask};
+
 /// Time of the reference at which the shading grid is defined.
 pub const REFERENCE_TIME: f32 = 0.5;
 
 /// Largest distance of a cell from the image centre, so that its coordinates fit every use.
 const MAX_CELL: f32 = 1e6;
 
-/// Cell, in pixels from the top left of the image, of the point with the given barycentric `weights`.
-/// `reference` has the vertices at the reference, `origin` the image coordinate of the first column and row.
-/// `None` if the point is behind the camera there.
-pub fn cell(reference: &[[f32; 3]; 3], weights: [f32; 3], origin: [f32; 2]) -> Option<[i32; 2]> {
-    let mix = |axis: usize| (0..3).map(|k| weights[k] * reference[k][axis]).sum::<f32>();
-    let w = mix(2);
-    (w > 0.0)
-        .then(|| [0, 1].map(|axis| (mix(axis) / w - origin[axis]).clamp(-MAX_CELL, MAX_CELL).floor() as i32))
+/// Places of the points with the given barycentric `weights`, in pixels from the top left of the image, and the lanes whose point
+/// is in front of the camera. `reference` has the vertices at the reference, `origin` the image coordinate of the first column and
+/// row. The place in other lanes is undefined.
+#[inline(always)]
+pub(crate) fn places<V: Lanes>(
+    reference: &[[f32; 3]; 3],
+    weights: [V; 3],
+    origin: [f32; 2],
+) -> ([V; 2], Mask) {
+    let [x, y, w] =
+        [mixed(reference, &weights, 0), mixed(reference, &weights, 1), mixed(reference, &weights, 2)];
+    let place = [x / w - V::splat(origin[0]), y / w - V::splat(origin[1])];
+    (place, w.gt(V::splat(0.0)))
+}
+
+/// A coordinate of the points with the given weights. No closure, as that would be compiled for the baseline of the target.
+#[inline(always)]
+fn mixed<V: Lanes>(reference: &[[f32; 3]; 3], weights: &[V; 3], axis: usize) -> V {
+    (weights[0] * V::splat(reference[0][axis]) + weights[1] * V::splat(reference[1][axis]))
+        + weights[2] * V::splat(reference[2][axis])
+}
+
+/// Cell of a place.
+#[inline(always)]
+pub(crate) fn cell_at(place: [f32; 2]) -> [i32; 2] {
+    place.map(|at| {
+        let at = at.clamp(-MAX_CELL, MAX_CELL);
+        // The floor, without a call.
+        let whole = at as i32;
+        whole - i32::from(at < whole as f32)
+    })
 }
 
 /// Barycentric weights of the centre of a cell. It is outside the triangle for some cells on the border;
@@ -105,8 +130,28 @@ impl QuadSet {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::simd::{LANES, Plain};
 
     const TRIANGLE: [[f32; 3]; 3] = [[-8.0, -8.0, 1.0], [16.0, -16.0, 2.0], [-8.0, 8.0, 1.0]];
+
+    fn cell(reference: &[[f32; 3]; 3], weights: [f32; 3], origin: [f32; 2]) -> Option<[i32; 2]> {
+        let ([x, y], front) = places(reference, weights.map(Plain::splat), origin);
+        (front & 1 != 0).then(|| {
+            cell_at([x, y].map(|lanes| {
+                let mut row = [0.0; LANES];
+                lanes.store(&mut row);
+                row[0]
+            }))
+        })
+    }
+
+    #[test]
+    fn a_cell_is_the_floor_of_its_place() {
+        for place in [[0.0, -0.0], [0.99, -0.01], [-1.0, -1.5], [7e5, -7e5], [1e9, f32::NEG_INFINITY]] {
+            let floor = place.map(|at: f32| at.clamp(-MAX_CELL, MAX_CELL).floor() as i32);
+            assert_eq!(cell_at(place), floor, "{place:?}");
+        }
+    }
 
     #[test]
     fn the_middle_of_a_cell_falls_into_it() {

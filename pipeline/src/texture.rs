@@ -269,10 +269,18 @@ impl<'a> Sampler<'a> {
 /// The four texels around `uv` in an image of `size`, and the position between them.
 pub(crate) fn taps(size: [u32; 2], wrap: [Wrap; 2], uv: Vec2) -> ([[u32; 2]; 4], Vec2) {
     let at = uv * Vec2::new(size[0] as f32, size[1] as f32) - Vec2::splat(0.5);
-    let first = at.floor();
+    let first = Vec2::new(floor(at.x), floor(at.y));
     let x = [0, 1].map(|step| wrapped(first.x, step, size[0], wrap[0]));
     let y = [0, 1].map(|step| wrapped(first.y, step, size[1], wrap[1]));
     ([[x[0], y[0]], [x[1], y[0]], [x[0], y[1]], [x[1], y[1]]], at - first)
+}
+
+/// The floor, without a call on machines that have no instruction for it.
+fn floor(value: f32) -> f32 {
+    /// From here on all numbers are whole.
+    const WHOLE: f32 = 8_388_608.0;
+    let truncated = value as i32 as f32;
+    if value.abs() < WHOLE { truncated - f32::from(truncated > value) } else { value }
 }
 
 fn block(level: &Level, x: u32, y: u32) -> u32 {
@@ -282,6 +290,10 @@ fn block(level: &Level, x: u32, y: u32) -> u32 {
 /// Texel `first + step` wrapped into `0..side`.
 fn wrapped(first: f32, step: i64, side: u32, wrap: Wrap) -> u32 {
     let (texel, side) = ((first as i64).saturating_add(step), i64::from(side));
+    // Divisions are slow, and few fetches wrap.
+    if (0..side).contains(&texel) {
+        return texel as u32;
+    }
     let inside = match wrap {
         Wrap::Clamp => texel.clamp(0, side - 1),
         Wrap::Repeat => texel.rem_euclid(side),
@@ -296,6 +308,16 @@ fn wrapped(first: f32, step: i64, side: u32, wrap: Wrap) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_floor_is_that_of_the_standard_library() {
+        let values =
+            [0.0, 0.5, -0.5, 1.0, -1.0, 8_388_607.5, -8_388_607.5, 8_388_608.0, -3e38, f32::INFINITY];
+        for value in values {
+            assert_eq!(floor(value), value.floor(), "{value}");
+        }
+        assert!(floor(f32::NAN).is_nan());
+    }
 
     #[test]
     fn the_chain_ends_at_one_texel() {

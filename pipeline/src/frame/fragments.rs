@@ -3,9 +3,10 @@
 
 use glam::Vec4;
 
+use super::cells::{Grid, own_pixel};
 use super::pass::Pass;
 use super::resolve::ByCell;
-use super::shaded::{Grid, SampleView, ShadedTriangle, own_pixel};
+use super::shaded::{SampleView, ShadedTriangle};
 use super::{Settings, Shading};
 use crate::depth::DepthTile;
 use crate::sample_test::{Covered, Hits};
@@ -78,7 +79,7 @@ impl<'a> FragmentTests<'a> {
             samples,
             origin,
             surface: ShadedTriangle::new(pass, triangle.id),
-            grid: Grid::new(pass, &triangle.corners, triangle.moving),
+            grid: Grid::new(pass, (&triangle.corners, triangle.moving), samples, origin),
             shaded: ByCell::default(),
         }
     }
@@ -164,7 +165,7 @@ impl<'a> FragmentTests<'a> {
             let single = || only(surface.shade_at(&lane, &view));
             return kept(&lane, if is_single { single() } else { surface.outputs_at(&lane, &view) });
         }
-        let cell = self.grid.cell(self.samples, slot, self.origin, spec.tile_px);
+        let cell = self.grid.cell(slot);
         let single = || only(surface.shade(&lane, cell));
         let outputs = || if is_single { single() } else { surface.outputs(&lane, cell) };
         *self.shaded.entry(cell).or_insert_with(|| {

@@ -2,6 +2,7 @@
 
 mod attachments;
 mod bin;
+mod cells;
 mod conservative_pass;
 mod dispatch;
 mod error;

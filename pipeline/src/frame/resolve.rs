@@ -9,8 +9,9 @@ use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 
 use super::bin::Bin;
+use super::cells::{Grid, own_pixel};
 use super::pass::{First, Pass, Plane};
-use super::shaded::{Grid, SampleView, ShadedTriangle, own_pixel};
+use super::shaded::{SampleView, ShadedTriangle};
 use super::{Settings, Shading};
 use crate::depth::DepthTile;
 use crate::memory::{LINE_BYTES, MemorySystem};
@@ -163,7 +164,7 @@ fn resolve_tile(
             continue;
         }
         let (corners, moving) = pass.moving_corners(triangle);
-        let grid = Grid::new(pass, &corners, moving);
+        let mut grid = Grid::new(pass, (&corners, moving), samples, origin);
         let surface = ShadedTriangle::new(pass, triangle);
         let lane = surface.lane();
         scratch.shaded.clear();
@@ -174,7 +175,7 @@ fn resolve_tile(
                     surface.shade_at(&lane, &SampleView::of_slot(&corners, samples, slot, at)).truncate()
                 }
                 Shading::Cached => {
-                    let cell = grid.cell(samples, slot, origin, side);
+                    let cell = grid.cell(slot);
                     *scratch.shaded.entry(cell).or_insert_with(|| surface.shade(&lane, cell).truncate())
                 }
             };

@@ -1,10 +1,11 @@
-//! Shaded triangles: the shading cell of a sample, and shading at cells and at samples.
+//! Shaded triangles: shading at cells and at samples.
 
 use std::cell::RefCell;
 
 use glam::{Vec2, Vec3, Vec4};
 
 use super::Shading;
+use super::cells::reference;
 use super::pass::{Draw, Pass};
 use crate::geometry::{Clip, Viewport};
 use crate::sample_test::exact;
@@ -33,46 +34,6 @@ impl QuadWork {
     fn fetching(self, more: u32) -> Self {
         Self { fetches: self.fetches + more, ..self }
     }
-}
-
-/// Shading grid over one triangle.
-pub(super) struct Grid<'a> {
-    corners: &'a [Corner; 3],
-    reference: [[f32; 3]; 3],
-    origin: [f32; 2],
-    plain: bool,
-}
-
-impl<'a> Grid<'a> {
-    pub fn new(pass: &Pass<'_>, corners: &'a [Corner; 3], moving: bool) -> Self {
-        let reference = reference(pass, corners);
-        Self { corners, reference, origin: pass.origin, plain: !moving && !pass.lens }
-    }
-
-    /// Cell that shades the sample in `slot` of a tile. A sample of a still triangle in focus uses its own
-    /// pixel. So does a sample whose surface point is behind the camera at the reference.
-    pub fn cell(&self, samples: &TileSamples, slot: usize, tile: [u32; 2], side: u32) -> [i32; 2] {
-        let own = own_pixel(samples, slot, tile, side);
-        if self.plain {
-            return own;
-        }
-        let seen = exact::seen_in_tile(self.corners, samples, slot);
-        let edge = |i: usize, j: usize| seen[i][0] * seen[j][1] - seen[j][0] * seen[i][1];
-        let e = [edge(1, 2), edge(2, 0), edge(0, 1)];
-        let sum = (e[0] + e[1]) + e[2];
-        shading::cell(&self.reference, e.map(|part| part / sum), self.origin).unwrap_or(own)
-    }
-}
-
-/// Vertices at the reference, as homogeneous points of the image plane.
-fn reference(pass: &Pass<'_>, corners: &[Corner; 3]) -> [[f32; 3]; 3] {
-    corners.map(|corner| pass.projection.shear.homogeneous(corner.at(REFERENCE_TIME)))
-}
-
-/// Pixel of the sample in `slot` of a tile.
-pub(super) fn own_pixel(samples: &TileSamples, slot: usize, tile: [u32; 2], side: u32) -> [i32; 2] {
-    let pixel = u32::from(samples.pixel[slot]);
-    [(tile[0] + pixel % side) as i32, (tile[1] + pixel / side) as i32]
 }
 
 /// One triangle as a surface for shading.

@@ -4,9 +4,9 @@ use activity::Packet;
 
 use super::bin::Bin;
 use super::bin::{BinLog, SamplesHere, TestsHere, TileWork, Work};
+use super::cells::{Grid, own_pixel};
 use super::fragments::{FragmentTests, Fragments};
 use super::pass::Pass;
-use super::shaded::{Grid, own_pixel};
 use super::test_selection::TestSelector;
 use super::tile_tests::{Remaining, Subject, TestContext, TestTile};
 use super::vertices::Ready;
@@ -270,10 +270,10 @@ impl<'a, 'p> Worker<'a, 'p> {
         let Settings { spec, viewport, samples: source, .. } = *self.pass.settings;
         let (samples, side) = (&self.scratch.samples[index], spec.tile_px);
         let per_pixel = source.per_pixel();
-        let grid = Grid::new(self.pass, corners, moving);
+        let mut grid = Grid::new(self.pass, (corners, moving), samples, origin);
         for slot in self.scratch.fragments.shaded.iter().map(|&slot| slot as usize) {
             match self.pass.shading {
-                Shading::Cached => self.scratch.quads.request(grid.cell(samples, slot, origin, side), 0),
+                Shading::Cached => self.scratch.quads.request(grid.cell(slot), 0),
                 Shading::PerSample => {
                     let index =
                         samples.in_image(slot, origin, side, viewport, per_pixel) % per_pixel as usize;
@@ -434,7 +434,7 @@ impl Worker<'_, '_> {
             return [0; 2];
         };
         let samples = &self.scratch.samples[index];
-        let grid = Grid::new(self.pass, &triangle.corners, triangle.moving);
+        let mut grid = Grid::new(self.pass, (&triangle.corners, triangle.moving), samples, origin);
         // Stored colours may be mixed from those of several cells.
         let colours = compression.colour && self.pass.shading == Shading::Cached && !self.pass.is_ordered;
         let mut pixels = [Pixel::NONE; 64];
@@ -442,7 +442,7 @@ impl Worker<'_, '_> {
             let pixel = samples.pixel[slot] as usize;
             if written & 1 << pixel != 0 {
                 let own = colours && stored.triangle[slot] == triangle.id;
-                let cell = own.then(|| grid.cell(samples, slot, origin, spec.tile_px));
+                let cell = own.then(|| grid.cell(slot));
                 pixels[pixel].add(stored.depth[slot], cell);
             }
         }

@@ -108,7 +108,7 @@ impl Cache {
         let set = &mut self.lines[first..first + self.ways];
         if let Some(way) = set.iter().position(|line| line.key == key) {
             set[way].dirty |= write;
-            if self.replacement == Replacement::Lru {
+            if self.replacement == Replacement::Lru && way > 0 {
                 set[..=way].rotate_right(1);
             }
             return Access::Hit;

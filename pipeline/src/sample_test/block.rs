@@ -1,5 +1,6 @@
 //! Edge functions of a triangle at sixteen samples.
 
+use crate::sampling::TileSamples;
 use crate::setup::Corner;
 use crate::simd::{LANES, Lanes, Mask};
 
@@ -12,6 +13,24 @@ pub(crate) struct SampleRows<'a> {
     pub lens: [&'a [f32; LANES]; 2],
     /// Time; read for moving triangles.
     pub t: &'a [f32; LANES],
+}
+
+impl<'a> SampleRows<'a> {
+    /// The sixteen samples of a tile from `base` on, a multiple of sixteen.
+    #[inline(always)]
+    pub fn of(samples: &'a TileSamples, base: usize) -> Self {
+        Self {
+            slope: [block_of(&samples.slope[0], base), block_of(&samples.slope[1], base)],
+            lens: [block_of(&samples.lens[0], base), block_of(&samples.lens[1], base)],
+            t: block_of(&samples.t, base),
+        }
+    }
+}
+
+#[inline(always)]
+pub(crate) fn block_of(array: &[f32], base: usize) -> &[f32; LANES] {
+    // Arrays are padded to whole blocks, so the fallback is never used.
+    array[base..base + LANES].first_chunk().unwrap_or(&[0.0; LANES])
 }
 
 /// Data of sixteen samples in registers, in perspective or in an orthographic view.
@@ -114,6 +133,14 @@ impl<V: Lanes> Crossing<V> {
             shown |= zero.gt(self.ends[1]);
         }
         shown
+    }
+
+    /// Barycentric weights of the lanes, extrapolated outside.
+    #[inline(always)]
+    pub fn weights(&self) -> [V; 3] {
+        let [e0, e1, e2] = self.edges;
+        let sum = (e0 + e1) + e2;
+        [e0 / sum, e1 / sum, e2 / sum]
     }
 
     /// Depth of the lanes inside.

@@ -5,7 +5,7 @@
 
 use std::ops::Range;
 
-use super::block::{Crossing, SampleRows, View};
+use super::block::{Crossing, SampleRows, View, block_of};
 use super::exact;
 use crate::sampling::TileSamples;
 use crate::setup::Triangle;
@@ -159,7 +159,7 @@ impl<const MOTION: bool, const LENS: bool, const PARALLEL: bool> Kernel
             if active != 0 {
                 job.hits.tested += active.count_ones();
                 job.note(base, active, |pixels| &mut pixels.tested);
-                let view = View::<V, MOTION, LENS, PARALLEL>::load(&job.rows(base));
+                let view = View::<V, MOTION, LENS, PARALLEL>::load(&SampleRows::of(job.samples, base));
                 job.store(base, &Crossing::new(&job.triangle.corners, &view), active);
             }
             base += LANES;
@@ -168,16 +168,6 @@ impl<const MOTION: bool, const LENS: bool, const PARALLEL: bool> Kernel
 }
 
 impl SampleTest<'_, '_> {
-    #[inline(always)]
-    fn rows(&self, base: usize) -> SampleRows<'_> {
-        let samples = self.samples;
-        SampleRows {
-            slope: [block_of(&samples.slope[0], base), block_of(&samples.slope[1], base)],
-            lens: [block_of(&samples.lens[0], base), block_of(&samples.lens[1], base)],
-            t: block_of(&samples.t, base),
-        }
-    }
-
     /// Lanes with a lens position in the box.
     #[inline(always)]
     fn in_lens_box<V: Lanes>(&self, base: usize) -> Mask {
@@ -257,7 +247,7 @@ impl SampleTest<'_, '_> {
 
     #[cold]
     fn keep_exact(&mut self, base: usize, lane: usize) {
-        let seen = exact::seen(&self.triangle.corners, &self.rows(base), lane);
+        let seen = exact::seen(&self.triangle.corners, &SampleRows::of(self.samples, base), lane);
         if let Some((depth, _)) = exact::hit(&seen, self.triangle.faces) {
             self.keep(base + lane, depth);
         }
@@ -272,7 +262,7 @@ impl SampleTest<'_, '_> {
         crossing.depth().store(&mut depth);
         for lane in (0..LANES).filter(|lane| (shown | tie) >> lane & 1 == 1) {
             let found = if tie >> lane & 1 == 1 {
-                let seen = exact::seen(&self.triangle.corners, &self.rows(base), lane);
+                let seen = exact::seen(&self.triangle.corners, &SampleRows::of(self.samples, base), lane);
                 exact::hit(&seen, self.triangle.faces)
             } else {
                 Some((depth[lane], counter_clockwise >> lane & 1 == 1))
@@ -317,12 +307,6 @@ impl SampleTest<'_, '_> {
             }
         }
     }
-}
-
-#[inline(always)]
-fn block_of(array: &[f32], base: usize) -> &[f32; LANES] {
-    // Arrays are padded to whole blocks, so the fallback is never used.
-    array[base..base + LANES].first_chunk().unwrap_or(&[0.0; LANES])
 }
 
 /// Lanes of the block at `base` that belong to `run`.

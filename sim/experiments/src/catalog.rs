@@ -20,7 +20,7 @@ use crate::stress::Report;
 use crate::study::Entry;
 
 /// The charts of the book.
-pub static CHARTS: [Entry; 16] = [
+pub static CHARTS: &[Entry] = &[
     Entry::of::<CausticsChart>(),
     Entry::of::<CcdChart>(),
     Entry::of::<ComputeChart>(),

@@ -1,0 +1,96 @@
+//! Cells of the shading grid that the samples of a tile are shaded in, sixteen at a time.
+
+use super::pass::Pass;
+use crate::sample_test::block::{Crossing, SampleRows, View};
+use crate::sampling::TileSamples;
+use crate::setup::Corner;
+use crate::shading::{REFERENCE_TIME, cell_at, places};
+use crate::simd::{Kernel, LANES, Lanes, Mask, Row, Width, dispatch};
+
+/// Shading grid over one triangle, for the samples of one tile.
+pub(super) struct Grid<'a> {
+    corners: &'a [Corner; 3],
+    reference: [[f32; 3]; 3],
+    image: [f32; 2],
+    /// Whether every sample uses its own pixel, as those of a still triangle in focus do.
+    plain: bool,
+    samples: &'a TileSamples,
+    /// First pixel of the tile.
+    origin: [u32; 2],
+    side_px: u32,
+    places: Places,
+}
+
+/// Places of a block of samples.
+struct Places {
+    /// First slot of the block; none has the largest number.
+    base: usize,
+    at: [Row; 2],
+    in_front: Mask,
+}
+
+impl<'a> Grid<'a> {
+    /// Grid over the triangle with these `corners`, which may be `moving`, for a tile of `pass` that starts at pixel `origin`.
+    pub fn new(
+        pass: &Pass<'_>,
+        (corners, moving): (&'a [Corner; 3], bool),
+        samples: &'a TileSamples,
+        origin: [u32; 2],
+    ) -> Self {
+        let places = Places { base: usize::MAX, at: [Row::splat(0.0); 2], in_front: 0 };
+        let (plain, side_px) = (!moving && !pass.lens, pass.settings.spec.tile_px);
+        let reference = reference(pass, corners);
+        Self { corners, reference, image: pass.origin, plain, samples, origin, side_px, places }
+    }
+
+    /// Cell of the sample in `slot`. A sample whose surface point is behind the camera at the reference uses its own pixel.
+    pub fn cell(&mut self, slot: usize) -> [i32; 2] {
+        if self.plain {
+            return own_pixel(self.samples, slot, self.origin, self.side_px);
+        }
+        let (base, lane) = (slot / LANES * LANES, slot % LANES);
+        if self.places.base != base {
+            self.places.base = base;
+            let Self { corners, reference, image, samples, .. } = *self;
+            let rows = SampleRows::of(samples, base);
+            let places = &mut self.places;
+            dispatch(Width::widest(), Block { corners, reference: &reference, image, rows, places });
+        }
+        if self.places.in_front >> lane & 1 == 0 {
+            return own_pixel(self.samples, slot, self.origin, self.side_px);
+        }
+        let [x, y] = &self.places.at;
+        cell_at([x.0[lane], y.0[lane]])
+    }
+}
+
+/// The places of sixteen samples, with the operations of the sample test in their order.
+struct Block<'a> {
+    corners: &'a [Corner; 3],
+    reference: &'a [[f32; 3]; 3],
+    image: [f32; 2],
+    rows: SampleRows<'a>,
+    places: &'a mut Places,
+}
+
+impl Kernel for Block<'_> {
+    #[inline(always)]
+    fn run<V: Lanes>(self) {
+        let crossing = Crossing::new(self.corners, &View::<V, true, true>::load(&self.rows));
+        let ([x, y], in_front) = places(self.reference, crossing.weights(), self.image);
+        x.store(&mut self.places.at[0].0);
+        y.store(&mut self.places.at[1].0);
+        self.places.in_front = in_front;
+    }
+}
+
+/// Vertices at the reference, as homogeneous points of the image plane.
+pub(super) fn reference(pass: &Pass<'_>, corners: &[Corner; 3]) -> [[f32; 3]; 3] {
+    corners.map(|corner| pass.projection.shear.homogeneous(corner.at(REFERENCE_TIME)))
+}
+
+/// Pixel of the sample in `slot` of a tile.
+pub(super) fn own_pixel(samples: &TileSamples, slot: usize, tile: [u32; 2], side: u32) -> [i32; 2] {
+    let pixel = u32::from(samples.pixel[slot]);
+    [(tile[0] + pixel % side) as i32, (tile[1] + pixel / side) as i32]
+}
