@@ -32,7 +32,7 @@ pub struct TraceHeader {
 }
 
 impl TraceHeader {
-    /// Left edge of a sample to the nearest nanosecond, as [`Trace::time_ns`].
+    /// Left edge of a sample to the nearest nanosecond.
     pub fn time_ns(&self, index: u64) -> i64 {
         time_ns(self.start_s, self.rate_hz, index)
     }
