@@ -108,8 +108,8 @@ impl Cache {
         let set = &mut self.lines[first..first + self.ways];
         if let Some(way) = set.iter().position(|line| line.key == key) {
             set[way].dirty |= write;
-            if self.replacement == Replacement::Lru && way > 0 {
-                set[..=way].rotate_right(1);
+            if self.replacement == Replacement::Lru {
+                to_front(set, way);
             }
             return Access::Hit;
         }
@@ -120,7 +120,7 @@ impl Cache {
             }
             _ => self.ways - 1,
         };
-        set[..=way].rotate_right(1);
+        to_front(set, way);
         let victim = std::mem::replace(&mut set[0], Line { key, dirty: write });
         if victim.dirty { Access::MissEvicting(victim.key) } else { Access::Miss }
     }
@@ -141,6 +141,16 @@ impl Cache {
         self.lines.fill(Line::EMPTY);
         dirty
     }
+}
+
+/// Moves the entry at `way` to the front; those before it keep their order.
+fn to_front(set: &mut [Line], way: usize) {
+    let entry = set[way];
+    // A loop rather than `rotate_right`, which is slow for a few entries.
+    for at in (0..way).rev() {
+        set[at + 1] = set[at];
+    }
+    set[0] = entry;
 }
 
 #[cfg(test)]
