@@ -171,7 +171,6 @@ impl SampleTest<'_, '_> {
     /// Lanes with a lens position in the box.
     #[inline(always)]
     fn in_lens_box<V: Lanes>(&self, base: usize) -> Mask {
-        let within = |position: V, [lo, hi]: [f32; 2]| position.ge(V::splat(lo)) & V::splat(hi).ge(position);
         let (u, v) = (V::load(block_of(&self.samples.u, base)), V::load(block_of(&self.samples.v, base)));
         within(u, self.within.u) & within(v, self.within.v)
     }
@@ -254,12 +253,23 @@ impl SampleTest<'_, '_> {
     }
 
     /// List the samples that see the triangle.
-    #[cold]
+    #[inline(always)]
     fn list<V: Lanes>(&mut self, base: usize, crossing: &Crossing<V>, active: Mask) {
-        let (shown, tie) = (crossing.shown(self.triangle.faces) & active, crossing.tie() & active);
-        let counter_clockwise = crossing.shown([false, true]);
+        let shown = crossing.shown(self.triangle.faces) & active;
         let mut depth = [0.0; LANES];
         crossing.depth().store(&mut depth);
+        let block = SeenBlock {
+            shown,
+            tie: crossing.tie() & active,
+            counter_clockwise: crossing.shown([false, true]),
+            depth,
+        };
+        self.list_block(base, &block);
+    }
+
+    #[inline(never)]
+    fn list_block(&mut self, base: usize, block: &SeenBlock) {
+        let SeenBlock { shown, tie, counter_clockwise, depth } = *block;
         for lane in (0..LANES).filter(|lane| (shown | tie) >> lane & 1 == 1) {
             let found = if tie >> lane & 1 == 1 {
                 let seen = exact::seen(&self.triangle.corners, &SampleRows::of(self.samples, base), lane);
@@ -307,6 +317,22 @@ impl SampleTest<'_, '_> {
             }
         }
     }
+}
+
+/// What sixteen samples see of a triangle.
+struct SeenBlock {
+    /// Lanes inside that show a drawn face.
+    shown: Mask,
+    /// Lanes that [`exact`] decides.
+    tie: Mask,
+    counter_clockwise: Mask,
+    depth: [f32; LANES],
+}
+
+/// Lanes with a position in the range. No closure, as that would be compiled for the baseline of the target.
+#[inline(always)]
+fn within<V: Lanes>(position: V, [lo, hi]: [f32; 2]) -> Mask {
+    position.ge(V::splat(lo)) & V::splat(hi).ge(position)
 }
 
 /// Lanes of the block at `base` that belong to `run`.
