@@ -227,13 +227,10 @@ impl<'a> ShadedTriangle<'a> {
     fn point(&self, weights: [f32; 3], corners: [Vec3; 3]) -> ShadingPoint {
         let geometry = &self.pass.draws[self.draw].geometry;
         let position: Vec3 = (0..3).map(|k| corners[k] * weights[k]).sum();
-        let flat = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize_or_zero();
+        let flat = || (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize_or_zero();
         let normals = geometry.normals();
-        let smooth = if normals.is_empty() {
-            flat
-        } else {
-            (0..3).map(|k| normals[self.vertices[k]] * weights[k]).sum::<Vec3>().normalize_or(flat)
-        };
+        let mean = || (0..3).map(|k| normals[self.vertices[k]] * weights[k]).sum::<Vec3>();
+        let smooth = (!normals.is_empty()).then(mean).and_then(Vec3::try_normalize).unwrap_or_else(flat);
         let eye = self.pass.eye;
         let to_camera = (eye.truncate() - position * eye.w).normalize_or_zero();
         let normal = if smooth.dot(to_camera) < 0.0 { -smooth } else { smooth };
