@@ -1,6 +1,6 @@
 //! Occlusion queries by samples: passes of a frame that count what all samples give, and end early where they may.
 
-use activity::{Counts, Event, LineAccess, Packet};
+use activity::{Counts, Event, LineAccess, Packet, Unit};
 use glam::Vec3;
 use pipeline::*;
 use proptest::prelude::*;
@@ -83,32 +83,18 @@ proptest! {
             prop_assert_eq!(early.passed[number] > 0, count.passed[number] > 0);
             prop_assert!(early.passed[number] <= count.passed[number]);
             let [few, all] = [&early, &count].map(|asked| &asked.draws[number]);
-            for event in WORK {
+            for event in Event::ALL.into_iter().filter(|event| !is_of_a_cache(*event)) {
                 prop_assert!(few[event] <= all[event], "{event:?}");
-            }
-            let rises: Vec<_> = Event::ALL.into_iter().filter(|event| few[*event] > all[*event]).collect();
-            if !rises.is_empty() {
-                println!("more after an early end of others: {rises:?}");
             }
             prop_assert!(count.passed[number] > 0 || tests(few) == tests(all), "nothing to end at");
         }
     }
 }
 
-/// Work that depends on no cache. A later query may miss in a cache what an earlier one would have read.
-const WORK: [Event; 11] = [
-    Event::TilesVisited,
-    Event::CoarseTilesVisited,
-    Event::TileMadds,
-    Event::ScreenMadds,
-    Event::SampleMadds,
-    Event::DepthIntervalMadds,
-    Event::ZCullTests,
-    Event::SamplesScreened,
-    Event::SamplesTested,
-    Event::DepthReads,
-    Event::SetupMadds,
-];
+/// A query may miss in a cache what one before it that ended early did not read.
+fn is_of_a_cache(event: Event) -> bool {
+    event == Event::DepthMisses || [Unit::L2, Unit::Dram].contains(&event.unit())
+}
 
 const ALL_OF_IT: ([f32; 2], [f32; 2]) = ([-99.0, 99.0], [-99.0, 99.0]);
 
