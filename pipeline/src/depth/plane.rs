@@ -153,10 +153,7 @@ impl<R: Real> MovingPlane<R> {
                 None => found,
                 Some((known, before)) => found.filter(|_| before == front).map(|found| hull(known, found)),
             };
-            if found.is_none() {
-                return None;
-            }
-            depths = found.map(|found| (found, front));
+            depths = Some((found?, front));
         }
         depths.map(|(depths, _)| depths)
     }
