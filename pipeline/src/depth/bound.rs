@@ -253,7 +253,7 @@ impl<R: Real> Facts<R> {
         let planes = shutter.copied().unwrap_or_else(|| self.through(ends));
         let bounds = planes[..self.different()].iter().map(|plane| {
             let reach = if shutter.is_some() && self.moving { plane.within(region.t) } else { plane.whole() };
-            plane.depths(reach, beam, margin.off, ())
+            plane.depths(reach, beam, margin.off)
         });
         tightest(bounds).map(|[lo, hi]| [lo - margin.depth, hi + margin.depth])
     }

@@ -17,7 +17,6 @@
 //! functions linear in each variable, so its extremes are at corners.
 
 use super::number::{Real, both, cross, dot, hull, range};
-use crate::tally::Branches;
 
 /// Three points.
 pub type Points<R> = [[R; 3]; 3];
@@ -140,8 +139,8 @@ impl<R: Real> MovingPlane<R> {
     }
 
     /// Depth range in which a ray of the beam meets points with `n . p` in `reach` that are at most `off`
-    /// from the ray in x and y. `None` if the plane may be seen edge-on, which gives no bound. `path` records the branches.
-    pub fn depths(&self, reach: [R; 2], beam: &Beam<R>, off: [R; 2], path: impl Branches) -> Option<[R; 2]> {
+    /// from the ray in x and y. `None` if the plane may be seen edge-on, which gives no bound.
+    pub fn depths(&self, reach: [R; 2], beam: &Beam<R>, off: [R; 2]) -> Option<[R; 2]> {
         let [nx, ny, _] = self.normal;
         let slack = nx.magnitude().madd(off[0], ny.magnitude().madd(off[1], self.noise));
         let reach = [reach[0] - slack, reach[1] + slack];
@@ -154,10 +153,7 @@ impl<R: Real> MovingPlane<R> {
                 None => found,
                 Some((known, before)) => found.filter(|_| before == front).map(|found| hull(known, found)),
             };
-            if path.branch(found.is_none()) {
-                return None;
-            }
-            depths = found.map(|found| (found, front));
+            depths = Some((found?, front));
         }
         depths.map(|(depths, _)| depths)
     }
@@ -238,12 +234,12 @@ mod tests {
     fn a_triangle_parallel_to_the_screen_is_bounded_by_its_depth() {
         let plane = MovingPlane::new(normal(&OPEN), [&OPEN, &CLOSE], SIZE);
         let beam = Beam::pinhole(TILE);
-        close_to(plane.depths(plane.whole(), &beam, [0.0; 2], ()).unwrap(), [2.0, 4.0]);
-        close_to(plane.depths(plane.within([0.25, 0.5]), &beam, [0.0; 2], ()).unwrap(), [2.5, 3.0]);
+        close_to(plane.depths(plane.whole(), &beam, [0.0; 2]).unwrap(), [2.0, 4.0]);
+        close_to(plane.depths(plane.within([0.25, 0.5]), &beam, [0.0; 2]).unwrap(), [2.5, 3.0]);
         let lens = Beam::lens(TILE, [[-1.0, 1.0]; 2], [3.0, -3.0], [0.5, -0.5]);
-        close_to(plane.depths(plane.within([0.25, 0.5]), &lens, [0.0; 2], ()).unwrap(), [2.5, 3.0]);
+        close_to(plane.depths(plane.within([0.25, 0.5]), &lens, [0.0; 2]).unwrap(), [2.5, 3.0]);
         let parallel = Beam::orthographic(TILE);
-        close_to(plane.depths(plane.within([0.25, 0.5]), &parallel, [0.0; 2], ()).unwrap(), [2.5, 3.0]);
+        close_to(plane.depths(plane.within([0.25, 0.5]), &parallel, [0.0; 2]).unwrap(), [2.5, 3.0]);
     }
 
     /// The plane w = 4 + x has depth 4 / (1 - X) at X, and 4 + X in parallel light.
@@ -251,7 +247,7 @@ mod tests {
     fn a_slanted_plane_is_bounded_at_the_corners_of_the_tile() {
         let points = [[0.0, 0.0, 4.0], [1.0, 0.0, 5.0], [0.0, 1.0, 4.0]];
         let plane = MovingPlane::new(normal(&points), [&points, &points], [1.0, 1.0, 5.0]);
-        let depths = |beam: &Beam<f64>| plane.depths(plane.whole(), beam, [0.0; 2], ());
+        let depths = |beam: &Beam<f64>| plane.depths(plane.whole(), beam, [0.0; 2]);
         close_to(depths(&Beam::pinhole(TILE)).unwrap(), [4.0 / 1.5, 8.0]);
         close_to(depths(&Beam::orthographic(TILE)).unwrap(), [3.5, 4.5]);
         assert!(depths(&Beam::pinhole([[0.5, 1.5], [0.0, 1.0]])).is_none(), "seen edge-on at X = 1");
@@ -275,7 +271,7 @@ mod tests {
         let beam = Beam::oblique(TILE, [[-1.0, 0.5], [0.0, 0.0]], [2.0, 2.0], [0.5, 0.5]);
         let at = |x: f64, u: f64| (4.0 + x + 2.0 * u) / (1.0 + 0.5 * u);
         let corners = range([at(-0.5, -1.0), at(0.5, -1.0), at(-0.5, 0.5), at(0.5, 0.5)]);
-        close_to(plane.depths(plane.whole(), &beam, [0.0; 2], ()).unwrap(), corners);
+        close_to(plane.depths(plane.whole(), &beam, [0.0; 2]).unwrap(), corners);
     }
 
     /// A bound that allowed only for rounding relative to the products would leave out a vertex.
@@ -287,7 +283,7 @@ mod tests {
         let size = [24.0 * units[0], 3.0 * units[1], 84.0 * units[2]];
         let plane = MovingPlane::new(normal(&points), [&points, &points], size);
         for [x, y, w] in points {
-            let found = plane.depths(plane.whole(), &Beam::orthographic([[x; 2], [y; 2]]), [0.0; 2], ());
+            let found = plane.depths(plane.whole(), &Beam::orthographic([[x; 2], [y; 2]]), [0.0; 2]);
             assert!(found.is_none_or(|[lo, hi]| lo <= w && w <= hi), "{w} in {found:?}");
         }
     }
@@ -299,9 +295,9 @@ mod tests {
         let plane = MovingPlane::new(normal(&points), [&points, &points], [1.0, 1.0, 5.0]);
         let tile = [[1.0, 1.2], [0.0, 0.1]];
         let from = |u| Beam::lens(tile, [u, [0.0; 2]], [2.0; 2], [0.5; 2]);
-        assert!(plane.depths(plane.whole(), &from([1.0; 2]), [0.0; 2], ()).is_some());
-        assert!(plane.depths(plane.whole(), &from([-1.0; 2]), [0.0; 2], ()).is_some());
-        assert!(plane.depths(plane.whole(), &from([-1.0, 1.0]), [0.0; 2], ()).is_none());
+        assert!(plane.depths(plane.whole(), &from([1.0; 2]), [0.0; 2]).is_some());
+        assert!(plane.depths(plane.whole(), &from([-1.0; 2]), [0.0; 2]).is_some());
+        assert!(plane.depths(plane.whole(), &from([-1.0, 1.0]), [0.0; 2]).is_none());
     }
 
     #[test]

@@ -216,6 +216,8 @@ pub(super) struct Work {
     pub written: u32,
     /// Samples with a new colour.
     pub coloured: u32,
+    /// Samples of a query that pass all tests.
+    pub passed: u32,
     pub sample_madds: u32,
     pub read_pixels: u64,
     pub written_pixels: u64,

@@ -31,6 +31,17 @@ pub enum PassError {
         /// The draw.
         draw: usize,
     },
+    /// A query that may end early stores something.
+    #[error(
+        "pass `{pass}`: draw {draw} asks whether any sample passes, so the rest of it may not be drawn, but it stores depths or colours, \
+         or has a stencil test; give it a state without them, or let it count all samples"
+    )]
+    QueryStores {
+        /// The pass.
+        pass: String,
+        /// The draw.
+        draw: usize,
+    },
     /// Groups cannot run.
     #[error("pass `{pass}`: {error}")]
     Compute {

@@ -26,6 +26,8 @@ pub(super) struct Fragments {
     pub coloured: u32,
     /// Pixels of these.
     pub coloured_pixels: u64,
+    /// Samples of a query that pass all tests.
+    pub passed: u32,
 }
 
 impl Fragments {
@@ -52,6 +54,7 @@ pub(super) struct FragmentTests<'a> {
     triangle: &'a Triangle,
     state: &'a DrawState,
     may_discard: bool,
+    is_query: bool,
     samples: &'a TileSamples,
     /// First pixel of the tile.
     origin: [u32; 2],
@@ -76,6 +79,7 @@ impl<'a> FragmentTests<'a> {
             triangle,
             state: &draw.state,
             may_discard: draw.shader.may_discard(),
+            is_query: draw.query.is_some(),
             samples,
             origin,
             surface: ShadedTriangle::new(pass, triangle.id),
@@ -106,7 +110,8 @@ impl<'a> FragmentTests<'a> {
         let writes_depth = outcome.passes && self.state.depth.write;
         let writes_colour = outcome.passes && self.writes_colour;
         let writes_stencil = outcome.stencil != stencil;
-        if !(writes_depth || writes_colour || writes_stencil) {
+        let is_asked = outcome.passes && self.is_query;
+        if !(writes_depth || writes_colour || writes_stencil || is_asked) {
             return;
         }
         let mut outputs = Outputs::default();
@@ -115,6 +120,7 @@ impl<'a> FragmentTests<'a> {
             let Some(shaded) = self.shade(slot) else { return };
             outputs = shaded;
         }
+        fragments.passed += u32::from(is_asked);
         let pixel = usize::from(self.samples.pixel[slot]);
         if writes_depth {
             tile.depth[slot] = depth;

@@ -61,6 +61,8 @@ pub struct Rendered {
     pub visible: Vec<(u32, u32)>,
     /// Count of every event of the pass.
     pub counts: Counts,
+    /// Samples that passed, by draw; 0 for draws that are no [`Query`], and those up to the end of one that ends early.
+    pub passed: Vec<u64>,
     /// Images or depths in memory.
     pub region: MemoryRange,
 }
@@ -262,6 +264,11 @@ impl<'e> Gpu<'e> {
         self.passes.last().map_or(0, |pass| pass.triangles)
     }
 
+    /// Events of each draw of the last pass so far.
+    pub(super) fn draws_of_pass(&self) -> &[Counts] {
+        self.passes.last().map_or(&[], |pass| &pass.draws)
+    }
+
     /// Events of the last pass so far.
     pub fn counts_of_pass(&self) -> Counts {
         self.passes.last().map_or_else(Counts::default, PassReport::counts)
@@ -304,6 +311,7 @@ impl<'e> Gpu<'e> {
         let number = self.passes.len() as u32;
         let has_heat = self.heat.is_of(pass.settings.viewport);
         self.check_memory(pass.name)?;
+        pass.check_queries()?;
         self.surfaces.check(pass)?;
         let prepared = Pass::new(pass, (number, has_heat), &self.surfaces, &mut self.space);
         self.check_memory(pass.name)?;
@@ -336,6 +344,7 @@ impl<'e> Gpu<'e> {
         let mut replay = Replay::new(prepared, &mut self.memory)?;
         let is_empty = matches!(pass.target, Target::Views(_)) && prepared.is_depth_only();
         let bins = if is_empty { Vec::new() } else { rasterize(prepared, &mut replay, &mut done) };
+        let passed = std::mem::take(&mut replay.passed);
         let visible = if pass.visible { resolve::visible(prepared, &bins) } else { Vec::new() };
         let report = report.counts();
         if let Target::Surfaces(targets) = pass.target {
@@ -345,6 +354,7 @@ impl<'e> Gpu<'e> {
             images: if pass.image { resolve::resolve(prepared, &bins) } else { Vec::new() },
             visible,
             counts: report,
+            passed,
             region: prepared.result(),
         })
     }

@@ -39,7 +39,7 @@ pub use gpu::{FrameReport, Gpu, PassReport, Rendered};
 pub use heat::{HeatMap, TileHeat};
 pub use lanes::Lanes;
 use pass::Pass;
-pub use pass::{Draw, RasterPass, Resident, Target};
+pub use pass::{Draw, Query, RasterPass, Resident, Target};
 pub use query::{IntervalAnswer, IntervalQueries, MovingBox, SampledAnswer, SampledAnswers, SampledQueries};
 use replay::Replay;
 pub use resolve_pass::ResolvePass;

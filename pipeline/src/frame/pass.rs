@@ -6,15 +6,15 @@ use std::sync::Arc;
 use glam::Vec4;
 
 use super::attachments::{Attachment, Attachments, Binding, Load, Store, Surfaces};
-use super::{Features, Settings, Shading};
+use super::{Features, PassError, Settings, Shading};
 use crate::depth::{BoxGrid, DepthBoxes, DepthTile};
 use crate::geometry::{Camera, Clip, Cull, Geometry, MovingVertex, Projection, Viewport};
 use crate::memory::{AddressSpace, LINE_BYTES, MemoryRange};
 use crate::sampling::TileSamples;
 use crate::setup::Corner;
 use crate::shader::{Program, Shader};
-use crate::state::{Clear, DrawState};
-use crate::surface::{Bound, Format, Texels};
+use crate::state::{Clear, DepthState, DrawState};
+use crate::surface::{Bound, Format, MAX_TARGETS, Texels};
 use crate::texture::{Sampler, Texture};
 use crate::traversal::LensSpans;
 use crate::traversal::thresholds::{at_rest, blur_px, motion_px};
@@ -97,7 +97,9 @@ impl<'a> Pass<'a> {
         let (depth, colours) = planes(pass, !views.is_empty(), surfaces, space);
         let addresses = AddressMap::new(pass, views.len(), space);
         let is_attached = matches!(pass.target, Target::Surfaces(_));
-        let state_matters = |draw: &Draw<'_>| !draw.state.keeps_nearest() || draw.shader.may_discard();
+        let state_matters = |draw: &Draw<'_>| {
+            !draw.state.keeps_nearest() || draw.shader.may_discard() || draw.query.is_some()
+        };
         Self {
             number,
             draws,
@@ -426,6 +428,18 @@ pub(super) fn resident<'s>(
     })
 }
 
+/// An occlusion query: what is asked about the samples of a draw.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Query {
+    /// How many samples pass.
+    Count,
+    /// Whether any sample passes. The answer is known where a packet, the work of a triangle in a tile, leaves the depth test;
+    /// later packets of the draw in the order of the stream are dropped. The samples of a packet are tested together, so it is
+    /// finished. The front end works ahead of the tiles, so vertices and set-up are not spared. The tile loop is taken to know
+    /// the answer at once, which is the best that hardware can do.
+    Any,
+}
+
 /// Triangles with a shader.
 #[derive(Clone, Copy)]
 pub struct Draw<'a> {
@@ -439,13 +453,15 @@ pub struct Draw<'a> {
     pub bindings: &'a [Binding<'a>],
     /// Addresses of its data, if an earlier pass of the frame has used them.
     pub resident: Resident,
+    /// What is asked about its samples, if anything.
+    pub query: Option<Query>,
 }
 
 impl<'a> Draw<'a> {
     /// A draw of opaque triangles whose data are new to the GPU.
     pub fn new(geometry: Geometry<'a>, shader: &'a dyn Shader, cull: Cull) -> Self {
         let (state, resident) = (DrawState::new(cull), Resident::default());
-        Self { geometry, shader, state, bindings: &[], resident }
+        Self { geometry, shader, state, bindings: &[], resident, query: None }
     }
 
     /// The draw with other faces culled.
@@ -458,6 +474,15 @@ impl<'a> Draw<'a> {
     #[must_use]
     pub fn with_state(self, state: DrawState) -> Self {
         Self { state, ..self }
+    }
+
+    /// The draw as an occlusion query, which stores nothing. Depths are compared as its state says.
+    #[must_use]
+    pub fn asking(self, query: Query) -> Self {
+        let depth = DepthState { write: false, ..self.state.depth };
+        let others = Default::default();
+        let state = DrawState { depth, colour_mask: [false; 4], others, ..self.state };
+        Self { state, query: Some(query), ..self }
     }
 
     /// The draw with a shader that reads `bindings`, the first in slot 0.
@@ -582,6 +607,16 @@ impl<'a> RasterPass<'a> {
         let (viewport, tile_px) = (self.settings.viewport, self.settings.spec.tile_px);
         let [across, down] = [viewport.width(), viewport.height()].map(|side| side.div_ceil(tile_px));
         u64::from(across) * u64::from(down) * u64::from(tile_px * tile_px)
+    }
+
+    /// Checks that queries that may end early store nothing.
+    pub(super) fn check_queries(&self) -> Result<(), PassError> {
+        let stores = |draw: &Draw<'_>| {
+            let DrawState { depth, stencil, .. } = draw.state;
+            depth.write || stencil.is_some() || (0..MAX_TARGETS).any(|to| draw.state.target(to).writes())
+        };
+        let refused = self.draws.iter().position(|draw| draw.query == Some(Query::Any) && stores(draw));
+        refused.map_or(Ok(()), |draw| Err(PassError::QueryStores { pass: self.name.to_owned(), draw }))
     }
 
     /// Triangles of all draws.

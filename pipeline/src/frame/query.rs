@@ -1,11 +1,9 @@
 //! Occlusion queries (thesis, Paper VI, section 3), by samples and by intervals, with their work counted where it is done.
 
-use std::ops::Range;
-
 use activity::{Counts, Event, Packet, PacketKind};
 use glam::{Vec3, Vec4};
 
-use super::{Draw, FrameReport, Gpu, PassError, RasterPass};
+use super::{Draw, FrameReport, Gpu, PassError, Query, RasterPass};
 use crate::depth::{Bounder, DepthBound, Pyramid, interval_madds, set_up_madds};
 use crate::geometry::{Cull, Geometry, MovingVertex, Projection};
 use crate::memory::{LINE_BYTES, MemoryRange};
@@ -317,20 +315,23 @@ impl SampledAnswer {
         DEPTH_BYTES * (self.compared + self.read)
     }
 
-    fn add(&mut self, counts: &Counts) {
+    /// From the events of its draw.
+    fn of(counts: &Counts, passed: u64) -> Self {
         let all = |events: &[Event]| events.iter().map(|event| counts[*event]).sum::<u64>();
-        self.passed += counts[Event::ColourWrites];
-        self.tested += all(&[Event::SamplesTested, Event::SamplesScreened]);
-        self.tiles += all(&[Event::TilesVisited, Event::CoarseTilesVisited]);
-        self.compared += counts[Event::ZCullTests];
-        self.read += counts[Event::DepthReads];
-        self.madds += all(&[
-            Event::SetupMadds,
-            Event::TileMadds,
-            Event::ScreenMadds,
-            Event::SampleMadds,
-            Event::DepthIntervalMadds,
-        ]);
+        Self {
+            passed,
+            tested: all(&[Event::SamplesTested, Event::SamplesScreened]),
+            tiles: all(&[Event::TilesVisited, Event::CoarseTilesVisited]),
+            compared: counts[Event::ZCullTests],
+            read: counts[Event::DepthReads],
+            madds: all(&[
+                Event::SetupMadds,
+                Event::TileMadds,
+                Event::ScreenMadds,
+                Event::SampleMadds,
+                Event::DepthIntervalMadds,
+            ]),
+        }
     }
 }
 
@@ -363,40 +364,50 @@ impl Shader for Counted {
 
 impl SampledQueries<'_> {
     /// Asks about boxes, one after the other, over what the occluders stored. All culling of the hardware works as for
-    /// other draws; the colours that a pass would write are not part of an answer.
+    /// other draws.
     ///
     /// # Errors
     /// [`PassError`] if the hardware cannot draw it.
     pub fn ask(&self, objects: &[MovingBox]) -> Result<SampledAnswers, PassError> {
+        let mut gpu = Gpu::quiet(self.occluders.settings.spec)?;
+        let query = if self.any { Query::Any } else { Query::Count };
+        let answers = gpu.query_samples(&self.occluders.without_image(), query, objects)?;
+        Ok(SampledAnswers { answers, report: gpu.finish() })
+    }
+}
+
+impl Gpu<'_> {
+    /// Draws `pass`, and after its draws a box as a query for each object. The pass may have no draws, and load the depths that
+    /// an earlier pass stored.
+    ///
+    /// # Errors
+    /// As [`Gpu::draw`].
+    pub fn query_samples(
+        &mut self,
+        pass: &RasterPass<'_>,
+        query: Query,
+        objects: &[MovingBox],
+    ) -> Result<Vec<SampledAnswer>, PassError> {
         let corners: Vec<[[Vec3; 8]; 2]> = objects.iter().map(MovingBox::corners).collect();
-        let state = DrawState {
-            depth: DepthState { test: Compare::LessEqual, write: false },
-            ..DrawState::new(Cull::None)
-        };
-        let mut draws = self.occluders.draws.to_vec();
+        let depth = DepthState { test: Compare::LessEqual, write: false };
+        let state = DrawState { depth, ..DrawState::new(Cull::None) };
+        let mut draws = pass.draws.to_vec();
         let mut asked: Vec<Option<usize>> = Vec::new();
         for [open, close] in &corners {
             // A geometry is refused only for values that are not finite, which are invisible.
             let geometry = Geometry::new(open, close, &MovingBox::TRIANGLES).ok();
             asked.push(geometry.is_some().then_some(draws.len()));
-            draws
-                .extend(geometry.map(|geometry| Draw::new(geometry, &Counted, Cull::None).with_state(state)));
+            let draw = |geometry| Draw::new(geometry, &Counted, Cull::None).with_state(state).asking(query);
+            draws.extend(geometry.map(draw));
         }
-        let range: Range<usize> = self.occluders.draws.len()..draws.len();
-        let mut found = vec![SampledAnswer::default(); draws.len()];
-        let pass = RasterPass { draws: &draws, ..self.occluders.without_image() };
-        let mut gpu = Gpu::new(pass.settings.spec, |packet: &Packet, _| {
-            let draw = packet.draw as usize;
-            let ended = range.contains(&draw) && self.any && found[draw].passed > 0;
-            if range.contains(&draw) && !ended {
-                let mut counts = Counts::default();
-                counts += &packet.counts;
-                found[draw].add(&counts);
-            }
-        })?;
-        gpu.draw(&pass)?;
-        let report = gpu.finish();
+        let passed = self.draw(&RasterPass { draws: &draws, ..*pass })?.passed;
+        let found: Vec<SampledAnswer> = self
+            .draws_of_pass()
+            .iter()
+            .zip(passed)
+            .map(|(counts, passed)| SampledAnswer::of(counts, passed))
+            .collect();
         let answer = |draw: Option<usize>| draw.map_or_else(SampledAnswer::default, |draw| found[draw]);
-        Ok(SampledAnswers { answers: asked.into_iter().map(answer).collect(), report })
+        Ok(asked.into_iter().map(answer).collect())
     }
 }

@@ -5,7 +5,7 @@ use activity::{Event, LineAccess, Packet, PacketCounts, PacketKind};
 use super::Shading;
 use super::bin::Bin;
 use super::bin::{BinLog, Work};
-use super::pass::{Pass, Plane, SAMPLE_BYTES, VertexBuffer};
+use super::pass::{Pass, Plane, Query, SAMPLE_BYTES, VertexBuffer};
 use super::resolve::{SampleLine, TileResolve, tile_lines};
 use super::shaded::{QuadWork, ShadedTriangle};
 use crate::memory::{Access, Cache, CacheError, LINE_BYTES, MemorySystem};
@@ -25,6 +25,8 @@ pub(super) struct Replay<'a> {
     colour_used: Vec<Vec<bool>>,
     /// Pixels of each tile whose depths and whose colours compress to half; empty without compression.
     small: Vec<[u64; 2]>,
+    /// Samples of queries that passed so far, by draw.
+    pub passed: Vec<u64>,
 }
 
 /// Recently shaded vertices, first in first out.
@@ -61,6 +63,7 @@ impl<'a> Replay<'a> {
             pass,
             memory,
             small,
+            passed: vec![0; pass.draws.len()],
             shading: Cache::new(spec.shading_cache)?,
             reuse: Reuse { recent: vec![(usize::MAX, 0); spec.vertex_reuse as usize], next: 0 },
             depth_used: used(&pass.depth),
@@ -93,15 +96,23 @@ impl<'a> Replay<'a> {
         self.memory.clear_log();
     }
 
-    /// Emit the packets of one bin in one batch.
+    /// Emit the packets of one bin in one batch. Work of a query whose answer an earlier packet gave is not done.
     pub fn bin(&mut self, batch: u32, log: &BinLog, emit: &mut impl FnMut(&Packet, &[LineAccess])) {
         let mut first_quad = 0;
         for work in &log.work {
             let quads = &log.quads[first_quad..work.quads_end as usize];
             first_quad = work.quads_end as usize;
+            if self.is_answered(work.draw as usize) {
+                continue;
+            }
+            self.passed[work.draw as usize] += u64::from(work.passed);
             let packet = self.tile(batch, work, quads);
             self.emit(&packet, emit);
         }
+    }
+
+    fn is_answered(&self, draw: usize) -> bool {
+        self.pass.draws[draw].query == Some(Query::Any) && self.passed[draw] > 0
     }
 
     fn tile(&mut self, batch: u32, work: &Work, quads: &[QuadAccess]) -> Packet {

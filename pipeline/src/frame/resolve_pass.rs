@@ -102,7 +102,13 @@ impl Gpu<'_> {
         self.open(pass.name, Some(spec.viewport));
         self.resolve_tiles(pass, &Places { spec, from, to, words: spec.format.words() });
         self.keep(region);
-        Ok(Rendered { images: vec![image], visible: Vec::new(), counts: self.counts_of_pass(), region })
+        Ok(Rendered {
+            images: vec![image],
+            visible: Vec::new(),
+            counts: self.counts_of_pass(),
+            passed: Vec::new(),
+            region,
+        })
     }
 
     /// The stored samples of a pass, and where they are.

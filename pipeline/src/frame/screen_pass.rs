@@ -29,7 +29,13 @@ impl Gpu<'_> {
             colour
         });
         self.keep(image);
-        Rendered { images: vec![colours], visible: Vec::new(), counts: self.counts_of_pass(), region: image }
+        Rendered {
+            images: vec![colours],
+            visible: Vec::new(),
+            counts: self.counts_of_pass(),
+            passed: Vec::new(),
+            region: image,
+        }
     }
 
     /// Runs a program for the pixel at every column and row, in the pass that was begun. Returns its values, row by row.

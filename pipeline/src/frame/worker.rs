@@ -316,6 +316,7 @@ impl<'a, 'p> Worker<'a, 'p> {
             unread: if in_front { hits.hit } else { 0 },
             written: hits.written.len() as u32 + fragments.stencils,
             coloured: fragments.coloured,
+            passed: fragments.passed,
             sample_madds: hits.tested * sample_test::madds(moving, lens),
             read_pixels: if state.reads_depth() { hits.read_pixels } else { 0 },
             written_pixels: hits.written_pixels,

@@ -29,6 +29,7 @@ mod oracle;
 mod orthographic;
 mod passes;
 mod per_sample;
+mod queries;
 mod resolve;
 mod rounding;
 mod settings;
