@@ -1,5 +1,7 @@
 //! Triangle set-up: everything known of a triangle before any tile is visited.
 
+use std::ops::{Add, Mul, Sub};
+
 use crate::geometry::{Cull, MovingVertex, Shear, Viewport};
 
 /// A vertex `open + t delta` on the image plane, as `[x, y, w]` (see [`MovingVertex`]). In this form a still
@@ -15,8 +17,7 @@ pub struct Corner<C = f32> {
 impl Corner {
     /// The corner at `vertex`.
     pub fn new(vertex: &MovingVertex) -> Self {
-        let delta = std::array::from_fn(|axis| vertex.close[axis] - vertex.open[axis]);
-        Self { open: vertex.open, delta }
+        Self { open: vertex.open, delta: difference(vertex.close, vertex.open) }
     }
 
     /// Vertex when the shutter opens and closes, rounded as in the sample test.
@@ -115,7 +116,18 @@ pub fn is_flat([a, b, c]: [&MovingVertex; 3]) -> bool {
     [cross(ab0, ac0), mixed, cross(ab1, ac1)].iter().flatten().all(|&part| part == 0.0)
 }
 
-pub(crate) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+/// `a - b`.
+fn difference<N: Copy + Sub<Output = N>>(a: [N; 3], b: [N; 3]) -> [N; 3] {
+    std::array::from_fn(|axis| a[axis] - b[axis])
+}
+
+/// `det[a, b, c]`.
+fn determinant<N: Copy + Add<Output = N> + Sub<Output = N> + Mul<Output = N>>([a, b, c]: [[N; 3]; 3]) -> N {
+    let normal = cross(b, c);
+    a[0] * normal[0] + a[1] * normal[1] + a[2] * normal[2]
+}
+
+pub(crate) fn cross<N: Copy + Sub<Output = N> + Mul<Output = N>>(a: [N; 3], b: [N; 3]) -> [N; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
@@ -127,8 +139,7 @@ fn shows_culled_face(images: &[[f32; 3]; 3], faces: [bool; 2], slack: [f32; 2]) 
     if p.iter().any(|vertex| vertex[2] <= 0.0) {
         return false;
     }
-    let normal = cross(p[1], p[2]);
-    let det: f64 = (0..3).map(|i| p[0][i] * normal[i]).sum();
+    let det = determinant(p);
     // A sample inside sees every vertex within the extent of the triangle. An edge is a cross product of two
     // vertices, each rounded by the slack at most, and the determinant weights three edges by depth.
     let reach = [0, 1].map(|axis| {
@@ -263,6 +274,22 @@ mod tests {
     use super::*;
     use crate::geometry::{Cull, MovingVertex};
     use crate::setup::{SetupResult, set_up};
+    use crate::tally::{Counting, Tally};
+
+    #[test]
+    fn the_cost_of_set_up_is_that_of_its_kernels() {
+        let tally = Tally::default();
+        let points = [[1.0, 2.0, 3.0], [4.0, 5.0, 7.0], [2.0, 8.0, 6.0]];
+        let [a, b, c] = points.map(|point| point.map(|value| Counting::new(value, &tally)));
+        assert_eq!(determinant([a, b, c]).value(), 20.0);
+        assert_eq!(tally.madds(), madds(false, Cull::Back));
+        let facing = tally.madds();
+        for (close, open) in [(a, b), (b, c), (c, a)] {
+            let _ = difference(close, open);
+        }
+        assert_eq!(tally.madds() - facing, madds(true, Cull::None));
+        assert_eq!(tally.madds(), madds(true, Cull::Front));
+    }
 
     fn still(p: [f32; 3]) -> MovingVertex {
         MovingVertex { open: p, close: p }
