@@ -1,5 +1,6 @@
 //! Errors of a run.
 
+use crate::changes::ChangeError;
 use crate::gpu::{GpuError, GpuSpec};
 use output::OutputError;
 use output::image::ImageError;
@@ -23,6 +24,8 @@ pub enum RunError {
     Groups { gpu: String, source: JobError },
     #[error(transparent)]
     Gpu(#[from] GpuError),
+    #[error(transparent)]
+    Change(#[from] ChangeError),
     #[error(transparent)]
     Platform(#[from] power_model::PlatformError),
     #[error(transparent)]
@@ -89,6 +92,7 @@ impl RunError {
             Self::Pacing(power_model::PacingError::Rate(_)) | Self::Timing(TimingError::TooLong) => true,
             Self::Spec(_)
             | Self::Gpu(_)
+            | Self::Change(_)
             | Self::Marks(_)
             | Self::Sample(_)
             | Self::Samples(_)

@@ -20,6 +20,7 @@
 //! # Ok::<(), run::RunError>(())
 //! ```
 
+mod changes;
 mod choice;
 pub mod compare;
 mod distinct;
@@ -48,6 +49,7 @@ use output::progress::Progress;
 use output::{Destination, OutDir};
 use workloads::Scene;
 
+pub use changes::{Change, ChangeError, ChangedFile, InputFile};
 pub use choice::{Choice, Dimensions, ProbeSummary, Verified, cheapest_level};
 pub use distinct::Distinct;
 pub use dry_run::{DryRun, Expected};

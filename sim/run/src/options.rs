@@ -11,6 +11,8 @@ use timing::Level;
 use workloads::Overrides;
 use workloads::job::OptionSource;
 
+use crate::Change;
+
 /// Default rate of the recorder in Hz. The method of per-frame energy is described at this rate.
 pub(crate) const DEFAULT_RATE_HZ: f64 = 50e3;
 
@@ -101,6 +103,9 @@ pub struct RunOptions {
     pub scene: PathBuf,
     /// Options of a workload.
     pub options: OptionSource,
+    /// Changed values in the files of GPU, platform, energy table and scene.
+    #[serde(default)]
+    pub changes: Vec<Change>,
     /// Changes to the scene's settings.
     pub overrides: Overrides,
     /// A built-in GPU or a RON file.
@@ -156,6 +161,7 @@ impl Default for RunOptions {
         Self {
             scene: "default".into(),
             options: OptionSource::default(),
+            changes: Vec::new(),
             overrides: Overrides::default(),
             gpu: "reference".into(),
             platform: None,

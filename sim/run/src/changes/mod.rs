@@ -1,0 +1,328 @@
+//! Changes of single values in the input files of a run: `--set gpu.pipeline.tile_px=8`.
+//!
+//! A change edits the text of the file, and the changed text goes through the same parser and checks as a file.
+
+mod edit;
+
+use std::path::Path;
+
+use activity::spec::{self, SpecError, suggestion};
+use power_model::{EnergyTable, Platform, PlatformError, TableError};
+use serde::{Deserialize, Serialize};
+use workloads::{LoadError, Scene};
+
+use crate::RunError;
+use crate::gpu::{GpuError, GpuSpec};
+
+/// An input file in which values can be changed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum InputFile {
+    /// The GPU.
+    Gpu,
+    /// The platform.
+    Platform,
+    /// The energy table.
+    Table,
+    /// A scene in RON.
+    Scene,
+}
+
+impl InputFile {
+    /// All files.
+    pub const ALL: [Self; 4] = [Self::Gpu, Self::Platform, Self::Table, Self::Scene];
+
+    /// First name of paths into the file.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Gpu => "gpu",
+            Self::Platform => "platform",
+            Self::Table => "table",
+            Self::Scene => "scene",
+        }
+    }
+
+    /// File in the results folder that holds the changed text.
+    pub const fn result(self) -> &'static str {
+        match self {
+            Self::Gpu => "inputs/gpu.ron",
+            Self::Platform => "inputs/platform.ron",
+            Self::Table => "inputs/table.ron",
+            Self::Scene => "inputs/scene.ron",
+        }
+    }
+
+    /// The file that `path` leads into, such as that of `gpu.core_hz`; `None` for other settings.
+    pub fn of(path: &str) -> Option<Self> {
+        let (first, _) = path.split_once('.')?;
+        Self::ALL.into_iter().find(|file| file.name() == first)
+    }
+}
+
+/// A changed value in an input file.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Change {
+    /// Names from the file inward, separated by dots: `gpu.pipeline.tile_px`. Entries of lists are named by their `name`,
+    /// `event` or `unit`, or by their number from 0.
+    pub path: String,
+    /// The value as in the file; text may be without quotes.
+    pub value: String,
+}
+
+/// Why a change cannot be made.
+#[derive(Debug, thiserror::Error)]
+pub enum ChangeError {
+    /// The path leads into no file.
+    #[error("--set {path}: it names none of gpu, platform, table and scene; {suggestion}")]
+    File {
+        /// The path.
+        path: String,
+        /// The nearest names.
+        suggestion: String,
+    },
+    /// The path is unknown, or its value can never be valid.
+    #[error("--set {set}: {message}")]
+    Refused {
+        /// The changes.
+        set: String,
+        /// What is wrong, and what to do.
+        message: String,
+    },
+    /// The file with all changes is invalid as a whole; other values may go together.
+    #[error("--set {set}: {message}")]
+    Invalid {
+        /// The changes.
+        set: String,
+        /// What is wrong, and what to do.
+        message: String,
+    },
+}
+
+/// Text of an input file with changes.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ChangedFile {
+    /// Which file.
+    pub file: InputFile,
+    /// The text. Files that it names are given by whole paths, so it can be used from any folder.
+    pub text: String,
+}
+
+/// Why changed text is refused: by its syntax or by a check of the whole.
+struct Reason {
+    is_whole: bool,
+    message: String,
+}
+
+/// Changes of the input files of a run, and the changed texts.
+pub(crate) struct Changes<'a> {
+    changes: &'a [Change],
+    /// Texts of the files that were changed so far.
+    pub files: Vec<ChangedFile>,
+}
+
+impl<'a> Changes<'a> {
+    /// Changes to be made.
+    ///
+    /// # Errors
+    /// [`ChangeError::File`] if one leads into no file.
+    pub fn new(changes: &'a [Change]) -> Result<Self, ChangeError> {
+        match changes.iter().find(|change| InputFile::of(&change.path).is_none()) {
+            Some(Change { path, .. }) => {
+                let first = path.split('.').next().unwrap_or_default();
+                let suggestion = suggestion(first, &InputFile::ALL.map(InputFile::name));
+                Err(ChangeError::File { path: path.clone(), suggestion })
+            }
+            None => Ok(Self { changes, files: Vec::new() }),
+        }
+    }
+
+    /// The changes of `file`, joined for messages; `None` if there are none.
+    pub fn of(&self, file: InputFile) -> Option<String> {
+        let found: Vec<String> = self.inside(file).map(Change::to_string).collect();
+        (!found.is_empty()).then(|| found.join(", "))
+    }
+
+    fn inside(&self, file: InputFile) -> impl Iterator<Item = &'a Change> {
+        self.changes.iter().filter(move |change| InputFile::of(&change.path) == Some(file))
+    }
+
+    /// Changes `text` of `file`, which was read at `origin`, and parses it.
+    fn apply<T>(
+        &mut self,
+        file: InputFile,
+        (text, origin): (&str, &Path),
+        parse: impl Fn(&str) -> Result<T, Reason>,
+    ) -> Result<T, ChangeError> {
+        let mut changed = text.to_owned();
+        for change in self.inside(file) {
+            changed = change.made_in(&changed)?;
+        }
+        let value = parse(&changed).map_err(|reason| self.blamed(file, text, reason, &parse))?;
+        let head =
+            format!("// {}, changed by --set {}\n", origin.display(), self.of(file).unwrap_or_default());
+        self.files.push(ChangedFile { file, text: head + &with_whole_paths(&changed, origin) });
+        Ok(value)
+    }
+
+    /// The error of a refused text. It names one change if that alone is refused for the same reason, otherwise all.
+    fn blamed<T>(
+        &self,
+        file: InputFile,
+        text: &str,
+        reason: Reason,
+        parse: &dyn Fn(&str) -> Result<T, Reason>,
+    ) -> ChangeError {
+        let alone = |change: &&Change| {
+            let message =
+                change.made_in(text).ok().and_then(|text| parse(&text).err()).map(|error| error.message);
+            message.as_ref() == Some(&reason.message)
+        };
+        let set = self
+            .inside(file)
+            .find(alone)
+            .map(Change::to_string)
+            .or_else(|| self.of(file))
+            .unwrap_or_default();
+        let Reason { is_whole, message } = reason;
+        if is_whole { ChangeError::Invalid { set, message } } else { ChangeError::Refused { set, message } }
+    }
+}
+
+impl std::fmt::Display for Change {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}={}", self.path, self.value)
+    }
+}
+
+impl Change {
+    fn made_in(&self, text: &str) -> Result<String, ChangeError> {
+        let path: Vec<&str> = self.path.split('.').skip(1).collect();
+        edit::set(text, &path, &self.value)
+            .map_err(|message| ChangeError::Refused { set: self.to_string(), message })
+    }
+}
+
+/// The text with whole paths in place of file names relative to the file at `origin`.
+fn with_whole_paths(text: &str, origin: &Path) -> String {
+    let folder = std::path::absolute(origin).ok().and_then(|path| path.parent().map(Path::to_path_buf));
+    let Some(folder) = folder else { return text.to_owned() };
+    edit::replace_strings(text, &["file", "end", "table", "platform", "energy"], &|name| {
+        let is_relative = Path::new(name).extension().is_some() && Path::new(name).is_relative();
+        is_relative.then(|| folder.join(name).display().to_string())
+    })
+}
+
+/// A syntax error without its place in the changed text, which the user does not have.
+fn refused(error: SpecError) -> Reason {
+    match error {
+        SpecError::Parse { message, .. } => Reason { is_whole: false, message },
+        error => Reason { is_whole: false, message: error.to_string() },
+    }
+}
+
+/// A check of the whole, without the name of the file.
+fn whole(error: &impl std::fmt::Display, origin: &Path) -> Reason {
+    let text = error.to_string();
+    let message = text.strip_prefix(&format!("{}: ", origin.display())).unwrap_or(&text).to_owned();
+    Reason { is_whole: true, message }
+}
+
+impl Changes<'_> {
+    /// Text of the input `name` if it has changes: of a `.ron` file, or built in. `None` for unknown names, too.
+    fn text(
+        &self,
+        file: InputFile,
+        name: &Path,
+        builtin: impl FnOnce(&str) -> Option<&'static str>,
+    ) -> Result<Option<String>, SpecError> {
+        match self.of(file) {
+            None => Ok(None),
+            Some(_) if is_file(name) => spec::read(name).map(Some),
+            Some(_) => Ok(builtin(&name.to_string_lossy()).map(str::to_owned)),
+        }
+    }
+
+    /// The GPU of a name or file with its changes; `None` if it has none.
+    ///
+    /// # Errors
+    /// If the file cannot be read, or not be changed so.
+    pub fn gpu(&mut self, name: &Path) -> Result<Option<GpuSpec>, RunError> {
+        let Some(text) = self.text(InputFile::Gpu, name, GpuSpec::builtin_text)? else { return Ok(None) };
+        let file = name.display().to_string();
+        let parse = |text: &str| {
+            GpuSpec::parse(text, &file).map_err(|error| match error {
+                GpuError::Spec(error) => refused(error),
+                GpuError::Value { message, .. } => Reason { is_whole: true, message },
+                error => whole(&error, name),
+            })
+        };
+        let mut gpu = self.apply(InputFile::Gpu, (&text, name), parse)?;
+        gpu.name_power_files_beside(name);
+        Ok(Some(gpu))
+    }
+
+    /// The platform of a name or file with its changes; `None` if it has none.
+    ///
+    /// # Errors
+    /// As [`Self::gpu`].
+    pub fn platform(&mut self, name: &Path) -> Result<Option<Platform>, RunError> {
+        let text = self.text(InputFile::Platform, name, Platform::builtin_text);
+        let Some(text) = text.map_err(PlatformError::from)? else { return Ok(None) };
+        let file = name.display().to_string();
+        let parse = |text: &str| {
+            Platform::parse(text, &file).map_err(|error| match error {
+                PlatformError::Spec(error) => refused(error),
+                error => whole(&error, name),
+            })
+        };
+        Ok(Some(self.apply(InputFile::Platform, (&text, name), parse)?))
+    }
+
+    /// The energy table of a name or file with its changes; `None` if it has none.
+    ///
+    /// # Errors
+    /// As [`Self::gpu`].
+    pub fn table(&mut self, name: &Path) -> Result<Option<EnergyTable>, RunError> {
+        let text = self.text(InputFile::Table, name, EnergyTable::builtin_text);
+        let Some(text) = text.map_err(TableError::from)? else { return Ok(None) };
+        let file = name.display().to_string();
+        let parse = |text: &str| {
+            EnergyTable::parse(text, &file).map_err(|error| match error {
+                TableError::Spec(error) => refused(error),
+                error => whole(&error, name),
+            })
+        };
+        Ok(Some(self.apply(InputFile::Table, (&text, name), parse)?))
+    }
+
+    /// The scene in a RON file with its changes; `None` if it has none.
+    ///
+    /// # Errors
+    /// As [`Self::gpu`], and if it is no RON file.
+    pub fn scene(&mut self, name: &Path) -> Result<Option<Scene>, RunError> {
+        let Some(set) = self.of(InputFile::Scene) else { return Ok(None) };
+        if !is_file(name) {
+            let message = format!(
+                "`{}` is not a scene in a .ron file: change a scene by --size, --samples, --lens and the like, a workload by \
+                 its options (--set name=value)",
+                name.display()
+            );
+            return Err(ChangeError::Refused { set, message }.into());
+        }
+        let text = spec::read(name)?;
+        let parse = |text: &str| {
+            workloads::load_text(text, name).map_err(|error| match error {
+                LoadError::Spec(error) => refused(error),
+                LoadError::Description { place, message, .. } => {
+                    Reason { is_whole: true, message: format!("{place}: {message}") }
+                }
+                error => whole(&error, name),
+            })
+        };
+        Ok(Some(self.apply(InputFile::Scene, (&text, name), parse)?))
+    }
+}
+
+fn is_file(name: &Path) -> bool {
+    name.extension().is_some_and(|ending| ending == "ron")
+}
