@@ -187,7 +187,7 @@ fn quantity(text: &str) -> Result<HeatQuantity, String> {
 }
 
 /// The git revision of this program.
-const REVISION: Option<&str> = option_env!("QUINTILE_REVISION");
+pub(super) const REVISION: Option<&str> = option_env!("QUINTILE_REVISION");
 
 pub(super) fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), Failure> {
     let started = Instant::now();

@@ -55,13 +55,17 @@ impl Folder {
         }
     }
 
-    /// Creates the folder and writes `plan` into it. An earlier plan of the same sweep is replaced, results stay.
+    /// Creates the folder and writes `plan` into it, unless it is there. An earlier plan of the same sweep is replaced, results
+    /// stay.
     ///
     /// # Errors
     /// As [`Self::check`], and if the folder cannot be written.
     pub fn write_plan(&self, plan: &Plan) -> Result<(), SweepError> {
         fs::create_dir_all(&self.root).map_err(SweepError::folder(&self.root))?;
         self.check(plan)?;
+        if self.plan().is_ok_and(|known| known == *plan) {
+            return Ok(atomic::try_place(&self.root.join(PLAN))?);
+        }
         let header = Header { schema: SCHEMA, sweep: plan.name.clone(), points: plan.points.len() };
         let write = |out: &mut io::BufWriter<File>| {
             serde_json::to_writer(&mut *out, &header)?;

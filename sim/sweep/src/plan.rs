@@ -191,7 +191,6 @@ mod tests {
             ),
             ("Values(path: \"gpu.pipeline.tile_px\", values: [8, \"x\"])", "--set gpu.pipeline.tile_px=x: "),
             ("Values(path: \"timing\", values: [\"boundd\"])", "did you mean `bound`?"),
-            ("Values(path: \"scene\", values: [\"tinny\"])", "did you mean"),
             ("Values(path: \"workload.bins\", values: [8])", "only workloads have options"),
             ("Values(path: \"platform.units.shade.idle_unit_w\", values: [0])", "did you mean `shader`?"),
             ("Values(path: \"table.rows.draws.nominal_pi\", values: [200])", "did you mean `nominal_pj`?"),
@@ -199,6 +198,13 @@ mod tests {
             let error = of_axis(axis).unwrap_err();
             assert!(error.contains("sweep.ron: ") && error.contains(says), "{error}");
         }
+    }
+
+    #[test]
+    fn an_unknown_scene_is_refused() {
+        let error = planned("(name: \"a\", axes: [Values(path: \"scene\", values: [\"tiny\", \"tinny\"])])")
+            .unwrap_err();
+        assert!(error.contains("no scene called `tinny`; did you mean `tiny`?"), "{error}");
     }
 
     #[test]

@@ -1,0 +1,217 @@
+//! `quintile sweep`.
+
+use std::path::{Path, PathBuf};
+
+use clap::{Args, Subcommand};
+use output::progress::Progress;
+use output::table::counted;
+use output::terminal::Terminal;
+use rayon::ThreadPool;
+use serde::Serialize;
+use sweep::{Expected, Folder, Plan, Shard, Status, SweepError, Work, merge};
+
+use super::Failure;
+use super::outputs::{print, print_json};
+use super::run::REVISION;
+use crate::cli::args::ThreadArgs;
+
+/// Arguments of `sweep`.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  quintile sweep run tiles.ron --out tiles --dry-run\n  quintile sweep run tiles.ron --out tiles\n  \
+    quintile sweep merge tiles\n  sbatch --array=0-7 --wrap 'quintile sweep run tiles.ron --out tiles'\n\n\
+    `sweep run` may be stopped at any moment and called again: finished points are skipped. Points are finished when their \
+    file is in DIR/points; a point that fails is finished, too, with its reason."
+)]
+pub struct SweepArgs {
+    /// What to do
+    #[command(subcommand)]
+    pub step: Step,
+}
+
+/// Step of a sweep.
+#[derive(Debug, Subcommand)]
+pub enum Step {
+    /// Check a sweep file, write its points into DIR/plan.jsonl, and print their number and the expected time
+    Plan(PlanArgs),
+    /// Run the points that are not finished, on all cores
+    Run(RunStepArgs),
+    /// Print how many points are finished, from the files of the sweep alone
+    Status(StatusArgs),
+    /// Write DIR/results.parquet, with a row for each point
+    Merge(MergeArgs),
+}
+
+/// A sweep file and its folder.
+#[derive(Debug, Args)]
+pub struct FileArgs {
+    /// The sweep file
+    #[arg(value_name = "FILE.ron")]
+    pub file: PathBuf,
+    /// Folder of the sweep; created if missing
+    #[arg(long, value_name = "DIR", default_value = "sweep")]
+    pub out: PathBuf,
+    /// Take the settings under `quick` of the sweep file, which make the runs small
+    #[arg(long)]
+    pub quick: bool,
+    /// Worker threads
+    #[command(flatten)]
+    pub threads: ThreadArgs,
+    /// Print as JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `sweep plan`.
+#[derive(Debug, Args)]
+pub struct PlanArgs {
+    /// The sweep
+    #[command(flatten)]
+    pub sweep: FileArgs,
+}
+
+/// Arguments of `sweep run`.
+#[derive(Debug, Args)]
+pub struct RunStepArgs {
+    /// The sweep
+    #[command(flatten)]
+    pub sweep: FileArgs,
+    /// Run part i of n of the points, such as 1/8 [default: that of the task by the variables of Slurm, PBS or HyperQueue;
+    /// all points outside of a task]
+    #[arg(long, value_name = "i/n", value_parser = Shard::parse, conflicts_with = "shards")]
+    pub shard: Option<Shard>,
+    /// Number of tasks, for PBS and HyperQueue, which do not give it
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub shards: Option<u32>,
+    /// Run points that failed again
+    #[arg(long)]
+    pub retry: bool,
+    /// Print number and expected time of the runs, and stop before anything is written
+    #[arg(long)]
+    pub dry_run: bool,
+}
+
+/// The folder of a sweep.
+#[derive(Debug, Args)]
+pub struct FolderArgs {
+    /// The folder of the sweep; or its file, and --out for the folder
+    #[arg(value_name = "DIR|FILE.ron")]
+    pub sweep: PathBuf,
+    /// Folder of the sweep, if its file is given
+    #[arg(long, value_name = "DIR", default_value = "sweep")]
+    pub out: PathBuf,
+    /// Print as JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `sweep status`.
+#[derive(Debug, Args)]
+pub struct StatusArgs {
+    /// The sweep
+    #[command(flatten)]
+    pub folder: FolderArgs,
+}
+
+/// Arguments of `sweep merge`.
+#[derive(Debug, Args)]
+pub struct MergeArgs {
+    /// The sweep
+    #[command(flatten)]
+    pub folder: FolderArgs,
+    /// Write points that are not finished as rows with that reason
+    #[arg(long)]
+    pub partial: bool,
+}
+
+impl FolderArgs {
+    fn folder(&self) -> Folder {
+        let is_file = self.sweep.extension().is_some_and(|ending| ending == "ron") && !self.sweep.is_dir();
+        Folder::at(if is_file { &self.out } else { &self.sweep })
+    }
+}
+
+impl From<SweepError> for Failure {
+    fn from(error: SweepError) -> Self {
+        Self { message: error.to_string(), code: if error.is_usage() { 2 } else { 1 } }
+    }
+}
+
+/// What a step did, with the folder.
+#[derive(Serialize)]
+struct Printed<'a, T: Serialize> {
+    out: String,
+    #[serde(flatten)]
+    done: &'a T,
+}
+
+pub(super) fn run(args: &SweepArgs, terminal: &Terminal) -> Result<(), Failure> {
+    match &args.step {
+        Step::Plan(args) => plan(args),
+        Step::Run(args) => run_points(args, terminal),
+        Step::Status(args) => status(args),
+        Step::Merge(args) => merged(args),
+    }
+}
+
+/// The plan of a sweep, its folder, and worker threads.
+fn opened(args: &FileArgs) -> Result<(Plan, Folder, ThreadPool), Failure> {
+    let pool = args.threads.pool()?;
+    let plan = pool.install(|| Plan::load(&args.file, args.quick, REVISION))?;
+    let folder = Folder::at(&args.out);
+    folder.check(&plan)?;
+    Ok((plan, folder, pool))
+}
+
+fn plan(args: &PlanArgs) -> Result<(), Failure> {
+    let (plan, folder, pool) = opened(&args.sweep)?;
+    folder.write_plan(&plan)?;
+    let work = Work::new(&plan, &folder, Shard::default(), false)?;
+    let expected = pool.install(|| work.probe());
+    print_expected(&args.sweep, &expected)
+}
+
+fn run_points(args: &RunStepArgs, terminal: &Terminal) -> Result<(), Failure> {
+    let shard = match args.shard {
+        Some(shard) => shard,
+        None => Shard::of_task(args.shards.map(|count| count as usize), |name| std::env::var(name).ok())?,
+    };
+    let (plan, folder, pool) = opened(&args.sweep)?;
+    if args.dry_run {
+        let work = Work::new(&plan, &folder, shard, args.retry)?;
+        return print_expected(&args.sweep, &pool.install(|| work.probe()));
+    }
+    folder.write_plan(&plan)?;
+    let progress = Progress::on(terminal, args.sweep.json);
+    let work = Work::new(&plan, &folder, shard, args.retry)?;
+    let status = pool.install(|| work.run(&progress))?;
+    print_status(&args.sweep.out, args.sweep.json, &status)
+}
+
+fn status(args: &StatusArgs) -> Result<(), Failure> {
+    let folder = args.folder.folder();
+    print_status(folder.path(), args.folder.json, &Status::of(&folder)?)
+}
+
+fn merged(args: &MergeArgs) -> Result<(), Failure> {
+    let path = merge(&args.folder.folder(), args.partial)?;
+    match args.folder.json {
+        true => print_json(&serde_json::json!({ "results": path.display().to_string() }), true),
+        false => print(&format!("results: {}", path.display())),
+    }
+}
+
+fn print_expected(args: &FileArgs, expected: &Expected) -> Result<(), Failure> {
+    match args.json {
+        true => print_json(&Printed { out: args.out.display().to_string(), done: expected }, true),
+        false => print(&expected.line()),
+    }
+}
+
+fn print_status(out: &Path, json: bool, status: &Status) -> Result<(), Failure> {
+    if json {
+        return print_json(&Printed { out: out.display().to_string(), done: status }, true);
+    }
+    let Status { points, finished, failed } = status;
+    print(&format!("{}: {finished} of {} finished, {failed} failed", out.display(), counted(*points, "run")))
+}
