@@ -40,7 +40,7 @@ pub enum SweepError {
         folder: PathBuf,
         /// Sweep in it.
         holds: String,
-        /// Sweep at hand.
+        /// Sweep to be run.
         name: String,
     },
     /// The folder has no plan, or a damaged one.

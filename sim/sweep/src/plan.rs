@@ -14,7 +14,7 @@ use crate::{SweepError, points};
 /// Version of the files of a sweep.
 pub(crate) const SCHEMA: u32 = 1;
 
-/// Digits of an id: of a million points, two are alike with a probability below one in 10^11.
+/// Digits of an id: of a million points, two have the same with a probability below one in 10^11.
 const ID_DIGITS: usize = 20;
 
 /// Most values of a setting that are tried; a value that was not tried fails when it runs.
