@@ -6,14 +6,14 @@ use std::path::{Path, PathBuf};
 use crate::support::{Ended, Inputs, quintile};
 use traces::table::InputTable;
 
-/// Four points; the tile of 7 pixels is not valid.
+/// Four points; a tile of 8 pixels does not fit into a coarse tile of 4.
 const SWEEP: &str = r#"(
     name: "tiles",
     settings: {"scene": "tiny", "frames": (0, 2)},
     quick: {"samples": 1},
     axes: [
-        Values(path: "gpu.pipeline.tile_px", values: [4, 7]),
-        Range(path: "gpu.core_hz", from: 200e6, to: 400e6, count: 2),
+        Values(path: "gpu.pipeline.tile_px", values: [4, 8]),
+        Range(path: "gpu.pipeline.coarse_tile_px", from: 4, to: 8, step: 2, log: true),
     ],
 )"#;
 
@@ -52,7 +52,7 @@ fn shards_merge_to_the_bytes_of_a_local_run() {
     let file = inputs.put("tiles.ron", SWEEP);
     let [local, shards] = ["local", "shards"].map(|name| inputs.path(name));
     let ended = done(&["run", &file, "--out", &local]);
-    assert!(ended.stdout.contains("4 of 4 runs finished, 2 failed"), "{}", ended.stdout);
+    assert!(ended.stdout.contains("4 of 4 runs finished, 1 failed"), "{}", ended.stdout);
     assert!(ended.stderr.contains("4/4 ") && ended.stderr.contains("expected to take"), "{}", ended.stderr);
 
     let planned = done(&["plan", &file, "--out", &shards]);
@@ -74,14 +74,18 @@ fn every_point_is_a_row_with_its_settings_and_numbers_or_a_reason() {
     done(&["run", &file, "--out", &out]);
     merged(&out);
     let table = InputTable::read(&Path::new(&out).join("results.parquet")).unwrap();
-    assert_eq!(table.numbers("gpu.pipeline.tile_px").unwrap(), [4.0, 4.0, 7.0, 7.0]);
-    assert_eq!(table.numbers("gpu.core_hz").unwrap(), [2e8, 4e8, 2e8, 4e8]);
+    assert_eq!(table.numbers("gpu.pipeline.tile_px").unwrap(), [4.0, 4.0, 8.0, 8.0]);
+    assert_eq!(table.numbers("gpu.pipeline.coarse_tile_px").unwrap(), [4.0, 8.0, 4.0, 8.0]);
     let errors = table.texts("error").unwrap();
-    assert!(errors[..2] == ["", ""] && errors[3].contains("tile_px"), "{errors:?}");
+    assert!(
+        [0, 1, 3].iter().all(|&row| errors[row].is_empty()) && errors[2].contains("tile_px"),
+        "{errors:?}"
+    );
     let (cycles, ms) = (table.texts("cycles").unwrap(), table.texts("busy_ms").unwrap());
     assert!(cycles[2].is_empty() && ms[2].is_empty());
     // The numbers are those of `quintile run`.
-    let sets = ["--set", "gpu.pipeline.tile_px=4", "--set", "gpu.core_hz=200e6", "--frames", "0..2"];
+    let sets =
+        ["--set", "gpu.pipeline.tile_px=4", "--set", "gpu.pipeline.coarse_tile_px=4", "--frames", "0..2"];
     let summary = quintile().run("tiny", &sets).summary();
     let frames = summary["frames"].as_array().unwrap();
     let sum = |key: &str| frames.iter().map(|frame| frame[key].as_f64().unwrap()).sum::<f64>();
@@ -101,7 +105,7 @@ fn every_point_is_a_row_with_its_settings_and_numbers_or_a_reason() {
 #[test]
 fn a_killed_sweep_continues_where_it_was() {
     let inputs = Inputs::new();
-    let many = SWEEP.replace("values: [4, 7]", "values: [4, 8]").replace("count: 2", "count: 40");
+    let many = SWEEP.replace("axes: [", "repetitions: 20, axes: [");
     let file = inputs.put("tiles.ron", many);
     let [killed, whole] = ["killed", "whole"].map(|name| inputs.path(name));
     let begun = || point_files(&killed).len() >= 3;
@@ -179,8 +183,8 @@ fn wrong_sweeps_and_folders_are_refused() {
         assert_eq!(ended.code, Some(code), "{}", ended.stderr);
         assert!(ended.stderr.contains("wrong.ron") && ended.stderr.contains(says), "{}", ended.stderr);
     };
-    refused(&SWEEP.replace("tile_px", "tile_pix"), 2, "unknown field `tile_pix`, did you mean `tile_px`?");
-    refused(&SWEEP.replace("[4, 7]", "[4, \"big\"]"), 2, "--set gpu.pipeline.tile_px=big");
+    refused(&SWEEP.replace(".tile_px", ".tile_pix"), 2, "unknown field `tile_pix`, did you mean `tile_px`?");
+    refused(&SWEEP.replace("[4, 8]", "[4, \"big\"]"), 2, "--set gpu.pipeline.tile_px=big");
     refused(&SWEEP.replace("axes", "axis"), 2, "unknown field `axis`, did you mean `axes`?");
     refused(&SWEEP.replace("\"tiny\"", "\"tinny\""), 2, "did you mean `tiny`?");
     let (file, other) =

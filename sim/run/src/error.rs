@@ -86,13 +86,13 @@ impl RunError {
             Self::Scene(error) => error.is_usage(),
             Self::Gpu(GpuError::Spec(activity::spec::SpecError::Read { .. })) => false,
             Self::Output(error) => error.is_usage(),
+            Self::Change(error) => !is_unreadable(error),
             Self::Platform(error) => !is_unreadable(error),
             Self::Table(error) => !is_unreadable(error),
             Self::Spec(activity::spec::SpecError::Read { .. }) => false,
             Self::Pacing(power_model::PacingError::Rate(_)) | Self::Timing(TimingError::TooLong) => true,
             Self::Spec(_)
             | Self::Gpu(_)
-            | Self::Change(_)
             | Self::Marks(_)
             | Self::Sample(_)
             | Self::Samples(_)

@@ -49,7 +49,7 @@ use output::progress::Progress;
 use output::{Destination, OutDir};
 use workloads::Scene;
 
-pub use changes::{Change, ChangeError, ChangedFile, InputFile};
+pub use changes::{ChangeError, ChangedFile, InputFile};
 pub use choice::{Choice, Dimensions, ProbeSummary, Verified, cheapest_level};
 pub use distinct::Distinct;
 pub use dry_run::{DryRun, Expected};
@@ -58,7 +58,7 @@ pub use frame::{BIN_PS, CrashedFrame, frames_of};
 pub use gpu::{GpuError, GpuSpec, PowerFiles};
 pub use heat::HeatPicture;
 pub use measure::{Checks, Measurement, Resolution};
-pub use options::{HeatQuantity, PacingChoice, Requested, RunOptions, Sampling, TimingChoice};
+pub use options::{Change, HeatQuantity, PacingChoice, Requested, RunOptions, Sampling, TimingChoice};
 pub use passes::{PassSummary, WorkSummary};
 pub use plan::{Plan, fits_memory};
 pub use provenance::{Host, Input, Provenance, again};

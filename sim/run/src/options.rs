@@ -11,8 +11,6 @@ use timing::Level;
 use workloads::Overrides;
 use workloads::job::OptionSource;
 
-use crate::Change;
-
 /// Default rate of the recorder in Hz. The method of per-frame energy is described at this rate.
 pub(crate) const DEFAULT_RATE_HZ: f64 = 50e3;
 
@@ -34,6 +32,23 @@ impl PacingChoice {
             Self::Vsync => "vsync",
             Self::Free => "free",
         }
+    }
+}
+
+/// A changed value in an input file.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Change {
+    /// Names from the file inward, separated by dots: `gpu.pipeline.tile_px`. Entries of lists are named by their `name`,
+    /// `event` or `unit`, or by their number from 0.
+    pub path: String,
+    /// The value as in the file; text may be without quotes.
+    pub value: String,
+}
+
+impl std::fmt::Display for Change {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}={}", self.path, self.value)
     }
 }
 

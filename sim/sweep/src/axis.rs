@@ -4,8 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Deserialize;
 
-use crate::setting::{Setting, check_path};
-use crate::spec::{MAX_POINTS, Text};
+use crate::setting::{Setting, Text, check_path};
 
 /// What is varied.
 #[derive(Clone, Debug, Deserialize)]
@@ -109,7 +108,7 @@ impl Axis {
             Self::Range { from, to, step: Some(step), log, .. } => {
                 let steps = if *log { libm::log(to / from) / libm::log(*step) } else { (to - from) / step };
                 // A last value that rounding moves just beyond the end counts.
-                1 + (steps + 1e-9).min(MAX_POINTS as f64) as usize
+                ((steps + 1e-9) as usize).saturating_add(1)
             }
             Self::Range { .. } => 0,
         }

@@ -22,13 +22,15 @@ pub enum SweepError {
         /// What is wrong, and what to do.
         message: String,
     },
-    /// A setting is unknown, or its value can never be valid.
-    #[error("{file}: {source}")]
+    /// No point can run with a setting: it is unknown, or its value is invalid.
+    #[error("{file}: {message}")]
     Setting {
         /// The sweep file.
         file: String,
         /// What is wrong, and what to do.
-        source: RunError,
+        message: String,
+        /// Whether the request is wrong, rather than an input file.
+        is_usage: bool,
     },
     /// A shard is wrong, or its variables are.
     #[error("{0}")]
@@ -85,11 +87,8 @@ impl SweepError {
     pub fn is_usage(&self) -> bool {
         match self {
             Self::Spec(error) => matches!(error, SpecError::Parse { .. }),
-            Self::Value { .. }
-            | Self::Setting { .. }
-            | Self::Shard(_)
-            | Self::OtherSweep { .. }
-            | Self::Plan { .. } => true,
+            Self::Value { .. } | Self::Shard(_) | Self::OtherSweep { .. } | Self::Plan { .. } => true,
+            Self::Setting { is_usage, .. } => *is_usage,
             Self::Folder { .. } | Self::Write(_) | Self::Unfinished { .. } | Self::Input(_) => false,
         }
     }

@@ -23,6 +23,7 @@ mod run;
 mod setting;
 mod shard;
 mod spec;
+mod trials;
 
 pub use self::run::{Expected, Status, Work};
 pub use axis::Axis;
@@ -30,6 +31,6 @@ pub use error::SweepError;
 pub use folder::Folder;
 pub use merge::{RESULTS, merge};
 pub use plan::{Plan, Point};
-pub use setting::Setting;
+pub use setting::{Setting, Text};
 pub use shard::Shard;
-pub use spec::{Combination, MAX_POINTS, SweepSpec, Text};
+pub use spec::{Combination, MAX_POINTS, SweepSpec};

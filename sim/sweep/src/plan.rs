@@ -1,14 +1,13 @@
 //! The plan of a sweep: its points with stable ids. Every value is tried once, before anything runs.
 
-use std::collections::{HashMap, HashSet};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use output::dir::sha256_of_text;
-use run::{ChangeError, Input, RunError};
 use serde::{Deserialize, Serialize};
 
-use crate::setting::{self, Setting};
-use crate::spec::SweepSpec;
+use crate::setting::Setting;
+use crate::spec::{Combination, SweepSpec};
+use crate::trials::{Refusal, Trials};
 use crate::{SweepError, points};
 
 /// Version of the files of a sweep.
@@ -16,9 +15,6 @@ pub(crate) const SCHEMA: u32 = 1;
 
 /// Digits of an id: of a million points, two have the same with a probability below one in 10^11.
 const ID_DIGITS: usize = 20;
-
-/// Most values of a setting that are tried; a value that was not tried fails when it runs.
-const MAX_TRIED: usize = 100;
 
 /// A point of a sweep.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -46,103 +42,37 @@ impl Plan {
     /// # Errors
     /// If the file is invalid, a setting is unknown, a value can never be valid, or an input cannot be read.
     pub fn load(path: &Path, quick: bool, revision: Option<&str>) -> Result<Self, SweepError> {
+        let file = || path.display().to_string();
         let spec = SweepSpec::load(path)?;
         let settings = points::points(&spec, quick);
         if settings.is_empty() {
-            let (file, place) = (path.display().to_string(), "forbidden".to_owned());
-            let message = "all combinations are left out: forbid fewer".to_owned();
-            return Err(SweepError::Value { file, place, message });
+            let (place, message) = ("forbidden", "all combinations are left out: forbid fewer");
+            return Err(SweepError::Value {
+                file: file(),
+                place: place.to_owned(),
+                message: message.to_owned(),
+            });
         }
-        let mut trials = Trials::new(path);
+        let mut trials = Trials::new(&settings);
+        trials.try_settings(spec.points == Combination::Grid).map_err(|Refusal { message, is_usage }| {
+            SweepError::Setting { file: file(), message, is_usage }
+        })?;
         let version = format!("{} {}", env!("CARGO_PKG_VERSION"), revision.unwrap_or_default());
-        let point = |settings: Vec<Setting>| {
-            let id = trials.inputs_of(&settings).and_then(|inputs| id(&settings, &inputs, &version))?;
-            Ok(Point { id, settings })
-        };
-        let points = settings.into_iter().map(point).collect::<Result<_, SweepError>>()?;
+        let ids = (0..settings.len()).map(|at| Ok(id(&settings[at], &trials.inputs_of(at)?, &version)));
+        let ids = ids.collect::<Result<Vec<_>, SweepError>>()?;
+        let points = ids.into_iter().zip(settings).map(|(id, settings)| Point { id, settings }).collect();
         Ok(Self { name: spec.name, points })
     }
 }
 
 /// Id of a point.
-fn id(settings: &[Setting], inputs: &str, version: &str) -> Result<String, SweepError> {
+fn id(settings: &[Setting], inputs: &str, version: &str) -> String {
     let mut sorted: Vec<&Setting> = settings.iter().collect();
     sorted.sort();
     let lines: String =
         sorted.iter().map(|setting| format!("{:?}={:?}\n", setting.path, setting.value)).collect();
     let hash = sha256_of_text(&format!("{SCHEMA}\n{version}\n{lines}\n{inputs}"));
-    Ok(hash.chars().take(ID_DIGITS).collect())
-}
-
-/// Values that were tried, and the input files that were found by it.
-struct Trials<'a> {
-    file: &'a Path,
-    tried: HashMap<String, HashSet<String>>,
-    /// Hashes of input files as text, by the settings that name them.
-    inputs: HashMap<Vec<Setting>, String>,
-    hashes: HashMap<PathBuf, String>,
-}
-
-impl<'a> Trials<'a> {
-    fn new(file: &'a Path) -> Self {
-        Self { file, tried: HashMap::new(), inputs: HashMap::new(), hashes: HashMap::new() }
-    }
-
-    /// Names and hashes of the input files of a point. It is planned as a run if it has a value that was not tried yet.
-    fn inputs_of(&mut self, settings: &[Setting]) -> Result<String, SweepError> {
-        let key: Vec<Setting> = settings.iter().filter(|setting| setting.names_files()).cloned().collect();
-        let known = self.inputs.get(&key).cloned();
-        if let Some(known) = known.as_ref().filter(|_| !self.has_new_value(settings)) {
-            return Ok(known.clone());
-        }
-        let planned = setting::options(settings).and_then(run::Plan::resolve);
-        match planned {
-            Ok(plan) => {
-                let inputs = self.hashed(&plan.files)?;
-                self.inputs.insert(key, inputs.clone());
-                Ok(inputs)
-            }
-            Err(source) if is_never_valid(&source) => {
-                Err(SweepError::Setting { file: self.file.display().to_string(), source })
-            }
-            // Other values may go together: the point fails when it runs.
-            Err(_) => Ok(known.unwrap_or_default()),
-        }
-    }
-
-    /// Whether a point has a value that was not tried yet, of a setting with few values.
-    fn has_new_value(&mut self, settings: &[Setting]) -> bool {
-        let mut is_new = false;
-        for Setting { path, value } in settings {
-            let tried = self.tried.entry(path.clone()).or_default();
-            is_new |= tried.len() < MAX_TRIED && tried.insert(value.clone());
-        }
-        is_new
-    }
-
-    fn hashed(&mut self, files: &[PathBuf]) -> Result<String, SweepError> {
-        let mut text = String::new();
-        for file in files {
-            let hash = match self.hashes.get(file) {
-                Some(hash) => hash.clone(),
-                None => Input::now(file).map_err(SweepError::Input)?.sha256.unwrap_or_default(),
-            };
-            text += &format!("{:?} {hash}\n", file.display().to_string());
-            self.hashes.insert(file.clone(), hash);
-        }
-        Ok(text)
-    }
-}
-
-/// Whether an error of a point holds for its value in any other point, too: a name, a path or a type is wrong.
-fn is_never_valid(error: &RunError) -> bool {
-    match error {
-        RunError::Change(ChangeError::Invalid { .. })
-        | RunError::Model(_)
-        | RunError::Groups { .. }
-        | RunError::Job(_) => false,
-        error => error.is_usage(),
-    }
+    hash.chars().take(ID_DIGITS).collect()
 }
 
 #[cfg(test)]
@@ -208,8 +138,11 @@ mod tests {
     }
 
     #[test]
-    fn a_value_that_fits_others_is_planned() {
-        let plan = of_axis("Values(path: \"gpu.pipeline.tile_px\", values: [8, 7])").unwrap();
-        assert_eq!(plan.points.len(), 2);
+    fn a_value_that_fits_some_others_is_planned() {
+        let coarse = "Values(path: \"gpu.pipeline.coarse_tile_px\", values: [4, 32])";
+        let tile = "Values(path: \"gpu.pipeline.tile_px\", values: [8, 2])";
+        assert_eq!(of_axis(&format!("{tile}, {coarse}")).unwrap().points.len(), 4);
+        let never = of_axis(&format!("{}, {coarse}", tile.replace("8", "7"))).unwrap_err();
+        assert!(never.contains("tile_px=7"), "{never}");
     }
 }

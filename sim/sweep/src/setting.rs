@@ -2,7 +2,7 @@
 
 use activity::spec::suggestion;
 use run::{Change, InputFile, RunError, RunOptions};
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::{Map, Value, json};
 
 /// A setting and its value as text.
@@ -14,6 +14,24 @@ pub struct Setting {
     pub path: String,
     /// The value.
     pub value: String,
+}
+
+/// Text of a value: a number, `true`, text, or a list.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Text(pub String);
+
+impl<'de> Deserialize<'de> for Text {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        let value = ron::Value::deserialize(from)?;
+        match value {
+            ron::Value::String(text) => Ok(Self(text)),
+            ron::Value::Seq(items) => {
+                let items = items.iter().map(ron::to_string).collect::<Result<Vec<_>, _>>();
+                items.map(|items| Self(format!("({})", items.join(", ")))).map_err(serde::de::Error::custom)
+            }
+            other => ron::to_string(&other).map(Self).map_err(serde::de::Error::custom),
+        }
+    }
 }
 
 /// Options of a run that can be set.

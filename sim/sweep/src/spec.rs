@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use activity::spec;
-use serde::{Deserialize, Deserializer};
+use serde::Deserialize;
 
 use crate::SweepError;
 use crate::axis::Axis;
-use crate::setting::{Setting, check_path};
+use crate::setting::{Setting, Text, check_path};
 
 /// Largest number of points of a sweep.
 pub const MAX_POINTS: usize = 1_000_000;
@@ -82,24 +82,6 @@ impl Combination {
         match self {
             Self::Grid => None,
             Self::LatinHypercube { count, .. } | Self::Sobol { count, .. } => Some(count),
-        }
-    }
-}
-
-/// Text of a value: a number, `true`, text, or a list.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Text(pub String);
-
-impl<'de> Deserialize<'de> for Text {
-    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
-        let value = ron::Value::deserialize(from)?;
-        match value {
-            ron::Value::String(text) => Ok(Self(text)),
-            ron::Value::Seq(items) => {
-                let items = items.iter().map(ron::to_string).collect::<Result<Vec<_>, _>>();
-                items.map(|items| Self(format!("({})", items.join(", ")))).map_err(serde::de::Error::custom)
-            }
-            other => ron::to_string(&other).map(Self).map_err(serde::de::Error::custom),
         }
     }
 }

@@ -8,11 +8,10 @@ use std::path::Path;
 
 use activity::spec::{self, SpecError, suggestion};
 use power_model::{EnergyTable, Platform, PlatformError, TableError};
-use serde::{Deserialize, Serialize};
 use workloads::{LoadError, Scene};
 
-use crate::RunError;
 use crate::gpu::{GpuError, GpuSpec};
+use crate::options::Change;
 
 /// An input file in which values can be changed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -58,17 +57,6 @@ impl InputFile {
     }
 }
 
-/// A changed value in an input file.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Change {
-    /// Names from the file inward, separated by dots: `gpu.pipeline.tile_px`. Entries of lists are named by their `name`,
-    /// `event` or `unit`, or by their number from 0.
-    pub path: String,
-    /// The value as in the file; text may be without quotes.
-    pub value: String,
-}
-
 /// Why a change cannot be made.
 #[derive(Debug, thiserror::Error)]
 pub enum ChangeError {
@@ -80,17 +68,12 @@ pub enum ChangeError {
         /// The nearest names.
         suggestion: String,
     },
-    /// The path is unknown, or its value can never be valid.
+    /// The file cannot be read.
+    #[error(transparent)]
+    Read(#[from] SpecError),
+    /// The path is unknown, or the value is invalid, alone or beside others.
     #[error("--set {set}: {message}")]
     Refused {
-        /// The changes.
-        set: String,
-        /// What is wrong, and what to do.
-        message: String,
-    },
-    /// The file with all changes is invalid as a whole; other values may go together.
-    #[error("--set {set}: {message}")]
-    Invalid {
         /// The changes.
         set: String,
         /// What is wrong, and what to do.
@@ -105,12 +88,6 @@ pub struct ChangedFile {
     pub file: InputFile,
     /// The text. Files that it names are given by whole paths, so it can be used from any folder.
     pub text: String,
-}
-
-/// Why changed text is refused: by its syntax or by a check of the whole.
-struct Reason {
-    is_whole: bool,
-    message: String,
 }
 
 /// Changes of the input files of a run, and the changed texts.
@@ -151,13 +128,13 @@ impl<'a> Changes<'a> {
         &mut self,
         file: InputFile,
         (text, origin): (&str, &Path),
-        parse: impl Fn(&str) -> Result<T, Reason>,
+        parse: impl Fn(&str) -> Result<T, String>,
     ) -> Result<T, ChangeError> {
         let mut changed = text.to_owned();
         for change in self.inside(file) {
-            changed = change.made_in(&changed)?;
+            changed = with(&changed, change)?;
         }
-        let value = parse(&changed).map_err(|reason| self.blamed(file, text, reason, &parse))?;
+        let value = parse(&changed).map_err(|message| self.blamed(file, text, message, &parse))?;
         let head =
             format!("// {}, changed by --set {}\n", origin.display(), self.of(file).unwrap_or_default());
         self.files.push(ChangedFile { file, text: head + &with_whole_paths(&changed, origin) });
@@ -169,37 +146,22 @@ impl<'a> Changes<'a> {
         &self,
         file: InputFile,
         text: &str,
-        reason: Reason,
-        parse: &dyn Fn(&str) -> Result<T, Reason>,
+        message: String,
+        parse: &dyn Fn(&str) -> Result<T, String>,
     ) -> ChangeError {
         let alone = |change: &&Change| {
-            let message =
-                change.made_in(text).ok().and_then(|text| parse(&text).err()).map(|error| error.message);
-            message.as_ref() == Some(&reason.message)
+            with(text, change).is_ok_and(|text| parse(&text).err().as_ref() == Some(&message))
         };
-        let set = self
-            .inside(file)
-            .find(alone)
-            .map(Change::to_string)
-            .or_else(|| self.of(file))
-            .unwrap_or_default();
-        let Reason { is_whole, message } = reason;
-        if is_whole { ChangeError::Invalid { set, message } } else { ChangeError::Refused { set, message } }
+        let one = self.inside(file).find(alone).map(Change::to_string);
+        ChangeError::Refused { set: one.or_else(|| self.of(file)).unwrap_or_default(), message }
     }
 }
 
-impl std::fmt::Display for Change {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{}={}", self.path, self.value)
-    }
-}
-
-impl Change {
-    fn made_in(&self, text: &str) -> Result<String, ChangeError> {
-        let path: Vec<&str> = self.path.split('.').skip(1).collect();
-        edit::set(text, &path, &self.value)
-            .map_err(|message| ChangeError::Refused { set: self.to_string(), message })
-    }
+/// `text` with one change.
+fn with(text: &str, change: &Change) -> Result<String, ChangeError> {
+    let path: Vec<&str> = change.path.split('.').skip(1).collect();
+    edit::set(text, &path, &change.value)
+        .map_err(|message| ChangeError::Refused { set: change.to_string(), message })
 }
 
 /// The text with whole paths in place of file names relative to the file at `origin`.
@@ -212,19 +174,18 @@ fn with_whole_paths(text: &str, origin: &Path) -> String {
     })
 }
 
-/// A syntax error without its place in the changed text, which the user does not have.
-fn refused(error: SpecError) -> Reason {
+/// Message of a syntax error without its place in the changed text, which the user does not have.
+fn without_place(error: SpecError) -> String {
     match error {
-        SpecError::Parse { message, .. } => Reason { is_whole: false, message },
-        error => Reason { is_whole: false, message: error.to_string() },
+        SpecError::Parse { message, .. } => message,
+        error => error.to_string(),
     }
 }
 
-/// A check of the whole, without the name of the file.
-fn whole(error: &impl std::fmt::Display, origin: &Path) -> Reason {
+/// Message of an error without the name of the file.
+fn without_name(error: &impl std::fmt::Display, file: &Path) -> String {
     let text = error.to_string();
-    let message = text.strip_prefix(&format!("{}: ", origin.display())).unwrap_or(&text).to_owned();
-    Reason { is_whole: true, message }
+    text.strip_prefix(&format!("{}: ", file.display())).unwrap_or(&text).to_owned()
 }
 
 impl Changes<'_> {
@@ -246,14 +207,14 @@ impl Changes<'_> {
     ///
     /// # Errors
     /// If the file cannot be read, or not be changed so.
-    pub fn gpu(&mut self, name: &Path) -> Result<Option<GpuSpec>, RunError> {
+    pub fn gpu(&mut self, name: &Path) -> Result<Option<GpuSpec>, ChangeError> {
         let Some(text) = self.text(InputFile::Gpu, name, GpuSpec::builtin_text)? else { return Ok(None) };
         let file = name.display().to_string();
         let parse = |text: &str| {
             GpuSpec::parse(text, &file).map_err(|error| match error {
-                GpuError::Spec(error) => refused(error),
-                GpuError::Value { message, .. } => Reason { is_whole: true, message },
-                error => whole(&error, name),
+                GpuError::Spec(error) => without_place(error),
+                GpuError::Value { message, .. } => message,
+                error => without_name(&error, name),
             })
         };
         let mut gpu = self.apply(InputFile::Gpu, (&text, name), parse)?;
@@ -265,41 +226,43 @@ impl Changes<'_> {
     ///
     /// # Errors
     /// As [`Self::gpu`].
-    pub fn platform(&mut self, name: &Path) -> Result<Option<Platform>, RunError> {
-        let text = self.text(InputFile::Platform, name, Platform::builtin_text);
-        let Some(text) = text.map_err(PlatformError::from)? else { return Ok(None) };
+    pub fn platform(&mut self, name: &Path) -> Result<Option<Platform>, ChangeError> {
+        let Some(text) = self.text(InputFile::Platform, name, Platform::builtin_text)? else {
+            return Ok(None);
+        };
         let file = name.display().to_string();
         let parse = |text: &str| {
             Platform::parse(text, &file).map_err(|error| match error {
-                PlatformError::Spec(error) => refused(error),
-                error => whole(&error, name),
+                PlatformError::Spec(error) => without_place(error),
+                error => without_name(&error, name),
             })
         };
-        Ok(Some(self.apply(InputFile::Platform, (&text, name), parse)?))
+        self.apply(InputFile::Platform, (&text, name), parse).map(Some)
     }
 
     /// The energy table of a name or file with its changes; `None` if it has none.
     ///
     /// # Errors
     /// As [`Self::gpu`].
-    pub fn table(&mut self, name: &Path) -> Result<Option<EnergyTable>, RunError> {
-        let text = self.text(InputFile::Table, name, EnergyTable::builtin_text);
-        let Some(text) = text.map_err(TableError::from)? else { return Ok(None) };
+    pub fn table(&mut self, name: &Path) -> Result<Option<EnergyTable>, ChangeError> {
+        let Some(text) = self.text(InputFile::Table, name, EnergyTable::builtin_text)? else {
+            return Ok(None);
+        };
         let file = name.display().to_string();
         let parse = |text: &str| {
             EnergyTable::parse(text, &file).map_err(|error| match error {
-                TableError::Spec(error) => refused(error),
-                error => whole(&error, name),
+                TableError::Spec(error) => without_place(error),
+                error => without_name(&error, name),
             })
         };
-        Ok(Some(self.apply(InputFile::Table, (&text, name), parse)?))
+        self.apply(InputFile::Table, (&text, name), parse).map(Some)
     }
 
     /// The scene in a RON file with its changes; `None` if it has none.
     ///
     /// # Errors
     /// As [`Self::gpu`], and if it is no RON file.
-    pub fn scene(&mut self, name: &Path) -> Result<Option<Scene>, RunError> {
+    pub fn scene(&mut self, name: &Path) -> Result<Option<Scene>, ChangeError> {
         let Some(set) = self.of(InputFile::Scene) else { return Ok(None) };
         if !is_file(name) {
             let message = format!(
@@ -307,19 +270,17 @@ impl Changes<'_> {
                  its options (--set name=value)",
                 name.display()
             );
-            return Err(ChangeError::Refused { set, message }.into());
+            return Err(ChangeError::Refused { set, message });
         }
         let text = spec::read(name)?;
         let parse = |text: &str| {
             workloads::load_text(text, name).map_err(|error| match error {
-                LoadError::Spec(error) => refused(error),
-                LoadError::Description { place, message, .. } => {
-                    Reason { is_whole: true, message: format!("{place}: {message}") }
-                }
-                error => whole(&error, name),
+                LoadError::Spec(error) => without_place(error),
+                LoadError::Description { place, message, .. } => format!("{place}: {message}"),
+                error => without_name(&error, name),
             })
         };
-        Ok(Some(self.apply(InputFile::Scene, (&text, name), parse)?))
+        self.apply(InputFile::Scene, (&text, name), parse).map(Some)
     }
 }
 
