@@ -95,8 +95,8 @@ fn every_point_is_a_row_with_its_settings_and_numbers_or_a_reason() {
         assert!((found / expected - 1.0).abs() < 1e-12, "{column}: {found} {expected}");
     };
     near("busy_ms", sum("busy_s") / 2.0 * 1e3);
-    near("frame_mj", sum("energy_j") / 2.0 * 1e3);
-    near("nj_per_pixel", sum("energy_per_pixel_j") / 2.0 * 1e9);
+    near("frame_mJ", sum("energy_j") / 2.0 * 1e3);
+    near("energy_per_pixel_nJ", sum("energy_per_pixel_j") / 2.0 * 1e9);
     let counts = &summary["counts"];
     let tested = table.texts("count.samples_tested").unwrap();
     assert_eq!(tested[0].parse::<u64>().unwrap(), counts["samples_tested"].as_u64().unwrap());
@@ -173,6 +173,30 @@ fn tasks_of_a_scheduler_take_their_shards() {
     assert!(String::from_utf8_lossy(&unknown.stderr).contains("give --shards N"));
 }
 
+/// The scripts, run without Slurm: by the shell, with the variables of a task.
+#[test]
+fn scripts_for_slurm_run_all_points_and_merge_them() {
+    let inputs = Inputs::new();
+    let (file, out, local) =
+        (inputs.put("tiles.ron", SWEEP), inputs.path("with space"), inputs.path("local"));
+    let ended = done(&["slurm", &file, "--out", &out, "--tasks", "3"]);
+    assert!(
+        ended.stdout.contains("3 tasks") && ended.stdout.contains("sbatch --dependency=afterany"),
+        "{}",
+        ended.stdout
+    );
+    let script = |name: &str, task: &str| {
+        let path = Path::new(&out).join(name);
+        let status =
+            std::process::Command::new("sh").arg(path).env("SLURM_ARRAY_TASK_ID", task).output().unwrap();
+        assert!(status.status.success(), "{}", String::from_utf8_lossy(&status.stderr));
+    };
+    ["0", "1", "2"].iter().for_each(|task| script("array.sh", task));
+    script("merge.sh", "");
+    done(&["run", &file, "--out", &local]);
+    assert_eq!(fs::read(Path::new(&out).join("results.parquet")).unwrap(), merged(&local));
+}
+
 #[test]
 fn wrong_sweeps_and_folders_are_refused() {
     let inputs = Inputs::new();
@@ -197,5 +221,5 @@ fn wrong_sweeps_and_folders_are_refused() {
     let ended = sweep(&["run", &file, "--out", &format!("{file}/below")]);
     assert!(ended.code == Some(1) && ended.stderr.contains("check that it is a folder"), "{}", ended.stderr);
     let ended = sweep(&["status", &inputs.path("nothing")]);
-    assert!(ended.code == Some(2) && ended.stderr.contains("there is none"), "{}", ended.stderr);
+    assert!(ended.code == Some(2) && ended.stderr.contains("it does not exist"), "{}", ended.stderr);
 }

@@ -4,11 +4,13 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
 use output::progress::Progress;
-use output::table::counted;
+use output::table::{counted, shell_line};
 use output::terminal::Terminal;
 use rayon::ThreadPool;
 use serde::Serialize;
-use sweep::{Expected, Folder, Plan, Shard, Status, SweepError, Work, merge};
+use sweep::{
+    Expected, Folder, Plan, Shard, SlurmArray, Status, SweepError, Work, merge, merge_script, write_scripts,
+};
 
 use super::Failure;
 use super::outputs::{print, print_json};
@@ -36,6 +38,8 @@ pub enum Step {
     Plan(PlanArgs),
     /// Run the points that are not finished, on all cores
     Run(RunStepArgs),
+    /// Plan, and write scripts for Slurm: DIR/array.sh, whose tasks run the points, and DIR/merge.sh
+    Slurm(SlurmArgs),
     /// Print how many points are finished, from the files of the sweep alone
     Status(StatusArgs),
     /// Write DIR/results.parquet, with a row for each point
@@ -89,6 +93,20 @@ pub struct RunStepArgs {
     /// Print number and expected time of the runs, and stop before anything is written
     #[arg(long)]
     pub dry_run: bool,
+}
+
+/// Arguments of `sweep slurm`.
+#[derive(Debug, Args)]
+pub struct SlurmArgs {
+    /// The sweep
+    #[command(flatten)]
+    pub sweep: FileArgs,
+    /// Number of tasks, at most 1000 [default: as many as take ten minutes each, by the expected time]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub tasks: Option<u32>,
+    /// Threads of a task
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub task_threads: u16,
 }
 
 /// The folder of a sweep.
@@ -149,6 +167,7 @@ pub(super) fn run(args: &SweepArgs, terminal: &Terminal) -> Result<(), Failure> 
     match &args.step {
         Step::Plan(args) => plan(args),
         Step::Run(args) => run_points(args, terminal),
+        Step::Slurm(args) => slurm(args),
         Step::Status(args) => status(args),
         Step::Merge(args) => merged(args),
     }
@@ -186,6 +205,41 @@ fn run_points(args: &RunStepArgs, terminal: &Terminal) -> Result<(), Failure> {
     let work = Work::new(&plan, &folder, shard, args.retry)?;
     let status = pool.install(|| work.run(&progress))?;
     print_status(&args.sweep.out, args.sweep.json, &status)
+}
+
+fn slurm(args: &SlurmArgs) -> Result<(), Failure> {
+    let (plan, folder, pool) = opened(&args.sweep)?;
+    folder.write_plan(&plan)?;
+    let work = Work::new(&plan, &folder, Shard::default(), false)?;
+    let expected = pool.install(|| work.probe());
+    let tasks = args.tasks.map(|count| count as usize);
+    let array = SlurmArray::new(&expected, pool.current_num_threads(), args.task_threads.into(), tasks);
+    let absolute = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+    let [file, out] = [&args.sweep.file, &args.sweep.out].map(|path| absolute(path));
+    let program = std::env::current_exe().unwrap_or_else(|_| "quintile".into());
+    let [program, file, folder] = [&program, &file, &out].map(|path| path.display().to_string());
+    let step = |name: &str| [program.clone(), "sweep".to_owned(), name.to_owned()];
+    let mut run = [&step("run")[..], &[file, "--out".to_owned(), folder.clone()]].concat();
+    run.extend(args.sweep.quick.then(|| "--quick".to_owned()));
+    let merge = [&step("merge")[..], &[folder, "--partial".to_owned()]].concat();
+    let [array_sh, merge_sh] =
+        write_scripts(&out, &array.script(&plan.name, &out, &run), &merge_script(&plan.name, &out, &merge))?;
+    if args.sweep.json {
+        let paths = [&array_sh, &merge_sh].map(|path| path.display().to_string());
+        return print_json(
+            &serde_json::json!({ "scripts": paths, "tasks": array.tasks, "expected": expected }),
+            true,
+        );
+    }
+    let tasks = counted(array.tasks, "task");
+    let submit = [array_sh, merge_sh].map(|path| shell_line(&[path.display().to_string()]));
+    print(&format!(
+        "{}\n{tasks} of {} min at most; submit with\nsbatch --dependency=afterany:$(sbatch --parsable {}) {}",
+        expected.line(),
+        array.minutes,
+        submit[0],
+        submit[1]
+    ))
 }
 
 fn status(args: &StatusArgs) -> Result<(), Failure> {

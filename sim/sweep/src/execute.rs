@@ -10,8 +10,7 @@ use power_model::{FramePower, pace};
 use run::{Distinct, Plan, RunError, RunFrame, frames_of};
 use serde::{Deserialize, Serialize};
 
-use crate::plan::Point;
-use crate::setting;
+use crate::setting::{self, Setting};
 
 /// Result of a point.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -60,15 +59,51 @@ pub(crate) struct Measured {
     pub dram_bytes: u64,
     /// Codes of accuracy warnings of the timing level, comma-separated.
     pub accuracy_warnings: String,
-    /// Event counts by name, sums.
-    pub counts: BTreeMap<String, u64>,
+    /// Event counts, sums.
+    pub counts: EventCounts,
 }
 
-/// Runs a point. A failure and a panic are results, too.
-pub(crate) fn execute(point: &Point) -> PointResult {
-    let outcome = catch_unwind(AssertUnwindSafe(|| measure(point)));
+/// Counts of the reported events, in files by name.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(from = "BTreeMap<String, u64>", into = "BTreeMap<String, u64>")]
+pub(crate) struct EventCounts(Box<[Option<u64>; Event::COUNT]>);
+
+impl EventCounts {
+    /// Count of an event; `None` if the GPU has no such unit.
+    pub fn get(&self, event: Event) -> Option<u64> {
+        self.0[event as usize]
+    }
+
+    fn of(frames: &[&RunFrame]) -> Self {
+        let mut sums = Self(Box::new([None; Event::COUNT]));
+        let observed = frames.iter().filter_map(|frame| frame.observed());
+        for (event, count) in observed.flat_map(|observed| observed.counts.reported()) {
+            *sums.0[event as usize].get_or_insert(0) += count;
+        }
+        sums
+    }
+}
+
+impl From<BTreeMap<String, u64>> for EventCounts {
+    fn from(counts: BTreeMap<String, u64>) -> Self {
+        Self(Box::new(Event::ALL.map(|event| counts.get(event.name()).copied())))
+    }
+}
+
+impl From<EventCounts> for BTreeMap<String, u64> {
+    fn from(counts: EventCounts) -> Self {
+        Event::ALL
+            .into_iter()
+            .filter_map(|event| Some((event.name().to_owned(), counts.get(event)?)))
+            .collect()
+    }
+}
+
+/// Runs the point `id` with these settings. A failure and a panic are results, too.
+pub(crate) fn execute(id: &str, settings: &[Setting]) -> PointResult {
+    let outcome = catch_unwind(AssertUnwindSafe(|| measure(settings)));
     let outcome = outcome.unwrap_or_else(|panic| Err(crash(&*panic)));
-    PointResult { id: point.id.clone(), outcome: outcome.into() }
+    PointResult { id: id.to_owned(), outcome: outcome.into() }
 }
 
 fn crash(panic: &(dyn Any + Send)) -> String {
@@ -76,9 +111,8 @@ fn crash(panic: &(dyn Any + Send)) -> String {
     format!("internal error, please report it: {}", text.unwrap_or("a panic"))
 }
 
-fn measure(point: &Point) -> Result<Measured, String> {
-    let plan =
-        setting::options(&point.settings).and_then(Plan::resolve).map_err(|error| error.to_string())?;
+fn measure(settings: &[Setting]) -> Result<Measured, String> {
+    let plan = setting::options(settings).and_then(Plan::resolve).map_err(|error| error.to_string())?;
     measured(&plan).map_err(|error| error.to_string())
 }
 
@@ -93,8 +127,8 @@ fn measured(plan: &Plan) -> Result<Measured, RunError> {
     let frame_j = paced.energy().total_j() / count;
     let busy_j = frames.iter().map(|frame| frame.cost().energy_j).sum::<f64>() / count;
     let busy_s = paced.frames.iter().map(|frame| frame.busy_end_s - frame.start_s).sum::<f64>() / count;
-    let counts = counts(&frames);
-    let bytes = |event: Event| counts.get(event.name()).copied().unwrap_or(0);
+    let counts = EventCounts::of(&frames);
+    let bytes = |event: Event| counts.get(event).unwrap_or(0);
     Ok(Measured {
         used: used(plan),
         cycles,
@@ -129,16 +163,6 @@ fn used(plan: &Plan) -> BTreeMap<String, String> {
     texts.into_iter().map(|(name, text)| (name.to_owned(), text)).collect()
 }
 
-fn counts(frames: &[&RunFrame]) -> BTreeMap<String, u64> {
-    let mut sums: BTreeMap<String, u64> = BTreeMap::new();
-    for (event, count) in
-        frames.iter().filter_map(|frame| frame.observed()).flat_map(|seen| seen.counts.reported())
-    {
-        *sums.entry(event.name().to_owned()).or_default() += count;
-    }
-    sums
-}
-
 fn accuracy_warnings(frames: &[&RunFrame]) -> String {
     let observed = frames.iter().filter_map(|frame| frame.observed());
     let codes: BTreeSet<&str> =
@@ -149,12 +173,11 @@ fn accuracy_warnings(frames: &[&RunFrame]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::setting::Setting;
 
     fn outcome(settings: &[(&str, &str)]) -> Outcome {
         let settings = [("scene", "tiny"), ("frames", "0..2")].iter().chain(settings);
-        let settings = settings.map(|(path, value)| Setting::new(*path, *value)).collect();
-        execute(&Point { id: "a".to_owned(), settings }).outcome
+        let settings: Vec<Setting> = settings.map(|(path, value)| Setting::new(*path, *value)).collect();
+        execute("a", &settings).outcome
     }
 
     #[test]

@@ -10,17 +10,27 @@ use traces::io::atomic;
 use crate::SweepError;
 use crate::execute::PointResult;
 use crate::plan::{Plan, Point, SCHEMA};
+use crate::setting::Setting;
 
 /// File of the plan: a header, then one line per point.
 const PLAN: &str = "plan.jsonl";
 
 /// First line of the plan.
-#[derive(Serialize, Deserialize)]
+#[derive(PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Header {
     schema: u32,
     sweep: String,
+    /// Settings of all points.
+    settings: Vec<Setting>,
     points: usize,
+}
+
+impl Header {
+    fn of(plan: &Plan) -> Self {
+        let Plan { name, settings, points } = plan;
+        Self { schema: SCHEMA, sweep: name.clone(), settings: settings.clone(), points: points.len() }
+    }
 }
 
 /// Folder of a sweep.
@@ -63,10 +73,10 @@ impl Folder {
     pub fn write_plan(&self, plan: &Plan) -> Result<(), SweepError> {
         fs::create_dir_all(&self.root).map_err(SweepError::folder(&self.root))?;
         self.check(plan)?;
-        if self.plan().is_ok_and(|known| known == *plan) {
+        let header = Header::of(plan);
+        if self.holds(plan, &header)? {
             return Ok(atomic::try_place(&self.root.join(PLAN))?);
         }
-        let header = Header { schema: SCHEMA, sweep: plan.name.clone(), points: plan.points.len() };
         let write = |out: &mut io::BufWriter<File>| {
             serde_json::to_writer(&mut *out, &header)?;
             for point in &plan.points {
@@ -98,28 +108,43 @@ impl Folder {
         Ok(Some(header))
     }
 
+    /// Points of the plan, line by line.
+    fn points(&self) -> Result<impl Iterator<Item = Result<Point, SweepError>>, SweepError> {
+        let path = self.root.join(PLAN);
+        let lines = BufReader::new(File::open(&path).map_err(SweepError::folder(&path))?).lines().skip(1);
+        Ok(lines.map(move |line| {
+            let line = line.map_err(SweepError::folder(&path))?;
+            serde_json::from_str(&line).map_err(|error| damaged(&path, &error))
+        }))
+    }
+
+    /// Whether the plan on disk is `plan`, without a second one in memory.
+    fn holds(&self, plan: &Plan, header: &Header) -> Result<bool, SweepError> {
+        if self.header()?.as_ref() != Some(header) {
+            return Ok(false);
+        }
+        let mut known = self.points()?;
+        let is_known = |point: &Point| known.next().is_some_and(|line| line.is_ok_and(|line| line == *point));
+        Ok(plan.points.iter().all(is_known))
+    }
+
     /// Reads the plan.
     ///
     /// # Errors
-    /// If there is none, or it is damaged.
+    /// If it does not exist, or it is damaged.
     pub fn plan(&self) -> Result<Plan, SweepError> {
         let path = self.root.join(PLAN);
         let Some(header) = self.header()? else {
-            let message = "there is none: call `quintile sweep plan FILE.ron --out DIR` first".to_owned();
+            let message = "it does not exist: call `quintile sweep plan FILE.ron --out DIR` first".to_owned();
             return Err(SweepError::Plan { path, message });
         };
-        let lines = BufReader::new(File::open(&path).map_err(SweepError::folder(&path))?).lines().skip(1);
-        let point = |line: io::Result<String>| {
-            let line = line.map_err(SweepError::folder(&path))?;
-            serde_json::from_str(&line).map_err(|error| damaged(&path, &error))
-        };
-        let points = lines.map(point).collect::<Result<Vec<Point>, _>>()?;
+        let points = self.points()?.collect::<Result<Vec<Point>, _>>()?;
         if points.len() != header.points {
             let message =
                 format!("it has {} of {} points: plan the sweep again", points.len(), header.points);
             return Err(SweepError::Plan { path, message });
         }
-        Ok(Plan { name: header.sweep, points })
+        Ok(Plan { name: header.sweep, settings: header.settings, points })
     }
 
     /// File of a point, in one of 256 folders: a folder of a million files is slow.
@@ -164,18 +189,21 @@ fn damaged(path: &Path, error: &serde_json::Error) -> SweepError {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::setting::Setting;
 
     fn plan(name: &str) -> Plan {
         let point = |id: &str| Point { id: id.to_owned(), settings: vec![Setting::new("samples", "2")] };
-        Plan { name: name.to_owned(), points: vec![point("aa01"), point("ab02")] }
+        Plan {
+            name: name.to_owned(),
+            settings: vec![Setting::new("scene", "tiny")],
+            points: vec![point("aa01"), point("ab02")],
+        }
     }
 
     #[test]
     fn a_plan_is_read_as_written_and_keeps_other_sweeps_out() {
         let root = tempfile::tempdir().unwrap();
         let folder = Folder::at(root.path().join("new"));
-        assert!(folder.plan().unwrap_err().to_string().contains("there is none"));
+        assert!(folder.plan().unwrap_err().to_string().contains("it does not exist"));
         folder.write_plan(&plan("a")).unwrap();
         assert_eq!(folder.plan().unwrap(), plan("a"));
         let error = folder.write_plan(&plan("b")).unwrap_err();

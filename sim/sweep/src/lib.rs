@@ -22,6 +22,7 @@ mod points;
 mod run;
 mod setting;
 mod shard;
+mod slurm;
 mod spec;
 mod trials;
 
@@ -33,4 +34,5 @@ pub use merge::{RESULTS, merge};
 pub use plan::{Plan, Point};
 pub use setting::{Setting, Text};
 pub use shard::Shard;
+pub use slurm::{SlurmArray, merge_script, write_scripts};
 pub use spec::{Combination, MAX_POINTS, SweepSpec};

@@ -7,7 +7,7 @@ use traces::io::atomic;
 
 use crate::execute::{Measured, Outcome};
 use crate::parquet::{self, Column, Values};
-use crate::plan::Plan;
+use crate::plan::{Plan, Point};
 use crate::{Folder, SweepError};
 
 /// Name of the table.
@@ -42,10 +42,9 @@ fn columns(plan: &Plan, rows: &[Outcome]) -> Vec<Column> {
     let ids = plan.points.iter().map(|point| Some(point.id.clone())).collect();
     let mut columns = vec![Column { name: "id".to_owned(), values: Values::Text(ids) }];
     columns.extend(settings(plan));
-    let used = used(rows).into_iter().filter(|used| {
-        plan.points.iter().all(|point| point.settings.iter().all(|setting| setting.path != used.name))
-    });
-    columns.extend(used.collect::<Vec<_>>());
+    let is_set = |name: &str| columns.iter().any(|column: &Column| column.name == name);
+    let used: Vec<Column> = used(rows).into_iter().filter(|used| !is_set(&used.name)).collect();
+    columns.extend(used);
     columns.extend(numbers(rows));
     columns.extend(counters(rows));
     let reasons = rows.iter().map(|row| match row {
@@ -56,21 +55,29 @@ fn columns(plan: &Plan, rows: &[Outcome]) -> Vec<Column> {
     columns
 }
 
-/// A column for each setting of the sweep, in order of first use.
+/// A column for each setting of the sweep: those of all points, then those that vary, in order of first use.
 fn settings(plan: &Plan) -> Vec<Column> {
+    let column = |path: &str, texts: Vec<Option<String>>| Column {
+        name: path.to_owned(),
+        values: Values::of_texts(texts),
+    };
+    let common = plan
+        .settings
+        .iter()
+        .map(|setting| column(&setting.path, vec![Some(setting.value.clone()); plan.points.len()]));
     let mut paths: Vec<&str> = Vec::new();
     for setting in plan.points.iter().flat_map(|point| &point.settings) {
         if !paths.contains(&setting.path.as_str()) {
             paths.push(&setting.path);
         }
     }
-    let column = |path: &str| {
-        let value = |point: &crate::Point| {
+    let varied = paths.into_iter().map(|path| {
+        let value = |point: &Point| {
             point.settings.iter().find(|setting| setting.path == path).map(|setting| setting.value.clone())
         };
-        Column { name: path.to_owned(), values: Values::of_texts(plan.points.iter().map(value).collect()) }
-    };
-    paths.into_iter().map(column).collect()
+        column(path, plan.points.iter().map(value).collect())
+    });
+    common.chain(varied).collect()
 }
 
 /// The numbers of a row; `None` if it failed.
@@ -106,9 +113,9 @@ fn numbers(rows: &[Outcome]) -> Vec<Column> {
         whole("cycles", |row| row.cycles),
         number("busy_ms", |row| row.busy_ms),
         number("frame_ms", |row| row.frame_ms),
-        number("busy_mj", |row| row.busy_mj),
-        number("frame_mj", |row| row.frame_mj),
-        number("nj_per_pixel", |row| row.nj_per_pixel),
+        number("busy_mJ", |row| row.busy_mj),
+        number("frame_mJ", |row| row.frame_mj),
+        number("energy_per_pixel_nJ", |row| row.nj_per_pixel),
         whole("dram_bytes", |row| row.dram_bytes),
         Column { name: "accuracy_warnings".to_owned(), values: Values::Text(warnings) },
     ]
@@ -117,7 +124,7 @@ fn numbers(rows: &[Outcome]) -> Vec<Column> {
 /// A column for each event that a point reports.
 fn counters(rows: &[Outcome]) -> Vec<Column> {
     let column = |event: Event| {
-        let count = |row: &Outcome| i64::try_from(*measured(row)?.counts.get(event.name())?).ok();
+        let count = |row: &Outcome| i64::try_from(measured(row)?.counts.get(event)?).ok();
         let counts: Vec<Option<i64>> = rows.iter().map(count).collect();
         let is_reported = counts.iter().any(Option::is_some);
         is_reported.then(|| Column { name: format!("count.{}", event.name()), values: Values::Whole(counts) })
@@ -129,23 +136,24 @@ fn counters(rows: &[Outcome]) -> Vec<Column> {
 mod tests {
     use super::*;
     use crate::setting::Setting;
-    use crate::{Point, Shard, Work};
+    use crate::{Shard, Work};
     use output::progress::Progress;
     use traces::table::InputTable;
 
     fn plan() -> Plan {
         let point = |samples: &str, tile: &str| Point {
             id: format!("{samples}{tile}"),
-            settings: [
-                ("scene", "tiny"),
-                ("frames", "0..1"),
-                ("samples", samples),
-                ("gpu.pipeline.tile_px", tile),
-            ]
-            .map(|(path, value)| Setting::new(path, value))
-            .into(),
+            settings: [("samples", samples), ("gpu.pipeline.tile_px", tile)]
+                .map(|(path, value)| Setting::new(path, value))
+                .into(),
         };
-        Plan { name: "a".to_owned(), points: vec![point("1", "8"), point("2", "7"), point("2", "4")] }
+        Plan {
+            name: "a".to_owned(),
+            settings: [("scene", "tiny"), ("frames", "0..1")]
+                .map(|(path, value)| Setting::new(path, value))
+                .into(),
+            points: vec![point("1", "8"), point("2", "7"), point("2", "4")],
+        }
     }
 
     fn bytes(shards: &[&str], threads: usize) -> Vec<u8> {

@@ -5,10 +5,11 @@ use std::path::Path;
 use output::dir::sha256_of_text;
 use serde::{Deserialize, Serialize};
 
+use crate::SweepError;
+use crate::points::Points;
 use crate::setting::Setting;
 use crate::spec::{Combination, SweepSpec};
 use crate::trials::{Refusal, Trials};
-use crate::{SweepError, points};
 
 /// Version of the files of a sweep.
 pub(crate) const SCHEMA: u32 = 1;
@@ -22,7 +23,7 @@ const ID_DIGITS: usize = 20;
 pub struct Point {
     /// Hash of its settings, of the contents of its input files and of the version of the program.
     pub id: String,
-    /// Settings that differ from the defaults of `quintile run`.
+    /// Settings beside those of all points.
     pub settings: Vec<Setting>,
 }
 
@@ -31,6 +32,8 @@ pub struct Point {
 pub struct Plan {
     /// Name of the sweep.
     pub name: String,
+    /// Settings of all points; others are the defaults of `quintile run`.
+    pub settings: Vec<Setting>,
     /// Points in order.
     pub points: Vec<Point>,
 }
@@ -44,8 +47,8 @@ impl Plan {
     pub fn load(path: &Path, quick: bool, revision: Option<&str>) -> Result<Self, SweepError> {
         let file = || path.display().to_string();
         let spec = SweepSpec::load(path)?;
-        let settings = points::points(&spec, quick);
-        if settings.is_empty() {
+        let points = Points::new(&spec, quick);
+        if points.varied.is_empty() {
             let (place, message) = ("forbidden", "all combinations are left out: forbid fewer");
             return Err(SweepError::Value {
                 file: file(),
@@ -53,24 +56,29 @@ impl Plan {
                 message: message.to_owned(),
             });
         }
-        let mut trials = Trials::new(&settings);
+        let mut trials = Trials::new(&points);
         trials.try_settings(spec.points == Combination::Grid).map_err(|Refusal { message, is_usage }| {
             SweepError::Setting { file: file(), message, is_usage }
         })?;
         let version = format!("{} {}", env!("CARGO_PKG_VERSION"), revision.unwrap_or_default());
-        let ids = (0..settings.len()).map(|at| Ok(id(&settings[at], &trials.inputs_of(at)?, &version)));
-        let ids = ids.collect::<Result<Vec<_>, SweepError>>()?;
-        let points = ids.into_iter().zip(settings).map(|(id, settings)| Point { id, settings }).collect();
-        Ok(Self { name: spec.name, points })
+        let id = |at| Ok(id(points.settings(at), &trials.inputs_of(at)?, &version));
+        let ids = (0..points.varied.len()).map(id).collect::<Result<Vec<_>, SweepError>>()?;
+        let Points { common: settings, varied } = points;
+        let points = ids.into_iter().zip(varied).map(|(id, settings)| Point { id, settings }).collect();
+        Ok(Self { name: spec.name, settings, points })
+    }
+
+    /// All settings of a point.
+    pub(crate) fn settings_of(&self, point: &Point) -> Vec<Setting> {
+        self.settings.iter().chain(&point.settings).cloned().collect()
     }
 }
 
 /// Id of a point.
-fn id(settings: &[Setting], inputs: &str, version: &str) -> String {
-    let mut sorted: Vec<&Setting> = settings.iter().collect();
-    sorted.sort();
+fn id(mut settings: Vec<Setting>, inputs: &str, version: &str) -> String {
+    settings.sort();
     let lines: String =
-        sorted.iter().map(|setting| format!("{:?}={:?}\n", setting.path, setting.value)).collect();
+        settings.iter().map(|setting| format!("{:?}={:?}\n", setting.path, setting.value)).collect();
     let hash = sha256_of_text(&format!("{SCHEMA}\n{version}\n{lines}\n{inputs}"));
     hash.chars().take(ID_DIGITS).collect()
 }

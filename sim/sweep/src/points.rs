@@ -5,26 +5,38 @@ use pipeline::random::{mix, unit};
 use crate::setting::Setting;
 use crate::spec::{Combination, SweepSpec};
 
-/// Settings of all points in order, with repetitions and without forbidden combinations.
-pub(crate) fn points(spec: &SweepSpec, quick: bool) -> Vec<Vec<Setting>> {
-    let base = spec.base(quick);
-    let first_seed =
-        base.iter().find(|setting| setting.path == "seed").and_then(|seed| seed.value.parse().ok());
-    let first_seed: u64 = first_seed.unwrap_or(1);
-    let mut points = Vec::new();
-    for varied in varied(spec).filter(|varied| !spec.is_forbidden(varied)) {
-        let settings: Vec<Setting> = base.iter().cloned().chain(varied).collect();
+/// Points of a sweep.
+pub(crate) struct Points {
+    /// Settings of all points.
+    pub common: Vec<Setting>,
+    /// Further settings of each point, in order: with repetitions and without forbidden combinations.
+    pub varied: Vec<Vec<Setting>>,
+}
+
+impl Points {
+    /// Points of `spec`, with the settings of `--quick` if it is given.
+    pub fn new(spec: &SweepSpec, quick: bool) -> Self {
+        let mut common = spec.base(quick);
+        let varied = varied(spec).filter(|varied| !spec.is_forbidden(varied));
         if spec.repetitions == 1 {
-            points.push(settings);
-            continue;
+            return Self { varied: varied.collect(), common };
         }
-        for repetition in 0..u64::from(spec.repetitions) {
-            let others = settings.iter().filter(|setting| setting.path != "seed").cloned();
-            let seed = Setting::new("seed", first_seed.wrapping_add(repetition).to_string());
-            points.push(others.chain([seed]).collect());
-        }
+        let seed = common.iter().find(|setting| setting.path == "seed");
+        let first: u64 = seed.and_then(|seed| seed.value.parse().ok()).unwrap_or(1);
+        common.retain(|setting| setting.path != "seed");
+        let seeds = (0..u64::from(spec.repetitions)).map(|repetition| first.wrapping_add(repetition));
+        let repeated = |varied: Vec<Setting>| {
+            let with =
+                move |seed: u64| [varied.clone(), vec![Setting::new("seed", seed.to_string())]].concat();
+            seeds.clone().map(with)
+        };
+        Self { varied: varied.flat_map(repeated).collect(), common }
     }
-    points
+
+    /// All settings of point `at`.
+    pub fn settings(&self, at: usize) -> Vec<Setting> {
+        self.common.iter().chain(&self.varied[at]).cloned().collect()
+    }
 }
 
 /// Settings of the axes, point by point.
@@ -82,7 +94,8 @@ mod tests {
     fn made(text: &str) -> Vec<Vec<String>> {
         let spec = SweepSpec::parse(&format!("(name: \"a\", {text})"), "a.ron").unwrap();
         let values = |settings: Vec<Setting>| settings.into_iter().map(|setting| setting.value).collect();
-        points(&spec, false).into_iter().map(values).collect()
+        let points = Points::new(&spec, false);
+        (0..points.varied.len()).map(|at| values(points.settings(at))).collect()
     }
 
     const AXES: &str = r#"axes: [Values(path: "samples", values: [1, 2]),

@@ -68,6 +68,7 @@ impl Status {
 
 /// The points of a shard that are not finished.
 pub struct Work<'a> {
+    plan: &'a Plan,
     folder: &'a Folder,
     runs: usize,
     pending: Vec<&'a Point>,
@@ -87,7 +88,7 @@ impl<'a> Work<'a> {
         };
         let keep = |point: &&'a Point| is_pending(point).map(|keep| keep.then_some(*point)).transpose();
         let pending = points.iter().filter_map(keep).collect::<Result<Vec<_>, SweepError>>()?;
-        Ok(Self { folder, runs: points.len(), pending })
+        Ok(Self { plan, folder, runs: points.len(), pending })
     }
 
     /// Expected time, from runs of the first and the middle pending point whose results are not kept.
@@ -96,8 +97,12 @@ impl<'a> Work<'a> {
         let probed: Vec<&Point> =
             self.pending.iter().copied().step_by(middle.max(1)).take(PROBE_POINTS).collect();
         let started = ProcessTime::now();
-        probed.iter().for_each(|point| drop(execute(point)));
+        probed.iter().for_each(|point| drop(self.execute(point)));
         self.expected(started, probed.len(), self.pending.len())
+    }
+
+    fn execute(&self, point: &Point) -> PointResult {
+        execute(&point.id, &self.plan.settings_of(point))
     }
 
     /// Expectation for `pending` runs, if `probed` runs took the processor time since `started`.
@@ -118,7 +123,7 @@ impl<'a> Work<'a> {
         let (started, processor) = (Instant::now(), ProcessTime::now());
         let (done, failed) = (AtomicUsize::new(0), AtomicUsize::new(0));
         let one = |point: &&Point| {
-            let result = execute(point);
+            let result = self.execute(point);
             self.folder.write_result(point, &result)?;
             let is_failed = matches!(result.outcome, Outcome::Error(_));
             failed.fetch_add(usize::from(is_failed), Ordering::Relaxed);

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use run::{Input, Plan};
 
 use crate::SweepError;
+use crate::points::Points;
 use crate::setting::{self, Setting};
 
 /// Most values of a setting that are tried.
@@ -25,7 +26,7 @@ pub(crate) struct Refusal {
 
 /// Points of a sweep, and what trials found about them.
 pub(crate) struct Trials<'a> {
-    points: &'a [Vec<Setting>],
+    points: &'a Points,
     /// Points that were tried.
     tried: HashMap<usize, Result<(), Refusal>>,
     /// Input files by the settings that name them.
@@ -45,7 +46,7 @@ struct Inputs {
 
 impl<'a> Trials<'a> {
     /// Trials of `points`.
-    pub fn new(points: &'a [Vec<Setting>]) -> Self {
+    pub fn new(points: &'a Points) -> Self {
         Self { points, tried: HashMap::new(), inputs: HashMap::new(), hashes: HashMap::new() }
     }
 
@@ -55,7 +56,7 @@ impl<'a> Trials<'a> {
     /// # Errors
     /// The first refusal of a setting that was refused in all of them.
     pub fn try_settings(&mut self, grid: bool) -> Result<(), Refusal> {
-        for owners in owners(self.points, grid) {
+        for owners in owners(&self.points.varied, grid) {
             let step = owners.len().div_ceil(MAX_TRIALS);
             let mut first = Ok(());
             for &at in owners.iter().step_by(step) {
@@ -76,8 +77,8 @@ impl<'a> Trials<'a> {
         if let Some(tried) = self.tried.get(&at) {
             return tried.clone();
         }
-        let planned = setting::options(&self.points[at]).and_then(Plan::resolve);
-        let inputs = self.inputs.entry(key(&self.points[at])).or_default();
+        let planned = setting::options(&self.points.settings(at)).and_then(Plan::resolve);
+        let inputs = self.inputs.entry(key(&self.points.varied[at])).or_default();
         let tried = match planned {
             Ok(plan) => {
                 inputs.files = Some(plan.files);
@@ -97,7 +98,7 @@ impl<'a> Trials<'a> {
     /// # Errors
     /// If a file cannot be read.
     pub fn inputs_of(&mut self, at: usize) -> Result<String, SweepError> {
-        let key = key(&self.points[at]);
+        let key = key(&self.points.varied[at]);
         let is_open = |inputs: &Inputs| inputs.files.is_none() && inputs.failures < MAX_TRIALS;
         if self.inputs.get(&key).is_none_or(is_open) {
             // A refused point is a row with a reason.
@@ -121,11 +122,11 @@ fn key(settings: &[Setting]) -> Vec<&Setting> {
     settings.iter().filter(|setting| setting.names_files()).collect()
 }
 
-/// Points of each setting, in order of first use: of each of its values if `by_value`, of the first [`MAX_VALUES`] of them.
+/// All points, and those of each setting that varies, in order of first use: of each of its values if `by_value`, of the first [`MAX_VALUES`] of them.
 fn owners(points: &[Vec<Setting>], by_value: bool) -> Vec<Vec<usize>> {
     let mut groups: HashMap<(&str, &str), usize> = HashMap::new();
     let mut values: HashMap<&str, usize> = HashMap::new();
-    let mut owners: Vec<Vec<usize>> = Vec::new();
+    let mut owners: Vec<Vec<usize>> = vec![(0..points.len()).collect()];
     for (at, setting) in
         points.iter().enumerate().flat_map(|(at, point)| point.iter().map(move |set| (at, set)))
     {
@@ -150,20 +151,19 @@ fn owners(points: &[Vec<Setting>], by_value: bool) -> Vec<Vec<usize>> {
 mod tests {
     use super::*;
 
-    fn points(values: &[[&str; 2]]) -> Vec<Vec<Setting>> {
+    fn points(values: &[[&str; 2]]) -> Points {
         let point = |[tile, coarse]: &[&str; 2]| {
             vec![
-                Setting::new("scene", "tiny"),
                 Setting::new("gpu.pipeline.tile_px", *tile),
                 Setting::new("gpu.pipeline.coarse_tile_px", *coarse),
             ]
         };
-        values.iter().map(point).collect()
+        Points { common: vec![Setting::new("scene", "tiny")], varied: values.iter().map(point).collect() }
     }
 
     #[test]
     fn owners_are_grouped_by_value_or_by_path() {
-        let points = points(&[["4", "4"], ["8", "4"]]);
+        let points = points(&[["4", "4"], ["8", "4"]]).varied;
         assert_eq!(owners(&points, true), [vec![0, 1], vec![0], vec![0, 1], vec![1]]);
         assert_eq!(owners(&points, false), [vec![0, 1], vec![0, 1], vec![0, 1]]);
     }
