@@ -173,6 +173,31 @@ fn tasks_of_a_scheduler_take_their_shards() {
     assert!(String::from_utf8_lossy(&unknown.stderr).contains("give --shards N"));
 }
 
+#[test]
+fn a_report_has_frontier_and_effects() {
+    let inputs = Inputs::new();
+    let (file, out) = (inputs.put("tiles.ron", SWEEP), inputs.path("out"));
+    done(&["run", &file, "--out", &out]);
+    let report: serde_json::Value = serde_json::from_str(&done(&["report", &out, "--json"]).stdout).unwrap();
+    assert_eq!(report["left_out"], 1);
+    let designs = report["workloads"]["tiny"].as_array().unwrap();
+    let of = |design: &serde_json::Value, key: &str| design[key].as_f64().unwrap();
+    let best = |key: &str| designs.iter().map(|design| of(design, key)).fold(f64::INFINITY, f64::min);
+    for key in ["time_s", "energy_j"] {
+        let first = designs.iter().find(|design| of(design, key) == best(key)).unwrap();
+        assert!(designs.len() == 3 && first["on_frontier"] == true, "{designs:?}");
+    }
+    // Three points: tiles of 4 pixels with both coarse tiles, tiles of 8 pixels with one.
+    let effects = report["effects"].as_array().unwrap();
+    let points: Vec<u64> = effects.iter().map(|effect| effect["points"].as_u64().unwrap()).collect();
+    assert_eq!(points, [2, 1, 1, 2]);
+    let read = |name: &str| fs::read_to_string(Path::new(&out).join(name)).unwrap();
+    assert!(read("frontier.svg").contains("gpu.pipeline.tile_px="));
+    assert_eq!((read("frontier.csv").lines().count(), read("effects.csv").lines().count()), (4, 5));
+    let text = done(&["report", &out]).stdout;
+    assert!(text.contains("design on the frontier") && text.contains("1 point left out"), "{text}");
+}
+
 /// The scripts, run without Slurm: by the shell, with the variables of a task.
 #[test]
 fn scripts_for_slurm_run_all_points_and_merge_them() {

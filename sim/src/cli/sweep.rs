@@ -4,24 +4,29 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
 use output::progress::Progress;
-use output::table::{counted, shell_line};
+use output::table::{Table, counted, shell_line, si};
 use output::terminal::Terminal;
 use rayon::ThreadPool;
 use serde::Serialize;
 use sweep::{
-    Expected, Folder, Plan, Shard, SlurmArray, Status, SweepError, Work, merge, merge_script, write_scripts,
+    Expected, Folder, Plan, Report, Shard, SlurmArray, Status, SweepError, Work, merge, merge_script,
+    write_scripts,
 };
+use traces::io::atomic::write_file;
+use traces::pareto::{RatedPoint, write_csv};
 
 use super::Failure;
 use super::outputs::{print, print_json};
 use super::run::REVISION;
-use crate::cli::args::ThreadArgs;
+use super::trace::pareto::{Groups, ParetoShow, picture};
+use super::trace::{PlotFormat, write_picture};
+use crate::cli::args::{LookArgs, ThreadArgs};
 
 /// Arguments of `sweep`.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  quintile sweep run tiles.ron --out tiles --dry-run\n  quintile sweep run tiles.ron --out tiles\n  \
-    quintile sweep merge tiles\n  sbatch --array=0-7 --wrap 'quintile sweep run tiles.ron --out tiles'\n\n\
+    quintile sweep merge tiles\n  quintile sweep report tiles\n  sbatch --array=0-7 --wrap 'quintile sweep run tiles.ron --out tiles'\n\n\
     `sweep run` may be stopped at any moment and called again: finished points are skipped. Points are finished when their \
     file is in DIR/points; a point that fails is finished, too, with its reason."
 )]
@@ -44,6 +49,9 @@ pub enum Step {
     Status(StatusArgs),
     /// Write DIR/results.parquet, with a row for each point
     Merge(MergeArgs),
+    /// Print the designs on the frontier of time and energy for each workload, and the main effects of settings; write both
+    /// into DIR as CSV, and a plot
+    Report(ReportArgs),
 }
 
 /// A sweep file and its folder.
@@ -142,6 +150,17 @@ pub struct MergeArgs {
     pub partial: bool,
 }
 
+/// Arguments of `sweep report`.
+#[derive(Debug, Args)]
+pub struct ReportArgs {
+    /// The sweep
+    #[command(flatten)]
+    pub folder: FolderArgs,
+    /// Style of the plot
+    #[command(flatten)]
+    pub look: LookArgs,
+}
+
 impl FolderArgs {
     fn folder(&self) -> Folder {
         let is_file = self.sweep.extension().is_some_and(|ending| ending == "ron") && !self.sweep.is_dir();
@@ -170,6 +189,7 @@ pub(super) fn run(args: &SweepArgs, terminal: &Terminal) -> Result<(), Failure> 
         Step::Slurm(args) => slurm(args),
         Step::Status(args) => status(args),
         Step::Merge(args) => merged(args),
+        Step::Report(args) => report(args),
     }
 }
 
@@ -252,6 +272,70 @@ fn merged(args: &MergeArgs) -> Result<(), Failure> {
     match args.folder.json {
         true => print_json(&serde_json::json!({ "results": path.display().to_string() }), true),
         false => print(&format!("results: {}", path.display())),
+    }
+}
+
+fn report(args: &ReportArgs) -> Result<(), Failure> {
+    let folder = args.folder.folder();
+    let report = Report::of(&folder)?;
+    let file = |name: &str| folder.path().join(name);
+    write_file(&file("frontier.csv"), |out| write_csv(&report.workloads, out))?;
+    write_file(&file("effects.csv"), |out| report.write_effects(out))?;
+    let name = folder.path().display().to_string();
+    let picture = picture(&name, ParetoShow::Energy, &args.look, &named_on_frontier(&report.workloads));
+    write_picture(&picture, &file("frontier.svg"), PlotFormat::Svg)?;
+    if args.folder.json {
+        return print_json(&Printed { out: name, done: &report }, true);
+    }
+    print(&format!("{}\n{}\n{}", frontiers(&report), effects(&report), left_out(&report)))
+}
+
+/// Groups in which only points on the frontier have names: many names would hide the points.
+fn named_on_frontier(groups: &Groups) -> Groups {
+    let mut groups = groups.clone();
+    for design in groups.values_mut().flatten().filter(|design| !design.on_frontier) {
+        design.point.label.clear();
+    }
+    groups
+}
+
+/// Designs on the frontier, the fastest first.
+fn frontiers(report: &Report) -> Table {
+    let mut table = Table::new(["workload", "busy time", "busy energy", "design on the frontier"]);
+    for (workload, designs) in &report.workloads {
+        let mut optimal: Vec<&RatedPoint> = designs.iter().filter(|design| design.on_frontier).collect();
+        optimal.sort_by(|a, b| a.point.time_s.total_cmp(&b.point.time_s));
+        for RatedPoint { point, .. } in optimal {
+            let [time, energy] =
+                [(point.time_s, "s"), (point.energy_j, "J")].map(|(value, unit)| si(value, unit));
+            table.row([workload.clone(), time, energy, point.label.clone()]);
+        }
+    }
+    table
+}
+
+/// Main effects.
+fn effects(report: &Report) -> Table {
+    let mut table = Table::new(["workload", "setting", "value", "points", "time ratio", "energy ratio"]);
+    for effect in &report.effects {
+        let [time, energy] = [effect.time_ratio, effect.energy_ratio].map(|ratio| format!("{ratio:.3}"));
+        let (workload, setting, value) = (&effect.workload, &effect.setting, &effect.value);
+        table.row([
+            workload.clone(),
+            setting.clone(),
+            value.clone(),
+            effect.points.to_string(),
+            time,
+            energy,
+        ]);
+    }
+    table
+}
+
+fn left_out(report: &Report) -> String {
+    match report.left_out {
+        0 => "all points are in".to_owned(),
+        count => format!("{} left out, failed or not finished", counted(count, "point")),
     }
 }
 

@@ -8,6 +8,7 @@
 //! - [`Folder`]: the plan and the results on disk, each file whole or absent.
 //! - [`Shard`]: which points a task runs. [`Work`]: runs those that are not finished.
 //! - [`merge()`]: all results in one table, the same bytes for any number of shards and threads.
+//! - [`Report`]: designs on the frontier of time and energy, and main effects.
 //!
 //! A point has no state but its file, so a sweep may be stopped at any moment and continued anywhere.
 
@@ -19,6 +20,7 @@ mod merge;
 mod parquet;
 mod plan;
 mod points;
+mod report;
 mod run;
 mod setting;
 mod shard;
@@ -32,6 +34,7 @@ pub use error::SweepError;
 pub use folder::Folder;
 pub use merge::{RESULTS, merge};
 pub use plan::{Plan, Point};
+pub use report::{Effect, Report};
 pub use setting::{Setting, Text};
 pub use shard::Shard;
 pub use slurm::{SlurmArray, merge_script, write_scripts};

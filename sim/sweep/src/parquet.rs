@@ -4,7 +4,7 @@ use std::io::Write;
 use std::sync::Arc;
 
 use ::parquet::basic::{Compression, LogicalType, Repetition, Type as Physical};
-use ::parquet::data_type::{ByteArray, ByteArrayType, DataType, DoubleType, Int64Type};
+use ::parquet::data_type::{BoolType, ByteArray, ByteArrayType, DataType, DoubleType, Int64Type};
 use ::parquet::errors::ParquetError;
 use ::parquet::file::properties::WriterProperties;
 use ::parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
@@ -22,29 +22,39 @@ pub(crate) struct Column {
 pub(crate) enum Values {
     Whole(Vec<Option<i64>>),
     Number(Vec<Option<f64>>),
+    Flag(Vec<Option<bool>>),
     Text(Vec<Option<String>>),
 }
 
 impl Values {
-    /// Texts as whole numbers or numbers if all of them are.
+    /// Texts as whole numbers, numbers or flags if all of them are.
     pub fn of_texts(texts: Vec<Option<String>>) -> Self {
-        let given = || texts.iter().flatten();
-        if given().all(|text| text.parse::<i64>().is_ok()) && given().next().is_some() {
-            return Self::Whole(texts.iter().map(|text| text.as_ref()?.parse().ok()).collect());
+        if texts.iter().all(Option::is_none) {
+            return Self::Text(texts);
         }
-        if given().all(|text| text.parse::<f64>().is_ok()) && given().next().is_some() {
-            return Self::Number(texts.iter().map(|text| text.as_ref()?.parse().ok()).collect());
-        }
-        Self::Text(texts)
+        let whole = parsed(&texts).map(Self::Whole);
+        let number = || parsed(&texts).map(Self::Number);
+        let flag = || parsed(&texts).map(Self::Flag);
+        whole.or_else(number).or_else(flag).unwrap_or(Self::Text(texts))
     }
 
     fn physical(&self) -> Physical {
         match self {
             Self::Whole(_) => Physical::INT64,
             Self::Number(_) => Physical::DOUBLE,
+            Self::Flag(_) => Physical::BOOLEAN,
             Self::Text(_) => Physical::BYTE_ARRAY,
         }
     }
+}
+
+/// The values of all texts; `None` if one has none.
+fn parsed<T: std::str::FromStr>(texts: &[Option<String>]) -> Option<Vec<Option<T>>> {
+    let value = |text: &Option<String>| match text {
+        Some(text) => text.parse().ok().map(Some),
+        None => Some(None),
+    };
+    texts.iter().map(value).collect()
 }
 
 /// Writes `columns` of equal length. Equal columns give equal bytes.
@@ -65,6 +75,7 @@ pub(crate) fn write<W: Write + Send>(columns: &[Column], out: W) -> Result<(), P
         match &column.values {
             Values::Whole(values) => write_column::<Int64Type, W>(&mut group, values)?,
             Values::Number(values) => write_column::<DoubleType, W>(&mut group, values)?,
+            Values::Flag(values) => write_column::<BoolType, W>(&mut group, values)?,
             Values::Text(values) => {
                 let bytes = |text: &Option<String>| text.as_deref().map(ByteArray::from);
                 write_column::<ByteArrayType, W>(&mut group, &values.iter().map(bytes).collect::<Vec<_>>())?;
@@ -95,4 +106,23 @@ fn write_column<T: DataType, W: Write + Send>(
         group.next_column()?.ok_or_else(|| ParquetError::General("no column left".to_owned()))?;
     column.typed::<T>().write_batch(&given, Some(&levels), None)?;
     column.close()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn texts_are_typed_if_all_of_them_are() {
+        let of = |texts: &[&str]| {
+            let texts = texts.iter().map(|text| (!text.is_empty()).then(|| (*text).to_owned()));
+            Values::of_texts(texts.collect())
+        };
+        assert!(matches!(of(&["1", "", "-2"]), Values::Whole(values) if values == [Some(1), None, Some(-2)]));
+        assert!(matches!(of(&["1", "2.5"]), Values::Number(values) if values == [Some(1.0), Some(2.5)]));
+        assert!(
+            matches!(of(&["true", "false"]), Values::Flag(values) if values == [Some(true), Some(false)])
+        );
+        assert!(matches!(of(&["1", "a"]), Values::Text(_)) && matches!(of(&["", ""]), Values::Text(_)));
+    }
 }

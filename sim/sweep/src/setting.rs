@@ -68,6 +68,15 @@ impl Setting {
             || within.iter().any(|start| self.path.starts_with(start))
     }
 
+    /// Whether it is of the hardware rather than of the work, or of how the work is measured.
+    pub(crate) fn is_of_design(&self) -> bool {
+        let of_file = matches!(
+            InputFile::of(&self.path),
+            Some(InputFile::Gpu | InputFile::Platform | InputFile::Table)
+        );
+        of_file || matches!(&*self.path, "gpu" | "platform" | "energy")
+    }
+
     fn refused(&self, message: impl std::fmt::Display) -> RunError {
         RunError::Setting(format!("{}: `{}`: {message}", self.path, self.value))
     }
