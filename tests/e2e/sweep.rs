@@ -192,7 +192,7 @@ fn a_report_has_frontier_and_effects() {
     let points: Vec<u64> = effects.iter().map(|effect| effect["points"].as_u64().unwrap()).collect();
     assert_eq!(points, [2, 1, 1, 2]);
     let read = |name: &str| fs::read_to_string(Path::new(&out).join(name)).unwrap();
-    assert!(read("frontier.svg").contains("gpu.pipeline.tile_px="));
+    assert!(read("frontier.svg").contains("coarse_tile_px="));
     assert_eq!((read("frontier.csv").lines().count(), read("effects.csv").lines().count()), (4, 5));
     let text = done(&["report", &out]).stdout;
     assert!(text.contains("design on the frontier") && text.contains("1 point left out"), "{text}");

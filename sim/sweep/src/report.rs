@@ -1,6 +1,6 @@
 //! What a sweep found: the designs that no other dominates in time and energy, and the main effect of each setting.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, Write};
 
 use output::MeanSd;
@@ -8,7 +8,7 @@ use serde::Serialize;
 use traces::pareto::{Point as Measurement, RatedPoint, frontier};
 
 use crate::execute::{Measured, Outcome};
-use crate::plan::Point;
+use crate::plan::{Plan, Point};
 use crate::setting::Setting;
 use crate::{Folder, SweepError};
 
@@ -63,10 +63,11 @@ impl Report {
     /// If the plan or a result cannot be read.
     pub fn of(folder: &Folder) -> Result<Self, SweepError> {
         let plan = folder.plan()?;
+        let names = short_names(&plan);
         let mut rows = Vec::new();
         for point in &plan.points {
             if let Some(Outcome::Measured(measured)) = folder.result(point)?.map(|result| result.outcome) {
-                rows.push(Row::new(point, &measured));
+                rows.push(Row::new(point, &measured, &names));
             }
         }
         let left_out = plan.points.len() - rows.len();
@@ -92,16 +93,17 @@ impl Report {
 }
 
 impl<'a> Row<'a> {
-    fn new(point: &'a Point, measured: &Measured) -> Self {
+    fn new(point: &'a Point, measured: &Measured, names: &BTreeMap<&str, &str>) -> Self {
+        let name = |set: &Setting| format!("{}={}", names.get(&*set.path).unwrap_or(&&*set.path), set.value);
         let (settings, conditions): (Vec<&Setting>, Vec<&Setting>) = point
             .settings
             .iter()
             .filter(|setting| setting.path != "seed")
             .partition(|setting| setting.is_of_design());
-        let name = measured.used.get("scene").cloned();
+        let scene = measured.used.get("scene").cloned();
         let others = conditions.iter().filter(|set| set.path != "scene");
-        let workload = name.into_iter().chain(others.map(|set| format!("{}={}", set.path, set.value)));
-        let design = settings.iter().map(|set| format!("{}={}", set.path, set.value));
+        let workload = scene.into_iter().chain(others.map(|set| name(set)));
+        let design = settings.iter().map(|set| name(set));
         Self {
             workload: workload.collect::<Vec<_>>().join(", "),
             design: design.collect::<Vec<_>>().join(" "),
@@ -110,6 +112,22 @@ impl<'a> Row<'a> {
             energy_j: measured.busy_mj * 1e-3,
         }
     }
+}
+
+fn last_name(path: &str) -> &str {
+    path.rsplit('.').next().unwrap_or(path)
+}
+
+/// The last name of each path that varies, or the whole path where two end in the same one.
+fn short_names<'a>(plan: &'a Plan) -> BTreeMap<&'a str, &'a str> {
+    let settings = plan.points.iter().flat_map(|point| &point.settings);
+    let paths: BTreeSet<&str> = settings.map(|setting| setting.path.as_str()).collect();
+    let name = |path: &&'a str| {
+        let last = last_name(path);
+        let is_unique = paths.iter().filter(|other| last_name(other) == last).count() == 1;
+        (*path, if is_unique { last } else { *path })
+    };
+    paths.iter().map(name).collect()
 }
 
 /// Designs in order of first use, with means and standard deviations over their runs.
@@ -208,6 +226,16 @@ mod tests {
         let expected = [0.5, 2.0, 1.0 / 3_f64.sqrt(), 3_f64.sqrt()];
         assert!(ratios.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{ratios:?}");
         assert!(found.iter().all(|effect| effect.points == 2 && (effect.energy_ratio - 1.0).abs() < 1e-12));
+    }
+
+    #[test]
+    fn names_are_short_where_they_are_unique() {
+        let paths = ["gpu.a.queue", "gpu.b.queue", "gpu.core_hz"];
+        let settings = paths.map(|path| Setting::new(path, "1")).into();
+        let points = vec![Point { id: String::new(), settings }];
+        let plan = Plan { name: String::new(), settings: Vec::new(), points };
+        let names: Vec<&str> = short_names(&plan).into_values().collect();
+        assert_eq!(names, ["gpu.a.queue", "gpu.b.queue", "core_hz"]);
     }
 
     #[test]
