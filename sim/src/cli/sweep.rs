@@ -9,7 +9,7 @@ use output::terminal::Terminal;
 use rayon::ThreadPool;
 use serde::Serialize;
 use sweep::{
-    Expected, Folder, Plan, Report, Shard, SlurmArray, Status, SweepError, Work, merge, merge_script,
+    Expected, Folder, Plan, Report, Shard, SlurmArray, SlurmJob, Status, SweepError, Work, merge,
     write_scripts,
 };
 use traces::io::atomic::write_file;
@@ -234,32 +234,39 @@ fn slurm(args: &SlurmArgs) -> Result<(), Failure> {
     let expected = pool.install(|| work.probe());
     let tasks = args.tasks.map(|count| count as usize);
     let array = SlurmArray::new(&expected, pool.current_num_threads(), args.task_threads.into(), tasks);
-    let absolute = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
-    let [file, out] = [&args.sweep.file, &args.sweep.out].map(|path| absolute(path));
-    let program = std::env::current_exe().unwrap_or_else(|_| "quintile".into());
-    let [program, file, folder] = [&program, &file, &out].map(|path| path.display().to_string());
-    let step = |name: &str| [program.clone(), "sweep".to_owned(), name.to_owned()];
-    let mut run = [&step("run")[..], &[file, "--out".to_owned(), folder.clone()]].concat();
-    run.extend(args.sweep.quick.then(|| "--quick".to_owned()));
-    let merge = [&step("merge")[..], &[folder, "--partial".to_owned()]].concat();
-    let [array_sh, merge_sh] =
-        write_scripts(&out, &array.script(&plan.name, &out, &run), &merge_script(&plan.name, &out, &merge))?;
+    let [out, directory] = [&*args.sweep.out, Path::new("")].map(absolute);
+    let [run, merge] = commands(&args.sweep);
+    let job = SlurmJob { name: &plan.name, folder: &out, directory: &directory, command: &run };
+    let merge_sh = SlurmJob { command: &merge, ..job }.merge_script();
+    let scripts = write_scripts(&out, &array.script(&job), &merge_sh)?.map(|path| path.display().to_string());
     if args.sweep.json {
-        let paths = [&array_sh, &merge_sh].map(|path| path.display().to_string());
-        return print_json(
-            &serde_json::json!({ "scripts": paths, "tasks": array.tasks, "expected": expected }),
-            true,
-        );
+        let printed = serde_json::json!({ "scripts": scripts, "tasks": array.tasks, "expected": expected });
+        return print_json(&printed, true);
     }
-    let tasks = counted(array.tasks, "task");
-    let submit = [array_sh, merge_sh].map(|path| shell_line(&[path.display().to_string()]));
+    let [array_sh, merge_sh] = scripts.map(|path| shell_line(&[path]));
+    let (tasks, minutes) = (counted(array.tasks, "task"), array.minutes);
     print(&format!(
-        "{}\n{tasks} of {} min at most; submit with\nsbatch --dependency=afterany:$(sbatch --parsable {}) {}",
-        expected.line(),
-        array.minutes,
-        submit[0],
-        submit[1]
+        "{}\n{tasks} of {minutes} min at most; submit with\n\
+         sbatch --dependency=afterany:$(sbatch --parsable {array_sh}) {merge_sh}",
+        expected.line()
     ))
+}
+
+/// Commands of a task and of the merge job, with absolute paths.
+fn commands(args: &FileArgs) -> [Vec<String>; 2] {
+    let text = |path: &Path| path.display().to_string();
+    let program = text(&std::env::current_exe().unwrap_or_else(|_| "quintile".into()));
+    let [file, out] = [&args.file, &args.out].map(|path| text(&absolute(path)));
+    let step = |name: &str| vec![program.clone(), "sweep".to_owned(), name.to_owned()];
+    let quick = args.quick.then(|| "--quick".to_owned());
+    let run = step("run").into_iter().chain([file, "--out".to_owned(), out.clone()]).chain(quick);
+    let merge = step("merge").into_iter().chain([out, "--partial".to_owned()]);
+    [run.collect(), merge.collect()]
+}
+
+/// The path from the root; an empty one is the current directory.
+fn absolute(path: &Path) -> PathBuf {
+    std::env::current_dir().map_or_else(|_| path.to_owned(), |directory| directory.join(path))
 }
 
 fn status(args: &StatusArgs) -> Result<(), Failure> {

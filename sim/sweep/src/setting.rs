@@ -64,7 +64,7 @@ impl Setting {
     /// Whether files that a run reads may depend on it.
     pub(crate) fn names_files(&self) -> bool {
         let within = ["workload.", "scene.", "gpu.power"];
-        matches!(&*self.path, "scene" | "gpu" | "platform" | "energy" | "table")
+        matches!(&*self.path, "scene" | "gpu" | "platform" | "energy" | "table" | "camera")
             || within.iter().any(|start| self.path.starts_with(start))
     }
 

@@ -41,31 +41,53 @@ impl SlurmArray {
         Self { tasks, threads, minutes }
     }
 
-    /// Script of the array, for `sbatch`. `run` is the command of a task, without shard and threads.
-    pub fn script(&self, name: &str, folder: &Path, run: &[String]) -> String {
+    /// Script of the array, for `sbatch`. The command of `job` is that of a task, without shard and threads.
+    pub fn script(&self, job: &SlurmJob<'_>) -> String {
         let Self { tasks, threads, minutes } = self;
         let options = ["--shards", &tasks.to_string(), "--threads", &threads.to_string()].map(str::to_owned);
-        let command: Vec<String> = run.iter().cloned().chain(options).collect();
-        let log = folder.join("slurm-%A_%a.log");
+        let command: Vec<String> = job.command.iter().cloned().chain(options).collect();
         let last = tasks - 1;
-        head(name, &log)
-            + &format!("#SBATCH --array=0-{last}\n#SBATCH --cpus-per-task={threads}\n#SBATCH --time={minutes}\n")
-            // The program gets the signal in place of the shell, and removes what is unfinished.
-            + &format!("#SBATCH --signal=B:TERM@60\nexec {}\n", shell_line(&command))
+        // The program gets the signal in place of the shell, and removes what is unfinished.
+        let options = format!(
+            "#SBATCH --array=0-{last}\n#SBATCH --cpus-per-task={threads}\n#SBATCH --time={minutes}\n\
+             #SBATCH --signal=B:TERM@60\n"
+        );
+        job.head("", "slurm-%A_%a.log") + &options + &job.exec(&command)
     }
 }
 
-/// Script that merges the results, to be submitted after the array.
-pub fn merge_script(name: &str, folder: &Path, merge: &[String]) -> String {
-    head(&format!("{name}-merge"), &folder.join("slurm-%A.log")) + &format!("exec {}\n", shell_line(merge))
+/// What both scripts of a sweep need.
+#[derive(Clone, Copy, Debug)]
+pub struct SlurmJob<'a> {
+    /// Name of the sweep.
+    pub name: &'a str,
+    /// Folder of the sweep.
+    pub folder: &'a Path,
+    /// Directory at which relative paths of settings begin.
+    pub directory: &'a Path,
+    /// Command, word by word.
+    pub command: &'a [String],
 }
 
-fn head(name: &str, log: &Path) -> String {
-    // A name with spaces would end the option.
-    let word: String =
-        name.chars().map(|c| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '_' }).collect();
-    let log = log.display().to_string().replace('"', "");
-    format!("#!/bin/sh\n#SBATCH --job-name={word}\n#SBATCH --output=\"{log}\"\n")
+impl SlurmJob<'_> {
+    /// Script that merges the results, to be submitted after the array.
+    pub fn merge_script(&self) -> String {
+        self.head("-merge", "slurm-%A.log") + &self.exec(self.command)
+    }
+
+    /// First lines of a script whose job is called as the sweep and `ending`.
+    fn head(&self, ending: &str, log: &str) -> String {
+        // A name with spaces would end the option.
+        let plain = |c: char| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '_' };
+        let name: String = self.name.chars().map(plain).collect();
+        let log = self.folder.join(log).display().to_string().replace('"', "");
+        format!("#!/bin/sh\n#SBATCH --job-name={name}{ending}\n#SBATCH --output=\"{log}\"\n")
+    }
+
+    fn exec(&self, command: &[String]) -> String {
+        let directory = shell_line(&[self.directory.display().to_string()]);
+        format!("cd {directory} && exec {}\n", shell_line(command))
+    }
 }
 
 /// Writes both scripts into `folder`; returns their paths.
@@ -101,14 +123,18 @@ mod tests {
 
     #[test]
     fn scripts_quote_names_and_paths() {
-        let run = ["/opt/my tools/quintile", "sweep", "run", "a b.ron"].map(str::to_owned);
-        let text = array(500, 3600.0, Some(4)).script("tile sizes", Path::new("/scratch/a"), &run);
+        let command = ["/opt/my tools/quintile", "sweep", "run", "a b.ron"].map(str::to_owned);
+        let [folder, directory] = ["/scratch/a", "/home/me"].map(Path::new);
+        let job = SlurmJob { name: "tile sizes", folder, directory, command: &command };
+        let text = array(500, 3600.0, Some(4)).script(&job);
         assert!(text.contains("#SBATCH --array=0-3\n") && text.contains("--job-name=tile_sizes\n"), "{text}");
+        let last =
+            "cd /home/me && exec '/opt/my tools/quintile' sweep run 'a b.ron' --shards 4 --threads 2\n";
+        assert!(text.ends_with(last), "{text}");
+        let merge = job.merge_script();
         assert!(
-            text.ends_with("exec '/opt/my tools/quintile' sweep run 'a b.ron' --shards 4 --threads 2\n"),
-            "{text}"
+            merge.contains("--job-name=tile_sizes-merge\n") && merge.starts_with("#!/bin/sh\n"),
+            "{merge}"
         );
-        let merge = merge_script("a", Path::new("/scratch/a"), &run);
-        assert!(merge.contains("--job-name=a-merge\n") && merge.starts_with("#!/bin/sh\n"), "{merge}");
     }
 }

@@ -135,9 +135,11 @@ impl<'a> Changes<'a> {
             changed = with(&changed, change)?;
         }
         let value = parse(&changed).map_err(|message| self.blamed(file, text, message, &parse))?;
-        let head =
-            format!("// {}, changed by --set {}\n", origin.display(), self.of(file).unwrap_or_default());
-        self.files.push(ChangedFile { file, text: head + &with_whole_paths(&changed, origin) });
+        let head = format!("// {}, changed by --set {}", origin.display(), self.of(file).unwrap_or_default());
+        // A comment ends with its line, and a byte order mark is one at the start alone.
+        let (head, body) = (head.replace(['\n', '\r'], " "), changed.trim_start_matches('\u{feff}'));
+        let text = format!("{head}\n{}", with_whole_paths(body, origin));
+        self.files.push(ChangedFile { file, text });
         Ok(value)
     }
 
@@ -286,4 +288,46 @@ impl Changes<'_> {
 
 fn is_file(name: &Path) -> bool {
     name.extension().is_some_and(|ending| ending == "ron")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn change(path: &str, value: &str) -> Change {
+        Change { path: path.to_owned(), value: value.to_owned() }
+    }
+
+    #[test]
+    fn a_changed_text_is_read_as_a_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("gpu.ron");
+        let text = include_str!("../../gpus/mobile.ron").replace("\"iphone_4s\"", "\"own.ron\"");
+        std::fs::write(&file, format!("\u{feff}{text}")).unwrap();
+        let list = [change("gpu.doc", "two\nlines"), change("gpu.pipeline.tile_px", "4")];
+        let mut changes = Changes::new(&list).unwrap();
+        let gpu = changes.gpu(&file).unwrap().unwrap();
+        assert_eq!((gpu.pipeline.tile_px, &*gpu.doc), (4, "two\nlines"));
+        let [ChangedFile { file: InputFile::Gpu, text }] = &changes.files[..] else { panic!() };
+        let elsewhere = GpuSpec::parse(text, "elsewhere.ron").unwrap();
+        assert_eq!(elsewhere, gpu);
+        let platform = folder.path().join("own.ron").display().to_string();
+        assert_eq!(gpu.power.map(|power| power.platform), Some(platform));
+    }
+
+    #[test]
+    fn an_error_names_the_change_that_is_wrong_alone_or_all() {
+        let error = |list: &[Change]| {
+            let mut changes = Changes::new(list).unwrap();
+            changes.gpu(Path::new("reference")).unwrap_err().to_string()
+        };
+        let [tile, coarse] =
+            [change("gpu.pipeline.tile_px", "8"), change("gpu.pipeline.coarse_tile_px", "12")];
+        assert!(error(&[tile.clone(), coarse]).starts_with("--set gpu.pipeline.coarse_tile_px=12: "));
+        let [tile, coarse] =
+            [change("gpu.pipeline.tile_px", "4"), change("gpu.pipeline.coarse_tile_px", "6")];
+        let clock = change("gpu.core_hz", "2e8");
+        let text = error(&[clock, tile, coarse]);
+        assert!(text.contains("gpu.pipeline.coarse_tile_px=6"), "{text}");
+    }
 }
