@@ -52,7 +52,7 @@ use workloads::Scene;
 pub use changes::{ChangeError, ChangedFile, InputFile};
 pub use choice::{Choice, Dimensions, ProbeSummary, Verified, cheapest_level};
 pub use distinct::Distinct;
-pub use dry_run::{DryRun, Expected};
+pub use dry_run::{DryRun, Expected, duration};
 pub use error::RunError;
 pub use frame::{BIN_PS, CrashedFrame, frames_of};
 pub use gpu::{GpuError, GpuSpec, PowerFiles};

@@ -3,6 +3,7 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
+use ::run::duration;
 use cpu_time::ProcessTime;
 use output::progress::Progress;
 use output::table::si;
@@ -155,14 +156,4 @@ fn line(point: &Point, result: &PointResult, (done, count): (usize, usize), left
     };
     let left = if done < count { format!(" ({} left)", duration(left_s)) } else { String::new() };
     format!("{done}/{count} {}: {outcome}{left}", settings.join(" "))
-}
-
-/// Duration as text, to two digits.
-fn duration(seconds: f64) -> String {
-    match seconds {
-        s if s < 1.0 => "a second".to_owned(),
-        s if s < 100.0 => format!("{s:.0} s"),
-        s if s < 6000.0 => format!("{:.0} min", s / 60.0),
-        s => format!("{:.0} h", s / 3600.0),
-    }
 }
