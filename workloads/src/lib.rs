@@ -66,7 +66,7 @@ pub use error::LoadError;
 pub use fingerprint::{Fingerprint, FingerprintError};
 pub use job::Job;
 pub use lighting::Light;
-pub use load::load;
+pub use load::{load, load_text};
 pub use material::{Alpha, Material};
 pub use regime::Regime;
 pub use rendering::Rendering;

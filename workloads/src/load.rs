@@ -26,6 +26,14 @@ pub fn load(name_or_path: impl AsRef<Path>) -> Result<Scene, LoadError> {
     }
 }
 
+/// Parses the RON scene in `text` as if the file at `path` held it: other files are relative to its folder.
+///
+/// # Errors
+/// As [`load`].
+pub fn load_text(text: &str, path: &Path) -> Result<Scene, LoadError> {
+    Scene::new(import::ron::parse(text, path)?).map_err(|error| error.in_file(&path.display().to_string()))
+}
+
 /// Error for a path that is not a scene.
 fn unreadable(path: &Path) -> Option<LoadError> {
     let message = import::foreign(path).or_else(|| {

@@ -134,12 +134,17 @@ impl Platform {
         BUILTIN.into_iter().map(|(name, _)| name)
     }
 
+    /// RON text of the built-in platform `name`.
+    pub fn builtin_text(name: &str) -> Option<&'static str> {
+        BUILTIN.into_iter().find(|(known, _)| *known == name).map(|(_, text)| text)
+    }
+
     /// The built-in platform `name`.
     ///
     /// # Errors
     /// [`PlatformError::Unknown`] with the nearest known name.
     pub fn builtin(name: &str) -> Result<Self, PlatformError> {
-        let Some((_, text)) = BUILTIN.into_iter().find(|(known, _)| *known == name) else {
+        let Some(text) = Self::builtin_text(name) else {
             let suggestion = spec::suggestion(name, &BUILTIN.map(|(known, _)| known));
             return Err(PlatformError::Unknown { name: name.to_owned(), suggestion });
         };

@@ -207,7 +207,7 @@ impl Expected {
 }
 
 /// Duration as text, to two digits.
-fn duration(seconds: f64) -> String {
+pub fn duration(seconds: f64) -> String {
     match seconds {
         s if s < 1.0 => "a second".to_owned(),
         s if s < 100.0 => format!("{s:.0} s"),

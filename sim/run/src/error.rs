@@ -1,5 +1,6 @@
 //! Errors of a run.
 
+use crate::changes::ChangeError;
 use crate::gpu::{GpuError, GpuSpec};
 use output::OutputError;
 use output::image::ImageError;
@@ -23,6 +24,8 @@ pub enum RunError {
     Groups { gpu: String, source: JobError },
     #[error(transparent)]
     Gpu(#[from] GpuError),
+    #[error(transparent)]
+    Change(#[from] ChangeError),
     #[error(transparent)]
     Platform(#[from] power_model::PlatformError),
     #[error(transparent)]
@@ -83,6 +86,7 @@ impl RunError {
             Self::Scene(error) => error.is_usage(),
             Self::Gpu(GpuError::Spec(activity::spec::SpecError::Read { .. })) => false,
             Self::Output(error) => error.is_usage(),
+            Self::Change(error) => !is_unreadable(error),
             Self::Platform(error) => !is_unreadable(error),
             Self::Table(error) => !is_unreadable(error),
             Self::Spec(activity::spec::SpecError::Read { .. }) => false,

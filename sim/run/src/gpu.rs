@@ -110,7 +110,7 @@ impl GpuSpec {
     pub fn load(name: impl AsRef<Path>) -> Result<Self, GpuError> {
         let path = name.as_ref();
         let name = &*path.to_string_lossy();
-        if let Some((_, text)) = BUILTIN.iter().find(|(known, _)| *known == name) {
+        if let Some(text) = Self::builtin_text(name) {
             return Self::parse(text, name);
         }
         if path.extension().is_none_or(|ending| ending != "ron") {
@@ -119,10 +119,20 @@ impl GpuSpec {
             return Err(GpuError::Unknown { name: name.to_owned(), suggestion });
         }
         let mut gpu = Self::parse(&spec::read(path)?, name)?;
-        if let Some(power) = &mut gpu.power {
+        gpu.name_power_files_beside(path);
+        Ok(gpu)
+    }
+
+    /// RON text of the built-in GPU `name`.
+    pub(crate) fn builtin_text(name: &str) -> Option<&'static str> {
+        BUILTIN.iter().find(|(known, _)| *known == name).map(|(_, text)| *text)
+    }
+
+    /// Resolves names of platform and table files relative to the folder of the GPU file at `path`.
+    pub(crate) fn name_power_files_beside(&mut self, path: &Path) {
+        if let Some(power) = &mut self.power {
             power.beside(path);
         }
-        Ok(gpu)
     }
 
     /// Parses and validates RON text; messages name `file`.

@@ -20,6 +20,7 @@
 //! # Ok::<(), run::RunError>(())
 //! ```
 
+mod changes;
 mod choice;
 pub mod compare;
 mod distinct;
@@ -48,15 +49,16 @@ use output::progress::Progress;
 use output::{Destination, OutDir};
 use workloads::Scene;
 
+pub use changes::{ChangeError, ChangedFile, InputFile};
 pub use choice::{Choice, Dimensions, ProbeSummary, Verified, cheapest_level};
 pub use distinct::Distinct;
-pub use dry_run::{DryRun, Expected};
+pub use dry_run::{DryRun, Expected, duration};
 pub use error::RunError;
 pub use frame::{BIN_PS, CrashedFrame, frames_of};
 pub use gpu::{GpuError, GpuSpec, PowerFiles};
 pub use heat::HeatPicture;
 pub use measure::{Checks, Measurement, Resolution};
-pub use options::{HeatQuantity, PacingChoice, Requested, RunOptions, Sampling, TimingChoice};
+pub use options::{Change, HeatQuantity, PacingChoice, Requested, RunOptions, Sampling, TimingChoice};
 pub use passes::{PassSummary, WorkSummary};
 pub use plan::{Plan, fits_memory};
 pub use provenance::{Host, Input, Provenance, again};

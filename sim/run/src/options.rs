@@ -35,6 +35,23 @@ impl PacingChoice {
     }
 }
 
+/// A changed value in an input file.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Change {
+    /// Names from the file inward, separated by dots: `gpu.pipeline.tile_px`. Entries of lists are named by their `name`,
+    /// `event` or `unit`, or by their number from 0.
+    pub path: String,
+    /// The value as in the file; text may be without quotes.
+    pub value: String,
+}
+
+impl std::fmt::Display for Change {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}={}", self.path, self.value)
+    }
+}
+
 /// Requested accuracy and time budget; they replace a timing level.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -101,6 +118,9 @@ pub struct RunOptions {
     pub scene: PathBuf,
     /// Options of a workload.
     pub options: OptionSource,
+    /// Changed values in the files of GPU, platform, energy table and scene.
+    #[serde(default)]
+    pub changes: Vec<Change>,
     /// Changes to the scene's settings.
     pub overrides: Overrides,
     /// A built-in GPU or a RON file.
@@ -156,6 +176,7 @@ impl Default for RunOptions {
         Self {
             scene: "default".into(),
             options: OptionSource::default(),
+            changes: Vec::new(),
             overrides: Overrides::default(),
             gpu: "reference".into(),
             platform: None,

@@ -7,9 +7,10 @@ use pipeline::Viewport;
 use power_model::{EnergyTable, Pacing, Platform, PowerModel};
 use traces::device::RATES_HZ;
 use workloads::job::{Reduction, Request};
-use workloads::{Job, Settings, catalog};
+use workloads::{Job, Rendering, Settings, catalog};
 
 use crate::RunError;
+use crate::changes::{ChangedFile, Changes};
 use crate::gpu::GpuSpec;
 use crate::options::{DEFAULT_RATE_HZ, PacingChoice, RunOptions};
 
@@ -35,6 +36,8 @@ pub struct Plan {
     pub pacing: Pacing,
     /// Input files, sorted by name.
     pub files: Vec<PathBuf>,
+    /// Texts of the input files in which values were changed.
+    pub changed: Vec<ChangedFile>,
 }
 
 impl Plan {
@@ -59,7 +62,8 @@ impl Plan {
                 "packet loss: {loss}; a share from 0 to below 1 can be lost"
             )));
         }
-        let (name, job) = catalog::load(&options.scene, &options.options, &request(&options))?;
+        let mut changes = Changes::new(&options.changes)?;
+        let (name, job) = load_job(&options, &mut changes)?;
         let settings = job.settings();
         let viewport = Viewport::new(settings.width, settings.height)
             .ok_or_else(|| RunError::Setting(format!("size: {}x{}", settings.width, settings.height)))?;
@@ -67,16 +71,22 @@ impl Plan {
             PacingChoice::Vsync => Pacing::vsync(settings.frame_rate_hz)?,
             PacingChoice::Free => Pacing::FreeRunning,
         };
-        let gpu = GpuSpec::load(&options.gpu)?;
+        let gpu = changes.gpu(&options.gpu)?.map_or_else(|| GpuSpec::load(&options.gpu), Ok)?;
         let files = gpu.power.clone().unwrap_or_default();
         let platform = options.platform.as_deref().unwrap_or(Path::new(&files.platform));
-        let platform = file_or_name(platform, Platform::load, Platform::builtin)?;
+        let platform = match changes.platform(platform)? {
+            Some(changed) => changed,
+            None => file_or_name(platform, Platform::load, Platform::builtin)?,
+        };
         size_of(settings, viewport, pacing, &platform, options.trace_rate_hz).check()?;
         let table = options.energy.as_deref().unwrap_or(Path::new(&files.energy));
-        let table = file_or_name(table, EnergyTable::load, EnergyTable::builtin)?;
+        let table = match changes.table(table)? {
+            Some(changed) => changed,
+            None => file_or_name(table, EnergyTable::load, EnergyTable::builtin)?,
+        };
         let model = PowerModel::at(&table, &platform, options.bound)?;
-        let files = Vec::new();
-        Ok(Self { name, job, viewport, gpu, platform, table, model, pacing, options, files })
+        let (files, changed) = (Vec::new(), changes.files);
+        Ok(Self { name, job, viewport, gpu, platform, table, model, pacing, options, files, changed })
     }
 
     /// The same plan on another GPU, platform and energy table.
@@ -130,6 +140,15 @@ fn size_of(
         pacing,
         trace_rate_hz: trace_rate_hz.unwrap_or(DEFAULT_RATE_HZ),
         idle_s: platform.lead_in_s.value() + platform.tail_s.value(),
+    }
+}
+
+/// Name and job of the scene or workload, with its changes.
+fn load_job(options: &RunOptions, changes: &mut Changes<'_>) -> Result<(String, Box<dyn Job>), RunError> {
+    let request = request(options);
+    match changes.scene(&options.scene)? {
+        Some(scene) => Ok((scene.name().to_owned(), Box::new(Rendering::new(scene, &request)?))),
+        None => Ok(catalog::load(&options.scene, &options.options, &request)?),
     }
 }
 

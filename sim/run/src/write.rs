@@ -26,7 +26,9 @@ pub(super) fn claim(plan: &Plan) -> Claim {
     let maps = plan.options.heat.iter().flat_map(|&of| frames().map(move |frame| heat_name(of, frame)));
     let heat = maps.flat_map(|name| ["png", "exr", "csv"].map(|end| format!("{name}.{end}")));
     let figures = FIGURES.map(|(figure, _)| figure).into_iter();
+    let changed = plan.changed.iter().map(|changed| changed.file.result());
     Claim::new("run")
+        .files(changed)
         .files(images.chain(heat))
         .plots(figures.map(|figure| format!("plots/{figure}")))
         .files(["trace.parquet", "trace.csv", "trace.json", "frames.csv"])
@@ -41,6 +43,9 @@ pub(super) fn write(outcome: &FinishedRun, dir: &OutDir, progress: &Progress) ->
     dir.write_file("trace.csv", |out| Ok(traces::io::csv::write(trace, out)?))?;
     dir.write_file("trace.json", |out| Ok(traces::io::csv::write_sidecar(trace, out)?))?;
     bar.inc();
+    for changed in &outcome.plan.changed {
+        dir.write_file(changed.file.result(), |out| Ok(out.write_all(changed.text.as_bytes())?))?;
+    }
     write_frames(outcome, dir)?;
     let process = format!("quintile {} on {}", outcome.plan.name, outcome.plan.gpu.name);
     let timeline = timeline(outcome, &process);

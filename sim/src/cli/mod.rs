@@ -11,6 +11,7 @@ mod outputs;
 mod parse;
 mod run;
 mod sample;
+mod sweep;
 mod trace;
 mod visibility;
 
@@ -58,6 +59,8 @@ pub enum Command {
     Info(InfoArgs),
     /// Compare two runs, two images or two folders of images
     Compare(CompareArgs),
+    /// Plan, run and merge many runs from one file: design-space exploration
+    Sweep(sweep::SweepArgs),
     /// Compute the visible triangle and depth of every sample, for comparison with another renderer
     Visibility(VisibilityArgs),
     /// Find the pairs of moving objects that may collide
@@ -176,6 +179,7 @@ fn dispatch(cli: &Cli, terminal: &Terminal) -> Result<(), Failure> {
         Command::Run(args) => run::run(args, terminal),
         Command::Info(args) => info::run(args),
         Command::Compare(args) => compare::run(args),
+        Command::Sweep(args) => sweep::run(args, terminal),
         Command::Completions(args) => completions(args),
         Command::Man(args) => man(args),
         Command::List(args) => list::list(args),

@@ -13,7 +13,7 @@ use output::terminal::{Terminal, Verbosity};
 use output::{Destination, MeanSd};
 use power_model::Bound;
 use run::{
-    DryRun, FinishedRun, HeatQuantity, PacingChoice, Plan, Prepared, Requested, RunError, RunOptions,
+    Change, DryRun, FinishedRun, HeatQuantity, PacingChoice, Plan, Prepared, Requested, RunError, RunOptions,
     Summary, TimingChoice, again, open, prepare,
 };
 use serde::Serialize;
@@ -47,7 +47,8 @@ pub struct RunArgs {
     /// Options of a workload in a .ron file
     #[arg(long, value_name = "FILE.ron")]
     pub options: Option<PathBuf>,
-    /// An option of a workload; may be given several times, and overrides --options
+    /// An option of a workload, or a value in the file of GPU, platform, energy table or scene, such as
+    /// gpu.pipeline.tile_px=8; may be given several times, and overrides --options
     #[arg(long, value_name = "NAME=VALUE", value_parser = setting)]
     pub set: Vec<(String, String)>,
     /// Folder for the results; created if missing
@@ -186,7 +187,7 @@ fn quantity(text: &str) -> Result<HeatQuantity, String> {
 }
 
 /// The git revision of this program.
-const REVISION: Option<&str> = option_env!("QUINTILE_REVISION");
+pub(super) const REVISION: Option<&str> = option_env!("QUINTILE_REVISION");
 
 pub(super) fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), Failure> {
     let started = Instant::now();
@@ -235,9 +236,11 @@ fn dry_run(args: &RunArgs, dry_run: &DryRun, terminal: &Terminal) -> Result<(), 
 }
 
 fn options(args: &RunArgs) -> RunOptions {
+    let (changes, set): (Vec<_>, Vec<_>) = args.set.iter().cloned().partition(|(path, _)| path.contains('.'));
     RunOptions {
         scene: args.scene.clone(),
-        options: OptionSource { file: args.options.clone(), set: args.set.clone() },
+        options: OptionSource { file: args.options.clone(), set },
+        changes: changes.into_iter().map(|(path, value)| Change { path, value }).collect(),
         overrides: args.view.overrides(),
         gpu: args.gpu.clone(),
         platform: args.platform.clone(),

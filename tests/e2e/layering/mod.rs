@@ -10,7 +10,7 @@ use crate::support::{Inputs, root};
 use cargo_metadata::{Metadata, MetadataCommand};
 
 /// Workspace crates that each crate may use, in builds and in tests.
-const ARROWS: [(&str, &[&str]); 12] = [
+const ARROWS: [(&str, &[&str]); 13] = [
     ("warnings", &[]),
     ("activity", &[]),
     ("pipeline", &["activity"]),
@@ -22,6 +22,7 @@ const ARROWS: [(&str, &[&str]); 12] = [
     ("output", &["activity", "pipeline", "power-model", "traces", "warnings"]),
     ("run", &["activity", "output", "pipeline", "power-model", "timing", "traces", "warnings", "workloads"]),
     ("experiments", BELOW_EXPERIMENTS),
+    ("sweep", BELOW_SWEEP),
     ("sim", &BELOW_COMMAND),
 ];
 
@@ -29,14 +30,18 @@ const ARROWS: [(&str, &[&str]); 12] = [
 const BELOW_EXPERIMENTS: &[&str] =
     &["activity", "output", "pipeline", "power-model", "run", "timing", "traces", "warnings", "workloads"];
 
+/// Crates below the sweeps.
+const BELOW_SWEEP: &[&str] = &["activity", "output", "pipeline", "power-model", "run", "traces", "workloads"];
+
 /// Crates below the command.
-const BELOW_COMMAND: [&str; 10] = [
+const BELOW_COMMAND: [&str; 11] = [
     "activity",
     "experiments",
     "output",
     "pipeline",
     "power-model",
     "run",
+    "sweep",
     "timing",
     "traces",
     "warnings",
@@ -77,7 +82,7 @@ fn crates_use_only_allowed_crates() {
 #[test]
 fn packets_are_built_in_the_pipeline_alone() {
     let made = ["Packet::new", "PacketCounts", "PacketKind"];
-    let above = ["workloads/src", "sim/run/src", "sim/experiments/src", "sim/src"];
+    let above = ["workloads/src", "sim/run/src", "sim/experiments/src", "sim/sweep/src", "sim/src"];
     let files: Vec<PathBuf> = above.iter().flat_map(|folder| rust_files(&root().join(folder))).collect();
     assert!(files.len() > 150, "{} files", files.len());
     let found = files.iter().filter(|file| {

@@ -159,12 +159,15 @@ fn settings(runs: &[Value; 2]) -> Vec<Setting> {
     pairs.filter(differs).map(made).chain(options).collect()
 }
 
-/// Options of a workload as on the command line, or null.
+/// Options of a workload and changed values as on the command line, or null.
 fn options(run: &Value) -> Value {
     let options = &run["request"]["options"];
     let pair = |pair: &Value| Some(format!("{}={}", pair[0].as_str()?, pair[1].as_str()?));
     let set = options["set"].as_array().into_iter().flatten().filter_map(pair);
-    let all: Vec<String> = options["file"].as_str().map(str::to_owned).into_iter().chain(set).collect();
+    let change = |change: &Value| Some(format!("{}={}", change["path"].as_str()?, change["value"].as_str()?));
+    let changes = run["request"]["changes"].as_array().into_iter().flatten().filter_map(change);
+    let file = options["file"].as_str().map(str::to_owned);
+    let all: Vec<String> = file.into_iter().chain(set).chain(changes).collect();
     if all.is_empty() { Value::Null } else { Value::String(all.join(" ")) }
 }
 

@@ -5,7 +5,7 @@ mod convert;
 mod energy;
 mod frames;
 mod input;
-mod pareto;
+pub(super) mod pareto;
 mod plot;
 
 use std::path::Path;
@@ -176,7 +176,7 @@ impl PlotFormat {
 }
 
 /// Writes a picture in a format.
-fn write_picture(picture: &Picture, path: &Path, format: PlotFormat) -> Result<(), Failure> {
+pub(super) fn write_picture(picture: &Picture, path: &Path, format: PlotFormat) -> Result<(), Failure> {
     let bytes = match format {
         PlotFormat::Svg => picture.svg().map(String::into_bytes),
         PlotFormat::Png => picture.png(),

@@ -96,7 +96,7 @@ impl From<ParetoError> for Failure {
     }
 }
 
-type Groups = BTreeMap<String, Vec<RatedPoint>>;
+pub(in crate::cli) type Groups = BTreeMap<String, Vec<RatedPoint>>;
 
 pub(super) fn run(args: &ParetoArgs, terminal: &Terminal) -> Result<(), Failure> {
     may_hold_results("--out", args.out.as_deref(), [args.table.as_path()])?;
@@ -106,7 +106,8 @@ pub(super) fn run(args: &ParetoArgs, terminal: &Terminal) -> Result<(), Failure>
         if out.extension().is_some_and(|end| end.eq_ignore_ascii_case("csv")) {
             write_file(out, |file| write_csv(&groups, file))?;
         } else {
-            write_picture(&picture(args, &groups), out, PlotFormat::of(out)?)?;
+            let subject = format!("{} - idle power charged: {} W", shown(&args.table), args.idle_w);
+            write_picture(&picture(&subject, args.show, &args.look, &groups), out, PlotFormat::of(out)?)?;
         }
     }
     if args.json {
@@ -158,8 +159,8 @@ fn place(show: ParetoShow, p: &Point) -> (f64, f64, f64, f64) {
 
 /// All groups in one picture: points with their names and deviations, and each group's frontier as steps, as between two settings
 /// there is none.
-fn picture(args: &ParetoArgs, groups: &Groups) -> Picture {
-    let place = |s: &RatedPoint| place(args.show, &s.point);
+pub(in crate::cli) fn picture(subject: &str, show: ParetoShow, look: &LookArgs, groups: &Groups) -> Picture {
+    let place = |s: &RatedPoint| place(show, &s.point);
     let all = || groups.values().flatten();
     let of = |on: bool| {
         let chosen = all().filter(move |s| s.on_frontier == on);
@@ -185,11 +186,10 @@ fn picture(args: &ParetoArgs, groups: &Groups) -> Picture {
     }
     series.push(Series::new("dominated", Mark::Rings(of(false))).painted(Paint::Like(0)));
     series.push(Series::new("on the frontier", Mark::Dots(of(true))).painted(Paint::Like(0)));
-    let subject = format!("{} - idle power charged: {} W", shown(&args.table), args.idle_w);
-    let (title, y) = match args.show {
+    let (title, y) = match show {
         ParetoShow::Energy => ("Time and energy", ("energy", "J")),
         ParetoShow::Power => ("Time and mean power", ("power", "W")),
     };
     let axes = [("time", "s"), y].map(|(name, unit)| AxisSpec::even(name, unit));
-    Chart::new(title, &subject, vec![ChartPanel::over("", axes, series)]).picture(&args.look.look())
+    Chart::new(title, subject, vec![ChartPanel::over("", axes, series)]).picture(&look.look())
 }

@@ -33,6 +33,11 @@ pub(super) fn import(path: &Path) -> Result<Parts, LoadError> {
     build(spec, path)
 }
 
+/// Parses `text` as the scene at `path`.
+pub(crate) fn parse(text: &str, path: &Path) -> Result<Parts, LoadError> {
+    build(activity::spec::parse(text, &path.display().to_string())?, path)
+}
+
 /// A scene file being turned into a scene.
 #[derive(Clone, Copy)]
 struct Context<'a> {

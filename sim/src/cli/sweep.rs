@@ -1,0 +1,362 @@
+//! `quintile sweep`.
+
+use std::path::{Path, PathBuf};
+
+use clap::{Args, Subcommand};
+use output::progress::Progress;
+use output::table::{Table, counted, shell_line, si};
+use output::terminal::Terminal;
+use rayon::ThreadPool;
+use serde::Serialize;
+use sweep::{
+    Expected, Folder, Plan, Report, Shard, SlurmArray, SlurmJob, Status, SweepError, Work, merge,
+    write_scripts,
+};
+use traces::io::atomic::write_file;
+use traces::pareto::{RatedPoint, write_csv};
+
+use super::Failure;
+use super::outputs::{print, print_json};
+use super::run::REVISION;
+use super::trace::pareto::{Groups, ParetoShow, picture};
+use super::trace::{PlotFormat, write_picture};
+use crate::cli::args::{LookArgs, ThreadArgs};
+
+/// Arguments of `sweep`.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  quintile sweep run tiles.ron --out tiles --dry-run\n  quintile sweep run tiles.ron --out tiles\n  \
+    quintile sweep merge tiles\n  quintile sweep report tiles\n  sbatch --array=0-7 --wrap 'quintile sweep run tiles.ron --out tiles'\n\n\
+    `sweep run` may be stopped at any moment and called again: finished points are skipped. Points are finished when their \
+    file is in DIR/points; a point that fails is finished, too, with its reason."
+)]
+pub struct SweepArgs {
+    /// What to do
+    #[command(subcommand)]
+    pub step: Step,
+}
+
+/// Step of a sweep.
+#[derive(Debug, Subcommand)]
+pub enum Step {
+    /// Check a sweep file, write its points into DIR/plan.jsonl, and print their number and the expected time
+    Plan(PlanArgs),
+    /// Run the points that are not finished, on all cores
+    Run(RunStepArgs),
+    /// Plan, and write scripts for Slurm: DIR/array.sh, whose tasks run the points, and DIR/merge.sh
+    Slurm(SlurmArgs),
+    /// Print how many points are finished, from the files of the sweep alone
+    Status(StatusArgs),
+    /// Write DIR/results.parquet, with a row for each point
+    Merge(MergeArgs),
+    /// Print the designs on the frontier of time and energy for each workload, and the main effects of settings; write both
+    /// into DIR as CSV, and a plot
+    Report(ReportArgs),
+}
+
+/// A sweep file and its folder.
+#[derive(Debug, Args)]
+pub struct FileArgs {
+    /// The sweep file
+    #[arg(value_name = "FILE.ron")]
+    pub file: PathBuf,
+    /// Folder of the sweep; created if missing
+    #[arg(long, value_name = "DIR", default_value = "sweep")]
+    pub out: PathBuf,
+    /// Take the settings under `quick` of the sweep file, which make the runs small
+    #[arg(long)]
+    pub quick: bool,
+    /// Worker threads
+    #[command(flatten)]
+    pub threads: ThreadArgs,
+    /// Print as JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `sweep plan`.
+#[derive(Debug, Args)]
+pub struct PlanArgs {
+    /// The sweep
+    #[command(flatten)]
+    pub sweep: FileArgs,
+}
+
+/// Arguments of `sweep run`.
+#[derive(Debug, Args)]
+pub struct RunStepArgs {
+    /// The sweep
+    #[command(flatten)]
+    pub sweep: FileArgs,
+    /// Run part i of n of the points, such as 1/8 [default: that of the task by the variables of Slurm, PBS or HyperQueue;
+    /// all points outside of a task]
+    #[arg(long, value_name = "i/n", value_parser = Shard::parse, conflicts_with = "shards")]
+    pub shard: Option<Shard>,
+    /// Number of tasks, for PBS and HyperQueue, which do not give it
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub shards: Option<u32>,
+    /// Run points that failed again
+    #[arg(long)]
+    pub retry: bool,
+    /// Print number and expected time of the runs, and stop before anything is written
+    #[arg(long)]
+    pub dry_run: bool,
+}
+
+/// Arguments of `sweep slurm`.
+#[derive(Debug, Args)]
+pub struct SlurmArgs {
+    /// The sweep
+    #[command(flatten)]
+    pub sweep: FileArgs,
+    /// Number of tasks, at most 1000 [default: as many as take ten minutes each, by the expected time]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub tasks: Option<u32>,
+    /// Threads of a task
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub task_threads: u16,
+}
+
+/// The folder of a sweep.
+#[derive(Debug, Args)]
+pub struct FolderArgs {
+    /// The folder of the sweep; or its file, and --out for the folder
+    #[arg(value_name = "DIR|FILE.ron")]
+    pub sweep: PathBuf,
+    /// Folder of the sweep, if its file is given
+    #[arg(long, value_name = "DIR", default_value = "sweep")]
+    pub out: PathBuf,
+    /// Print as JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `sweep status`.
+#[derive(Debug, Args)]
+pub struct StatusArgs {
+    /// The sweep
+    #[command(flatten)]
+    pub folder: FolderArgs,
+}
+
+/// Arguments of `sweep merge`.
+#[derive(Debug, Args)]
+pub struct MergeArgs {
+    /// The sweep
+    #[command(flatten)]
+    pub folder: FolderArgs,
+    /// Write points that are not finished as rows with that reason
+    #[arg(long)]
+    pub partial: bool,
+}
+
+/// Arguments of `sweep report`.
+#[derive(Debug, Args)]
+pub struct ReportArgs {
+    /// The sweep
+    #[command(flatten)]
+    pub folder: FolderArgs,
+    /// Style of the plot
+    #[command(flatten)]
+    pub look: LookArgs,
+}
+
+impl FolderArgs {
+    fn folder(&self) -> Folder {
+        let is_file = self.sweep.extension().is_some_and(|ending| ending == "ron") && !self.sweep.is_dir();
+        Folder::at(if is_file { &self.out } else { &self.sweep })
+    }
+}
+
+impl From<SweepError> for Failure {
+    fn from(error: SweepError) -> Self {
+        Self { message: error.to_string(), code: if error.is_usage() { 2 } else { 1 } }
+    }
+}
+
+/// What a step did, with the folder.
+#[derive(Serialize)]
+struct Printed<'a, T: Serialize> {
+    out: String,
+    #[serde(flatten)]
+    done: &'a T,
+}
+
+pub(super) fn run(args: &SweepArgs, terminal: &Terminal) -> Result<(), Failure> {
+    match &args.step {
+        Step::Plan(args) => plan(args),
+        Step::Run(args) => run_points(args, terminal),
+        Step::Slurm(args) => slurm(args),
+        Step::Status(args) => status(args),
+        Step::Merge(args) => merged(args),
+        Step::Report(args) => report(args),
+    }
+}
+
+/// The plan of a sweep, its folder, and worker threads.
+fn opened(args: &FileArgs) -> Result<(Plan, Folder, ThreadPool), Failure> {
+    let pool = args.threads.pool()?;
+    let plan = pool.install(|| Plan::load(&args.file, args.quick, REVISION))?;
+    let folder = Folder::at(&args.out);
+    folder.check(&plan)?;
+    Ok((plan, folder, pool))
+}
+
+fn plan(args: &PlanArgs) -> Result<(), Failure> {
+    let (plan, folder, pool) = opened(&args.sweep)?;
+    folder.write_plan(&plan)?;
+    let work = Work::new(&plan, &folder, Shard::default(), false)?;
+    let expected = pool.install(|| work.probe());
+    print_expected(&args.sweep, &expected)
+}
+
+fn run_points(args: &RunStepArgs, terminal: &Terminal) -> Result<(), Failure> {
+    let shard = match args.shard {
+        Some(shard) => shard,
+        None => Shard::of_task(args.shards.map(|count| count as usize), |name| std::env::var(name).ok())?,
+    };
+    let (plan, folder, pool) = opened(&args.sweep)?;
+    if args.dry_run {
+        let work = Work::new(&plan, &folder, shard, args.retry)?;
+        return print_expected(&args.sweep, &pool.install(|| work.probe()));
+    }
+    folder.write_plan(&plan)?;
+    let progress = Progress::on(terminal, args.sweep.json);
+    let work = Work::new(&plan, &folder, shard, args.retry)?;
+    let status = pool.install(|| work.run(&progress))?;
+    print_status(&args.sweep.out, args.sweep.json, &status)
+}
+
+fn slurm(args: &SlurmArgs) -> Result<(), Failure> {
+    let (plan, folder, pool) = opened(&args.sweep)?;
+    folder.write_plan(&plan)?;
+    let work = Work::new(&plan, &folder, Shard::default(), false)?;
+    let expected = pool.install(|| work.probe());
+    let tasks = args.tasks.map(|count| count as usize);
+    let array = SlurmArray::new(&expected, pool.current_num_threads(), args.task_threads.into(), tasks);
+    let [out, directory] = [&*args.sweep.out, Path::new("")].map(absolute);
+    let [run, merge] = commands(&args.sweep);
+    let job = SlurmJob { name: &plan.name, folder: &out, directory: &directory, command: &run };
+    let merge_sh = SlurmJob { command: &merge, ..job }.merge_script();
+    let scripts = write_scripts(&out, &array.script(&job), &merge_sh)?.map(|path| path.display().to_string());
+    if args.sweep.json {
+        let printed = serde_json::json!({ "scripts": scripts, "tasks": array.tasks, "expected": expected });
+        return print_json(&printed, true);
+    }
+    let [array_sh, merge_sh] = scripts.map(|path| shell_line(&[path]));
+    let (tasks, minutes) = (counted(array.tasks, "task"), array.minutes);
+    print(&format!(
+        "{}\n{tasks} of {minutes} min at most; submit with\n\
+         sbatch --dependency=afterany:$(sbatch --parsable {array_sh}) {merge_sh}",
+        expected.line()
+    ))
+}
+
+/// Commands of a task and of the merge job, with absolute paths.
+fn commands(args: &FileArgs) -> [Vec<String>; 2] {
+    let text = |path: &Path| path.display().to_string();
+    let program = text(&std::env::current_exe().unwrap_or_else(|_| "quintile".into()));
+    let [file, out] = [&args.file, &args.out].map(|path| text(&absolute(path)));
+    let step = |name: &str| vec![program.clone(), "sweep".to_owned(), name.to_owned()];
+    let quick = args.quick.then(|| "--quick".to_owned());
+    let run = step("run").into_iter().chain([file, "--out".to_owned(), out.clone()]).chain(quick);
+    let merge = step("merge").into_iter().chain([out, "--partial".to_owned()]);
+    [run.collect(), merge.collect()]
+}
+
+/// The path from the root; an empty one is the current directory.
+fn absolute(path: &Path) -> PathBuf {
+    std::env::current_dir().map_or_else(|_| path.to_owned(), |directory| directory.join(path))
+}
+
+fn status(args: &StatusArgs) -> Result<(), Failure> {
+    let folder = args.folder.folder();
+    print_status(folder.path(), args.folder.json, &Status::of(&folder)?)
+}
+
+fn merged(args: &MergeArgs) -> Result<(), Failure> {
+    let path = merge(&args.folder.folder(), args.partial)?;
+    match args.folder.json {
+        true => print_json(&serde_json::json!({ "results": path.display().to_string() }), true),
+        false => print(&format!("results: {}", path.display())),
+    }
+}
+
+fn report(args: &ReportArgs) -> Result<(), Failure> {
+    let folder = args.folder.folder();
+    let report = Report::of(&folder)?;
+    let file = |name: &str| folder.path().join(name);
+    write_file(&file("frontier.csv"), |out| write_csv(&report.workloads, out))?;
+    write_file(&file("effects.csv"), |out| report.write_effects(out))?;
+    let name = folder.path().display().to_string();
+    let picture = picture(&name, ParetoShow::Energy, &args.look, &named_on_frontier(&report.workloads));
+    write_picture(&picture, &file("frontier.svg"), PlotFormat::Svg)?;
+    if args.folder.json {
+        return print_json(&Printed { out: name, done: &report }, true);
+    }
+    print(&format!("{}\n{}\n{}", frontiers(&report), effects(&report), left_out(&report)))
+}
+
+/// Groups in which only points on the frontier have names: many names would hide the points.
+fn named_on_frontier(groups: &Groups) -> Groups {
+    let mut groups = groups.clone();
+    for design in groups.values_mut().flatten().filter(|design| !design.on_frontier) {
+        design.point.label.clear();
+    }
+    groups
+}
+
+/// Designs on the frontier, the fastest first.
+fn frontiers(report: &Report) -> Table {
+    let mut table = Table::new(["workload", "busy time", "busy energy", "design on the frontier"]);
+    for (workload, designs) in &report.workloads {
+        let mut optimal: Vec<&RatedPoint> = designs.iter().filter(|design| design.on_frontier).collect();
+        optimal.sort_by(|a, b| a.point.time_s.total_cmp(&b.point.time_s));
+        for RatedPoint { point, .. } in optimal {
+            let [time, energy] =
+                [(point.time_s, "s"), (point.energy_j, "J")].map(|(value, unit)| si(value, unit));
+            table.row([workload.clone(), time, energy, point.label.clone()]);
+        }
+    }
+    table
+}
+
+/// Main effects.
+fn effects(report: &Report) -> Table {
+    let mut table = Table::new(["workload", "setting", "value", "points", "time ratio", "energy ratio"]);
+    for effect in &report.effects {
+        let [time, energy] = [effect.time_ratio, effect.energy_ratio].map(|ratio| format!("{ratio:.3}"));
+        let (workload, setting, value) = (&effect.workload, &effect.setting, &effect.value);
+        table.row([
+            workload.clone(),
+            setting.clone(),
+            value.clone(),
+            effect.points.to_string(),
+            time,
+            energy,
+        ]);
+    }
+    table
+}
+
+fn left_out(report: &Report) -> String {
+    match report.left_out {
+        0 => "all points are in".to_owned(),
+        count => format!("{} left out, failed or not finished", counted(count, "point")),
+    }
+}
+
+fn print_expected(args: &FileArgs, expected: &Expected) -> Result<(), Failure> {
+    match args.json {
+        true => print_json(&Printed { out: args.out.display().to_string(), done: expected }, true),
+        false => print(&expected.line()),
+    }
+}
+
+fn print_status(out: &Path, json: bool, status: &Status) -> Result<(), Failure> {
+    if json {
+        return print_json(&Printed { out: out.display().to_string(), done: status }, true);
+    }
+    let Status { points, finished, failed } = status;
+    print(&format!("{}: {finished} of {} finished, {failed} failed", out.display(), counted(*points, "run")))
+}

@@ -1,0 +1,100 @@
+//! Errors of a sweep.
+
+use std::path::{Path, PathBuf};
+
+use activity::spec::SpecError;
+use run::RunError;
+use traces::io::WriteError;
+
+/// Why a sweep cannot be planned, run or merged.
+#[derive(Debug, thiserror::Error)]
+pub enum SweepError {
+    /// The sweep file cannot be read or parsed.
+    #[error(transparent)]
+    Spec(#[from] SpecError),
+    /// A part of the sweep file is invalid.
+    #[error("{file}: {place}: {message}")]
+    Value {
+        /// The sweep file.
+        file: String,
+        /// The part.
+        place: String,
+        /// What is wrong, and what to do.
+        message: String,
+    },
+    /// No point can run with a setting: it is unknown, or its value is invalid.
+    #[error("{file}: {message}")]
+    Setting {
+        /// The sweep file.
+        file: String,
+        /// What is wrong, and what to do.
+        message: String,
+        /// Whether the request is wrong, rather than an input file.
+        is_usage: bool,
+    },
+    /// A shard is wrong, or its variables are.
+    #[error("{0}")]
+    Shard(String),
+    /// The folder holds another sweep.
+    #[error("{folder} holds the sweep `{holds}`, and this is `{name}`: give another --out, or remove that folder", folder = .folder.display())]
+    OtherSweep {
+        /// The folder.
+        folder: PathBuf,
+        /// Sweep in it.
+        holds: String,
+        /// Sweep to be run.
+        name: String,
+    },
+    /// The folder has no plan, or a damaged one.
+    #[error("{path}: {message}", path = .path.display())]
+    Plan {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, and what to do.
+        message: String,
+    },
+    /// A folder or file cannot be used.
+    #[error("{path}: {source}; check that it is a folder, that you may write there, and that the disk is not full", path = .path.display())]
+    Folder {
+        /// The folder or file.
+        path: PathBuf,
+        /// Error of the operating system.
+        source: std::io::Error,
+    },
+    /// A result cannot be written.
+    #[error("{0}; what is finished is kept: call it again to continue")]
+    Write(#[from] WriteError),
+    /// Points are not finished.
+    #[error(
+        "{folder}: {missing} of {points} points are not finished: call `quintile sweep run` again, or give --partial",
+        folder = .folder.display()
+    )]
+    Unfinished {
+        /// The folder.
+        folder: PathBuf,
+        /// Points without a result.
+        missing: usize,
+        /// All points.
+        points: usize,
+    },
+    /// An input file cannot be read.
+    #[error(transparent)]
+    Input(RunError),
+}
+
+impl SweepError {
+    /// Whether this is a usage error (exit code 2) rather than a failure (exit code 1).
+    pub fn is_usage(&self) -> bool {
+        match self {
+            Self::Spec(error) => matches!(error, SpecError::Parse { .. }),
+            Self::Value { .. } | Self::Shard(_) | Self::OtherSweep { .. } | Self::Plan { .. } => true,
+            Self::Setting { is_usage, .. } => *is_usage,
+            Self::Folder { .. } | Self::Write(_) | Self::Unfinished { .. } | Self::Input(_) => false,
+        }
+    }
+
+    /// Error of the operating system at `path`.
+    pub(crate) fn folder(path: &Path) -> impl FnOnce(std::io::Error) -> Self {
+        |source| Self::Folder { path: path.to_owned(), source }
+    }
+}

@@ -1,0 +1,200 @@
+//! One point: its run, and what is kept of it.
+
+use std::any::Any;
+use std::collections::{BTreeMap, BTreeSet};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use activity::Event;
+use output::progress::Progress;
+use power_model::{FramePower, pace};
+use run::{Distinct, Plan, RunError, RunFrame, frames_of};
+use serde::{Deserialize, Serialize};
+
+use crate::setting::{self, Setting};
+
+/// Result of a point.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct PointResult {
+    /// Id of the point.
+    pub id: String,
+    #[serde(flatten)]
+    pub outcome: Outcome,
+}
+
+/// What came of a run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum Outcome {
+    /// It was measured.
+    Measured(Box<Measured>),
+    /// It failed, for this reason.
+    Error(String),
+}
+
+impl From<Result<Measured, String>> for Outcome {
+    fn from(result: Result<Measured, String>) -> Self {
+        result.map_or_else(Self::Error, |measured| Self::Measured(Box::new(measured)))
+    }
+}
+
+/// Numbers of a run. Sums are over all its frames, means are per frame.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Measured {
+    /// Settings in use, by name: those of the sweep and of the inputs.
+    pub used: BTreeMap<String, String>,
+    /// Cycles of the core clock, sum.
+    pub cycles: u64,
+    /// Busy time in milliseconds, mean.
+    pub busy_ms: f64,
+    /// Time from the start to the next start in milliseconds, mean.
+    pub frame_ms: f64,
+    /// Energy while busy in millijoules, mean.
+    pub busy_mj: f64,
+    /// Energy from the start to the next start in millijoules, mean.
+    pub frame_mj: f64,
+    /// `frame_mj` over the pixels of a frame, in nanojoules.
+    pub nj_per_pixel: f64,
+    /// Bytes read from and written to memory, sum.
+    pub dram_bytes: u64,
+    /// Codes of accuracy warnings of the timing level, comma-separated.
+    pub accuracy_warnings: String,
+    /// Event counts, sums.
+    pub counts: EventCounts,
+}
+
+/// Counts of the reported events, in files by name.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(from = "BTreeMap<String, u64>", into = "BTreeMap<String, u64>")]
+pub(crate) struct EventCounts(Box<[Option<u64>; Event::COUNT]>);
+
+impl EventCounts {
+    /// Count of an event; `None` if the GPU has no such unit.
+    pub fn get(&self, event: Event) -> Option<u64> {
+        self.0[event as usize]
+    }
+
+    fn of(frames: &[&RunFrame]) -> Self {
+        let mut sums = Self(Box::new([None; Event::COUNT]));
+        let observed = frames.iter().filter_map(|frame| frame.observed());
+        for (event, count) in observed.flat_map(|observed| observed.counts.reported()) {
+            *sums.0[event as usize].get_or_insert(0) += count;
+        }
+        sums
+    }
+}
+
+impl From<BTreeMap<String, u64>> for EventCounts {
+    fn from(counts: BTreeMap<String, u64>) -> Self {
+        Self(Box::new(Event::ALL.map(|event| counts.get(event.name()).copied())))
+    }
+}
+
+impl From<EventCounts> for BTreeMap<String, u64> {
+    fn from(counts: EventCounts) -> Self {
+        Event::ALL
+            .into_iter()
+            .filter_map(|event| Some((event.name().to_owned(), counts.get(event)?)))
+            .collect()
+    }
+}
+
+/// Runs the point `id` with these settings. A failure and a panic are results, too.
+pub(crate) fn execute(id: &str, settings: &[Setting]) -> PointResult {
+    let outcome = catch_unwind(AssertUnwindSafe(|| measure(settings)));
+    let outcome = outcome.unwrap_or_else(|panic| Err(crash(&*panic)));
+    PointResult { id: id.to_owned(), outcome: outcome.into() }
+}
+
+fn crash(panic: &(dyn Any + Send)) -> String {
+    let text = panic.downcast_ref::<&str>().copied().or(panic.downcast_ref::<String>().map(String::as_str));
+    format!("internal error, please report it: {}", text.unwrap_or("a panic"))
+}
+
+fn measure(settings: &[Setting]) -> Result<Measured, String> {
+    let plan = setting::options(settings).and_then(Plan::resolve).map_err(|error| error.to_string())?;
+    measured(&plan).map_err(|error| error.to_string())
+}
+
+fn measured(plan: &Plan) -> Result<Measured, RunError> {
+    let distinct = Distinct::new(&*plan.job)?;
+    let drawn = frames_of(plan, distinct.numbers(), &Progress::new(true))?;
+    let frames: Vec<&RunFrame> = distinct.groups().iter().map(|&group| &drawn[group]).collect();
+    let powers: Vec<&FramePower> = frames.iter().map(|frame| &frame.power).collect();
+    let paced = pace(&powers, &plan.platform, plan.pacing)?;
+    let count = frames.len() as f64;
+    let cycles: u64 = frames.iter().map(|frame| frame.cycles).sum();
+    let frame_j = paced.energy().total_j() / count;
+    let busy_j = frames.iter().map(|frame| frame.cost().energy_j).sum::<f64>() / count;
+    let busy_s = paced.frames.iter().map(|frame| frame.busy_end_s - frame.start_s).sum::<f64>() / count;
+    let counts = EventCounts::of(&frames);
+    let bytes = |event: Event| counts.get(event).unwrap_or(0);
+    Ok(Measured {
+        used: used(plan),
+        cycles,
+        busy_ms: busy_s * 1e3,
+        frame_ms: (paced.end_s - paced.start_s) / count * 1e3,
+        busy_mj: busy_j * 1e3,
+        frame_mj: frame_j * 1e3,
+        nj_per_pixel: frame_j / plan.pixels() as f64 * 1e9,
+        dram_bytes: bytes(Event::DramReadBytes) + bytes(Event::DramWriteBytes),
+        accuracy_warnings: accuracy_warnings(&frames),
+        counts,
+    })
+}
+
+/// Names and sizes in use, so that each row says what it is of.
+fn used(plan: &Plan) -> BTreeMap<String, String> {
+    let (options, settings) = (&plan.options, plan.job.settings());
+    let texts = [
+        ("scene", plan.name.clone()),
+        ("gpu", plan.gpu.name.clone()),
+        ("platform", plan.platform.name.clone()),
+        ("energy", plan.table.name().to_owned()),
+        ("bound", format!("{:?}", options.bound).to_lowercase()),
+        ("timing", options.timing.name().to_owned()),
+        ("pacing", options.pacing.name().to_owned()),
+        ("seed", options.seed.to_string()),
+        ("width", settings.width.to_string()),
+        ("height", settings.height.to_string()),
+        ("samples", settings.samples.to_string()),
+        ("frame_count", settings.frames.len().to_string()),
+    ];
+    texts.into_iter().map(|(name, text)| (name.to_owned(), text)).collect()
+}
+
+fn accuracy_warnings(frames: &[&RunFrame]) -> String {
+    let observed = frames.iter().filter_map(|frame| frame.observed());
+    let codes: BTreeSet<&str> =
+        observed.flat_map(|observed| &observed.accuracy).map(|warning| warning.code().name()).collect();
+    codes.into_iter().collect::<Vec<_>>().join(",")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn outcome(settings: &[(&str, &str)]) -> Outcome {
+        let settings = [("scene", "tiny"), ("frames", "0..2")].iter().chain(settings);
+        let settings: Vec<Setting> = settings.map(|(path, value)| Setting::new(*path, *value)).collect();
+        execute("a", &settings).outcome
+    }
+
+    #[test]
+    fn a_point_is_measured() {
+        let Outcome::Measured(measured) = outcome(&[("samples", "2")]) else { panic!() };
+        assert!(measured.cycles > 0 && measured.busy_mj > 0.0 && measured.frame_mj > measured.busy_mj);
+        assert_eq!((&*measured.used["samples"], &*measured.used["frame_count"]), ("2", "2"));
+        // 64 x 48 pixels.
+        assert!(
+            (measured.nj_per_pixel - measured.frame_mj * 1e6 / 3072.0).abs() < 1e-9 * measured.nj_per_pixel
+        );
+        assert!((measured.frame_ms - 1e3 / 60.0).abs() < 1e-3, "{}", measured.frame_ms);
+    }
+
+    #[test]
+    fn a_failure_is_a_result_with_its_reason() {
+        let Outcome::Error(reason) = outcome(&[("gpu.pipeline.tile_px", "7")]) else { panic!() };
+        assert!(reason.starts_with("--set gpu.pipeline.tile_px=7: "), "{reason}");
+    }
+}

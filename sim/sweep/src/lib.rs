@@ -1,0 +1,41 @@
+//! Design-space exploration: many runs from one file, on one machine or a cluster.
+//!
+//! ```text
+//! SweepSpec (axes) -> points -> Plan (ids) -> Folder -> Work: execute -> a file per point -> merge -> results.parquet
+//! ```
+//!
+//! - [`SweepSpec`]: the sweep file. [`Plan`]: its points with ids, every value tried.
+//! - [`Folder`]: the plan and the results on disk, each file whole or absent.
+//! - [`Shard`]: which points a task runs. [`Work`]: runs those that are not finished.
+//! - [`merge()`]: all results in one table, the same bytes for any number of shards and threads.
+//! - [`Report`]: designs on the frontier of time and energy, and main effects.
+//!
+//! A point has no state but its file, so a sweep may be stopped at any moment and continued anywhere.
+
+mod axis;
+mod error;
+mod execute;
+mod folder;
+mod merge;
+mod parquet;
+mod plan;
+mod points;
+mod report;
+mod run;
+mod setting;
+mod shard;
+mod slurm;
+mod spec;
+mod trials;
+
+pub use self::run::{Expected, Status, Work};
+pub use axis::Axis;
+pub use error::SweepError;
+pub use folder::Folder;
+pub use merge::{RESULTS, merge};
+pub use plan::{Plan, Point};
+pub use report::{Effect, Report};
+pub use setting::{Setting, Text};
+pub use shard::Shard;
+pub use slurm::{SlurmArray, SlurmJob, write_scripts};
+pub use spec::{Combination, MAX_POINTS, SweepSpec};

@@ -1,0 +1,200 @@
+//! All results of a sweep in one table.
+
+use std::path::PathBuf;
+
+use activity::Event;
+use traces::io::atomic;
+
+use crate::execute::{Measured, Outcome};
+use crate::parquet::{self, Column, Values};
+use crate::plan::{Plan, Point};
+use crate::{Folder, SweepError};
+
+/// Name of the table.
+pub const RESULTS: &str = "results.parquet";
+
+/// Writes `results.parquet` of the sweep in `folder`: a row for each point, in the order of the plan. Returns its path. With
+/// `partial`, points without a result are rows with a reason, too.
+///
+/// # Errors
+/// [`SweepError::Unfinished`] if points are missing, and if a file cannot be read or written.
+pub fn merge(folder: &Folder, partial: bool) -> Result<PathBuf, SweepError> {
+    let plan = folder.plan()?;
+    let mut rows = Vec::with_capacity(plan.points.len());
+    let mut missing = 0;
+    for point in &plan.points {
+        let result = folder.result(point)?.map(|result| result.outcome);
+        missing += usize::from(result.is_none());
+        rows.push(result.unwrap_or_else(|| Outcome::Error("not finished".to_owned())));
+    }
+    if missing > 0 && !partial {
+        let (folder, points) = (folder.path().to_owned(), plan.points.len());
+        return Err(SweepError::Unfinished { folder, missing, points });
+    }
+    let path = folder.path().join(RESULTS);
+    let columns = columns(&plan, &rows);
+    atomic::write_file(&path, |out| parquet::write(&columns, out))?;
+    Ok(path)
+}
+
+/// Columns of the table: id, settings, numbers, counters, reason of a failure.
+fn columns(plan: &Plan, rows: &[Outcome]) -> Vec<Column> {
+    let ids = plan.points.iter().map(|point| Some(point.id.clone())).collect();
+    let mut columns = vec![Column { name: "id".to_owned(), values: Values::Text(ids) }];
+    columns.extend(settings(plan));
+    let is_set = |name: &str| columns.iter().any(|column: &Column| column.name == name);
+    let used: Vec<Column> = used(rows).into_iter().filter(|used| !is_set(&used.name)).collect();
+    columns.extend(used);
+    columns.extend(numbers(rows));
+    columns.extend(counters(rows));
+    let reasons = rows.iter().map(|row| match row {
+        Outcome::Error(reason) => Some(reason.clone()),
+        Outcome::Measured(_) => None,
+    });
+    columns.push(Column { name: "error".to_owned(), values: Values::Text(reasons.collect()) });
+    columns
+}
+
+/// A column for each setting of the sweep: those of all points, then those that vary, in order of first use.
+fn settings(plan: &Plan) -> Vec<Column> {
+    let column = |path: &str, texts: Vec<Option<String>>| Column {
+        name: path.to_owned(),
+        values: Values::of_texts(texts),
+    };
+    let common = plan
+        .settings
+        .iter()
+        .map(|setting| column(&setting.path, vec![Some(setting.value.clone()); plan.points.len()]));
+    let mut paths: Vec<&str> = Vec::new();
+    for setting in plan.points.iter().flat_map(|point| &point.settings) {
+        if !paths.contains(&setting.path.as_str()) {
+            paths.push(&setting.path);
+        }
+    }
+    let varied = paths.into_iter().map(|path| {
+        let value = |point: &Point| {
+            point.settings.iter().find(|setting| setting.path == path).map(|setting| setting.value.clone())
+        };
+        column(path, plan.points.iter().map(value).collect())
+    });
+    common.chain(varied).collect()
+}
+
+/// The numbers of a row; `None` if it failed.
+fn measured(row: &Outcome) -> Option<&Measured> {
+    match row {
+        Outcome::Measured(measured) => Some(measured),
+        Outcome::Error(_) => None,
+    }
+}
+
+/// Settings in use that are the same for all kinds of sweeps.
+fn used(rows: &[Outcome]) -> Vec<Column> {
+    let names: Vec<&String> =
+        rows.iter().find_map(measured).map_or(Vec::new(), |first| first.used.keys().collect());
+    let column = |name: &String| {
+        let texts = rows.iter().map(|row| measured(row)?.used.get(name).cloned()).collect();
+        Column { name: name.clone(), values: Values::of_texts(texts) }
+    };
+    names.into_iter().map(column).collect()
+}
+
+fn numbers(rows: &[Outcome]) -> Vec<Column> {
+    let whole = |name: &str, of: fn(&Measured) -> u64| Column {
+        name: name.to_owned(),
+        values: Values::Whole(rows.iter().map(|row| i64::try_from(of(measured(row)?)).ok()).collect()),
+    };
+    let number = |name: &str, of: fn(&Measured) -> f64| Column {
+        name: name.to_owned(),
+        values: Values::Number(rows.iter().map(|row| measured(row).map(of)).collect()),
+    };
+    let warnings = rows.iter().map(|row| measured(row).map(|row| row.accuracy_warnings.clone())).collect();
+    vec![
+        whole("cycles", |row| row.cycles),
+        number("busy_ms", |row| row.busy_ms),
+        number("frame_ms", |row| row.frame_ms),
+        number("busy_mJ", |row| row.busy_mj),
+        number("frame_mJ", |row| row.frame_mj),
+        number("energy_per_pixel_nJ", |row| row.nj_per_pixel),
+        whole("dram_bytes", |row| row.dram_bytes),
+        Column { name: "accuracy_warnings".to_owned(), values: Values::Text(warnings) },
+    ]
+}
+
+/// A column for each event that a point reports.
+fn counters(rows: &[Outcome]) -> Vec<Column> {
+    let column = |event: Event| {
+        let count = |row: &Outcome| i64::try_from(measured(row)?.counts.get(event)?).ok();
+        let counts: Vec<Option<i64>> = rows.iter().map(count).collect();
+        let is_reported = counts.iter().any(Option::is_some);
+        is_reported.then(|| Column { name: format!("count.{}", event.name()), values: Values::Whole(counts) })
+    };
+    Event::ALL.into_iter().filter_map(column).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::setting::Setting;
+    use crate::{Shard, Work};
+    use output::progress::Progress;
+    use traces::table::InputTable;
+
+    fn plan() -> Plan {
+        let point = |samples: &str, tile: &str| Point {
+            id: format!("{samples}{tile}"),
+            settings: [("samples", samples), ("gpu.pipeline.tile_px", tile)]
+                .map(|(path, value)| Setting::new(path, value))
+                .into(),
+        };
+        Plan {
+            name: "a".to_owned(),
+            settings: [("scene", "tiny"), ("frames", "0..1")]
+                .map(|(path, value)| Setting::new(path, value))
+                .into(),
+            points: vec![point("1", "8"), point("2", "7"), point("2", "4")],
+        }
+    }
+
+    fn bytes(shards: &[&str], threads: usize) -> Vec<u8> {
+        let root = tempfile::tempdir().unwrap();
+        let (folder, plan) = (Folder::at(root.path()), plan());
+        folder.write_plan(&plan).unwrap();
+        assert!(matches!(merge(&folder, false), Err(SweepError::Unfinished { missing: 3, points: 3, .. })));
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        for shard in shards {
+            let work = Work::new(&plan, &folder, Shard::parse(shard).unwrap(), false).unwrap();
+            pool.install(|| work.run(&Progress::new(true))).unwrap();
+        }
+        std::fs::read(merge(&folder, false).unwrap()).unwrap()
+    }
+
+    #[test]
+    fn the_table_is_the_same_bytes_for_any_shards_and_threads() {
+        let all = bytes(&["1/1"], 2);
+        assert_eq!(all, bytes(&["2/2", "1/2"], 1));
+        assert_eq!(all, bytes(&["3/3", "1/3", "2/3", "2/3"], 3));
+    }
+
+    #[test]
+    fn every_point_is_a_row_with_numbers_or_a_reason() {
+        let root = tempfile::tempdir().unwrap();
+        let (folder, plan) = (Folder::at(root.path()), plan());
+        folder.write_plan(&plan).unwrap();
+        let work = Work::new(&plan, &folder, Shard::parse("1/2").unwrap(), false).unwrap();
+        work.run(&Progress::new(true)).unwrap();
+        let table = InputTable::read(&merge(&folder, true).unwrap()).unwrap();
+        let cells = |name: &str| table.texts(name).unwrap();
+        assert_eq!(cells("samples"), ["1", "2", "2"]);
+        let errors = cells("error");
+        assert!(errors[0].is_empty() && errors[1] == "not finished" && errors[2].is_empty(), "{errors:?}");
+        let cycles = cells("cycles");
+        assert!(cycles[1].is_empty() && cycles[0].parse::<u64>().unwrap() > 0, "{cycles:?}");
+        assert_eq!(cells("gpu")[0], "reference");
+        let work = Work::new(&plan, &folder, Shard::default(), false).unwrap();
+        let status = work.run(&Progress::new(true)).unwrap();
+        assert_eq!((status.points, status.failed), (3, 1));
+        let table = InputTable::read(&merge(&folder, false).unwrap()).unwrap();
+        assert!(table.texts("error").unwrap()[1].starts_with("--set gpu.pipeline.tile_px=7: "));
+    }
+}

@@ -1,0 +1,136 @@
+//! Points of a sweep: the values of its axes, combined.
+
+use pipeline::random::{mix, unit};
+
+use crate::setting::Setting;
+use crate::spec::{Combination, SweepSpec};
+
+/// Points of a sweep.
+pub(crate) struct Points {
+    /// Settings of all points.
+    pub common: Vec<Setting>,
+    /// Further settings of each point, in order: with repetitions and without forbidden combinations.
+    pub varied: Vec<Vec<Setting>>,
+}
+
+impl Points {
+    /// Points of `spec`, with the settings of `--quick` if it is given.
+    pub fn new(spec: &SweepSpec, quick: bool) -> Self {
+        let mut common = spec.base(quick);
+        let varied = varied(spec).filter(|varied| !spec.is_forbidden(varied));
+        if spec.repetitions == 1 {
+            return Self { varied: varied.collect(), common };
+        }
+        let seed = common.iter().find(|setting| setting.path == "seed");
+        let first: u64 = seed.and_then(|seed| seed.value.parse().ok()).unwrap_or(1);
+        common.retain(|setting| setting.path != "seed");
+        let seeds = (0..u64::from(spec.repetitions)).map(|repetition| first.wrapping_add(repetition));
+        let repeated = |varied: Vec<Setting>| {
+            let with =
+                move |seed: u64| [varied.clone(), vec![Setting::new("seed", seed.to_string())]].concat();
+            seeds.clone().map(with)
+        };
+        Self { varied: varied.flat_map(repeated).collect(), common }
+    }
+
+    /// All settings of point `at`.
+    pub fn settings(&self, at: usize) -> Vec<Setting> {
+        self.common.iter().chain(&self.varied[at]).cloned().collect()
+    }
+}
+
+/// Settings of the axes, point by point.
+fn varied(spec: &SweepSpec) -> Box<dyn Iterator<Item = Vec<Setting>> + '_> {
+    let count = spec.points.count().unwrap_or(0);
+    let at = |shares: &dyn Fn(u32) -> f64| -> Vec<Setting> {
+        (0..).zip(&spec.axes).flat_map(|(dimension, axis)| axis.at(shares(dimension))).collect()
+    };
+    match spec.points {
+        Combination::Grid => Box::new(grid(spec)),
+        Combination::LatinHypercube { seed, .. } => {
+            let parts: Vec<Vec<f64>> =
+                (0..spec.axes.len()).map(|axis| latin(count, seed, axis as u64)).collect();
+            Box::new((0..count as usize).map(move |point| at(&|axis| parts[axis as usize][point])))
+        }
+        Combination::Sobol { seed, .. } => Box::new(
+            (0..count).map(move |point| at(&|axis| f64::from(sobol_burley::sample(point, axis, seed)))),
+        ),
+    }
+}
+
+/// Each value of each axis with all others; the last axis varies fastest.
+fn grid(spec: &SweepSpec) -> impl Iterator<Item = Vec<Setting>> + '_ {
+    let lengths: Vec<usize> = spec.axes.iter().map(|axis| axis.len()).collect();
+    (0..lengths.iter().product()).map(move |point: usize| {
+        let mut rest = point;
+        let mut settings: Vec<Vec<Setting>> = Vec::with_capacity(lengths.len());
+        for (axis, &length) in spec.axes.iter().zip(&lengths).rev() {
+            settings.push(axis.value(rest % length));
+            rest /= length;
+        }
+        settings.into_iter().rev().flatten().collect()
+    })
+}
+
+/// A number in each of `count` equal parts of 0 to 1, in random order.
+fn latin(count: u32, seed: u32, axis: u64) -> Vec<f64> {
+    let mut state = mix(mix(u64::from(seed)) ^ axis);
+    let mut next = move || {
+        state = state.wrapping_add(1);
+        unit(mix(state))
+    };
+    let mut parts: Vec<u32> = (0..count).collect();
+    // Fisher and Yates.
+    for last in (1..parts.len()).rev() {
+        parts.swap(last, ((next() * (last + 1) as f64) as usize).min(last));
+    }
+    parts.into_iter().map(|part| (f64::from(part) + next()) / f64::from(count)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn made(text: &str) -> Vec<Vec<String>> {
+        let spec = SweepSpec::parse(&format!("(name: \"a\", {text})"), "a.ron").unwrap();
+        let values = |settings: Vec<Setting>| settings.into_iter().map(|setting| setting.value).collect();
+        let points = Points::new(&spec, false);
+        (0..points.varied.len()).map(|at| values(points.settings(at))).collect()
+    }
+
+    const AXES: &str = r#"axes: [Values(path: "samples", values: [1, 2]),
+        Linked(settings: {"lens_radius": [0, 1], "shutter": [0.5, 1]})]"#;
+
+    #[test]
+    fn a_grid_combines_all_values_and_links_some() {
+        assert_eq!(made(AXES), [["1", "0", "0.5"], ["1", "1", "1"], ["2", "0", "0.5"], ["2", "1", "1"]]);
+        let fewer = made(&format!("{AXES}, forbidden: [{{\"samples\": 2, \"shutter\": 1.0}}]"));
+        assert_eq!(fewer, [["1", "0", "0.5"], ["1", "1", "1"], ["2", "0", "0.5"]]);
+    }
+
+    #[test]
+    fn repetitions_have_one_seed_after_another() {
+        let text =
+            r#"settings: {"seed": 7}, axes: [Values(path: "samples", values: [1, 2])], repetitions: 2"#;
+        assert_eq!(made(text), [["1", "7"], ["1", "8"], ["2", "7"], ["2", "8"]]);
+    }
+
+    /// Two axes, each with eight equal parts.
+    const PARTS: &str = r#"axes: [Range(path: "gpu.core_hz", from: 0, to: 8),
+        Range(path: "gpu.memory_hz", from: 0, to: 8)]"#;
+
+    #[test]
+    fn sampled_points_fill_each_part_of_each_axis_once() {
+        for points in ["LatinHypercube(count: 8, seed: 3)", "Sobol(count: 8, seed: 3)"] {
+            let text = format!("{PARTS}, points: {points}");
+            let made = made(&text);
+            for axis in 0..2 {
+                let mut parts: Vec<usize> =
+                    made.iter().map(|point| point[axis].parse::<f64>().unwrap() as usize).collect();
+                parts.sort_unstable();
+                assert_eq!(parts, [0, 1, 2, 3, 4, 5, 6, 7], "{points}: {made:?}");
+            }
+            assert_ne!(made, self::made(&text.replace("seed: 3", "seed: 4")));
+        }
+    }
+}

@@ -1,0 +1,159 @@
+//! Running the points of a shard, and the state of a sweep.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Instant;
+
+use ::run::duration;
+use cpu_time::ProcessTime;
+use output::progress::Progress;
+use output::table::si;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use crate::execute::{Outcome, PointResult, execute};
+use crate::plan::{Plan, Point};
+use crate::{Folder, Shard, SweepError};
+
+/// Number of points that a probe runs.
+const PROBE_POINTS: usize = 2;
+
+/// Number of runs to come, and their expected time on the threads of the current pool.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Expected {
+    /// Runs of the shard.
+    pub runs: usize,
+    /// Runs that are not finished.
+    pub pending: usize,
+    /// Expected wall-clock time of the pending runs in seconds; `None` if there are none.
+    pub host_s: Option<f64>,
+}
+
+impl Expected {
+    /// Line for the terminal.
+    pub fn line(&self) -> String {
+        let time = self
+            .host_s
+            .map_or(String::new(), |host_s| format!(", expected to take about {}", duration(host_s)));
+        format!("{} of {} runs to do{time}", self.pending, self.runs)
+    }
+}
+
+/// State of a sweep.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Status {
+    /// Planned points.
+    pub points: usize,
+    /// Points with a result, failed ones included.
+    pub finished: usize,
+    /// Points that failed.
+    pub failed: usize,
+}
+
+impl Status {
+    /// State of the sweep in `folder`, from its files alone.
+    ///
+    /// # Errors
+    /// If there is no plan, or a file cannot be read.
+    pub fn of(folder: &Folder) -> Result<Self, SweepError> {
+        let plan = folder.plan()?;
+        let mut status = Self { points: plan.points.len(), ..Self::default() };
+        for point in &plan.points {
+            if let Some(result) = folder.result(point)? {
+                status.finished += 1;
+                status.failed += usize::from(matches!(result.outcome, Outcome::Error(_)));
+            }
+        }
+        Ok(status)
+    }
+}
+
+/// The points of a shard that are not finished.
+pub struct Work<'a> {
+    plan: &'a Plan,
+    folder: &'a Folder,
+    runs: usize,
+    pending: Vec<&'a Point>,
+}
+
+impl<'a> Work<'a> {
+    /// Points of `plan` in `shard` without a whole result in `folder`; with `retry` also those that failed.
+    ///
+    /// # Errors
+    /// If a result cannot be read.
+    pub fn new(plan: &'a Plan, folder: &'a Folder, shard: Shard, retry: bool) -> Result<Self, SweepError> {
+        let points = plan.points.iter().enumerate();
+        let points: Vec<&Point> = points.filter(|(at, _)| shard.has(*at)).map(|(_, point)| point).collect();
+        let is_pending = |point: &Point| {
+            let result = folder.result(point)?;
+            Ok(result.is_none_or(|result| retry && matches!(result.outcome, Outcome::Error(_))))
+        };
+        let keep = |point: &&'a Point| is_pending(point).map(|keep| keep.then_some(*point)).transpose();
+        let pending = points.iter().filter_map(keep).collect::<Result<Vec<_>, SweepError>>()?;
+        Ok(Self { plan, folder, runs: points.len(), pending })
+    }
+
+    /// Expected time, from runs of the first and the middle pending point whose results are not kept.
+    pub fn probe(&self) -> Expected {
+        let middle = self.pending.len() / 2;
+        let probed: Vec<&Point> =
+            self.pending.iter().copied().step_by(middle.max(1)).take(PROBE_POINTS).collect();
+        let started = ProcessTime::now();
+        probed.iter().for_each(|point| drop(self.execute(point)));
+        self.expected(started, probed.len(), self.pending.len())
+    }
+
+    fn execute(&self, point: &Point) -> PointResult {
+        execute(&point.id, &self.plan.settings_of(point))
+    }
+
+    /// Expectation for `pending` runs, if `probed` runs took the processor time since `started`.
+    fn expected(&self, started: ProcessTime, probed: usize, pending: usize) -> Expected {
+        let each_s = started.elapsed().as_secs_f64() / probed.max(1) as f64;
+        let host_s = each_s * pending as f64 / rayon::current_num_threads() as f64;
+        Expected { runs: self.runs, pending, host_s: (probed > 0).then_some(host_s) }
+    }
+
+    /// Runs all pending points on the current pool. Each result is on disk, whole, before it counts; a point that fails is
+    /// a result with a reason. The first points are the probe for the expected time.
+    ///
+    /// # Errors
+    /// If a result cannot be written. Those that were written stay.
+    pub fn run(&self, progress: &Progress) -> Result<Status, SweepError> {
+        let count = self.pending.len();
+        progress.note(&format!("{count} of {} runs to do", self.runs));
+        let (started, processor) = (Instant::now(), ProcessTime::now());
+        let (done, failed) = (AtomicUsize::new(0), AtomicUsize::new(0));
+        let one = |point: &&Point| {
+            let result = self.execute(point);
+            self.folder.write_result(point, &result)?;
+            let is_failed = matches!(result.outcome, Outcome::Error(_));
+            failed.fetch_add(usize::from(is_failed), Ordering::Relaxed);
+            let done = 1 + done.fetch_add(1, Ordering::Relaxed);
+            let left_s = started.elapsed().as_secs_f64() / done as f64 * (count - done) as f64;
+            progress.note(&line(point, &result, (done, count), left_s));
+            Ok::<(), SweepError>(())
+        };
+        let (first, others) = self.pending.split_at(count.min(PROBE_POINTS));
+        first.iter().try_for_each(one)?;
+        if !others.is_empty() {
+            progress.note(&self.expected(processor, first.len(), others.len()).line());
+        }
+        others.par_iter().try_for_each(one)?;
+        let finished = self.runs;
+        Ok(Status { points: self.runs, finished, failed: failed.into_inner() })
+    }
+}
+
+/// Line about a finished run.
+fn line(point: &Point, result: &PointResult, (done, count): (usize, usize), left_s: f64) -> String {
+    let settings: Vec<String> =
+        point.settings.iter().map(|setting| format!("{}={}", setting.path, setting.value)).collect();
+    let outcome = match &result.outcome {
+        Outcome::Measured(measured) => {
+            format!("{} cycles, {}", measured.cycles, si(measured.frame_mj * 1e-3, "J"))
+        }
+        Outcome::Error(reason) => format!("failed: {reason}"),
+    };
+    let left = if done < count { format!(" ({} left)", duration(left_s)) } else { String::new() };
+    format!("{done}/{count} {}: {outcome}{left}", settings.join(" "))
+}

@@ -1,0 +1,216 @@
+//! Settings of a point by path, and the options of a run made from them.
+
+use activity::spec::suggestion;
+use run::{Change, InputFile, RunError, RunOptions};
+use serde::{Deserialize, Deserializer, Serialize};
+use serde_json::{Map, Value, json};
+
+/// A setting and its value as text.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Setting {
+    /// An option of a run (`timing`), a view option (`samples`), a value in an input file (`gpu.core_hz`), or an option of a
+    /// workload (`workload.bins`).
+    pub path: String,
+    /// The value.
+    pub value: String,
+}
+
+/// Text of a value: a number, `true`, text, or a list.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Text(pub String);
+
+impl<'de> Deserialize<'de> for Text {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        let value = ron::Value::deserialize(from)?;
+        match value {
+            ron::Value::String(text) => Ok(Self(text)),
+            ron::Value::Seq(items) => {
+                let items = items.iter().map(ron::to_string).collect::<Result<Vec<_>, _>>();
+                items.map(|items| Self(format!("({})", items.join(", ")))).map_err(serde::de::Error::custom)
+            }
+            other => ron::to_string(&other).map(Self).map_err(serde::de::Error::custom),
+        }
+    }
+}
+
+/// Options of a run that can be set.
+pub(crate) const OPTIONS: [&str; 8] =
+    ["scene", "gpu", "platform", "energy", "bound", "timing", "pacing", "seed"];
+
+/// View options that can be set: those of [`workloads::Overrides`].
+const VIEW: [&str; 10] = [
+    "size",
+    "samples",
+    "frame_rate_hz",
+    "shutter",
+    "frames",
+    "lens_radius",
+    "focus",
+    "table",
+    "clip",
+    "camera",
+];
+
+/// First name of paths to options of a workload.
+const WORKLOAD: &str = "workload";
+
+impl Setting {
+    /// A setting.
+    pub fn new(path: impl Into<String>, value: impl Into<String>) -> Self {
+        Self { path: path.into(), value: value.into() }
+    }
+
+    /// Whether files that a run reads may depend on it.
+    pub(crate) fn names_files(&self) -> bool {
+        let within = ["workload.", "scene.", "gpu.power"];
+        matches!(&*self.path, "scene" | "gpu" | "platform" | "energy" | "table" | "camera")
+            || within.iter().any(|start| self.path.starts_with(start))
+    }
+
+    /// Whether it is of the hardware rather than of the work, or of how the work is measured.
+    pub(crate) fn is_of_design(&self) -> bool {
+        let of_file = matches!(
+            InputFile::of(&self.path),
+            Some(InputFile::Gpu | InputFile::Platform | InputFile::Table)
+        );
+        of_file || matches!(&*self.path, "gpu" | "platform" | "energy")
+    }
+
+    fn refused(&self, message: impl std::fmt::Display) -> RunError {
+        RunError::Setting(format!("{}: `{}`: {message}", self.path, self.value))
+    }
+}
+
+/// Checks that `path` names a kind of setting.
+///
+/// # Errors
+/// In words, with the nearest known name.
+pub(crate) fn check_path(path: &str) -> Result<(), String> {
+    let first = path.split_once('.').map(|(first, _)| first);
+    let is_known = match first {
+        Some(first) => first == WORKLOAD || InputFile::of(path).is_some(),
+        None => OPTIONS.contains(&path) || VIEW.contains(&path),
+    };
+    if is_known {
+        return Ok(());
+    }
+    let known: Vec<&str> = match first {
+        Some(_) => InputFile::ALL.map(InputFile::name).into_iter().chain([WORKLOAD]).collect(),
+        None => OPTIONS.into_iter().chain(VIEW).collect(),
+    };
+    Err(format!("unknown setting `{path}`, {}", suggestion(first.unwrap_or(path), &known)))
+}
+
+/// Options of a run with `settings`.
+///
+/// # Errors
+/// [`RunError::Setting`] for a value of the wrong type. Values in input files and options of workloads are checked when the
+/// run is planned.
+pub(crate) fn options(settings: &[Setting]) -> Result<RunOptions, RunError> {
+    let mut options = RunOptions::default();
+    for setting in settings {
+        let Setting { path, value } = setting;
+        if InputFile::of(path).is_some() {
+            options.changes.push(Change { path: path.clone(), value: value.clone() });
+        } else if let Some(name) = path.strip_prefix("workload.") {
+            options.options.set.push((name.to_owned(), value.clone()));
+        } else {
+            options = with(&options, setting)?;
+        }
+    }
+    Ok(options)
+}
+
+/// `options` with an option of the run or of the view changed.
+fn with(options: &RunOptions, setting: &Setting) -> Result<RunOptions, RunError> {
+    let Ok(Value::Object(fields)) = serde_json::to_value(options) else {
+        return Err(setting.refused("the options cannot be changed"));
+    };
+    let changed = |value: Value| {
+        let mut fields = fields.clone();
+        let view = fields.get_mut("overrides").and_then(Value::as_object_mut);
+        let of_view = view.filter(|_| VIEW.contains(&&*setting.path));
+        let within: &mut Map<String, Value> = match of_view {
+            Some(view) => view,
+            None => &mut fields,
+        };
+        within.insert(setting.path.clone(), value);
+        serde_json::from_value(Value::Object(fields))
+    };
+    // A value that looks like a number may be a name.
+    let typed = changed(json_of(setting));
+    typed.or_else(|error| {
+        changed(Value::String(setting.value.clone())).map_err(|_| setting.refused(in_words(setting, &error)))
+    })
+}
+
+/// The value in JSON: a number, `true`, a pair such as `(64, 48)`, or text. Frames are a pair or a range such as `0..4`.
+fn json_of(setting: &Setting) -> Value {
+    let text = setting.value.trim();
+    let list = text.replace('(', "[").replace(')', "]");
+    let value = serde_json::from_str(&list).unwrap_or_else(|_| Value::String(text.to_owned()));
+    if setting.path != "frames" {
+        return value;
+    }
+    let numbers =
+        |start: &str, end: &str| Some((start.trim().parse::<u32>().ok()?, end.trim().parse::<u32>().ok()?));
+    let range = text.split_once("..").and_then(|(start, end)| numbers(start, end));
+    match (range, value.as_array().map(Vec::as_slice)) {
+        (Some((start, end)), _) => json!({ "start": start, "end": end }),
+        (_, Some([start, end])) => json!({ "start": start, "end": end }),
+        _ => value,
+    }
+}
+
+/// What is wrong with a value, and which values there are.
+fn in_words(setting: &Setting, error: &serde_json::Error) -> String {
+    let text = error.to_string();
+    let Some((_, expected)) = text.split_once(", expected ") else { return text };
+    if text.starts_with("unknown variant") {
+        let names: Vec<&str> = expected.split('`').skip(1).step_by(2).collect();
+        return format!("unknown value, {}", suggestion(&setting.value, &names));
+    }
+    format!("it is not {expected}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn one(path: &str, value: &str) -> Result<RunOptions, String> {
+        options(&[Setting::new(path, value)]).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn every_kind_of_setting_has_its_place() {
+        assert_eq!(one("samples", "4").unwrap().overrides.samples, Some(4));
+        assert_eq!(one("size", "(64, 48)").unwrap().overrides.size, Some((64, 48)));
+        assert_eq!(one("frames", "(1, 3)").unwrap().overrides.frames, Some(1..3));
+        assert_eq!(one("frames", "1..3").unwrap().overrides.frames, Some(1..3));
+        assert_eq!(one("clip", "5").unwrap().overrides.clip.as_deref(), Some("5"));
+        assert_eq!(one("timing", "bound").unwrap().timing.name(), "bound");
+        assert_eq!(one("gpu.core_hz", "1e8").unwrap().changes[0].path, "gpu.core_hz");
+        assert_eq!(one("workload.bins", "8").unwrap().options.set, [("bins".to_owned(), "8".to_owned())]);
+    }
+
+    #[test]
+    fn every_listed_option_is_one_of_a_run() {
+        let Ok(Value::Object(fields)) = serde_json::to_value(RunOptions::default()) else { panic!() };
+        assert!(OPTIONS.iter().all(|name| fields.contains_key(*name)));
+        let view: Vec<&str> = fields["overrides"].as_object().unwrap().keys().map(String::as_str).collect();
+        assert!(view.len() == VIEW.len() && VIEW.iter().all(|name| view.contains(name)), "{view:?}");
+    }
+
+    #[test]
+    fn unknown_names_and_values_get_a_suggestion() {
+        assert_eq!(check_path("timming").unwrap_err(), "unknown setting `timming`, did you mean `timing`?");
+        assert!(check_path("gpo.core_hz").unwrap_err().contains("did you mean `gpu`?"));
+        assert!(check_path("platform.v_v").is_ok() && check_path("workload.x").is_ok());
+        assert_eq!(
+            one("timing", "stepd").unwrap_err(),
+            "timing: `stepd`: unknown value, did you mean `stepped`?"
+        );
+        assert_eq!(one("samples", "x").unwrap_err(), "samples: `x`: it is not u32");
+    }
+}
