@@ -61,7 +61,7 @@ pub struct Rendered {
     pub visible: Vec<(u32, u32)>,
     /// Count of every event of the pass.
     pub counts: Counts,
-    /// Samples that passed, by draw; 0 for draws that are no [`Query`], and those up to the end of one that ends early.
+    /// Samples that passed, by draw; 0 for draws that are no [`Query`](crate::Query), and those up to the end of one that ends early.
     pub passed: Vec<u64>,
     /// Images or depths in memory.
     pub region: MemoryRange,
