@@ -360,6 +360,11 @@ const OPTIONS: &[WorkloadOptions] = &[
                 "motion of a wall during the shutter in metres; it is 3 m wide",
             ),
             Doc("lens", Numbers(0.0, 1.0), "radius of the lens in metres"),
+            Doc(
+                "query",
+                Names(&["intervals", "any", "samples"]),
+                "what is asked of a box: intervals, whether any sample passes, or how many samples do",
+            ),
             Doc("tile_px", Numbers(1.0, 256.0), "side of a tile of the first level in pixels"),
             Doc("boxes", Numbers(1.0, 16.0), "boxes of lens and time in a tile, along u, v and t"),
         ],

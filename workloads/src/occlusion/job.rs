@@ -9,17 +9,30 @@ use pipeline::random::mix;
 use pipeline::sampling::SampleSource;
 use pipeline::{
     Camera, Cull, Draw, DrawError, Geometry, Gpu, IntervalAnswer, IntervalQueries, Lane, Lens, MovingBox,
-    PassError, RasterPass, Shader, ShadingPoint, Target, Viewport,
+    PassError, Query, RasterPass, SampledAnswer, Shader, ShadingPoint, Target, Viewport,
 };
 use serde::{Deserialize, Serialize};
 use warnings::{Code, Warning};
 
 use crate::error::LoadError;
 use crate::job::{
-    Drawn, Draws, Fact, Flag, Flags, Job, JobError, JobOptions, OptionSource, Request, must_hold,
+    Drawn, Draws, Fact, Flag, Flags, Job, JobError, JobOptions, Need, OptionSource, Request, must_hold,
 };
 use crate::samples::SampleChoice;
 use crate::scene::Settings;
+
+/// What the queries are about.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Asked {
+    /// Intervals of lens, time and depth.
+    #[default]
+    Intervals,
+    /// Whether any sample passes.
+    Any,
+    /// How many samples pass.
+    Samples,
+}
 
 /// Options of the job: walls, boxes behind them, and the queries.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -37,13 +50,18 @@ pub struct Options {
     pub motion: f32,
     /// Radius of the lens in metres, 0 to 1; it is focused in front of everything.
     pub lens: f32,
+    /// What the queries are about.
+    pub query: Asked,
     /// Side of a tile of the first level in pixels, 1 to 256.
     pub tile_px: u32,
     /// Boxes of lens and time per tile, along u, v and t, 1 to 16 each.
     pub boxes: [u32; 3],
 }
 
-impl JobOptions for Options {}
+impl JobOptions for Options {
+    const NEEDS: &'static [Need] =
+        &[Need::new("tile_px", "query", &["intervals"]), Need::new("boxes", "query", &["intervals"])];
+}
 
 impl Default for Options {
     fn default() -> Self {
@@ -54,6 +72,7 @@ impl Default for Options {
             objects: 96,
             motion: 1.0,
             lens: 0.0,
+            query: Asked::default(),
             tile_px: 8,
             boxes: [1, 1, 8],
         }
@@ -135,17 +154,15 @@ impl Draws for Occlusion {
         let settings = pipeline::Settings { spec: gpu.spec(), viewport, samples: &*self.samples, background };
         let walls = gpu.resident(&[self.wall_scene.walls(&WALL).map_err(JobError::setting)?]);
         let camera = &self.wall_scene.camera;
-        let occluders = RasterPass::new(camera, &walls, &settings).named("occluders");
-        let occluders = gpu.draw(&occluders.onto(Target::Depth).with_visible())?;
-        let pyramid = self.pyramid(&depths_of(&occluders.visible), viewport)?;
-        gpu.gather_farthest_depths("farthest depths", &pyramid, occluders.region);
-        let projection = Projection::new(camera, viewport);
-        let queries = IntervalQueries::new(&pyramid, &projection);
-        let (answers, half_covered) =
-            (gpu.query_boxes("queries", &queries, &self.wall_scene.boxes), pyramid.half_covered());
+        let occluders = RasterPass::new(camera, &walls, &settings).named("occluders").onto(Target::Depth);
+        let answers = match self.options.query {
+            Asked::Intervals => self.by_intervals(gpu, &occluders.with_visible())?,
+            Asked::Any => self.by_samples(gpu, &occluders, Query::Any)?,
+            Asked::Samples => self.by_samples(gpu, &occluders, Query::Count)?,
+        };
         // The host draws what is not hidden.
         gpu.wait();
-        let seen = self.wall_scene.boxes.iter().zip(&answers).filter(|(_, answer)| !answer.hidden);
+        let seen = self.wall_scene.boxes.iter().zip(&answers.hidden).filter(|(_, hidden)| !**hidden);
         let Mesh { open, close, triangles } = mesh(&seen.map(|(object, _)| object).collect::<Vec<_>>());
         let boxes = Geometry::new(&open, &close, &triangles).map_err(JobError::setting)?;
         let draws = [walls[0], Draw::new(boxes, &BOX, Cull::None)];
@@ -154,13 +171,35 @@ impl Draws for Occlusion {
             image,
             moving: self.options.motion > 0.0,
             lens: camera.lens().is_some(),
-            facts: facts(&answers),
-            warnings: warnings(&answers, half_covered),
+            facts: answers.facts(),
+            warnings: answers.warnings,
         })
     }
 }
 
 impl Occlusion {
+    fn by_intervals(&self, gpu: &mut Gpu<'_>, occluders: &RasterPass<'_>) -> Result<Answers, JobError> {
+        let viewport = occluders.settings.viewport;
+        let drawn = gpu.draw(occluders)?;
+        let pyramid = self.pyramid(&depths_of(&drawn.visible), viewport)?;
+        gpu.gather_farthest_depths("farthest depths", &pyramid, drawn.region);
+        let projection = Projection::new(&self.wall_scene.camera, viewport);
+        let queries = IntervalQueries::new(&pyramid, &projection);
+        let answers = gpu.query_boxes("queries", &queries, &self.wall_scene.boxes);
+        Ok(Answers::of_intervals(&answers, pyramid.half_covered()))
+    }
+
+    /// The boxes follow the occluders in one pass.
+    fn by_samples(
+        &self,
+        gpu: &mut Gpu<'_>,
+        occluders: &RasterPass<'_>,
+        query: Query,
+    ) -> Result<Answers, JobError> {
+        let pass = occluders.named("occluders and queries");
+        Ok(Answers::of_samples(&gpu.query_samples(&pass, query, &self.wall_scene.boxes)?))
+    }
+
     fn pyramid(&self, depths: &[f32], viewport: Viewport) -> Result<Pyramid, JobError> {
         let grid = BoxGrid::new(self.options.boxes, self.wall_scene.camera.lens().is_some())
             .ok_or_else(|| JobError::setting("boxes: 1 to 16 along each axis"))?;
@@ -185,14 +224,42 @@ fn mesh(boxes: &[&MovingBox]) -> Mesh {
     mesh
 }
 
-fn facts(answers: &[IntervalAnswer]) -> Vec<Fact> {
-    let sum = |of: fn(&IntervalAnswer) -> u64| answers.iter().map(of).sum::<u64>() as f64;
-    Fact::all([
-        ("objects", answers.len() as f64),
-        ("objects_hidden", sum(|answer| u64::from(answer.hidden))),
-        ("tests", sum(IntervalAnswer::tests)),
-        ("depth_bytes", sum(IntervalAnswer::bytes)),
-    ])
+/// Answers of all queries.
+struct Answers {
+    hidden: Vec<bool>,
+    tests: u64,
+    depth_bytes: u64,
+    warnings: Vec<Warning>,
+}
+
+impl Answers {
+    fn of_intervals(answers: &[IntervalAnswer], half_covered: f64) -> Self {
+        Self {
+            hidden: answers.iter().map(|answer| answer.hidden).collect(),
+            tests: answers.iter().map(IntervalAnswer::tests).sum(),
+            depth_bytes: answers.iter().map(IntervalAnswer::bytes).sum(),
+            warnings: warnings(answers, half_covered),
+        }
+    }
+
+    fn of_samples(answers: &[SampledAnswer]) -> Self {
+        Self {
+            hidden: answers.iter().map(|answer| answer.passed == 0).collect(),
+            tests: answers.iter().map(SampledAnswer::tests).sum(),
+            depth_bytes: answers.iter().map(SampledAnswer::bytes).sum(),
+            warnings: Vec::new(),
+        }
+    }
+
+    fn facts(&self) -> Vec<Fact> {
+        let hidden = self.hidden.iter().filter(|hidden| **hidden).count();
+        Fact::all([
+            ("objects", self.hidden.len() as f64),
+            ("objects_hidden", hidden as f64),
+            ("tests", self.tests as f64),
+            ("depth_bytes", self.depth_bytes as f64),
+        ])
+    }
 }
 
 fn warnings(answers: &[IntervalAnswer], half_covered: f64) -> Vec<Warning> {

@@ -1,14 +1,21 @@
 //! Occlusion queries, compared with all samples.
 
+use activity::Event;
 use glam::Vec3;
 use pipeline::depth::{BoxGrid, Pyramid};
 use pipeline::geometry::Projection;
 use pipeline::{
-    IntervalQueries, LensShape, MovingBox, RasterPass, SampleTable, SampledQueries, Settings, Viewport,
+    FrameReport, IntervalQueries, LensShape, MovingBox, RasterPass, SampleTable, SampledQueries, Settings,
+    Viewport,
 };
 use proptest::prelude::*;
+use workloads::Overrides;
+use workloads::catalog::find;
+use workloads::job::{OptionSource, Request};
 use workloads::occlusion::{WallScene, WallSceneSpec, depths};
 use workloads::visibility::Unshaded;
+
+use crate::common::bits;
 
 /// Which boxes of a wall scene are hidden: by intervals, for each grid of boxes and tile side, and by
 /// samples.
@@ -136,6 +143,42 @@ fn a_box_around_the_camera_is_never_hidden_and_one_out_of_view_is() {
     ];
     let hidden_boxes = query(&wall_scene, [80, 45], 4, &[([1, 1, 2], 8)]);
     assert_eq!(hidden_boxes.by_intervals[0], [false, true]);
+}
+
+/// Image and facts of `quintile run occlusion` in a small size, and the work of the GPU.
+fn run(query: &str) -> (Vec<[u32; 3]>, [f64; 2], FrameReport) {
+    let options = OptionSource {
+        file: None,
+        set: vec![("query".into(), query.into()), ("objects".into(), "40".into())],
+    };
+    let overrides = Overrides { size: Some((128, 72)), samples: Some(8), ..Overrides::default() };
+    let job = find("occlusion", &options, &Request { overrides: &overrides, seed: 1 }).unwrap().unwrap();
+    let (drawn, report) = crate::common::drawn_on(&crate::common::spec(), &*job, 0);
+    let fact = |name: &str| drawn.facts.iter().find(|fact| fact.name == name).unwrap().value;
+    (bits(&drawn.image), [fact("objects_hidden"), fact("tests")], report)
+}
+
+/// What is hidden by any kind of query has no visible sample, so the image is the same.
+#[test]
+fn every_kind_of_query_draws_the_same_image() {
+    let kinds = [run("intervals"), run("any"), run("samples")];
+    let [
+        (image, [by_intervals, _], _),
+        (of_any, [any, any_tests], any_work),
+        (of_samples, [all, all_tests], all_work),
+    ] = kinds;
+    assert!(image == of_any && image == of_samples);
+    assert!(
+        0.0 < by_intervals && by_intervals <= any && any == all && all < 40.0,
+        "{by_intervals} {any} {all}"
+    );
+    assert!(any_tests < all_tests, "{any_tests} {all_tests}");
+    let tested = |report: &FrameReport| report.counts()[Event::SamplesTested];
+    assert!(tested(&any_work) < tested(&all_work));
+    assert_eq!(
+        any_work.passes.iter().map(|pass| &*pass.name).collect::<Vec<_>>(),
+        ["occluders and queries", "image"]
+    );
 }
 
 proptest! {
