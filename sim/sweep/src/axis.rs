@@ -1,6 +1,6 @@
 //! Axes: the values of one setting, or of several that change together.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Deserialize;
 
@@ -61,7 +61,11 @@ impl Axis {
             Self::Values { path, values } if values.is_empty() => {
                 Err(format!("`{path}` has no values: list some"))
             }
-            Self::Values { .. } => Ok(()),
+            Self::Values { path, values } => {
+                let mut seen = BTreeSet::new();
+                let repeated = values.iter().find(|value| !seen.insert(value.0.as_str()));
+                repeated.map_or(Ok(()), |value| Err(format!("`{path}` has {} twice", value.0)))
+            }
             Self::Linked { settings } => {
                 let lengths: Vec<usize> = settings.values().map(Vec::len).collect();
                 let fits =

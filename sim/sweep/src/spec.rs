@@ -249,6 +249,7 @@ mod tests {
             ),
             (axes("Range(path: \"gpu.core_hz\", from: 1, to: 2)"), "give `count` or `step`"),
             (axes("Range(path: \"gpu.core_hz\", from: 0, to: 2, count: 3, log: true)"), "above 0"),
+            (axes("Values(path: \"samples\", values: [1, 2, 1])"), "`samples` has 1 twice"),
             (axes("Linked(settings: {\"seed\": [1], \"samples\": [1, 2]})"), "lists of equal length"),
             (message("(name: \"a\", axes: [], points: Sobol(count: 0))"), "points: `count` is 0"),
             (message("(name: \"a\", axes: [], forbidden: [{\"seed\": 1}])"), "`seed` is not varied"),
