@@ -171,6 +171,11 @@ fn in_words(setting: &Setting, error: &serde_json::Error) -> String {
         let names: Vec<&str> = expected.split('`').skip(1).step_by(2).collect();
         return format!("unknown value, {}", suggestion(&setting.value, &names));
     }
+    let expected = match expected {
+        "u32" | "u64" | "usize" => "a whole number",
+        "f32" | "f64" => "a number",
+        other => other,
+    };
     format!("it is not {expected}")
 }
 
@@ -211,6 +216,6 @@ mod tests {
             one("timing", "stepd").unwrap_err(),
             "timing: `stepd`: unknown value, did you mean `stepped`?"
         );
-        assert_eq!(one("samples", "x").unwrap_err(), "samples: `x`: it is not u32");
+        assert_eq!(one("samples", "x").unwrap_err(), "samples: `x`: it is not a whole number");
     }
 }

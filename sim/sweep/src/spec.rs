@@ -147,7 +147,7 @@ impl SweepSpec {
         if self.size().is_none_or(|size| size > MAX_POINTS) {
             return wrong(
                 "axes",
-                "they make more than a million runs: give fewer values, or use Sobol' points",
+                "they make more than a million runs: give fewer values, or `points: Sobol(count: 64)`",
             );
         }
         Ok(())

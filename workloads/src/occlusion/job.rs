@@ -21,10 +21,10 @@ use crate::job::{
 use crate::samples::SampleChoice;
 use crate::scene::Settings;
 
-/// What the queries are about.
+/// Kind of the queries.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Asked {
+pub enum QueryKind {
     /// Intervals of lens, time and depth.
     #[default]
     Intervals,
@@ -50,8 +50,8 @@ pub struct Options {
     pub motion: f32,
     /// Radius of the lens in metres, 0 to 1; it is focused in front of everything.
     pub lens: f32,
-    /// What the queries are about.
-    pub query: Asked,
+    /// Kind of the queries.
+    pub query: QueryKind,
     /// Side of a tile of the first level in pixels, 1 to 256.
     pub tile_px: u32,
     /// Boxes of lens and time per tile, along u, v and t, 1 to 16 each.
@@ -72,7 +72,7 @@ impl Default for Options {
             objects: 96,
             motion: 1.0,
             lens: 0.0,
-            query: Asked::default(),
+            query: QueryKind::default(),
             tile_px: 8,
             boxes: [1, 1, 8],
         }
@@ -156,9 +156,9 @@ impl Draws for Occlusion {
         let camera = &self.wall_scene.camera;
         let occluders = RasterPass::new(camera, &walls, &settings).named("occluders").onto(Target::Depth);
         let answers = match self.options.query {
-            Asked::Intervals => self.by_intervals(gpu, &occluders.with_visible())?,
-            Asked::Any => self.by_samples(gpu, &occluders, Query::Any)?,
-            Asked::Samples => self.by_samples(gpu, &occluders, Query::Count)?,
+            QueryKind::Intervals => self.by_intervals(gpu, &occluders.with_visible())?,
+            QueryKind::Any => self.by_samples(gpu, &occluders, Query::Any)?,
+            QueryKind::Samples => self.by_samples(gpu, &occluders, Query::Count)?,
         };
         // The host draws what is not hidden.
         gpu.wait();

@@ -15,4 +15,4 @@
 mod job;
 
 pub(crate) use job::FLAGS;
-pub use job::{Asked, MAX_HALF_COVERED_SHARE, Options, WallScene, WallSceneSpec, depths, depths_of, job};
+pub use job::{MAX_HALF_COVERED_SHARE, Options, QueryKind, WallScene, WallSceneSpec, depths, depths_of, job};

@@ -191,18 +191,23 @@ fn without_name(error: &impl std::fmt::Display, file: &Path) -> String {
 }
 
 impl Changes<'_> {
-    /// Text of the input `name` if it has changes: of a `.ron` file, or built in. `None` for unknown names, too.
-    fn text(
-        &self,
-        file: InputFile,
-        name: &Path,
+    /// The input `name` with its changes, of a `.ron` file or built in; `None` if it has none, and for unknown names. `in_words` is
+    /// the message of an error without the name of the file.
+    fn input<T, E>(
+        &mut self,
+        (file, name): (InputFile, &Path),
         builtin: impl FnOnce(&str) -> Option<&'static str>,
-    ) -> Result<Option<String>, SpecError> {
-        match self.of(file) {
-            None => Ok(None),
-            Some(_) if is_file(name) => spec::read(name).map(Some),
-            Some(_) => Ok(builtin(&name.to_string_lossy()).map(str::to_owned)),
-        }
+        parse: impl Fn(&str, &str) -> Result<T, E>,
+        in_words: impl Fn(E) -> String,
+    ) -> Result<Option<T>, ChangeError> {
+        let text = match self.of(file) {
+            None => None,
+            Some(_) if is_ron(name) => Some(spec::read(name)?),
+            Some(_) => builtin(&name.to_string_lossy()).map(str::to_owned),
+        };
+        let Some(text) = text else { return Ok(None) };
+        let shown = name.display().to_string();
+        self.apply(file, (&text, name), |text| parse(text, &shown).map_err(&in_words)).map(Some)
     }
 
     /// The GPU of a name or file with its changes; `None` if it has none.
@@ -210,18 +215,16 @@ impl Changes<'_> {
     /// # Errors
     /// If the file cannot be read, or not be changed so.
     pub fn gpu(&mut self, name: &Path) -> Result<Option<GpuSpec>, ChangeError> {
-        let Some(text) = self.text(InputFile::Gpu, name, GpuSpec::builtin_text)? else { return Ok(None) };
-        let file = name.display().to_string();
-        let parse = |text: &str| {
-            GpuSpec::parse(text, &file).map_err(|error| match error {
-                GpuError::Spec(error) => without_place(error),
-                GpuError::Value { message, .. } => message,
-                error => without_name(&error, name),
-            })
+        let in_words = |error| match error {
+            GpuError::Spec(error) => without_place(error),
+            GpuError::Value { message, .. } => message,
+            error => without_name(&error, name),
         };
-        let mut gpu = self.apply(InputFile::Gpu, (&text, name), parse)?;
-        gpu.name_power_files_beside(name);
-        Ok(Some(gpu))
+        let gpu = self.input((InputFile::Gpu, name), GpuSpec::builtin_text, GpuSpec::parse, in_words)?;
+        Ok(gpu.map(|mut gpu| {
+            gpu.name_power_files_beside(name);
+            gpu
+        }))
     }
 
     /// The platform of a name or file with its changes; `None` if it has none.
@@ -229,17 +232,11 @@ impl Changes<'_> {
     /// # Errors
     /// As [`Self::gpu`].
     pub fn platform(&mut self, name: &Path) -> Result<Option<Platform>, ChangeError> {
-        let Some(text) = self.text(InputFile::Platform, name, Platform::builtin_text)? else {
-            return Ok(None);
+        let in_words = |error| match error {
+            PlatformError::Spec(error) => without_place(error),
+            error => without_name(&error, name),
         };
-        let file = name.display().to_string();
-        let parse = |text: &str| {
-            Platform::parse(text, &file).map_err(|error| match error {
-                PlatformError::Spec(error) => without_place(error),
-                error => without_name(&error, name),
-            })
-        };
-        self.apply(InputFile::Platform, (&text, name), parse).map(Some)
+        self.input((InputFile::Platform, name), Platform::builtin_text, Platform::parse, in_words)
     }
 
     /// The energy table of a name or file with its changes; `None` if it has none.
@@ -247,17 +244,11 @@ impl Changes<'_> {
     /// # Errors
     /// As [`Self::gpu`].
     pub fn table(&mut self, name: &Path) -> Result<Option<EnergyTable>, ChangeError> {
-        let Some(text) = self.text(InputFile::Table, name, EnergyTable::builtin_text)? else {
-            return Ok(None);
+        let in_words = |error| match error {
+            TableError::Spec(error) => without_place(error),
+            error => without_name(&error, name),
         };
-        let file = name.display().to_string();
-        let parse = |text: &str| {
-            EnergyTable::parse(text, &file).map_err(|error| match error {
-                TableError::Spec(error) => without_place(error),
-                error => without_name(&error, name),
-            })
-        };
-        self.apply(InputFile::Table, (&text, name), parse).map(Some)
+        self.input((InputFile::Table, name), EnergyTable::builtin_text, EnergyTable::parse, in_words)
     }
 
     /// The scene in a RON file with its changes; `None` if it has none.
@@ -266,7 +257,7 @@ impl Changes<'_> {
     /// As [`Self::gpu`], and if it is no RON file.
     pub fn scene(&mut self, name: &Path) -> Result<Option<Scene>, ChangeError> {
         let Some(set) = self.of(InputFile::Scene) else { return Ok(None) };
-        if !is_file(name) {
+        if !is_ron(name) {
             let message = format!(
                 "`{}` is not a scene in a .ron file: change a scene by --size, --samples, --lens and the like, a workload by \
                  its options (--set name=value)",
@@ -286,7 +277,7 @@ impl Changes<'_> {
     }
 }
 
-fn is_file(name: &Path) -> bool {
+fn is_ron(name: &Path) -> bool {
     name.extension().is_some_and(|ending| ending == "ron")
 }
 
