@@ -2,7 +2,8 @@
 
 use crate::events::EVENTS;
 use crate::{Event, Unit};
-use serde::{Serialize, Serializer};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use std::collections::BTreeMap;
 use std::ops::{AddAssign, Index, IndexMut};
 
 /// Count of every event. Each worker has its own counts, which are summed with `+=`. The sum is exact and
@@ -85,6 +86,17 @@ impl Serialize for Counts {
     /// Write a map from event name to count, in declaration order, as [`Counts::reported`].
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_map(self.reported().map(|(event, count)| (event.name(), count)))
+    }
+}
+
+impl<'de> Deserialize<'de> for Counts {
+    /// Reads a map from event name to count; events that are left out have a count of 0.
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        let mut counts = Self::default();
+        for (name, count) in BTreeMap::<String, u64>::deserialize(from)? {
+            counts[Event::try_from(name).map_err(serde::de::Error::custom)?] = count;
+        }
+        Ok(counts)
     }
 }
 

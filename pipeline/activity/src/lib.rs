@@ -6,6 +6,7 @@
 //! - [`Counts`]: one integer per event, one set per worker, summed at the end.
 //! - [`Packet`]: work that moves through the units as one, with the events it causes.
 //! - [`LineAccess`]: a request of a packet for a memory line, in order.
+//! - [`PacketStream`]: the packets of a frame in few bytes.
 //! - [`Timeline`]: counts over time, written by a timing model and read by a power model.
 //! - [`inputs`]: recording of the files that a run reads.
 //! - [`Bounded`]: an integer with a range in its type.
@@ -28,8 +29,10 @@ mod events;
 pub mod inputs;
 mod packet;
 pub mod spec;
+mod stream;
 
 pub use bounded::{Bounded, OutOfBounds};
 pub use counts::{Bin, Counts, Timeline};
 pub use events::{Event, Unit};
 pub use packet::{LEVELS, LevelRequests, LineAccess, LineKind, Packet, PacketCounts, PacketKind, Waits};
+pub use stream::{PacketStream, StreamError, StreamWriter};

@@ -19,7 +19,7 @@ mod shared;
 mod view;
 mod warp;
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 pub use buffers::{Access, Atomic, Buffer, BufferBinding, Word};
 pub(crate) use buffers::{Buffers, Stored};
@@ -29,7 +29,7 @@ pub use view::SurfaceView;
 pub(crate) use warp::Touched;
 
 /// Sizes of the hardware for groups.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ComputeSpec {
     /// Lanes of a warp, 1 to 128.

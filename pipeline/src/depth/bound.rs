@@ -1,7 +1,7 @@
 //! Depth interval: bounds of every depth that the sample test computes for a triangle, over a tile and a box
 //! of lens and time.
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use super::number::{Real, both, cross, hull, range};
 use super::plane::{Beam, MovingPlane, Points, normal, sides, tightest};
@@ -11,7 +11,7 @@ use crate::traversal::{Box5, Coordinate, TileRect};
 
 /// Method of bounding the depth of a triangle over a tile. Each method includes the bounds of the methods
 /// before it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub enum DepthBound {
     /// Depths of the vertices at the ends of the shutter, the bound of other methods.
     Vertices,

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use activity::{Counts, Event, LineAccess, Packet, PacketCounts, PacketKind, Waits};
 use glam::{Vec3, Vec4};
+use serde::{Deserialize, Serialize};
 
 use super::attachments::{Attachments, Store, SurfaceId, Surfaces};
 use super::error::PassError;
@@ -82,7 +83,7 @@ impl Rendered {
 }
 
 /// Work of a pass.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PassReport {
     /// Name of the pass.
     pub name: String,
@@ -119,13 +120,14 @@ impl PassReport {
 }
 
 /// Work of a frame.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FrameReport {
     /// The passes, in order.
     pub passes: Vec<PassReport>,
     /// Events of writing results back to memory when the frame ends.
     pub write_back: Counts,
-    /// Heat map of each requested event.
+    /// Heat map of each requested event; they are pictures, and not part of a report in a file.
+    #[serde(skip)]
     pub heat: Vec<HeatMap>,
 }
 

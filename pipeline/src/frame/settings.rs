@@ -1,7 +1,7 @@
 //! Settings of the modelled hardware and of a frame.
 
 use glam::Vec3;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use crate::compute::ComputeSpec;
 use crate::depth::{BoxGrid, DepthSpec};
@@ -12,7 +12,7 @@ use crate::traversal::TimePieces;
 
 /// Functional parameters of the hardware: sizes that decide *what* happens. Throughput belongs to the timing
 /// models.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PipelineSpec {
     /// Side of a fine tile in pixels: 1, 2, 4 or 8.
@@ -41,7 +41,7 @@ pub struct PipelineSpec {
 }
 
 /// Where visible samples are shaded. The choice changes the image.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Shading {
     /// At cells of the shading grid, through the shading cache.
     #[default]
@@ -52,7 +52,7 @@ pub enum Shading {
 
 /// Tests that can be disabled. They change the cost, never the image. The two thresholds change the image if
 /// they are above zero.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Features {
     /// Narrow the lens interval by dual-space lines found in set-up.

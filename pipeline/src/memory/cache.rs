@@ -1,11 +1,11 @@
 //! Functional model of a set-associative cache: hits and misses.
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use crate::random::mix;
 
 /// Size and organization of a cache.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CacheSpec {
     /// Total number of entries.
@@ -25,7 +25,7 @@ impl CacheSpec {
 }
 
 /// Replacement policy: which entry of a full set is evicted.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub enum Replacement {
     /// Least recently used.

@@ -2,14 +2,14 @@
 //! addresses and compression of the buffers.
 
 use activity::{Event, LEVELS, LineAccess, PacketCounts, Unit};
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use super::address::{LINE_BYTES, MemoryRange};
 use super::shared::SharedCaches;
 use super::{Access, Cache, CacheError, CacheSpec};
 
 /// Caches of memory, with lines of 64 bytes as entries.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MemorySpec {
     /// Depth cache.
@@ -190,7 +190,7 @@ fn access(
 /// section 3): the smallest depth is stored in full, the others as offsets. A pixel of one colour stores it
 /// once. Lines come in pairs. A compressed line uses one half of the first line of its pair, so that two
 /// compressed lines are moved as one.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Compression {
     /// Depths of pixels whose samples have similar depths.

@@ -61,6 +61,10 @@ pub enum RunError {
     /// A file is cut off or damaged.
     #[error("{path}: {message}")]
     Damaged { path: String, message: String },
+    #[error("a recorded frame: {0}")]
+    Stream(#[from] activity::StreamError),
+    #[error(transparent)]
+    Write(#[from] traces::io::WriteError),
     /// A setting is invalid, or two settings conflict.
     #[error("{0}")]
     Setting(String),

@@ -3,15 +3,19 @@
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
-use activity::{Timeline, Unit};
+use activity::{LineAccess, Packet, Timeline, Unit};
 use glam::Vec3;
 use output::OutDir;
 use output::image::LinearImage;
 use output::progress::Progress;
-use pipeline::Gpu;
 use pipeline::frame::HeatMap;
+use pipeline::{FrameReport, Gpu};
+use power_model::PowerModel;
 use rayon::prelude::*;
-use timing::{AccuracyWarning, FrameClock, Recorder};
+use timing::{AccuracyWarning, FrameClock, Level, Recorder, Timed};
+use warnings::Warning;
+use workloads::Regime;
+use workloads::job::{Drawn, Fact};
 
 use crate::heat::{self, HeatPicture};
 use crate::passes;
@@ -89,7 +93,7 @@ impl FrameSimulator<'_> {
         };
         let simulated = catch_unwind(AssertUnwindSafe(simulate))
             .unwrap_or_else(|panic| resume_unwind(Box::new(CrashedFrame { frame: number, panic })));
-        let (frame, image, maps) = simulated?;
+        let (frame, Pictures { image, heat: maps }) = simulated?;
         let mut heat = Vec::new();
         if let Some(dir) = dir {
             heat = heat::write_all(plan, dir, number, &maps, &image)?;
@@ -99,47 +103,80 @@ impl FrameSimulator<'_> {
     }
 }
 
-fn simulate_frame(
-    plan: &Plan,
+/// A frame as drawn: all but its packets.
+#[derive(Clone, Debug)]
+pub(crate) struct DrawnFrame {
+    pub number: u32,
+    /// Work by pass, without heat maps.
+    pub report: FrameReport,
+    pub moving: bool,
+    pub lens: bool,
+    pub facts: Vec<Fact>,
+    pub warnings: Vec<Warning>,
+    pub regime: Regime,
+}
+
+/// Pictures of a frame.
+pub(crate) struct Pictures {
+    /// Linear radiance of each pixel.
+    pub image: Vec<Vec3>,
+    pub heat: Vec<HeatMap>,
+}
+
+/// Draws frame `number` and emits its packets.
+pub(crate) fn draw<'a>(
+    plan: &'a Plan,
     number: u32,
-    max_bins: usize,
-) -> Result<(RunFrame, Vec<Vec3>, Vec<HeatMap>), RunError> {
-    let mut clock =
-        FrameClock::new(plan.options.timing, plan.gpu.machine()?, Recorder::new(BIN_PS, max_bins));
-    let emit = |packet: &_, lines: &_| clock.push(packet, lines);
+    emit: impl FnMut(&Packet, &[LineAccess]) + 'a,
+) -> Result<(DrawnFrame, Pictures), RunError> {
     let gpu = Gpu::new(&plan.gpu.pipeline, emit).map_err(RunError::setting)?;
     let mut gpu = gpu.with_heat(&heat::events(&plan.options.heat), plan.viewport);
     let ready = plan.job.prepare(number)?;
-    let drawn = ready.draw(&mut gpu).map_err(RunError::on(&plan.gpu))?;
+    let Drawn { image, moving, lens, facts, warnings } =
+        ready.draw(&mut gpu).map_err(RunError::on(&plan.gpu))?;
     let mut report = gpu.finish();
     let heat = std::mem::take(&mut report.heat);
-    let mut timed = clock.finish()?;
-    passes::limit_draws(&mut report, &mut timed);
-    let accuracy = AccuracyWarning::all(plan.options.timing, &timed);
-    let timeline = timed.timeline;
-    let power = plan.model.frame(&timeline).map_err(|source| RunError::Timeline { frame: number, source })?;
-    let simulated = RunFrame {
-        index: number,
-        triangles: report.triangles(),
-        moving: drawn.moving,
-        lens: drawn.lens,
-        power,
-        busy_ps: timeline.busy_ps(),
-        busy: busy_shares(&timeline),
-        cycles: timed.cycles,
-        origin: Origin::Simulated(Box::new(Observed {
-            counts: report.counts(),
-            report,
-            times: timed.passes,
-            spans: timed.spans,
-            facts: drawn.facts,
-            warnings: drawn.warnings,
-            regime: ready.regime()?,
-            stalls: timed.stalls,
-            accuracy,
-        })),
-    };
-    Ok((simulated, drawn.image, heat))
+    passes::limit_draws(&mut report);
+    let regime = ready.regime()?;
+    Ok((DrawnFrame { number, report, moving, lens, facts, warnings, regime }, Pictures { image, heat }))
+}
+
+impl DrawnFrame {
+    /// The frame with its time at `level`, and with the power that `model` gives it.
+    pub fn powered(self, level: Level, timed: &Timed, model: &PowerModel) -> Result<RunFrame, RunError> {
+        let Self { number, report, moving, lens, facts, warnings, regime } = self;
+        let timeline = &timed.timeline;
+        let power = model.frame(timeline).map_err(|source| RunError::Timeline { frame: number, source })?;
+        let (times, spans) = passes::limited_times(timed);
+        Ok(RunFrame {
+            index: number,
+            triangles: report.triangles(),
+            moving,
+            lens,
+            power,
+            busy_ps: timeline.busy_ps(),
+            busy: busy_shares(timeline),
+            cycles: timed.cycles,
+            origin: Origin::Simulated(Box::new(Observed {
+                counts: report.counts(),
+                report,
+                times,
+                spans,
+                facts,
+                warnings,
+                regime,
+                stalls: timed.stalls.clone(),
+                accuracy: AccuracyWarning::all(level, timed),
+            })),
+        })
+    }
+}
+
+fn simulate_frame(plan: &Plan, number: u32, max_bins: usize) -> Result<(RunFrame, Pictures), RunError> {
+    let level = plan.options.timing;
+    let mut clock = FrameClock::new(level, plan.gpu.machine()?, Recorder::new(BIN_PS, max_bins));
+    let (frame, pictures) = draw(plan, number, |packet, lines| clock.push(packet, lines))?;
+    Ok((frame.powered(level, &clock.finish()?, &plan.model)?, pictures))
 }
 
 fn busy_shares(timeline: &Timeline) -> Vec<[f32; Unit::COUNT]> {

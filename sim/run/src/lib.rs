@@ -7,6 +7,7 @@
 //! - [`RunOptions`]: everything that may be requested; [`Plan`]: with all inputs loaded and checked.
 //! - [`GpuSpec`]: a GPU: its pipeline, its machine, and the platform and energy table it belongs to.
 //! - [`Distinct`]: which frames differ.
+//! - [`Recording`]: drawn frames, timed again on other machines.
 //! - [`frames_of`]: frames in cycles and joules, without a trace. [`run()`]: all of it, into a folder.
 //! - [`Summary`]: `summary.json`; [`compare`]: two of them side by side.
 //!
@@ -35,6 +36,7 @@ mod passes;
 mod pictures;
 mod plan;
 mod provenance;
+mod recording;
 mod report;
 mod sampled;
 mod simulate;
@@ -62,6 +64,7 @@ pub use options::{Change, HeatQuantity, PacingChoice, Requested, RunOptions, Sam
 pub use passes::{PassSummary, WorkSummary};
 pub use plan::{Plan, fits_memory};
 pub use provenance::{Host, Input, Provenance, again};
+pub use recording::{RecordedRun, Recording, TimedFrames};
 pub use sampled::{Forecast, FramePreview, Previewer, Previews, Signatures};
 pub use simulate::MachineTexts;
 pub use simulated::{FrameCost, Modelled, Observed, Origin, Quantity, RunFrame, SampledSummary, Simulated};

@@ -50,18 +50,18 @@ pub const WRITE_BACK: &str = "write back";
 /// Largest number of draws of a pass that are listed.
 const MAX_DRAWS: usize = 256;
 
-/// Drops the numbers of single draws where there are too many to list, and their spans where nobody reads them: those of draws
-/// that take turns are for stalls alone.
-pub(crate) fn limit_draws(report: &mut FrameReport, timed: &mut Timed) {
+/// Drops the numbers of single draws where there are too many to list.
+pub(crate) fn limit_draws(report: &mut FrameReport) {
     report.passes.iter_mut().filter(|pass| pass.draws.len() > MAX_DRAWS).for_each(|pass| pass.forget_draws());
-    timed
-        .passes
-        .iter_mut()
-        .filter(|pass| pass.draws_ps.len() > MAX_DRAWS)
-        .for_each(|pass| pass.draws_ps.clear());
-    if timed.stalls.is_none() && take_turns(&timed.spans) {
-        timed.spans = Vec::new();
-    }
+}
+
+/// Time of passes and spans of draws, without those of single draws where there are too many to list, and without spans that
+/// nobody reads: those of draws that take turns are for stalls alone.
+pub(crate) fn limited_times(timed: &Timed) -> (Vec<PassTime>, Vec<DrawSpan>) {
+    let mut times = timed.passes.clone();
+    times.iter_mut().filter(|pass| pass.draws_ps.len() > MAX_DRAWS).for_each(|pass| pass.draws_ps.clear());
+    let are_read = timed.stalls.is_some() || !take_turns(&timed.spans);
+    (times, if are_read { timed.spans.clone() } else { Vec::new() })
 }
 
 /// Whether any draw has more than one of the spans.
@@ -218,7 +218,7 @@ impl<'a> Group<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use activity::{Timeline, Unit};
+    use activity::Unit;
     use power_model::{EnergyTable, Platform};
 
     fn counts(event: Event, count: u64) -> Counts {
@@ -279,25 +279,7 @@ mod tests {
         let draws = vec![counts(Event::SamplesHit, 1); MAX_DRAWS + 1];
         let mut report = FrameReport { passes: vec![pass("scene", draws)], ..FrameReport::default() };
         let before = report.counts();
-        let mut timed = untimed();
-        limit_draws(&mut report, &mut timed);
+        limit_draws(&mut report);
         assert!(report.passes[0].draws.is_empty() && report.counts() == before);
-    }
-
-    fn untimed() -> Timed {
-        let timeline = Timeline { bin_ps: 1, duration_ps: 1, bins: Vec::new() };
-        let (passes, spans) = Default::default();
-        Timed {
-            timeline,
-            cycles: 0,
-            stalls: None,
-            unit_cycles: 0,
-            packets: 0,
-            rows: None,
-            disputed: None,
-            overlap: None,
-            passes,
-            spans,
-        }
     }
 }

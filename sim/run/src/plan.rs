@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use activity::inputs;
 use pipeline::Viewport;
 use power_model::{EnergyTable, Pacing, Platform, PowerModel};
-use traces::device::RATES_HZ;
 use workloads::job::{Reduction, Request};
 use workloads::{Job, Rendering, Settings, catalog};
 
@@ -46,22 +45,27 @@ impl Plan {
     /// # Errors
     /// The first input that is missing or invalid.
     pub fn resolve(options: RunOptions) -> Result<Self, RunError> {
-        let (plan, files) = inputs::record(|| Self::load(options));
+        let (plan, files) = inputs::record(|| Self::load(options, load_job));
         Ok(Self { files, ..plan? })
     }
 
-    fn load(options: RunOptions) -> Result<Self, RunError> {
-        if let Some(rate) = options.trace_rate_hz.filter(|rate| !RATES_HZ.contains(rate)) {
-            return Err(RunError::Setting(format!(
-                "trace rate: {rate}; a recorder takes 1 to 1e7 samples a second"
-            )));
-        }
-        if !(0.0..1.0).contains(&options.packet_loss) {
-            let loss = options.packet_loss;
-            return Err(RunError::Setting(format!(
-                "packet loss: {loss}; a share from 0 to below 1 can be lost"
-            )));
-        }
+    /// Plan of a job that is already there, on the GPU, platform and energy table that `options` name. Scene and view of the
+    /// options are not used.
+    pub(crate) fn of_job(
+        options: RunOptions,
+        name: &str,
+        job: impl FnOnce() -> Box<dyn Job>,
+    ) -> Result<Self, RunError> {
+        let load = |_: &RunOptions, _: &mut Changes<'_>| Ok((name.to_owned(), job()));
+        let (plan, files) = inputs::record(|| Self::load(options, load));
+        Ok(Self { files, ..plan? })
+    }
+
+    fn load(
+        options: RunOptions,
+        load_job: impl FnOnce(&RunOptions, &mut Changes<'_>) -> Result<(String, Box<dyn Job>), RunError>,
+    ) -> Result<Self, RunError> {
+        options.check_recorder()?;
         let mut changes = Changes::new(&options.changes)?;
         let (name, job) = load_job(&options, &mut changes)?;
         let settings = job.settings();

@@ -9,6 +9,7 @@ mod info;
 mod list;
 mod outputs;
 mod parse;
+mod record;
 mod run;
 mod sample;
 mod sweep;
@@ -59,6 +60,10 @@ pub enum Command {
     Info(InfoArgs),
     /// Compare two runs, two images or two folders of images
     Compare(CompareArgs),
+    /// Draw the frames of a run once and keep them, to be timed on many machines
+    Record(record::RecordArgs),
+    /// Time recorded frames on GPUs with the pipeline that drew them
+    Time(record::TimeArgs),
     /// Plan, run and merge many runs from one file: design-space exploration
     Sweep(sweep::SweepArgs),
     /// Compute the visible triangle and depth of every sample, for comparison with another renderer
@@ -179,6 +184,8 @@ fn dispatch(cli: &Cli, terminal: &Terminal) -> Result<(), Failure> {
         Command::Run(args) => run::run(args, terminal),
         Command::Info(args) => info::run(args),
         Command::Compare(args) => compare::run(args),
+        Command::Record(args) => record::record(args, terminal),
+        Command::Time(args) => record::time(args),
         Command::Sweep(args) => sweep::run(args, terminal),
         Command::Completions(args) => completions(args),
         Command::Man(args) => man(args),

@@ -159,7 +159,7 @@ const SETTINGS: [&str; 31] = [
 ];
 
 /// Parser of `--bound`: the name of a column of the energy table.
-fn bound() -> impl TypedValueParser<Value = Bound> {
+pub(super) fn bound() -> impl TypedValueParser<Value = Bound> {
     let names = [
         PossibleValue::new("low").help("The lowest that sources support"),
         PossibleValue::new("nominal").help("The most likely"),
@@ -235,12 +235,18 @@ fn dry_run(args: &RunArgs, dry_run: &DryRun, terminal: &Terminal) -> Result<(), 
     print(&rows.map(|(name, value)| format!("{name:<9} {value}")).collect::<Vec<_>>().join("\n"))
 }
 
+/// Values of `--set` in files, and those of options of a workload.
+pub(super) fn changes_of(set: &[(String, String)]) -> (Vec<Change>, Vec<(String, String)>) {
+    let (changes, options): (Vec<_>, Vec<_>) = set.iter().cloned().partition(|(path, _)| path.contains('.'));
+    (changes.into_iter().map(|(path, value)| Change { path, value }).collect(), options)
+}
+
 fn options(args: &RunArgs) -> RunOptions {
-    let (changes, set): (Vec<_>, Vec<_>) = args.set.iter().cloned().partition(|(path, _)| path.contains('.'));
+    let (changes, set) = changes_of(&args.set);
     RunOptions {
         scene: args.scene.clone(),
         options: OptionSource { file: args.options.clone(), set },
-        changes: changes.into_iter().map(|(path, value)| Change { path, value }).collect(),
+        changes,
         overrides: args.view.overrides(),
         gpu: args.gpu.clone(),
         platform: args.platform.clone(),

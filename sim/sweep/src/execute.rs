@@ -40,7 +40,7 @@ impl From<Result<Measured, String>> for Outcome {
 /// Numbers of a run. Sums are over all its frames, means are per frame.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct Measured {
+pub struct Measured {
     /// Settings in use, by name: those of the sweep and of the inputs.
     pub used: BTreeMap<String, String>,
     /// Cycles of the core clock, sum.
@@ -66,7 +66,7 @@ pub(crate) struct Measured {
 /// Counts of the reported events, in files by name.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(from = "BTreeMap<String, u64>", into = "BTreeMap<String, u64>")]
-pub(crate) struct EventCounts(Box<[Option<u64>; Event::COUNT]>);
+pub struct EventCounts(Box<[Option<u64>; Event::COUNT]>);
 
 impl EventCounts {
     /// Count of an event; `None` if the GPU has no such unit.
@@ -101,9 +101,16 @@ impl From<EventCounts> for BTreeMap<String, u64> {
 
 /// Runs the point `id` with these settings. A failure and a panic are results, too.
 pub(crate) fn execute(id: &str, settings: &[Setting]) -> PointResult {
-    let outcome = catch_unwind(AssertUnwindSafe(|| measure(settings)));
-    let outcome = outcome.unwrap_or_else(|panic| Err(crash(&*panic)));
-    PointResult { id: id.to_owned(), outcome: outcome.into() }
+    let run = || setting::options(settings).and_then(Plan::resolve).and_then(|plan| drawn(&plan));
+    PointResult { id: id.to_owned(), outcome: guarded(run).into() }
+}
+
+/// The result of `run`, or why it failed. A panic is a failure, too.
+pub(crate) fn guarded<T>(run: impl FnOnce() -> Result<T, RunError>) -> Result<T, String> {
+    match catch_unwind(AssertUnwindSafe(run)) {
+        Ok(result) => result.map_err(|error| error.to_string()),
+        Err(panic) => Err(crash(&*panic)),
+    }
 }
 
 fn crash(panic: &(dyn Any + Send)) -> String {
@@ -111,15 +118,19 @@ fn crash(panic: &(dyn Any + Send)) -> String {
     format!("internal error, please report it: {}", text.unwrap_or("a panic"))
 }
 
-fn measure(settings: &[Setting]) -> Result<Measured, String> {
-    let plan = setting::options(settings).and_then(Plan::resolve).map_err(|error| error.to_string())?;
-    measured(&plan).map_err(|error| error.to_string())
-}
-
-fn measured(plan: &Plan) -> Result<Measured, RunError> {
+/// Draws and measures all frames of a run.
+fn drawn(plan: &Plan) -> Result<Measured, RunError> {
     let distinct = Distinct::new(&*plan.job)?;
     let drawn = frames_of(plan, distinct.numbers(), &Progress::new(true))?;
     let frames: Vec<&RunFrame> = distinct.groups().iter().map(|&group| &drawn[group]).collect();
+    measured(plan, &frames)
+}
+
+/// Numbers of a run of `plan` with these frames, in order.
+///
+/// # Errors
+/// If the frames cannot follow each other at the pace of the plan.
+pub fn measured(plan: &Plan, frames: &[&RunFrame]) -> Result<Measured, RunError> {
     let powers: Vec<&FramePower> = frames.iter().map(|frame| &frame.power).collect();
     let paced = pace(&powers, &plan.platform, plan.pacing)?;
     let count = frames.len() as f64;
@@ -127,7 +138,7 @@ fn measured(plan: &Plan) -> Result<Measured, RunError> {
     let frame_j = paced.energy().total_j() / count;
     let busy_j = frames.iter().map(|frame| frame.cost().energy_j).sum::<f64>() / count;
     let busy_s = paced.frames.iter().map(|frame| frame.busy_end_s - frame.start_s).sum::<f64>() / count;
-    let counts = EventCounts::of(&frames);
+    let counts = EventCounts::of(frames);
     let bytes = |event: Event| counts.get(event).unwrap_or(0);
     Ok(Measured {
         used: used(plan),
@@ -138,7 +149,7 @@ fn measured(plan: &Plan) -> Result<Measured, RunError> {
         frame_mj: frame_j * 1e3,
         nj_per_pixel: frame_j / plan.pixels() as f64 * 1e9,
         dram_bytes: bytes(Event::DramReadBytes) + bytes(Event::DramWriteBytes),
-        accuracy_warnings: accuracy_warnings(&frames),
+        accuracy_warnings: accuracy_warnings(frames),
         counts,
     })
 }

@@ -4,18 +4,20 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 use ::run::duration;
-use cpu_time::ProcessTime;
 use output::progress::Progress;
 use output::table::si;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::execute::{Outcome, PointResult, execute};
+use crate::execute::{Outcome, PointResult};
 use crate::plan::{Plan, Point};
+use crate::shared::{Costs, groups};
 use crate::{Folder, Shard, SweepError};
 
 /// Number of points that a probe runs.
 const PROBE_POINTS: usize = 2;
+/// Number of groups that run before the expected time is printed.
+const PROBE_GROUPS: usize = 2;
 
 /// Number of runs to come, and their expected time on the threads of the current pool.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -95,50 +97,42 @@ impl<'a> Work<'a> {
     /// Expected time, from runs of the first and the middle pending point whose results are not kept.
     pub fn probe(&self) -> Expected {
         let middle = self.pending.len() / 2;
-        let probed: Vec<&Point> =
-            self.pending.iter().copied().step_by(middle.max(1)).take(PROBE_POINTS).collect();
-        let started = ProcessTime::now();
-        probed.iter().for_each(|point| drop(self.execute(point)));
-        self.expected(started, probed.len(), self.pending.len())
+        let probed = self.pending.iter().step_by(middle.max(1)).take(PROBE_POINTS);
+        let costs: Costs = probed.map(|point| Costs::of(self.plan, point)).sum();
+        let host_s = costs.expected_s(&self.pending) / rayon::current_num_threads() as f64;
+        Expected { runs: self.runs, pending: self.pending.len(), host_s: costs.is_known().then_some(host_s) }
     }
 
-    fn execute(&self, point: &Point) -> PointResult {
-        execute(&point.id, &self.plan.settings_of(point))
-    }
-
-    /// Expectation for `pending` runs, if `probed` runs took the processor time since `started`.
-    fn expected(&self, started: ProcessTime, probed: usize, pending: usize) -> Expected {
-        let each_s = started.elapsed().as_secs_f64() / probed.max(1) as f64;
-        let host_s = each_s * pending as f64 / rayon::current_num_threads() as f64;
-        Expected { runs: self.runs, pending, host_s: (probed > 0).then_some(host_s) }
-    }
-
-    /// Runs all pending points on the current pool. Each result is on disk, whole, before it counts; a point that fails is
-    /// a result with a reason. The first points are the probe for the expected time.
+    /// Runs all pending points on the current pool, those with equal drawings together. Each result is on disk, whole, before it
+    /// counts; a point that fails is a result with a reason. The first group is the probe for the expected time.
     ///
     /// # Errors
     /// If a result cannot be written. Those that were written stay.
     pub fn run(&self, progress: &Progress) -> Result<Status, SweepError> {
         let count = self.pending.len();
         progress.note(&format!("{count} of {} runs to do", self.runs));
-        let (started, processor) = (Instant::now(), ProcessTime::now());
+        let started = Instant::now();
         let (done, failed) = (AtomicUsize::new(0), AtomicUsize::new(0));
-        let one = |point: &&Point| {
-            let result = self.execute(point);
+        let left_s = |done: usize| started.elapsed().as_secs_f64() / done as f64 * (count - done) as f64;
+        let record = |point: &Point, result: PointResult| {
             self.folder.write_result(point, &result)?;
             let is_failed = matches!(result.outcome, Outcome::Error(_));
             failed.fetch_add(usize::from(is_failed), Ordering::Relaxed);
             let done = 1 + done.fetch_add(1, Ordering::Relaxed);
-            let left_s = started.elapsed().as_secs_f64() / done as f64 * (count - done) as f64;
-            progress.note(&line(point, &result, (done, count), left_s));
+            progress.note(&line(point, &result, (done, count), left_s(done)));
             Ok::<(), SweepError>(())
         };
-        let (first, others) = self.pending.split_at(count.min(PROBE_POINTS));
-        first.iter().try_for_each(one)?;
+        let groups = groups(&self.pending);
+        let (first, others) = groups.split_at(groups.len().min(PROBE_GROUPS));
+        first.iter().try_for_each(|group| group.run(self.plan, &record))?;
         if !others.is_empty() {
-            progress.note(&self.expected(processor, first.len(), others.len()).line());
+            let finished = done.load(Ordering::Relaxed);
+            // The first groups use one core where their points do not share.
+            let cores = if finished == PROBE_GROUPS { rayon::current_num_threads() } else { 1 };
+            let host_s = Some(left_s(finished) / cores as f64);
+            progress.note(&Expected { runs: self.runs, pending: count - finished, host_s }.line());
         }
-        others.par_iter().try_for_each(one)?;
+        others.par_iter().try_for_each(|group| group.run(self.plan, &record))?;
         let finished = self.runs;
         Ok(Status { points: self.runs, finished, failed: failed.into_inner() })
     }

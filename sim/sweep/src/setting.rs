@@ -55,6 +55,17 @@ const VIEW: [&str; 10] = [
 /// First name of paths to options of a workload.
 const WORKLOAD: &str = "workload";
 
+/// Stage of a run, in order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Stage {
+    /// Frames are drawn: packets and counts.
+    Drawing,
+    /// They are timed.
+    Timing,
+    /// They get energies.
+    Power,
+}
+
 impl Setting {
     /// A setting.
     pub fn new(path: impl Into<String>, value: impl Into<String>) -> Self {
@@ -75,6 +86,19 @@ impl Setting {
             Some(InputFile::Gpu | InputFile::Platform | InputFile::Table)
         );
         of_file || matches!(&*self.path, "gpu" | "platform" | "energy")
+    }
+
+    /// The first stage of a run that depends on it. A GPU as a whole, and all that is not known to be later, is of the drawing.
+    pub(crate) fn stage(&self) -> Stage {
+        match self.path.as_str() {
+            "platform" | "energy" | "bound" | "pacing" => Stage::Power,
+            "timing" | "gpu.core_hz" | "gpu.memory_hz" => Stage::Timing,
+            path if path.starts_with("gpu.units.") => Stage::Timing,
+            path => match InputFile::of(path) {
+                Some(InputFile::Platform | InputFile::Table) => Stage::Power,
+                _ => Stage::Drawing,
+            },
+        }
     }
 
     fn refused(&self, message: impl std::fmt::Display) -> RunError {

@@ -1,0 +1,239 @@
+//! Work that points share: what is drawn does not depend on clocks, rates and energies, and the time of a frame does not depend on
+//! energies. So points with the same drawing are a group, which is drawn once; those of them with the same machine are timed once.
+
+use std::collections::HashMap;
+use std::iter::Sum;
+
+use cpu_time::ProcessTime;
+use output::progress::Progress;
+use rayon::prelude::*;
+use run::{Distinct, Recording, RunFrame};
+
+use crate::SweepError;
+use crate::execute::{Outcome, PointResult, execute, guarded, measured};
+use crate::plan::{Plan, Point};
+use crate::setting::{Setting, Stage, options};
+
+/// Most bytes of the packets that are kept for a group. Points of a larger one are drawn one by one.
+const MAX_BYTES: usize = 1 << 30;
+
+/// Points with the same drawing.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Group<'a> {
+    /// Those with the same times together.
+    timings: Vec<Vec<&'a Point>>,
+}
+
+/// Groups of `points`, in the order of their first points.
+pub(crate) fn groups<'a>(points: &[&'a Point]) -> Vec<Group<'a>> {
+    let drawings = by_settings(points, |setting| setting.stage() == Stage::Drawing);
+    let timings = |points: Vec<&'a Point>| by_settings(&points, |setting| setting.stage() != Stage::Power);
+    drawings.into_iter().map(|points| Group { timings: timings(points) }).collect()
+}
+
+/// Points with the same settings of those that `counts` says matter.
+fn by_settings<'a>(points: &[&'a Point], counts: fn(&Setting) -> bool) -> Vec<Vec<&'a Point>> {
+    let mut places: HashMap<Vec<&Setting>, usize> = HashMap::new();
+    let mut parts: Vec<Vec<&'a Point>> = Vec::new();
+    for point in points {
+        let key = point.settings.iter().filter(|setting| counts(setting)).collect();
+        let place = *places.entry(key).or_insert_with(|| {
+            parts.push(Vec::new());
+            parts.len() - 1
+        });
+        parts[place].push(point);
+    }
+    parts
+}
+
+impl<'a> Group<'a> {
+    /// Its points.
+    pub fn points(&self) -> impl Iterator<Item = &'a Point> {
+        self.timings.iter().flatten().copied()
+    }
+
+    /// Runs its points and passes each result on. A failure and a panic are results, too.
+    ///
+    /// # Errors
+    /// Those of `done`.
+    pub fn run(
+        &self,
+        plan: &Plan,
+        done: &(impl Fn(&Point, PointResult) -> Result<(), SweepError> + Sync),
+    ) -> Result<(), SweepError> {
+        let alone = |point: &Point| done(point, execute(&point.id, &plan.settings_of(point)));
+        let drawing = (self.points().count() > 1).then(|| Drawing::new(plan, self.points()));
+        match drawing.flatten() {
+            Some(drawing) => self.timings.par_iter().try_for_each(|points| drawing.time(plan, points, done)),
+            None => self.points().try_for_each(alone),
+        }
+    }
+}
+
+/// The frames of a group, drawn once.
+struct Drawing {
+    distinct: Distinct,
+    recording: Recording,
+}
+
+impl Drawing {
+    /// The frames of the first point that can run; `None` if there is none, or the frames are too large to be kept.
+    fn new<'a>(plan: &Plan, mut points: impl Iterator<Item = &'a Point>) -> Option<Self> {
+        let first = points.find_map(|point| planned(plan, point).ok())?;
+        let draw = || {
+            let distinct = Distinct::new(&*first.job)?;
+            let recording = Recording::draw(&first, distinct.numbers(), MAX_BYTES, &Progress::new(true))?;
+            Ok(recording.map(|recording| Self { distinct, recording }))
+        };
+        // What fails here fails again with the reason of each point.
+        guarded(draw).ok().flatten()
+    }
+
+    /// Times the frames once for all `points`, and gives each its power.
+    fn time(
+        &self,
+        plan: &Plan,
+        points: &[&Point],
+        done: &impl Fn(&Point, PointResult) -> Result<(), SweepError>,
+    ) -> Result<(), SweepError> {
+        let mut timed = None;
+        for point in points {
+            let outcome = guarded(|| {
+                let run = planned(plan, point)?;
+                let timed = match &timed {
+                    Some(timed) => timed,
+                    None => timed.insert(self.recording.timed(&run)?),
+                };
+                let frames = timed.powered(&run.model)?;
+                measured(&run, &self.in_order(&frames))
+            });
+            done(point, PointResult { id: point.id.clone(), outcome: Outcome::from(outcome) })?;
+        }
+        Ok(())
+    }
+
+    /// Frames of the run in order.
+    fn in_order<'f>(&self, frames: &'f [RunFrame]) -> Vec<&'f RunFrame> {
+        self.distinct.groups().iter().map(|&group| &frames[group]).collect()
+    }
+}
+
+fn planned(plan: &Plan, point: &Point) -> Result<run::Plan, run::RunError> {
+    options(&plan.settings_of(point)).and_then(run::Plan::resolve)
+}
+
+/// Processor time of the stages of some points, in seconds.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Costs {
+    points: usize,
+    drawing_s: f64,
+    timing_s: f64,
+    power_s: f64,
+}
+
+impl Costs {
+    /// Costs of a point; none if it cannot run.
+    pub fn of(plan: &Plan, point: &Point) -> Self {
+        let mut started = ProcessTime::now();
+        let mut lap_s = || std::mem::replace(&mut started, ProcessTime::now()).elapsed().as_secs_f64();
+        let stages = guarded(|| {
+            let run = planned(plan, point)?;
+            let resolved_s = lap_s();
+            let distinct = Distinct::new(&*run.job)?;
+            // Nothing is drawn twice for the probe, so all of it may be kept.
+            let recording = Recording::draw(&run, distinct.numbers(), usize::MAX, &Progress::new(true))?;
+            let drawing_s = lap_s();
+            let timed = recording.as_ref().map(|recording| recording.timed(&run)).transpose()?;
+            let timing_s = lap_s();
+            timed.map(|timed| timed.powered(&run.model)).transpose()?;
+            Ok(Self { points: 1, drawing_s, timing_s, power_s: resolved_s + lap_s() })
+        });
+        stages.unwrap_or_default()
+    }
+
+    /// Whether any point could run.
+    pub fn is_known(&self) -> bool {
+        self.points > 0
+    }
+
+    /// Expected processor time of `points` in seconds.
+    pub fn expected_s(&self, points: &[&Point]) -> f64 {
+        let groups = groups(points);
+        let timings: usize = groups.iter().map(|group| group.timings.len()).sum();
+        let all_s = self.drawing_s * groups.len() as f64
+            + self.timing_s * timings as f64
+            + self.power_s * points.len() as f64;
+        all_s / self.points.max(1) as f64
+    }
+}
+
+impl Sum for Costs {
+    fn sum<I: Iterator<Item = Self>>(all: I) -> Self {
+        all.fold(Self::default(), |sum, one| Self {
+            points: sum.points + one.points,
+            drawing_s: sum.drawing_s + one.drawing_s,
+            timing_s: sum.timing_s + one.timing_s,
+            power_s: sum.power_s + one.power_s,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Mutex;
+
+    use super::*;
+
+    const SETTINGS: [[(&str, &str); 2]; 8] = [
+        [("samples", "2"), ("gpu.core_hz", "400e6")],
+        [("samples", "2"), ("table.rows.draws.nominal_pj", "700")],
+        [("samples", "1"), ("gpu.units.setup.rates.triangles_in", "0.5")],
+        [("samples", "2"), ("bound", "high")],
+        [("samples", "2"), ("gpu.pipeline.tile_px", "4")],
+        [("samples", "2"), ("timing", "bound")],
+        [("samples", "2"), ("gpu.core_hz", "-1")],
+        [("samples", "2"), ("pacing", "free")],
+    ];
+
+    fn plan() -> Plan {
+        let settings = |pairs: &[(&str, &str)]| -> Vec<Setting> {
+            pairs.iter().map(|(path, value)| Setting::new(*path, *value)).collect()
+        };
+        let point = |(number, pairs): (usize, &[(&str, &str); 2])| Point {
+            id: number.to_string(),
+            settings: settings(pairs),
+        };
+        let points = SETTINGS.iter().enumerate().map(point).collect();
+        Plan { name: "a".to_owned(), settings: settings(&[("scene", "tiny"), ("frames", "0..2")]), points }
+    }
+
+    #[test]
+    fn points_are_grouped_by_drawing_and_by_machine() {
+        let plan = plan();
+        let points: Vec<&Point> = plan.points.iter().collect();
+        let ids = |group: &Group<'_>| -> Vec<String> {
+            let of = |points: &Vec<&Point>| points.iter().map(|point| point.id.as_str()).collect();
+            group.timings.iter().map(of).collect()
+        };
+        let found: Vec<Vec<String>> = groups(&points).iter().map(ids).collect();
+        assert_eq!(found, [vec!["0", "137", "5", "6"], vec!["2"], vec!["4"]]);
+    }
+
+    #[test]
+    fn shared_work_gives_the_results_of_single_runs() {
+        let plan = plan();
+        let points: Vec<&Point> = plan.points.iter().collect();
+        let results = Mutex::new(Vec::new());
+        let keep = |_: &Point, result: PointResult| {
+            results.lock().unwrap().push(result);
+            Ok(())
+        };
+        groups(&points).iter().try_for_each(|group| group.run(&plan, &keep)).unwrap();
+        let mut results = results.into_inner().unwrap();
+        results.sort_by(|a, b| a.id.cmp(&b.id));
+        let alone = plan.points.iter().map(|point| execute(&point.id, &plan.settings_of(point)));
+        assert_eq!(results, alone.collect::<Vec<_>>());
+        let failed = results.iter().filter(|result| matches!(result.outcome, Outcome::Error(_)));
+        assert_eq!(failed.map(|result| result.id.as_str()).collect::<Vec<_>>(), ["6"]);
+    }
+}
