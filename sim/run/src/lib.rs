@@ -64,7 +64,7 @@ pub use options::{Change, HeatQuantity, PacingChoice, Requested, RunOptions, Sam
 pub use passes::{PassSummary, WorkSummary};
 pub use plan::{Plan, fits_memory};
 pub use provenance::{Host, Input, Provenance, again};
-pub use recording::{RecordedRun, Recording, TimedFrames};
+pub use recording::{MACHINES_IN_TURN, RecordedRun, Recording, TimedFrames};
 pub use sampled::{Forecast, FramePreview, Previewer, Previews, Signatures};
 pub use simulate::MachineTexts;
 pub use simulated::{FrameCost, Modelled, Observed, Origin, Quantity, RunFrame, SampledSummary, Simulated};

@@ -8,7 +8,7 @@ use output::table::{Table, counted, si};
 use output::terminal::Terminal;
 use power_model::Bound;
 use rayon::prelude::*;
-use run::{PacingChoice, Plan, RecordedRun, RunError, RunOptions};
+use run::{MACHINES_IN_TURN, PacingChoice, Plan, RecordedRun, RunError, RunOptions, TimedFrames};
 use serde::Serialize;
 use sweep::{Measured, measured};
 use timing::Level;
@@ -137,7 +137,7 @@ pub(super) fn record(args: &RecordArgs, terminal: &Terminal) -> Result<(), Failu
 }
 
 /// A machine with its numbers.
-#[derive(Serialize)]
+#[derive(Clone, Serialize)]
 struct TimedRow {
     gpu: String,
     #[serde(flatten)]
@@ -146,9 +146,11 @@ struct TimedRow {
 
 pub(super) fn time(args: &TimeArgs) -> Result<(), Failure> {
     let recorded = RecordedRun::read(&args.recording)?;
-    let one = |gpu: &PathBuf| timed(args, &recorded, gpu);
+    let rows = |gpus: &[PathBuf]| timed(args, &recorded, gpus);
+    let pool = args.threads.pool()?;
+    let in_turn = args.gpu.len().div_ceil(pool.current_num_threads()).clamp(1, MACHINES_IN_TURN);
     let rows =
-        args.threads.pool()?.install(|| args.gpu.par_iter().map(one).collect::<Result<Vec<_>, _>>())?;
+        pool.install(|| args.gpu.par_chunks(in_turn).map(rows).collect::<Result<Vec<_>, _>>())?.concat();
     if args.json {
         return print_json(&rows, true);
     }
@@ -163,15 +165,27 @@ pub(super) fn time(args: &TimeArgs) -> Result<(), Failure> {
     print(&table.to_string())
 }
 
-/// Numbers of the recorded frames on a GPU.
-fn timed(args: &TimeArgs, recorded: &RecordedRun, gpu: &Path) -> Result<TimedRow, RunError> {
+/// Numbers of the recorded frames on some GPUs.
+fn timed(args: &TimeArgs, recorded: &RecordedRun, gpus: &[PathBuf]) -> Result<Vec<TimedRow>, RunError> {
+    let plans: Vec<Plan> = gpus.iter().map(|gpu| planned(args, recorded, gpu)).collect::<Result<_, _>>()?;
+    let timed = recorded.timed(&plans.iter().collect::<Vec<_>>())?;
+    let row = |((gpu, plan), timed): ((&PathBuf, &Plan), TimedFrames<'_>)| {
+        let frames = timed.powered(&plan.model)?;
+        let in_order: Vec<_> = recorded.groups().iter().map(|&group| &frames[group]).collect();
+        Ok(TimedRow { gpu: gpu.display().to_string(), measured: measured(plan, &in_order)? })
+    };
+    gpus.iter().zip(&plans).zip(timed).map(row).collect()
+}
+
+/// The recorded run on a GPU.
+fn planned(args: &TimeArgs, recorded: &RecordedRun, gpu: &Path) -> Result<Plan, RunError> {
     let (changes, options) = changes_of(&args.set);
     if let Some((name, value)) = options.first() {
         return Err(RunError::Setting(format!(
             "--set {name}={value}: it is of the drawing; only gpu., platform. and table. can be set here"
         )));
     }
-    let plan = recorded.plan(RunOptions {
+    recorded.plan(RunOptions {
         changes,
         gpu: gpu.to_owned(),
         platform: args.platform.clone(),
@@ -180,8 +194,5 @@ fn timed(args: &TimeArgs, recorded: &RecordedRun, gpu: &Path) -> Result<TimedRow
         timing: args.timing,
         pacing: args.pacing,
         ..RunOptions::default()
-    })?;
-    let (frames, groups) = recorded.frames(&plan)?;
-    let in_order: Vec<_> = groups.iter().map(|&group| &frames[group]).collect();
-    Ok(TimedRow { gpu: gpu.display().to_string(), measured: measured(&plan, &in_order)? })
+    })
 }

@@ -7,10 +7,10 @@ use std::iter::Sum;
 use cpu_time::ProcessTime;
 use output::progress::Progress;
 use rayon::prelude::*;
-use run::{Distinct, Recording, RunFrame};
+use run::{Distinct, MACHINES_IN_TURN, Recording, RunError, RunFrame, TimedFrames};
 
 use crate::SweepError;
-use crate::execute::{Outcome, PointResult, execute, guarded, measured};
+use crate::execute::{Measured, Outcome, PointResult, execute, guarded, measured};
 use crate::plan::{Plan, Point};
 use crate::setting::{Setting, Stage, options};
 
@@ -62,12 +62,41 @@ impl<'a> Group<'a> {
         done: &(impl Fn(&Point, PointResult) -> Result<(), SweepError> + Sync),
     ) -> Result<(), SweepError> {
         let alone = |point: &Point| done(point, execute(&point.id, &plan.settings_of(point)));
-        let drawing = (self.points().count() > 1).then(|| Drawing::new(plan, self.points()));
-        match drawing.flatten() {
-            Some(drawing) => self.timings.par_iter().try_for_each(|points| drawing.time(plan, points, done)),
-            None => self.points().try_for_each(alone),
-        }
+        let drawing = (self.points().count() > 1).then(|| Drawing::new(plan, self.points())).flatten();
+        let Some(drawing) = drawing else { return self.points().try_for_each(alone) };
+        let in_turn = self.timings.len().div_ceil(rayon::current_num_threads()).min(MACHINES_IN_TURN);
+        self.timings.par_chunks(in_turn).try_for_each(|timings| {
+            let planned: Vec<Vec<PlannedPoint<'_>>> = timings
+                .iter()
+                .map(|points| points.iter().map(|point| planned(plan, point)).collect())
+                .collect();
+            let results = guarded(|| drawing.results(&planned));
+            match results {
+                Ok(mut results) => results.drain(..).try_for_each(|(point, result)| done(point, result)),
+                // One of the machines is to blame; alone each point gets its own reason.
+                Err(_) => timings.iter().flatten().try_for_each(|point| alone(point)),
+            }
+        })
     }
+}
+
+/// A point with its run, or why it cannot run.
+struct PlannedPoint<'a> {
+    point: &'a Point,
+    run: Result<run::Plan, String>,
+}
+
+fn planned<'a>(plan: &Plan, point: &'a Point) -> PlannedPoint<'a> {
+    PlannedPoint { point, run: guarded(|| run_of(plan, point)) }
+}
+
+/// The run whose times are those of all `points`.
+fn machine<'p>(points: &'p [PlannedPoint<'_>]) -> Option<&'p run::Plan> {
+    points.iter().find_map(|point| point.run.as_ref().ok())
+}
+
+fn run_of(plan: &Plan, point: &Point) -> Result<run::Plan, RunError> {
+    options(&plan.settings_of(point)).and_then(run::Plan::resolve)
 }
 
 /// The frames of a group, drawn once.
@@ -79,7 +108,7 @@ struct Drawing {
 impl Drawing {
     /// The frames of the first point that can run; `None` if there is none, or the frames are too large to be kept.
     fn new<'a>(plan: &Plan, mut points: impl Iterator<Item = &'a Point>) -> Option<Self> {
-        let first = points.find_map(|point| planned(plan, point).ok())?;
+        let first = points.find_map(|point| run_of(plan, point).ok())?;
         let draw = || {
             let distinct = Distinct::new(&*first.job)?;
             let recording = Recording::draw(&first, distinct.numbers(), MAX_BYTES, &Progress::new(true))?;
@@ -89,37 +118,36 @@ impl Drawing {
         guarded(draw).ok().flatten()
     }
 
-    /// Times the frames once for all `points`, and gives each its power.
-    fn time(
+    /// Results of points, those with the same times together: their frames are timed once.
+    fn results<'a>(
         &self,
-        plan: &Plan,
-        points: &[&Point],
-        done: &impl Fn(&Point, PointResult) -> Result<(), SweepError>,
-    ) -> Result<(), SweepError> {
-        let mut timed = None;
-        for point in points {
-            let outcome = guarded(|| {
-                let run = planned(plan, point)?;
-                let timed = match &timed {
-                    Some(timed) => timed,
-                    None => timed.insert(self.recording.timed(&run)?),
+        timings: &[Vec<PlannedPoint<'a>>],
+    ) -> Result<Vec<(&'a Point, PointResult)>, RunError> {
+        let machines: Vec<&run::Plan> = timings.iter().filter_map(|points| machine(points)).collect();
+        let mut timed = self.recording.timed(&machines)?.into_iter();
+        let mut results = Vec::new();
+        for points in timings {
+            let timed = machine(points).and_then(|_| timed.next());
+            for PlannedPoint { point, run } in points {
+                let outcome = match (run, &timed) {
+                    (Ok(run), Some(timed)) => guarded(|| self.measured(run, timed)),
+                    (Ok(_), None) => continue,
+                    (Err(reason), _) => Err(reason.clone()),
                 };
-                let frames = timed.powered(&run.model)?;
-                measured(&run, &self.in_order(&frames))
-            });
-            done(point, PointResult { id: point.id.clone(), outcome: Outcome::from(outcome) })?;
+                results.push((*point, PointResult { id: point.id.clone(), outcome: Outcome::from(outcome) }));
+            }
         }
-        Ok(())
+        Ok(results)
+    }
+
+    fn measured(&self, run: &run::Plan, timed: &TimedFrames<'_>) -> Result<Measured, RunError> {
+        measured(run, &self.in_order(&timed.powered(&run.model)?))
     }
 
     /// Frames of the run in order.
     fn in_order<'f>(&self, frames: &'f [RunFrame]) -> Vec<&'f RunFrame> {
         self.distinct.groups().iter().map(|&group| &frames[group]).collect()
     }
-}
-
-fn planned(plan: &Plan, point: &Point) -> Result<run::Plan, run::RunError> {
-    options(&plan.settings_of(point)).and_then(run::Plan::resolve)
 }
 
 /// Processor time of the stages of some points, in seconds.
@@ -137,15 +165,15 @@ impl Costs {
         let mut started = ProcessTime::now();
         let mut lap_s = || std::mem::replace(&mut started, ProcessTime::now()).elapsed().as_secs_f64();
         let stages = guarded(|| {
-            let run = planned(plan, point)?;
+            let run = run_of(plan, point)?;
             let resolved_s = lap_s();
             let distinct = Distinct::new(&*run.job)?;
             // Nothing is drawn twice for the probe, so all of it may be kept.
             let recording = Recording::draw(&run, distinct.numbers(), usize::MAX, &Progress::new(true))?;
             let drawing_s = lap_s();
-            let timed = recording.as_ref().map(|recording| recording.timed(&run)).transpose()?;
+            let timed = recording.as_ref().map(|recording| recording.timed(&[&run])).transpose()?;
             let timing_s = lap_s();
-            timed.map(|timed| timed.powered(&run.model)).transpose()?;
+            timed.into_iter().flatten().try_for_each(|timed| timed.powered(&run.model).map(drop))?;
             Ok(Self { points: 1, drawing_s, timing_s, power_s: resolved_s + lap_s() })
         });
         stages.unwrap_or_default()

@@ -12,6 +12,7 @@ use workloads::job::Reduction;
 
 use super::Findings;
 use super::{ProbeSummary, with_blur_thresholds};
+use crate::recording::PacketBuffer;
 use crate::{Distinct, FrameCost, Plan, RunError, frame};
 
 /// Largest number of probed frames: the middles of as many equal parts of the run.
@@ -28,12 +29,11 @@ pub(super) struct Probe {
     pub findings: Findings,
 }
 
-/// Result of one frame at one level.
+/// A frame as drawn.
 struct ProbedFrame {
-    cost: FrameCost,
+    number: u32,
+    packets: PacketBuffer,
     counts: Counts,
-    /// CPU seconds of the timing model.
-    timing_s: f64,
     /// Wall-clock seconds of the pipeline.
     pipeline_s: f64,
 }
@@ -71,66 +71,50 @@ impl Probe {
     }
 }
 
-/// Simulates a frame at every level, and once more without small motion and blur.
+/// Draws a frame once and times it at every level, and draws it once more without small motion and blur.
 fn probe_frame(plan: &Plan, job: &dyn Job, number: u32, findings: &mut Findings) -> Result<(), RunError> {
     let spec = &plan.gpu.pipeline;
-    let truth = simulate_frame(plan, job, number, spec, Level::Stepped)?;
-    for level in Level::ALL {
-        let probed = if level == Level::Stepped {
-            None
-        } else {
-            Some(simulate_frame(plan, job, number, spec, level)?)
-        };
-        let probed = probed.as_ref().unwrap_or(&truth);
-        findings.add(level, relative_error(&probed.cost, &truth.cost), probed.timing_s, probed.pipeline_s);
+    let drawn = ProbedFrame::draw(plan, job, number, spec)?;
+    let [stepped, packet, bound] = Level::ALL.map(|level| drawn.timed(plan, level));
+    let timed = [stepped?, packet?, bound?];
+    let cost = |level: Level| timed[level as usize].0;
+    for (level, (_, timing_s)) in Level::ALL.into_iter().zip(timed) {
+        let error = relative_error(&cost(level), &cost(Level::Stepped));
+        findings.add(level, error, timing_s, drawn.pipeline_s);
     }
     let by = plan.viewport.width() as f32 / job.settings().width as f32;
     let thresholds = PipelineSpec { features: with_blur_thresholds(spec.features, by), ..*spec };
-    let (exact, reduced) = (
-        simulate_frame(plan, job, number, spec, Level::Packet)?,
-        simulate_frame(plan, job, number, &thresholds, Level::Packet)?,
-    );
-    if exact.counts != reduced.counts {
-        findings.add_dimensions(
-            relative_error(&reduced.cost, &exact.cost),
-            [&exact, &reduced].map(|probed| madds(&probed.counts)),
-        );
+    let reduced = ProbedFrame::draw(plan, job, number, &thresholds)?;
+    if drawn.counts != reduced.counts {
+        let error = relative_error(&reduced.timed(plan, Level::Packet)?.0, &cost(Level::Packet));
+        findings.add_dimensions(error, [&drawn, &reduced].map(|probed| madds(&probed.counts)));
     }
     Ok(())
 }
 
-fn simulate_frame(
-    plan: &Plan,
-    job: &dyn Job,
-    number: u32,
-    spec: &PipelineSpec,
-    level: Level,
-) -> Result<ProbedFrame, RunError> {
-    let started = Instant::now();
-    let mut clock =
-        FrameClock::new(level, plan.gpu.machine()?, Recorder::new(frame::BIN_PS, frame::MIN_FRAME_BINS));
-    let mut packets = Vec::new();
-    let mut lines = Vec::new();
-    let emit = |packet: &activity::Packet, new_lines: &[activity::LineAccess]| {
-        lines.extend_from_slice(new_lines);
-        packets.push((*packet, lines.len()));
-    };
-    let mut gpu = Gpu::new(spec, emit).map_err(RunError::setting)?;
-    job.frame(number, &mut gpu).map_err(RunError::on(&plan.gpu))?;
-    let counts = gpu.finish().counts();
-    let pipeline_s = started.elapsed().as_secs_f64();
-    let started = ThreadTime::now();
-    let mut first = 0;
-    for (packet, end) in &packets {
-        clock.push(packet, &lines[first..*end]);
-        first = *end;
+impl ProbedFrame {
+    fn draw(plan: &Plan, job: &dyn Job, number: u32, spec: &PipelineSpec) -> Result<Self, RunError> {
+        let started = Instant::now();
+        let mut packets = PacketBuffer::default();
+        let mut gpu =
+            Gpu::new(spec, |packet, lines| packets.push(packet, lines)).map_err(RunError::setting)?;
+        job.frame(number, &mut gpu).map_err(RunError::on(&plan.gpu))?;
+        let counts = gpu.finish().counts();
+        Ok(Self { number, packets, counts, pipeline_s: started.elapsed().as_secs_f64() })
     }
-    let timed = clock.finish()?;
-    let timing_s = started.elapsed().as_secs_f64();
-    let power = plan.model.frame(&timed.timeline);
-    let power = power.map_err(|source| RunError::Timeline { frame: number, source })?;
-    let cost = FrameCost { cycles: timed.cycles as f64, energy_j: power.energy().total_j() };
-    Ok(ProbedFrame { cost, counts, timing_s, pipeline_s })
+
+    /// Cost of the frame at `level`, and the CPU seconds of the timing model.
+    fn timed(&self, plan: &Plan, level: Level) -> Result<(FrameCost, f64), RunError> {
+        let started = ThreadTime::now();
+        let recorder = Recorder::new(frame::BIN_PS, frame::MIN_FRAME_BINS);
+        let mut clock = FrameClock::new(level, plan.gpu.machine()?, recorder);
+        self.packets.send(&mut clock);
+        let timed = clock.finish()?;
+        let timing_s = started.elapsed().as_secs_f64();
+        let power = plan.model.frame(&timed.timeline);
+        let power = power.map_err(|source| RunError::Timeline { frame: self.number, source })?;
+        Ok((FrameCost { cycles: timed.cycles as f64, energy_j: power.energy().total_j() }, timing_s))
+    }
 }
 
 /// Larger of the relative errors of cycles and energy.

@@ -16,9 +16,9 @@ use traces::io::atomic;
 use workloads::Settings;
 use workloads::job::{Drawn, Draws, JobError};
 
-use super::{RecordedFrame, Recording};
+use super::{RecordedFrame, Recording, TimedFrames};
 use crate::frame::DrawnFrame;
-use crate::{Change, Distinct, InputFile, Plan, RunError, RunFrame, RunOptions};
+use crate::{Change, Distinct, InputFile, Plan, RunError, RunOptions};
 
 /// All frames of a run as drawn.
 pub struct RecordedRun {
@@ -191,12 +191,17 @@ impl RecordedRun {
         }
     }
 
-    /// All frames of the run as from [`frames_of`](crate::frames_of), and the place of each frame among them.
+    /// All frames of the run on each of the plans as from [`frames_of`](crate::frames_of), in order.
     ///
     /// # Errors
     /// If a frame cannot be timed.
-    pub fn frames(&self, plan: &Plan) -> Result<(Vec<RunFrame>, &[usize]), RunError> {
-        Ok((self.recording.timed(plan)?.powered(&plan.model)?, &self.about.groups))
+    pub fn timed(&self, plans: &[&Plan]) -> Result<Vec<TimedFrames<'_>>, RunError> {
+        self.recording.timed(plans)
+    }
+
+    /// Place of each frame of the run among those that are timed.
+    pub fn groups(&self) -> &[usize] {
+        &self.about.groups
     }
 }
 
@@ -302,9 +307,9 @@ mod tests {
         let read = RecordedRun::read(&path).unwrap();
         assert_eq!(read.about, run.about);
         let again = read.plan(RunOptions::default()).unwrap();
-        let (timed, groups) = read.frames(&again).unwrap();
+        let timed = read.timed(&[&again]).unwrap()[0].powered(&again.model).unwrap();
         let direct = frames_of(&plan, &[0, 1, 2], &Progress::new(true)).unwrap();
-        for (frame, &group) in direct.iter().zip(groups) {
+        for (frame, &group) in direct.iter().zip(read.groups()) {
             let timed = &timed[group];
             assert_eq!((frame.cycles, &frame.power), (timed.cycles, &timed.power));
             assert_eq!(frame.observed().unwrap().report, timed.observed().unwrap().report);

@@ -4,7 +4,7 @@ mod file;
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use activity::{PacketStream, StreamWriter};
+use activity::{LineAccess, Packet, PacketStream, StreamError, StreamWriter};
 use output::progress::Progress;
 use power_model::PowerModel;
 use rayon::prelude::*;
@@ -56,19 +56,77 @@ impl Recording {
         Ok(frames.into_iter().collect::<Option<_>>().filter(|_| fits).map(|frames| Self { frames }))
     }
 
-    /// The frames with their times on the machine of `plan`, whose pipeline has to be that of the recording.
+    /// The frames with their times on the machine of each plan, whose pipelines have to be that of the recording. Packets are
+    /// read once for all of them.
     ///
     /// # Errors
     /// If a frame cannot be timed.
-    pub fn timed(&self, plan: &Plan) -> Result<TimedFrames<'_>, RunError> {
-        let (level, max_bins) = (plan.options.timing, max_bins_per_frame(self.frames.len()));
+    pub fn timed(&self, plans: &[&Plan]) -> Result<Vec<TimedFrames<'_>>, RunError> {
+        let max_bins = max_bins_per_frame(self.frames.len());
         let time = |recorded: &RecordedFrame| {
-            let mut clock = FrameClock::new(level, plan.gpu.machine()?, Recorder::new(BIN_PS, max_bins));
-            recorded.packets.replay(|packet, lines| clock.push(packet, lines))?;
-            Ok(clock.finish()?)
+            let clocks = plans.iter().map(|plan| {
+                let recorder = Recorder::new(BIN_PS, max_bins);
+                Ok(FrameClock::new(plan.options.timing, plan.gpu.machine()?, recorder))
+            });
+            let mut clocks = clocks.collect::<Result<Vec<_>, RunError>>()?;
+            push_all(&recorded.packets, &mut clocks)?;
+            Ok(clocks.into_iter().map(FrameClock::finish).collect::<Result<Vec<Timed>, _>>()?)
         };
-        let timed = self.frames.par_iter().map(time).collect::<Result<_, RunError>>()?;
-        Ok(TimedFrames { recording: self, timed, level })
+        let frames = self.frames.par_iter().map(time).collect::<Result<Vec<_>, RunError>>()?;
+        let mut timed: Vec<_> =
+            plans.iter().map(|plan| TimedFrames::new(self, plan.options.timing)).collect();
+        for (times, machine) in frames.into_iter().flat_map(|times| times.into_iter().zip(0..)) {
+            timed[machine].timed.push(times);
+        }
+        Ok(timed)
+    }
+}
+
+/// Number of machines that are worth timing together: reading the packets is then a small part of the work.
+pub const MACHINES_IN_TURN: usize = 8;
+
+/// Number of packets that one clock takes before the next does: few enough to stay in a cache of the host.
+const PACKETS_IN_TURN: usize = 256;
+
+/// Sends all packets to each of the clocks.
+fn push_all(stream: &PacketStream, clocks: &mut [FrameClock<'_>]) -> Result<(), StreamError> {
+    let mut buffer = PacketBuffer::default();
+    stream.replay(|packet, lines| {
+        buffer.push(packet, lines);
+        if buffer.packets.len() == PACKETS_IN_TURN {
+            clocks.iter_mut().for_each(|clock| buffer.send(clock));
+            buffer.clear();
+        }
+    })?;
+    clocks.iter_mut().for_each(|clock| buffer.send(clock));
+    Ok(())
+}
+
+/// Packets with their lines.
+#[derive(Default)]
+pub(crate) struct PacketBuffer {
+    /// Each packet, and where its lines end.
+    packets: Vec<(Packet, usize)>,
+    lines: Vec<LineAccess>,
+}
+
+impl PacketBuffer {
+    pub fn push(&mut self, packet: &Packet, lines: &[LineAccess]) {
+        self.lines.extend_from_slice(lines);
+        self.packets.push((*packet, self.lines.len()));
+    }
+
+    pub fn send(&self, clock: &mut FrameClock<'_>) {
+        let mut first = 0;
+        for (packet, end) in &self.packets {
+            clock.push(packet, &self.lines[first..*end]);
+            first = *end;
+        }
+    }
+
+    fn clear(&mut self) {
+        self.packets.clear();
+        self.lines.clear();
     }
 }
 
@@ -79,7 +137,11 @@ pub struct TimedFrames<'a> {
     level: Level,
 }
 
-impl TimedFrames<'_> {
+impl<'a> TimedFrames<'a> {
+    const fn new(recording: &'a Recording, level: Level) -> Self {
+        Self { recording, timed: Vec::new(), level }
+    }
+
     /// The frames with the power that `model` gives them, as from [`frames_of`](crate::frames_of).
     ///
     /// # Errors
@@ -112,7 +174,8 @@ mod tests {
             let plan = plan("reference", level);
             let direct = frames_of(&plan, &[0, 1], &Progress::new(true)).unwrap();
             let recording = recorded(&plan, usize::MAX).unwrap();
-            let timed = recording.timed(&plan).unwrap().powered(&plan.model).unwrap();
+            let other = self::plan("reference", Level::Bound);
+            let timed = recording.timed(&[&other, &plan]).unwrap()[1].powered(&plan.model).unwrap();
             for (a, b) in direct.iter().zip(&timed) {
                 let (seen, again) = (a.observed().unwrap(), b.observed().unwrap());
                 assert_eq!(
