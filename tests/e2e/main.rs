@@ -22,6 +22,7 @@ mod outputs;
 mod picture;
 mod readme;
 mod real_scenes;
+mod record;
 mod references;
 mod reproduce;
 mod results_folder;
