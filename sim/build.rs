@@ -1,11 +1,12 @@
-//! The git revision that the program is built from, in release builds within a clone; and whether there are real scenes to test with.
+//! The git revision that the program is built from, in release builds within a clone; and what there is to test with: real scenes,
+//! Slurm, packages of Python.
 
 use std::path::Path;
 use std::process::Command;
 
 /// Sources of the program, from the root of the repository. A change of these builds the program anew anyway, so that asking git
 /// costs nothing more.
-const SOURCES: [&str; 19] = [
+const SOURCES: [&str; 20] = [
     "Cargo.toml",
     "Cargo.lock",
     "pipeline/src",
@@ -20,6 +21,7 @@ const SOURCES: [&str; 19] = [
     "sim/run/gpus",
     "sim/run/src",
     "sim/src",
+    "sim/sweep/src",
     "sim/timing/src",
     "traces/jls/src",
     "traces/src",
@@ -30,12 +32,15 @@ const SOURCES: [&str; 19] = [
 fn main() {
     // Tests on real scenes count as ignored where there are none.
     println!("cargo:rerun-if-env-changed=QUINTILE_SCENES");
-    println!("cargo:rustc-check-cfg=cfg(real_scenes, collision_data, superuser)");
+    println!("cargo:rustc-check-cfg=cfg(real_scenes, collision_data, superuser, slurm)");
     if let Some(scenes) = std::env::var_os("QUINTILE_SCENES") {
         println!("cargo:rustc-cfg=real_scenes");
         if Path::new(&scenes).join("../ccd").is_dir() {
             println!("cargo:rustc-cfg=collision_data");
         }
+    }
+    if has_slurm() {
+        println!("cargo:rustc-cfg=slurm");
     }
     if may_write_anywhere() {
         println!("cargo:rustc-cfg=superuser");
@@ -47,6 +52,16 @@ fn main() {
     } else {
         println!("cargo:rerun-if-changed=build.rs");
     }
+}
+
+/// Whether a cluster of Slurm can be started here; tests of it count as ignored otherwise.
+fn has_slurm() -> bool {
+    // Its package puts the daemons there, which changes the folder.
+    let folder = Path::new("/usr/sbin");
+    if folder.is_dir() {
+        println!("cargo:rerun-if-changed={}", folder.display());
+    }
+    ["slurmctld", "slurmd", "munged"].iter().all(|daemon| folder.join(daemon).is_file())
 }
 
 /// Whether permissions of folders do not hold for this user; tests of them then count as ignored.

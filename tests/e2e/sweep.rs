@@ -1,5 +1,8 @@
 //! `quintile sweep`: plan, shards, merge, an end in the middle, failures, and refusals.
 
+mod ends;
+mod slurm;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -33,16 +36,29 @@ fn merged(folder: &str) -> Vec<u8> {
     fs::read(Path::new(folder).join("results.parquet")).unwrap()
 }
 
-/// Files of points, by name.
-fn point_files(folder: &str) -> Vec<PathBuf> {
+/// Files below `points` of the sweep in a folder, by name.
+fn files(folder: &str) -> Vec<PathBuf> {
     let entries = |path: &Path| -> Vec<PathBuf> {
         let entries = fs::read_dir(path).into_iter().flatten();
         entries.map(|entry| entry.unwrap().path()).collect()
     };
     let mut files: Vec<PathBuf> =
         entries(&Path::new(folder).join("points")).iter().flat_map(|path| entries(path)).collect();
-    files.retain(|path| path.extension().is_some_and(|ending| ending == "json"));
     files.sort();
+    files
+}
+
+/// Files of finished points.
+fn point_files(folder: &str) -> Vec<PathBuf> {
+    let mut files = files(folder);
+    files.retain(|path| path.extension().is_some_and(|ending| ending == "json"));
+    files
+}
+
+/// Files of points that are being written, or were.
+fn unfinished_files(folder: &str) -> Vec<PathBuf> {
+    let mut files = files(folder);
+    files.retain(|path| path.extension().is_some_and(|ending| ending != "json"));
     files
 }
 

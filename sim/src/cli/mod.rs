@@ -11,6 +11,7 @@ mod outputs;
 mod parse;
 mod run;
 mod sample;
+mod stop;
 mod sweep;
 mod trace;
 mod visibility;
@@ -35,6 +36,7 @@ use crash::Crashes;
 use info::InfoArgs;
 use outputs::print;
 use run::RunArgs;
+use stop::Stop;
 use trace::TraceArgs;
 use visibility::{SamplesArgs, VisibilityArgs};
 
@@ -126,9 +128,11 @@ pub struct ListArgs {
 pub fn main() -> ExitCode {
     let cli = parse(std::env::args_os().collect()).unwrap_or_else(|error| error.exit());
     let terminal = cli.messages.terminal();
-    crash::handle(terminal.clone());
+    let stop = Stop::default();
+    let follows_stop = matches!(&cli.command, Command::Sweep(args) if args.follows_stop());
+    crash::handle(terminal.clone(), follows_stop.then(|| stop.clone()));
     let crashes = Crashes::record();
-    match std::panic::catch_unwind(AssertUnwindSafe(|| dispatch(&cli, &terminal))) {
+    match std::panic::catch_unwind(AssertUnwindSafe(|| dispatch(&cli, &terminal, &stop))) {
         Ok(Ok(())) => ExitCode::SUCCESS,
         Ok(Err(failure)) => {
             terminal.error(&failure.message);
@@ -174,12 +178,12 @@ impl From<workloads::LoadError> for Failure {
     }
 }
 
-fn dispatch(cli: &Cli, terminal: &Terminal) -> Result<(), Failure> {
+fn dispatch(cli: &Cli, terminal: &Terminal, stop: &Stop) -> Result<(), Failure> {
     match &cli.command {
         Command::Run(args) => run::run(args, terminal),
         Command::Info(args) => info::run(args),
         Command::Compare(args) => compare::run(args),
-        Command::Sweep(args) => sweep::run(args, terminal),
+        Command::Sweep(args) => sweep::run(args, terminal, stop),
         Command::Completions(args) => completions(args),
         Command::Man(args) => man(args),
         Command::List(args) => list::list(args),

@@ -9,7 +9,7 @@ use output::terminal::Terminal;
 use rayon::ThreadPool;
 use serde::Serialize;
 use sweep::{
-    Expected, Folder, Plan, Report, Shard, SlurmArray, SlurmJob, Status, SweepError, Work, merge,
+    Expected, Folder, Plan, Report, Shard, SlurmArray, SlurmJob, Status, SweepError, Work, merge, submit,
     write_scripts,
 };
 use traces::io::atomic::write_file;
@@ -18,6 +18,7 @@ use traces::pareto::{RatedPoint, write_csv};
 use super::Failure;
 use super::outputs::{print, print_json};
 use super::run::REVISION;
+use super::stop::Stop;
 use super::trace::pareto::{Groups, ParetoShow, picture};
 use super::trace::{PlotFormat, write_picture};
 use crate::cli::args::{LookArgs, ThreadArgs};
@@ -28,12 +29,20 @@ use crate::cli::args::{LookArgs, ThreadArgs};
     after_help = "Examples:\n  quintile sweep run tiles.ron --out tiles --dry-run\n  quintile sweep run tiles.ron --out tiles\n  \
     quintile sweep merge tiles\n  quintile sweep report tiles\n  sbatch --array=0-7 --wrap 'quintile sweep run tiles.ron --out tiles'\n\n\
     `sweep run` may be stopped at any moment and called again: finished points are skipped. Points are finished when their \
-    file is in DIR/points; a point that fails is finished, too, with its reason."
+    file is in DIR/points; a point that fails is finished, too, with its reason. After USR1 or TERM no further points are begun, those \
+    in flight are finished (after TERM, if they can within 20 s), and the exit code is 138 or 143 if points are left."
 )]
 pub struct SweepArgs {
     /// What to do
     #[command(subcommand)]
     pub step: Step,
+}
+
+impl SweepArgs {
+    /// Whether signals of a scheduler end it between two points.
+    pub(super) const fn follows_stop(&self) -> bool {
+        matches!(self.step, Step::Run(_))
+    }
 }
 
 /// Step of a sweep.
@@ -115,6 +124,9 @@ pub struct SlurmArgs {
     /// Threads of a task
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub task_threads: u16,
+    /// Submit both scripts by `sbatch`, and print the numbers of the jobs
+    #[arg(long)]
+    pub submit: bool,
 }
 
 /// The folder of a sweep.
@@ -182,10 +194,10 @@ struct Printed<'a, T: Serialize> {
     done: &'a T,
 }
 
-pub(super) fn run(args: &SweepArgs, terminal: &Terminal) -> Result<(), Failure> {
+pub(super) fn run(args: &SweepArgs, terminal: &Terminal, stop: &Stop) -> Result<(), Failure> {
     match &args.step {
         Step::Plan(args) => plan(args),
-        Step::Run(args) => run_points(args, terminal),
+        Step::Run(args) => run_points(args, terminal, stop),
         Step::Slurm(args) => slurm(args),
         Step::Status(args) => status(args),
         Step::Merge(args) => merged(args),
@@ -210,7 +222,7 @@ fn plan(args: &PlanArgs) -> Result<(), Failure> {
     print_expected(&args.sweep, &expected)
 }
 
-fn run_points(args: &RunStepArgs, terminal: &Terminal) -> Result<(), Failure> {
+fn run_points(args: &RunStepArgs, terminal: &Terminal, stop: &Stop) -> Result<(), Failure> {
     let shard = match args.shard {
         Some(shard) => shard,
         None => Shard::of_task(args.shards.map(|count| count as usize), |name| std::env::var(name).ok())?,
@@ -222,9 +234,20 @@ fn run_points(args: &RunStepArgs, terminal: &Terminal) -> Result<(), Failure> {
     }
     folder.write_plan(&plan)?;
     let progress = Progress::on(terminal, args.sweep.json);
-    let work = Work::new(&plan, &folder, shard, args.retry)?;
+    let is_asked = || stop.is_asked();
+    let work = Work::new(&plan, &folder, shard, args.retry)?.until(&is_asked);
     let status = pool.install(|| work.run(&progress))?;
-    print_status(&args.sweep.out, args.sweep.json, &status)
+    print_status(&args.sweep.out, args.sweep.json, &status)?;
+    match status.points - status.finished {
+        0 => Ok(()),
+        left => Err(Failure {
+            message: format!(
+                "stopped by a signal: {} not finished; call it again to continue",
+                counted(left, "run")
+            ),
+            code: stop.code(),
+        }),
+    }
 }
 
 fn slurm(args: &SlurmArgs) -> Result<(), Failure> {
@@ -238,18 +261,27 @@ fn slurm(args: &SlurmArgs) -> Result<(), Failure> {
     let [run, merge] = commands(&args.sweep);
     let job = SlurmJob { name: &plan.name, folder: &out, directory: &directory, command: &run };
     let merge_sh = SlurmJob { command: &merge, ..job }.merge_script();
-    let scripts = write_scripts(&out, &array.script(&job), &merge_sh)?.map(|path| path.display().to_string());
+    let paths = write_scripts(&out, &array.script(&job), &merge_sh)?;
+    let jobs = match args.submit {
+        true => Some(submit(paths.each_ref().map(PathBuf::as_path))?),
+        false => None,
+    };
+    let scripts = paths.map(|path| path.display().to_string());
     if args.sweep.json {
-        let printed = serde_json::json!({ "scripts": scripts, "tasks": array.tasks, "expected": expected });
+        let printed = serde_json::json!({
+            "scripts": scripts, "tasks": array.tasks, "jobs": jobs, "expected": expected
+        });
         return print_json(&printed, true);
     }
-    let [array_sh, merge_sh] = scripts.map(|path| shell_line(&[path]));
     let (tasks, minutes) = (counted(array.tasks, "task"), array.minutes);
-    print(&format!(
-        "{}\n{tasks} of {minutes} min at most; submit with\n\
-         sbatch --dependency=afterany:$(sbatch --parsable {array_sh}) {merge_sh}",
-        expected.line()
-    ))
+    let then = match jobs {
+        Some([array, merge]) => format!("submitted as job {array}, and job {merge} to merge"),
+        None => {
+            let [array_sh, merge_sh] = scripts.map(|path| shell_line(&[path]));
+            format!("submit with\nsbatch --dependency=afterany:$(sbatch --parsable {array_sh}) {merge_sh}")
+        }
+    };
+    print(&format!("{}\n{tasks} of {minutes} min at most; {then}", expected.line()))
 }
 
 /// Commands of a task and of the merge job, with absolute paths.

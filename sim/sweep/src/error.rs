@@ -77,6 +77,9 @@ pub enum SweepError {
         /// All points.
         points: usize,
     },
+    /// Jobs cannot be submitted.
+    #[error("{0}")]
+    Slurm(String),
     /// An input file cannot be read.
     #[error(transparent)]
     Input(RunError),
@@ -89,7 +92,11 @@ impl SweepError {
             Self::Spec(error) => matches!(error, SpecError::Parse { .. }),
             Self::Value { .. } | Self::Shard(_) | Self::OtherSweep { .. } | Self::Plan { .. } => true,
             Self::Setting { is_usage, .. } => *is_usage,
-            Self::Folder { .. } | Self::Write(_) | Self::Unfinished { .. } | Self::Input(_) => false,
+            Self::Folder { .. }
+            | Self::Write(_)
+            | Self::Unfinished { .. }
+            | Self::Slurm(_)
+            | Self::Input(_) => false,
         }
     }
 

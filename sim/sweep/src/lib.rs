@@ -37,5 +37,5 @@ pub use plan::{Plan, Point};
 pub use report::{Effect, Report};
 pub use setting::{Setting, Text};
 pub use shard::Shard;
-pub use slurm::{SlurmArray, SlurmJob, write_scripts};
+pub use slurm::{SlurmArray, SlurmJob, submit, write_scripts};
 pub use spec::{Combination, MAX_POINTS, SweepSpec};

@@ -73,6 +73,8 @@ pub struct Work<'a> {
     folder: &'a Folder,
     runs: usize,
     pending: Vec<&'a Point>,
+    /// Whether to begin no further points.
+    stop: &'a (dyn Fn() -> bool + Sync),
 }
 
 impl<'a> Work<'a> {
@@ -89,7 +91,13 @@ impl<'a> Work<'a> {
         };
         let keep = |point: &&'a Point| is_pending(point).map(|keep| keep.then_some(*point)).transpose();
         let pending = points.iter().filter_map(keep).collect::<Result<Vec<_>, SweepError>>()?;
-        Ok(Self { plan, folder, runs: points.len(), pending })
+        Ok(Self { plan, folder, runs: points.len(), pending, stop: &|| false })
+    }
+
+    /// The same work; [`Self::run`] begins no further point once `stop` holds.
+    #[must_use]
+    pub fn until(self, stop: &'a (dyn Fn() -> bool + Sync)) -> Self {
+        Self { stop, ..self }
     }
 
     /// Expected time, from runs of the first and the middle pending point whose results are not kept.
@@ -114,7 +122,8 @@ impl<'a> Work<'a> {
     }
 
     /// Runs all pending points on the current pool. Each result is on disk, whole, before it counts; a point that fails is
-    /// a result with a reason. The first points are the probe for the expected time.
+    /// a result with a reason. The first points are the probe for the expected time. The state is that of the shard; points are
+    /// left over if the work was to stop.
     ///
     /// # Errors
     /// If a result cannot be written. Those that were written stay.
@@ -123,7 +132,10 @@ impl<'a> Work<'a> {
         progress.note(&format!("{count} of {} runs to do", self.runs));
         let (started, processor) = (Instant::now(), ProcessTime::now());
         let (done, failed) = (AtomicUsize::new(0), AtomicUsize::new(0));
-        let one = |point: &&Point| {
+        let one = |point: &&Point| -> Result<(), SweepError> {
+            if (self.stop)() {
+                return Ok(());
+            }
             let result = self.execute(point);
             self.folder.write_result(point, &result)?;
             let is_failed = matches!(result.outcome, Outcome::Error(_));
@@ -131,15 +143,15 @@ impl<'a> Work<'a> {
             let done = 1 + done.fetch_add(1, Ordering::Relaxed);
             let left_s = started.elapsed().as_secs_f64() / done as f64 * (count - done) as f64;
             progress.note(&line(point, &result, (done, count), left_s));
-            Ok::<(), SweepError>(())
+            Ok(())
         };
         let (first, others) = self.pending.split_at(count.min(PROBE_POINTS));
         first.iter().try_for_each(one)?;
-        if !others.is_empty() {
+        if !others.is_empty() && !(self.stop)() {
             progress.note(&self.expected(processor, first.len(), others.len()).line());
         }
         others.par_iter().try_for_each(one)?;
-        let finished = self.runs;
+        let finished = self.runs - count + done.into_inner();
         Ok(Status { points: self.runs, finished, failed: failed.into_inner() })
     }
 }
