@@ -32,7 +32,7 @@ const SOURCES: [&str; 20] = [
 fn main() {
     // Tests on real scenes count as ignored where there are none.
     println!("cargo:rerun-if-env-changed=QUINTILE_SCENES");
-    println!("cargo:rustc-check-cfg=cfg(real_scenes, collision_data, superuser, slurm)");
+    println!("cargo:rustc-check-cfg=cfg(real_scenes, collision_data, superuser, slurm, ray, readers)");
     if let Some(scenes) = std::env::var_os("QUINTILE_SCENES") {
         println!("cargo:rustc-cfg=real_scenes");
         if Path::new(&scenes).join("../ccd").is_dir() {
@@ -41,6 +41,13 @@ fn main() {
     }
     if has_slurm() {
         println!("cargo:rustc-cfg=slurm");
+    }
+    let packages = python_packages();
+    let has = |names: &[&str]| names.iter().all(|name| packages.iter().any(|package| package == name));
+    for (cfg, names) in [("ray", &["ray"][..]), ("readers", &["pandas", "pyarrow", "polars", "duckdb"])] {
+        if has(names) {
+            println!("cargo:rustc-cfg={cfg}");
+        }
     }
     if may_write_anywhere() {
         println!("cargo:rustc-cfg=superuser");
@@ -62,6 +69,18 @@ fn has_slurm() -> bool {
         println!("cargo:rerun-if-changed={}", folder.display());
     }
     ["slurmctld", "slurmd", "munged"].iter().all(|daemon| folder.join(daemon).is_file())
+}
+
+/// Packages of Python that tests need and that are there.
+fn python_packages() -> Vec<String> {
+    println!("cargo:rerun-if-env-changed=QUINTILE_PYTHON");
+    let python = std::env::var("QUINTILE_PYTHON").unwrap_or_else(|_| "python3".to_owned());
+    let find =
+        "import sys, importlib.util as u; print(*[name for name in sys.argv[1:] if u.find_spec(name)])";
+    let names = ["ray", "pandas", "pyarrow", "polars", "duckdb"];
+    let found = Command::new(python).args(["-c", find]).args(names).output();
+    let text = found.map(|found| String::from_utf8_lossy(&found.stdout).into_owned()).unwrap_or_default();
+    text.split_whitespace().map(str::to_owned).collect()
 }
 
 /// Whether permissions of folders do not hold for this user; tests of them then count as ignored.
