@@ -7,6 +7,7 @@ mod compare;
 mod crash;
 mod info;
 mod list;
+mod lists;
 mod outputs;
 mod parse;
 mod run;

@@ -7,6 +7,7 @@ use output::progress::Progress;
 use output::table::{Table, counted, shell_line, si};
 use output::terminal::Terminal;
 use rayon::ThreadPool;
+use run::Input;
 use serde::Serialize;
 use sweep::{
     Expected, Folder, Plan, Report, Shard, SlurmArray, SlurmJob, Status, SweepError, Work, merge, submit,
@@ -196,30 +197,55 @@ struct Printed<'a, T: Serialize> {
 
 pub(super) fn run(args: &SweepArgs, terminal: &Terminal, stop: &Stop) -> Result<(), Failure> {
     match &args.step {
-        Step::Plan(args) => plan(args),
+        Step::Plan(args) => plan(args, terminal),
         Step::Run(args) => run_points(args, terminal, stop),
-        Step::Slurm(args) => slurm(args),
+        Step::Slurm(args) => slurm(args, terminal),
         Step::Status(args) => status(args),
         Step::Merge(args) => merged(args),
         Step::Report(args) => report(args),
     }
 }
 
-/// The plan of a sweep, its folder, and worker threads.
-fn opened(args: &FileArgs) -> Result<(Plan, Folder, ThreadPool), Failure> {
-    let pool = args.threads.pool()?;
-    let plan = pool.install(|| Plan::load(&args.file, args.quick, REVISION))?;
-    let folder = Folder::at(&args.out);
-    folder.check(&plan)?;
-    Ok((plan, folder, pool))
+/// A sweep that is planned.
+struct Opened {
+    plan: Plan,
+    folder: Folder,
+    pool: ThreadPool,
+    progress: Progress,
 }
 
-fn plan(args: &PlanArgs) -> Result<(), Failure> {
-    let (plan, folder, pool) = opened(&args.sweep)?;
-    folder.write_plan(&plan)?;
-    let work = Work::new(&plan, &folder, Shard::default(), false)?;
-    let expected = pool.install(|| work.probe());
-    print_expected(&args.sweep, &expected)
+impl Opened {
+    /// Plans the sweep of these arguments.
+    fn new(args: &FileArgs, terminal: &Terminal) -> Result<Self, Failure> {
+        let (pool, progress) = (args.threads.pool()?, Progress::on(terminal, args.json));
+        let plan =
+            pool.install(|| Plan::load_with_progress(&args.file, args.quick, Some(&program()), &progress))?;
+        let folder = Folder::at(&args.out);
+        folder.check(&plan)?;
+        Ok(Self { plan, folder, pool, progress })
+    }
+
+    /// Expected time of all points that are not finished, by running two of them.
+    fn probe(&self, shard: Shard, retry: bool) -> Result<Expected, Failure> {
+        let work = Work::new(&self.plan, &self.folder, shard, retry)?;
+        self.progress.note(&format!(
+            "{} planned; running two for the expected time",
+            counted(self.plan.points.len(), "run")
+        ));
+        Ok(self.pool.install(|| work.probe()))
+    }
+}
+
+/// Revision and contents of this program: results of another one do not count.
+fn program() -> String {
+    let hash = std::env::current_exe().ok().and_then(|path| Input::now(&path).ok()?.sha256);
+    format!("{} {}", REVISION.unwrap_or_default(), hash.unwrap_or_default())
+}
+
+fn plan(args: &PlanArgs, terminal: &Terminal) -> Result<(), Failure> {
+    let opened = Opened::new(&args.sweep, terminal)?;
+    opened.folder.write_plan(&opened.plan)?;
+    print_expected(&args.sweep, &opened.probe(Shard::default(), false)?)
 }
 
 fn run_points(args: &RunStepArgs, terminal: &Terminal, stop: &Stop) -> Result<(), Failure> {
@@ -227,13 +253,12 @@ fn run_points(args: &RunStepArgs, terminal: &Terminal, stop: &Stop) -> Result<()
         Some(shard) => shard,
         None => Shard::of_task(args.shards.map(|count| count as usize), |name| std::env::var(name).ok())?,
     };
-    let (plan, folder, pool) = opened(&args.sweep)?;
+    let opened = Opened::new(&args.sweep, terminal)?;
     if args.dry_run {
-        let work = Work::new(&plan, &folder, shard, args.retry)?;
-        return print_expected(&args.sweep, &pool.install(|| work.probe()));
+        return print_expected(&args.sweep, &opened.probe(shard, args.retry)?);
     }
+    let Opened { plan, folder, pool, progress } = opened;
     folder.write_plan(&plan)?;
-    let progress = Progress::on(terminal, args.sweep.json);
     let is_asked = || stop.is_asked();
     let work = Work::new(&plan, &folder, shard, args.retry)?.until(&is_asked);
     let status = pool.install(|| work.run(&progress))?;
@@ -250,11 +275,11 @@ fn run_points(args: &RunStepArgs, terminal: &Terminal, stop: &Stop) -> Result<()
     }
 }
 
-fn slurm(args: &SlurmArgs) -> Result<(), Failure> {
-    let (plan, folder, pool) = opened(&args.sweep)?;
-    folder.write_plan(&plan)?;
-    let work = Work::new(&plan, &folder, Shard::default(), false)?;
-    let expected = pool.install(|| work.probe());
+fn slurm(args: &SlurmArgs, terminal: &Terminal) -> Result<(), Failure> {
+    let opened = Opened::new(&args.sweep, terminal)?;
+    opened.folder.write_plan(&opened.plan)?;
+    let expected = opened.probe(Shard::default(), false)?;
+    let Opened { plan, pool, .. } = opened;
     let tasks = args.tasks.map(|count| count as usize);
     let array = SlurmArray::new(&expected, pool.current_num_threads(), args.task_threads.into(), tasks);
     let [out, directory] = [&*args.sweep.out, Path::new("")].map(absolute);

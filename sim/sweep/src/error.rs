@@ -89,7 +89,8 @@ impl SweepError {
     /// Whether this is a usage error (exit code 2) rather than a failure (exit code 1).
     pub fn is_usage(&self) -> bool {
         match self {
-            Self::Spec(error) => matches!(error, SpecError::Parse { .. }),
+            Self::Spec(SpecError::Read { source, .. }) => source.kind() == std::io::ErrorKind::NotFound,
+            Self::Spec(SpecError::Parse { .. }) => true,
             Self::Value { .. } | Self::Shard(_) | Self::OtherSweep { .. } | Self::Plan { .. } => true,
             Self::Setting { is_usage, .. } => *is_usage,
             Self::Folder { .. }
