@@ -32,7 +32,9 @@ const SOURCES: [&str; 20] = [
 fn main() {
     // Tests on real scenes count as ignored where there are none.
     println!("cargo:rerun-if-env-changed=QUINTILE_SCENES");
-    println!("cargo:rustc-check-cfg=cfg(real_scenes, collision_data, superuser, slurm, ray, readers)");
+    println!(
+        "cargo:rustc-check-cfg=cfg(real_scenes, collision_data, superuser, may_mount, slurm, ray, readers)"
+    );
     if let Some(scenes) = std::env::var_os("QUINTILE_SCENES") {
         println!("cargo:rustc-cfg=real_scenes");
         if Path::new(&scenes).join("../ccd").is_dir() {
@@ -51,6 +53,9 @@ fn main() {
     }
     if may_write_anywhere() {
         println!("cargo:rustc-cfg=superuser");
+    }
+    if may_mount() {
+        println!("cargo:rustc-cfg=may_mount");
     }
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     if std::env::var("PROFILE").is_ok_and(|profile| profile == "release") {
@@ -89,6 +94,14 @@ fn may_write_anywhere() -> bool {
     return std::fs::metadata("/proc/self").is_ok_and(|this| std::os::unix::fs::MetadataExt::uid(&this) == 0);
     #[cfg(not(unix))]
     return false;
+}
+
+/// Whether this user may mount file systems (`CAP_SYS_ADMIN`); tests of a full disk count as ignored otherwise.
+fn may_mount() -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let capabilities = status.lines().find_map(|line| line.strip_prefix("CapEff:"));
+    let mask = capabilities.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).unwrap_or(0);
+    mask >> 21 & 1 == 1
 }
 
 /// The revision, with `+changes` where the sources are not quite its.

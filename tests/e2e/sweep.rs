@@ -1,6 +1,7 @@
 //! `quintile sweep`: plan, shards, merge, an end in the middle, failures, and refusals.
 
 mod ends;
+mod failures;
 mod python;
 mod slurm;
 

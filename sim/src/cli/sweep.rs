@@ -200,7 +200,7 @@ pub(super) fn run(args: &SweepArgs, terminal: &Terminal, stop: &Stop) -> Result<
         Step::Plan(args) => plan(args, terminal),
         Step::Run(args) => run_points(args, terminal, stop),
         Step::Slurm(args) => slurm(args, terminal),
-        Step::Status(args) => status(args),
+        Step::Status(args) => status(args, terminal),
         Step::Merge(args) => merged(args),
         Step::Report(args) => report(args),
     }
@@ -326,9 +326,11 @@ fn absolute(path: &Path) -> PathBuf {
     std::env::current_dir().map_or_else(|_| path.to_owned(), |directory| directory.join(path))
 }
 
-fn status(args: &StatusArgs) -> Result<(), Failure> {
+fn status(args: &StatusArgs, terminal: &Terminal) -> Result<(), Failure> {
     let folder = args.folder.folder();
-    print_status(folder.path(), args.folder.json, &Status::of(&folder)?)
+    let (status, damaged) = Status::of(&folder)?;
+    damaged.iter().for_each(|message| terminal.note(message));
+    print_status(folder.path(), args.folder.json, &status)
 }
 
 fn merged(args: &MergeArgs) -> Result<(), Failure> {

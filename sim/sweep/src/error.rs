@@ -66,7 +66,7 @@ pub enum SweepError {
     Write(#[from] WriteError),
     /// Points are not finished.
     #[error(
-        "{folder}: {missing} of {points} points are not finished: call `quintile sweep run` again, or give --partial",
+        "{folder}: {missing} of {points} points are not finished: call `quintile sweep run` again, or give --partial{damaged}",
         folder = .folder.display()
     )]
     Unfinished {
@@ -76,6 +76,8 @@ pub enum SweepError {
         missing: usize,
         /// All points.
         points: usize,
+        /// What is wrong with a damaged file; empty if none is.
+        damaged: String,
     },
     /// Jobs cannot be submitted.
     #[error("{0}")]

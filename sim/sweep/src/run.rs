@@ -11,6 +11,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::execute::{Outcome, PointResult, execute};
+use crate::folder::Stored;
 use crate::plan::{Plan, Point};
 use crate::{Folder, Shard, SweepError};
 
@@ -50,20 +51,25 @@ pub struct Status {
 }
 
 impl Status {
-    /// State of the sweep in `folder`, from its files alone.
+    /// State of the sweep in `folder`, from its files alone; and what is wrong with damaged ones.
     ///
     /// # Errors
     /// If there is no plan, or a file cannot be read.
-    pub fn of(folder: &Folder) -> Result<Self, SweepError> {
+    pub fn of(folder: &Folder) -> Result<(Self, Vec<String>), SweepError> {
         let plan = folder.plan()?;
         let mut status = Self { points: plan.points.len(), ..Self::default() };
+        let mut damaged = Vec::new();
         for point in &plan.points {
-            if let Some(result) = folder.result(point)? {
-                status.finished += 1;
-                status.failed += usize::from(matches!(result.outcome, Outcome::Error(_)));
+            match folder.stored(point)? {
+                Stored::Whole(result) => {
+                    status.finished += 1;
+                    status.failed += usize::from(matches!(result.outcome, Outcome::Error(_)));
+                }
+                Stored::Damaged(message) => damaged.push(message),
+                Stored::Missing => {}
             }
         }
-        Ok(status)
+        Ok((status, damaged))
     }
 }
 
@@ -73,6 +79,8 @@ pub struct Work<'a> {
     folder: &'a Folder,
     runs: usize,
     pending: Vec<&'a Point>,
+    /// What is wrong with damaged files of these points.
+    damaged: Vec<String>,
     /// Whether to begin no further points.
     stop: &'a (dyn Fn() -> bool + Sync),
 }
@@ -85,13 +93,18 @@ impl<'a> Work<'a> {
     pub fn new(plan: &'a Plan, folder: &'a Folder, shard: Shard, retry: bool) -> Result<Self, SweepError> {
         let points = plan.points.iter().enumerate();
         let points: Vec<&Point> = points.filter(|(at, _)| shard.has(*at)).map(|(_, point)| point).collect();
-        let is_pending = |point: &Point| {
-            let result = folder.result(point)?;
-            Ok(result.is_none_or(|result| retry && matches!(result.outcome, Outcome::Error(_))))
+        let mut damaged = Vec::new();
+        let mut is_pending = |point: &Point| match folder.stored(point)? {
+            Stored::Whole(result) => Ok(retry && matches!(result.outcome, Outcome::Error(_))),
+            Stored::Missing => Ok(true),
+            Stored::Damaged(message) => {
+                damaged.push(message);
+                Ok(true)
+            }
         };
         let keep = |point: &&'a Point| is_pending(point).map(|keep| keep.then_some(*point)).transpose();
         let pending = points.iter().filter_map(keep).collect::<Result<Vec<_>, SweepError>>()?;
-        Ok(Self { plan, folder, runs: points.len(), pending, stop: &|| false })
+        Ok(Self { plan, folder, runs: points.len(), pending, damaged, stop: &|| false })
     }
 
     /// The same work; [`Self::run`] begins no further point once `stop` holds.
@@ -129,6 +142,7 @@ impl<'a> Work<'a> {
     /// If a result cannot be written. Those that were written stay.
     pub fn run(&self, progress: &Progress) -> Result<Status, SweepError> {
         let count = self.pending.len();
+        self.damaged.iter().for_each(|message| progress.note(message));
         progress.note(&format!("{count} of {} runs to do", self.runs));
         let (started, processor) = (Instant::now(), ProcessTime::now());
         let (done, failed) = (AtomicUsize::new(0), AtomicUsize::new(0));
@@ -151,6 +165,9 @@ impl<'a> Work<'a> {
             progress.note(&self.expected(processor, first.len(), others.len()).line());
         }
         others.par_iter().try_for_each(one)?;
+        if self.runs == self.plan.points.len() {
+            self.folder.clean()?;
+        }
         let finished = self.runs - count + done.into_inner();
         Ok(Status { points: self.runs, finished, failed: failed.into_inner() })
     }

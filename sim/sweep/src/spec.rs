@@ -104,6 +104,10 @@ impl SweepSpec {
     /// # Errors
     /// As [`Self::load`].
     pub fn parse(text: &str, file: &str) -> Result<Self, SweepError> {
+        if text.trim().is_empty() {
+            let message = "it is empty: write a sweep, such as (name: \"a\", axes: [])".to_owned();
+            return Err(SweepError::Setting { file: file.to_owned(), message, is_usage: true });
+        }
         let spec: Self = spec::parse(text, file)?;
         spec.check().map_err(|(place, message)| SweepError::Value {
             file: file.to_owned(),
@@ -273,6 +277,7 @@ mod tests {
         let axes = |axes: &str| message(&format!("(name: \"a\", axes: [{axes}])"));
         for (text, says) in [
             (message("(nam: \"a\", axes: [])"), "a.ron:1:2: unknown field `nam`, did you mean `name`?"),
+            (message(" \n"), "a.ron: it is empty"),
             (message("(name: \" \", axes: [])"), "a.ron: name: it is empty"),
             (axes("Values(path: \"timming\", values: [1])"), "axes[0]: unknown setting `timming`"),
             (axes("Values(path: \"samples\", values: [])"), "axes[0]: `samples` has no values"),
