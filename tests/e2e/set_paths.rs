@@ -93,3 +93,27 @@ fn wrong_paths_and_values_are_refused_by_name() {
         assert!(!ended.stderr.contains(".ron:"), "{}", ended.stderr);
     }
 }
+
+#[test]
+fn several_values_are_several_runs_that_a_table_compares() {
+    let inputs = Inputs::new();
+    let out = inputs.path("out");
+    let sets = ["--set", "gpu.pipeline.tile_px=4,8", "--set", "samples=2", "--set", "workload.bins=4"];
+    let ended = quintile().call(["run", "tiny", "--out", &out].iter().chain(&TINY).chain(&sets[..4]));
+    assert_eq!(ended.code, Some(0), "{}", ended.stderr);
+    let table: Vec<&str> = ended.stdout.lines().rev().take(3).collect();
+    assert!(table[2].contains("gpu.pipeline.tile_px") && table[2].contains("busy time"), "{table:?}");
+    assert!(table[1].contains("1.0000") && !table[0].contains(" 1.0000"), "{table:?}");
+    for value in ["4", "8"] {
+        let alone = run("tiny", &["--set", &format!("gpu.pipeline.tile_px={value}"), "--set", "samples=2"]);
+        let folder = std::path::Path::new(&out).join(format!("gpu.pipeline.tile_px={value}"));
+        assert_eq!(numbers(&Results::in_folder(&folder, ended.clone())), numbers(&alone));
+    }
+    // Nothing is run if one value is wrong, or belongs to something else.
+    for wrong in [&["--set", "gpu.pipeline.tile_px=4,7"][..], &sets] {
+        let new = inputs.path("new");
+        let ended = quintile().call(["run", "tiny", "--out", &new].iter().chain(&TINY).chain(wrong));
+        assert_eq!(ended.code, Some(2), "{}", ended.stderr);
+        assert!(!std::path::Path::new(&new).exists());
+    }
+}

@@ -1,5 +1,10 @@
 //! `quintile sweep`: plan, shards, merge, an end in the middle, failures, and refusals.
 
+mod ends;
+mod failures;
+mod python;
+mod slurm;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -33,16 +38,29 @@ fn merged(folder: &str) -> Vec<u8> {
     fs::read(Path::new(folder).join("results.parquet")).unwrap()
 }
 
-/// Files of points, by name.
-fn point_files(folder: &str) -> Vec<PathBuf> {
+/// Files below `points` of the sweep in a folder, by name.
+fn files(folder: &str) -> Vec<PathBuf> {
     let entries = |path: &Path| -> Vec<PathBuf> {
         let entries = fs::read_dir(path).into_iter().flatten();
         entries.map(|entry| entry.unwrap().path()).collect()
     };
     let mut files: Vec<PathBuf> =
         entries(&Path::new(folder).join("points")).iter().flat_map(|path| entries(path)).collect();
-    files.retain(|path| path.extension().is_some_and(|ending| ending == "json"));
     files.sort();
+    files
+}
+
+/// Files of finished points.
+fn point_files(folder: &str) -> Vec<PathBuf> {
+    let mut files = files(folder);
+    files.retain(|path| path.extension().is_some_and(|ending| ending == "json"));
+    files
+}
+
+/// Files of points that are being written, or were.
+fn unfinished_files(folder: &str) -> Vec<PathBuf> {
+    let mut files = files(folder);
+    files.retain(|path| path.extension().is_some_and(|ending| ending != "json"));
     files
 }
 
@@ -156,6 +174,19 @@ fn a_dry_run_writes_nothing_and_quick_makes_runs_small() {
 }
 
 #[test]
+fn constraints_leave_out_points_and_are_named_if_they_leave_out_none() {
+    let inputs = Inputs::new();
+    let constraints =
+        "constraints: [\"gpu.pipeline.tile_px <= gpu.pipeline.coarse_tile_px\", \"samples < 3\"], axes: [";
+    let text = SWEEP.replace("axes: [", constraints).replace("(0, 2)}", "(0, 2), \"samples\": 2}");
+    let (file, out) = (inputs.put("tiles.ron", text), inputs.path("out"));
+    let ended = done(&["run", &file, "--out", &out]);
+    assert!(ended.stdout.contains("3 of 3 runs finished, 0 failed"), "{}", ended.stdout);
+    let idle = ended.stderr.lines().filter(|line| line.contains("leaves out no point")).collect::<Vec<_>>();
+    assert!(idle.len() == 1 && idle[0].contains("tiles.ron: constraints[1] "), "{}", ended.stderr);
+}
+
+#[test]
 fn tasks_of_a_scheduler_take_their_shards() {
     let inputs = Inputs::new();
     let (file, out) = (inputs.put("tiles.ron", SWEEP), inputs.path("out"));
@@ -233,7 +264,12 @@ fn wrong_sweeps_and_folders_are_refused() {
         assert!(ended.stderr.contains("wrong.ron") && ended.stderr.contains(says), "{}", ended.stderr);
     };
     refused(&SWEEP.replace(".tile_px", ".tile_pix"), 2, "unknown field `tile_pix`, did you mean `tile_px`?");
-    refused(&SWEEP.replace("[4, 8]", "[4, \"big\"]"), 2, "--set gpu.pipeline.tile_px=big");
+    refused(&SWEEP.replace("[4, 8]", "[4, \"big\"]"), 2, "wrong.ron:6: axes[0]: gpu.pipeline.tile_px=big");
+    refused(
+        &SWEEP.replace("\"tiny\"", "\"Fox.glb\", \"scene.settings.samples\": 4"),
+        2,
+        "use `samples` in its place",
+    );
     refused(&SWEEP.replace("axes", "axis"), 2, "unknown field `axis`, did you mean `axes`?");
     refused(&SWEEP.replace("\"tiny\"", "\"tinny\""), 2, "did you mean `tiny`?");
     let (file, other) =
@@ -245,6 +281,12 @@ fn wrong_sweeps_and_folders_are_refused() {
     assert_eq!(point_files(&out), files);
     let ended = sweep(&["run", &file, "--out", &format!("{file}/below")]);
     assert!(ended.code == Some(1) && ended.stderr.contains("check that it is a folder"), "{}", ended.stderr);
+    let ended = sweep(&["plan", &inputs.path("missing.ron"), "--out", &out]);
+    assert!(
+        ended.code == Some(2) && ended.stderr.contains("missing.ron: cannot read it"),
+        "{}",
+        ended.stderr
+    );
     let ended = sweep(&["status", &inputs.path("nothing")]);
     assert!(ended.code == Some(2) && ended.stderr.contains("it does not exist"), "{}", ended.stderr);
 }

@@ -4,11 +4,15 @@ use std::any::Any;
 use std::backtrace::{Backtrace, BacktraceStatus};
 use std::io::{IsTerminal, Write, stderr};
 use std::sync::{Arc, Mutex, PoisonError};
+#[cfg(unix)]
+use std::time::Duration;
 
 use output::table::shell_line;
 use output::terminal::Terminal;
 use run::CrashedFrame;
 use traces::io::atomic;
+
+use super::stop::Stop;
 
 /// Panics in all threads of this process.
 #[derive(Clone, Default)]
@@ -94,24 +98,47 @@ fn alone(arguments: &[String], frame: u32) -> Vec<String> {
     kept
 }
 
+/// How long steps that have begun may go on after a termination, in seconds. Schedulers kill after 30 s.
+#[cfg(unix)]
+const GRACE_S: u64 = 20;
+
 /// Handles interrupt, termination and hang-up: unfinished files are removed, a message is printed, and the process ends with
 /// 128 plus the number of the signal, as in shells. Signals that the caller ignores (`nohup`, background jobs of scripts)
 /// stay ignored.
+///
+/// Work that follows `stop` ends by itself after USR1, and within 20 s after a first termination.
 #[cfg(unix)]
-pub(super) fn handle(terminal: Terminal) {
-    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+pub(super) fn handle(terminal: Terminal, stop: Option<Stop>) {
+    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGUSR1};
 
     let ignored = ignored_signals();
-    let handled = [SIGINT, SIGTERM, SIGHUP].into_iter().filter(|signal| ignored >> (signal - 1) & 1 == 0);
+    let handled = [SIGINT, SIGTERM, SIGHUP].into_iter().chain(stop.is_some().then_some(SIGUSR1));
+    let handled = handled.filter(|signal| ignored >> (signal - 1) & 1 == 0);
     // Without a handler the next process with the same folder removes unfinished files.
-    if let Ok(mut signals) = signal_hook::iterator::Signals::new(handled) {
-        std::thread::spawn(move || signals.forever().for_each(|signal| end(&terminal, 128 + signal)));
-    }
+    let Ok(mut signals) = signal_hook::iterator::Signals::new(handled) else { return };
+    std::thread::spawn(move || {
+        let mut is_terminated = false;
+        for signal in signals.forever() {
+            match &stop {
+                Some(stop) if signal == SIGUSR1 => stop.ask(signal),
+                Some(stop) if signal == SIGTERM && !is_terminated => {
+                    is_terminated = true;
+                    stop.ask(signal);
+                    let terminal = terminal.clone();
+                    std::thread::spawn(move || {
+                        std::thread::sleep(Duration::from_secs(GRACE_S));
+                        end(&terminal, 128 + signal);
+                    });
+                }
+                _ => end(&terminal, 128 + signal),
+            }
+        }
+    });
 }
 
 /// Without signals the next process with the same folder removes unfinished files.
 #[cfg(not(unix))]
-pub(super) fn handle(_: Terminal) {}
+pub(super) fn handle(_: Terminal, _: Option<Stop>) {}
 
 /// Signals that this process ignores, one bit each from signal 1 on; none where the system does not list them.
 #[cfg(unix)]

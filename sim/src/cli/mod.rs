@@ -7,11 +7,13 @@ mod compare;
 mod crash;
 mod info;
 mod list;
+mod lists;
 mod outputs;
 mod parse;
 mod record;
 mod run;
 mod sample;
+mod stop;
 mod sweep;
 mod trace;
 mod visibility;
@@ -36,6 +38,7 @@ use crash::Crashes;
 use info::InfoArgs;
 use outputs::print;
 use run::RunArgs;
+use stop::Stop;
 use trace::TraceArgs;
 use visibility::{SamplesArgs, VisibilityArgs};
 
@@ -131,9 +134,11 @@ pub struct ListArgs {
 pub fn main() -> ExitCode {
     let cli = parse(std::env::args_os().collect()).unwrap_or_else(|error| error.exit());
     let terminal = cli.messages.terminal();
-    crash::handle(terminal.clone());
+    let stop = Stop::default();
+    let follows_stop = matches!(&cli.command, Command::Sweep(args) if args.follows_stop());
+    crash::handle(terminal.clone(), follows_stop.then(|| stop.clone()));
     let crashes = Crashes::record();
-    match std::panic::catch_unwind(AssertUnwindSafe(|| dispatch(&cli, &terminal))) {
+    match std::panic::catch_unwind(AssertUnwindSafe(|| dispatch(&cli, &terminal, &stop))) {
         Ok(Ok(())) => ExitCode::SUCCESS,
         Ok(Err(failure)) => {
             terminal.error(&failure.message);
@@ -179,14 +184,14 @@ impl From<workloads::LoadError> for Failure {
     }
 }
 
-fn dispatch(cli: &Cli, terminal: &Terminal) -> Result<(), Failure> {
+fn dispatch(cli: &Cli, terminal: &Terminal, stop: &Stop) -> Result<(), Failure> {
     match &cli.command {
         Command::Run(args) => run::run(args, terminal),
         Command::Info(args) => info::run(args),
         Command::Compare(args) => compare::run(args),
         Command::Record(args) => record::record(args, terminal),
         Command::Time(args) => record::time(args),
-        Command::Sweep(args) => sweep::run(args, terminal),
+        Command::Sweep(args) => sweep::run(args, terminal, stop),
         Command::Completions(args) => completions(args),
         Command::Man(args) => man(args),
         Command::List(args) => list::list(args),

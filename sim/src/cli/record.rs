@@ -8,15 +8,16 @@ use output::table::{Table, counted, si};
 use output::terminal::Terminal;
 use power_model::Bound;
 use rayon::prelude::*;
-use run::{MACHINES_IN_TURN, PacingChoice, Plan, RecordedRun, RunError, RunOptions, TimedFrames};
+use run::{Change, MACHINES_IN_TURN, PacingChoice, Plan, RecordedRun, RunError, RunOptions, TimedFrames};
 use serde::Serialize;
-use sweep::{Measured, measured};
+use sweep::{Measured, Setting, measured};
 use timing::Level;
 use workloads::job::OptionSource;
 
 use super::Failure;
+use super::lists;
 use super::outputs::{print, print_json};
-use super::run::{bound, changes_of};
+use super::run::bound;
 use crate::cli::args::{SceneArgs, ThreadArgs};
 use crate::cli::parse::setting;
 
@@ -105,16 +106,15 @@ fn level(text: &str) -> Result<Level, String> {
 }
 
 pub(super) fn record(args: &RecordArgs, terminal: &Terminal) -> Result<(), Failure> {
-    let (changes, set) = changes_of(&args.set);
-    let options = RunOptions {
+    let mut options = RunOptions {
         scene: args.scene.clone(),
-        options: OptionSource { file: args.options.clone(), set },
-        changes,
+        options: OptionSource { file: args.options.clone(), set: Vec::new() },
         overrides: args.view.overrides(),
         gpu: args.gpu.clone(),
         seed: args.seed,
         ..RunOptions::default()
     };
+    args.set.iter().try_for_each(|(path, value)| lists::set(&mut options, &Setting::new(path, value)))?;
     let progress = Progress::on(terminal, args.json);
     let plan = Plan::resolve(options)?;
     traces::io::atomic::try_place(&args.out).map_err(RunError::from)?;
@@ -179,12 +179,12 @@ fn timed(args: &TimeArgs, recorded: &RecordedRun, gpus: &[PathBuf]) -> Result<Ve
 
 /// The recorded run on a GPU.
 fn planned(args: &TimeArgs, recorded: &RecordedRun, gpu: &Path) -> Result<Plan, RunError> {
-    let (changes, options) = changes_of(&args.set);
-    if let Some((name, value)) = options.first() {
+    if let Some((name, value)) = args.set.iter().find(|(path, _)| !path.contains('.')) {
         return Err(RunError::Setting(format!(
             "--set {name}={value}: it is of the drawing; only gpu., platform. and table. can be set here"
         )));
     }
+    let changes = args.set.iter().cloned().map(|(path, value)| Change { path, value }).collect();
     recorded.plan(RunOptions {
         changes,
         gpu: gpu.to_owned(),

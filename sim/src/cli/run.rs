@@ -1,6 +1,6 @@
 //! `quintile run`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use activity::Event;
@@ -13,13 +13,14 @@ use output::terminal::{Terminal, Verbosity};
 use output::{Destination, MeanSd};
 use power_model::Bound;
 use run::{
-    Change, DryRun, FinishedRun, HeatQuantity, PacingChoice, Plan, Prepared, Requested, RunError, RunOptions,
+    Choice, DryRun, FinishedRun, HeatQuantity, PacingChoice, Plan, Prepared, Requested, RunError, RunOptions,
     Summary, TimingChoice, again, open, prepare,
 };
 use serde::Serialize;
 use workloads::job::OptionSource;
 
 use super::Failure;
+use super::lists;
 use super::outputs::{print, print_json};
 use crate::cli::args::{LookArgs, SceneArgs, ThreadArgs};
 use crate::cli::parse::{duration, percent, rate, setting, share_below_one};
@@ -47,9 +48,11 @@ pub struct RunArgs {
     /// Options of a workload in a .ron file
     #[arg(long, value_name = "FILE.ron")]
     pub options: Option<PathBuf>,
-    /// An option of a workload, or a value in the file of GPU, platform, energy table or scene, such as
-    /// gpu.pipeline.tile_px=8; may be given several times, and overrides --options
-    #[arg(long, value_name = "NAME=VALUE", value_parser = setting)]
+    /// An option of a workload (bins=8, or workload.bins=8), a value in the file of GPU, platform, energy table or scene
+    /// (gpu.pipeline.tile_px=8), or, where a scene is run, an option of the run as sweep files name it (timing=bound); may be given
+    /// several times, and overrides others. With several values, as tile_px=4,8, each has a run in a folder of its own below DIR, and a
+    /// table compares them
+    #[arg(long, value_name = "NAME=VALUE[,VALUE...]", value_parser = setting)]
     pub set: Vec<(String, String)>,
     /// Folder for the results; created if missing
     #[arg(long, value_name = "DIR", default_value = "out")]
@@ -190,30 +193,55 @@ fn quantity(text: &str) -> Result<HeatQuantity, String> {
 pub(super) const REVISION: Option<&str> = option_env!("QUINTILE_REVISION");
 
 pub(super) fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), Failure> {
+    if let Some(summary) = &args.again {
+        let (options, recorded) = again(summary, args.force, REVISION)?;
+        return one(args, terminal, (options, recorded), &args.out).map(drop);
+    }
+    let listed = lists::runs(&options(args), &args.set, &args.out)?;
+    let is_alone = listed.iter().all(|run| run.varied.is_empty());
+    if !is_alone {
+        // Wrong values are refused before the first of several runs.
+        listed.iter().try_for_each(|run| Plan::resolve(run.options.clone()).map(drop))?;
+    }
+    let mut done = Vec::new();
+    for run in listed {
+        let summary = one(args, terminal, (run.options.clone(), None), &run.out)?;
+        done.extend(summary.map(|summary| (run, summary)));
+    }
+    match is_alone || args.json || done.is_empty() {
+        true => Ok(()),
+        false => print(&lists::table(&done).to_string()),
+    }
+}
+
+/// Runs with `options` into `out`, and prints its results; returns the summary, unless it is a dry run.
+fn one(
+    args: &RunArgs,
+    terminal: &Terminal,
+    (options, recorded): (RunOptions, Option<Choice>),
+    out: &Path,
+) -> Result<Option<Summary>, Failure> {
     let started = Instant::now();
     let progress = Progress::on(terminal, args.json);
-    let out = Destination { folder: args.out.clone(), force: args.force };
+    let destination = Destination { folder: out.to_owned(), force: args.force };
     let pool = args.threads.pool()?;
-    let (options, recorded) = match &args.again {
-        Some(summary) => again(summary, args.force, REVISION)?,
-        None => (options(args), None),
-    };
     let plan = Plan::resolve(options)?;
-    let dir = open(&plan, &out)?;
+    let dir = open(&plan, &destination)?;
     let prepared = pool.install(|| prepare(plan, recorded, REVISION, &progress))?;
     if args.dry_run {
-        return dry_run(args, &pool.install(|| DryRun::new(&prepared))?, terminal);
+        return dry_run((args.json, out), &pool.install(|| DryRun::new(&prepared))?, terminal).map(|()| None);
     }
     if !args.json && terminal.verbosity() > Verbosity::Quiet {
         pool.install(|| note_expected(&prepared, &progress))?;
     }
     let outcome = pool.install(|| prepared.run(dir, &progress))?;
     if args.json {
-        let printed = Printed { out: args.out.display().to_string(), summary: &outcome.summary };
-        return print_json(&printed, true);
+        print_json(&Printed { out: out.display().to_string(), summary: &outcome.summary }, true)?;
+    } else {
+        outcome.summary.warnings.iter().for_each(|warning| terminal.warn(warning));
+        print(&format!("{}took {:.1} s", text(out, &outcome), started.elapsed().as_secs_f64()))?;
     }
-    outcome.summary.warnings.iter().for_each(|warning| terminal.warn(warning));
-    print(&format!("{}took {:.1} s", text(args, &outcome), started.elapsed().as_secs_f64()))
+    Ok(Some(outcome.summary))
 }
 
 /// Prints the expected time of a run.
@@ -225,28 +253,22 @@ fn note_expected(prepared: &Prepared, progress: &Progress) -> Result<(), RunErro
 }
 
 /// Prints a description of the run and the folder of results.
-fn dry_run(args: &RunArgs, dry_run: &DryRun, terminal: &Terminal) -> Result<(), Failure> {
-    if args.json {
+fn dry_run((json, out): (bool, &Path), dry_run: &DryRun, terminal: &Terminal) -> Result<(), Failure> {
+    if json {
         return print_json(dry_run, true);
     }
     dry_run.warnings.iter().for_each(|warning| terminal.warn(warning));
-    let results = ("results", format!("would be written into {}; nothing was", args.out.display()));
+    let results = ("results", format!("would be written into {}; nothing was", out.display()));
     let rows = dry_run.rows().into_iter().chain([results]);
     print(&rows.map(|(name, value)| format!("{name:<9} {value}")).collect::<Vec<_>>().join("\n"))
 }
 
-/// Values of `--set` in files, and those of options of a workload.
-pub(super) fn changes_of(set: &[(String, String)]) -> (Vec<Change>, Vec<(String, String)>) {
-    let (changes, options): (Vec<_>, Vec<_>) = set.iter().cloned().partition(|(path, _)| path.contains('.'));
-    (changes.into_iter().map(|(path, value)| Change { path, value }).collect(), options)
-}
-
+/// Options without those of `--set`.
 fn options(args: &RunArgs) -> RunOptions {
-    let (changes, set) = changes_of(&args.set);
     RunOptions {
         scene: args.scene.clone(),
-        options: OptionSource { file: args.options.clone(), set },
-        changes,
+        options: OptionSource { file: args.options.clone(), set: Vec::new() },
+        changes: Vec::new(),
         overrides: args.view.overrides(),
         gpu: args.gpu.clone(),
         platform: args.platform.clone(),
@@ -276,7 +298,7 @@ struct Printed<'a> {
 }
 
 /// Text of a finished run for the terminal.
-fn text(args: &RunArgs, outcome: &FinishedRun) -> String {
+fn text(out: &Path, outcome: &FinishedRun) -> String {
     let (summary, settings) = (&outcome.summary, &outcome.summary.settings);
     let mut lines = vec![
         format!(
@@ -299,8 +321,8 @@ fn text(args: &RunArgs, outcome: &FinishedRun) -> String {
         lines.push(format!("sample test efficiency {:.1} %", efficiency * 100.0));
     }
     lines.extend(summary.facts.iter().map(|(name, value)| format!("{name}: {}", count_or_digits(*value))));
-    lines.push(format!("results: {}", args.out.display()));
-    lines.push(format!("report:  {}\n", args.out.join("report.html").display()));
+    lines.push(format!("results: {}", out.display()));
+    lines.push(format!("report:  {}\n", out.join("report.html").display()));
     lines.join("\n")
 }
 

@@ -7,9 +7,10 @@ use output::progress::Progress;
 use output::table::{Table, counted, shell_line, si};
 use output::terminal::Terminal;
 use rayon::ThreadPool;
+use run::Input;
 use serde::Serialize;
 use sweep::{
-    Expected, Folder, Plan, Report, Shard, SlurmArray, SlurmJob, Status, SweepError, Work, merge,
+    Expected, Folder, Plan, Report, Shard, SlurmArray, SlurmJob, Status, SweepError, Work, merge, submit,
     write_scripts,
 };
 use traces::io::atomic::write_file;
@@ -18,6 +19,7 @@ use traces::pareto::{RatedPoint, write_csv};
 use super::Failure;
 use super::outputs::{print, print_json};
 use super::run::REVISION;
+use super::stop::Stop;
 use super::trace::pareto::{Groups, ParetoShow, picture};
 use super::trace::{PlotFormat, write_picture};
 use crate::cli::args::{LookArgs, ThreadArgs};
@@ -28,12 +30,20 @@ use crate::cli::args::{LookArgs, ThreadArgs};
     after_help = "Examples:\n  quintile sweep run tiles.ron --out tiles --dry-run\n  quintile sweep run tiles.ron --out tiles\n  \
     quintile sweep merge tiles\n  quintile sweep report tiles\n  sbatch --array=0-7 --wrap 'quintile sweep run tiles.ron --out tiles'\n\n\
     `sweep run` may be stopped at any moment and called again: finished points are skipped. Points are finished when their \
-    file is in DIR/points; a point that fails is finished, too, with its reason."
+    file is in DIR/points; a point that fails is finished, too, with its reason. After USR1 or TERM no further points are begun, those \
+    in flight are finished (after TERM, if they can within 20 s), and the exit code is 138 or 143 if points are left."
 )]
 pub struct SweepArgs {
     /// What to do
     #[command(subcommand)]
     pub step: Step,
+}
+
+impl SweepArgs {
+    /// Whether signals of a scheduler end it between two points.
+    pub(super) const fn follows_stop(&self) -> bool {
+        matches!(self.step, Step::Run(_))
+    }
 }
 
 /// Step of a sweep.
@@ -115,6 +125,9 @@ pub struct SlurmArgs {
     /// Threads of a task
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub task_threads: u16,
+    /// Submit both scripts by `sbatch`, and print the numbers of the jobs
+    #[arg(long)]
+    pub submit: bool,
 }
 
 /// The folder of a sweep.
@@ -182,74 +195,118 @@ struct Printed<'a, T: Serialize> {
     done: &'a T,
 }
 
-pub(super) fn run(args: &SweepArgs, terminal: &Terminal) -> Result<(), Failure> {
+pub(super) fn run(args: &SweepArgs, terminal: &Terminal, stop: &Stop) -> Result<(), Failure> {
     match &args.step {
-        Step::Plan(args) => plan(args),
-        Step::Run(args) => run_points(args, terminal),
-        Step::Slurm(args) => slurm(args),
-        Step::Status(args) => status(args),
+        Step::Plan(args) => plan(args, terminal),
+        Step::Run(args) => run_points(args, terminal, stop),
+        Step::Slurm(args) => slurm(args, terminal),
+        Step::Status(args) => status(args, terminal),
         Step::Merge(args) => merged(args),
         Step::Report(args) => report(args),
     }
 }
 
-/// The plan of a sweep, its folder, and worker threads.
-fn opened(args: &FileArgs) -> Result<(Plan, Folder, ThreadPool), Failure> {
-    let pool = args.threads.pool()?;
-    let plan = pool.install(|| Plan::load(&args.file, args.quick, REVISION))?;
-    let folder = Folder::at(&args.out);
-    folder.check(&plan)?;
-    Ok((plan, folder, pool))
+/// A sweep that is planned.
+struct Opened {
+    plan: Plan,
+    folder: Folder,
+    pool: ThreadPool,
+    progress: Progress,
 }
 
-fn plan(args: &PlanArgs) -> Result<(), Failure> {
-    let (plan, folder, pool) = opened(&args.sweep)?;
-    folder.write_plan(&plan)?;
-    let work = Work::new(&plan, &folder, Shard::default(), false)?;
-    let expected = pool.install(|| work.probe());
-    print_expected(&args.sweep, &expected)
+impl Opened {
+    /// Plans the sweep of these arguments.
+    fn new(args: &FileArgs, terminal: &Terminal) -> Result<Self, Failure> {
+        let (pool, progress) = (args.threads.pool()?, Progress::on(terminal, args.json));
+        let plan =
+            pool.install(|| Plan::load_with_progress(&args.file, args.quick, Some(&program()), &progress))?;
+        let folder = Folder::at(&args.out);
+        folder.check(&plan)?;
+        Ok(Self { plan, folder, pool, progress })
+    }
+
+    /// Expected time of all points that are not finished, by running two of them.
+    fn probe(&self, shard: Shard, retry: bool) -> Result<Expected, Failure> {
+        let work = Work::new(&self.plan, &self.folder, shard, retry)?;
+        self.progress.note(&format!(
+            "{} planned; running two for the expected time",
+            counted(self.plan.points.len(), "run")
+        ));
+        Ok(self.pool.install(|| work.probe()))
+    }
 }
 
-fn run_points(args: &RunStepArgs, terminal: &Terminal) -> Result<(), Failure> {
+/// Revision and contents of this program: results of another one do not count.
+fn program() -> String {
+    let hash = std::env::current_exe().ok().and_then(|path| Input::now(&path).ok()?.sha256);
+    format!("{} {}", REVISION.unwrap_or_default(), hash.unwrap_or_default())
+}
+
+fn plan(args: &PlanArgs, terminal: &Terminal) -> Result<(), Failure> {
+    let opened = Opened::new(&args.sweep, terminal)?;
+    opened.folder.write_plan(&opened.plan)?;
+    print_expected(&args.sweep, &opened.probe(Shard::default(), false)?)
+}
+
+fn run_points(args: &RunStepArgs, terminal: &Terminal, stop: &Stop) -> Result<(), Failure> {
     let shard = match args.shard {
         Some(shard) => shard,
         None => Shard::of_task(args.shards.map(|count| count as usize), |name| std::env::var(name).ok())?,
     };
-    let (plan, folder, pool) = opened(&args.sweep)?;
+    let opened = Opened::new(&args.sweep, terminal)?;
     if args.dry_run {
-        let work = Work::new(&plan, &folder, shard, args.retry)?;
-        return print_expected(&args.sweep, &pool.install(|| work.probe()));
+        return print_expected(&args.sweep, &opened.probe(shard, args.retry)?);
     }
+    let Opened { plan, folder, pool, progress } = opened;
     folder.write_plan(&plan)?;
-    let progress = Progress::on(terminal, args.sweep.json);
-    let work = Work::new(&plan, &folder, shard, args.retry)?;
+    let is_asked = || stop.is_asked();
+    let work = Work::new(&plan, &folder, shard, args.retry)?.until(&is_asked);
     let status = pool.install(|| work.run(&progress))?;
-    print_status(&args.sweep.out, args.sweep.json, &status)
+    print_status(&args.sweep.out, args.sweep.json, &status)?;
+    match status.points - status.finished {
+        0 => Ok(()),
+        left => Err(Failure {
+            message: format!(
+                "stopped by a signal: {} not finished; call it again to continue",
+                counted(left, "run")
+            ),
+            code: stop.code(),
+        }),
+    }
 }
 
-fn slurm(args: &SlurmArgs) -> Result<(), Failure> {
-    let (plan, folder, pool) = opened(&args.sweep)?;
-    folder.write_plan(&plan)?;
-    let work = Work::new(&plan, &folder, Shard::default(), false)?;
-    let expected = pool.install(|| work.probe());
+fn slurm(args: &SlurmArgs, terminal: &Terminal) -> Result<(), Failure> {
+    let opened = Opened::new(&args.sweep, terminal)?;
+    opened.folder.write_plan(&opened.plan)?;
+    let expected = opened.probe(Shard::default(), false)?;
+    let Opened { plan, pool, .. } = opened;
     let tasks = args.tasks.map(|count| count as usize);
     let array = SlurmArray::new(&expected, pool.current_num_threads(), args.task_threads.into(), tasks);
     let [out, directory] = [&*args.sweep.out, Path::new("")].map(absolute);
     let [run, merge] = commands(&args.sweep);
     let job = SlurmJob { name: &plan.name, folder: &out, directory: &directory, command: &run };
     let merge_sh = SlurmJob { command: &merge, ..job }.merge_script();
-    let scripts = write_scripts(&out, &array.script(&job), &merge_sh)?.map(|path| path.display().to_string());
+    let paths = write_scripts(&out, &array.script(&job), &merge_sh)?;
+    let jobs = match args.submit {
+        true => Some(submit(paths.each_ref().map(PathBuf::as_path))?),
+        false => None,
+    };
+    let scripts = paths.map(|path| path.display().to_string());
     if args.sweep.json {
-        let printed = serde_json::json!({ "scripts": scripts, "tasks": array.tasks, "expected": expected });
+        let printed = serde_json::json!({
+            "scripts": scripts, "tasks": array.tasks, "jobs": jobs, "expected": expected
+        });
         return print_json(&printed, true);
     }
-    let [array_sh, merge_sh] = scripts.map(|path| shell_line(&[path]));
     let (tasks, minutes) = (counted(array.tasks, "task"), array.minutes);
-    print(&format!(
-        "{}\n{tasks} of {minutes} min at most; submit with\n\
-         sbatch --dependency=afterany:$(sbatch --parsable {array_sh}) {merge_sh}",
-        expected.line()
-    ))
+    let then = match jobs {
+        Some([array, merge]) => format!("submitted as job {array}, and job {merge} to merge"),
+        None => {
+            let [array_sh, merge_sh] = scripts.map(|path| shell_line(&[path]));
+            format!("submit with\nsbatch --dependency=afterany:$(sbatch --parsable {array_sh}) {merge_sh}")
+        }
+    };
+    print(&format!("{}\n{tasks} of {minutes} min at most; {then}", expected.line()))
 }
 
 /// Commands of a task and of the merge job, with absolute paths.
@@ -269,9 +326,11 @@ fn absolute(path: &Path) -> PathBuf {
     std::env::current_dir().map_or_else(|_| path.to_owned(), |directory| directory.join(path))
 }
 
-fn status(args: &StatusArgs) -> Result<(), Failure> {
+fn status(args: &StatusArgs, terminal: &Terminal) -> Result<(), Failure> {
     let folder = args.folder.folder();
-    print_status(folder.path(), args.folder.json, &Status::of(&folder)?)
+    let (status, damaged) = Status::of(&folder)?;
+    damaged.iter().for_each(|message| terminal.note(message));
+    print_status(folder.path(), args.folder.json, &status)
 }
 
 fn merged(args: &MergeArgs) -> Result<(), Failure> {

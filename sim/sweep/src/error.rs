@@ -66,7 +66,7 @@ pub enum SweepError {
     Write(#[from] WriteError),
     /// Points are not finished.
     #[error(
-        "{folder}: {missing} of {points} points are not finished: call `quintile sweep run` again, or give --partial",
+        "{folder}: {missing} of {points} points are not finished: call `quintile sweep run` again, or give --partial{damaged}",
         folder = .folder.display()
     )]
     Unfinished {
@@ -76,7 +76,12 @@ pub enum SweepError {
         missing: usize,
         /// All points.
         points: usize,
+        /// What is wrong with a damaged file; empty if none is.
+        damaged: String,
     },
+    /// Jobs cannot be submitted.
+    #[error("{0}")]
+    Slurm(String),
     /// An input file cannot be read.
     #[error(transparent)]
     Input(RunError),
@@ -86,10 +91,15 @@ impl SweepError {
     /// Whether this is a usage error (exit code 2) rather than a failure (exit code 1).
     pub fn is_usage(&self) -> bool {
         match self {
-            Self::Spec(error) => matches!(error, SpecError::Parse { .. }),
+            Self::Spec(SpecError::Read { source, .. }) => source.kind() == std::io::ErrorKind::NotFound,
+            Self::Spec(SpecError::Parse { .. }) => true,
             Self::Value { .. } | Self::Shard(_) | Self::OtherSweep { .. } | Self::Plan { .. } => true,
             Self::Setting { is_usage, .. } => *is_usage,
-            Self::Folder { .. } | Self::Write(_) | Self::Unfinished { .. } | Self::Input(_) => false,
+            Self::Folder { .. }
+            | Self::Write(_)
+            | Self::Unfinished { .. }
+            | Self::Slurm(_)
+            | Self::Input(_) => false,
         }
     }
 

@@ -85,7 +85,9 @@ impl Folder {
             }
             writeln!(out)
         };
-        Ok(atomic::write_file(&self.root.join(PLAN), write)?)
+        atomic::write_file(&self.root.join(PLAN), write)?;
+        // Another sweep may have come between.
+        self.check(plan)
     }
 
     fn header(&self) -> Result<Option<Header>, SweepError> {
@@ -96,8 +98,10 @@ impl Folder {
             Err(error) => return Err(SweepError::folder(&path)(error)),
         };
         let line = BufReader::new(file).lines().next().transpose().map_err(SweepError::folder(&path))?;
-        let header: Header =
-            serde_json::from_str(&line.unwrap_or_default()).map_err(|error| damaged(&path, &error))?;
+        let Some(line) = line else {
+            return Err(SweepError::Plan { path, message: "it is empty: plan the sweep again".to_owned() });
+        };
+        let header: Header = serde_json::from_str(&line).map_err(|error| damaged(&path, &error))?;
         if header.schema != SCHEMA {
             let message = format!(
                 "its schema is {}, this version reads {SCHEMA}: use the version that wrote it",
@@ -153,31 +157,98 @@ impl Folder {
         self.root.join("points").join(start).join(format!("{}.json", point.id))
     }
 
+    /// What is kept of a point.
+    ///
+    /// # Errors
+    /// If its file exists and cannot be read.
+    pub(crate) fn stored(&self, point: &Point) -> Result<Stored, SweepError> {
+        let path = self.file_of(point);
+        let fault = match fs::read(&path) {
+            Ok(bytes) if bytes.is_empty() => "it is empty".to_owned(),
+            Ok(bytes) => match serde_json::from_slice::<PointResult>(&bytes) {
+                Ok(result) if result.id == point.id => return Ok(Stored::Whole(result)),
+                Ok(result) => format!("it holds the point {}", result.id),
+                Err(error) => format!("it is cut off or damaged: {error}"),
+            },
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Stored::Missing),
+            Err(error) => return Err(SweepError::folder(&path)(error)),
+        };
+        Ok(Stored::Damaged(format!("{}: {fault}; `quintile sweep run` runs its point again", path.display())))
+    }
+
     /// Result of a point; `None` if it is missing or not whole.
     ///
     /// # Errors
     /// If the file exists and cannot be read.
     pub(crate) fn result(&self, point: &Point) -> Result<Option<PointResult>, SweepError> {
-        let path = self.file_of(point);
-        match fs::read(&path) {
-            Ok(bytes) => {
-                Ok(serde_json::from_slice(&bytes).ok().filter(|result: &PointResult| result.id == point.id))
-            }
-            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
-            Err(error) => Err(SweepError::folder(&path)(error)),
-        }
+        Ok(match self.stored(point)? {
+            Stored::Whole(result) => Some(result),
+            Stored::Missing | Stored::Damaged(_) => None,
+        })
     }
 
     /// Writes the result of a point.
     ///
     /// # Errors
-    /// If it cannot be written.
+    /// If it cannot be written, unless another process has.
     pub(crate) fn write_result(&self, point: &Point, result: &PointResult) -> Result<(), SweepError> {
         let path = self.file_of(point);
         if let Some(folder) = path.parent() {
             fs::create_dir_all(folder).map_err(SweepError::folder(folder))?;
         }
-        Ok(atomic::write_file(&path, |out| serde_json::to_writer(out, result))?)
+        atomic::write_file(&path, |out| serde_json::to_writer(out, result)).or_else(|error| {
+            match self.result(point) {
+                Ok(Some(_)) => Ok(()),
+                _ => Err(error.into()),
+            }
+        })
+    }
+
+    /// Removes what killed processes left of points that are finished. Files of other points may be about to be finished.
+    ///
+    /// # Errors
+    /// If a folder cannot be read.
+    pub(crate) fn clean(&self) -> Result<(), SweepError> {
+        let points = self.root.join("points");
+        for folder in entries(&points)? {
+            for path in entries(&folder)? {
+                let whole = path.file_name().and_then(|name| Some(finished_name(name.to_str()?)?.to_owned()));
+                if whole.is_some_and(|whole| path.with_file_name(whole).exists()) {
+                    // Another process may have removed it.
+                    let _ = fs::remove_file(&path);
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// What is kept of a point.
+pub(crate) enum Stored {
+    /// Its result.
+    Whole(PointResult),
+    /// A file that is not its result: what is wrong, and what to do.
+    Damaged(String),
+    /// Nothing.
+    Missing,
+}
+
+/// Name of the file that the file called `name` was to become, such as `ID.json` of `.ID.json.PID.part`.
+fn finished_name(name: &str) -> Option<&str> {
+    let (whole, _process) = name.strip_prefix('.')?.strip_suffix(".part")?.rsplit_once('.')?;
+    Some(whole)
+}
+
+/// Paths in a folder; none if it does not exist, or is a file.
+fn entries(folder: &Path) -> Result<Vec<PathBuf>, SweepError> {
+    let none = [io::ErrorKind::NotFound, io::ErrorKind::NotADirectory];
+    match fs::read_dir(folder) {
+        Ok(entries) => entries
+            .map(|entry| entry.map(|entry| entry.path()))
+            .collect::<Result<_, _>>()
+            .map_err(SweepError::folder(folder)),
+        Err(error) if none.contains(&error.kind()) => Ok(Vec::new()),
+        Err(error) => Err(SweepError::folder(folder)(error)),
     }
 }
 
@@ -225,8 +296,15 @@ mod tests {
         assert_eq!(folder.result(&plan.points[1]).unwrap(), None);
         let path = folder.file_of(&plan.points[0]);
         let text = fs::read_to_string(&path).unwrap();
-        fs::write(&path, &text[..text.len() / 2]).unwrap();
-        assert_eq!(folder.result(&plan.points[0]).unwrap(), None);
+        let other = text.replace("aa01", "aa02");
+        for (damaged, says) in
+            [(&text[..text.len() / 2], "cut off"), ("", "it is empty"), (&*other, "the point aa02")]
+        {
+            fs::write(&path, damaged).unwrap();
+            assert_eq!(folder.result(&plan.points[0]).unwrap(), None);
+            let Ok(Stored::Damaged(message)) = folder.stored(&plan.points[0]) else { panic!() };
+            assert!(message.contains("aa01.json: ") && message.contains(says), "{message}");
+        }
         let path = root.path().join(PLAN);
         let text = fs::read_to_string(&path).unwrap();
         for length in [0, 10, text.find('\n').unwrap() + 1, text.len() - 5] {
@@ -234,6 +312,22 @@ mod tests {
             let error = folder.plan().unwrap_err();
             assert!(error.to_string().contains("plan the sweep again"), "{error}");
         }
+    }
+
+    #[test]
+    fn leftovers_of_finished_points_are_removed() {
+        let root = tempfile::tempdir().unwrap();
+        let (folder, plan) = (Folder::at(root.path()), plan("a"));
+        folder.clean().unwrap();
+        folder.write_plan(&plan).unwrap();
+        let failed = PointResult { id: "aa01".to_owned(), outcome: Err("why".to_owned()).into() };
+        folder.write_result(&plan.points[0], &failed).unwrap();
+        let left = ["aa/.aa01.json.7.part", "aa/.aa02.json.7.part", "aa/notes.part"]
+            .map(|name| root.path().join("points").join(name));
+        left.iter().for_each(|path| fs::write(path, "{").unwrap());
+        folder.clean().unwrap();
+        assert_eq!(left.map(|path| path.exists()), [false, true, true]);
+        assert!(folder.result(&plan.points[0]).unwrap().is_some());
     }
 
     #[test]

@@ -13,6 +13,7 @@
 //! A point has no state but its file, so a sweep may be stopped at any moment and continued anywhere.
 
 mod axis;
+mod constraint;
 mod error;
 mod execute;
 mod folder;
@@ -36,8 +37,9 @@ pub use execute::{EventCounts, Measured, measured};
 pub use folder::Folder;
 pub use merge::{RESULTS, merge};
 pub use plan::{Plan, Point};
+pub use points::combinations;
 pub use report::{Effect, Report};
-pub use setting::{Setting, Text};
+pub use setting::{Setting, Text, is_option, with};
 pub use shard::Shard;
-pub use slurm::{SlurmArray, SlurmJob, write_scripts};
+pub use slurm::{SlurmArray, SlurmJob, submit, write_scripts};
 pub use spec::{Combination, MAX_POINTS, SweepSpec};

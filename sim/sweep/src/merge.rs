@@ -8,7 +8,7 @@ use traces::io::atomic;
 use crate::execute::{Measured, Outcome};
 use crate::parquet::{self, Column, Values};
 use crate::plan::{Plan, Point};
-use crate::{Folder, SweepError};
+use crate::{Folder, Status, SweepError};
 
 /// Name of the table.
 pub const RESULTS: &str = "results.parquet";
@@ -28,13 +28,20 @@ pub fn merge(folder: &Folder, partial: bool) -> Result<PathBuf, SweepError> {
         rows.push(result.unwrap_or_else(|| Outcome::Error("not finished".to_owned())));
     }
     if missing > 0 && !partial {
-        let (folder, points) = (folder.path().to_owned(), plan.points.len());
-        return Err(SweepError::Unfinished { folder, missing, points });
+        let (root, points) = (folder.path().to_owned(), plan.points.len());
+        return Err(SweepError::Unfinished { damaged: damaged(folder)?, folder: root, missing, points });
     }
+    folder.clean()?;
     let path = folder.path().join(RESULTS);
     let columns = columns(&plan, &rows);
     atomic::write_file(&path, |out| parquet::write(&columns, out))?;
     Ok(path)
+}
+
+/// End of a message with the first damaged file; empty if there is none.
+fn damaged(folder: &Folder) -> Result<String, SweepError> {
+    let (_, damaged) = Status::of(folder)?;
+    Ok(damaged.first().map_or(String::new(), |message| format!("; {message}")))
 }
 
 /// Columns of the table: id, settings, numbers, counters, reason of a failure.

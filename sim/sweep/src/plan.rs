@@ -3,13 +3,14 @@
 use std::path::Path;
 
 use output::dir::sha256_of_text;
+use output::progress::Progress;
 use serde::{Deserialize, Serialize};
 
 use crate::SweepError;
 use crate::points::Points;
 use crate::setting::Setting;
 use crate::spec::{Combination, SweepSpec};
-use crate::trials::{Refusal, Trials};
+use crate::trials::{Refusal, Ticker, Trials};
 
 /// Version of the files of a sweep.
 pub(crate) const SCHEMA: u32 = 1;
@@ -39,31 +40,49 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Plans the sweep in the file at `path`, with the settings of `--quick` if it is given. `revision` is the git revision of
-    /// the program.
+    /// Plans the sweep in the file at `path`, with the settings of `--quick` if it is given. `program` is the git revision of the
+    /// program and whatever else changes with it.
     ///
     /// # Errors
     /// If the file is invalid, a setting is unknown, a value can never be valid, or an input cannot be read.
-    pub fn load(path: &Path, quick: bool, revision: Option<&str>) -> Result<Self, SweepError> {
-        let file = || path.display().to_string();
-        let spec = SweepSpec::load(path)?;
-        let points = Points::new(&spec, quick);
-        if points.varied.is_empty() {
-            let (place, message) = ("forbidden", "all combinations are left out: forbid fewer");
-            return Err(SweepError::Value {
-                file: file(),
-                place: place.to_owned(),
-                message: message.to_owned(),
-            });
-        }
-        let mut trials = Trials::new(&points);
-        trials.try_settings(spec.points == Combination::Grid).map_err(|Refusal { message, is_usage }| {
-            SweepError::Setting { file: file(), message, is_usage }
+    pub fn load(path: &Path, quick: bool, program: Option<&str>) -> Result<Self, SweepError> {
+        Self::load_with_progress(path, quick, program, &Progress::new(true))
+    }
+
+    /// As [`Self::load`], with notes about long planning and about constraints that leave out no point.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn load_with_progress(
+        path: &Path,
+        quick: bool,
+        program: Option<&str>,
+        progress: &Progress,
+    ) -> Result<Self, SweepError> {
+        let file = path.display().to_string();
+        let text = activity::spec::read(path)?;
+        let spec = SweepSpec::parse(&text, &file)?;
+        let points = Points::new(&spec, quick).map_err(|(place, message)| SweepError::Value {
+            file: file.clone(),
+            place,
+            message,
         })?;
-        let version = format!("{} {}", env!("CARGO_PKG_VERSION"), revision.unwrap_or_default());
-        let id = |at| Ok(id(points.settings(at), &trials.inputs_of(at)?, &version));
-        let ids = (0..points.varied.len()).map(id).collect::<Result<Vec<_>, SweepError>>()?;
-        let Points { common: settings, varied } = points;
+        for place in &points.idle {
+            progress.note(&format!("{file}: {place} leaves out no point: check it, or remove it"));
+        }
+        let mut ticker = Ticker::new(progress);
+        let mut trials = Trials::new(&points);
+        trials
+            .try_settings(spec.points == Combination::Grid, &mut ticker)
+            .map_err(|refusal| refused(refusal, &spec, (&file, &text), &points))?;
+        let version = format!("{} {}", env!("CARGO_PKG_VERSION"), program.unwrap_or_default());
+        let count = points.varied.len();
+        let id = |at| {
+            ticker.tick(|| format!("{at} of {count} points planned"));
+            Ok(id(points.settings(at), &trials.inputs_of(at)?, &version))
+        };
+        let ids = (0..count).map(id).collect::<Result<Vec<_>, SweepError>>()?;
+        let Points { common: settings, varied, .. } = points;
         let points = ids.into_iter().zip(varied).map(|(id, settings)| Point { id, settings }).collect();
         Ok(Self { name: spec.name, settings, points })
     }
@@ -72,6 +91,35 @@ impl Plan {
     pub(crate) fn settings_of(&self, point: &Point) -> Vec<Setting> {
         self.settings.iter().chain(&point.settings).cloned().collect()
     }
+}
+
+/// The refusal of a setting, with its place in the sweep file.
+fn refused(refusal: Refusal, spec: &SweepSpec, (file, text): (&str, &str), points: &Points) -> SweepError {
+    let Refusal { message, is_usage, path } = refusal;
+    // Messages are those of `quintile run`.
+    let of_workload = message.strip_prefix("set: ");
+    let message = of_workload.or(message.strip_prefix("--set ")).unwrap_or(&message).to_owned();
+    let begins = |setting: &Setting| {
+        let name = setting.path.strip_prefix("workload.").unwrap_or(&setting.path);
+        let rest = message.strip_prefix(&setting.path).or_else(|| message.strip_prefix(name));
+        rest.is_some_and(|rest| rest.starts_with(['=', ':']))
+    };
+    let quotes = |setting: &Setting| message.contains(&format!("`{}`", setting.value));
+    let first = points.settings(0);
+    let named = first.iter().find(|setting| begins(setting)).map(|setting| setting.path.clone());
+    let path = path.or_else(|| {
+        let option = first.iter().find(|setting| setting.path.starts_with("workload."));
+        option.filter(|_| of_workload.is_some()).map(|setting| setting.path.clone())
+    });
+    let quoted = || first.iter().find(|setting| quotes(setting)).map(|setting| setting.path.clone());
+    let Some(path) = named.clone().or(path).or_else(quoted) else {
+        return SweepError::Setting { file: file.to_owned(), message, is_usage };
+    };
+    let place = spec.place_of(&path);
+    let line = text.find(&format!("{path:?}")).map(|at| 1 + text[..at].matches('\n').count());
+    let file = line.map_or_else(|| file.to_owned(), |line| format!("{file}:{line}"));
+    let path = if named.is_some() { String::new() } else { format!("`{path}`: ") };
+    SweepError::Setting { file, message: format!("{place}: {path}{message}"), is_usage }
 }
 
 /// Id of a point.
@@ -127,14 +175,21 @@ mod tests {
                 "Values(path: \"gpu.pipeline.tile_pix\", values: [8])",
                 "unknown field `tile_pix`, did you mean `tile_px`?",
             ),
-            ("Values(path: \"gpu.pipeline.tile_px\", values: [8, \"x\"])", "--set gpu.pipeline.tile_px=x: "),
+            (
+                "Values(path: \"gpu.pipeline.tile_px\", values: [8, \"x\"])",
+                "sweep.ron:1: axes[0]: gpu.pipeline.tile_px=x: ",
+            ),
+            (
+                "Values(path: \"samples\", values: [\"x\"])",
+                "sweep.ron:1: axes[0]: samples: `x`: it is not a whole number",
+            ),
             ("Values(path: \"timing\", values: [\"boundd\"])", "did you mean `bound`?"),
             ("Values(path: \"workload.bins\", values: [8])", "only workloads have options"),
             ("Values(path: \"platform.units.shade.idle_unit_w\", values: [0])", "did you mean `shader`?"),
             ("Values(path: \"table.rows.draws.nominal_pi\", values: [200])", "did you mean `nominal_pj`?"),
         ] {
             let error = of_axis(axis).unwrap_err();
-            assert!(error.contains("sweep.ron: ") && error.contains(says), "{error}");
+            assert!(error.contains("sweep.ron:1: axes[0]: ") && error.contains(says), "{error}");
         }
     }
 
@@ -142,7 +197,7 @@ mod tests {
     fn an_unknown_scene_is_refused() {
         let error = planned("(name: \"a\", axes: [Values(path: \"scene\", values: [\"tiny\", \"tinny\"])])")
             .unwrap_err();
-        assert!(error.contains("no scene called `tinny`; did you mean `tiny`?"), "{error}");
+        assert!(error.contains("axes[0]: `scene`: no scene called `tinny`; did you mean `tiny`?"), "{error}");
     }
 
     #[test]

@@ -2,7 +2,8 @@
 
 use pipeline::random::{mix, unit};
 
-use crate::setting::Setting;
+use crate::axis::Axis;
+use crate::setting::{Setting, Text};
 use crate::spec::{Combination, SweepSpec};
 
 /// Points of a sweep.
@@ -11,16 +12,21 @@ pub(crate) struct Points {
     pub common: Vec<Setting>,
     /// Further settings of each point, in order: with repetitions and without forbidden combinations.
     pub varied: Vec<Vec<Setting>>,
+    /// Places in the file of constraints that leave out no point.
+    pub idle: Vec<String>,
 }
 
 impl Points {
     /// Points of `spec`, with the settings of `--quick` if it is given.
-    pub fn new(spec: &SweepSpec, quick: bool) -> Self {
-        let mut common = spec.base(quick);
-        let varied = varied(spec).filter(|varied| !spec.is_forbidden(varied));
+    ///
+    /// # Errors
+    /// Place in the file and message: a constraint compares values that do not fit, or no point is left.
+    pub fn new(spec: &SweepSpec, quick: bool) -> Result<Self, (String, String)> {
+        let once = kept(spec, spec.base(quick))?;
         if spec.repetitions == 1 {
-            return Self { varied: varied.collect(), common };
+            return Ok(once);
         }
+        let Self { mut common, varied, idle } = once;
         let seed = common.iter().find(|setting| setting.path == "seed");
         let first: u64 = seed.and_then(|seed| seed.value.parse().ok()).unwrap_or(1);
         common.retain(|setting| setting.path != "seed");
@@ -30,13 +36,47 @@ impl Points {
                 move |seed: u64| [varied.clone(), vec![Setting::new("seed", seed.to_string())]].concat();
             seeds.clone().map(with)
         };
-        Self { varied: varied.flat_map(repeated).collect(), common }
+        Ok(Self { varied: varied.into_iter().flat_map(repeated).collect(), common, idle })
     }
 
     /// All settings of point `at`.
     pub fn settings(&self, at: usize) -> Vec<Setting> {
         self.common.iter().chain(&self.varied[at]).cloned().collect()
     }
+}
+
+/// Points that no constraint leaves out, without repetitions.
+fn kept(spec: &SweepSpec, common: Vec<Setting>) -> Result<Points, (String, String)> {
+    let constraints = spec.parsed_constraints()?;
+    let mut forbids = vec![false; spec.forbidden.len()];
+    let mut excludes = vec![false; constraints.len()];
+    let mut points = Vec::new();
+    for point in varied(spec) {
+        let mut is_kept = true;
+        for index in spec.forbids(&point) {
+            (forbids[index], is_kept) = (true, false);
+        }
+        for (index, constraint) in constraints.iter().enumerate() {
+            let holds = constraint.holds(&[&point, &common]).map_err(|message| {
+                (format!("constraints[{index}]"), format!("`{}`: {message}", spec.constraints[index]))
+            })?;
+            excludes[index] |= !holds;
+            is_kept &= holds;
+        }
+        if is_kept {
+            points.push(point);
+        }
+    }
+    if points.is_empty() {
+        let place = if spec.constraints.is_empty() { "forbidden" } else { "constraints" };
+        return Err((place.to_owned(), "all combinations are left out: leave out fewer".to_owned()));
+    }
+    let idle = |place: &'static str, matched: Vec<bool>| {
+        let idle = matched.into_iter().enumerate().filter(|(_, matched)| !matched);
+        idle.map(move |(index, _)| format!("{place}[{index}]"))
+    };
+    let idle = idle("forbidden", forbids).chain(idle("constraints", excludes)).collect();
+    Ok(Points { common, varied: points, idle })
 }
 
 /// Settings of the axes, point by point.
@@ -46,7 +86,7 @@ fn varied(spec: &SweepSpec) -> Box<dyn Iterator<Item = Vec<Setting>> + '_> {
         (0..).zip(&spec.axes).flat_map(|(dimension, axis)| axis.at(shares(dimension))).collect()
     };
     match spec.points {
-        Combination::Grid => Box::new(grid(spec)),
+        Combination::Grid => Box::new(grid(&spec.axes)),
         Combination::LatinHypercube { seed, .. } => {
             let parts: Vec<Vec<f64>> =
                 (0..spec.axes.len()).map(|axis| latin(count, seed, axis as u64)).collect();
@@ -59,17 +99,31 @@ fn varied(spec: &SweepSpec) -> Box<dyn Iterator<Item = Vec<Setting>> + '_> {
 }
 
 /// Each value of each axis with all others; the last axis varies fastest.
-fn grid(spec: &SweepSpec) -> impl Iterator<Item = Vec<Setting>> + '_ {
-    let lengths: Vec<usize> = spec.axes.iter().map(|axis| axis.len()).collect();
+fn grid(axes: &[Axis]) -> impl Iterator<Item = Vec<Setting>> + '_ {
+    let lengths: Vec<usize> = axes.iter().map(|axis| axis.len()).collect();
     (0..lengths.iter().product()).map(move |point: usize| {
         let mut rest = point;
         let mut settings: Vec<Vec<Setting>> = Vec::with_capacity(lengths.len());
-        for (axis, &length) in spec.axes.iter().zip(&lengths).rev() {
+        for (axis, &length) in axes.iter().zip(&lengths).rev() {
             settings.push(axis.value(rest % length));
             rest /= length;
         }
         settings.into_iter().rev().flatten().collect()
     })
+}
+
+/// Settings for each combination of listed values; the last list varies fastest.
+///
+/// # Errors
+/// In words, if a path is unknown or a value is listed twice.
+pub fn combinations(lists: Vec<(String, Vec<String>)>) -> Result<Vec<Vec<Setting>>, String> {
+    let axis = |(path, values): (String, Vec<String>)| Axis::Values {
+        path,
+        values: values.into_iter().map(Text).collect(),
+    };
+    let axes: Vec<Axis> = lists.into_iter().map(axis).collect();
+    axes.iter().try_for_each(|axis| axis.check(true))?;
+    Ok(grid(&axes).collect())
 }
 
 /// A number in each of `count` equal parts of 0 to 1, in random order.
@@ -94,7 +148,7 @@ mod tests {
     fn made(text: &str) -> Vec<Vec<String>> {
         let spec = SweepSpec::parse(&format!("(name: \"a\", {text})"), "a.ron").unwrap();
         let values = |settings: Vec<Setting>| settings.into_iter().map(|setting| setting.value).collect();
-        let points = Points::new(&spec, false);
+        let points = Points::new(&spec, false).unwrap();
         (0..points.varied.len()).map(|at| values(points.settings(at))).collect()
     }
 
@@ -106,6 +160,24 @@ mod tests {
         assert_eq!(made(AXES), [["1", "0", "0.5"], ["1", "1", "1"], ["2", "0", "0.5"], ["2", "1", "1"]]);
         let fewer = made(&format!("{AXES}, forbidden: [{{\"samples\": 2, \"shutter\": 1.0}}]"));
         assert_eq!(fewer, [["1", "0", "0.5"], ["1", "1", "1"], ["2", "0", "0.5"]]);
+    }
+
+    #[test]
+    fn constraints_leave_out_points_and_are_reported_if_they_leave_out_none() {
+        let text = format!(
+            "(name: \"a\", settings: {{\"gpu.core_hz\": 2}}, {AXES}, forbidden: [{{\"samples\": 3}}], constraints: \
+             [\"samples * shutter < gpu.core_hz\", \"samples > 0\"])"
+        );
+        let of = |text: &str| Points::new(&SweepSpec::parse(text, "a.ron").unwrap(), false);
+        let points = of(&text).unwrap();
+        assert_eq!(
+            (points.varied.len(), points.idle),
+            (3, ["forbidden[0]", "constraints[1]"].map(str::to_owned).into())
+        );
+        let error = of(&text.replace("> 0", "> 9")).err().unwrap();
+        assert!(error.0 == "constraints" && error.1.contains("all combinations are left out"), "{error:?}");
+        let error = of(&text.replace("samples > 0", "samples > 'x'")).err().unwrap();
+        assert_eq!(error.0, "constraints[1]");
     }
 
     #[test]

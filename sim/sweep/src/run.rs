@@ -10,8 +10,9 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::execute::{Outcome, PointResult};
+use crate::folder::Stored;
 use crate::plan::{Plan, Point};
-use crate::shared::{Costs, groups};
+use crate::shared::{Costs, Group, groups};
 use crate::{Folder, Shard, SweepError};
 
 /// Number of points that a probe runs.
@@ -52,20 +53,25 @@ pub struct Status {
 }
 
 impl Status {
-    /// State of the sweep in `folder`, from its files alone.
+    /// State of the sweep in `folder`, from its files alone; and what is wrong with damaged ones.
     ///
     /// # Errors
     /// If there is no plan, or a file cannot be read.
-    pub fn of(folder: &Folder) -> Result<Self, SweepError> {
+    pub fn of(folder: &Folder) -> Result<(Self, Vec<String>), SweepError> {
         let plan = folder.plan()?;
         let mut status = Self { points: plan.points.len(), ..Self::default() };
+        let mut damaged = Vec::new();
         for point in &plan.points {
-            if let Some(result) = folder.result(point)? {
-                status.finished += 1;
-                status.failed += usize::from(matches!(result.outcome, Outcome::Error(_)));
+            match folder.stored(point)? {
+                Stored::Whole(result) => {
+                    status.finished += 1;
+                    status.failed += usize::from(matches!(result.outcome, Outcome::Error(_)));
+                }
+                Stored::Damaged(message) => damaged.push(message),
+                Stored::Missing => {}
             }
         }
-        Ok(status)
+        Ok((status, damaged))
     }
 }
 
@@ -75,6 +81,10 @@ pub struct Work<'a> {
     folder: &'a Folder,
     runs: usize,
     pending: Vec<&'a Point>,
+    /// What is wrong with damaged files of these points.
+    damaged: Vec<String>,
+    /// Whether to begin no further points.
+    stop: &'a (dyn Fn() -> bool + Sync),
 }
 
 impl<'a> Work<'a> {
@@ -85,13 +95,24 @@ impl<'a> Work<'a> {
     pub fn new(plan: &'a Plan, folder: &'a Folder, shard: Shard, retry: bool) -> Result<Self, SweepError> {
         let points = plan.points.iter().enumerate();
         let points: Vec<&Point> = points.filter(|(at, _)| shard.has(*at)).map(|(_, point)| point).collect();
-        let is_pending = |point: &Point| {
-            let result = folder.result(point)?;
-            Ok(result.is_none_or(|result| retry && matches!(result.outcome, Outcome::Error(_))))
+        let mut damaged = Vec::new();
+        let mut is_pending = |point: &Point| match folder.stored(point)? {
+            Stored::Whole(result) => Ok(retry && matches!(result.outcome, Outcome::Error(_))),
+            Stored::Missing => Ok(true),
+            Stored::Damaged(message) => {
+                damaged.push(message);
+                Ok(true)
+            }
         };
         let keep = |point: &&'a Point| is_pending(point).map(|keep| keep.then_some(*point)).transpose();
         let pending = points.iter().filter_map(keep).collect::<Result<Vec<_>, SweepError>>()?;
-        Ok(Self { plan, folder, runs: points.len(), pending })
+        Ok(Self { plan, folder, runs: points.len(), pending, damaged, stop: &|| false })
+    }
+
+    /// The same work; [`Self::run`] begins no further point once `stop` holds.
+    #[must_use]
+    pub fn until(self, stop: &'a (dyn Fn() -> bool + Sync)) -> Self {
+        Self { stop, ..self }
     }
 
     /// Expected time, from runs of the first and the middle pending point whose results are not kept.
@@ -104,16 +125,19 @@ impl<'a> Work<'a> {
     }
 
     /// Runs all pending points on the current pool, those with equal drawings together. Each result is on disk, whole, before it
-    /// counts; a point that fails is a result with a reason. The first group is the probe for the expected time.
+    /// counts; a point that fails is a result with a reason. The first groups are the probe for the expected time. The state is that
+    /// of the shard; points are left over if the work was to stop.
     ///
     /// # Errors
     /// If a result cannot be written. Those that were written stay.
     pub fn run(&self, progress: &Progress) -> Result<Status, SweepError> {
         let count = self.pending.len();
+        self.damaged.iter().for_each(|message| progress.note(message));
         progress.note(&format!("{count} of {} runs to do", self.runs));
         let started = Instant::now();
         let (done, failed) = (AtomicUsize::new(0), AtomicUsize::new(0));
-        let left_s = |done: usize| started.elapsed().as_secs_f64() / done as f64 * (count - done) as f64;
+        let left_s =
+            |done: usize| started.elapsed().as_secs_f64() / done.max(1) as f64 * (count - done) as f64;
         let record = |point: &Point, result: PointResult| {
             self.folder.write_result(point, &result)?;
             let is_failed = matches!(result.outcome, Outcome::Error(_));
@@ -124,16 +148,20 @@ impl<'a> Work<'a> {
         };
         let groups = groups(&self.pending);
         let (first, others) = groups.split_at(groups.len().min(PROBE_GROUPS));
-        first.iter().try_for_each(|group| group.run(self.plan, &record))?;
-        if !others.is_empty() {
-            let finished = done.load(Ordering::Relaxed);
+        let run = |group: &Group<'_>| group.run(self.plan, self.stop, &record);
+        first.iter().try_for_each(run)?;
+        let finished = done.load(Ordering::Relaxed);
+        if !others.is_empty() && !(self.stop)() {
             // The first groups use one core where their points do not share.
             let cores = if finished == PROBE_GROUPS { rayon::current_num_threads() } else { 1 };
             let host_s = Some(left_s(finished) / cores as f64);
             progress.note(&Expected { runs: self.runs, pending: count - finished, host_s }.line());
         }
-        others.par_iter().try_for_each(|group| group.run(self.plan, &record))?;
-        let finished = self.runs;
+        others.par_iter().try_for_each(run)?;
+        if self.runs == self.plan.points.len() {
+            self.folder.clean()?;
+        }
+        let finished = self.runs - count + done.into_inner();
         Ok(Status { points: self.runs, finished, failed: failed.into_inner() })
     }
 }

@@ -106,6 +106,11 @@ impl Setting {
     }
 }
 
+/// Whether `path` is an option of the run or of the view.
+pub fn is_option(path: &str) -> bool {
+    OPTIONS.contains(&path) || VIEW.contains(&path)
+}
+
 /// Checks that `path` names a kind of setting.
 ///
 /// # Errors
@@ -114,7 +119,7 @@ pub(crate) fn check_path(path: &str) -> Result<(), String> {
     let first = path.split_once('.').map(|(first, _)| first);
     let is_known = match first {
         Some(first) => first == WORKLOAD || InputFile::of(path).is_some(),
-        None => OPTIONS.contains(&path) || VIEW.contains(&path),
+        None => is_option(path),
     };
     if is_known {
         return Ok(());
@@ -132,6 +137,7 @@ pub(crate) fn check_path(path: &str) -> Result<(), String> {
 /// [`RunError::Setting`] for a value of the wrong type. Values in input files and options of workloads are checked when the
 /// run is planned.
 pub(crate) fn options(settings: &[Setting]) -> Result<RunOptions, RunError> {
+    check_scene(settings)?;
     let mut options = RunOptions::default();
     for setting in settings {
         let Setting { path, value } = setting;
@@ -147,7 +153,10 @@ pub(crate) fn options(settings: &[Setting]) -> Result<RunOptions, RunError> {
 }
 
 /// `options` with an option of the run or of the view changed.
-fn with(options: &RunOptions, setting: &Setting) -> Result<RunOptions, RunError> {
+///
+/// # Errors
+/// [`RunError::Setting`] for a value of the wrong type.
+pub fn with(options: &RunOptions, setting: &Setting) -> Result<RunOptions, RunError> {
     let Ok(Value::Object(fields)) = serde_json::to_value(options) else {
         return Err(setting.refused("the options cannot be changed"));
     };
@@ -195,12 +204,39 @@ fn in_words(setting: &Setting, error: &serde_json::Error) -> String {
         let names: Vec<&str> = expected.split('`').skip(1).step_by(2).collect();
         return format!("unknown value, {}", suggestion(&setting.value, &names));
     }
-    let expected = match expected {
-        "u32" | "u64" | "usize" => "a whole number",
-        "f32" | "f64" => "a number",
-        other => other,
+    let of_path = match &*setting.path {
+        "frames" => Some("two whole numbers, such as (0, 4)"),
+        "size" => Some("two whole numbers, such as (64, 48)"),
+        _ => None,
     };
+    let expected = of_path.unwrap_or(match expected {
+        "u8" | "u16" | "u32" | "u64" | "usize" => "a whole number from 0, within its range",
+        "f32" | "f64" => "a number",
+        _ => "of a form that this setting takes",
+    });
     format!("it is not {expected}")
+}
+
+/// Refuses a value in a scene that is no RON file, and names the setting that stands for it.
+fn check_scene(settings: &[Setting]) -> Result<(), RunError> {
+    let Some(inside) = settings.iter().find(|setting| setting.path.starts_with("scene.")) else {
+        return Ok(());
+    };
+    let scene = settings.iter().find(|setting| setting.path == "scene");
+    let scene = scene.map_or("default", |scene| &scene.value);
+    if scene.ends_with(".ron") {
+        return Ok(());
+    }
+    let name = inside.path.rsplit('.').next().unwrap_or_default();
+    let instead = match name {
+        "width" | "height" => "`size`".to_owned(),
+        name if VIEW.contains(&name) => format!("`{name}`"),
+        _ => format!("the settings {}, or `workload.NAME` of a workload", VIEW.join(", ")),
+    };
+    Err(RunError::Setting(format!(
+        "{}={}: `{scene}` is not a scene in a .ron file: use {instead} in its place",
+        inside.path, inside.value
+    )))
 }
 
 #[cfg(test)]
@@ -232,6 +268,50 @@ mod tests {
     }
 
     #[test]
+    fn a_value_in_a_scene_that_is_no_ron_file_names_its_setting() {
+        let refused = |path: &str| {
+            let settings = [Setting::new("scene", "Fox.glb"), Setting::new(path, "4")];
+            options(&settings).unwrap_err().to_string()
+        };
+        assert!(refused("scene.settings.samples").ends_with("use `samples` in its place"));
+        assert!(refused("scene.settings.width").ends_with("use `size` in its place"));
+        assert!(refused("scene.objects.0.velocity").contains("lens_radius, focus"));
+    }
+
+    #[test]
+    fn values_of_another_type_are_refused_in_words() {
+        for (path, value) in [
+            ("samples", "1.5"),
+            ("samples", "-1"),
+            ("samples", "99999999999"),
+            ("samples", "(1, 2)"),
+            ("samples", "true"),
+            ("size", "3"),
+            ("size", "(1, 2, 3)"),
+            ("size", "x"),
+            ("frames", "5"),
+            ("frames", "(1, 2, 3)"),
+            ("frames", "a..b"),
+            ("seed", "-1"),
+            ("shutter", "x"),
+            ("lens_radius", "true"),
+            ("focus", "(1, 2)"),
+            ("timing", "1"),
+            ("bound", "true"),
+            ("pacing", "(1, 2)"),
+            ("frame_rate_hz", "x"),
+        ] {
+            let message = one(path, value).unwrap_err();
+            let words = [
+                "u32", "u64", "f32", "f64", "tuple", "struct", "enum", "integer", "variant", "floating",
+                "line ",
+            ];
+            assert!(words.iter().all(|word| !message.contains(word)), "{message}");
+            assert!(message.starts_with(&format!("{path}: `{value}`: ")), "{message}");
+        }
+    }
+
+    #[test]
     fn unknown_names_and_values_get_a_suggestion() {
         assert_eq!(check_path("timming").unwrap_err(), "unknown setting `timming`, did you mean `timing`?");
         assert!(check_path("gpo.core_hz").unwrap_err().contains("did you mean `gpu`?"));
@@ -240,6 +320,9 @@ mod tests {
             one("timing", "stepd").unwrap_err(),
             "timing: `stepd`: unknown value, did you mean `stepped`?"
         );
-        assert_eq!(one("samples", "x").unwrap_err(), "samples: `x`: it is not a whole number");
+        assert_eq!(
+            one("samples", "x").unwrap_err(),
+            "samples: `x`: it is not a whole number from 0, within its range"
+        );
     }
 }

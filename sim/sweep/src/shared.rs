@@ -52,20 +52,27 @@ impl<'a> Group<'a> {
         self.timings.iter().flatten().copied()
     }
 
-    /// Runs its points and passes each result on. A failure and a panic are results, too.
+    /// Runs its points and passes each result on. A failure and a panic are results, too. Nothing is begun once `stop` holds.
     ///
     /// # Errors
     /// Those of `done`.
     pub fn run(
         &self,
         plan: &Plan,
+        stop: &(dyn Fn() -> bool + Sync),
         done: &(impl Fn(&Point, PointResult) -> Result<(), SweepError> + Sync),
     ) -> Result<(), SweepError> {
-        let alone = |point: &Point| done(point, execute(&point.id, &plan.settings_of(point)));
+        let alone = |point: &Point| match stop() {
+            true => Ok(()),
+            false => done(point, execute(&point.id, &plan.settings_of(point))),
+        };
+        if stop() {
+            return Ok(());
+        }
         let drawing = (self.points().count() > 1).then(|| Drawing::new(plan, self.points())).flatten();
         let Some(drawing) = drawing else { return self.points().try_for_each(alone) };
         let in_turn = self.timings.len().div_ceil(rayon::current_num_threads()).min(MACHINES_IN_TURN);
-        self.timings.par_chunks(in_turn).try_for_each(|timings| {
+        self.timings.par_chunks(in_turn).filter(|_| !stop()).try_for_each(|timings| {
             let planned: Vec<Vec<PlannedPoint<'_>>> = timings
                 .iter()
                 .map(|points| points.iter().map(|point| planned(plan, point)).collect())
@@ -256,7 +263,7 @@ mod tests {
             results.lock().unwrap().push(result);
             Ok(())
         };
-        groups(&points).iter().try_for_each(|group| group.run(&plan, &keep)).unwrap();
+        groups(&points).iter().try_for_each(|group| group.run(&plan, &|| false, &keep)).unwrap();
         let mut results = results.into_inner().unwrap();
         results.sort_by(|a, b| a.id.cmp(&b.id));
         let alone = plan.points.iter().map(|point| execute(&point.id, &plan.settings_of(point)));

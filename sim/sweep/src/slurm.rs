@@ -1,11 +1,12 @@
 //! Batch scripts for Slurm: an array of tasks that run the points, and a job that merges.
 
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 use output::table::shell_line;
 use traces::io::{WriteError, atomic};
 
-use crate::Expected;
+use crate::{Expected, SweepError};
 
 /// Most tasks of an array: the usual limit `MaxArraySize` of Slurm is 1001.
 const MAX_TASKS: usize = 1000;
@@ -47,10 +48,10 @@ impl SlurmArray {
         let options = ["--shards", &tasks.to_string(), "--threads", &threads.to_string()].map(str::to_owned);
         let command: Vec<String> = job.command.iter().cloned().chain(options).collect();
         let last = tasks - 1;
-        // The program gets the signal in place of the shell, and removes what is unfinished.
+        // The program gets the signal in place of the shell, begins no further point, and ends.
         let options = format!(
             "#SBATCH --array=0-{last}\n#SBATCH --cpus-per-task={threads}\n#SBATCH --time={minutes}\n\
-             #SBATCH --signal=B:TERM@60\n"
+             #SBATCH --signal=B:USR1@60\n"
         );
         job.head("", "slurm-%A_%a.log") + &options + &job.exec(&command)
     }
@@ -81,7 +82,9 @@ impl SlurmJob<'_> {
         let plain = |c: char| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '_' };
         let name: String = self.name.chars().map(plain).collect();
         let log = self.folder.join(log).display().to_string().replace('"', "");
-        format!("#!/bin/sh\n#SBATCH --job-name={name}{ending}\n#SBATCH --output=\"{log}\"\n")
+        format!(
+            "#!/bin/sh\n#SBATCH --job-name={name}{ending}\n#SBATCH --output=\"{log}\"\n#SBATCH --open-mode=append\n"
+        )
     }
 
     fn exec(&self, command: &[String]) -> String {
@@ -100,6 +103,40 @@ pub fn write_scripts(folder: &Path, array: &str, merge: &str) -> Result<[PathBuf
         atomic::write_file(path, |out| std::io::Write::write_all(out, text.as_bytes()))?;
     }
     Ok(paths)
+}
+
+/// Submits the scripts of [`write_scripts`] by `sbatch`: the array, and the merge job for when it has ended. Returns the numbers of
+/// both jobs.
+///
+/// # Errors
+/// [`SweepError::Slurm`] if `sbatch` is not there or refuses a script.
+pub fn submit([array, merge]: [&Path; 2]) -> Result<[String; 2], SweepError> {
+    let array = sbatch(&[], array)?;
+    let merge = sbatch(&[&format!("--dependency=afterany:{array}")], merge).map_err(|error| {
+        SweepError::Slurm(format!(
+            "{error}; the array is submitted as job {array}: merge by hand once it has ended"
+        ))
+    })?;
+    Ok([array, merge])
+}
+
+/// Number of the job that `sbatch` makes of `script`.
+fn sbatch(options: &[&str], script: &Path) -> Result<String, SweepError> {
+    let wrong = |message: String| SweepError::Slurm(format!("sbatch {}: {message}", script.display()));
+    let ended = Command::new("sbatch").arg("--parsable").args(options).arg(script).output();
+    let ended = ended.map_err(|error| {
+        wrong(format!("cannot be started: {error}; submit where Slurm is installed, or leave out --submit"))
+    })?;
+    if !ended.status.success() {
+        return Err(wrong(String::from_utf8_lossy(&ended.stderr).trim().replace('\n', "; ")));
+    }
+    // The name of the cluster may follow.
+    let text = String::from_utf8_lossy(&ended.stdout);
+    let number = text.trim().split(';').next().unwrap_or_default();
+    match number.parse::<u64>() {
+        Ok(_) => Ok(number.to_owned()),
+        Err(_) => Err(wrong(format!("it printed `{}`, and no number of a job", text.trim()))),
+    }
 }
 
 #[cfg(test)]
@@ -127,6 +164,7 @@ mod tests {
         let [folder, directory] = ["/scratch/a", "/home/me"].map(Path::new);
         let job = SlurmJob { name: "tile sizes", folder, directory, command: &command };
         let text = array(500, 3600.0, Some(4)).script(&job);
+        assert!(text.contains("#SBATCH --signal=B:USR1@60\n"), "{text}");
         assert!(text.contains("#SBATCH --array=0-3\n") && text.contains("--job-name=tile_sizes\n"), "{text}");
         let last =
             "cd /home/me && exec '/opt/my tools/quintile' sweep run 'a b.ron' --shards 4 --threads 2\n";

@@ -8,6 +8,7 @@ use serde::Deserialize;
 
 use crate::SweepError;
 use crate::axis::Axis;
+use crate::constraint::Constraint;
 use crate::setting::{Setting, Text, check_path};
 
 /// Largest number of points of a sweep.
@@ -45,6 +46,9 @@ pub struct SweepSpec {
     /// Combinations that are left out: a point with all values of an entry.
     #[serde(default)]
     pub forbidden: Vec<BTreeMap<String, Text>>,
+    /// Expressions over settings of the file that hold for every point, such as `gpu.pipeline.tile_px <= 8`; others are left out.
+    #[serde(default)]
+    pub constraints: Vec<String>,
 }
 
 const fn one() -> u32 {
@@ -100,6 +104,10 @@ impl SweepSpec {
     /// # Errors
     /// As [`Self::load`].
     pub fn parse(text: &str, file: &str) -> Result<Self, SweepError> {
+        if text.trim().is_empty() {
+            let message = "it is empty: write a sweep, such as (name: \"a\", axes: [])".to_owned();
+            return Err(SweepError::Setting { file: file.to_owned(), message, is_usage: true });
+        }
         let spec: Self = spec::parse(text, file)?;
         spec.check().map_err(|(place, message)| SweepError::Value {
             file: file.to_owned(),
@@ -132,6 +140,7 @@ impl SweepSpec {
         }
         self.check_axes()?;
         self.check_forbidden()?;
+        self.parsed_constraints()?;
         if self.repetitions == 0 || self.repetitions > 1 && self.paths().any(|path| path == "seed") {
             return wrong("repetitions", "it has to be 1 or more, and 1 where `seed` is an axis");
         }
@@ -186,6 +195,33 @@ impl SweepSpec {
         Ok(())
     }
 
+    /// The constraints. Error: place in the file and message.
+    pub(crate) fn parsed_constraints(&self) -> Result<Vec<Constraint>, (String, String)> {
+        let known: Vec<&str> =
+            self.paths().chain(self.settings.keys().chain(self.quick.keys()).map(String::as_str)).collect();
+        let parsed = |(index, text): (usize, &String)| {
+            let place = || format!("constraints[{index}]");
+            let wrong = |message: String| (place(), format!("`{text}`: {message}"));
+            let constraint = Constraint::parse(text).map_err(wrong)?;
+            match constraint.paths().into_iter().find(|path| !known.contains(path)) {
+                Some(path) => {
+                    let suggestion = spec::suggestion(path, &known);
+                    Err(wrong(format!("`{path}` is no setting of this file, {suggestion}")))
+                }
+                None => Ok(constraint),
+            }
+        };
+        self.constraints.iter().enumerate().map(parsed).collect()
+    }
+
+    /// Place in the file of the setting `path`.
+    pub(crate) fn place_of(&self, path: &str) -> String {
+        match self.axes.iter().position(|axis| axis.paths().any(|known| known == path)) {
+            Some(axis) => format!("axes[{axis}]"),
+            None => "settings".to_owned(),
+        }
+    }
+
     /// Paths of all axes.
     pub(crate) fn paths(&self) -> impl Iterator<Item = &str> {
         self.axes.iter().flat_map(Axis::paths)
@@ -200,12 +236,13 @@ impl SweepSpec {
         points.checked_mul(self.repetitions as usize)
     }
 
-    /// Whether a constraint leaves out a point with these values.
-    pub(crate) fn is_forbidden(&self, settings: &[Setting]) -> bool {
+    /// Entries of `forbidden` that leave out a point with these values, by number.
+    pub(crate) fn forbids<'a>(&'a self, settings: &'a [Setting]) -> impl Iterator<Item = usize> + 'a {
         let has = |(path, value): (&String, &Text)| {
             settings.iter().any(|setting| setting.path == *path && same(&setting.value, &value.0))
         };
-        self.forbidden.iter().any(|entry| entry.iter().all(has))
+        let entries = self.forbidden.iter().enumerate();
+        entries.filter(move |(_, entry)| entry.iter().all(has)).map(|(index, _)| index)
     }
 }
 
@@ -240,6 +277,7 @@ mod tests {
         let axes = |axes: &str| message(&format!("(name: \"a\", axes: [{axes}])"));
         for (text, says) in [
             (message("(nam: \"a\", axes: [])"), "a.ron:1:2: unknown field `nam`, did you mean `name`?"),
+            (message(" \n"), "a.ron: it is empty"),
             (message("(name: \" \", axes: [])"), "a.ron: name: it is empty"),
             (axes("Values(path: \"timming\", values: [1])"), "axes[0]: unknown setting `timming`"),
             (axes("Values(path: \"samples\", values: [])"), "axes[0]: `samples` has no values"),
@@ -254,6 +292,14 @@ mod tests {
             (message("(name: \"a\", axes: [], points: Sobol(count: 0))"), "points: `count` is 0"),
             (message("(name: \"a\", axes: [], forbidden: [{\"seed\": 1}])"), "`seed` is not varied"),
             (axes("Range(path: \"gpu.core_hz\", from: 1, to: 2, count: 9999999)"), "more than a million"),
+            (
+                message("(name: \"a\", axes: [], constraints: [\"1 <\"])"),
+                "constraints[0]: `1 <`: a value is missing",
+            ),
+            (
+                message("(name: \"a\", axes: [], settings: {\"samples\": 1}, constraints: [\"sample < 2\"])"),
+                "`sample` is no setting of this file, did you mean `samples`?",
+            ),
         ] {
             assert!(text.contains(says), "{text}");
         }

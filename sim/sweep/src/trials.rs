@@ -2,7 +2,9 @@
 
 use std::collections::HashMap;
 use std::path::PathBuf;
+use std::time::{Duration, Instant};
 
+use output::progress::Progress;
 use run::{Input, Plan};
 
 use crate::SweepError;
@@ -15,6 +17,9 @@ const MAX_VALUES: usize = 100;
 /// Most points in which a value is tried.
 const MAX_TRIALS: usize = 16;
 
+/// Time between two notes.
+const TICK: Duration = Duration::from_secs(5);
+
 /// Why a point cannot run.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Refusal {
@@ -22,6 +27,29 @@ pub(crate) struct Refusal {
     pub message: String,
     /// Whether it is a usage error.
     pub is_usage: bool,
+    /// Setting whose points were refused.
+    pub path: Option<String>,
+}
+
+/// Notes about work that takes long, one in some seconds.
+pub(crate) struct Ticker<'a> {
+    progress: &'a Progress,
+    last: Instant,
+}
+
+impl<'a> Ticker<'a> {
+    /// Notes to `progress`.
+    pub fn new(progress: &'a Progress) -> Self {
+        Self { progress, last: Instant::now() }
+    }
+
+    /// A step is done; `text` says how many are.
+    pub fn tick(&mut self, text: impl FnOnce() -> String) {
+        if self.last.elapsed() >= TICK {
+            self.last = Instant::now();
+            self.progress.note(&text());
+        }
+    }
 }
 
 /// Points of a sweep, and what trials found about them.
@@ -55,19 +83,22 @@ impl<'a> Trials<'a> {
     ///
     /// # Errors
     /// The first refusal of a setting that was refused in all of them.
-    pub fn try_settings(&mut self, grid: bool) -> Result<(), Refusal> {
-        for owners in owners(&self.points.varied, grid) {
+    pub fn try_settings(&mut self, grid: bool, ticker: &mut Ticker<'_>) -> Result<(), Refusal> {
+        let all = owners(&self.points.varied, grid);
+        let count = all.len();
+        for (number, (path, owners)) in all.into_iter().enumerate() {
             let step = owners.len().div_ceil(MAX_TRIALS);
             let mut first = Ok(());
             for &at in owners.iter().step_by(step) {
                 let tried = self.plan(at);
+                ticker.tick(|| format!("{number} of {count} values tried"));
                 if tried.is_ok() {
                     first = Ok(());
                     break;
                 }
                 first = first.and(tried);
             }
-            first?;
+            first.map_err(|refusal| Refusal { path: path.map(str::to_owned), ..refusal })?;
         }
         Ok(())
     }
@@ -86,7 +117,7 @@ impl<'a> Trials<'a> {
             }
             Err(error) => {
                 inputs.failures += 1;
-                Err(Refusal { message: error.to_string(), is_usage: error.is_usage() })
+                Err(Refusal { message: error.to_string(), is_usage: error.is_usage(), path: None })
             }
         };
         self.tried.insert(at, tried.clone());
@@ -122,11 +153,12 @@ fn key(settings: &[Setting]) -> Vec<&Setting> {
     settings.iter().filter(|setting| setting.names_files()).collect()
 }
 
-/// All points, and those of each setting that varies, in order of first use: of each of its values if `by_value`, of the first [`MAX_VALUES`] of them.
-fn owners(points: &[Vec<Setting>], by_value: bool) -> Vec<Vec<usize>> {
+/// All points, and those of each setting that varies, in order of first use: of each of its values if `by_value`, of the first [`MAX_VALUES`] of them. With the path of
+/// that setting.
+fn owners(points: &[Vec<Setting>], by_value: bool) -> Vec<(Option<&str>, Vec<usize>)> {
     let mut groups: HashMap<(&str, &str), usize> = HashMap::new();
     let mut values: HashMap<&str, usize> = HashMap::new();
-    let mut owners: Vec<Vec<usize>> = vec![(0..points.len()).collect()];
+    let mut owners: Vec<(Option<&str>, Vec<usize>)> = vec![(None, (0..points.len()).collect())];
     for (at, setting) in
         points.iter().enumerate().flat_map(|(at, point)| point.iter().map(move |set| (at, set)))
     {
@@ -135,13 +167,13 @@ fn owners(points: &[Vec<Setting>], by_value: bool) -> Vec<Vec<usize>> {
             let count = values.entry(key.0).or_default();
             *count += 1;
             (*count <= MAX_VALUES).then(|| {
-                owners.push(Vec::new());
+                owners.push((Some(key.0), Vec::new()));
                 groups.insert(key, owners.len() - 1);
                 owners.len() - 1
             })
         });
         if let Some(group) = group {
-            owners[group].push(at);
+            owners[group].1.push(at);
         }
     }
     owners
@@ -158,19 +190,29 @@ mod tests {
                 Setting::new("gpu.pipeline.coarse_tile_px", *coarse),
             ]
         };
-        Points { common: vec![Setting::new("scene", "tiny")], varied: values.iter().map(point).collect() }
+        Points {
+            common: vec![Setting::new("scene", "tiny")],
+            varied: values.iter().map(point).collect(),
+            idle: Vec::new(),
+        }
     }
 
     #[test]
     fn owners_are_grouped_by_value_or_by_path() {
         let points = points(&[["4", "4"], ["8", "4"]]).varied;
-        assert_eq!(owners(&points, true), [vec![0, 1], vec![0], vec![0, 1], vec![1]]);
-        assert_eq!(owners(&points, false), [vec![0, 1], vec![0, 1], vec![0, 1]]);
+        let of = |by_value| owners(&points, by_value).into_iter().map(|(_, at)| at).collect::<Vec<_>>();
+        assert_eq!(of(true), [vec![0, 1], vec![0], vec![0, 1], vec![1]]);
+        assert_eq!(of(false), [vec![0, 1], vec![0, 1], vec![0, 1]]);
+        let paths: Vec<_> = owners(&points, false).into_iter().map(|(path, _)| path).collect();
+        assert_eq!(paths, [None, Some("gpu.pipeline.tile_px"), Some("gpu.pipeline.coarse_tile_px")]);
     }
 
     #[test]
     fn a_value_is_refused_if_no_point_can_run_with_it() {
-        let refused = |values: &[[&str; 2]], grid| Trials::new(&points(values)).try_settings(grid).err();
+        let refused = |values: &[[&str; 2]], grid| {
+            let progress = Progress::new(true);
+            Trials::new(&points(values)).try_settings(grid, &mut Ticker::new(&progress)).err()
+        };
         assert_eq!(refused(&[["8", "4"], ["8", "32"], ["2", "4"], ["2", "32"]], true), None);
         let never = refused(&[["7", "4"], ["7", "32"], ["2", "4"], ["2", "32"]], true).unwrap();
         assert!(never.is_usage && never.message.contains("tile_px=7"), "{never:?}");
