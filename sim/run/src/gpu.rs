@@ -76,6 +76,14 @@ pub enum GpuError {
         /// The value, what is wrong with it, and valid values.
         message: String,
     },
+    /// The GPU of a platform cannot be loaded.
+    #[error("`made_for` of platform `{platform}`: {source}")]
+    Home {
+        /// Name of the platform.
+        platform: String,
+        /// Why.
+        source: Box<Self>,
+    },
     /// No GPU has this name.
     #[error("no GPU called `{name}`; {suggestion}; or name a .ron file")]
     Unknown {

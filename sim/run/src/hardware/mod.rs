@@ -37,7 +37,8 @@ pub fn area_mm2(plan: &Plan) -> Estimate {
 /// # Errors
 /// If that GPU cannot be loaded.
 pub fn scaling(gpu: &GpuSpec, platform: &Platform) -> Result<Scaling, GpuError> {
-    let home = GpuSpec::load(&platform.made_for)?;
+    let of_platform = |source| GpuError::Home { platform: platform.name.clone(), source: Box::new(source) };
+    let home = GpuSpec::load(&platform.made_for).map_err(of_platform)?;
     Ok(Scaling::new(&structure(gpu), &structure(&home), &stated()?, platform.node_nm))
 }
 

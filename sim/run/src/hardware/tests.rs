@@ -48,13 +48,15 @@ const GROW: [(&str, f64); 39] = [
     ("units.dram.channels", 2.0),
 ];
 
+/// Changes of values in the GPU file.
+fn set(values: &[(&str, f64)]) -> Vec<crate::Change> {
+    let change = |&(path, value): &(&str, f64)| crate::Change { path: format!("gpu.{path}"), value: format!("{value}") };
+    values.iter().map(change).collect()
+}
+
 /// The GPU `name` with changes.
-fn changed(name: &str, changes: &[(&str, f64)]) -> GpuSpec {
-    let set = |&(path, value): &(&str, f64)| crate::Change {
-        path: format!("gpu.{path}"),
-        value: format!("{value}"),
-    };
-    let changes: Vec<crate::Change> = changes.iter().map(set).collect();
+fn changed(name: &str, values: &[(&str, f64)]) -> GpuSpec {
+    let changes = set(values);
     let mut changes = crate::changes::Changes::new(&changes).unwrap();
     changes.gpu(name.as_ref()).unwrap().unwrap()
 }
@@ -163,4 +165,61 @@ fn areas_are_below_those_of_products() {
         println!("{name}: {area:?}, product {product_mm2} mm2");
         assert!(area.nominal < product_mm2 && product_mm2 < 2.0 * area.high, "{name}: {area:?}");
     }
+}
+
+/// Energy of the first frame of `scene` in joules on the reference GPU with changes, until it ends.
+fn frame_j(scene: &str, size: (u32, u32), changes: &[(&str, f64)]) -> f64 {
+    let options = crate::RunOptions {
+        scene: scene.into(),
+        overrides: workloads::Overrides { size: Some(size), samples: Some(4), ..workloads::Overrides::default() },
+        changes: set(changes),
+        ..crate::RunOptions::default()
+    };
+    let plan = Plan::resolve(options).unwrap();
+    let frames = crate::frames_of(&plan, &[0], &output::progress::Progress::new(true)).unwrap();
+    frames[0].cost().energy_j
+}
+
+/// Every rate, the cores and all caches, 64 times.
+fn sixty_fourfold() -> Vec<(&'static str, f64)> {
+    let is_speed = |path: &&(&str, f64)| {
+        path.0.contains("rates") || path.0.contains("entries") || path.0.ends_with("cores") || path.0.ends_with("lines_per_cycle")
+    };
+    GROW.iter().filter(is_speed).map(|&(path, start)| (path, 64.0 * start)).collect()
+}
+
+#[test]
+fn the_machine_of_64_times_the_hardware_loses_on_energy() {
+    for (scene, size) in [("tiny", (64, 48)), ("default", (320, 180))] {
+        let [own, large] = [&[("core_hz", 400e6)][..], &sixty_fourfold()].map(|set| frame_j(scene, size, set));
+        println!("{scene}: {own} J, 64 times the hardware {large} J");
+        assert!(large > 1.5 * own, "{scene}: {own} J, {large} J");
+    }
+}
+
+/// Levels below the L2, from those of a GPU that has them.
+#[test]
+fn larger_levels_below_the_l2_are_dearer() {
+    let platform = Platform::builtin("reference").unwrap();
+    let platform = Platform { made_for: "iris_pro".to_owned(), ..platform };
+    let home = costs(&GpuSpec::load("iris_pro").unwrap(), &platform, Bound::Nominal);
+    for (path, value) in [
+        ("pipeline.memory.llc.entries", 393_216.0),
+        ("pipeline.memory.edram.entries", 8_388_608.0),
+        ("units.llc.lines_per_cycle", 8.0),
+    ] {
+        let grown = costs(&changed("iris_pro", &[(path, value)]), &platform, Bound::Nominal);
+        assert!(home.iter().zip(&grown).all(|((_, few), (_, more))| more >= few), "{path}");
+        let level = if path.contains("edram") { "edram idle" } else { "llc idle" };
+        let watts = |costs: &[(String, f64)]| costs.iter().find(|(what, _)| what == level).unwrap().1;
+        assert!(watts(&grown) > 1.5 * watts(&home), "{path}: {} W, {} W", watts(&home), watts(&grown));
+    }
+}
+
+#[test]
+fn a_platform_of_a_gpu_that_is_not_there_is_refused() {
+    let platform = Platform::builtin("reference").unwrap();
+    let platform = Platform { made_for: "referense".to_owned(), ..platform };
+    let error = scaling(&GpuSpec::load("reference").unwrap(), &platform).unwrap_err().to_string();
+    assert!(error.contains("`made_for` of platform `reference`") && error.contains("`reference`?"), "{error}");
 }
