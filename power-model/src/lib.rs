@@ -50,7 +50,8 @@ pub use model::{FramePower, PowerModel};
 pub use pacing::{PacedFrame, Pacing, Run, pace};
 pub use parts::{Energy, PARTS, Part};
 pub use platform::{
-    Disturbance, Finish, Launch, Leakage, Platform, Provenance, Rail, ScaledFrom, System, UnitPower,
+    Disturbance, Finish, Launch, Leakage, Platform, Provenance, Rail, Range, Ranges, ScaledFrom, System,
+    UnitPower,
 };
 pub use quantity::{
     Basis, Celsius, Exponent, Hertz, Interval, OutOfRange, Picojoules, Quantity, Ratio, Seconds, Share,

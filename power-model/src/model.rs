@@ -29,13 +29,13 @@ impl PowerModel {
         Self::at(table, platform, Bound::Nominal)
     }
 
-    /// The model with all energies at one end of their intervals.
+    /// The model with all energies and watts at one end of their intervals.
     ///
     /// # Errors
     /// As for [`Self::new`].
     pub fn at(table: &EnergyTable, platform: &Platform, bound: Bound) -> Result<Self, ModelError> {
         check_match(table, platform)?;
-        Ok(Self::built(table, platform, bound))
+        Ok(Self::built(table, &platform.at(bound), bound))
     }
 
     /// The model of a GPU that differs by `scaling` from the one that the platform was made for.
@@ -52,7 +52,7 @@ impl PowerModel {
         Ok(Self::built(&table.on(scaling), &platform.on(scaling, bound), bound))
     }
 
-    /// The model of a table and a platform that match.
+    /// The model of a table and a platform that match, with the platform's watts at `bound`.
     fn built(table: &EnergyTable, platform: &Platform, bound: Bound) -> Self {
         let squared = platform.voltage_ratio() * platform.voltage_ratio();
         let unit_w = |watts: fn(&crate::UnitPower) -> f64| {

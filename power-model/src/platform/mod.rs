@@ -1,6 +1,7 @@
 //! Platforms and their files: all power that is not caused by events, such as voltages, constant power, leakage,
 //! clock trees and idle power.
 
+mod ranges;
 mod scaled;
 mod system;
 
@@ -16,6 +17,7 @@ use crate::quantity::{
 };
 use crate::table::EnergyRow;
 
+pub use self::ranges::{Range, Ranges};
 pub use self::system::{Disturbance, Finish, Launch, System};
 
 /// Built-in platforms by name.
@@ -110,6 +112,8 @@ pub struct Platform {
     units: Vec<UnitPower>,
     /// Power between frames: everything, with the core power-gated.
     pub idle_w: Sourced<Watts>,
+    /// How far off the watts may be; without it they are taken as exact.
+    pub ranges: Option<Ranges>,
     /// Free-running: gap between the end of a frame and the start of the next, in which the driver submits.
     pub submit_gap_s: Sourced<Seconds>,
     /// Idle time recorded before the first frame.
@@ -283,6 +287,8 @@ struct Written {
     leakage: Leakage,
     units: Vec<UnitRow>,
     idle_w: Sourced<Watts>,
+    #[serde(default)]
+    ranges: Option<Ranges>,
     submit_gap_s: Sourced<Seconds>,
     lead_in_s: Sourced<RecordedIdle>,
     tail_s: Sourced<RecordedIdle>,
@@ -332,6 +338,7 @@ impl Written {
             leakage: self.leakage,
             units: complete(self.units, file)?,
             idle_w: self.idle_w,
+            ranges: self.ranges,
             submit_gap_s: self.submit_gap_s,
             lead_in_s: self.lead_in_s,
             tail_s: self.tail_s,

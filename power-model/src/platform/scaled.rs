@@ -11,9 +11,13 @@ use crate::table::Bound;
 const IDLE_SHARE: f64 = 0.5;
 
 impl Platform {
-    /// The platform of a GPU that differs by `scaling` from the one that it was made for.
+    /// The platform at `bound`, of a GPU that differs by `scaling` from the one that it was made for.
     #[must_use]
     pub fn on(&self, scaling: &Scaling, bound: Bound) -> Self {
+        self.at(bound).scaled(scaling, bound)
+    }
+
+    fn scaled(&self, scaling: &Scaling, bound: Bound) -> Self {
         let how = "scaled to the structure and clocks of the GPU";
         let mut scaled = self.clone();
         let leakage = scaling.leakage.at(bound);

@@ -50,7 +50,10 @@ const GROW: [(&str, f64); 39] = [
 
 /// Changes of values in the GPU file.
 fn set(values: &[(&str, f64)]) -> Vec<crate::Change> {
-    let change = |&(path, value): &(&str, f64)| crate::Change { path: format!("gpu.{path}"), value: format!("{value}") };
+    let change = |&(path, value): &(&str, f64)| crate::Change {
+        path: format!("gpu.{path}"),
+        value: format!("{value}"),
+    };
     values.iter().map(change).collect()
 }
 
@@ -121,7 +124,7 @@ fn the_gpu_of_a_platform_keeps_its_numbers_to_the_last_bit() {
         let scaling = scaling(&gpu, &platform).unwrap();
         let table = EnergyTable::builtin("28nm").unwrap();
         for bound in [Bound::Low, Bound::Nominal, Bound::High] {
-            assert_eq!(platform.on(&scaling, bound), platform, "{name}");
+            assert_eq!(platform.on(&scaling, bound), platform.at(bound), "{name}");
             let [plain, scaled] = [
                 PowerModel::at(&table, &platform, bound),
                 PowerModel::on(&table, &platform, bound, &scaling),
@@ -171,7 +174,11 @@ fn areas_are_below_those_of_products() {
 fn frame_j(scene: &str, size: (u32, u32), changes: &[(&str, f64)]) -> f64 {
     let options = crate::RunOptions {
         scene: scene.into(),
-        overrides: workloads::Overrides { size: Some(size), samples: Some(4), ..workloads::Overrides::default() },
+        overrides: workloads::Overrides {
+            size: Some(size),
+            samples: Some(4),
+            ..workloads::Overrides::default()
+        },
         changes: set(changes),
         ..crate::RunOptions::default()
     };
@@ -183,7 +190,10 @@ fn frame_j(scene: &str, size: (u32, u32), changes: &[(&str, f64)]) -> f64 {
 /// Every rate, the cores and all caches, 64 times.
 fn sixty_fourfold() -> Vec<(&'static str, f64)> {
     let is_speed = |path: &&(&str, f64)| {
-        path.0.contains("rates") || path.0.contains("entries") || path.0.ends_with("cores") || path.0.ends_with("lines_per_cycle")
+        path.0.contains("rates")
+            || path.0.contains("entries")
+            || path.0.ends_with("cores")
+            || path.0.ends_with("lines_per_cycle")
     };
     GROW.iter().filter(is_speed).map(|&(path, start)| (path, 64.0 * start)).collect()
 }
@@ -191,7 +201,8 @@ fn sixty_fourfold() -> Vec<(&'static str, f64)> {
 #[test]
 fn the_machine_of_64_times_the_hardware_loses_on_energy() {
     for (scene, size) in [("tiny", (64, 48)), ("default", (320, 180))] {
-        let [own, large] = [&[("core_hz", 400e6)][..], &sixty_fourfold()].map(|set| frame_j(scene, size, set));
+        let [own, large] =
+            [&[("core_hz", 400e6)][..], &sixty_fourfold()].map(|set| frame_j(scene, size, set));
         println!("{scene}: {own} J, 64 times the hardware {large} J");
         assert!(large > 1.5 * own, "{scene}: {own} J, {large} J");
     }
@@ -221,5 +232,8 @@ fn a_platform_of_a_gpu_that_is_not_there_is_refused() {
     let platform = Platform::builtin("reference").unwrap();
     let platform = Platform { made_for: "referense".to_owned(), ..platform };
     let error = scaling(&GpuSpec::load("reference").unwrap(), &platform).unwrap_err().to_string();
-    assert!(error.contains("`made_for` of platform `reference`") && error.contains("`reference`?"), "{error}");
+    assert!(
+        error.contains("`made_for` of platform `reference`") && error.contains("`reference`?"),
+        "{error}"
+    );
 }
