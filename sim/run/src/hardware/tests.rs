@@ -208,11 +208,17 @@ fn the_machine_of_64_times_the_hardware_loses_on_energy() {
     }
 }
 
+/// The reference platform, as if it was made for `gpu`.
+fn made_for(gpu: &str) -> Platform {
+    let mut platform = Platform::builtin("reference").unwrap();
+    gpu.clone_into(&mut platform.made_for);
+    platform
+}
+
 /// Levels below the L2, from those of a GPU that has them.
 #[test]
 fn larger_levels_below_the_l2_are_dearer() {
-    let platform = Platform::builtin("reference").unwrap();
-    let platform = Platform { made_for: "iris_pro".to_owned(), ..platform };
+    let platform = made_for("iris_pro");
     let home = costs(&GpuSpec::load("iris_pro").unwrap(), &platform, Bound::Nominal);
     for (path, value) in [
         ("pipeline.memory.llc.entries", 393_216.0),
@@ -229,8 +235,7 @@ fn larger_levels_below_the_l2_are_dearer() {
 
 #[test]
 fn a_platform_of_a_gpu_that_is_not_there_is_refused() {
-    let platform = Platform::builtin("reference").unwrap();
-    let platform = Platform { made_for: "referense".to_owned(), ..platform };
+    let platform = made_for("referense");
     let error = scaling(&GpuSpec::load("reference").unwrap(), &platform).unwrap_err().to_string();
     assert!(
         error.contains("`made_for` of platform `reference`") && error.contains("`reference`?"),
