@@ -3,6 +3,8 @@
 //! - [`EnergyTable`]: energy per [`activity::Event`], with low, nominal and high value and a source in each
 //!   row.
 //! - [`Platform`]: voltages, constant power, leakage, clock trees and idle power.
+//! - [`Structure`]: memories and logic of a GPU, and what they cost in area, energy and leakage beside those of the GPU that a platform
+//!   was made for ([`Scaling`]).
 //! - [`Part`] and [`Energy`]: energy by part. The sum over parts is the exact energy of a frame.
 //! - [`PowerModel`]: converts an [`activity::Timeline`] to a [`FramePower`].
 //! - [`pace`]: puts frames one after another, under V-sync or free-running, into one power curve.
@@ -39,6 +41,7 @@ mod pacing;
 mod parts;
 mod platform;
 mod quantity;
+mod structure;
 mod system;
 mod table;
 
@@ -47,11 +50,16 @@ pub use model::{FramePower, PowerModel};
 pub use pacing::{PacedFrame, Pacing, Run, pace};
 pub use parts::{Energy, PARTS, Part};
 pub use platform::{
-    Disturbance, Finish, Launch, Leakage, Platform, Provenance, Rail, ScaledFrom, System, UnitPower,
+    Disturbance, Finish, Launch, Leakage, Platform, Provenance, Rail, Range, Ranges, ScaledFrom, System,
+    UnitPower,
 };
 pub use quantity::{
     Basis, Celsius, Exponent, Hertz, Interval, OutOfRange, Picojoules, Quantity, Ratio, Seconds, Share,
     Source, Sourced, Volts, Watts,
+};
+pub use structure::{
+    Charge, Cost, Estimate, INTERPOLATION, LANE_MADDS, Memory, REGISTER_BYTES, Scaling, Sram, SramRun,
+    Structure, madds,
 };
 pub use system::{Cause, Circumstances, Pulse, Surrounded, SurroundedFrame, overlay};
 pub use table::{Bound, EnergyRow, EnergyTable, Entry, Supply};

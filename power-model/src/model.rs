@@ -6,6 +6,7 @@ use crate::error::{ModelError, TimelineError};
 use crate::parts::{Energy, PARTS, Part};
 use crate::platform::Platform;
 use crate::quantity::Watts;
+use crate::structure::Scaling;
 use crate::table::{Bound, EnergyRow, EnergyTable, Supply};
 
 /// An energy table and a platform, with voltages applied.
@@ -28,12 +29,31 @@ impl PowerModel {
         Self::at(table, platform, Bound::Nominal)
     }
 
-    /// The model with all energies at one end of their intervals.
+    /// The model with all energies and watts at one end of their intervals.
     ///
     /// # Errors
     /// As for [`Self::new`].
     pub fn at(table: &EnergyTable, platform: &Platform, bound: Bound) -> Result<Self, ModelError> {
         check_match(table, platform)?;
+        Ok(Self::built(table, &platform.at(bound), bound))
+    }
+
+    /// The model of a GPU that differs by `scaling` from the one that the platform was made for.
+    ///
+    /// # Errors
+    /// As for [`Self::new`].
+    pub fn on(
+        table: &EnergyTable,
+        platform: &Platform,
+        bound: Bound,
+        scaling: &Scaling,
+    ) -> Result<Self, ModelError> {
+        check_match(table, platform)?;
+        Ok(Self::built(&table.on(scaling), &platform.on(scaling, bound), bound))
+    }
+
+    /// The model of a table and a platform that match, with the platform's watts at `bound`.
+    fn built(table: &EnergyTable, platform: &Platform, bound: Bound) -> Self {
         let squared = platform.voltage_ratio() * platform.voltage_ratio();
         let unit_w = |watts: fn(&crate::UnitPower) -> f64| {
             let mut by_unit = [0.0; Unit::COUNT];
@@ -42,13 +62,23 @@ impl PowerModel {
             }
             by_unit
         };
-        Ok(Self {
+        Self {
             event_j: event_energies(table, platform, bound),
             clock_tree_w: unit_w(|row| row.clock_tree_w.value()),
             idle_unit_w: unit_w(|row| row.idle_unit_w.value()),
             constant_w: platform.constant_w.value(),
             leakage_w: platform.leakage_w(),
-        })
+        }
+    }
+
+    /// Leakage at the platform's voltage and temperature, in watts.
+    pub const fn leakage_w(&self) -> f64 {
+        self.leakage_w
+    }
+
+    /// Power of `unit` at the platform's voltage while it is busy and while it is idle, without its events, in watts.
+    pub const fn unit_w(&self, unit: Unit) -> [f64; 2] {
+        [self.clock_tree_w[unit as usize], self.idle_unit_w[unit as usize]]
     }
 
     /// Energy of one `event` at the platform's voltage, in joules.

@@ -108,8 +108,6 @@ pub enum Basis {
     Assumed,
 }
 
-impl Basis {}
-
 /// Source of a number: a citation or a reasoning. Never empty.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 #[serde(try_from = "String")]
@@ -166,6 +164,16 @@ impl<T> Sourced<T> {
             Self::Derived(..) => Basis::Derived,
             Self::Assumed(..) => Basis::Assumed,
         }
+    }
+}
+
+impl Sourced<Watts> {
+    /// Watts computed from these. The range of [`Watts`] is that of numbers in files and does not hold for them.
+    pub(crate) fn computed(&self, value: f64, how: &str) -> Self {
+        if value == self.value() {
+            return self.clone();
+        }
+        Self::Derived(Watts(value), Source(format!("{}; {how}", self.source())))
     }
 }
 

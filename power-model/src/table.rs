@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::TableError;
 use crate::quantity::{Basis, Nanometres, Picojoules, Source, Volts};
+use crate::structure::Scaling;
 
 /// Built-in tables by name.
 const BUILTIN: [(&str, &str); 1] = [("28nm", include_str!("../tables/28nm.ron"))];
@@ -150,6 +151,16 @@ impl EnergyTable {
         })
     }
 
+    /// The table for a GPU that differs from that of the platform by `scaling`.
+    #[must_use]
+    pub fn on(&self, scaling: &Scaling) -> Self {
+        let entry = |entry: &Entry| match entry {
+            Entry::Costs(row) => Entry::Costs(row.on(scaling)),
+            Entry::Free(reason) => Entry::Free(reason.clone()),
+        };
+        Self { entries: self.entries.iter().map(entry).collect(), ..self.clone() }
+    }
+
     /// Nominal energy per event at V0 in joules, indexed by event.
     pub fn nominal(&self) -> [f64; Event::COUNT] {
         self.joules(Bound::Nominal)
@@ -246,6 +257,14 @@ impl EnergyRow {
     /// Largest energy that the sources allow, in joules.
     pub fn high_j(&self) -> f64 {
         self.pj[2] * J_PER_PJ
+    }
+
+    /// The row for a GPU that differs from that of the platform by `scaling`.
+    #[must_use]
+    pub(crate) fn on(&self, scaling: &Scaling) -> Self {
+        let ratio = scaling.event(self.event);
+        let [low, nominal, high] = self.pj;
+        Self { pj: [low * ratio.low, nominal * ratio.nominal, high * ratio.high], ..self.clone() }
     }
 
     /// Supply.

@@ -263,6 +263,10 @@ fn a_gpu_on_a_platform_of_another() {
     let warned = |args: &[&str]| quintile().run("tiny", args);
     assert_warns(&warned(&["--gpu", "discrete"]), "platform-mismatch");
     assert_warns(&warned(&["--gpu", "mobile", "--platform", "hd_4000"]), "platform-mismatch");
+    let large = ["--set", "gpu.pipeline.memory.l2.entries=1048576"];
+    assert_warns(&warned(&large), "platform-mismatch");
+    let same_class = ["--set", "gpu.pipeline.memory.l2.entries=8192"];
+    assert!(!warned(&same_class).warning_codes().contains(&"platform-mismatch".to_owned()));
 }
 
 #[test]

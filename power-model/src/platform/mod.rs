@@ -1,6 +1,8 @@
 //! Platforms and their files: all power that is not caused by events, such as voltages, constant power, leakage,
 //! clock trees and idle power.
 
+mod ranges;
+mod scaled;
 mod system;
 
 use std::path::Path;
@@ -10,11 +12,12 @@ use serde::Deserialize;
 
 use crate::PlatformError;
 use crate::quantity::{
-    Basis, Celsius, Exponent, Nanometres, Quantity, Ratio, RecordedIdle, Seconds, Source, Sourced, Volts,
-    Watts,
+    Basis, Celsius, Exponent, Nanometres, Quantity, Ratio, RecordedIdle, Seconds, Share, Source, Sourced,
+    Volts, Watts,
 };
 use crate::table::EnergyRow;
 
+pub use self::ranges::{Range, Ranges};
 pub use self::system::{Disturbance, Finish, Launch, System};
 
 /// Built-in platforms by name.
@@ -61,9 +64,12 @@ pub struct Leakage {
     pub reference_c: Sourced<Celsius>,
     /// Temperature difference that doubles the leakage; 0 or less makes it independent of temperature.
     pub doubling_c: Sourced<Celsius>,
+    /// Share of the leakage that is left between frames, with the core power-gated, and is in [`Platform::idle_w`]. A
+    /// GPU with more leakage draws as much more of it. Half if a file does not say it.
+    pub idle_share: Option<Sourced<Share>>,
 }
 
-/// Power of one unit apart from its events, at [`Platform::v0_v`] and the clock of the GPU in use. Both
+/// Power of one unit apart from its events, at [`Platform::v0_v`] and the clock of the GPU of the platform. Both
 /// values scale with (V/V0)^2 and apply only in frames that use the unit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct UnitPower {
@@ -82,6 +88,8 @@ pub struct Platform {
     pub name: String,
     /// Description.
     pub doc: String,
+    /// GPU for which its numbers hold: a name, or a file that ends in `.ron`. On another GPU they are scaled.
+    pub made_for: String,
     /// Process node in nanometres. It has to match the energy table's, or `energy_from` gives the table's
     /// node.
     pub node_nm: u32,
@@ -95,12 +103,17 @@ pub struct Platform {
     pub v_v: Sourced<Volts>,
     /// Constant power during a frame.
     pub constant_w: Sourced<Watts>,
+    /// Share of [`Self::constant_w`] that memory and its controllers draw, which grows with the number of channels. None if a file
+    /// does not say it.
+    pub memory_share: Option<Sourced<Share>>,
     /// Leakage of the powered core.
     pub leakage: Leakage,
     /// One row per unit, in the order of [`Unit::ALL`].
     units: Vec<UnitPower>,
     /// Power between frames: everything, with the core power-gated.
     pub idle_w: Sourced<Watts>,
+    /// How far off the watts may be; without it they are taken as exact.
+    pub ranges: Option<Ranges>,
     /// Free-running: gap between the end of a frame and the start of the next, in which the driver submits.
     pub submit_gap_s: Sourced<Seconds>,
     /// Idle time recorded before the first frame.
@@ -156,7 +169,9 @@ impl Platform {
     /// # Errors
     /// [`PlatformError`] if the file cannot be read, a number is out of range, or a unit is missing.
     pub fn load(path: &Path) -> Result<Self, PlatformError> {
-        spec::load::<Written>(path)?.check(&path.display().to_string())
+        let mut platform = spec::load::<Written>(path)?.check(&path.display().to_string())?;
+        platform.name_gpu_beside(path);
+        Ok(platform)
     }
 
     /// Parse RON `text`; `file` is the file name in messages.
@@ -165,6 +180,13 @@ impl Platform {
     /// As for [`Self::load`].
     pub fn parse(text: &str, file: &str) -> Result<Self, PlatformError> {
         spec::parse::<Written>(text, file)?.check(file)
+    }
+
+    /// Resolve the name of a GPU file relative to the folder of the platform file at `path`.
+    pub fn name_gpu_beside(&mut self, path: &Path) {
+        if self.made_for.ends_with(".ron") {
+            self.made_for = path.with_file_name(&self.made_for).display().to_string();
+        }
     }
 
     /// Power of every unit apart from its events, in the order of [`Unit::ALL`].
@@ -179,7 +201,8 @@ impl Platform {
 
     /// Leakage at the operating voltage and temperature, in watts.
     pub fn leakage_w(&self) -> f64 {
-        let Leakage { reference_w, voltage_exponent, temperature_c, reference_c, doubling_c } = &self.leakage;
+        let Leakage { reference_w, voltage_exponent, temperature_c, reference_c, doubling_c, .. } =
+            &self.leakage;
         let voltage = libm::pow(self.voltage_ratio(), voltage_exponent.value());
         let doublings = if doubling_c.value() > 0.0 {
             (temperature_c.value() - reference_c.value()) / doubling_c.value()
@@ -211,12 +234,16 @@ impl Platform {
             provenance("v0_v", &self.v0_v),
             provenance("v_v", &self.v_v),
             provenance("constant_w", &self.constant_w),
+        ]);
+        list.extend(self.memory_share.as_ref().map(|share| provenance("memory_share", share)));
+        list.extend([
             provenance("leakage.reference_w", &self.leakage.reference_w),
             provenance("leakage.voltage_exponent", &self.leakage.voltage_exponent),
             provenance("leakage.temperature_c", &self.leakage.temperature_c),
             provenance("leakage.reference_c", &self.leakage.reference_c),
             provenance("leakage.doubling_c", &self.leakage.doubling_c),
         ]);
+        list.extend(self.leakage.idle_share.as_ref().map(|share| provenance("leakage.idle_share", share)));
         for row in &self.units {
             let name = row.unit.name();
             list.push(provenance(&format!("units.{name}.clock_tree_w"), &row.clock_tree_w));
@@ -247,6 +274,7 @@ fn provenance<'a, T: Quantity>(field: &str, number: &'a Sourced<T>) -> Provenanc
 struct Written {
     name: String,
     doc: Source,
+    made_for: String,
     node_nm: Nanometres,
     #[serde(default)]
     energy_from: Option<ScaledFrom>,
@@ -254,9 +282,13 @@ struct Written {
     v0_v: Sourced<Volts>,
     v_v: Sourced<Volts>,
     constant_w: Sourced<Watts>,
+    #[serde(default)]
+    memory_share: Option<Sourced<Share>>,
     leakage: Leakage,
     units: Vec<UnitRow>,
     idle_w: Sourced<Watts>,
+    #[serde(default)]
+    ranges: Option<Ranges>,
     submit_gap_s: Sourced<Seconds>,
     lead_in_s: Sourced<RecordedIdle>,
     tail_s: Sourced<RecordedIdle>,
@@ -295,15 +327,18 @@ impl Written {
         Ok(Platform {
             name: self.name,
             doc: self.doc.text().to_owned(),
+            made_for: self.made_for,
             node_nm: self.node_nm.get(),
             energy_from: self.energy_from,
             rail: self.rail,
             v0_v: self.v0_v,
             v_v: self.v_v,
             constant_w: self.constant_w,
+            memory_share: self.memory_share,
             leakage: self.leakage,
             units: complete(self.units, file)?,
             idle_w: self.idle_w,
+            ranges: self.ranges,
             submit_gap_s: self.submit_gap_s,
             lead_in_s: self.lead_in_s,
             tail_s: self.tail_s,

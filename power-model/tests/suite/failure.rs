@@ -252,3 +252,19 @@ fn frames_without_length_lead_in_or_gap_leave_no_curve_to_draw() {
     let error = pace(&[&frame], &bare(), Pacing::FreeRunning).unwrap_err();
     assert_says(&error.to_string(), &["the power curve of the run", "at least one segment"]);
 }
+
+#[test]
+fn a_range_has_to_hold_the_number_itself() {
+    let message = platform_error("low: 0.6, high: 1.5", "low: 1.2, high: 1.5");
+    assert_says(&message, &["mine.ron:", "from 1.2 to 1.5 times", "put low <= 1 <= high"]);
+    let message = platform_error("low: 0.6, high: 1.5", "low: 0.6, high: 1500");
+    assert_says(&message, &["mine.ron:", "1500 (ratio) is not a number from 0.01 to 100"]);
+}
+
+#[test]
+fn a_platform_without_its_gpu_is_refused() {
+    assert_says(
+        &platform_error("    made_for: \"reference\",\n", ""),
+        &["mine.ron:", "missing field `made_for`"],
+    );
+}

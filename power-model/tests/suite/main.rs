@@ -11,4 +11,6 @@ mod failure;
 #[cfg(test)]
 mod property;
 #[cfg(test)]
+mod structure;
+#[cfg(test)]
 mod system;

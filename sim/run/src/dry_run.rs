@@ -1,8 +1,9 @@
 //! `--dry-run`: what a run would do, and the time and memory that it is expected to take.
 
 use cpu_time::ProcessTime;
-use output::table::{counted, grouped, si};
+use output::table::{counted, digits, grouped, si};
 use pipeline::Gpu;
+use power_model::Estimate;
 use serde::Serialize;
 use timing::{FrameClock, Level, Recorder};
 use warnings::Warning;
@@ -10,7 +11,7 @@ use workloads::Scene;
 use workloads::job::Reduction;
 
 use crate::plan::BYTES_PER_SAMPLE;
-use crate::{Choice, Distinct, Plan, Prepared, RunError, Sampling, frame, gpu};
+use crate::{Choice, Distinct, Plan, Prepared, RunError, Sampling, area_mm2, frame};
 
 /// Description of a run before it starts.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -43,6 +44,8 @@ pub struct DryRun {
     pub platform: String,
     /// Name of the energy table.
     pub energy_table: String,
+    /// Area of the GPU in square millimetres.
+    pub area_mm2: Estimate,
     /// Timing level.
     pub timing: &'static str,
     /// Pacing of frames.
@@ -70,7 +73,7 @@ impl DryRun {
             sampling => sampling.first(prepared.distinct.groups().len()).min(distinct),
         };
         let mut warnings = plan.job.warnings().to_vec();
-        warnings.extend(gpu::check_pairing(&plan.options, &plan.gpu, &plan.platform, &plan.table));
+        warnings.extend(plan.pairing.clone());
         Ok(Self {
             scene: plan.name.clone(),
             triangles: plan.job.scene().map(Scene::triangle_count),
@@ -86,6 +89,7 @@ impl DryRun {
             gpu: plan.gpu.name.clone(),
             platform: plan.platform.name.clone(),
             energy_table: plan.table.name().to_owned(),
+            area_mm2: area_mm2(plan),
             timing: plan.options.timing.name(),
             pacing: plan.options.pacing.name(),
             trace_rate_hz: plan.options.trace_rate_hz,
@@ -128,6 +132,7 @@ impl DryRun {
                 ),
             ),
             ("GPU", format!("{}, platform {}, energy table {}", self.gpu, self.platform, self.energy_table)),
+            ("area", area_text(&self.area_mm2)),
             ("timing", format!("{}, pacing {}", self.timing, self.pacing)),
             ("recorder", rate),
         ];
@@ -204,6 +209,12 @@ impl Expected {
         let memory = self.memory_bytes.map(|bytes| format!(", {:.0} MB of memory", bytes as f64 / 1e6));
         format!("about {}{}", duration(self.host_s), memory.unwrap_or_default())
     }
+}
+
+/// Area as text.
+pub(super) fn area_text(area_mm2: &Estimate) -> String {
+    let [low, nominal, high] = [area_mm2.low, area_mm2.nominal, area_mm2.high].map(digits);
+    format!("{nominal} mm2 ({low} to {high}), without interfaces")
 }
 
 /// Duration as text, to two digits.

@@ -4,8 +4,9 @@ use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 use activity::{LEVELS, spec};
+use output::table::digits;
 use pipeline::PipelineSpec;
-use power_model::{EnergyTable, Platform};
+use power_model::{EnergyTable, Platform, Scaling};
 use serde::Deserialize;
 use timing::{Clocks, Machine, MachineSpec, TimingError};
 use warnings::{Code, Warning};
@@ -74,6 +75,14 @@ pub enum GpuError {
         place: String,
         /// The value, what is wrong with it, and valid values.
         message: String,
+    },
+    /// The GPU of a platform cannot be loaded.
+    #[error("`made_for` of platform `{platform}`: {source}")]
+    Home {
+        /// Name of the platform.
+        platform: String,
+        /// Why.
+        source: Box<Self>,
     },
     /// No GPU has this name.
     #[error("no GPU called `{name}`; {suggestion}; or name a .ron file")]
@@ -257,25 +266,38 @@ impl GpuSpec {
     }
 }
 
-/// Checks that platform and energy table belong to the GPU. The power values of a platform hold for the size
-/// and clock of one GPU and are not scaled; others give a warning.
+/// Ratio from which watts are too far from those of the GPU of the platform to be scaled without a warning.
+const FAR: f64 = 4.0;
+
+/// Checks that platform and energy table belong to the GPU, and that it is near the one that the platform was made for.
 pub(super) fn check_pairing(
     options: &RunOptions,
     gpu: &GpuSpec,
-    platform: &Platform,
-    table: &EnergyTable,
+    (platform, table): (&Platform, &EnergyTable),
+    scaling: &Scaling,
 ) -> Option<Warning> {
     let in_use = format!("platform `{}` and energy table `{}`", platform.name, table.name());
+    let (ratio, of) = scaling.farthest();
+    let scaled = format!("of GPU `{}`; {of} is scaled by {}", platform.made_for, digits(ratio));
     let message = match &gpu.power {
         None => format!(
-            "no platform belongs to GPU `{}`, so its watts come from {in_use}, which were made for another machine: compare its \
-             cycles and counts, not its watts; or write a platform for it and name that as `power` in the GPU file",
+            "no platform belongs to GPU `{}`, so its watts come from {in_use}, which are those {scaled}: compare its cycles, counts and \
+             area, not its watts; or write a platform for it and name that as `power` in the GPU file",
             gpu.name
         ),
-        Some(own) if belongs(own, options, platform, table) => return None,
+        Some(own) if belongs(own, options, platform, table) => {
+            if (1.0 / FAR..=FAR).contains(&ratio) {
+                return None;
+            }
+            format!(
+                "the watts of GPU `{}` are far from home: {in_use} are those {scaled}, which holds for changes of up to {FAR} times; \
+                 write a platform for this GPU and name it as `power` in the GPU file",
+                gpu.name
+            )
+        }
         Some(own) => format!(
-            "GPU `{}` belongs to platform `{}` and energy table `{}`, and its watts come from {in_use}: they are those of another \
-             machine; leave --platform and --energy out, or choose the GPU that belongs to them (`quintile list`)",
+            "GPU `{}` belongs to platform `{}` and energy table `{}`, and its watts come from {in_use}, those {scaled}; \
+             leave --platform and --energy out, or choose the GPU that belongs to them (`quintile list`)",
             gpu.name, own.platform, own.energy
         ),
     };

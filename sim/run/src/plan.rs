@@ -4,13 +4,15 @@ use std::path::{Path, PathBuf};
 
 use activity::inputs;
 use pipeline::Viewport;
-use power_model::{EnergyTable, Pacing, Platform, PowerModel};
+use power_model::{EnergyTable, Pacing, Platform, PowerModel, Scaling};
+use warnings::Warning;
 use workloads::job::{Reduction, Request};
 use workloads::{Job, Rendering, Settings, catalog};
 
 use crate::RunError;
 use crate::changes::{ChangedFile, Changes};
-use crate::gpu::GpuSpec;
+use crate::gpu::{GpuSpec, check_pairing};
+use crate::hardware;
 use crate::options::{DEFAULT_RATE_HZ, PacingChoice, RunOptions};
 
 /// Plan of a run: options, and all inputs loaded and checked.
@@ -25,12 +27,16 @@ pub struct Plan {
     pub viewport: Viewport,
     /// The hardware.
     pub gpu: GpuSpec,
-    /// The platform.
+    /// The platform, with its watts scaled to the GPU.
     pub platform: Platform,
-    /// Energy table, in joules per event.
+    /// Energy table, in joules per event, as in its file.
     pub table: EnergyTable,
-    /// Power model of table and platform.
+    /// What the GPU costs over the one that the platform was made for.
+    pub scaling: Scaling,
+    /// Power model of table and platform, scaled to the GPU.
     pub model: PowerModel,
+    /// Warning of a platform or table that does not belong to the GPU.
+    pub(crate) pairing: Option<Warning>,
     /// When the next frame starts.
     pub pacing: Pacing,
     /// Input files, sorted by name.
@@ -88,9 +94,23 @@ impl Plan {
             Some(changed) => changed,
             None => file_or_name(table, EnergyTable::load, EnergyTable::builtin)?,
         };
-        let model = PowerModel::at(&table, &platform, options.bound)?;
         let (files, changed) = (Vec::new(), changes.files);
-        Ok(Self { name, job, viewport, gpu, platform, table, model, pacing, options, files, changed })
+        let Powered { platform, scaling, model, pairing } = Powered::new(&options, &gpu, &platform, &table)?;
+        Ok(Self {
+            name,
+            job,
+            viewport,
+            gpu,
+            platform,
+            table,
+            scaling,
+            model,
+            pairing,
+            pacing,
+            options,
+            files,
+            changed,
+        })
     }
 
     /// The same plan on another GPU, platform and energy table.
@@ -98,8 +118,9 @@ impl Plan {
     /// # Errors
     /// If platform and table do not match, or the recording would be too large.
     pub fn on(self, gpu: GpuSpec, platform: Platform, table: EnergyTable) -> Result<Self, RunError> {
-        let model = PowerModel::at(&table, &platform, self.options.bound)?;
-        let plan = Self { gpu, platform, table, model, ..self };
+        let Powered { platform, scaling, model, pairing } =
+            Powered::new(&self.options, &gpu, &platform, &table)?;
+        let plan = Self { gpu, platform, table, scaling, model, pairing, ..self };
         plan.size().check()?;
         Ok(plan)
     }
@@ -126,6 +147,28 @@ impl Plan {
     /// Pixels of the image.
     pub fn pixels(&self) -> u64 {
         self.viewport.pixels() as u64
+    }
+}
+
+/// Power of a GPU: platform and model scaled to it.
+struct Powered {
+    platform: Platform,
+    scaling: Scaling,
+    model: PowerModel,
+    pairing: Option<Warning>,
+}
+
+impl Powered {
+    fn new(
+        options: &RunOptions,
+        gpu: &GpuSpec,
+        platform: &Platform,
+        table: &EnergyTable,
+    ) -> Result<Self, RunError> {
+        let scaling = hardware::scaling(gpu, platform)?;
+        let model = PowerModel::on(table, platform, options.bound, &scaling)?;
+        let pairing = check_pairing(options, gpu, (platform, table), &scaling);
+        Ok(Self { platform: platform.on(&scaling, options.bound), scaling, model, pairing })
     }
 }
 

@@ -11,6 +11,7 @@ use output::report::{
 use output::table::{count_or_digits, grouped, shell_line, si};
 use power_model::{Bound, Part};
 
+use crate::dry_run::area_text;
 use crate::frame::image_name;
 use crate::heat::heat_name;
 use crate::pictures::{Plot, parts_in_use};
@@ -201,6 +202,7 @@ fn facts(outcome: &FinishedRun) -> Vec<FactRow> {
         FactRow::new("GPU", format!("{}: {}", plan.gpu.name, plan.gpu.doc)),
         FactRow::new("platform", format!("{}: {}", plan.platform.name, plan.platform.doc)),
         FactRow::new("energy table", format!("{}, {}", plan.table.name(), bound(plan.options.bound))),
+        FactRow::new("area", area_text(&summary.hardware.area_mm2)),
         FactRow::new("modelled", summary.modelled.line()),
         FactRow::new("limits", summary.modelled.limits.join("; ")),
         FactRow::new("counts hash", summary.counts_hash.clone()),

@@ -18,8 +18,8 @@ use crate::passes::{self, PassSummary};
 use crate::provenance::SCHEMA;
 use crate::stalls::{self, StallShares};
 use crate::{
-    Choice, Host, Input, Measurement, Modelled, Plan, Provenance, Resolution, RunOptions, SampledSummary,
-    Simulated, Verified, warn,
+    Choice, HardwareSummary, Host, Input, Measurement, Modelled, Plan, Provenance, Resolution, RunOptions,
+    SampledSummary, Simulated, Verified, warn,
 };
 
 /// Contents of `summary.json`.
@@ -45,6 +45,8 @@ pub struct Summary {
     pub settings: SettingsSummary,
     /// Camera of the first frame; `None` for workloads without a scene.
     pub camera: Option<CameraUsed>,
+    /// Area and power of the hardware, scaled from the GPU that the platform was made for.
+    pub hardware: HardwareSummary,
     /// Dimensions and units that were modelled.
     pub modelled: Modelled,
     /// Warnings.
@@ -217,6 +219,7 @@ impl Summary {
             inputs,
             settings: settings(plan, simulated, measurement),
             camera,
+            hardware: HardwareSummary::new(plan),
             modelled: Modelled::new(plan, simulated),
             warnings: warn::gather(plan, simulated, measurement),
             measured: Figures::of(&measurement.frames, pixels).filter(|_| !measurement.is_mark_alone()),

@@ -11,12 +11,12 @@ use warnings::{Code, Warning};
 use workloads::Regime;
 
 use crate::measure::MIN_BUSY_SAMPLES;
-use crate::{Choice, Measurement, Observed, Plan, RunFrame, Simulated, gpu};
+use crate::{Choice, Measurement, Observed, Plan, RunFrame, Simulated};
 
 /// All warnings of a run, sorted, without duplicates.
 pub(crate) fn gather(plan: &Plan, simulated: &Simulated, measurement: &Measurement) -> Vec<Warning> {
     let mut all = plan.job.warnings().to_vec();
-    all.extend(gpu::check_pairing(&plan.options, &plan.gpu, &plan.platform, &plan.table));
+    all.extend(plan.pairing.clone());
     all.extend(of_frames(
         simulated
             .distinct

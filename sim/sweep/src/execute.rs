@@ -7,7 +7,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use activity::Event;
 use output::progress::Progress;
 use power_model::{FramePower, pace};
-use run::{Distinct, Plan, RunError, RunFrame, frames_of};
+use run::{Distinct, Plan, RunError, RunFrame, area_mm2, frames_of};
 use serde::{Deserialize, Serialize};
 
 use crate::setting::{self, Setting};
@@ -57,6 +57,8 @@ pub struct Measured {
     pub nj_per_pixel: f64,
     /// Bytes read from and written to memory, sum.
     pub dram_bytes: u64,
+    /// Area of the GPU in square millimetres: nominal, low, high.
+    pub area_mm2: [f64; 3],
     /// Codes of accuracy warnings of the timing level, comma-separated.
     pub accuracy_warnings: String,
     /// Event counts, sums.
@@ -139,6 +141,7 @@ pub fn measured(plan: &Plan, frames: &[&RunFrame]) -> Result<Measured, RunError>
     let busy_j = frames.iter().map(|frame| frame.cost().energy_j).sum::<f64>() / count;
     let busy_s = paced.frames.iter().map(|frame| frame.busy_end_s - frame.start_s).sum::<f64>() / count;
     let counts = EventCounts::of(frames);
+    let area = area_mm2(plan);
     let bytes = |event: Event| counts.get(event).unwrap_or(0);
     Ok(Measured {
         used: used(plan),
@@ -149,6 +152,7 @@ pub fn measured(plan: &Plan, frames: &[&RunFrame]) -> Result<Measured, RunError>
         frame_mj: frame_j * 1e3,
         nj_per_pixel: frame_j / plan.pixels() as f64 * 1e9,
         dram_bytes: bytes(Event::DramReadBytes) + bytes(Event::DramWriteBytes),
+        area_mm2: [area.nominal, area.low, area.high],
         accuracy_warnings: accuracy_warnings(frames),
         counts,
     })

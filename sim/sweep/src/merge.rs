@@ -124,6 +124,9 @@ fn numbers(rows: &[Outcome]) -> Vec<Column> {
         number("frame_mJ", |row| row.frame_mj),
         number("energy_per_pixel_nJ", |row| row.nj_per_pixel),
         whole("dram_bytes", |row| row.dram_bytes),
+        number("area_mm2", |row| row.area_mm2[0]),
+        number("area_low_mm2", |row| row.area_mm2[1]),
+        number("area_high_mm2", |row| row.area_mm2[2]),
         Column { name: "accuracy_warnings".to_owned(), values: Values::Text(warnings) },
     ]
 }

@@ -13,7 +13,7 @@ use crate::spec::{Combination, SweepSpec};
 use crate::trials::{Refusal, Ticker, Trials};
 
 /// Version of the files of a sweep.
-pub(crate) const SCHEMA: u32 = 1;
+pub(crate) const SCHEMA: u32 = 2;
 
 /// Digits of an id: of a million points, two have the same with a probability below one in 10^11.
 const ID_DIGITS: usize = 20;

@@ -170,7 +170,7 @@ fn with(text: &str, change: &Change) -> Result<String, ChangeError> {
 fn with_whole_paths(text: &str, origin: &Path) -> String {
     let folder = std::path::absolute(origin).ok().and_then(|path| path.parent().map(Path::to_path_buf));
     let Some(folder) = folder else { return text.to_owned() };
-    edit::replace_strings(text, &["file", "end", "table", "platform", "energy"], &|name| {
+    edit::replace_strings(text, &["file", "end", "table", "platform", "energy", "made_for"], &|name| {
         let is_relative = Path::new(name).extension().is_some() && Path::new(name).is_relative();
         is_relative.then(|| folder.join(name).display().to_string())
     })
@@ -236,7 +236,12 @@ impl Changes<'_> {
             PlatformError::Spec(error) => without_place(error),
             error => without_name(&error, name),
         };
-        self.input((InputFile::Platform, name), Platform::builtin_text, Platform::parse, in_words)
+        let platform =
+            self.input((InputFile::Platform, name), Platform::builtin_text, Platform::parse, in_words)?;
+        Ok(platform.map(|mut platform| {
+            platform.name_gpu_beside(name);
+            platform
+        }))
     }
 
     /// The energy table of a name or file with its changes; `None` if it has none.
