@@ -779,6 +779,43 @@ fn what_surfaces_cannot_do_is_refused_by_name() {
     assert!(memory.starts_with("pass `light`: the surfaces of the frame take "), "{memory}");
 }
 
+/// The error names the surface, the first draw that reads it and the first that writes it.
+#[test]
+fn feedback_names_both_draws() {
+    let masked = DrawState { colour_mask: [false; 4], ..flat() };
+    let message = |states: [DrawState; 3], is_depth: bool| {
+        with(|stage, settings| {
+            let mut gpu = Gpu::quiet(settings.spec).unwrap();
+            let [colour, depth] = [("albedo", Format::Rgba8), ("depth", Format::D32)]
+                .map(|(name, format)| gpu.create_surface(&SurfaceSpec::new(name, stage.viewport, format)));
+            let mut targets = to(&[colour]);
+            targets.depth = Some(Attachment::cleared(depth, Clear::default()));
+            let (corners, bindings) =
+                (screen(1.0), [Binding::Surface(if is_depth { depth } else { colour })]);
+            let draws = [0, 1, 2].map(|number| {
+                let draw = still(&corners, &RED).with_state(states[number]);
+                if number == 0 { draw } else { draw.binding(&bindings) }
+            });
+            let pass = RasterPass::new(&stage.camera, &draws, settings).named("light");
+            gpu.draw(&pass.onto(Target::Surfaces(&targets))).unwrap_err().to_string()
+        })
+    };
+    let start = |surface, reader, writer| {
+        format!(
+            "pass `light`, surface `{surface}`: it is read and written in the same pass: {reader} reads it, and {writer} writes it;"
+        )
+    };
+    let cases = [
+        (message([flat(); 3], false), start("albedo", "draw 1", "draw 0")),
+        (message([masked, masked, flat()], false), start("albedo", "draw 1", "draw 2")),
+        (message([masked; 3], false), start("albedo", "draw 1", "the pass as a whole")),
+        (message([flat(), DrawState::default(), flat()], true), start("depth", "draw 1", "draw 1")),
+    ];
+    for (message, start) in cases {
+        assert!(message.starts_with(&start), "{message}");
+    }
+}
+
 /// What a pass drops cannot be read, and costs no memory traffic.
 #[test]
 fn dropped_contents_are_gone() {
