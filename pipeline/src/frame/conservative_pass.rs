@@ -13,9 +13,9 @@ use super::Gpu;
 use super::lanes::{LaneWork, Lanes};
 use crate::conservative::{Grid, MovingTriangle, Rasterizer, TileLoop, Touch};
 use crate::depth::{Numbers, Real};
-use crate::geometry::{Cull, Projection, Viewport};
+use crate::geometry::{Projection, Viewport};
 use crate::memory::MemoryRange;
-use crate::setup;
+use crate::setup::difference_madds;
 use crate::tally::{Costs, Kernel};
 
 /// Triangles of a packet of vertices.
@@ -324,7 +324,7 @@ fn vertices(gpu: &mut Gpu<'_>, draw: &ConservativeDraw<'_>, costs: &Costs) {
             counts[outcome] += 1;
             counts[Event::SetupMadds] += madds;
             if !is_culled {
-                counts[Event::SetupMadds] += setup::madds(primitive.triangle.is_moving(), Cull::None);
+                counts[Event::SetupMadds] += difference_madds(primitive.triangle.is_moving());
             }
         }
         let from = draw.vertices.address() + 3 * BATCH as u64 * number * bytes;

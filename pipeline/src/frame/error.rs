@@ -52,6 +52,16 @@ pub enum PassError {
         /// What is wrong.
         error: ComputeError,
     },
+    /// A buffer is of another frame.
+    #[error(
+        "pass `{pass}`: the frame has no such buffer number {number}; use one that `Gpu::buffer` returned in this frame"
+    )]
+    Buffer {
+        /// The pass.
+        pass: String,
+        /// Number of the buffer.
+        number: u32,
+    },
     /// The surfaces of a frame are too large.
     #[error(
         "pass `{pass}`: the surfaces of the frame take {bytes} bytes, more than the {} that can be addressed; draw fewer pixels, \

@@ -2,7 +2,7 @@
 //! whose hyperplanes these are; the remainder bound is new here).
 
 use super::edges::{Edge, Edges};
-use super::number::{Number, Quadratic};
+use super::number::{Number, Quadratic, Scalar};
 use super::region::{Faces, View};
 
 /// Linear edges in the arithmetic of the sample test. A sample is outside if one edge is below `-margin` and
@@ -21,9 +21,8 @@ pub struct Screen {
     pub extent: [f32; 3],
 }
 
-/// Multiply-adds of [`Screen::gain`]: for each edge a reciprocal, two positions and two products; the product
-/// of both.
-pub const SCREEN_GAIN_MADDS: u32 = 3 * 5 + 1;
+/// Multiply-adds of [`Screen::gain`].
+pub const SCREEN_GAIN_MADDS: u32 = 28;
 
 impl Screen {
     /// Screen for single samples of the box of `edges` at times `t`, within those of the box, if only `faces`
@@ -51,15 +50,30 @@ impl Screen {
     /// Expected fraction of samples rejected, for edges distributed evenly over their extents and independent
     /// of each other.
     pub fn gain(&self) -> f32 {
-        let mut kept = [1.0_f32; 2];
-        for k in 0..3 {
-            let per = 0.5 / self.extent[k].max(f32::MIN_POSITIVE);
-            let [below, above] = [-self.value[k], self.value[k]]
-                .map(|value| ((value - self.margin[k] + self.extent[k]) * per).clamp(0.0, 1.0));
-            (kept[0], kept[1]) = (kept[0] * (1.0 - below), kept[1] * (1.0 - above));
-        }
-        (1.0 - kept[0]) * (1.0 - kept[1])
+        gain(self.value, self.margin, self.extent.map(|extent| extent.max(f32::MIN_POSITIVE)))
     }
+}
+
+/// [`Screen::gain`] of edges with positive extents.
+fn gain<N: Scalar>(value: [N; 3], margin: [N; 3], extent: [N; 3]) -> N {
+    let [zero, one] = [0.0, 1.0].map(N::from);
+    let share = |part: N| {
+        if part < zero {
+            zero
+        } else if part > one {
+            one
+        } else {
+            part
+        }
+    };
+    let mut kept = [one; 2];
+    for k in 0..3 {
+        let per = N::from(0.5) / extent[k];
+        let [below, above] =
+            [-value[k], value[k]].map(|value| share(one - (value - margin[k] + extent[k]) * per));
+        kept = [kept[0] * below, kept[1] * above];
+    }
+    (one - kept[0]) * (one - kept[1])
 }
 
 /// `value + slopes . d` over a box, within `remainder` of the result of the sample test.
@@ -72,9 +86,10 @@ pub(super) struct Linear<N> {
     pub extent: N,
 }
 
-/// Multiply-adds of screening one sample: three edges, one per dimension in use.
+/// Multiply-adds of screening one sample: its distance from the middle in each dimension in use, which each of three edges
+/// weights; the lens part of an edge is a sum of its own.
 pub const fn screen_madds(moving: bool, lens: bool) -> u32 {
-    3 * (2 + moving as u32 + 2 * lens as u32)
+    (1 + 3) * (2 + moving as u32 + 2 * lens as u32) + 3 * lens as u32
 }
 
 /// Value of an edge and its margin. If only one face can be visible, one edge on the wrong side suffices. The
@@ -139,8 +154,19 @@ impl<N: Number> Edge<N> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::number::counted::{Counted, count};
     use super::super::testing::{Uniform, cases};
     use super::super::{Edges, Screen, View};
+    use super::{SCREEN_GAIN_MADDS, gain};
+
+    #[test]
+    fn the_cost_of_a_gain_is_that_of_its_kernel() {
+        let part = |value: f32| [value; 3].map(Counted::from);
+        for value in [-9.0, -0.5, 0.0, 0.25, 9.0] {
+            let (madds, _) = count(|| gain(part(value), part(0.1), part(1.0)));
+            assert_eq!(madds, SCREEN_GAIN_MADDS, "{value}");
+        }
+    }
 
     #[test]
     fn edges_stay_within_the_margin_and_one_sided_screens_say_the_same() {

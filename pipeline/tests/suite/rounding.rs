@@ -58,7 +58,8 @@ fn edges_keep(triangle: &Triangle, probe: &Probe, tile: &TileRect, within: &Box5
             let mut target = Target { depth: &mut depth, triangle: &mut owner };
             let (samples, near, hits) = (&probe.samples, -1.0, &mut Hits::default());
             let target = &mut target;
-            SampleTest { triangle: &seen, samples, within, screen, near, target, hits }.run(Width::widest());
+            SampleTest { triangle: &seen, samples, within, image: None, screen, near, target, hits }
+                .run(Width::widest());
             owner[slot] == triangle.id
         };
         if !hit(None) {
