@@ -190,23 +190,23 @@ impl SampleTest<'_, '_> {
     #[inline(always)]
     fn pass<V: Lanes, const MOTION: bool, const LENS: bool>(&self, screen: &Screen, base: usize) -> Mask {
         let samples = self.samples;
-        let from = [&samples.x, &samples.y, &samples.u, &samples.v, &samples.t];
-        let mut offset = [V::splat(0.0); 5];
+        let from = [&samples.from_middle[0], &samples.from_middle[1], &samples.u, &samples.v, &samples.t];
+        let mut at = [V::splat(0.0); 5];
         for axis in 0..5 {
             if axis < 2 || (axis < 4 && LENS) || (axis == 4 && MOTION) {
-                offset[axis] = V::load(block_of(from[axis], base)) - V::splat(screen.middle[axis]);
+                at[axis] = V::load(block_of(from[axis], base));
             }
         }
         let (mut below, mut above) = (0, 0);
         for edge in 0..3 {
             let slope = &screen.gradient[edge];
-            let mut value = (V::splat(screen.value[edge]) + V::splat(slope[0]) * offset[0])
-                + V::splat(slope[1]) * offset[1];
+            let mut value =
+                (V::splat(screen.base[edge]) + V::splat(slope[0]) * at[0]) + V::splat(slope[1]) * at[1];
             if LENS {
-                value = value + (V::splat(slope[2]) * offset[2] + V::splat(slope[3]) * offset[3]);
+                value = (value + V::splat(slope[2]) * at[2]) + V::splat(slope[3]) * at[3];
             }
             if MOTION {
-                value = value + V::splat(slope[4]) * offset[4];
+                value = value + V::splat(slope[4]) * at[4];
             }
             below |= V::splat(-screen.margin[edge]).gt(value);
             above |= value.gt(V::splat(screen.margin[edge]));
@@ -458,8 +458,8 @@ mod tests {
             slack: [0.0; 2],
         };
         let screen = Screen {
-            middle: [0.0; 5],
             value: [1.0; 3],
+            base: [1.0; 3],
             gradient: [[1.0; 5]; 3],
             margin: [0.0; 3],
             extent: [1.0; 3],
