@@ -8,17 +8,15 @@ use glam::Vec3;
 use output::OutDir;
 use output::image::LinearImage;
 use output::progress::Progress;
-use pipeline::Gpu;
 use pipeline::frame::HeatMap;
 use rayon::prelude::*;
-use timing::{AccuracyWarning, FrameClock, Recorder};
+use timing::AccuracyWarning;
 
 use crate::heat::{self, HeatPicture};
+use crate::job_frame::{Machine, TimedFrame};
 use crate::passes;
 use crate::{Distinct, Observed, Origin, Plan, RunError, RunFrame};
 
-/// Length of a timeline bin in picoseconds: one microsecond, a twentieth of a sample at 50 kHz.
-pub const BIN_PS: u64 = 1_000_000;
 /// Largest number of bins of all frames, at about 200 bytes each. Longer runs use longer bins.
 const MAX_TOTAL_BINS: usize = 8_000_000;
 /// Lower limit of the bins of a frame, for any number of frames.
@@ -104,20 +102,15 @@ fn simulate_frame(
     number: u32,
     max_bins: usize,
 ) -> Result<(RunFrame, Vec<Vec3>, Vec<HeatMap>), RunError> {
-    let mut clock =
-        FrameClock::new(plan.options.timing, plan.gpu.machine()?, Recorder::new(BIN_PS, max_bins));
-    let emit = |packet: &_, lines: &_| clock.push(packet, lines);
-    let gpu = Gpu::new(&plan.gpu.pipeline, emit).map_err(RunError::setting)?;
-    let mut gpu = gpu.with_heat(&heat::events(&plan.options.heat), plan.viewport);
+    let events = heat::events(&plan.options.heat);
+    let (gpu, model, level) = (&plan.gpu, &plan.model, plan.options.timing);
+    let machine = Machine { gpu, model, level, max_bins, heat: Some((&events, plan.viewport)) };
     let ready = plan.job.prepare(number)?;
-    let drawn = ready.draw(&mut gpu).map_err(RunError::on(&plan.gpu))?;
-    let mut report = gpu.finish();
+    let TimedFrame { drawn, mut report, mut timed, power } = machine.frame(number, &*ready)?;
     let heat = std::mem::take(&mut report.heat);
-    let mut timed = clock.finish()?;
     passes::limit_draws(&mut report, &mut timed);
-    let accuracy = AccuracyWarning::all(plan.options.timing, &timed);
+    let accuracy = AccuracyWarning::all(level, &timed);
     let timeline = timed.timeline;
-    let power = plan.model.frame(&timeline).map_err(|source| RunError::Timeline { frame: number, source })?;
     let simulated = RunFrame {
         index: number,
         triangles: report.triangles(),

@@ -108,7 +108,7 @@ fn simulate_frame(
 ) -> Result<ProbedFrame, RunError> {
     let started = Instant::now();
     let mut clock =
-        FrameClock::new(level, plan.gpu.machine()?, Recorder::new(frame::BIN_PS, frame::MIN_FRAME_BINS));
+        FrameClock::new(level, plan.gpu.machine()?, Recorder::new(crate::BIN_PS, frame::MIN_FRAME_BINS));
     let mut packets = Vec::new();
     let mut lines = Vec::new();
     let emit = |packet: &activity::Packet, new_lines: &[activity::LineAccess]| {

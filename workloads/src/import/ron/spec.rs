@@ -138,13 +138,13 @@ pub(super) struct VisibleSpec {
     #[serde(default, deserialize_with = "bounded::lens_part")]
     pub v: Option<[f32; 2]>,
     /// Within the shutter, 0 to 1.
-    #[serde(default, deserialize_with = "bounded::share")]
+    #[serde(default, deserialize_with = "bounded::part")]
     pub t: Option<[f32; 2]>,
     /// Across the image from its left, 0 to 1.
-    #[serde(default, deserialize_with = "bounded::share")]
+    #[serde(default, deserialize_with = "bounded::part")]
     pub x: Option<[f32; 2]>,
     /// Down the image from its top, 0 to 1.
-    #[serde(default, deserialize_with = "bounded::share")]
+    #[serde(default, deserialize_with = "bounded::part")]
     pub y: Option<[f32; 2]>,
 }
 

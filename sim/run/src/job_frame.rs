@@ -1,14 +1,18 @@
 //! A frame of a job on a machine, with the energy of each of its passes.
 
 use activity::{Counts, Event};
-use pipeline::{FrameReport, Gpu};
+use pipeline::{FrameReport, Gpu, Viewport};
 use power_model::{FramePower, Part, PowerModel};
-use run::{BIN_PS, GpuSpec, RunError};
-use timing::{FrameClock, Level, Recorder};
+use timing::{FrameClock, Level, Recorder, Timed};
 use workloads::Job;
-use workloads::job::Drawn;
+use workloads::job::{Drawn, ReadyFrame};
 
-/// A drawn and timed frame.
+use crate::{GpuSpec, RunError};
+
+/// Length of a timeline bin in picoseconds: one microsecond, a twentieth of a sample at 50 kHz.
+pub const BIN_PS: u64 = 1_000_000;
+
+/// A drawn and timed frame with the energy of its passes.
 pub struct JobFrame {
     /// Image and facts.
     pub drawn: Drawn,
@@ -20,6 +24,26 @@ pub struct JobFrame {
     pub passes: Vec<PassEnergy>,
     /// Energy of writing results to memory when the frame ends, J.
     pub write_back_j: f64,
+}
+
+/// A frame as it was drawn and timed.
+pub(crate) struct TimedFrame {
+    pub drawn: Drawn,
+    pub report: FrameReport,
+    pub timed: Timed,
+    pub power: FramePower,
+}
+
+/// What frames are simulated on, and how.
+#[derive(Clone, Copy)]
+pub(crate) struct Machine<'a> {
+    pub gpu: &'a GpuSpec,
+    pub model: &'a PowerModel,
+    pub level: Level,
+    /// Largest number of timeline bins of a frame.
+    pub max_bins: usize,
+    /// Events of heat maps, over images of a size.
+    pub heat: Option<(&'a [Event], Viewport)>,
 }
 
 /// Energy of a pass.
@@ -47,20 +71,33 @@ impl PassEnergy {
 /// Largest number of bins of a frame.
 const MAX_BINS: usize = 4096;
 
+impl Machine<'_> {
+    /// Draws frame `number`.
+    pub fn frame(&self, number: u32, ready: &dyn ReadyFrame) -> Result<TimedFrame, RunError> {
+        let recorder = Recorder::new(BIN_PS, self.max_bins);
+        let mut clock = FrameClock::new(self.level, self.gpu.machine()?, recorder);
+        let emit = |packet: &_, lines: &_| clock.push(packet, lines);
+        let mut gpu = Gpu::new(&self.gpu.pipeline, emit).map_err(RunError::setting)?;
+        if let Some((events, viewport)) = self.heat {
+            gpu = gpu.with_heat(events, viewport);
+        }
+        let drawn = ready.draw(&mut gpu).map_err(RunError::on(self.gpu))?;
+        let report = gpu.finish();
+        let timed = clock.finish()?;
+        let power = self.model.frame(&timed.timeline);
+        let power = power.map_err(|source| RunError::Timeline { frame: number, source })?;
+        Ok(TimedFrame { drawn, report, timed, power })
+    }
+}
+
 impl JobFrame {
     /// Draws frame `number` of a job.
     ///
     /// # Errors
     /// [`RunError`] if the frame cannot be drawn or timed.
     pub fn new(job: &dyn Job, number: u32, gpu: &GpuSpec, model: &PowerModel) -> Result<Self, RunError> {
-        let mut clock = FrameClock::new(Level::default(), gpu.machine()?, Recorder::new(BIN_PS, MAX_BINS));
-        let emit = |packet: &_, lines: &_| clock.push(packet, lines);
-        let mut passes = Gpu::new(&gpu.pipeline, emit).map_err(RunError::setting)?;
-        let drawn = job.frame(number, &mut passes)?;
-        let report = passes.finish();
-        let timed = clock.finish()?;
-        let power = model.frame(&timed.timeline);
-        let power = power.map_err(|source| RunError::Timeline { frame: number, source })?;
+        let machine = Machine { gpu, model, level: Level::default(), max_bins: MAX_BINS, heat: None };
+        let TimedFrame { drawn, report, timed, power } = machine.frame(number, &*job.prepare(number)?)?;
         let mut before_s = 0.0;
         let pass = |(pass, time): (&pipeline::PassReport, &timing::PassTime)| {
             let end_s = time.end_ps as f64 * 1e-12;
@@ -94,8 +131,8 @@ fn events_j(model: &PowerModel, counts: &Counts) -> f64 {
     model.counts_energy(counts).total_j()
 }
 
-/// Energy between two times of the parts of a power that depend on time.
-fn timed_j(power: &FramePower, from_s: f64, to_s: f64) -> f64 {
+/// Energy between two times of the parts of a power that depend on time: what a pass takes besides its events.
+pub(crate) fn timed_j(power: &FramePower, from_s: f64, to_s: f64) -> f64 {
     let is_timed = |part: &Part| !matches!(part, Part::Unit(_));
     let mut at_s = 0.0;
     let energy = |(length_s, watts): (f64, &[f64; Part::ALL.len()])| {
