@@ -88,7 +88,8 @@ pub struct TileIntervals<'a> {
 }
 
 /// Shader of conservative mode: runs for every triangle and tile that it may touch. Results have to depend on the
-/// arguments alone, and on what was stored before the draw.
+/// arguments alone, and on what was stored before the draw. Its lanes have no helpers: nothing is interpolated, so no lane needs the
+/// differences to its neighbours.
 pub trait TileShader: Sync {
     /// State that the triangles of a body share.
     type BodyState: Default;
