@@ -18,6 +18,7 @@
 //! - [`shader`], [`shading`] and [`texture`]: shaders and the lanes that run them, the shading grid, and textures,
 //! - [`surface`]: images that passes write and read, and their formats,
 //! - [`memory`]: caches and addresses,
+//! - [`buffer`]: typed data that groups read and write and shaders read,
 //! - [`compute`]: groups of lanes with shared memory, buffers, atomics and barriers,
 //! - [`conservative`]: the tiles that a triangle may touch, without samples,
 //! - [`frame`]: all stages in order.
@@ -48,6 +49,7 @@
 //! - *Watertight*: the sample test is exact for the rounded points it sees, so a shared edge has one owner.
 //! - *Deterministic*: the same bytes for any number of threads and any vector width.
 
+pub mod buffer;
 pub mod compute;
 pub mod conservative;
 pub mod depth;
@@ -69,15 +71,15 @@ pub mod traversal;
 mod viewport;
 pub mod visibility;
 
+pub use buffer::{Atomic, Buffer, BufferBinding, Word};
 pub use compute::{
-    Atomic, Buffer, BufferBinding, ComputeError, ComputePass, ComputeSpec, Fault, Group, GroupLane,
-    GroupShader, SurfaceView,
+    ComputeError, ComputePass, ComputeSpec, Fault, Group, GroupLane, GroupShader, SurfaceView,
 };
 pub use frame::{
     Attachment, Attachments, Binding, ConservativeDraw, ConservativePass, Draw, Features, FrameReport, Gpu,
-    IntervalAnswer, IntervalQueries, Lanes, Load, MovingBox, PassError, PassReport, PipelineSpec, Primitive,
-    Query, RasterPass, Rendered, ResolvePass, SampledAnswer, SampledAnswers, SampledQueries, Settings,
-    Shading, Store, SurfaceId, SurfaceProblem, Target, TileIntervals, TileShader,
+    IntervalAnswer, IntervalQueries, Lanes, Load, MovingBox, PassError, PassPart, PassReport, PipelineSpec,
+    Primitive, Query, RasterPass, Rendered, ResolvePass, SampledAnswer, SampledAnswers, SampledQueries,
+    Settings, Shading, Store, SurfaceId, SurfaceProblem, Target, TileIntervals, TileShader,
 };
 pub use geometry::{
     Camera, CameraError, Clip, Cull, DrawError, Geometry, Lens, MovingVertex, Shear, Viewport,

@@ -66,11 +66,13 @@ pub enum SetupResult {
     FaceCulled,
 }
 
-/// Multiply-adds of set-up: the differences of moving vertices and, unless both faces are drawn, the facing
-/// determinant.
-pub fn madds(moving: bool, cull: Cull) -> u32 {
-    u32::from(moving) * 9 + if cull == Cull::None { 0 } else { 9 }
+/// Multiply-adds of the differences between both ends of the vertices of a triangle; none for a still one.
+pub const fn difference_madds(moving: bool) -> u32 {
+    if moving { 9 } else { 0 }
 }
+
+/// Multiply-adds of the determinant that says which face a triangle shows.
+const FACING_MADDS: u32 = 9;
 
 /// Set up the triangle `id` with the given vertices; `half_px` is half the size of the image in pixels.
 pub fn set_up(
@@ -81,23 +83,39 @@ pub fn set_up(
     near: f32,
     half_px: [f32; 2],
 ) -> SetupResult {
+    set_up_counted(id, vertices, cull, shear, near, half_px).0
+}
+
+/// The same with its multiply-adds. The bounds of rounding are the model's own and are not counted.
+pub fn set_up_counted(
+    id: u32,
+    vertices: [&MovingVertex; 3],
+    cull: Cull,
+    shear: &Shear,
+    near: f32,
+    half_px: [f32; 2],
+) -> (SetupResult, u32) {
     if has_no_area(vertices) {
-        return SetupResult::Degenerate;
+        return (SetupResult::Degenerate, 0);
     }
-    let corners = vertices.map(Corner::new);
+    let (corners, moving) = (vertices.map(Corner::new), vertices.iter().any(|vertex| !vertex.is_still()));
+    let madds = difference_madds(moving);
     // The depth of a sample is between those of the vertices, which are farthest at an end of the shutter.
     if corners.iter().all(|c| c.ends().iter().all(|p| p[2] <= near)) {
-        return SetupResult::Outside;
+        return (SetupResult::Outside, madds);
     }
     let faces = [cull != Cull::Back, cull != Cull::Front];
-    let moving = vertices.iter().any(|vertex| !vertex.is_still());
     let slack = slack(&corners, shear, half_px);
     let images = corners.map(|corner| shear.homogeneous(corner.open));
-    if !moving && shear.is_none() && !(faces[0] && faces[1]) && shows_culled_face(&images, faces, slack) {
-        return SetupResult::FaceCulled;
+    // Triangles that reach behind the camera are left to the sample test.
+    let asks_face =
+        !moving && shear.is_none() && !(faces[0] && faces[1]) && images.iter().all(|vertex| vertex[2] > 0.0);
+    let madds = madds + if asks_face { FACING_MADDS } else { 0 };
+    if asks_face && shows_culled_face(&images, faces, slack) {
+        return (SetupResult::FaceCulled, madds);
     }
     let behind = corners.iter().any(|c| c.ends().iter().any(|p| shear.weight(p[2]) < 0.0));
-    SetupResult::Ready(Triangle { id, corners, moving, behind, faces, slack })
+    (SetupResult::Ready(Triangle { id, corners, moving, behind, faces, slack }), madds)
 }
 
 /// Whether two vertices coincide at both ends. No sample is on any side of such an edge. Three collinear
@@ -131,14 +149,10 @@ pub(crate) fn cross<N: Copy + Sub<Output = N> + Mul<Output = N>>(a: [N; 3], b: [
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-/// Whether a still triangle, seen through a pinhole and given by homogeneous points, shows a culled face. The
-/// sign of det[p0, p1, p2] is used only beyond its rounding error in the sample test. Triangles that reach
-/// behind the camera are left to the sample test.
+/// Whether a still triangle in front of the camera, seen through a pinhole and given by homogeneous points, shows a culled face. The
+/// sign of det[p0, p1, p2] is used only beyond its rounding error in the sample test.
 fn shows_culled_face(images: &[[f32; 3]; 3], faces: [bool; 2], slack: [f32; 2]) -> bool {
     let p = images.map(|image| image.map(f64::from));
-    if p.iter().any(|vertex| vertex[2] <= 0.0) {
-        return false;
-    }
     let det = determinant(p);
     // A sample inside sees every vertex within the extent of the triangle. An edge is a cross product of two
     // vertices, each rounded by the slack at most, and the determinant weights three edges by depth.
@@ -186,6 +200,18 @@ impl PixelRect {
     /// The whole viewport.
     pub fn whole(viewport: Viewport) -> Self {
         Self { x0: 0, y0: 0, x1: viewport.width(), y1: viewport.height() }
+    }
+
+    /// Pixels with samples in a range of image coordinates x and y, in pixels from the centre of the image, and one more on each
+    /// side, as the position of a sample may be rounded up to the next pixel.
+    pub fn around(range: [[f32; 2]; 2], viewport: Viewport) -> Self {
+        let sides = [viewport.width(), viewport.height()];
+        let [x, y] = [0, 1].map(|axis| {
+            let ([lo, hi], side) = (range[axis].map(f64::from), f64::from(sides[axis]));
+            // The cast truncates, which rounds non-negative values down.
+            [lo - 1.0, hi + 2.0].map(|at| (at + 0.5 * side).clamp(0.0, side) as u32)
+        });
+        Self { x0: x[0], y0: y[0], x1: x[1], y1: y[1] }
     }
 
     /// Whether it contains no pixel.
@@ -282,13 +308,33 @@ mod tests {
         let points = [[1.0, 2.0, 3.0], [4.0, 5.0, 7.0], [2.0, 8.0, 6.0]];
         let [a, b, c] = points.map(|point| point.map(|value| Counting::new(value, &tally)));
         assert_eq!(determinant([a, b, c]).value(), 20.0);
-        assert_eq!(tally.madds(), madds(false, Cull::Back));
-        let facing = tally.madds();
+        assert_eq!(tally.madds(), FACING_MADDS);
         for (close, open) in [(a, b), (b, c), (c, a)] {
             let _ = difference(close, open);
         }
-        assert_eq!(tally.madds() - facing, madds(true, Cull::None));
-        assert_eq!(tally.madds(), madds(true, Cull::Front));
+        assert_eq!(tally.madds() - FACING_MADDS, difference_madds(true));
+    }
+
+    #[test]
+    fn only_what_set_up_computes_is_counted() {
+        let open = [[0.0, 0.0, 1.0], [10.0, 0.0, 1.0], [0.0, 10.0, 1.0]];
+        let madds = |points: [[f32; 3]; 3], moved: f32, cull: Cull, shear: Shear| {
+            let v = points.map(|[x, y, w]| MovingVertex { open: [x, y, w], close: [x + moved, y, w] });
+            set_up_counted(0, v.each_ref(), cull, &shear, 0.1, [64.0; 2]).1
+        };
+        let (pinhole, lens) = (Shear::default(), Shear::new([9.0, -9.0], [3.0, -3.0]));
+        for cull in [Cull::Back, Cull::Front] {
+            assert_eq!(madds(open, 0.0, cull, pinhole), FACING_MADDS);
+            assert_eq!(madds(open, 0.0, cull, lens), 0, "the face depends on the lens position");
+            assert_eq!(madds(open, 1.0, cull, pinhole), difference_madds(true), "and on the time");
+            let behind = [[0.0, 0.0, -1.0], open[1], open[2]];
+            assert_eq!(madds(behind, 0.0, cull, pinhole), 0);
+        }
+        assert_eq!(madds(open, 0.0, Cull::None, pinhole), 0);
+        assert_eq!(madds(open, 1.0, Cull::None, lens), difference_madds(true));
+        assert_eq!(madds([open[0], open[0], open[2]], 1.0, Cull::Back, pinhole), 0, "dropped at once");
+        let near = open.map(|[x, y, _]| [x, y, 0.05]);
+        assert_eq!(madds(near, 1.0, Cull::Back, pinhole), difference_madds(true));
     }
 
     fn still(p: [f32; 3]) -> MovingVertex {

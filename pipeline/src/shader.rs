@@ -5,6 +5,7 @@ use std::ops::{Add, Mul, Sub};
 
 use glam::{DAffine3, DVec3, Mat4, Vec2, Vec3, Vec4};
 
+use crate::buffer::{Buffer, Word};
 use crate::surface::{Bound, MAX_TARGETS};
 use crate::tally::Costs;
 use crate::texture::Texture;
@@ -125,6 +126,25 @@ macro_rules! operands {
 }
 operands!(u32: 1, f32: 1, f64: 1, Vec2: 2, Vec3: 3, Vec4: 4, DVec3: 3);
 
+/// Addresses of lines that the lanes of a quad read.
+#[derive(Debug, Default)]
+pub(crate) struct Lines {
+    /// By fetches, in order.
+    fetched: Vec<u64>,
+    /// By loads, each with how many loads its lane made before.
+    loaded: Vec<(u32, u64)>,
+}
+
+impl Lines {
+    /// The lines as the texture cache sees them: those of fetches, then those of loads. The n-th loads of the lanes are one
+    /// access, which reads a line once.
+    pub fn accessed(mut self) -> impl Iterator<Item = u64> {
+        self.loaded.sort_unstable();
+        self.loaded.dedup();
+        self.fetched.into_iter().chain(self.loaded.into_iter().map(|(_, line)| line))
+    }
+}
+
 /// A lane of a warp. It computes what a shader asks for and counts the operations: a multiply-add, or anything simpler, of
 /// one component is one operation; so are a comparison, a reciprocal and a square root, as in the shader cores of the GPU
 /// files. Constants and the choice between programs that is the same for a whole draw are free.
@@ -136,8 +156,9 @@ pub struct Lane<'a> {
     /// What the draw binds, by slot.
     bound: &'a [Bound<'a>],
     fetches: Cell<u32>,
+    loads: Cell<u32>,
     /// Lines that were read, if they are of interest.
-    lines: Option<&'a RefCell<Vec<u64>>>,
+    lines: Option<&'a RefCell<Lines>>,
     /// Costs of kernels, if they are known from other lanes.
     costs: Option<&'a Costs>,
 }
@@ -154,13 +175,13 @@ impl<'a> Lane<'a> {
     }
 
     /// A lane that reads what a draw binds, and notes the lines it reads.
-    pub(crate) fn noting(bound: &'a [Bound<'a>], lines: &'a RefCell<Vec<u64>>) -> Self {
+    pub(crate) fn noting(bound: &'a [Bound<'a>], lines: &'a RefCell<Lines>) -> Self {
         Self { bound, lines: Some(lines), ..Self::default() }
     }
 
     fn note(&self, line: u64) {
         if let Some(lines) = self.lines {
-            lines.borrow_mut().push(line);
+            lines.borrow_mut().fetched.push(line);
         }
     }
 
@@ -180,6 +201,20 @@ impl<'a> Lane<'a> {
         let Some(bound) = self.bound.get(slot) else { return Vec4::ZERO };
         self.fetches.set(self.fetches.get() + 1);
         bound.load(pixel, sample, |line| self.note(line))
+    }
+
+    /// The value at `index` of a buffer that the draw binds. It is an operation, as a load of a group is, and a fetch of the texture
+    /// unit, through whose cache it reads: the n-th loads of the lanes of a quad read each line once. A buffer that is not bound
+    /// reads as zero, and so does an index beyond it, which helper lanes may have; no line is read then.
+    pub fn load<T: Word>(&self, buffer: Buffer<T>, index: u32) -> T {
+        self.count(1);
+        self.fetches.set(self.fetches.get() + 1);
+        let nth = self.loads.replace(self.loads.get() + 1);
+        let found = self.bound.iter().find_map(|bound| bound.word(buffer.number(), index));
+        if let (Some((_, line)), Some(lines)) = (found, self.lines) {
+            lines.borrow_mut().loaded.push((nth, line));
+        }
+        T::of(found.map_or(0, |(word, _)| word))
     }
 
     /// Fetches so far.

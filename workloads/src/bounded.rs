@@ -95,8 +95,8 @@ pub(crate) fn lens_part<'de, D: Deserializer<'de>>(from: D) -> Result<Option<[f3
     checked(from, fits, "a range within -1 and 1, the lower end first")
 }
 
-/// A range within the shutter.
-pub(crate) fn shutter_part<'de, D: Deserializer<'de>>(from: D) -> Result<Option<[f32; 2]>, D::Error> {
+/// A range within the shutter or a side of the image.
+pub(crate) fn part<'de, D: Deserializer<'de>>(from: D) -> Result<Option<[f32; 2]>, D::Error> {
     let fits = |[low, high]: &[f32; 2]| 0.0 <= *low && low < high && *high <= 1.0;
     checked(from, fits, "a range within 0 and 1, the lower end first")
 }

@@ -5,10 +5,10 @@ use std::ops::Deref;
 
 use activity::{Event, PacketCounts};
 
-use super::buffers::{Access, Atomic, Buffer, Buffers, Stored, Word};
 use super::shared::{SharedAccess, SharedMemory};
 use super::warp::{Kind, LaneAccess, LineTouch, account};
 use super::{ComputePass, ComputeSpec};
+use crate::buffer::{Access, Atomic, Buffer, Buffers, Stored, Word};
 use crate::shader::Lane;
 
 /// What a program may not do.
@@ -178,19 +178,22 @@ impl GroupLane<'_, '_> {
     pub fn load<T: Word>(&self, buffer: Buffer<T>, index: u32) -> T {
         self.lane.count(1);
         let mut state = self.state.borrow_mut();
-        let is_there = state.reach(self.index, (buffer.number, index), Kind::Load);
-        T::of(if is_there { state.buffers.word(buffer.number, index) } else { 0 })
+        let is_there = state.reach(self.index, (buffer.number(), index), Kind::Load);
+        T::of(if is_there { state.buffers.word(buffer.number(), index) } else { 0 })
     }
 
     /// Stores a value in a buffer. Of stores of several lanes to one word the last lane's stays.
     pub fn store<T: Word>(&self, buffer: Buffer<T>, index: u32, value: T) {
-        let stored = Stored { buffer: buffer.number, index, atomic: None, bits: value.bits() };
+        let stored = Stored { buffer: buffer.number(), index, atomic: None, bits: value.bits() };
         self.write(stored, Kind::Store);
     }
 
     /// Changes a word of a buffer.
     pub fn atomic(&self, buffer: Buffer<u32>, index: u32, atomic: Atomic, value: u32) {
-        self.write(Stored { buffer: buffer.number, index, atomic: Some(atomic), bits: value }, Kind::Atomic);
+        self.write(
+            Stored { buffer: buffer.number(), index, atomic: Some(atomic), bits: value },
+            Kind::Atomic,
+        );
     }
 
     fn write(&self, stored: Stored, kind: Kind) {

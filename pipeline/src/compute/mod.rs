@@ -13,7 +13,6 @@
 //! - For the same reason no atomic on a buffer returns the word before it.
 //! - Caches see the lines in the order of the groups.
 
-mod buffers;
 mod group;
 mod shared;
 mod view;
@@ -21,8 +20,7 @@ mod warp;
 
 use serde::{Deserialize, Serialize};
 
-pub use buffers::{Access, Atomic, Buffer, BufferBinding, Word};
-pub(crate) use buffers::{Buffers, Stored};
+use crate::buffer::BufferBinding;
 pub use group::{Fault, Group, GroupLane};
 pub(crate) use group::{GroupLog, run};
 pub use view::SurfaceView;

@@ -2,8 +2,8 @@
 
 use glam::Vec4;
 
-use super::buffers::{Buffer, BufferBinding};
 use super::group::GroupLane;
+use crate::buffer::{Buffer, BufferBinding};
 use crate::surface::{Format, Layout, SurfaceSpec};
 
 /// A surface that a pass stored, for programs of groups. Its words are where the pass wrote them, so that caches see the same

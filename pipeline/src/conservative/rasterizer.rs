@@ -151,26 +151,6 @@ impl Rasterizer {
         tests.descend(grid, [columns, rows], within, each);
         tests.work
     }
-
-    /// Intervals in which a triangle may touch `rect` within `region`, or `None` if it cannot. For
-    /// callers with their own tile hierarchy: intervals of a tile are valid for the tiles inside.
-    pub fn touch(&self, triangle: &MovingTriangle, rect: &Rect, region: &Region) -> Option<Touch> {
-        if self.in_doubles {
-            self.touch_in::<f64>(triangle, rect, region)
-        } else {
-            self.touch_in::<f32>(triangle, rect, region)
-        }
-    }
-
-    fn touch_in<C: Precision>(
-        &self,
-        triangle: &MovingTriangle,
-        rect: &Rect,
-        region: &Region,
-    ) -> Option<Touch> {
-        let mut tests = Tests::<C>::new(self, triangle, rect, region);
-        tests.touch(rect, region.outward(self.view.has_lens())).ok()
-    }
 }
 
 /// What is called with every tile. It is not a parameter of a type, so that the tests are compiled here, in one piece.

@@ -210,6 +210,8 @@ pub struct DepthTile {
     pub colours: Vec<Vec<Vec4>>,
     /// Farthest and nearest depths.
     pub boxes: DepthBoxes,
+    /// Whether the hardware knows them. Those of loaded depths have to be found first.
+    pub is_bounded: bool,
 }
 
 impl DepthTile {
@@ -224,6 +226,7 @@ impl DepthTile {
             stencil: Vec::new(),
             colours: Vec::new(),
             boxes: DepthBoxes::cleared(grid, samples, depth),
+            is_bounded: true,
         }
     }
 

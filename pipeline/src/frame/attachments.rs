@@ -5,6 +5,7 @@ use std::sync::Arc;
 use glam::Vec4;
 
 use super::error::{PassError, SurfaceProblem};
+use crate::buffer::BufferBinding;
 use crate::memory::{AddressSpace, MemoryRange};
 use crate::state::Clear;
 use crate::surface::{Layout, SurfaceSpec, Texels};
@@ -102,6 +103,8 @@ pub enum Binding<'a> {
     Surface(SurfaceId),
     /// All levels of a surface, each of which an earlier pass of the frame stored.
     Levels(SurfaceId),
+    /// A buffer, for [`crate::Lane::load`]. Draws read it alone.
+    Buffer(BufferBinding),
 }
 
 /// A level of a surface with its place and its contents.
@@ -158,7 +161,7 @@ impl Surfaces {
     /// What a binding reads: levels of a surface.
     pub fn read_by(&self, binding: &Binding<'_>) -> Vec<SurfaceId> {
         match *binding {
-            Binding::Texture(_) => Vec::new(),
+            Binding::Texture(_) | Binding::Buffer(_) => Vec::new(),
             Binding::Surface(id) => vec![id],
             Binding::Levels(id) => (0..self.levels(id).max(1)).map(|level| id.level(level)).collect(),
         }

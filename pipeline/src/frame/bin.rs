@@ -199,7 +199,7 @@ impl SamplesHere {
     }
 }
 
-/// One triangle in one tile, or tile tests without a packet of their own.
+/// One triangle in one tile, reading its loaded depths, or tile tests without a packet of their own.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Work {
     pub draw: u32,
@@ -212,6 +212,8 @@ pub(super) struct Work {
     pub hit: u32,
     /// Hits whose tests need no stored depth.
     pub unread: u32,
+    /// Loaded depths that are read to find their bounds.
+    pub bounded: u32,
     /// Depth and stencil words written.
     pub written: u32,
     /// Samples with a new colour.

@@ -13,9 +13,9 @@ use super::Gpu;
 use super::lanes::{LaneWork, Lanes};
 use crate::conservative::{Grid, MovingTriangle, Rasterizer, TileLoop, Touch};
 use crate::depth::{Numbers, Real};
-use crate::geometry::{Cull, Projection, Viewport};
+use crate::geometry::{Projection, Viewport};
 use crate::memory::MemoryRange;
-use crate::setup;
+use crate::setup::difference_madds;
 use crate::tally::{Costs, Kernel};
 
 /// Triangles of a packet of vertices.
@@ -88,7 +88,8 @@ pub struct TileIntervals<'a> {
 }
 
 /// Shader of conservative mode: runs for every triangle and tile that it may touch. Results have to depend on the
-/// arguments alone, and on what was stored before the draw.
+/// arguments alone, and on what was stored before the draw. Its lanes have no helpers: nothing is interpolated, so no lane needs the
+/// differences to its neighbours.
 pub trait TileShader: Sync {
     /// State that the triangles of a body share.
     type BodyState: Default;
@@ -324,7 +325,7 @@ fn vertices(gpu: &mut Gpu<'_>, draw: &ConservativeDraw<'_>, costs: &Costs) {
             counts[outcome] += 1;
             counts[Event::SetupMadds] += madds;
             if !is_culled {
-                counts[Event::SetupMadds] += setup::madds(primitive.triangle.is_moving(), Cull::None);
+                counts[Event::SetupMadds] += difference_madds(primitive.triangle.is_moving());
             }
         }
         let from = draw.vertices.address() + 3 * BATCH as u64 * number * bytes;

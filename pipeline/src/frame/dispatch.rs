@@ -6,10 +6,8 @@ use rayon::prelude::*;
 use super::attachments::SurfaceId;
 use super::error::PassError;
 use super::gpu::{Gpu, PassReport};
-use crate::compute::{
-    self, Access, Buffer, ComputeError, ComputePass, ComputeSpec, GroupLog, Stored, SurfaceView, Touched,
-    Word,
-};
+use crate::buffer::{Access, Buffer, BufferBinding, Stored, Word};
+use crate::compute::{self, ComputeError, ComputePass, ComputeSpec, GroupLog, SurfaceView, Touched};
 use crate::memory::MemorySystem;
 
 /// Groups that run before their packets are emitted.
@@ -39,11 +37,13 @@ impl Gpu<'_> {
     ///
     /// # Errors
     /// [`PassError::Compute`] if the GPU has no compute unit, if groups are too large for it, or if the program does
-    /// what it may not; [`PassError::Memory`] if the buffers of the frame are too large.
+    /// what it may not; [`PassError::Buffer`] if a buffer is of another frame; [`PassError::Memory`] if the buffers of the
+    /// frame are too large.
     pub fn dispatch(&mut self, pass: &ComputePass<'_>) -> Result<Counts, PassError> {
         let failed = |error| PassError::Compute { pass: pass.name.to_owned(), error };
         let spec = pass.check(self.spec().compute.as_ref()).map_err(failed)?;
         self.check_memory(pass.name)?;
+        self.check_buffers(pass.name, pass.bindings)?;
         let (name, draws, others) = (pass.name.to_owned(), vec![Counts::default()], Counts::default());
         self.start(PassReport { name, triangles: 0, draws, others });
         if pass.bindings.iter().any(|binding| self.conflicts(binding.region, binding.access == Access::Write))
@@ -62,6 +62,18 @@ impl Gpu<'_> {
             }
         }
         Ok(self.counts_of_pass())
+    }
+
+    /// Checks that the frame has the bound buffers.
+    pub(super) fn check_buffers<'b>(
+        &self,
+        pass: &str,
+        bindings: impl IntoIterator<Item = &'b BufferBinding>,
+    ) -> Result<(), PassError> {
+        let missing = bindings.into_iter().find(|binding| !self.buffers.has(binding));
+        let refused =
+            |binding: &BufferBinding| PassError::Buffer { pass: pass.to_owned(), number: binding.number() };
+        missing.map_or(Ok(()), |binding| Err(refused(binding)))
     }
 
     fn groups(

@@ -1,5 +1,7 @@
 //! Reasons why a pass cannot be drawn.
 
+use std::fmt;
+
 use crate::compute::ComputeError;
 use crate::memory::{AddressSpace, CacheError};
 use crate::surface::{Format, MAX_TARGETS};
@@ -50,6 +52,16 @@ pub enum PassError {
         /// What is wrong.
         error: ComputeError,
     },
+    /// A buffer is of another frame.
+    #[error(
+        "pass `{pass}`: the frame has no such buffer number {number}; use one that `Gpu::buffer` returned in this frame"
+    )]
+    Buffer {
+        /// The pass.
+        pass: String,
+        /// Number of the buffer.
+        number: u32,
+    },
     /// The surfaces of a frame are too large.
     #[error(
         "pass `{pass}`: the surfaces of the frame take {bytes} bytes, more than the {} that can be addressed; draw fewer pixels, \
@@ -71,8 +83,15 @@ pub enum SurfaceProblem {
     #[error("the frame has no such surface; use one that `Gpu::create_surface` returned in this frame")]
     Unknown,
     /// It is read and written.
-    #[error("it is read and written in the same pass; draw to another surface")]
-    Feedback,
+    #[error(
+        "it is read and written in the same pass: {reader} reads it, and {writer} writes it; draw to another surface"
+    )]
+    Feedback {
+        /// What reads it first.
+        reader: PassPart,
+        /// What writes it first.
+        writer: PassPart,
+    },
     /// Nothing was stored in it.
     #[error("it is read, but no earlier pass of the frame stored anything in it; store it, or clear it")]
     Unwritten,
@@ -112,4 +131,22 @@ pub enum SurfaceProblem {
         /// The format.
         format: Format,
     },
+}
+
+/// A part of a pass, in messages.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PassPart {
+    /// The draw of this number.
+    Draw(usize),
+    /// All of it: a resolve, or a target that no draw changes.
+    Whole,
+}
+
+impl fmt::Display for PassPart {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Draw(number) => write!(f, "draw {number}"),
+            Self::Whole => f.write_str("the pass as a whole"),
+        }
+    }
 }

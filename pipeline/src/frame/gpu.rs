@@ -12,7 +12,7 @@ use super::heat::{FrameHeat, HeatMap};
 use super::pass::{AddressMap, Draw, Pass, RasterPass, Resident, Target, resident};
 use super::replay::Replay;
 use super::{Finished, PipelineSpec, rasterize, resolve};
-use crate::compute::Buffers;
+use crate::buffer::Buffers;
 use crate::geometry::Viewport;
 use crate::memory::{AddressSpace, MemoryRange, MemorySystem};
 use crate::surface::{SurfaceSpec, Texels};
@@ -48,7 +48,7 @@ pub struct Gpu<'e> {
 struct Reads {
     /// Vertices of its draws.
     vertices: Vec<u64>,
-    /// Textures and surfaces.
+    /// Textures, surfaces and buffers.
     tiles: Vec<u64>,
 }
 
@@ -307,15 +307,17 @@ impl<'e> Gpu<'e> {
     /// Draws a pass.
     ///
     /// # Errors
-    /// [`PassError`] if a cache of the settings is invalid, if a surface cannot be used as it is, or if the surfaces of the
-    /// frame are too large.
+    /// [`PassError`] if a cache of the settings is invalid, if a surface or buffer cannot be used as it is, or if the surfaces of
+    /// the frame are too large.
     pub fn draw(&mut self, pass: &RasterPass<'_>) -> Result<Rendered, PassError> {
         let number = self.passes.len() as u32;
         let has_heat = self.heat.is_of(pass.settings.viewport);
         self.check_memory(pass.name)?;
         pass.check_queries()?;
         self.surfaces.check(pass)?;
-        let prepared = Pass::new(pass, (number, has_heat), &self.surfaces, &mut self.space);
+        self.check_buffers(pass.name, pass.buffers())?;
+        let stored = (&self.surfaces, &self.buffers);
+        let prepared = Pass::new(pass, (number, has_heat), stored, &mut self.space);
         self.check_memory(pass.name)?;
         self.passes.push(PassReport::new(pass));
         let reads = self.reads_of(&prepared.addresses, pass);
@@ -397,9 +399,10 @@ impl<'e> Gpu<'e> {
     fn reads_of(&self, at: &AddressMap, pass: &RasterPass<'_>) -> Reads {
         let surfaces =
             self.surfaces.read_in(pass).filter_map(|id| Some(self.surfaces.get(id)?.region.address()));
+        let buffers = pass.buffers().map(|binding| binding.region.address());
         Reads {
             vertices: at.vertices.iter().map(|buffer| buffer.address).collect(),
-            tiles: at.textures.iter().flatten().copied().chain(surfaces).collect(),
+            tiles: at.textures.iter().flatten().copied().chain(surfaces).chain(buffers).collect(),
         }
     }
 

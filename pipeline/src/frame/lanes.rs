@@ -1,5 +1,9 @@
 //! Lanes of a shader that runs on the tiles of conservative mode or of a full-screen pass. Everything a lane does is
 //! counted as it is done: operations, accesses to memory and tests of points.
+//!
+//! A full-screen pass is drawn as a triangle over the image, so its lanes run in quads of pixels, with helpers. Lanes of
+//! conservative mode have none: quads are there for the differences between neighbours, and a tile shader has intervals in place
+//! of interpolated values. Each of its lanes stands alone and may be in a warp with any others.
 
 use std::cell::RefCell;
 
@@ -47,6 +51,8 @@ impl Touch {
 pub struct Lanes {
     counts: RefCell<PacketCounts>,
     touches: RefCell<Vec<Touch>>,
+    /// Operations of each program that was run and not counted so far.
+    runs: RefCell<Vec<u32>>,
     costs: Costs,
 }
 
@@ -65,9 +71,24 @@ impl Lanes {
     pub fn run<T>(&self, program: impl FnOnce(&Lane) -> T) -> T {
         let lane = Lane::knowing(&self.costs);
         let result = program(&lane);
-        self.count(Event::PixelInvocations, 1);
-        self.count(Event::ShaderOps, lane.ops());
+        self.runs.borrow_mut().push(lane.ops());
         result
+    }
+
+    /// Operations of the programs since it was last asked, which are then not counted as those of single lanes.
+    pub(super) fn take_runs(&self) -> Vec<u32> {
+        self.runs.take()
+    }
+
+    /// Counts the lanes of a quad, by the operations of the programs that each of them ran. The n-th programs of the lanes run in
+    /// step, and each takes as long as the longest; a lane without an n-th program is a helper.
+    pub(super) fn count_quad(&self, lanes: [&[u32]; 4]) {
+        for nth in 0..lanes.iter().map(|runs| runs.len()).max().unwrap_or(0) {
+            let running = lanes.iter().filter_map(|runs| runs.get(nth));
+            self.count(Event::PixelInvocations, 4);
+            self.count(Event::HelperInvocations, 4 - running.clone().count() as u32);
+            self.count(Event::ShaderOps, 4 * running.max().copied().unwrap_or(0));
+        }
     }
 
     /// Fetches `bytes` at an address through the texture unit.
@@ -142,6 +163,9 @@ impl Lanes {
 
     /// What the lanes did since they were last asked.
     pub(super) fn finish(&self) -> LaneWork {
+        let runs = self.runs.take();
+        self.count(Event::PixelInvocations, runs.len() as u32);
+        self.count(Event::ShaderOps, runs.iter().sum());
         LaneWork { counts: self.counts.take(), touches: self.touches.take() }
     }
 }

@@ -34,7 +34,7 @@ use crate::setup::distribute;
 pub use attachments::{Attachment, Attachments, Binding, Load, Store, SurfaceId};
 use bin::{Bin, BinLog};
 pub use conservative_pass::{ConservativeDraw, ConservativePass, Primitive, TileIntervals, TileShader};
-pub use error::{PassError, SurfaceProblem};
+pub use error::{PassError, PassPart, SurfaceProblem};
 pub use gpu::{FrameReport, Gpu, PassReport, Rendered};
 pub use heat::{HeatMap, TileHeat};
 pub use lanes::Lanes;

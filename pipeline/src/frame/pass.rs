@@ -7,6 +7,7 @@ use glam::Vec4;
 
 use super::attachments::{Attachment, Attachments, Binding, Load, Store, Surfaces};
 use super::{Features, PassError, Settings, Shading};
+use crate::buffer::{BufferBinding, Buffers};
 use crate::depth::{BoxGrid, DepthBoxes, DepthTile};
 use crate::geometry::{Camera, Clip, Cull, Geometry, MovingVertex, Projection, Viewport};
 use crate::memory::{AddressSpace, LINE_BYTES, MemoryRange};
@@ -75,11 +76,12 @@ pub(super) struct Pass<'a> {
 }
 
 impl<'a> Pass<'a> {
-    /// Prepares pass `number` of a frame, which was checked, and gives its data addresses in `space`.
+    /// Prepares pass `number` of a frame, which was checked, and gives its data addresses in `space`. It reads surfaces and
+    /// buffers as they are.
     pub fn new(
         pass: &RasterPass<'a>,
         (number, heat): (u32, bool),
-        surfaces: &Surfaces,
+        (surfaces, buffers): (&Surfaces, &Buffers),
         space: &mut AddressSpace,
     ) -> Self {
         let RasterPass { camera, draws, settings, .. } = *pass;
@@ -106,7 +108,7 @@ impl<'a> Pass<'a> {
             settings,
             vertices,
             first_triangle,
-            bound: bound(draws, &addresses, surfaces, space),
+            bound: bound(draws, &addresses, (surfaces, buffers), space),
             addresses,
             programs: draws.iter().map(|draw| Program::of(draw.shader, colours.len())).collect(),
             origin: [Viewport::edge(0, viewport.width()), Viewport::edge(0, viewport.height())],
@@ -197,6 +199,7 @@ impl<'a> Pass<'a> {
             if self.depth.is_loaded() {
                 tile.depth = stored.iter().map(|value| value.x).collect();
                 tile.boxes = DepthBoxes::of(self.depth_grid(), samples, &tile.depth);
+                tile.is_bounded = false;
             }
             if format.has_stencil() {
                 tile.stencil = stored.iter().map(|value| value.y as u8).collect();
@@ -361,7 +364,7 @@ impl TextureAddresses {
 fn bound<'a>(
     draws: &[Draw<'a>],
     addresses: &AddressMap,
-    surfaces: &Surfaces,
+    (surfaces, buffers): (&Surfaces, &Buffers),
     space: &mut AddressSpace,
 ) -> Vec<Vec<Bound<'a>>> {
     let own = draws.iter().map(|draw| draw.shader.texture());
@@ -380,6 +383,7 @@ fn bound<'a>(
             let levels = surfaces.read_by(binding).into_iter().map(stored);
             Some(Bound::surface(levels.collect::<Option<_>>()?))
         }
+        Binding::Buffer(ref binding) => Some(Bound::buffer(buffers.bound(binding)?)),
     };
     draws.iter().map(|draw| draw.bindings.iter().filter_map(&mut bind).collect()).collect()
 }
@@ -617,6 +621,12 @@ impl<'a> RasterPass<'a> {
         };
         let refused = self.draws.iter().position(|draw| draw.query == Some(Query::Any) && stores(draw));
         refused.map_or(Ok(()), |draw| Err(PassError::QueryStores { pass: self.name.to_owned(), draw }))
+    }
+
+    /// Buffers that its draws bind.
+    pub(super) fn buffers(&self) -> impl Iterator<Item = &'a BufferBinding> + use<'a> {
+        let bindings = self.draws.iter().flat_map(|draw| draw.bindings);
+        bindings.filter_map(|binding| if let Binding::Buffer(buffer) = binding { Some(buffer) } else { None })
     }
 
     /// Triangles of all draws.

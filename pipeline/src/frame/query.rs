@@ -7,7 +7,7 @@ use super::{Draw, FrameReport, Gpu, PassError, Query, RasterPass};
 use crate::depth::{Bounder, DepthBound, Pyramid, interval_madds, set_up_madds};
 use crate::geometry::{Cull, Geometry, MovingVertex, Projection};
 use crate::memory::{LINE_BYTES, MemoryRange};
-use crate::setup::{SetupResult, Triangle, bounds, madds, set_up};
+use crate::setup::{SetupResult, Triangle, bounds, set_up_counted};
 use crate::shader::{Lane, Shader, ShadingPoint};
 use crate::state::{Compare, DepthState, DrawState};
 use crate::traversal::{Box5, TileRect, narrow_counted};
@@ -125,12 +125,13 @@ impl<'a> IntervalQueries<'a> {
         let half_px = self.pyramid.viewport().half_px();
         answer.hidden = (0..).zip(FACES).all(|(id, corners)| {
             let three = corners.map(|corner| &vertices[corner as usize]);
-            let SetupResult::Ready(triangle) = set_up(id, three, Cull::None, shear, near, half_px) else {
+            let (outcome, madds) = set_up_counted(id, three, Cull::None, shear, near, half_px);
+            answer.madds[0] += u64::from(madds);
+            let SetupResult::Ready(triangle) = outcome else {
                 // A triangle without area is invisible.
                 return true;
             };
             answer.triangles += 1;
-            answer.madds[0] += u64::from(madds(triangle.moving, Cull::None));
             answer.madds[2] += u64::from(set_up_madds(self.bound, triangle.moving));
             let bounder = Bounder::new(&triangle, shear, self.bound);
             self.triangle(&Side { triangle, bounder }, &mut answer)

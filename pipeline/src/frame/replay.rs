@@ -102,7 +102,8 @@ impl<'a> Replay<'a> {
         for work in &log.work {
             let quads = &log.quads[first_quad..work.quads_end as usize];
             first_quad = work.quads_end as usize;
-            if self.is_answered(work.draw as usize) {
+            // Bounds of loaded depths are for later draws, too.
+            if self.is_answered(work.draw as usize) && work.bounded == 0 {
                 continue;
             }
             self.passed[work.draw as usize] += u64::from(work.passed);
@@ -131,7 +132,7 @@ impl<'a> Replay<'a> {
         counts[Event::SamplesTested] = work.tested;
         counts[Event::SamplesHit] = work.hit;
         counts[Event::SampleMadds] = work.sample_madds;
-        counts[Event::DepthReads] = work.hit - work.unread;
+        counts[Event::DepthReads] = work.hit - work.unread + work.bounded;
         counts[Event::DepthReadsSkipped] = work.unread;
         counts[Event::DepthWrites] = work.written;
         self.colours(work, counts);

@@ -163,26 +163,38 @@ fn resolve_tile(
             group.iter().for_each(|&slot| add(slot as usize, pass.settings.background));
             continue;
         }
-        let (corners, moving) = pass.moving_corners(triangle);
-        let mut grid = Grid::new(pass, (&corners, moving), samples, origin);
-        let surface = ShadedTriangle::new(pass, triangle);
-        let lane = surface.lane();
-        scratch.shaded.clear();
-        for slot in group.iter().map(|&slot| slot as usize) {
-            let colour = match pass.shading {
-                Shading::PerSample => {
-                    let at = (own_pixel(samples, slot, origin, side), samples.in_pixel(slot, per_pixel));
-                    surface.shade_at(&lane, &SampleView::of_slot(&corners, samples, slot, at)).truncate()
-                }
-                Shading::Cached => {
-                    let cell = grid.cell(slot);
-                    *scratch.shaded.entry(cell).or_insert_with(|| surface.shade(&lane, cell).truncate())
-                }
-            };
-            add(slot, colour);
-        }
+        shade_group(pass, (triangle, group), (samples, origin), &mut scratch.shaded, &mut add);
     }
     means(pass, &sums, pixels)
+}
+
+/// Calls `add` with the colours of the samples in `slots` of the tile at `origin`, which see `triangle`.
+fn shade_group(
+    pass: &Pass<'_>,
+    (triangle, slots): (u32, &[u16]),
+    (samples, origin): (&TileSamples, [u32; 2]),
+    shaded: &mut ByCell<Vec3>,
+    add: &mut impl FnMut(usize, Vec3),
+) {
+    let (side, per_pixel) = (pass.settings.spec.tile_px, pass.settings.samples.per_pixel());
+    let (corners, moving) = pass.moving_corners(triangle);
+    let mut grid = Grid::new(pass, (&corners, moving), samples, origin);
+    let surface = ShadedTriangle::new(pass, triangle);
+    let lane = surface.lane();
+    shaded.clear();
+    for slot in slots.iter().map(|&slot| slot as usize) {
+        let colour = match pass.shading {
+            Shading::PerSample => {
+                let at = (own_pixel(samples, slot, origin, side), samples.in_pixel(slot, per_pixel));
+                surface.shade_at(&lane, &SampleView::of_slot(&corners, samples, slot, at)).truncate()
+            }
+            Shading::Cached => {
+                let cell = grid.cell(slot);
+                *shaded.entry(cell).or_insert_with(|| surface.shade(&lane, cell).truncate())
+            }
+        };
+        add(slot, colour);
+    }
 }
 
 /// Means of the samples of each pixel of each view.

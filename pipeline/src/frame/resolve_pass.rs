@@ -5,7 +5,7 @@ use glam::{Vec3, Vec4};
 
 use super::attachments::{Store, SurfaceId};
 use super::bin::tile_pixels;
-use super::error::{PassError, SurfaceProblem};
+use super::error::{PassError, PassPart, SurfaceProblem};
 use super::resolve::{SampleLine, TileResolve, mean_values, tile_lines};
 use super::{Gpu, Rendered};
 use crate::memory::LINE_BYTES;
@@ -62,7 +62,7 @@ impl Gpu<'_> {
         let size = |[width, height]: [u32; 2]| format!("{width} x {height}");
         let of_target = [target.viewport.width(), target.viewport.height()];
         if to == pass.from {
-            return refused(SurfaceProblem::Feedback);
+            return refused(SurfaceProblem::Feedback { reader: PassPart::Whole, writer: PassPart::Whole });
         }
         if !target.format.can_blend() {
             return refused(SurfaceProblem::Format(target.format, AVERAGED));

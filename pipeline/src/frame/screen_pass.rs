@@ -14,7 +14,8 @@ const PIXEL_BYTES: u64 = 4;
 
 impl Gpu<'_> {
     /// Draws an image in a pass of its own: `pixel` gives the colour of the pixel at a column and row. What its lanes do is
-    /// counted as they do it.
+    /// counted as they do it, in quads of 2 x 2 pixels: the n-th programs of their lanes run in step, and a lane without one, as
+    /// beyond an odd side of the image, is a helper. Accesses of helpers to memory are not counted.
     pub fn shade_pixels(
         &mut self,
         name: &str,
@@ -38,7 +39,8 @@ impl Gpu<'_> {
         }
     }
 
-    /// Runs a program for the pixel at every column and row, in the pass that was begun. Returns its values, row by row.
+    /// Runs a program for the pixel at every column and row, in the pass that was begun, in quads as [`Self::shade_pixels`]. Returns
+    /// its values, row by row.
     pub fn run_pixels<T: Clone + Default + Send>(
         &mut self,
         viewport: Viewport,
@@ -49,8 +51,14 @@ impl Gpu<'_> {
         let mut values = vec![T::default(); viewport.pixels()];
         for y0 in (0..viewport.height()).step_by(side as usize) {
             let run = |&x0: &u32| {
-                let lanes = Lanes::default();
-                let values: Vec<T> = pixels([x0, y0], side, viewport).map(|at| pixel(&lanes, at)).collect();
+                let (lanes, mut runs) = (Lanes::default(), TileRuns::new(side));
+                let run = |[x, y]: [u32; 2]| {
+                    let value = pixel(&lanes, [x, y]);
+                    runs.of([x - x0, y - y0]).extend(lanes.take_runs());
+                    value
+                };
+                let values: Vec<T> = pixels([x0, y0], side, viewport).map(run).collect();
+                runs.count(&lanes);
                 (values, lanes.finish())
             };
             let tiles: Vec<(Vec<T>, LaneWork)> = columns.par_iter().map(run).collect();
@@ -95,6 +103,29 @@ impl Gpu<'_> {
             triangle: triangle.unwrap_or(Packet::NONE),
             ..Packet::new(kind, self.last_pass())
         }
+    }
+}
+
+/// Operations of the programs of the pixels of a tile, by quad and lane.
+struct TileRuns {
+    /// Quads in a row.
+    across: u32,
+    quads: Vec<[Vec<u32>; 4]>,
+}
+
+impl TileRuns {
+    fn new(side: u32) -> Self {
+        let across = side.div_ceil(2);
+        Self { across, quads: vec![Default::default(); (across * across) as usize] }
+    }
+
+    /// Those of a pixel, by its place in the tile.
+    fn of(&mut self, [x, y]: [u32; 2]) -> &mut Vec<u32> {
+        &mut self.quads[(y / 2 * self.across + x / 2) as usize][(y % 2 * 2 + x % 2) as usize]
+    }
+
+    fn count(&self, lanes: &Lanes) {
+        self.quads.iter().for_each(|quad| lanes.count_quad(quad.each_ref().map(Vec::as_slice)));
     }
 }
 

@@ -11,7 +11,7 @@ use crate::geometry::{Clip, Viewport};
 use crate::sample_test::exact;
 use crate::sampling::{Sample, TileSamples};
 use crate::setup::Corner;
-use crate::shader::{Lane, Outputs, Program, Shader, ShadingPoint};
+use crate::shader::{Lane, Lines, Outputs, Program, Shader, ShadingPoint};
 use crate::shading;
 use crate::shading::{QuadAccess, REFERENCE_TIME, weights_at};
 use crate::texture::{Footprint, Sampler};
@@ -178,14 +178,14 @@ impl<'a> ShadedTriangle<'a> {
         if let Some(ops) = self.program().pixel_ops.filter(|_| !self.reads_bindings()) {
             return QuadWork { ops, ..QuadWork::default() };
         }
-        let lines = RefCell::default();
+        let lines = RefCell::<Lines>::default();
         let work = lanes.fold(QuadWork::default(), |work, own| {
             let lane = Lane::noting(&self.pass.bound[self.draw], &lines);
             run(own, &lane);
             let (ops, fetches) = (work.ops.max(lane.ops()), work.fetches + lane.fetches());
             QuadWork { ops, fetches, ..work }
         });
-        lines.into_inner().into_iter().for_each(line);
+        lines.into_inner().accessed().for_each(line);
         work
     }
 

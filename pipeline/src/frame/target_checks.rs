@@ -1,8 +1,8 @@
 //! Checks of the targets and bindings of a pass, before it is drawn.
 
 use super::attachments::{Attachments, SurfaceId, Surfaces};
-use super::error::{PassError, SurfaceProblem};
-use super::pass::{RasterPass, Target};
+use super::error::{PassError, PassPart, SurfaceProblem};
+use super::pass::{Draw, RasterPass, Target};
 use crate::geometry::Viewport;
 use crate::state::{Blend, Compare};
 use crate::surface::{MAX_TARGETS, SurfaceSpec};
@@ -43,12 +43,19 @@ impl Surfaces {
     }
 
     fn check_bindings(&self, pass: &RasterPass<'_>, targets: &Attachments) -> Result<(), PassError> {
-        for id in self.read_in(pass) {
-            let problem = match self.get(id) {
-                None => SurfaceProblem::Unknown,
-                Some(_) if targets.all().any(|(target, ..)| target == id) => SurfaceProblem::Feedback,
-                Some(state) if state.texels.is_none() => SurfaceProblem::Unwritten,
-                Some(_) => continue,
+        let bindings =
+            pass.draws.iter().enumerate().flat_map(|(draw, of)| of.bindings.iter().map(move |b| (draw, b)));
+        for (draw, id) in bindings.flat_map(|(draw, b)| self.read_by(b).into_iter().map(move |id| (draw, id)))
+        {
+            let target = targets.all().position(|(target, ..)| target == id);
+            let problem = match (self.get(id), target) {
+                (None, _) => SurfaceProblem::Unknown,
+                (Some(_), Some(target)) => SurfaceProblem::Feedback {
+                    reader: PassPart::Draw(draw),
+                    writer: writer(pass, targets, target),
+                },
+                (Some(state), None) if state.texels.is_none() => SurfaceProblem::Unwritten,
+                (Some(_), None) => continue,
             };
             return Err(self.refused(pass.name, id, problem));
         }
@@ -78,6 +85,15 @@ impl Surfaces {
         }
         Ok(())
     }
+}
+
+/// What writes first to the target of this number, the depths last.
+fn writer(pass: &RasterPass<'_>, targets: &Attachments, target: usize) -> PassPart {
+    let writes = |draw: &Draw<'_>| match targets.colours.get(target) {
+        Some(_) => draw.state.target(target).writes(),
+        None => draw.state.depth.write || draw.state.stencil.is_some(),
+    };
+    pass.draws.iter().position(writes).map_or(PassPart::Whole, PassPart::Draw)
 }
 
 /// Why a surface is no target of a pass, for depths or for colours.

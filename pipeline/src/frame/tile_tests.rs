@@ -17,6 +17,8 @@ pub(super) struct Subject<'a> {
     pub triangle: &'a Triangle,
     pub lines: Option<&'a LensLines>,
     pub shear: &'a Shear,
+    /// Range of image coordinates between clip planes, if there are any.
+    pub image: Option<[[f32; 2]; 2]>,
 }
 
 /// A tile with its amount of work.

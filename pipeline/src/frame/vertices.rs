@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::Features;
 use super::pass::{Draw, Pass, Staged};
 use super::replay::Replay;
-use crate::setup::{PixelRect, SetupResult, Triangle, bounds, is_flat, madds, set_up};
+use crate::setup::{PixelRect, SetupResult, Triangle, bounds, is_flat, set_up_counted};
 use crate::traversal::{self, Box5, LensLines, thresholds};
 
 /// A triangle for traversal, with the pixels it may touch.
@@ -17,6 +17,8 @@ pub(super) struct Ready {
     pub pixels: PixelRect,
     /// Part of lens and shutter between the clip planes; says whether the lens shears the triangle.
     pub within: Box5,
+    /// Range of image coordinates between the clip planes, if there are any.
+    pub image: Option<[[f32; 2]; 2]>,
     /// Bounds over lens and image, if enabled.
     pub lines: Option<LensLines>,
 }
@@ -57,11 +59,19 @@ pub(super) fn front_end(
         emit_packet(pass, vertices, &outcomes[at(first)..at(end)], replay, emit);
         first = end;
     }
-    outcomes.into_iter().filter_map(|(_, ready)| ready).collect()
+    outcomes.into_iter().filter_map(|outcome| outcome.ready).collect()
 }
 
-/// Result of a triangle as an event, and the triangle if it is kept.
-fn outcome(pass: &Pass<'_>, id: u32) -> (Event, Option<Ready>) {
+/// Result of set-up.
+struct Outcome {
+    event: Event,
+    /// Multiply-adds of set-up.
+    madds: u32,
+    /// The triangle if it is kept.
+    ready: Option<Ready>,
+}
+
+fn outcome(pass: &Pass<'_>, id: u32) -> Outcome {
     let viewport = pass.settings.viewport;
     let Draw { geometry, state, .. } = &pass.draws[pass.locate(id).0];
     let (Staged { vertices, lens }, near) = (pass.staged(id), pass.projection.near);
@@ -69,46 +79,52 @@ fn outcome(pass: &Pass<'_>, id: u32) -> (Event, Option<Ready>) {
     let shear = if lens { shear } else { shear.sharp() };
     let within = Box5::whole(lens).clipped(&pass.clip).clipped(&geometry.clip());
     if within.is_empty() {
-        return (Event::TrianglesOutside, None);
+        return Outcome { event: Event::TrianglesOutside, madds: 0, ready: None };
     }
-    match set_up(id, vertices.each_ref(), state.cull, &shear, near, viewport.half_px()) {
-        SetupResult::Degenerate => (Event::TrianglesDegenerate, None),
-        SetupResult::Outside => (Event::TrianglesOutside, None),
-        SetupResult::FaceCulled => (Event::TrianglesFaceCulled, None),
-        SetupResult::Ready(triangle) => {
-            let pixels = bounds(&triangle, &shear, viewport);
-            let wanted = lens && pass.settings.spec.features.lens_lines;
-            let lines = wanted.then(|| LensLines::new(&triangle, &shear, near));
-            if pixels.is_empty() {
-                (Event::TrianglesOutside, None)
-            } else {
-                (Event::TrianglesSetUp, Some(Ready { triangle, pixels, within, lines }))
-            }
-        }
+    let (result, madds) =
+        set_up_counted(id, vertices.each_ref(), state.cull, &shear, near, viewport.half_px());
+    let dropped = |event| Outcome { event, madds, ready: None };
+    let triangle = match result {
+        SetupResult::Degenerate => return dropped(Event::TrianglesDegenerate),
+        SetupResult::Outside => return dropped(Event::TrianglesOutside),
+        SetupResult::FaceCulled => return dropped(Event::TrianglesFaceCulled),
+        SetupResult::Ready(triangle) => triangle,
+    };
+    let mut pixels = bounds(&triangle, &shear, viewport);
+    let both =
+        |a: [[f32; 2]; 2], b: [[f32; 2]; 2]| [0, 1].map(|k| [a[k][0].max(b[k][0]), a[k][1].min(b[k][1])]);
+    let image = [pass.clip, geometry.clip()].iter().filter_map(|clip| clip.in_image(viewport)).reduce(both);
+    if let Some(image) = image {
+        pixels = pixels.intersection(&PixelRect::around(image, viewport));
     }
+    if pixels.is_empty() {
+        return dropped(Event::TrianglesOutside);
+    }
+    let wanted = lens && pass.settings.spec.features.lens_lines;
+    let lines = wanted.then(|| LensLines::new(&triangle, &shear, near));
+    let ready = Some(Ready { triangle, pixels, within, image, lines });
+    Outcome { event: Event::TrianglesSetUp, madds, ready }
 }
 
 fn emit_packet(
     pass: &Pass<'_>,
     mut packet: Packet,
-    outcomes: &[(Event, Option<Ready>)],
+    outcomes: &[Outcome],
     replay: &mut Replay<'_>,
     emit: &mut impl FnMut(&Packet, &[LineAccess]),
 ) {
     let draw = packet.draw as usize;
     let Features { still_px, in_focus_px, .. } = pass.settings.spec.features;
-    for ((event, ready), id) in outcomes.iter().zip(packet.triangle..) {
+    let thresholds = if still_px > 0.0 { thresholds::motion_madds(pass.lens) } else { 0 }
+        + if in_focus_px > 0.0 && pass.lens { thresholds::BLUR_MADDS } else { 0 };
+    for (Outcome { event, madds, ready }, id) in outcomes.iter().zip(packet.triangle..) {
         let corners = pass.images(id);
         packet.counts[*event] += 1;
         packet.counts[Event::TrianglesFlat] +=
             u32::from(*event != Event::TrianglesDegenerate && is_flat(corners));
         packet.counts[Event::TrianglesIn] += 1;
         packet.counts[Event::Indices] += 3;
-        packet.counts[Event::SetupMadds] +=
-            madds(corners.iter().any(|v| !v.is_still()), pass.draws[draw].state.cull);
-        packet.counts[Event::SetupMadds] += if still_px > 0.0 { thresholds::MOTION_MADDS } else { 0 }
-            + if in_focus_px > 0.0 { thresholds::BLUR_MADDS } else { 0 }
-            + ready.as_ref().map_or(0, Ready::line_madds);
+        packet.counts[Event::SetupMadds] += madds + thresholds + ready.as_ref().map_or(0, Ready::line_madds);
         replay.vertices(draw, id, &mut packet.counts);
     }
     replay.emit(&packet, emit);

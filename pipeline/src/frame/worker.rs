@@ -121,15 +121,20 @@ impl<'a, 'p> Worker<'a, 'p> {
         'a: 'r,
     {
         let shear = &self.pass.projection.shear;
-        Subject { triangle: &ready.triangle, lines: ready.lines.as_ref(), shear }
+        Subject { triangle: &ready.triangle, lines: ready.lines.as_ref(), shear, image: ready.image }
     }
 
     /// Record tile tests by tile, for heat maps. They are in the packet made since, or wait for the next one.
     fn note_tests(&mut self, (before, packets): (TileWork, usize), origin: [u32; 2]) {
         let index = self.tile_index(origin);
-        let after = self.log.work[packets..].last().map_or(self.tests, |work| work.tests);
+        let after = self.tested_since(packets).map_or(self.tests, |work| work.tests);
         self.log.tests.resize(self.bin.tiles.len(), TestsHere::default());
         self.log.tests[index].add(&before, &after);
+    }
+
+    /// The last packet of a triangle after a number of packets.
+    fn tested_since(&self, packets: usize) -> Option<&Work> {
+        self.log.work[packets..].last().filter(|work| work.bounded == 0)
     }
 
     /// Rasterize one triangle in one tile, and record the cost of tiles without hits for `auto`.
@@ -139,7 +144,7 @@ impl<'a, 'p> Worker<'a, 'p> {
         }
         let before = (self.tests.tile_madds(), self.log.work.len());
         self.tile(subject, remaining, origin);
-        let packet = self.log.work[before.1..].last();
+        let packet = self.tested_since(before.1);
         let madds = packet.map_or(self.tests.tile_madds(), |work| {
             work.tests.tile_madds() + work.screen_madds + work.sample_madds
         });
@@ -207,7 +212,8 @@ impl<'a, 'p> Worker<'a, 'p> {
             let before = [hits.screened, hits.tested];
             for within in remaining.boxes(within) {
                 let (triangle, screen, target) = (&triangle, screen.as_ref(), &mut target);
-                SampleTest { triangle, samples, within: &within, screen, near, target, hits: &mut *hits }
+                let (image, hits) = (subject.image, &mut *hits);
+                SampleTest { triangle, samples, within: &within, image, screen, near, target, hits }
                     .run(Width::widest());
             }
             if features.auto {
@@ -234,7 +240,8 @@ impl<'a, 'p> Worker<'a, 'p> {
         }
         if !hits.written.is_empty() {
             let lowered = tile.record_writes(&hits.written, state.may_raise_depth());
-            self.tests.z_min_updates += if self.pass.settings.spec.depth.z_min { lowered } else { 0 };
+            let counts = self.pass.settings.spec.depth.z_min && tile.is_bounded;
+            self.tests.z_min_updates += if counts { lowered } else { 0 };
         }
         self.request_quads((&triangle.corners, triangle.moving), index, origin);
     }
@@ -314,6 +321,7 @@ impl<'a, 'p> Worker<'a, 'p> {
             tested: hits.tested,
             hit: hits.hit,
             unread: if in_front { hits.hit } else { 0 },
+            bounded: 0,
             written: hits.written.len() as u32 + fragments.stencils,
             coloured: fragments.coloured,
             passed: fragments.passed,
@@ -535,9 +543,8 @@ impl Worker<'_, '_> {
         }
         self.prepare(triangle);
         let stored = &self.pass.depth;
-        if stored.is_loaded() && self.bin.tiles[index].is_none() {
-            let origin = self.bin.tile_origin(self.pass, index);
-            self.bin.tiles[index] = Some(self.pass.first_tile(&self.scratch.samples[index], origin));
+        if stored.is_loaded() {
+            self.bound_loaded(triangle.id, index);
         }
         let mut visible = Visible::in_cleared(within, state.depth.test, self.pass.clear.depth);
         if let (Some((_, bounder)), Some(tile)) = (&self.bounder, &mut self.bin.tiles[index]) {
@@ -561,6 +568,31 @@ impl Worker<'_, '_> {
         let time = |part: Box5| Box5 { t: if triangle.moving { part.t } else { within.t }, ..part };
         let front = skips_reads && visible.in_front && (triangle.moving || visible.behind == 0);
         visible.within.map(|part| (time(part), front))
+    }
+
+    /// Finds the bounds of the loaded depths of a tile when they are first needed: the unit of depth reads all of them, in a packet
+    /// before that of the triangle, and each is compared once, as when [`super::Gpu::gather_farthest_depths`] does it.
+    fn bound_loaded(&mut self, triangle: u32, index: usize) {
+        let (origin, pass) = (self.bin.tile_origin(self.pass, index), self.pass);
+        let samples = &self.scratch.samples[index];
+        let tile = self.bin.tiles[index].get_or_insert_with(|| pass.first_tile(samples, origin));
+        if std::mem::replace(&mut tile.is_bounded, true) {
+            return;
+        }
+        tile.update();
+        let (count, boxes) = (samples.len as u32, pass.depth_grid().len() as u32);
+        self.tests.z_tests += count;
+        self.tests.z_updates += if pass.settings.spec.features.z_max { boxes } else { 0 };
+        self.tests.z_min_updates += if pass.settings.spec.depth.z_min { boxes } else { 0 };
+        self.log.work.push(Work {
+            draw: self.draw,
+            triangle,
+            tile: Bin::tile_number(pass, origin),
+            bounded: count,
+            read_pixels: samples.pixel[..samples.len].iter().fold(0, |pixels, pixel| pixels | 1 << pixel),
+            quads_end: self.log.quads.len() as u32,
+            ..Work::default()
+        });
     }
 
     /// Whether stored depths are expected to save more than their test costs.

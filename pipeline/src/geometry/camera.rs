@@ -1,8 +1,10 @@
-//! Cameras: thin-lens or orthographic, moving while the shutter is open, with clip planes across lens and
-//! shutter.
+//! Cameras: thin-lens or orthographic, moving while the shutter is open, with clip planes across lens,
+//! shutter and image.
 
 use glam::{Affine3A, Vec2};
 use serde::Serialize;
+
+use crate::viewport::Viewport;
 
 /// A camera looking along `+z` of its own space, with `x` to the right and `y` up.
 ///
@@ -182,7 +184,7 @@ impl Camera {
     }
 }
 
-/// Part of lens and shutter in which something is drawn, as a half-open range on each axis. Samples on the
+/// Part of lens, shutter and image in which something is drawn, as a half-open range on each axis. Samples on the
 /// lower bound are included, samples on the upper bound are not, so adjacent parts share no sample.
 /// (Conservative mode includes both.) An infinite value is no bound; 1 would exclude samples on the rim of
 /// the lens.
@@ -191,6 +193,8 @@ pub struct Clip {
     u: [f32; 2],
     v: [f32; 2],
     t: [f32; 2],
+    /// Across and down the image, as shares of its sides.
+    image: [[f32; 2]; 2],
 }
 
 impl Default for Clip {
@@ -203,13 +207,31 @@ impl Clip {
     /// No clip planes.
     pub const NONE: Self = {
         let all = [f32::NEG_INFINITY, f32::INFINITY];
-        Self { u: all, v: all, t: all }
+        Self { u: all, v: all, t: all, image: [all; 2] }
     };
 
     /// Clip planes across `u`, `v` (lens, -1 to 1) and `t` (shutter, 0 to 1), or `None` if a bound is NaN.
     pub fn new(u: [f32; 2], v: [f32; 2], t: [f32; 2]) -> Option<Self> {
         let numbers = [u, v, t].iter().flatten().all(|bound| !bound.is_nan());
-        numbers.then_some(Self { u, v, t })
+        numbers.then_some(Self { u, v, t, ..Self::NONE })
+    }
+
+    /// The planes with others across `x` and `y`, shares of the image from its left (0 to 1) and from its top, or `None` if a
+    /// bound is NaN. Conservative mode has its scissors instead.
+    pub fn across_image(self, x: [f32; 2], y: [f32; 2]) -> Option<Self> {
+        let numbers = [x, y].iter().flatten().all(|bound| !bound.is_nan());
+        numbers.then_some(Self { image: [x, y], ..self })
+    }
+
+    /// First and last included image coordinate on each axis, in pixels from the centre of the image; `None` without planes there.
+    pub fn in_image(&self, viewport: Viewport) -> Option<[[f32; 2]; 2]> {
+        let sides = [viewport.width(), viewport.height()].map(f64::from);
+        let px = |share: f32, side: f64| ((f64::from(share) - 0.5) * side) as f32;
+        let of_axis = |axis: usize| {
+            let [lo, hi] = self.image[axis].map(|share| px(share, sides[axis]));
+            if hi == f32::INFINITY { [lo, hi] } else { [lo, hi.next_down()] }
+        };
+        (self.image != Self::NONE.image).then(|| [0, 1].map(of_axis))
     }
 
     /// First and last included value on each axis, for standard mode.
@@ -257,5 +279,16 @@ mod tests {
         }
         assert_eq!(Clip::new([0.0, f32::NAN], all, all), None);
         assert_eq!(Clip::new(all, all, [0.25, 0.5]).unwrap().closed()[2], [0.25, 0.5]);
+    }
+
+    #[test]
+    fn planes_across_the_image_are_in_pixels_from_its_centre() {
+        let viewport = Viewport::new(40, 30).unwrap();
+        let open = [f32::NEG_INFINITY, f32::INFINITY];
+        let of = |x, y| Clip::NONE.across_image(x, y).unwrap().in_image(viewport);
+        assert_eq!(of(open, open), None);
+        assert_eq!(of([0.25, 0.5], open), Some([[-10.0, 0.0_f32.next_down()], open]));
+        assert_eq!(of(open, [0.5, f32::INFINITY]), Some([open, [0.0, f32::INFINITY]]));
+        assert_eq!(Clip::NONE.across_image([0.0, f32::NAN], open), None);
     }
 }

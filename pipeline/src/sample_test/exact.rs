@@ -1,18 +1,11 @@
 //! Exact sample test for ties of rounded products, and the weights of a hit.
 
 use super::block::SampleRows;
-use crate::sampling::TileSamples;
 use crate::setup::Corner;
 use crate::simd::LANES;
 
 /// A vertex relative to a sample: `[x', y', w]`.
 pub type Seen = [f32; 3];
-
-/// Vertices of a triangle as seen by the sample in `slot` of a tile.
-pub fn seen_in_tile(corners: &[Corner; 3], samples: &TileSamples, slot: usize) -> [Seen; 3] {
-    let [slope, lens] = [&samples.slope, &samples.lens].map(|axes| [axes[0][slot], axes[1][slot]]);
-    corners.map(|corner| see(&corner, slope, lens, samples.t[slot]))
-}
 
 /// Vertices of a triangle as seen by one of sixteen samples.
 pub(crate) fn seen(corners: &[Corner; 3], rows: &SampleRows<'_>, lane: usize) -> [Seen; 3] {

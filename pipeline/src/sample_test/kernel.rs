@@ -98,7 +98,8 @@ pub fn test_run(
     target: &mut Target<'_>,
     hits: &mut Hits,
 ) {
-    SampleTest { triangle, samples, within, screen: None, near, target, hits }.run(Width::widest());
+    SampleTest { triangle, samples, within, image: None, screen: None, near, target, hits }
+        .run(Width::widest());
 }
 
 /// A triangle to be tested against the samples of a tile, and the memory of the result.
@@ -109,6 +110,8 @@ pub struct SampleTest<'a, 'b> {
     pub samples: &'a TileSamples,
     /// The part of lens and time that is tested.
     pub within: &'a Box5,
+    /// Range of image coordinates x and y that is tested, ends included, unless all are.
+    pub image: Option<[[f32; 2]; 2]>,
     /// If given, only samples that pass it are tested.
     pub screen: Option<&'a Screen>,
     /// Near depth.
@@ -149,6 +152,7 @@ impl<const MOTION: bool, const LENS: bool, const PARALLEL: bool> Kernel
         let mut base = run.start / LANES * LANES;
         while base < run.end {
             let mut active = lanes(&run, base) & if LENS { job.in_lens_box::<V>(base) } else { Mask::MAX };
+            active &= job.image.map_or(Mask::MAX, |image| job.in_image::<V>(image, base));
             if active != 0
                 && let Some(screen) = job.screen
             {
@@ -175,27 +179,34 @@ impl SampleTest<'_, '_> {
         within(u, self.within.u) & within(v, self.within.v)
     }
 
+    /// Lanes between the clip planes across the image.
+    #[inline(always)]
+    fn in_image<V: Lanes>(&self, [across, down]: [[f32; 2]; 2], base: usize) -> Mask {
+        let (x, y) = (V::load(block_of(&self.samples.x, base)), V::load(block_of(&self.samples.y, base)));
+        within(x, across) & within(y, down)
+    }
+
     /// Lanes that no pair of linearized edges places outside.
     #[inline(always)]
     fn pass<V: Lanes, const MOTION: bool, const LENS: bool>(&self, screen: &Screen, base: usize) -> Mask {
         let samples = self.samples;
-        let from = [&samples.x, &samples.y, &samples.u, &samples.v, &samples.t];
-        let mut offset = [V::splat(0.0); 5];
+        let from = [&samples.from_middle[0], &samples.from_middle[1], &samples.u, &samples.v, &samples.t];
+        let mut at = [V::splat(0.0); 5];
         for axis in 0..5 {
             if axis < 2 || (axis < 4 && LENS) || (axis == 4 && MOTION) {
-                offset[axis] = V::load(block_of(from[axis], base)) - V::splat(screen.middle[axis]);
+                at[axis] = V::load(block_of(from[axis], base));
             }
         }
         let (mut below, mut above) = (0, 0);
         for edge in 0..3 {
             let slope = &screen.gradient[edge];
-            let mut value = (V::splat(screen.value[edge]) + V::splat(slope[0]) * offset[0])
-                + V::splat(slope[1]) * offset[1];
+            let mut value =
+                (V::splat(screen.base[edge]) + V::splat(slope[0]) * at[0]) + V::splat(slope[1]) * at[1];
             if LENS {
-                value = value + (V::splat(slope[2]) * offset[2] + V::splat(slope[3]) * offset[3]);
+                value = (value + V::splat(slope[2]) * at[2]) + V::splat(slope[3]) * at[3];
             }
             if MOTION {
-                value = value + V::splat(slope[4]) * offset[4];
+                value = value + V::splat(slope[4]) * at[4];
             }
             below |= V::splat(-screen.margin[edge]).gt(value);
             above |= value.gt(V::splat(screen.margin[edge]));
@@ -355,6 +366,11 @@ pub const fn madds(moving: bool, lens: bool) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::{Shear, Viewport};
+    use crate::sampling::{LensShape, SampleTable};
+    use crate::setup::Corner;
+    use crate::traversal::counted::{Counted, count};
+    use crate::traversal::{Number, screen_madds};
 
     #[test]
     fn lanes_of_a_run() {
@@ -364,11 +380,131 @@ mod tests {
         assert_eq!(lanes(&(3..40), 32), 0x00FF);
     }
 
+    /// The first lane, whose operations count.
+    impl Lanes for Counted {
+        fn splat(value: f32) -> Self {
+            Self::from(value)
+        }
+        fn load(from: &[f32; LANES]) -> Self {
+            Self::from(from[0])
+        }
+        fn store(self, to: &mut [f32; LANES]) {
+            to[0] = self.value as f32;
+        }
+        fn min(self, other: Self) -> Self {
+            Number::min(self, other)
+        }
+        fn max(self, other: Self) -> Self {
+            Number::max(self, other)
+        }
+        fn abs(self) -> Self {
+            Number::abs(self)
+        }
+        fn times_plus(self, by: Self, plus: Self) -> Self {
+            self * by + plus
+        }
+        fn times_from(self, by: Self, from: Self) -> Self {
+            from - self * by
+        }
+        fn gt(self, other: Self) -> Mask {
+            Mask::from(self > other)
+        }
+        fn ge(self, other: Self) -> Mask {
+            Mask::from(self >= other)
+        }
+        fn equal(self, other: Self) -> Mask {
+            Mask::from(self == other)
+        }
+        fn put(mask: Mask, value: u32, to: &mut [u32; LANES]) {
+            to[0] = if mask & 1 == 1 { value } else { to[0] };
+        }
+        fn number(_: Mask, first: u32, to: &mut [u32; LANES]) {
+            to[0] = first;
+        }
+        fn or_else(self, mask: Mask, other: Self) -> Self {
+            if mask & 1 == 1 { self } else { other }
+        }
+        fn largest(self) -> f32 {
+            self.value as f32
+        }
+    }
+
+    /// A tile with samples in a view.
+    fn tile(shear: &Shear) -> TileSamples {
+        let table = SampleTable::low_discrepancy(1, 1, LensShape::Disk).unwrap();
+        let mut samples = TileSamples::default();
+        samples.fill(&table, Viewport::new(16, 16).unwrap(), shear, [8, 0], 8);
+        samples
+    }
+
+    fn test_cost<const MOTION: bool, const LENS: bool, const PARALLEL: bool>(shear: &Shear) -> u32 {
+        let (samples, corners) = (tile(shear), [Corner { open: [1.0, 2.0, 3.0], delta: [0.5; 3] }; 3]);
+        let see = || {
+            let rows = SampleRows::of(&samples, 0);
+            let view = View::<Counted, MOTION, LENS, PARALLEL>::load(&rows);
+            Crossing::new(&corners, &view).depth()
+        };
+        count(see).0
+    }
+
+    fn screen_cost<const MOTION: bool, const LENS: bool>() -> u32 {
+        let (samples, within) = (tile(&Shear::default()), Box5::whole(LENS));
+        let triangle = Triangle {
+            id: 0,
+            corners: [Corner::default(); 3],
+            moving: MOTION,
+            behind: false,
+            faces: [true; 2],
+            slack: [0.0; 2],
+        };
+        let screen = Screen {
+            value: [1.0; 3],
+            base: [1.0; 3],
+            gradient: [[1.0; 5]; 3],
+            margin: [0.0; 3],
+            extent: [1.0; 3],
+        };
+        let mut target = Target { depth: &mut [], triangle: &mut [] };
+        let (within, near, hits) = (&within, 0.1, &mut Hits::default());
+        let job = SampleTest {
+            triangle: &triangle,
+            samples: &samples,
+            within,
+            image: None,
+            screen: None,
+            near,
+            target: &mut target,
+            hits,
+        };
+        count(|| job.pass::<Counted, MOTION, LENS>(&screen, 0)).0
+    }
+
     #[test]
     fn the_cost_of_each_dimension_is_that_of_the_kernel() {
-        assert_eq!(
-            [madds(false, false), madds(true, false), madds(false, true), madds(true, true)],
-            [18, 27, 24, 33]
-        );
+        let shear = Shear::new([9.0, -9.0], [3.0, -3.0]);
+        let all = [(false, false), (true, false), (false, true), (true, true)];
+        let costs = all.map(|(moving, lens)| madds(moving, lens));
+        let counted = [
+            test_cost::<false, false, false>(&shear),
+            test_cost::<true, false, false>(&shear),
+            test_cost::<false, true, false>(&shear),
+            test_cost::<true, true, false>(&shear),
+        ];
+        assert_eq!(counted, costs);
+        let parallel = Shear { parallel: true, ..shear };
+        let counted = [
+            test_cost::<false, false, true>(&parallel),
+            test_cost::<true, false, true>(&parallel),
+            test_cost::<false, true, true>(&parallel),
+            test_cost::<true, true, true>(&parallel),
+        ];
+        assert_eq!(counted, costs);
+        let counted = [
+            screen_cost::<false, false>(),
+            screen_cost::<true, false>(),
+            screen_cost::<false, true>(),
+            screen_cost::<true, true>(),
+        ];
+        assert_eq!(counted, all.map(|(moving, lens)| screen_madds(moving, lens)));
     }
 }

@@ -13,6 +13,8 @@ pub struct TileSamples {
     pub x: Vec<f32>,
     /// Image position in pixels from the centre of the image, downwards.
     pub y: Vec<f32>,
+    /// Image position from the middle of the part of the tile in the image, as the sample table of the hardware keeps it.
+    pub from_middle: [Vec<f32>; 2],
     /// Lens position.
     pub u: Vec<f32>,
     /// Lens position.
@@ -55,12 +57,17 @@ impl TileSamples {
         self.sort_by_time(source, [px, py], inside, side_px);
         (self.len, self.parallel) = (self.order.len(), shear.parallel);
         self.resize(self.len.next_multiple_of(Self::LANES));
+        let sides = [viewport.width(), viewport.height()];
+        let middle = [(px, inside[0], sides[0]), (py, inside[1], sides[1])].map(|(first, count, side)| {
+            0.5 * (Viewport::edge(first, side) + Viewport::edge(first + count, side))
+        });
         for slot in 0..self.len {
             let index = u32::from(self.order[slot]);
             let (pixel, s) = (index / per_pixel, self.gathered[index as usize]);
             let x = Viewport::edge(px + pixel % side_px, viewport.width()) + s.x;
             let y = Viewport::edge(py + pixel / side_px, viewport.height()) + s.y;
             (self.x[slot], self.y[slot]) = (x, y);
+            [self.from_middle[0][slot], self.from_middle[1][slot]] = [x - middle[0], y - middle[1]];
             (self.u[slot], self.v[slot], self.t[slot]) = (s.u, s.v, s.t);
             for (axis, at, place) in [(0, x, s.u), (1, y, s.v)] {
                 [self.slope[axis][slot], self.lens[axis][slot]] = shear.ray(axis, at, place);
@@ -138,7 +145,9 @@ impl TileSamples {
     fn resize(&mut self, padded: usize) {
         let [lens_x, lens_y] = &mut self.lens;
         let [slope_x, slope_y] = &mut self.slope;
-        for array in [&mut self.x, &mut self.y, &mut self.u, &mut self.v, lens_x, lens_y, slope_x, slope_y] {
+        let [near_x, near_y] = &mut self.from_middle;
+        let of_image = [&mut self.x, &mut self.y, near_x, near_y, slope_x, slope_y];
+        for array in of_image.into_iter().chain([&mut self.u, &mut self.v, lens_x, lens_y]) {
             array.clear();
             array.resize(padded, 0.0);
         }

@@ -1,10 +1,11 @@
-//! Bindings of a draw as its shader reads them: textures, and surfaces of earlier passes.
+//! Bindings of a draw as its shader reads them: textures, and surfaces and buffers of earlier passes.
 
 use std::sync::Arc;
 
 use glam::{Vec2, Vec4};
 
 use super::{Layout, Texels};
+use crate::buffer::BoundBuffer;
 use crate::memory::LINE_BYTES;
 use crate::texture::{Footprint, Sampler, Wrap, taps};
 
@@ -17,6 +18,7 @@ enum Source<'a> {
     Texture(Sampler<'a>),
     /// Levels, from the finest.
     Surface(Vec<(Arc<Texels>, Layout)>),
+    Buffer(BoundBuffer),
 }
 
 impl<'a> Bound<'a> {
@@ -30,6 +32,17 @@ impl<'a> Bound<'a> {
         Self(Source::Surface(levels))
     }
 
+    /// Words of a buffer.
+    pub(crate) fn buffer(words: BoundBuffer) -> Self {
+        Self(Source::Buffer(words))
+    }
+
+    /// The word of buffer `number` at `index`, and the address of its line; `None` if another one is bound here, or beyond it.
+    pub(crate) fn word(&self, number: u32, index: u32) -> Option<(u32, u64)> {
+        let Source::Buffer(words) = &self.0 else { return None };
+        words.word(number, index).map(|(word, address)| (word, address / LINE_BYTES * LINE_BYTES))
+    }
+
     /// Filtered texel at `uv`, and the number of bilinear fetches. `line` gets every line that is read.
     pub(crate) fn fetch(&self, uv: Vec2, lod: f32, mut line: impl FnMut(u64)) -> (Vec4, u32) {
         match &self.0 {
@@ -39,10 +52,11 @@ impl<'a> Bound<'a> {
                 (sampler.sample(uv, &footprint), Sampler::fetches(&footprint))
             }
             Source::Surface(levels) => trilinear(levels, uv, lod, &mut line),
+            Source::Buffer(_) => (Vec4::ZERO, 0),
         }
     }
 
-    /// Unfiltered sample of a pixel; zero outside of a surface and for textures.
+    /// Unfiltered sample of a pixel; zero outside of a surface and for others.
     pub(crate) fn load(&self, pixel: [i32; 2], sample: u32, mut line: impl FnMut(u64)) -> Vec4 {
         let Source::Surface(levels) = &self.0 else { return Vec4::ZERO };
         let Some((texels, layout)) = levels.first() else { return Vec4::ZERO };

@@ -53,7 +53,7 @@ pub const fn edge_bound_madds(moving: bool, lens: bool) -> u32 {
 
 /// Linearizing the edges over a box; a part of its time costs more than the whole.
 pub const fn screen_setup_madds(moving: bool, lens: bool, whole: bool) -> u32 {
-    by(moving, lens, [8, 83, 24, 153]) + if whole { 0 } else { by(moving, lens, [0, 132, 0, 228]) }
+    by(moving, lens, [8, 86, 30, 162]) + if whole { 0 } else { by(moving, lens, [0, 132, 0, 228]) }
 }
 
 #[cfg(test)]

@@ -30,7 +30,9 @@ pub use edges::{EdgeBounds, Edges};
 pub use facing::Facing;
 pub use lens_lines::LensLines;
 pub use lens_spans::{LensSpan, LensSpans};
-pub use number::{Coordinate, Number, Pieces, Quadratic};
+#[cfg(test)]
+pub(crate) use number::counted;
+pub use number::{Coordinate, Number, Pieces, Quadratic, Scalar};
 pub use region::{Box5, Faces, Piece, TileRect, TimePieces, View};
 pub use screen::{SCREEN_GAIN_MADDS, Screen, screen_madds};
 pub use side_planes::{narrow, narrow_by_sides, narrow_counted, narrow_near};

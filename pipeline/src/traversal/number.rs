@@ -80,19 +80,34 @@ macro_rules! coordinate {
 coordinate!(f32);
 coordinate!(f64);
 
-/// Number type of the kernels of the tile tests. A generic kernel can be run with counting numbers to measure
-/// its cost.
-pub trait Number:
+/// Numbers with the four operations: those of kernels that are run with counting numbers to measure their cost.
+pub trait Scalar:
     Copy
     + PartialOrd
     + From<f32>
-    + Into<f64>
     + Add<Output = Self>
     + Sub<Output = Self>
     + Mul<Output = Self>
     + Div<Output = Self>
     + Neg<Output = Self>
 {
+}
+
+impl<N> Scalar for N where
+    N: Copy
+        + PartialOrd
+        + From<f32>
+        + Add<Output = N>
+        + Sub<Output = N>
+        + Mul<Output = N>
+        + Div<Output = N>
+        + Neg<Output = N>
+{
+}
+
+/// Number type of the kernels of the tile tests. A generic kernel can be run with counting numbers to measure
+/// its cost.
+pub trait Number: Scalar + Into<f64> {
     /// Magnitude.
     fn abs(self) -> Self;
     /// Square root.

@@ -2,17 +2,18 @@
 //! whose hyperplanes these are; the remainder bound is new here).
 
 use super::edges::{Edge, Edges};
-use super::number::{Number, Quadratic};
+use super::number::{Number, Quadratic, Scalar};
 use super::region::{Faces, View};
 
 /// Linear edges in the arithmetic of the sample test. A sample is outside if one edge is below `-margin` and
 /// another above `margin`.
 #[derive(Clone, Copy, Debug)]
 pub struct Screen {
-    /// Middle of the box: X, Y, u, v, t.
-    pub middle: [f32; 5],
-    /// Value of each edge in the middle.
+    /// Value of each edge in the middle of the box.
     pub value: [f32; 3],
+    /// Value of each edge in the middle of the tile, extrapolated to the middle of the lens and the start of the shutter, from which
+    /// positions of samples are.
+    pub base: [f32; 3],
     /// Slope of each edge along X, Y, u, v, t.
     pub gradient: [[f32; 5]; 3],
     /// Error bound of the linear value of each edge.
@@ -21,27 +22,39 @@ pub struct Screen {
     pub extent: [f32; 3],
 }
 
-/// Multiply-adds of [`Screen::gain`]: for each edge a reciprocal, two positions and two products; the product
-/// of both.
-pub const SCREEN_GAIN_MADDS: u32 = 3 * 5 + 1;
+/// Multiply-adds of [`Screen::gain`].
+pub const SCREEN_GAIN_MADDS: u32 = 28;
 
 impl Screen {
     /// Screen for single samples of the box of `edges` at times `t`, within those of the box, if only `faces`
     /// can be visible.
     pub fn new<N: Number>(edges: &Edges<N>, t: [f32; 2], faces: Faces) -> Self {
         let (view, skew) = (&edges.view, edges.skew());
-        let [x, y, u, v] = view.middle;
-        let middle = [x, y, u, v, if view.moving { 0.5 * (t[0] + t[1]) } else { 0.0 }];
+        let ([.., u, v], middle_t) = (view.middle, 0.5 * (t[0] + t[1]));
+        let middle = [(2, u, view.lens), (3, v, view.lens), (4, middle_t, view.moving)];
         let part = (view.moving && t != view.t).then(|| t.map(|t| view.phase(t)));
         let half_t = (N::from(t[1]) - N::from(t[0])) * N::from(0.5);
         let linear = edges.edges.map(|edge| edge.linear(view, part, half_t, skew));
-        let mut screen =
-            Self { middle, value: [0.0; 3], gradient: [[0.0; 5]; 3], margin: [0.0; 3], extent: [0.0; 3] };
+        let mut screen = Self {
+            value: [0.0; 3],
+            base: [0.0; 3],
+            gradient: [[0.0; 5]; 3],
+            margin: [0.0; 3],
+            extent: [0.0; 3],
+        };
         for (k, linear) in linear.iter().enumerate() {
+            let away = middle
+                .iter()
+                .filter(|(.., is_used)| *is_used)
+                .map(|(axis, at, _)| (linear.slopes[*axis], N::of(*at)));
+            let base = away.clone().fold(linear.value, |base, (slope, at)| base - slope * at);
+            let reach: f64 = away.map(|(slope, at)| (slope.into() * at.into()).abs()).sum();
             // The middle of the times is rounded; the resulting shift goes into the margin.
-            let off = Into::<f64>::into(linear.slopes[4]).abs() * f64::from(f32::EPSILON * middle[4].abs());
-            let [value, margin] = one_sided(linear, off, faces);
-            (screen.value[k], screen.margin[k]) = (value, margin);
+            let off = Into::<f64>::into(linear.slopes[4]).abs() * f64::from(f32::EPSILON * middle_t.abs());
+            let [shift, margin] = one_sided(linear, [off, reach], faces);
+            let [value, base] = [linear.value, base].map(|at| (Into::<f64>::into(at) + shift) as f32);
+            (screen.value[k], screen.base[k], screen.margin[k]) =
+                (value, base, margin as f32 + margin.abs() as f32 * 1e-6);
             screen.extent[k] = Into::<f64>::into(linear.extent) as f32;
             screen.gradient[k] = linear.slopes.map(|slope| Into::<f64>::into(slope) as f32);
         }
@@ -51,15 +64,30 @@ impl Screen {
     /// Expected fraction of samples rejected, for edges distributed evenly over their extents and independent
     /// of each other.
     pub fn gain(&self) -> f32 {
-        let mut kept = [1.0_f32; 2];
-        for k in 0..3 {
-            let per = 0.5 / self.extent[k].max(f32::MIN_POSITIVE);
-            let [below, above] = [-self.value[k], self.value[k]]
-                .map(|value| ((value - self.margin[k] + self.extent[k]) * per).clamp(0.0, 1.0));
-            (kept[0], kept[1]) = (kept[0] * (1.0 - below), kept[1] * (1.0 - above));
-        }
-        (1.0 - kept[0]) * (1.0 - kept[1])
+        gain(self.value, self.margin, self.extent.map(|extent| extent.max(f32::MIN_POSITIVE)))
     }
+}
+
+/// [`Screen::gain`] of edges with positive extents.
+fn gain<N: Scalar>(value: [N; 3], margin: [N; 3], extent: [N; 3]) -> N {
+    let [zero, one] = [0.0, 1.0].map(N::from);
+    let share = |part: N| {
+        if part < zero {
+            zero
+        } else if part > one {
+            one
+        } else {
+            part
+        }
+    };
+    let mut kept = [one; 2];
+    for k in 0..3 {
+        let per = N::from(0.5) / extent[k];
+        let [below, above] =
+            [-value[k], value[k]].map(|value| share(one - (value - margin[k] + extent[k]) * per));
+        kept = [kept[0] * below, kept[1] * above];
+    }
+    (one - kept[0]) * (one - kept[1])
 }
 
 /// `value + slopes . d` over a box, within `remainder` of the result of the sample test.
@@ -72,29 +100,30 @@ pub(super) struct Linear<N> {
     pub extent: N,
 }
 
-/// Multiply-adds of screening one sample: three edges, one per dimension in use.
+/// Multiply-adds of screening one sample: three edges, one per dimension in use. The sample table has positions from the middle of
+/// the tile.
 pub const fn screen_madds(moving: bool, lens: bool) -> u32 {
     3 * (2 + moving as u32 + 2 * lens as u32)
 }
 
-/// Value of an edge and its margin. If only one face can be visible, one edge on the wrong side suffices. The
-/// threshold is then shifted so far that the other side always passes.
-fn one_sided<N: Number>(linear: &Linear<N>, off: f64, faces: Faces) -> [f32; 2] {
+/// Shift of the values of an edge, and its margin. If only one face can be visible, one edge on the wrong side suffices. The
+/// threshold is then shifted so far that the other side always passes. `off` is an error of the values, and `reach` how far the edge
+/// changes from the box to where positions are from.
+fn one_sided<N: Number>(linear: &Linear<N>, [off, reach]: [f64; 2], faces: Faces) -> [f64; 2] {
     // The linear value is rounded a dozen times, each by at most 2^-24 of the sum of magnitudes.
     const ROUNDING: f64 = 1.0 / 1_048_576.0;
     let [value, extent, remainder]: [f64; 3] =
         [linear.value, linear.extent, linear.remainder].map(Into::into);
     let tallest = 1.001 * (value.abs() + extent);
     let both = faces[0] == faces[1];
-    let margin = remainder + off + ROUNDING * if both { tallest } else { 4.0 * (tallest + remainder) };
-    let (value, margin) = if both {
-        (value, margin)
-    } else {
-        let beyond = 2.0 * (tallest + margin);
-        let shift = 0.5 * (beyond + margin);
-        (if faces[0] { value + shift } else { value - shift }, 0.5 * (margin - beyond))
-    };
-    [value as f32, margin as f32 + margin.abs() as f32 * 1e-6]
+    let rounded = if both { tallest } else { 4.0 * (tallest + remainder) } + 4.0 * reach;
+    let margin = remainder + off + ROUNDING * rounded;
+    if both {
+        return [0.0, margin];
+    }
+    let beyond = 2.0 * (tallest + margin);
+    let shift = 0.5 * (beyond + margin);
+    [if faces[0] { shift } else { -shift }, 0.5 * (margin - beyond)]
 }
 
 impl<N: Number> Edge<N> {
@@ -139,8 +168,19 @@ impl<N: Number> Edge<N> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::number::counted::{Counted, count};
     use super::super::testing::{Uniform, cases};
     use super::super::{Edges, Screen, View};
+    use super::{SCREEN_GAIN_MADDS, gain};
+
+    #[test]
+    fn the_cost_of_a_gain_is_that_of_its_kernel() {
+        let part = |value: f32| [value; 3].map(Counted::from);
+        for value in [-9.0, -0.5, 0.0, 0.25, 9.0] {
+            let (madds, _) = count(|| gain(part(value), part(0.1), part(1.0)));
+            assert_eq!(madds, SCREEN_GAIN_MADDS, "{value}");
+        }
+    }
 
     #[test]
     fn edges_stay_within_the_margin_and_one_sided_screens_say_the_same() {
@@ -155,6 +195,8 @@ mod tests {
             };
             for (kind, faces) in [[true, true], [true, false], [false, true]].into_iter().enumerate() {
                 let screen = Screen::new(&edges, part, faces);
+                let [x, y] = [case.tile.x, case.tile.y].map(|[lo, hi]| 0.5 * (lo + hi));
+                let origin = [x, y, 0.0, 0.0, 0.0].map(f64::from);
                 for _ in 0..30 {
                     let mut place = case.position(&mut r);
                     place[4] = f64::from(r.often_an_end(part));
@@ -164,11 +206,11 @@ mod tests {
                         .map(|k| {
                             let linear: f64 = (0..5)
                                 .map(|axis| {
-                                    let offset = place[axis] - f64::from(screen.middle[axis]);
+                                    let offset = place[axis] - origin[axis];
                                     f64::from(screen.gradient[k][axis]) * offset
                                 })
                                 .sum();
-                            let value = f64::from(screen.value[k]) + linear;
+                            let value = f64::from(screen.base[k]) + linear;
                             let margin = f64::from(screen.margin[k]);
                             (value < -margin, value > margin)
                         })

@@ -6,35 +6,24 @@
 //! w - s`, also monotone. The image of a triangle in front of the camera is the hull of the images of its
 //! vertices, so no point of its outline moves farther than they do.
 
+use super::number::Number;
 use crate::geometry::{MovingVertex, Shear};
 
-/// Multiply-adds of [`motion_px`]: two quotients for three positions of each vertex, its middle, and two
-/// distances.
-pub const MOTION_MADDS: u32 = 3 * (3 * 2 + 3 + 2 * 4);
+/// Multiply-adds of [`motion_px`], through a pinhole or a lens.
+pub const fn motion_madds(lens: bool) -> u32 {
+    3 * if lens { 42 } else { 22 }
+}
 
-/// Multiply-adds of [`blur_px`]: a quotient and a difference for each axis, vertex and end.
+/// Multiply-adds of [`blur_px`].
 pub const BLUR_MADDS: u32 = 3 * 2 * 2 * 2;
 
 /// Largest distance in pixels of a vertex from its mid-shutter image, through a pinhole or from anywhere on
 /// the lens. Infinite if a vertex is not in front of the camera.
 pub fn motion_px(vertices: [&MovingVertex; 3], shear: &Shear) -> f64 {
-    let weight = |depth: f64| if shear.parallel { 1.0 } else { depth };
     let one = |vertex: &MovingVertex| {
-        let (open, close) = (vertex.open.map(f64::from), vertex.close.map(f64::from));
-        let middle = [0, 1, 2].map(|axis| 0.5 * (open[axis] + close[axis]));
-        let away = |end: [f64; 3]| {
-            let [x, y] = [0, 1].map(|axis| {
-                let circles = [end, middle].map(|p| shear.circle(axis, p[2]));
-                let images = [end, middle].map(|p| p[axis] / weight(p[2]));
-                (images[0] - images[1]).abs() + (circles[0] - circles[1]).abs()
-            });
-            x.hypot(y)
-        };
-        if weight(open[2]) > 0.0 && weight(close[2]) > 0.0 {
-            away(open).max(away(close))
-        } else {
-            f64::INFINITY
-        }
+        let ends = [vertex.open, vertex.close];
+        let is_in_front = ends.iter().all(|end| shear.weight(end[2]) > 0.0);
+        if is_in_front { distance(ends.map(|end| end.map(f64::from)), shear) } else { f64::INFINITY }
     };
     vertices.map(one).into_iter().fold(0.0, f64::max)
 }
@@ -42,18 +31,38 @@ pub fn motion_px(vertices: [&MovingVertex; 3], shear: &Shear) -> f64 {
 /// Largest radius in pixels of the circle of confusion of a vertex at either end of the shutter. Infinite if
 /// one is not in front of the camera.
 pub fn blur_px(vertices: [&MovingVertex; 3], shear: &Shear) -> f64 {
-    let radius = |w: f64, axis: usize| shear.circle(axis, w).abs();
-    vertices
-        .into_iter()
-        .flat_map(|vertex| [vertex.open[2], vertex.close[2]])
-        .map(|w| {
-            if shear.weight(w) > 0.0 {
-                radius(f64::from(w), 0).max(radius(f64::from(w), 1))
-            } else {
-                f64::INFINITY
-            }
-        })
-        .fold(0.0, f64::max)
+    let ends = vertices.into_iter().flat_map(|vertex| [vertex.open[2], vertex.close[2]]);
+    let radius = |w: f32| if shear.weight(w) > 0.0 { radius(f64::from(w), shear) } else { f64::INFINITY };
+    ends.map(radius).fold(0.0, f64::max)
+}
+
+/// Largest distance of a vertex in front of the camera, given by its ends, from its image in the middle.
+fn distance<N: Number>([open, close]: [[N; 3]; 2], shear: &Shear) -> N {
+    let middle = [0, 1, 2].map(|axis| (open[axis] + close[axis]) * N::from(0.5));
+    let image = |p: [N; 3]| [0, 1].map(|axis| if shear.parallel { p[axis] } else { p[axis] / p[2] });
+    let circles = |p: [N; 3]| [0, 1].map(|axis| circle(axis, p[2], shear));
+    let (has_lens, images) = (!shear.is_none(), [open, middle, close].map(image));
+    let circles = has_lens.then(|| [open, middle, close].map(circles));
+    let away = |end: usize| {
+        let [x, y] = [0, 1].map(|axis| {
+            let moved = (images[end][axis] - images[1][axis]).abs();
+            let blurred = circles.map(|circles| (circles[end][axis] - circles[1][axis]).abs());
+            blurred.map_or(moved, |blurred| moved + blurred)
+        });
+        (x * x + y * y).sqrt()
+    };
+    away(0).max(away(2))
+}
+
+/// Larger radius of the circle of confusion at a depth in front of the camera.
+fn radius<N: Number>(depth: N, shear: &Shear) -> N {
+    circle(0, depth, shear).abs().max(circle(1, depth, shear).abs())
+}
+
+/// [`Shear::circle`] in any numbers.
+fn circle<N: Number>(axis: usize, depth: N, shear: &Shear) -> N {
+    let [s, a] = [shear.s, shear.a].map(|of| N::from(of[axis]));
+    if shear.parallel { a * depth - s } else { a - s / depth }
 }
 
 /// The vertex at its mid-shutter position, still.
@@ -64,8 +73,25 @@ pub fn at_rest(vertex: &MovingVertex) -> MovingVertex {
 
 #[cfg(test)]
 mod tests {
+    use super::super::number::counted::{Counted, count};
     use super::super::testing::{Uniform, cases};
     use super::*;
+
+    #[test]
+    fn the_costs_are_those_of_the_kernels() {
+        let ends = [[-50.0, 20.0, 3.0], [60.0, 10.0, 5.0]].map(|end| end.map(Counted::from));
+        for (s, a) in [([0.0; 2], [0.0; 2]), ([90.0, -90.0], [15.0, -15.0])] {
+            let shear = Shear::new(s, a);
+            let parallel = Shear { parallel: true, ..shear };
+            let motion = |shear: &Shear| 3 * count(|| distance(ends, shear)).0;
+            let cost = motion_madds(!shear.is_none());
+            assert_eq!(motion(&shear), cost);
+            assert!(motion(&parallel) < cost, "one unit serves both views");
+            let blur = |shear: &Shear| 3 * 2 * count(|| radius(ends[0][2], shear)).0;
+            assert_eq!(blur(&shear), BLUR_MADDS);
+            assert!(blur(&parallel) < BLUR_MADDS);
+        }
+    }
 
     fn vertices(case: &super::super::testing::Case) -> [MovingVertex; 3] {
         case.triangle.corners.map(|corner| MovingVertex {

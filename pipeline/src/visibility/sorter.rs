@@ -82,6 +82,7 @@ impl Sorter<'_> {
         samples: &mut Vec<SampleEntry>,
     ) {
         let (viewport, [width, height]) = (self.viewport, self.plan.block_px);
+        let image = self.clip.in_image(viewport);
         samples.clear();
         for (row, column) in (0..height).flat_map(|row| (0..width).map(move |column| (row, column))) {
             let [bx, by] = [first[0] + column, first[1] + row];
@@ -91,22 +92,24 @@ impl Sorter<'_> {
             }
             self.source.pixel_into(px, py, pixel);
             let sample_index = (by * self.plan.bin_px + bx) * pixel.len() as u32;
-            let drawn = pixel.iter().zip(sample_index..).filter(|(sample, _)| self.is_drawn(sample));
-            samples.extend(drawn.map(|(s, sample_index)| SampleEntry {
+            let entries = pixel.iter().zip(sample_index..).map(|(s, sample_index)| SampleEntry {
                 x: Viewport::edge(px, viewport.width()) + s.x,
                 y: Viewport::edge(py, viewport.height()) + s.y,
                 u: s.u,
                 v: s.v,
                 t: s.t,
                 sample_index,
-            }));
+            });
+            samples.extend(entries.filter(|entry| self.is_drawn(entry, image)));
         }
     }
 
-    /// Whether a sample is between the clip planes.
-    fn is_drawn(&self, sample: &Sample) -> bool {
+    /// Whether a sample is between the clip planes, with a range of image coordinates.
+    fn is_drawn(&self, sample: &SampleEntry, image: Option<[[f32; 2]; 2]>) -> bool {
+        let within = |at: f32, [lo, hi]: [f32; 2]| (lo..=hi).contains(&at);
         let coordinates = [sample.u, sample.v, sample.t];
-        coordinates.iter().zip(self.clip.half_open()).all(|(at, [lo, hi])| (lo..=hi).contains(at))
+        coordinates.into_iter().zip(self.clip.half_open()).all(|(at, range)| within(at, range))
+            && image.is_none_or(|[x, y]| within(sample.x, x) && within(sample.y, y))
     }
 
     /// Halve `samples` along each axis, down to cells.

@@ -1,4 +1,4 @@
-//! Clip planes across lens and shutter, and motion and blur thresholds.
+//! Clip planes across lens, shutter and image, and motion and blur thresholds.
 
 use crate::common::*;
 use glam::Vec3;
@@ -28,10 +28,14 @@ impl Scene {
     }
 
     fn see(&self, features: Features, frame: Clip, draw: Clip) -> Vec<(u32, u32)> {
+        self.see_in(DrawState::new(Cull::None), features, frame, draw)
+    }
+
+    fn see_in(&self, state: DrawState, features: Features, frame: Clip, draw: Clip) -> Vec<(u32, u32)> {
         let spec = spec(features);
         let settings =
             Settings { spec: &spec, viewport: viewport(), samples: &self.table, background: Vec3::ZERO };
-        let mut drawn = self.soup.draw(&Plain, Cull::None);
+        let mut drawn = self.soup.draw(&Plain, Cull::None).with_state(state);
         drawn.geometry = drawn.geometry.with_clip(draw);
         RasterPass::new(&camera(self.lens).with_clip(frame), &[drawn], &settings).visibility().unwrap()
     }
@@ -66,6 +70,35 @@ proptest! {
         prop_assert!(scene.see_fast(clip) == clipped);
         for ((_, sample), (ours, all)) in sample_positions(&scene.table, viewport()).iter().zip(clipped.iter().zip(&whole)) {
             let inside = within(u, sample.u) && within(v, sample.v) && within(t, sample.t);
+            let expected = if inside { *all } else { (NOTHING, f32::INFINITY.to_bits()) };
+            prop_assert_eq!(*ours, expected, "{:?}", sample);
+        }
+    }
+
+    /// The same across the image, alone and with planes across the lens. Some planes are at borders of pixels and tiles, others cut
+    /// pixels, and some leave nothing.
+    #[test]
+    fn a_draw_is_seen_between_its_planes_across_the_image_only(
+        kind in kinds(), lens: bool, switches in 0..SWITCHES, count in 1..60_u32, seed: u64, ordered: bool, of_frame: bool,
+        x in prop::sample::select(vec![ALL, [0.2, 0.6], [0.0, 0.33], [0.41, 0.42], [0.5, f32::INFINITY], [0.7, 0.7], [1.5, 2.0]]),
+        y in prop::sample::select(vec![ALL, [0.25, 0.75], [f32::NEG_INFINITY, 0.4], [8.0 / 26.0, 16.0 / 26.0], [0.9, 3.0]]),
+        u in prop::sample::select(vec![ALL, [-0.5, 0.25]]),
+    ) {
+        let scene = Scene { soup: Soup::new(kind, count, seed), lens, table: border_table(seed) };
+        let clip = Clip::new(u, ALL, ALL).unwrap().across_image(x, y).unwrap();
+        let (frame, draw) = if of_frame { (clip, Clip::NONE) } else { (Clip::NONE, clip) };
+        // Ordered passes list samples before they store them.
+        let state = DrawState { blend: if ordered { Blend::Add } else { Blend::Replace }, ..DrawState::new(Cull::None) };
+        let features = switched(switches);
+        let see = |frame, draw| scene.see_in(state, features, frame, draw);
+        let (clipped, whole) = (see(frame, draw), see(Clip::NONE, Clip::NONE));
+        prop_assert!(ordered || scene.see_fast(clip) == clipped);
+        let side = [viewport().width() as f32, viewport().height() as f32];
+        let edge = |share: f32, axis: usize| ((f64::from(share) - 0.5) * f64::from(side[axis])) as f32;
+        for (([px, py], sample), (ours, all)) in sample_positions(&scene.table, viewport()).iter().zip(clipped.iter().zip(&whole)) {
+            let at = [(*px as f32 - 0.5 * side[0]) + sample.x, (*py as f32 - 0.5 * side[1]) + sample.y];
+            let inside = [x, y].iter().enumerate().all(|(axis, range)| within(range.map(|share| edge(share, axis)), at[axis]))
+                && within(u, sample.u);
             let expected = if inside { *all } else { (NOTHING, f32::INFINITY.to_bits()) };
             prop_assert_eq!(*ours, expected, "{:?}", sample);
         }

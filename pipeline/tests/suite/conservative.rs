@@ -3,6 +3,7 @@
 
 use std::collections::{HashMap, HashSet};
 
+use crate::common::touch;
 use pipeline::conservative::{Grid, MovingTriangle, Rasterizer, Rect, Region, Touch, View};
 use pipeline::random::{mix, unit};
 
@@ -354,11 +355,11 @@ fn tiles_can_be_walked_by_hand() {
         reported.insert(tile, *touch);
     });
     let whole = Rect { x: [-8.0, 8.0], y: [-8.0, 8.0] };
-    let coarse = rasterizer.touch(&moving, &whole, &Region::WHOLE).unwrap();
-    for ([column, row], touch) in &reported {
+    let coarse = touch(&rasterizer, &moving, &whole, &Region::WHOLE).unwrap();
+    for ([column, row], part) in &reported {
         let rect = GRID.rect(&(*column..column + 1), &(*row..row + 1));
         let within = Region { u: coarse.u, v: coarse.v, t: coarse.t };
-        assert!(rasterizer.touch(&moving, &rect, &within).is_some());
-        assert!(coarse.t[0] <= touch.t[0] && touch.t[1] <= coarse.t[1], "{coarse:?} {touch:?}");
+        assert!(touch(&rasterizer, &moving, &rect, &within).is_some());
+        assert!(coarse.t[0] <= part.t[0] && part.t[1] <= coarse.t[1], "{coarse:?} {part:?}");
     }
 }

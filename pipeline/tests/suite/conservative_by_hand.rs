@@ -2,6 +2,7 @@
 
 use std::collections::HashSet;
 
+use crate::common::touch;
 use pipeline::conservative::{Grid, MovingTriangle, Rasterizer, Rect, Region, Touch, View};
 
 const GRID: Grid = Grid { origin: [-8.0, -8.0], tile: [1.0; 2], columns: 16, rows: 16 };
@@ -136,7 +137,8 @@ fn an_edge_may_be_off_by_more_at_the_border_of_a_tile_than_in_its_middle() {
         [(points, moved, [1.0, 0.0, 0.0]), (turned(points), turned(moved), [0.0, 1.0, 0.0])]
     {
         let unsure = MovingTriangle::uncertain(points, points, off).unwrap();
-        let touches = |triangle: &MovingTriangle| rasterizer.touch(triangle, &tile, &Region::WHOLE).is_some();
+        let touches =
+            |triangle: &MovingTriangle| touch(&rasterizer, triangle, &tile, &Region::WHOLE).is_some();
         assert!(touches(&still(moved)) && touches(&unsure) && !touches(&still(points)));
     }
 }
@@ -167,7 +169,7 @@ fn products_that_vanish_miss_nothing() {
         for reach in [0.0, 1.0, 7.0] {
             let side = |axis: usize| [point[axis] - reach * units[axis], point[axis] + reach * units[axis]];
             let tile = Rect { x: side(0), y: side(1) };
-            let touch = rasterizer.touch(&triangle, &tile, &Region::WHOLE);
+            let touch = touch(&rasterizer, &triangle, &tile, &Region::WHOLE);
             let z = touch.unwrap_or_else(|| panic!("units of {units:?} are missed")).z;
             assert!(z[0] <= point[2] && point[2] <= z[1], "{z:?} in units of {units:?}");
         }

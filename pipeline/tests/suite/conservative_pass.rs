@@ -145,6 +145,35 @@ fn the_tiles_are_those_of_the_rasterizer() {
     }
 }
 
+/// Lanes of a quad run in step: it takes as long as its longest lane, for each program that any of them runs. Lanes of tiles in
+/// conservative mode have no helpers.
+#[test]
+fn lanes_of_a_full_screen_pass_wait_for_their_quad() {
+    let spec = spec(Features::ALL);
+    let counts = |programs: fn([u32; 2]) -> Vec<u32>| {
+        let mut gpu = Gpu::quiet(&spec).unwrap();
+        let drawn = gpu.shade_pixels("steps", Viewport::new(16, 8).unwrap(), |lanes, at| {
+            for ops in programs(at) {
+                lanes.run(|lane| (0..ops).for_each(|_| assert!(lane.add(1.0, 2.0) > 0.0)));
+            }
+            Vec3::ZERO
+        });
+        [Event::PixelInvocations, Event::HelperInvocations, Event::ShaderOps].map(|event| drawn.counts[event])
+    };
+    assert_eq!(counts(|_| vec![3]), [128, 0, 3 * 128]);
+    // One lane of 128 takes longer, and its quad with it.
+    assert_eq!(counts(|at| vec![if at == [5, 3] { 50 } else { 3 }]), [128, 0, 3 * 124 + 4 * 50]);
+    // A second program of three lanes of two quads.
+    let second = |at: [u32; 2]| if [[0, 0], [1, 1], [8, 0]].contains(&at) { vec![3, 7] } else { vec![3] };
+    assert_eq!(counts(second), [128 + 8, 8 - 3, 3 * 128 + 7 * 8]);
+    // Quads that run nothing are not started.
+    assert_eq!(counts(|[x, _]| if x < 3 { vec![2] } else { vec![] }), [2 * 4 * 4, 8, 2 * 32]);
+    let corners = [[0.5, 0.5, 2.0], [3.5, 0.5, 2.0], [0.5, 1.5, 4.0]];
+    let (found, _, counts) = drawn(&[primitive([corners; 2], 0)], 8);
+    assert_eq!(counts[Event::PixelInvocations], found.len() as u64);
+    assert_eq!(counts[Event::HelperInvocations], 0);
+}
+
 /// A program for every pixel writes every pixel once and counts its lanes.
 #[test]
 fn a_full_screen_pass_runs_every_pixel() {
@@ -158,7 +187,10 @@ fn a_full_screen_pass_runs_every_pixel() {
     });
     let pixels = 21 * 13;
     assert_eq!(drawn.counts[Event::PixelsResolved], pixels);
-    assert_eq!((drawn.counts[Event::PixelInvocations], drawn.counts[Event::ShaderOps]), (pixels, pixels));
+    // Quads of 2x2: eleven across and seven down, whose lanes beyond the image are helpers.
+    let lanes = 4 * 11 * 7;
+    assert_eq!((drawn.counts[Event::PixelInvocations], drawn.counts[Event::ShaderOps]), (lanes, lanes));
+    assert_eq!(drawn.counts[Event::HelperInvocations], lanes - pixels);
     assert_eq!(drawn.counts[Event::TextureFetches], pixels);
     assert_eq!(drawn.into_image()[21 * 5 + 7], Vec3::splat(12.0));
     gpu.write_image("copy", viewport);

@@ -2,7 +2,7 @@
 //! sampling. `cargo test --release -p pipeline --test suite -- depth_width --nocapture` prints the numbers of
 //! the book.
 
-use crate::common::Uniform;
+use crate::common::{Uniform, touch};
 use pipeline::conservative::{MovingTriangle, Rasterizer, Rect, Region, View};
 use pipeline::depth::{Bounder, DepthBound};
 use pipeline::setup::{SetupResult, Triangle, set_up};
@@ -78,7 +78,7 @@ fn exact(triangle: &[MovingVertex; 3], shear: &Shear, tile: &TileRect, within: &
     let moving = MovingTriangle::new(ends[0], ends[1]).unwrap();
     let rect = Rect { x: wide(tile.x), y: wide(tile.y) };
     let region = Region { u: wide(within.u), v: wide(within.v), t: wide(within.t) };
-    rasterizer.touch(&moving, &rect, &region).map_or(0.0, |touch| touch.z[1] - touch.z[0])
+    touch(&rasterizer, &moving, &rect, &region).map_or(0.0, |touch| touch.z[1] - touch.z[0])
 }
 
 /// Mean widths over that of the vertices in the whole shutter: the four methods, the last one without

@@ -25,6 +25,8 @@ mod golden;
 mod heat;
 mod hidden;
 mod levels;
+mod loaded_depths;
+mod loads;
 mod oracle;
 mod orthographic;
 mod passes;

@@ -50,15 +50,23 @@ fn edges_keep(triangle: &Triangle, probe: &Probe, tile: &TileRect, within: &Box5
         })
         .unwrap();
     let signs = exact_signs(triangle, probe, slot);
+    // Screens take positions from the middle of their tile, which is smaller here.
+    let mut samples = probe.samples.clone();
+    for slot in 0..samples.len {
+        for (axis, at, [lo, hi]) in [(0, samples.x[slot], tile.x), (1, samples.y[slot], tile.y)] {
+            samples.from_middle[axis][slot] = at - 0.5 * (lo + hi);
+        }
+    }
     for drawn in [[true, false], [false, true]] {
         let seen = Triangle { faces: drawn, ..*triangle };
         let hit = |screen: Option<&Screen>| {
             let mut depth = vec![f32::INFINITY; probe.samples.len];
             let mut owner = vec![u32::MAX; probe.samples.len];
             let mut target = Target { depth: &mut depth, triangle: &mut owner };
-            let (samples, near, hits) = (&probe.samples, -1.0, &mut Hits::default());
+            let (samples, near, hits) = (&samples, -1.0, &mut Hits::default());
             let target = &mut target;
-            SampleTest { triangle: &seen, samples, within, screen, near, target, hits }.run(Width::widest());
+            SampleTest { triangle: &seen, samples, within, image: None, screen, near, target, hits }
+                .run(Width::widest());
             owner[slot] == triangle.id
         };
         if !hit(None) {

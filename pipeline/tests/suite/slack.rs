@@ -2,9 +2,8 @@
 //! dominant term.
 
 use crate::common::*;
-use pipeline::sample_test::exact::seen_in_tile;
-use pipeline::sampling::Sample;
-use pipeline::setup::SetupResult;
+use pipeline::sampling::{Sample, TileSamples};
+use pipeline::setup::{Corner, SetupResult};
 use pipeline::*;
 
 /// Dominant term: vertex position, image position, lens at depth zero, lens per unit of depth.
@@ -53,6 +52,12 @@ fn setting(r: &mut Uniform, large: Large, moving: bool, parallel: bool, seed: u6
     Setting { probe, triangle }
 }
 
+/// A vertex as the sample in `slot` sees it, with the operations of the sample test in their order.
+fn seen(corner: &Corner, samples: &TileSamples, slot: usize) -> [f32; 2] {
+    let at = corner.at(samples.t[slot]);
+    [0, 1].map(|axis| (-samples.slope[axis][slot]).mul_add(at[2], at[axis] - samples.lens[axis][slot]))
+}
+
 /// Largest error of a vertex over half the slack, its bound.
 fn worst(large: Large, moving: bool, parallel: bool) -> f64 {
     let mut worst = 0.0_f64;
@@ -61,8 +66,8 @@ fn worst(large: Large, moving: bool, parallel: bool) -> f64 {
         let SetupResult::Ready(ready) = probe.set_up(triangle, Cull::None) else { continue };
         for slot in 0..probe.samples.len {
             let position = probe.at(slot);
-            let seen = seen_in_tile(&ready.corners, &probe.samples, slot);
-            for (corner, seen) in ready.corners.iter().zip(seen) {
+            for corner in &ready.corners {
+                let seen = seen(corner, &probe.samples, slot);
                 let at =
                     |axis: usize| f64::from(corner.open[axis]) + position.t * f64::from(corner.delta[axis]);
                 let weight = weight(&probe.shear, at(2));

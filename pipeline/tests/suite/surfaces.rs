@@ -564,12 +564,10 @@ fn loads_stores_and_clears_are_counted() {
         let (colour, depth) = (cleared[2] - 3 * 12, cleared[3] - 3 * 4);
         assert!((12..=24).contains(&colour) && (4..=8).contains(&depth), "{cleared:?}");
         assert_eq!(cleared[4..], [0, 4 * 16 * 64], "cleared tiles are not read, and all lines are written");
+        // The square ends at the borders of the other tiles, so these are tested, too: the 4 lines of depth of every tile are read to
+        // bound it. Of colour the lines drawn to are read; the others stay.
         let loaded = count(true, Store::Store);
-        assert_eq!(
-            loaded[2..],
-            [colour, depth, 16, 4 * 16 * 64],
-            "the lines drawn to are read; the others stay"
-        );
+        assert_eq!(loaded[2..], [colour, depth + 4 * 4, 8 + 4 + 4 * 4, 4 * 16 * 64]);
         assert_eq!(count(false, Store::Discard)[2..], [colour, depth, 0, 0], "nothing is written");
     });
 }
@@ -777,6 +775,43 @@ fn what_surfaces_cannot_do_is_refused_by_name() {
         flat(),
     );
     assert!(memory.starts_with("pass `light`: the surfaces of the frame take "), "{memory}");
+}
+
+/// The error names the surface, the first draw that reads it and the first that writes it.
+#[test]
+fn feedback_names_both_draws() {
+    let masked = DrawState { colour_mask: [false; 4], ..flat() };
+    let message = |states: [DrawState; 3], is_depth: bool| {
+        with(|stage, settings| {
+            let mut gpu = Gpu::quiet(settings.spec).unwrap();
+            let [colour, depth] = [("albedo", Format::Rgba8), ("depth", Format::D32)]
+                .map(|(name, format)| gpu.create_surface(&SurfaceSpec::new(name, stage.viewport, format)));
+            let mut targets = to(&[colour]);
+            targets.depth = Some(Attachment::cleared(depth, Clear::default()));
+            let (corners, bindings) =
+                (screen(1.0), [Binding::Surface(if is_depth { depth } else { colour })]);
+            let draws = [0, 1, 2].map(|number| {
+                let draw = still(&corners, &RED).with_state(states[number]);
+                if number == 0 { draw } else { draw.binding(&bindings) }
+            });
+            let pass = RasterPass::new(&stage.camera, &draws, settings).named("light");
+            gpu.draw(&pass.onto(Target::Surfaces(&targets))).unwrap_err().to_string()
+        })
+    };
+    let start = |surface, reader, writer| {
+        format!(
+            "pass `light`, surface `{surface}`: it is read and written in the same pass: {reader} reads it, and {writer} writes it;"
+        )
+    };
+    let cases = [
+        (message([flat(); 3], false), start("albedo", "draw 1", "draw 0")),
+        (message([masked, masked, flat()], false), start("albedo", "draw 1", "draw 2")),
+        (message([masked; 3], false), start("albedo", "draw 1", "the pass as a whole")),
+        (message([flat(), DrawState::default(), flat()], true), start("depth", "draw 1", "draw 1")),
+    ];
+    for (message, start) in cases {
+        assert!(message.starts_with(&start), "{message}");
+    }
 }
 
 /// What a pass drops cannot be read, and costs no memory traffic.

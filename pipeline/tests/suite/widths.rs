@@ -29,7 +29,7 @@ fn hits_at(width: Width, kind: Kind, Optics { lens, parallel }: Optics) -> (Vec<
         let mut target = Target { depth: &mut depth, triangle: &mut seen };
         let (within, target, hits) = (&Box5::whole(lens), &mut target, &mut hits);
         let (triangle, samples, screen, near) = (&ready, &samples, None, 0.25);
-        SampleTest { triangle, samples, within, screen, near, target, hits }.run(width);
+        SampleTest { triangle, samples, within, image: None, screen, near, target, hits }.run(width);
     }
     (seen, depth.into_iter().map(f32::to_bits).collect(), hits)
 }

@@ -4,7 +4,6 @@
 //! - [`chart`]: charts of the book.
 //! - [`stress`]: the failure catalogue, each tile test on each family of triangles.
 //! - [`catalog`]: the list of these studies.
-//! - [`job_frame`]: a frame of a job with the energy of each of its passes.
 //! - [`reproduce`]: claims of papers, computed and compared with them.
 //!
 //! A study is measured once with an effort, full or quick. Its result is drawn, put into tables and written as JSON, and
@@ -17,7 +16,6 @@
 
 pub mod catalog;
 pub mod chart;
-pub mod job_frame;
 pub mod reproduce;
 pub mod stress;
 pub mod study;

@@ -274,7 +274,7 @@ impl Probe<'_> {
         let started = ProcessTime::now();
         let ready = job.prepare(number)?;
         let made_s = started.elapsed().as_secs_f64();
-        let recorder = Recorder::new(frame::BIN_PS, frame::MIN_FRAME_BINS);
+        let recorder = Recorder::new(crate::BIN_PS, frame::MIN_FRAME_BINS);
         let mut clock = FrameClock::new(level, plan.gpu.machine()?, recorder);
         let emit = |packet: &_, lines: &_| clock.push(packet, lines);
         let mut gpu = Gpu::new(&plan.gpu.pipeline, emit).map_err(RunError::setting)?;

@@ -8,8 +8,8 @@ use glam::Vec3;
 use output::OutDir;
 use output::image::LinearImage;
 use output::progress::Progress;
+use pipeline::FrameReport;
 use pipeline::frame::HeatMap;
-use pipeline::{FrameReport, Gpu};
 use power_model::PowerModel;
 use rayon::prelude::*;
 use timing::{AccuracyWarning, FrameClock, Level, Recorder, Timed};
@@ -18,11 +18,10 @@ use workloads::Regime;
 use workloads::job::{Drawn, Fact};
 
 use crate::heat::{self, HeatPicture};
+use crate::job_frame::{self, BIN_PS};
 use crate::passes;
 use crate::{Distinct, Observed, Origin, Plan, RunError, RunFrame};
 
-/// Length of a timeline bin in picoseconds: one microsecond, a twentieth of a sample at 50 kHz.
-pub const BIN_PS: u64 = 1_000_000;
 /// Largest number of bins of all frames, at about 200 bytes each. Longer runs use longer bins.
 const MAX_TOTAL_BINS: usize = 8_000_000;
 /// Lower limit of the bins of a frame, for any number of frames.
@@ -129,12 +128,9 @@ pub(crate) fn draw<'a>(
     number: u32,
     emit: impl FnMut(&Packet, &[LineAccess]) + 'a,
 ) -> Result<(DrawnFrame, Pictures), RunError> {
-    let gpu = Gpu::new(&plan.gpu.pipeline, emit).map_err(RunError::setting)?;
-    let mut gpu = gpu.with_heat(&heat::events(&plan.options.heat), plan.viewport);
-    let ready = plan.job.prepare(number)?;
-    let Drawn { image, moving, lens, facts, warnings } =
-        ready.draw(&mut gpu).map_err(RunError::on(&plan.gpu))?;
-    let mut report = gpu.finish();
+    let (ready, events) = (plan.job.prepare(number)?, heat::events(&plan.options.heat));
+    let (drawn, mut report) = job_frame::draw(&plan.gpu, Some((&events, plan.viewport)), &*ready, emit)?;
+    let Drawn { image, moving, lens, facts, warnings } = drawn;
     let heat = std::mem::take(&mut report.heat);
     passes::limit_draws(&mut report);
     let regime = ready.regime()?;

@@ -8,6 +8,7 @@ use power_model::PowerModel;
 use serde::Serialize;
 use timing::{DrawSpan, PassTime, Stalls, Timed};
 
+use crate::job_frame::timed_j;
 use crate::stalls::{self, StalledSpan};
 use crate::{Observed, Plan, Simulated, StallShares};
 
@@ -33,7 +34,7 @@ pub struct PassSummary {
 pub struct WorkSummary {
     /// Time in seconds.
     pub time_s: f64,
-    /// Energy in joules: that of the events, and the other energy of frames by time.
+    /// Energy in joules: that of the events, and what a frame takes besides them in the time.
     pub energy_j: f64,
     /// Energy of the events in joules; parts that depend on time are not in it.
     pub events_j: f64,
@@ -78,10 +79,7 @@ pub(crate) fn summaries(plan: &Plan, simulated: &Simulated) -> Vec<PassSummary> 
     for frame in simulated.in_order() {
         let Some(observed) = frame.observed() else { continue };
         write_back.counts += &observed.report.write_back;
-        let events_j = plan.model.counts_energy(&observed.counts).total_j();
-        let others_j = frame.power.energy().total_j() - events_j;
-        let others_w = others_j / frame.power.duration_s();
-        add(&mut groups, &FrameWork::new(observed), others_w);
+        add(&mut groups, &FrameWork::new(observed), |from_s, to_s| timed_j(&frame.power, from_s, to_s));
     }
     let mut rows: Vec<_> = groups.into_iter().map(|group| group.summary(&plan.model)).collect();
     let used = write_back.counts;
@@ -129,7 +127,7 @@ struct Spent<'a> {
 
 impl Spent<'_> {
     fn add(&mut self, counts: &Counts, time_ps: u64, others_w: f64) {
-        let time_s = time_ps as f64 * 1e-12;
+        let time_s = seconds(time_ps);
         self.time_s += time_s;
         self.others_j += time_s * others_w;
         self.counts += counts;
@@ -160,8 +158,13 @@ struct Group<'a> {
     others: Spent<'a>,
 }
 
-/// Adds the passes of a frame. `others_w` is its power besides the events.
-fn add<'a>(groups: &mut Vec<Group<'a>>, frame: &FrameWork<'a>, others_w: f64) {
+fn seconds(time_ps: u64) -> f64 {
+    time_ps as f64 * 1e-12
+}
+
+/// Adds the passes of a frame. `timed_j` is its energy besides the events, between two times. Draws that share the time of a pass
+/// share it by their times.
+fn add<'a>(groups: &mut Vec<Group<'a>>, frame: &FrameWork<'a>, timed_j: impl Fn(f64, f64) -> f64) {
     let mut before_ps = 0;
     for (number, pass) in frame.report.passes.iter().enumerate() {
         let place = groups.iter().position(|group| group.name == pass.name).unwrap_or_else(|| {
@@ -171,6 +174,9 @@ fn add<'a>(groups: &mut Vec<Group<'a>>, frame: &FrameWork<'a>, others_w: f64) {
         let time = frame.times.get(number);
         let end_ps = time.map_or(before_ps, |time| time.end_ps);
         let span = [std::mem::replace(&mut before_ps, end_ps), end_ps];
+        let pass_s = seconds(end_ps - span[0]);
+        let others_j = if pass_s > 0.0 { timed_j(seconds(span[0]), seconds(end_ps)) } else { 0.0 };
+        let others_w = if pass_s > 0.0 { others_j / pass_s } else { 0.0 };
         let group = &mut groups[place];
         group.passes += 1;
         group.all.stalled.extend(frame.stalls.map(|stalls| (stalls, span)));
@@ -245,11 +251,16 @@ mod tests {
         let passes = vec![pass("map", vec![hits(5)]), pass("image", vec![hits(1), hits(2)])];
         let report = FrameReport { passes, ..FrameReport::default() };
         let frame = FrameWork { report: &report, times: &times, spans: &[], stalls: None };
-        (0..2).for_each(|_| add(&mut groups, &frame, 2.0));
+        (0..2).for_each(|_| add(&mut groups, &frame, |from_s, to_s| 2.0 * (to_s - from_s)));
         let found: Vec<_> = groups.iter().map(|group| (group.name.as_str(), group.passes)).collect();
         assert_eq!(found, [("map", 2), ("image", 2)]);
         let spent: Vec<_> = groups.iter().map(|group| (group.all.time_s, group.all.others_j)).collect();
-        assert_eq!(spent, [(6e-6, 12e-6), (4e-6, 8e-6)], "from end to end");
+        let near = |a: f64, b: f64| (a / b - 1.0).abs() < 1e-12;
+        let expected = [(6e-6, 12e-6), (4e-6, 8e-6)];
+        let close = |((time_s, joules), (of_s, of_j)): (&(f64, f64), (f64, f64))| {
+            near(*time_s, of_s) && near(*joules, of_j)
+        };
+        assert!(spent.iter().zip(expected).all(close), "from end to end: {spent:?}");
         let image = &groups[1];
         assert_eq!((image.all.counts[Event::SamplesHit], image.all.counts[Event::PixelsResolved]), (6, 6));
         assert_eq!([0, 1].map(|draw| image.draws[draw].counts), [hits(2), hits(4)]);

@@ -20,7 +20,7 @@ use timing::{FrameClock, Level, Recorder};
 use workloads::Job;
 use workloads::job::Reduction;
 
-use crate::frame::{self, FrameSimulator, SimulatedFrame};
+use crate::frame::{FrameSimulator, SimulatedFrame};
 use crate::{Distinct, FrameCost, Origin, Plan, Quantity, RunError, RunFrame, SampledSummary, Simulated};
 
 /// Previews of the frames of a run, and the pilot frame.
@@ -307,7 +307,7 @@ impl<'a> Previewer<'a> {
 
     /// Renders and times a preview of frame `number`.
     pub fn frame(&self, number: u32) -> Result<FramePreview, RunError> {
-        let recorder = Recorder::new(frame::BIN_PS, TIMELINE_BINS);
+        let recorder = Recorder::new(crate::BIN_PS, TIMELINE_BINS);
         let mut clock = FrameClock::new(self.level, self.plan.gpu.machine()?, recorder);
         let emit = |packet: &_, lines: &_| clock.push(packet, lines);
         let mut gpu = Gpu::new(&self.plan.gpu.pipeline, emit).map_err(RunError::setting)?;

@@ -201,7 +201,7 @@ impl<'a, 'e> Kernels<'a, 'e> {
     }
 
     /// The values of a buffer.
-    pub fn values<T: pipeline::compute::Word>(&self, buffer: Buffer<T>) -> Vec<T> {
+    pub fn values<T: pipeline::Word>(&self, buffer: Buffer<T>) -> Vec<T> {
         self.gpu.values(buffer)
     }
 

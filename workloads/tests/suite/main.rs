@@ -5,6 +5,7 @@ mod analytic;
 mod builtin;
 mod cameras;
 mod caustics;
+mod clip;
 mod collision;
 mod common;
 mod compute;

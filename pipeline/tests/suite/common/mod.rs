@@ -6,6 +6,7 @@ mod probe;
 pub mod stage;
 
 use glam::{Affine3A, Vec3, Vec4};
+use pipeline::conservative::{Grid, MovingTriangle, Rasterizer, Rect, Region, Touch};
 use pipeline::depth::DepthSpec;
 use pipeline::random::mix;
 use pipeline::sample_test::{Hits, Target, test_run};
@@ -32,6 +33,20 @@ impl Uniform {
     pub fn within(&mut self, lo: f32, hi: f32) -> f32 {
         lo + (hi - lo) * self.next()
     }
+}
+
+/// Intervals in which a triangle may touch `rect` within `region`, or `None` if it cannot: a grid of one tile.
+pub fn touch(
+    rasterizer: &Rasterizer,
+    triangle: &MovingTriangle,
+    rect: &Rect,
+    region: &Region,
+) -> Option<Touch> {
+    let tile = [rect.x, rect.y].map(|[lo, hi]| hi - lo);
+    let grid = Grid { origin: [rect.x[0], rect.y[0]], tile, columns: 1, rows: 1 };
+    let mut found = None;
+    rasterizer.clipped(*region).rasterize(triangle, &grid, |_, touch| found = Some(*touch));
+    found
 }
 
 /// A shader whose colour is a function of the normal.

@@ -17,10 +17,10 @@ use workloads::scene::{Local, Node, Parts, Rig, Scene, SceneCamera, Trs};
 use workloads::{Alpha, Material, Overrides, shapes};
 
 use crate::chart::statistics::{errors, mean_square};
-use crate::job_frame::JobFrame;
 use crate::study::table::{Sheet, Table, count, fixed, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
 use crate::study::{Gallery, Study, StudyError};
+use run::JobFrame;
 
 /// How much is drawn.
 #[derive(Clone, Copy, Debug, Serialize)]

@@ -17,7 +17,7 @@ use traces::score::{self, Score, TOLERANCE_S};
 use workloads::{Job, SampleChoice, Scene};
 
 use super::scenes;
-use crate::job_frame::JobFrame;
+use run::JobFrame;
 
 /// GPU, platform and energies.
 #[derive(Clone)]

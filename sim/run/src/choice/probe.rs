@@ -106,7 +106,7 @@ impl ProbedFrame {
     /// Cost of the frame at `level`, and the CPU seconds of the timing model.
     fn timed(&self, plan: &Plan, level: Level) -> Result<(FrameCost, f64), RunError> {
         let started = ThreadTime::now();
-        let recorder = Recorder::new(frame::BIN_PS, frame::MIN_FRAME_BINS);
+        let recorder = Recorder::new(crate::BIN_PS, frame::MIN_FRAME_BINS);
         let mut clock = FrameClock::new(level, plan.gpu.machine()?, recorder);
         self.packets.send(&mut clock);
         let timed = clock.finish()?;

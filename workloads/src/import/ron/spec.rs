@@ -97,7 +97,7 @@ pub(super) struct ObjectSpec {
     pub end_s: Option<f64>,
     /// Which animation clip of a glTF file plays, by name or number; the first by default.
     pub clip: Option<String>,
-    /// Part of lens and shutter in which it is drawn (user clip planes).
+    /// Part of lens, shutter and image in which it is drawn (user clip planes).
     pub visible: Option<VisibleSpec>,
     /// Material; glTF files bring their own materials, which this one replaces.
     pub material: Option<MaterialSpec>,
@@ -126,7 +126,7 @@ pub(super) struct ObjectSpec {
     pub repeat: bool,
 }
 
-/// Part of lens and shutter; what is left out is not limited. A sample on the lower bound is inside, one on the upper bound only
+/// Part of lens, shutter and image; what is left out is not limited. A sample on the lower bound is inside, one on the upper bound only
 /// at the end of the axis.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -138,8 +138,14 @@ pub(super) struct VisibleSpec {
     #[serde(default, deserialize_with = "bounded::lens_part")]
     pub v: Option<[f32; 2]>,
     /// Within the shutter, 0 to 1.
-    #[serde(default, deserialize_with = "bounded::shutter_part")]
+    #[serde(default, deserialize_with = "bounded::part")]
     pub t: Option<[f32; 2]>,
+    /// Across the image from its left, 0 to 1.
+    #[serde(default, deserialize_with = "bounded::part")]
+    pub x: Option<[f32; 2]>,
+    /// Down the image from its top, 0 to 1.
+    #[serde(default, deserialize_with = "bounded::part")]
+    pub y: Option<[f32; 2]>,
 }
 
 impl VisibleSpec {
@@ -149,7 +155,8 @@ impl VisibleSpec {
             let low = if low <= first { f32::NEG_INFINITY } else { low };
             [low, if high >= last { f32::INFINITY } else { high }]
         };
-        Clip::new(open(self.u, [-1.0, 1.0]), open(self.v, [-1.0, 1.0]), open(self.t, [0.0, 1.0]))
+        let [t, x, y] = [self.t, self.x, self.y].map(|part| open(part, [0.0, 1.0]));
+        Clip::new(open(self.u, [-1.0, 1.0]), open(self.v, [-1.0, 1.0]), t)?.across_image(x, y)
     }
 }
 

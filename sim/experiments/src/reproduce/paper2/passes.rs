@@ -10,13 +10,13 @@ use workloads::Overrides;
 use workloads::deferred::{Deferred, LightPass, NormalFormat, Options};
 
 use super::Passes;
-use crate::job_frame::JobFrame;
 use crate::reproduce::band::{Cases, one_at_a_time};
 use crate::reproduce::figure::{POWER, TIME, line};
 use crate::reproduce::row::{Number, Row, With, numbers};
 use crate::reproduce::settings::{Form, Setting};
 use crate::reproduce::stage::{Recording, Stage};
 use crate::reproduce::{Done, Figure};
+use run::JobFrame;
 
 /// The machine and its recordings.
 pub(super) struct Bench<'a> {

@@ -1,6 +1,7 @@
 //! Buffers: typed data of a frame, in words of 32 bits.
 
 use std::marker::PhantomData;
+use std::sync::Arc;
 
 use crate::memory::MemoryRange;
 
@@ -61,7 +62,7 @@ impl Word for f32 {
 /// A buffer of a frame.
 #[derive(Debug)]
 pub struct Buffer<T> {
-    pub(super) number: u32,
+    number: u32,
     words: u32,
     region: MemoryRange,
     of: PhantomData<fn() -> T>,
@@ -76,6 +77,11 @@ impl<T> Clone for Buffer<T> {
 impl<T> Copy for Buffer<T> {}
 
 impl<T> Buffer<T> {
+    /// Number in the frame.
+    pub(crate) fn number(&self) -> u32 {
+        self.number
+    }
+
     /// Number of values.
     pub fn len(&self) -> u32 {
         self.words
@@ -109,7 +115,7 @@ pub enum Access {
 /// A buffer of a pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BufferBinding {
-    pub(super) number: u32,
+    number: u32,
     pub(crate) region: MemoryRange,
     pub(crate) access: Access,
 }
@@ -126,12 +132,28 @@ impl BufferBinding {
 struct Data {
     name: String,
     region: MemoryRange,
-    words: Vec<u32>,
+    words: Arc<Vec<u32>>,
 }
 
 /// All buffers of a frame.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Buffers(Vec<Data>);
+
+/// Words of a buffer for the shaders of a draw, as they are before its pass.
+#[derive(Clone, Debug)]
+pub(crate) struct BoundBuffer {
+    number: u32,
+    address: u64,
+    words: Arc<Vec<u32>>,
+}
+
+impl BoundBuffer {
+    /// The word of buffer `number` at `index`, and its address, if this is the buffer and has it.
+    pub fn word(&self, number: u32, index: u32) -> Option<(u32, u64)> {
+        let word = self.words.get(index as usize).filter(|_| number == self.number)?;
+        Some((*word, self.address + 4 * u64::from(index)))
+    }
+}
 
 /// A store or an atomic that takes effect later.
 #[derive(Clone, Copy, Debug)]
@@ -146,7 +168,7 @@ pub(crate) struct Stored {
 impl Buffers {
     /// Adds a buffer of `data` in `region`.
     pub fn add<T: Word>(&mut self, name: &str, region: MemoryRange, data: &[T]) -> Buffer<T> {
-        let words = data.iter().map(|value| value.bits()).collect();
+        let words = Arc::new(data.iter().map(|value| value.bits()).collect());
         self.0.push(Data { name: name.to_owned(), region, words });
         let number = self.0.len() as u32 - 1;
         Buffer { number, words: data.len() as u32, region, of: PhantomData }
@@ -175,6 +197,17 @@ impl Buffers {
         self.0[buffer as usize].region.address() + 4 * u64::from(index)
     }
 
+    /// Whether the frame has the buffer of a binding.
+    pub fn has(&self, binding: &BufferBinding) -> bool {
+        self.0.get(binding.number as usize).is_some_and(|data| data.region == binding.region)
+    }
+
+    /// All words of a bound buffer as they are now.
+    pub fn bound(&self, binding: &BufferBinding) -> Option<BoundBuffer> {
+        let words = Arc::clone(&self.0.get(binding.number as usize)?.words);
+        Some(BoundBuffer { number: binding.number, address: binding.region.address(), words })
+    }
+
     /// A word of a buffer that has it.
     pub fn word(&self, buffer: u32, index: u32) -> u32 {
         self.0[buffer as usize].words[index as usize]
@@ -182,7 +215,7 @@ impl Buffers {
 
     /// Lets a store or an atomic take effect.
     pub fn apply(&mut self, stored: &Stored) {
-        let word = &mut self.0[stored.buffer as usize].words[stored.index as usize];
+        let word = &mut Arc::make_mut(&mut self.0[stored.buffer as usize].words)[stored.index as usize];
         *word = stored.atomic.map_or(stored.bits, |atomic| atomic.of(*word, stored.bits));
     }
 }

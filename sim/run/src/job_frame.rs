@@ -1,14 +1,18 @@
 //! A frame of a job on a machine, with the energy of each of its passes.
 
-use activity::{Counts, Event};
-use pipeline::{FrameReport, Gpu};
+use activity::{Counts, Event, LineAccess, Packet};
+use pipeline::{FrameReport, Gpu, Viewport};
 use power_model::{FramePower, Part, PowerModel};
-use run::{BIN_PS, GpuSpec, RunError};
 use timing::{FrameClock, Level, Recorder};
 use workloads::Job;
-use workloads::job::Drawn;
+use workloads::job::{Drawn, ReadyFrame};
 
-/// A drawn and timed frame.
+use crate::{GpuSpec, RunError};
+
+/// Length of a timeline bin in picoseconds: one microsecond, a twentieth of a sample at 50 kHz.
+pub const BIN_PS: u64 = 1_000_000;
+
+/// A drawn and timed frame with the energy of its passes.
 pub struct JobFrame {
     /// Image and facts.
     pub drawn: Drawn,
@@ -47,6 +51,21 @@ impl PassEnergy {
 /// Largest number of bins of a frame.
 const MAX_BINS: usize = 4096;
 
+/// Draws a frame on the pipeline of `gpu`, with heat maps of some events over images of a size, and emits its packets.
+pub(crate) fn draw<'a>(
+    gpu: &'a GpuSpec,
+    heat: Option<(&[Event], Viewport)>,
+    ready: &dyn ReadyFrame,
+    emit: impl FnMut(&Packet, &[LineAccess]) + 'a,
+) -> Result<(Drawn, FrameReport), RunError> {
+    let mut on = Gpu::new(&gpu.pipeline, emit).map_err(RunError::setting)?;
+    if let Some((events, viewport)) = heat {
+        on = on.with_heat(events, viewport);
+    }
+    let drawn = ready.draw(&mut on).map_err(RunError::on(gpu))?;
+    Ok((drawn, on.finish()))
+}
+
 impl JobFrame {
     /// Draws frame `number` of a job.
     ///
@@ -55,9 +74,7 @@ impl JobFrame {
     pub fn new(job: &dyn Job, number: u32, gpu: &GpuSpec, model: &PowerModel) -> Result<Self, RunError> {
         let mut clock = FrameClock::new(Level::default(), gpu.machine()?, Recorder::new(BIN_PS, MAX_BINS));
         let emit = |packet: &_, lines: &_| clock.push(packet, lines);
-        let mut passes = Gpu::new(&gpu.pipeline, emit).map_err(RunError::setting)?;
-        let drawn = job.frame(number, &mut passes)?;
-        let report = passes.finish();
+        let (drawn, report) = draw(gpu, None, &*job.prepare(number)?, emit)?;
         let timed = clock.finish()?;
         let power = model.frame(&timed.timeline);
         let power = power.map_err(|source| RunError::Timeline { frame: number, source })?;
@@ -94,8 +111,8 @@ fn events_j(model: &PowerModel, counts: &Counts) -> f64 {
     model.counts_energy(counts).total_j()
 }
 
-/// Energy between two times of the parts of a power that depend on time.
-fn timed_j(power: &FramePower, from_s: f64, to_s: f64) -> f64 {
+/// Energy between two times of the parts of a power that depend on time: what a pass takes besides its events.
+pub(crate) fn timed_j(power: &FramePower, from_s: f64, to_s: f64) -> f64 {
     let is_timed = |part: &Part| !matches!(part, Part::Unit(_));
     let mut at_s = 0.0;
     let energy = |(length_s, watts): (f64, &[f64; Part::ALL.len()])| {
