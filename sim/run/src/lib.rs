@@ -59,7 +59,7 @@ pub use gpu::{GpuError, GpuSpec, PowerFiles};
 pub use heat::HeatPicture;
 pub use measure::{Checks, Measurement, Resolution};
 pub use options::{Change, HeatQuantity, PacingChoice, Requested, RunOptions, Sampling, TimingChoice};
-pub use passes::{PassSummary, WorkSummary};
+pub use passes::{PassSummary, WorkSummary, passes_of};
 pub use plan::{Plan, fits_memory};
 pub use provenance::{Host, Input, Provenance, again};
 pub use sampled::{Forecast, FramePreview, Previewer, Previews, Signatures};

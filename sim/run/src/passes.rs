@@ -9,7 +9,7 @@ use serde::Serialize;
 use timing::{DrawSpan, PassTime, Stalls, Timed};
 
 use crate::stalls::{self, StalledSpan};
-use crate::{Observed, Plan, Simulated, StallShares};
+use crate::{Observed, Plan, RunFrame, StallShares};
 
 /// Passes of one name.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -71,11 +71,11 @@ pub(crate) fn take_turns(spans: &[DrawSpan]) -> bool {
     of_draws.into_iter().any(|span| !seen.insert((span.pass, span.draw)))
 }
 
-/// Passes of all simulated frames of a run, in the order of their first use.
-pub(crate) fn summaries(plan: &Plan, simulated: &Simulated) -> Vec<PassSummary> {
+/// Passes of the simulated frames of a run, in the order of their first use.
+pub fn passes_of<'a>(plan: &Plan, frames: impl Iterator<Item = &'a RunFrame>) -> Vec<PassSummary> {
     let mut groups: Vec<Group<'_>> = Vec::new();
     let mut write_back = Spent::default();
-    for frame in simulated.in_order() {
+    for frame in frames {
         let Some(observed) = frame.observed() else { continue };
         write_back.counts += &observed.report.write_back;
         let events_j = plan.model.counts_energy(&observed.counts).total_j();

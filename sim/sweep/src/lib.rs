@@ -13,6 +13,7 @@
 //! A point has no state but its file, so a sweep may be stopped at any moment and continued anywhere.
 
 mod axis;
+mod detail;
 mod error;
 mod execute;
 mod folder;
