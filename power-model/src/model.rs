@@ -116,6 +116,12 @@ impl PowerModel {
         energy
     }
 
+    /// Energy of a frame of this length from the sums over its timeline, as [`Self::frame`] has it.
+    pub fn energy_of(&self, sums: &Bin, duration_ps: u64) -> Energy {
+        let used = Unit::ALL.map(|unit| sums.counts.uses(unit) || sums.busy_ps[unit as usize] > 0);
+        self.bin_energy(sums, duration_ps, used)
+    }
+
     fn bin_energy(&self, bin: &Bin, length_ps: u64, used: [bool; Unit::COUNT]) -> Energy {
         let length_s = length_ps as f64 * S_PER_PS;
         let mut energy = self.counts_energy(&bin.counts);

@@ -65,7 +65,7 @@ pub use heat::HeatPicture;
 pub use job_frame::{BIN_PS, JobFrame, PassEnergy};
 pub use measure::{Checks, Measurement, Resolution};
 pub use options::{Change, HeatQuantity, PacingChoice, Requested, RunOptions, Sampling, TimingChoice};
-pub use passes::{PassSummary, WorkSummary};
+pub use passes::{PassSummary, WorkSummary, passes_of};
 pub use plan::{Plan, fits_memory};
 pub use provenance::{Host, Input, Provenance, again};
 pub use recording::{MACHINES_IN_TURN, RecordedRun, Recording, TimedFrames};

@@ -10,7 +10,7 @@ use timing::{DrawSpan, PassTime, Stalls, Timed};
 
 use crate::job_frame::timed_j;
 use crate::stalls::{self, StalledSpan};
-use crate::{Observed, Plan, Simulated, StallShares};
+use crate::{Observed, Plan, RunFrame, StallShares};
 
 /// Passes of one name.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -72,11 +72,11 @@ pub(crate) fn take_turns(spans: &[DrawSpan]) -> bool {
     of_draws.into_iter().any(|span| !seen.insert((span.pass, span.draw)))
 }
 
-/// Passes of all simulated frames of a run, in the order of their first use.
-pub(crate) fn summaries(plan: &Plan, simulated: &Simulated) -> Vec<PassSummary> {
+/// Passes of the simulated frames of a run, in the order of their first use.
+pub fn passes_of<'a>(plan: &Plan, frames: impl Iterator<Item = &'a RunFrame>) -> Vec<PassSummary> {
     let mut groups: Vec<Group<'_>> = Vec::new();
     let mut write_back = Spent::default();
-    for frame in simulated.in_order() {
+    for frame in frames {
         let Some(observed) = frame.observed() else { continue };
         write_back.counts += &observed.report.write_back;
         add(&mut groups, &FrameWork::new(observed), |from_s, to_s| timed_j(&frame.power, from_s, to_s));

@@ -239,7 +239,7 @@ impl Summary {
             facts: facts(simulated),
             sample_test_efficiency: counts.sample_test_efficiency(),
             counts,
-            passes: passes::summaries(plan, simulated),
+            passes: passes::passes_of(plan, simulated.in_order()),
             counts_hash: format!(
                 "{:016x}",
                 simulated.known().fold(0, |seed, frame| hash(seed, &frame.counts))

@@ -10,6 +10,7 @@ use power_model::{FramePower, pace};
 use run::{Distinct, Plan, RunError, RunFrame, area_mm2, frames_of};
 use serde::{Deserialize, Serialize};
 
+use crate::detail::{self, PassMeans};
 use crate::setting::{self, Setting};
 
 /// Result of a point.
@@ -51,6 +52,10 @@ pub struct Measured {
     pub frame_ms: f64,
     /// Energy while busy in millijoules, mean.
     pub busy_mj: f64,
+    /// `busy_mj` with all energies of the table at their low end.
+    pub busy_low_mj: f64,
+    /// `busy_mj` with all energies of the table at their high end.
+    pub busy_high_mj: f64,
     /// Energy from the start to the next start in millijoules, mean.
     pub frame_mj: f64,
     /// `frame_mj` over the pixels of a frame, in nanojoules.
@@ -61,6 +66,12 @@ pub struct Measured {
     pub area_mm2: [f64; 3],
     /// Codes of accuracy warnings of the timing level, comma-separated.
     pub accuracy_warnings: String,
+    /// Stated error of the cycles by the timing level, relative; `None` without a bound.
+    pub cycles_error: Option<f64>,
+    /// Stated error of the energy by the timing level, relative; `None` without a bound.
+    pub energy_error: Option<f64>,
+    /// Passes by name.
+    pub passes: Vec<PassMeans>,
     /// Event counts, sums.
     pub counts: EventCounts,
 }
@@ -143,17 +154,25 @@ pub fn measured(plan: &Plan, frames: &[&RunFrame]) -> Result<Measured, RunError>
     let counts = EventCounts::of(frames);
     let area = area_mm2(plan);
     let bytes = |event: Event| counts.get(event).unwrap_or(0);
+    let [low_j, high_j] = detail::energy_ends(plan, frames)?;
+    let accuracy_warnings = accuracy_warnings(frames);
+    let stated = detail::stated_error(plan.options.timing, &accuracy_warnings);
     Ok(Measured {
         used: used(plan),
         cycles,
         busy_ms: busy_s * 1e3,
         frame_ms: (paced.end_s - paced.start_s) / count * 1e3,
         busy_mj: busy_j * 1e3,
+        busy_low_mj: low_j * 1e3,
+        busy_high_mj: high_j * 1e3,
         frame_mj: frame_j * 1e3,
         nj_per_pixel: frame_j / plan.pixels() as f64 * 1e9,
         dram_bytes: bytes(Event::DramReadBytes) + bytes(Event::DramWriteBytes),
         area_mm2: [area.nominal, area.low, area.high],
-        accuracy_warnings: accuracy_warnings(frames),
+        accuracy_warnings,
+        cycles_error: stated.map(|error| error.cycles),
+        energy_error: stated.map(|error| error.energy),
+        passes: detail::passes(plan, frames),
         counts,
     })
 }
@@ -204,6 +223,14 @@ mod tests {
         assert!(
             (measured.nj_per_pixel - measured.frame_mj * 1e6 / 3072.0).abs() < 1e-9 * measured.nj_per_pixel
         );
+        let both = |bound| match outcome(&[("samples", "2"), ("bound", bound)]) {
+            Outcome::Measured(other) => other.busy_mj,
+            Outcome::Error(reason) => panic!("{reason}"),
+        };
+        let near = |a: f64, b: f64| (a / b - 1.0).abs() < 1e-9;
+        assert!(near(measured.busy_low_mj, both("low")) && near(measured.busy_high_mj, both("high")));
+        let sum = |of: fn(&PassMeans) -> f64| measured.passes.iter().map(of).sum::<f64>();
+        assert!(near(sum(|pass| pass.ms), measured.busy_ms) && near(sum(|pass| pass.mj), measured.busy_mj));
         assert!((measured.frame_ms - 1e3 / 60.0).abs() < 1e-3, "{}", measured.frame_ms);
     }
 

@@ -14,6 +14,7 @@
 
 mod axis;
 mod constraint;
+mod detail;
 mod error;
 mod execute;
 mod folder;

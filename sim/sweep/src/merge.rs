@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use activity::Event;
 use traces::io::atomic;
 
+use crate::detail::PassMeans;
 use crate::execute::{Measured, Outcome};
 use crate::parquet::{self, Column, Values};
 use crate::plan::{Plan, Point};
@@ -53,6 +54,7 @@ fn columns(plan: &Plan, rows: &[Outcome]) -> Vec<Column> {
     let used: Vec<Column> = used(rows).into_iter().filter(|used| !is_set(&used.name)).collect();
     columns.extend(used);
     columns.extend(numbers(rows));
+    columns.extend(passes(rows));
     columns.extend(counters(rows));
     let reasons = rows.iter().map(|row| match row {
         Outcome::Error(reason) => Some(reason.clone()),
@@ -115,12 +117,18 @@ fn numbers(rows: &[Outcome]) -> Vec<Column> {
         name: name.to_owned(),
         values: Values::Number(rows.iter().map(|row| measured(row).map(of)).collect()),
     };
+    let optional = |name: &str, of: fn(&Measured) -> Option<f64>| Column {
+        name: name.to_owned(),
+        values: Values::Number(rows.iter().map(|row| measured(row).and_then(of)).collect()),
+    };
     let warnings = rows.iter().map(|row| measured(row).map(|row| row.accuracy_warnings.clone())).collect();
     vec![
         whole("cycles", |row| row.cycles),
         number("busy_ms", |row| row.busy_ms),
         number("frame_ms", |row| row.frame_ms),
         number("busy_mJ", |row| row.busy_mj),
+        number("busy_low_mJ", |row| row.busy_low_mj),
+        number("busy_high_mJ", |row| row.busy_high_mj),
         number("frame_mJ", |row| row.frame_mj),
         number("energy_per_pixel_nJ", |row| row.nj_per_pixel),
         whole("dram_bytes", |row| row.dram_bytes),
@@ -128,7 +136,28 @@ fn numbers(rows: &[Outcome]) -> Vec<Column> {
         number("area_low_mm2", |row| row.area_mm2[1]),
         number("area_high_mm2", |row| row.area_mm2[2]),
         Column { name: "accuracy_warnings".to_owned(), values: Values::Text(warnings) },
+        optional("cycles_error", |row| row.cycles_error),
+        optional("energy_error", |row| row.energy_error),
     ]
+}
+
+/// Time and energy of each named pass. Rows without a pass of that name have no value.
+fn passes(rows: &[Outcome]) -> Vec<Column> {
+    let mut names: Vec<&str> = Vec::new();
+    for pass in rows.iter().filter_map(measured).flat_map(|row| &row.passes) {
+        if !names.contains(&pass.name.as_str()) {
+            names.push(&pass.name);
+        }
+    }
+    let column = |name: &str, unit: &str, of: fn(&PassMeans) -> f64| {
+        let value = |row: &Outcome| measured(row)?.passes.iter().find(|pass| pass.name == name).map(of);
+        Column {
+            name: format!("pass.{name}.{unit}"),
+            values: Values::Number(rows.iter().map(value).collect()),
+        }
+    };
+    let both = |name: &&str| [column(name, "ms", |pass| pass.ms), column(name, "mJ", |pass| pass.mj)];
+    names.iter().flat_map(both).collect()
 }
 
 /// A column for each event that a point reports.
