@@ -46,12 +46,12 @@ fn bounded(name: &str) -> bool {
         return true;
     }
     let program = std::env::current_exe().expect("the test knows its program");
-    let script = format!("ulimit -v {LIMIT_KIB} && exec \"$0\" --exact {name} --nocapture");
+    let script = format!("ulimit -v {LIMIT_KIB} && exec \"$0\" --exact machine_files::{name} --nocapture");
     let output = Command::new("sh").arg("-c").arg(script).arg(program).env(INSIDE, "1").output();
     let output = output.expect("a shell starts");
     let text =
         [output.stdout, output.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned()).concat();
-    assert!(output.status.success(), "{}: {text}", output.status);
+    assert!(output.status.success() && text.contains("1 passed"), "{}: {text}", output.status);
     false
 }
 
