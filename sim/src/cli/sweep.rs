@@ -416,6 +416,11 @@ fn print_status(out: &Path, json: bool, status: &Status) -> Result<(), Failure> 
     if json {
         return print_json(&Printed { out: out.display().to_string(), done: status }, true);
     }
-    let Status { points, finished, failed } = status;
-    print(&format!("{}: {finished} of {} finished, {failed} failed", out.display(), counted(*points, "run")))
+    let Status { points, finished, failed, screened_out } = status;
+    let screened = if *screened_out > 0 { format!(", {screened_out} screened out") } else { String::new() };
+    print(&format!(
+        "{}: {finished} of {} finished, {failed} failed{screened}",
+        out.display(),
+        counted(*points, "run")
+    ))
 }

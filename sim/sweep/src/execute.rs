@@ -30,6 +30,23 @@ pub(crate) enum Outcome {
     Measured(Box<Measured>),
     /// It failed, for this reason.
     Error(String),
+    /// It did not run, as a coarser timing level gave a reason.
+    ScreenedOut(String),
+}
+
+impl Outcome {
+    /// Whether the point ran, be it to a failure.
+    pub(crate) const fn ran(&self) -> bool {
+        !matches!(self, Self::ScreenedOut(_))
+    }
+
+    /// The numbers of a run that did not fail.
+    pub fn measured(&self) -> Option<&Measured> {
+        match self {
+            Self::Measured(measured) => Some(measured),
+            Self::Error(_) | Self::ScreenedOut(_) => None,
+        }
+    }
 }
 
 impl From<Result<Measured, String>> for Outcome {
@@ -225,7 +242,7 @@ mod tests {
         );
         let both = |bound| match outcome(&[("samples", "2"), ("bound", bound)]) {
             Outcome::Measured(other) => other.busy_mj,
-            Outcome::Error(reason) => panic!("{reason}"),
+            Outcome::Error(reason) | Outcome::ScreenedOut(reason) => panic!("{reason}"),
         };
         let near = |a: f64, b: f64| (a / b - 1.0).abs() < 1e-9;
         assert!(near(measured.busy_low_mj, both("low")) && near(measured.busy_high_mj, both("high")));

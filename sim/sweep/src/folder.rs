@@ -5,6 +5,7 @@ use std::io::{self, BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
+use timing::Level;
 use traces::io::atomic;
 
 use crate::SweepError;
@@ -24,12 +25,16 @@ struct Header {
     /// Settings of all points.
     settings: Vec<Setting>,
     points: usize,
+    /// Timing levels that screen.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    screen: Vec<Level>,
 }
 
 impl Header {
     fn of(plan: &Plan) -> Self {
-        let Plan { name, settings, points } = plan;
-        Self { schema: SCHEMA, sweep: name.clone(), settings: settings.clone(), points: points.len() }
+        let Plan { name, settings, points, screen } = plan;
+        let (settings, screen) = (settings.clone(), screen.clone());
+        Self { schema: SCHEMA, sweep: name.clone(), settings, points: points.len(), screen }
     }
 }
 
@@ -148,7 +153,7 @@ impl Folder {
                 format!("it has {} of {} points: plan the sweep again", points.len(), header.points);
             return Err(SweepError::Plan { path, message });
         }
-        Ok(Plan { name: header.sweep, settings: header.settings, points })
+        Ok(Plan { name: header.sweep, settings: header.settings, points, screen: header.screen })
     }
 
     /// File of a point, in one of 256 folders: a folder of a million files is slow.
@@ -264,6 +269,7 @@ mod tests {
     fn plan(name: &str) -> Plan {
         let point = |id: &str| Point { id: id.to_owned(), settings: vec![Setting::new("samples", "2")] };
         Plan {
+            screen: Vec::new(),
             name: name.to_owned(),
             settings: vec![Setting::new("scene", "tiny")],
             points: vec![point("aa01"), point("ab02")],

@@ -24,6 +24,7 @@ mod plan;
 mod points;
 mod report;
 mod run;
+mod screen;
 mod setting;
 mod shard;
 mod shared;

@@ -58,6 +58,7 @@ fn columns(plan: &Plan, rows: &[Outcome]) -> Vec<Column> {
     columns.extend(counters(rows));
     let reasons = rows.iter().map(|row| match row {
         Outcome::Error(reason) => Some(reason.clone()),
+        Outcome::ScreenedOut(reason) => Some(format!("screened out: {reason}")),
         Outcome::Measured(_) => None,
     });
     columns.push(Column { name: "error".to_owned(), values: Values::Text(reasons.collect()) });
@@ -89,20 +90,12 @@ fn settings(plan: &Plan) -> Vec<Column> {
     common.chain(varied).collect()
 }
 
-/// The numbers of a row; `None` if it failed.
-fn measured(row: &Outcome) -> Option<&Measured> {
-    match row {
-        Outcome::Measured(measured) => Some(measured),
-        Outcome::Error(_) => None,
-    }
-}
-
 /// Settings in use that are the same for all kinds of sweeps.
 fn used(rows: &[Outcome]) -> Vec<Column> {
     let names: Vec<&String> =
-        rows.iter().find_map(measured).map_or(Vec::new(), |first| first.used.keys().collect());
+        rows.iter().find_map(Outcome::measured).map_or(Vec::new(), |first| first.used.keys().collect());
     let column = |name: &String| {
-        let texts = rows.iter().map(|row| measured(row)?.used.get(name).cloned()).collect();
+        let texts = rows.iter().map(|row| row.measured()?.used.get(name).cloned()).collect();
         Column { name: name.clone(), values: Values::of_texts(texts) }
     };
     names.into_iter().map(column).collect()
@@ -111,17 +104,17 @@ fn used(rows: &[Outcome]) -> Vec<Column> {
 fn numbers(rows: &[Outcome]) -> Vec<Column> {
     let whole = |name: &str, of: fn(&Measured) -> u64| Column {
         name: name.to_owned(),
-        values: Values::Whole(rows.iter().map(|row| i64::try_from(of(measured(row)?)).ok()).collect()),
+        values: Values::Whole(rows.iter().map(|row| i64::try_from(of(row.measured()?)).ok()).collect()),
     };
     let number = |name: &str, of: fn(&Measured) -> f64| Column {
         name: name.to_owned(),
-        values: Values::Number(rows.iter().map(|row| measured(row).map(of)).collect()),
+        values: Values::Number(rows.iter().map(|row| row.measured().map(of)).collect()),
     };
     let optional = |name: &str, of: fn(&Measured) -> Option<f64>| Column {
         name: name.to_owned(),
-        values: Values::Number(rows.iter().map(|row| measured(row).and_then(of)).collect()),
+        values: Values::Number(rows.iter().map(|row| row.measured().and_then(of)).collect()),
     };
-    let warnings = rows.iter().map(|row| measured(row).map(|row| row.accuracy_warnings.clone())).collect();
+    let warnings = rows.iter().map(|row| row.measured().map(|row| row.accuracy_warnings.clone())).collect();
     vec![
         whole("cycles", |row| row.cycles),
         number("busy_ms", |row| row.busy_ms),
@@ -144,13 +137,13 @@ fn numbers(rows: &[Outcome]) -> Vec<Column> {
 /// Time and energy of each named pass. Rows without a pass of that name have no value.
 fn passes(rows: &[Outcome]) -> Vec<Column> {
     let mut names: Vec<&str> = Vec::new();
-    for pass in rows.iter().filter_map(measured).flat_map(|row| &row.passes) {
+    for pass in rows.iter().filter_map(Outcome::measured).flat_map(|row| &row.passes) {
         if !names.contains(&pass.name.as_str()) {
             names.push(&pass.name);
         }
     }
     let column = |name: &str, unit: &str, of: fn(&PassMeans) -> f64| {
-        let value = |row: &Outcome| measured(row)?.passes.iter().find(|pass| pass.name == name).map(of);
+        let value = |row: &Outcome| row.measured()?.passes.iter().find(|pass| pass.name == name).map(of);
         Column {
             name: format!("pass.{name}.{unit}"),
             values: Values::Number(rows.iter().map(value).collect()),
@@ -163,7 +156,7 @@ fn passes(rows: &[Outcome]) -> Vec<Column> {
 /// A column for each event that a point reports.
 fn counters(rows: &[Outcome]) -> Vec<Column> {
     let column = |event: Event| {
-        let count = |row: &Outcome| i64::try_from(measured(row)?.counts.get(event)?).ok();
+        let count = |row: &Outcome| i64::try_from(row.measured()?.counts.get(event)?).ok();
         let counts: Vec<Option<i64>> = rows.iter().map(count).collect();
         let is_reported = counts.iter().any(Option::is_some);
         is_reported.then(|| Column { name: format!("count.{}", event.name()), values: Values::Whole(counts) })
@@ -187,6 +180,7 @@ mod tests {
                 .into(),
         };
         Plan {
+            screen: Vec::new(),
             name: "a".to_owned(),
             settings: [("scene", "tiny"), ("frames", "0..1")]
                 .map(|(path, value)| Setting::new(path, value))

@@ -5,6 +5,7 @@ use std::path::Path;
 use output::dir::sha256_of_text;
 use output::progress::Progress;
 use serde::{Deserialize, Serialize};
+use timing::Level;
 
 use crate::SweepError;
 use crate::points::Points;
@@ -37,6 +38,9 @@ pub struct Plan {
     pub settings: Vec<Setting>,
     /// Points in order.
     pub points: Vec<Point>,
+    /// Timing levels that screen designs, from the coarsest; empty without screening. All points at one level come before those at
+    /// the next.
+    pub screen: Vec<Level>,
 }
 
 impl Plan {
@@ -84,7 +88,13 @@ impl Plan {
         let ids = (0..count).map(id).collect::<Result<Vec<_>, SweepError>>()?;
         let Points { common: settings, varied, .. } = points;
         let points = ids.into_iter().zip(varied).map(|(id, settings)| Point { id, settings }).collect();
-        Ok(Self { name: spec.name, settings, points })
+        Ok(Self { name: spec.name, settings, points, screen: spec.screen })
+    }
+
+    /// Points at level number `level` of [`Self::screen`]; all points without screening.
+    pub(crate) fn of_level(&self, level: usize) -> &[Point] {
+        let count = self.points.len() / self.screen.len().max(1);
+        &self.points[level * count..(level + 1) * count]
     }
 
     /// All settings of a point.

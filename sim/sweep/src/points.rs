@@ -1,6 +1,7 @@
 //! Points of a sweep: the values of its axes, combined.
 
 use pipeline::random::{mix, unit};
+use timing::Level;
 
 use crate::axis::Axis;
 use crate::setting::{Setting, Text};
@@ -23,20 +24,37 @@ impl Points {
     /// Place in the file and message: a constraint compares values that do not fit, or no point is left.
     pub fn new(spec: &SweepSpec, quick: bool) -> Result<Self, (String, String)> {
         let once = kept(spec, spec.base(quick))?;
-        if spec.repetitions == 1 {
-            return Ok(once);
+        Ok(once.repeated(spec.repetitions).at_levels(&spec.screen))
+    }
+
+    /// Each point with one seed after another.
+    fn repeated(self, repetitions: u32) -> Self {
+        if repetitions == 1 {
+            return self;
         }
-        let Self { mut common, varied, idle } = once;
+        let Self { mut common, varied, idle } = self;
         let seed = common.iter().find(|setting| setting.path == "seed");
         let first: u64 = seed.and_then(|seed| seed.value.parse().ok()).unwrap_or(1);
         common.retain(|setting| setting.path != "seed");
-        let seeds = (0..u64::from(spec.repetitions)).map(|repetition| first.wrapping_add(repetition));
+        let seeds = (0..u64::from(repetitions)).map(|repetition| first.wrapping_add(repetition));
         let repeated = |varied: Vec<Setting>| {
             let with =
                 move |seed: u64| [varied.clone(), vec![Setting::new("seed", seed.to_string())]].concat();
             seeds.clone().map(with)
         };
-        Ok(Self { varied: varied.into_iter().flat_map(repeated).collect(), common, idle })
+        Self { varied: varied.into_iter().flat_map(repeated).collect(), common, idle }
+    }
+
+    /// All points at the first level, then all of them at the next.
+    fn at_levels(self, levels: &[Level]) -> Self {
+        if levels.is_empty() {
+            return self;
+        }
+        let at = |level: &Level| {
+            let timing = Setting::new("timing", level.name());
+            self.varied.iter().map(move |point| [point.as_slice(), std::slice::from_ref(&timing)].concat())
+        };
+        Self { varied: levels.iter().flat_map(at).collect(), ..self }
     }
 
     /// All settings of point `at`.

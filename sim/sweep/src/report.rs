@@ -233,7 +233,7 @@ mod tests {
         let paths = ["gpu.a.queue", "gpu.b.queue", "gpu.core_hz"];
         let settings = paths.map(|path| Setting::new(path, "1")).into();
         let points = vec![Point { id: String::new(), settings }];
-        let plan = Plan { name: String::new(), settings: Vec::new(), points };
+        let plan = Plan { name: String::new(), settings: Vec::new(), points, screen: Vec::new() };
         let names: Vec<&str> = short_names(&plan).into_values().collect();
         assert_eq!(names, ["gpu.a.queue", "gpu.b.queue", "core_hz"]);
     }

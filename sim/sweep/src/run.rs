@@ -12,6 +12,7 @@ use serde::Serialize;
 use crate::execute::{Outcome, PointResult};
 use crate::folder::Stored;
 use crate::plan::{Plan, Point};
+use crate::screen::{note, screened};
 use crate::shared::{Costs, Group, groups};
 use crate::{Folder, Shard, SweepError};
 
@@ -50,6 +51,8 @@ pub struct Status {
     pub finished: usize,
     /// Points that failed.
     pub failed: usize,
+    /// Points that a coarser timing level left out.
+    pub screened_out: usize,
 }
 
 impl Status {
@@ -66,6 +69,7 @@ impl Status {
                 Stored::Whole(result) => {
                     status.finished += 1;
                     status.failed += usize::from(matches!(result.outcome, Outcome::Error(_)));
+                    status.screened_out += usize::from(!result.outcome.ran());
                 }
                 Stored::Damaged(message) => damaged.push(message),
                 Stored::Missing => {}
@@ -93,7 +97,12 @@ impl<'a> Work<'a> {
     /// # Errors
     /// If a result cannot be read.
     pub fn new(plan: &'a Plan, folder: &'a Folder, shard: Shard, retry: bool) -> Result<Self, SweepError> {
-        let points = plan.points.iter().enumerate();
+        if !plan.screen.is_empty() && !shard.is_whole() {
+            let message = "a sweep that screens runs as one task, as a level needs all results of the one before: leave --shard out";
+            return Err(SweepError::Shard(message.to_owned()));
+        }
+        // Finer levels begin when it is known which designs are left.
+        let points = plan.of_level(0).iter().enumerate();
         let points: Vec<&Point> = points.filter(|(at, _)| shard.has(*at)).map(|(_, point)| point).collect();
         let mut damaged = Vec::new();
         let mut is_pending = |point: &Point| match folder.stored(point)? {
@@ -106,7 +115,8 @@ impl<'a> Work<'a> {
         };
         let keep = |point: &&'a Point| is_pending(point).map(|keep| keep.then_some(*point)).transpose();
         let pending = points.iter().filter_map(keep).collect::<Result<Vec<_>, SweepError>>()?;
-        Ok(Self { plan, folder, runs: points.len(), pending, damaged, stop: &|| false })
+        let runs = if plan.screen.is_empty() { points.len() } else { plan.points.len() };
+        Ok(Self { plan, folder, runs, pending, damaged, stop: &|| false })
     }
 
     /// The same work; [`Self::run`] begins no further point once `stop` holds.
@@ -125,14 +135,57 @@ impl<'a> Work<'a> {
     }
 
     /// Runs all pending points on the current pool, those with equal drawings together. Each result is on disk, whole, before it
-    /// counts; a point that fails is a result with a reason. The first groups are the probe for the expected time. The state is that
-    /// of the shard; points are left over if the work was to stop.
+    /// counts; a point that fails is a result with a reason. The first groups are the probe for the expected time. In a sweep that
+    /// screens, one level after the other runs, each on the designs that the one before has left. The state is that of the
+    /// shard; points are left over if the work was to stop.
     ///
     /// # Errors
     /// If a result cannot be written. Those that were written stay.
     pub fn run(&self, progress: &Progress) -> Result<Status, SweepError> {
-        let count = self.pending.len();
         self.damaged.iter().for_each(|message| progress.note(message));
+        let status = if self.plan.screen.is_empty() {
+            let (done, failed) = self.run_points(&self.pending, progress)?;
+            Status {
+                points: self.runs,
+                finished: self.runs - self.pending.len() + done,
+                failed,
+                screened_out: 0,
+            }
+        } else {
+            self.run_levels(progress)?;
+            Status::of(self.folder)?.0
+        };
+        if self.runs == self.plan.points.len() {
+            self.folder.clean()?;
+        }
+        Ok(status)
+    }
+
+    /// Runs level after level.
+    fn run_levels(&self, progress: &Progress) -> Result<(), SweepError> {
+        self.run_points(&self.pending, progress)?;
+        for fine in 1..self.plan.screen.len() {
+            let screened = loop {
+                let screened = screened(self.plan, self.folder, fine)?;
+                if screened.pending.is_empty() || (self.stop)() {
+                    break screened;
+                }
+                self.run_points(&screened.pending, progress)?;
+            };
+            if (self.stop)() {
+                return Ok(());
+            }
+            progress.note(&note(self.plan.screen[fine - 1], self.plan.screen[fine], &screened));
+            for (point, outcome) in screened.dropped {
+                self.folder.write_result(point, &PointResult { id: point.id.clone(), outcome })?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Runs points; returns how many are done, and how many of them failed.
+    fn run_points(&self, points: &[&Point], progress: &Progress) -> Result<(usize, usize), SweepError> {
+        let count = points.len();
         progress.note(&format!("{count} of {} runs to do", self.runs));
         let started = Instant::now();
         let (done, failed) = (AtomicUsize::new(0), AtomicUsize::new(0));
@@ -146,7 +199,7 @@ impl<'a> Work<'a> {
             progress.note(&line(point, &result, (done, count), left_s(done)));
             Ok::<(), SweepError>(())
         };
-        let groups = groups(&self.pending);
+        let groups = groups(points);
         let (first, others) = groups.split_at(groups.len().min(PROBE_GROUPS));
         let run = |group: &Group<'_>| group.run(self.plan, self.stop, &record);
         first.iter().try_for_each(run)?;
@@ -158,11 +211,7 @@ impl<'a> Work<'a> {
             progress.note(&Expected { runs: self.runs, pending: count - finished, host_s }.line());
         }
         others.par_iter().try_for_each(run)?;
-        if self.runs == self.plan.points.len() {
-            self.folder.clean()?;
-        }
-        let finished = self.runs - count + done.into_inner();
-        Ok(Status { points: self.runs, finished, failed: failed.into_inner() })
+        Ok((done.into_inner(), failed.into_inner()))
     }
 }
 
@@ -175,6 +224,7 @@ fn line(point: &Point, result: &PointResult, (done, count): (usize, usize), left
             format!("{} cycles, {}", measured.cycles, si(measured.frame_mj * 1e-3, "J"))
         }
         Outcome::Error(reason) => format!("failed: {reason}"),
+        Outcome::ScreenedOut(reason) => format!("screened out: {reason}"),
     };
     let left = if done < count { format!(" ({} left)", duration(left_s)) } else { String::new() };
     format!("{done}/{count} {}: {outcome}{left}", settings.join(" "))

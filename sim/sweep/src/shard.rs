@@ -79,6 +79,11 @@ impl Shard {
         Ok(Self { index: number(task, text)? % count, count })
     }
 
+    /// Whether it is all points.
+    pub(crate) const fn is_whole(self) -> bool {
+        self.count == 1
+    }
+
     /// Whether point `index` belongs to it.
     pub(crate) const fn has(self, index: usize) -> bool {
         index % self.count == self.index

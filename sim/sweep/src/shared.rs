@@ -239,7 +239,12 @@ mod tests {
             settings: settings(pairs),
         };
         let points = SETTINGS.iter().enumerate().map(point).collect();
-        Plan { name: "a".to_owned(), settings: settings(&[("scene", "tiny"), ("frames", "0..2")]), points }
+        Plan {
+            name: "a".to_owned(),
+            settings: settings(&[("scene", "tiny"), ("frames", "0..2")]),
+            points,
+            screen: Vec::new(),
+        }
     }
 
     #[test]

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use activity::spec;
 use serde::Deserialize;
+use timing::Level;
 
 use crate::SweepError;
 use crate::axis::Axis;
@@ -43,6 +44,9 @@ pub struct SweepSpec {
     /// Number of runs of each point, with one seed after another.
     #[serde(default = "one")]
     pub repetitions: u32,
+    /// Timing levels, from the coarsest: designs that one of them shows to be far from the frontier do not run at the next.
+    #[serde(default)]
+    pub screen: Vec<Level>,
     /// Combinations that are left out: a point with all values of an entry.
     #[serde(default)]
     pub forbidden: Vec<BTreeMap<String, Text>>,
@@ -138,6 +142,7 @@ impl SweepSpec {
                 .try_for_each(|path| check_path(path))
                 .map_err(|error| (place.to_owned(), error))?;
         }
+        self.check_screen()?;
         self.check_axes()?;
         self.check_forbidden()?;
         self.parsed_constraints()?;
@@ -160,6 +165,23 @@ impl SweepSpec {
             );
         }
         Ok(())
+    }
+
+    fn check_screen(&self) -> Result<(), (String, String)> {
+        let wrong = |message: &str| Err(("screen".to_owned(), message.to_owned()));
+        let sets_timing =
+            [&self.settings, &self.quick].iter().any(|settings| settings.contains_key("timing"));
+        match self.screen.as_slice() {
+            [] => Ok(()),
+            [_] => wrong("one level screens nothing: give two or three, such as [bound, packet]"),
+            levels if !levels.is_sorted_by(|coarse, fine| coarse > fine) => {
+                wrong("levels go from the coarsest to the finest: bound, packet, stepped")
+            }
+            _ if sets_timing || self.paths().any(|path| path == "timing") => {
+                wrong("it sets `timing`, which is also set elsewhere: leave that out")
+            }
+            _ => Ok(()),
+        }
     }
 
     fn check_axes(&self) -> Result<(), (String, String)> {

@@ -1,0 +1,315 @@
+//! Screening: designs that a coarse timing level shows to be far from the frontier are not run at the finer ones.
+//!
+//! Levels differ in time and energy by a factor that varies from design to design. Some designs, chosen by their ids, run at both
+//! levels. A design is dropped if another one is better in both by more than the range of these factors: within it the order may
+//! turn. Designs that are kept add to the range, and where it grows more of them are kept. For designs like those that ran at
+//! both levels, a further one is outside of a range of `n` with a probability of 2 / (n + 1) (conformal prediction, Vovk, Gammerman
+//! and Shafer 2005).
+
+use std::collections::{BTreeMap, HashSet};
+
+use timing::Level;
+
+use crate::execute::{Measured, Outcome};
+use crate::plan::{Plan, Point};
+use crate::{Folder, SweepError};
+
+/// Number of designs of a workload that run at both levels whatever they cost.
+const CALIBRATED: usize = 8;
+
+/// Logarithms of busy time and busy energy.
+type Cost = [f64; 2];
+
+fn cost(measured: &Measured) -> Cost {
+    [measured.busy_ms, measured.busy_mj].map(libm::log)
+}
+
+/// A design at two levels.
+#[derive(Clone, Copy, Debug)]
+struct Design<'a> {
+    /// The point at the fine level.
+    point: &'a Point,
+    /// Its cost at the coarse level; `None` if it failed there or was dropped before.
+    coarse: Option<Cost>,
+    /// Its cost at the fine level; `None` if it did not run there, or failed.
+    fine: Option<Cost>,
+}
+
+/// Range of the factors between two levels, as a difference of logarithms; `None` with fewer than two designs at both.
+fn range(designs: &[Design<'_>]) -> Option<Cost> {
+    let both: Vec<Cost> = designs
+        .iter()
+        .filter_map(|design| Some((design.coarse?, design.fine?)))
+        .map(|(coarse, fine)| [0, 1].map(|of| fine[of] - coarse[of]))
+        .collect();
+    let ends = |of: usize| {
+        let factors = both.iter().map(|factor| factor[of]);
+        let [low, high] = [f64::min, f64::max].map(|end| factors.clone().reduce(end));
+        Some(high? - low?)
+    };
+    if both.len() < 2 { None } else { Some([ends(0)?, ends(1)?]) }
+}
+
+/// Whether `design` may be on the frontier of the fine level, if factors vary by `range`.
+fn may_be_optimal(design: &Design<'_>, designs: &[Design<'_>], range: Cost) -> bool {
+    let Some(cost) = design.coarse else { return false };
+    let is_far_better = |other: &Cost| (0..2).all(|of| other[of] + range[of] < cost[of]);
+    !designs.iter().filter_map(|other| other.coarse).any(|other| is_far_better(&other))
+}
+
+/// Designs of one workload that run at the fine level: those to calibrate, and those that may be on its frontier.
+fn kept<'a>(designs: &[Design<'a>]) -> Vec<&'a Point> {
+    let mut known: Vec<&Design<'_>> = designs.iter().filter(|design| design.coarse.is_some()).collect();
+    known.sort_by(|a, b| a.point.id.cmp(&b.point.id));
+    let calibrated: Vec<&str> =
+        known.iter().take(CALIBRATED).map(|design| design.point.id.as_str()).collect();
+    let range = range(designs);
+    let is_kept = |design: &&Design<'_>| {
+        let is_calibrated = design.coarse.is_some() && calibrated.contains(&design.point.id.as_str());
+        is_calibrated || range.is_some_and(|range| may_be_optimal(design, designs, range))
+    };
+    designs.iter().filter(is_kept).map(|design| design.point).collect()
+}
+
+/// Points of the level `fine` of a plan, by whether they have to run by what is known of the coarser level.
+pub(crate) struct Screened<'a> {
+    /// Number of points that have to run.
+    pub kept: usize,
+    /// Those of them that have not.
+    pub pending: Vec<&'a Point>,
+    /// Others, with the reason.
+    pub dropped: Vec<(&'a Point, Outcome)>,
+    /// Ranges of time and energy by workload, for notes.
+    pub ranges: BTreeMap<String, [f64; 2]>,
+}
+
+/// Screens the points of level number `fine` of the plan by those of the level before.
+///
+/// # Errors
+/// If a result cannot be read.
+pub(crate) fn screened<'a>(plan: &'a Plan, folder: &Folder, fine: usize) -> Result<Screened<'a>, SweepError> {
+    let (mut workloads, mut ran) = (BTreeMap::<String, Vec<Design<'a>>>::new(), HashSet::new());
+    for (coarse, point) in plan.of_level(fine - 1).iter().zip(plan.of_level(fine)) {
+        let outcome = |point: &Point| folder.result(point).map(|result| result.map(|result| result.outcome));
+        let of = |outcome: Option<&Outcome>| outcome.and_then(Outcome::measured).map(cost);
+        let (coarse, fine) = (outcome(coarse)?, outcome(point)?);
+        if fine.as_ref().is_some_and(Outcome::ran) {
+            ran.insert(point.id.as_str());
+        }
+        let design = Design { point, coarse: of(coarse.as_ref()), fine: of(fine.as_ref()) };
+        workloads.entry(workload(point)).or_default().push(design);
+    }
+    let name = plan.screen[fine - 1].name();
+    let mut all = Screened { kept: 0, pending: Vec::new(), dropped: Vec::new(), ranges: BTreeMap::new() };
+    for (workload, designs) in workloads {
+        let kept = kept(&designs);
+        let ids: HashSet<&str> = kept.iter().map(|point| point.id.as_str()).collect();
+        let dropped = designs.iter().filter(|design| !ids.contains(design.point.id.as_str()));
+        let reason = |design: &Design<'_>| match design.coarse {
+            Some(_) => {
+                format!("at `{name}` another design is better in time and energy by more than levels differ")
+            }
+            None => format!("it did not run at `{name}`"),
+        };
+        all.dropped.extend(dropped.map(|design| (design.point, Outcome::ScreenedOut(reason(design)))));
+        all.ranges.extend(range(&designs).map(|range| (workload, range)));
+        all.kept += kept.len();
+        all.pending.extend(kept.into_iter().filter(|point| !ran.contains(point.id.as_str())));
+    }
+    Ok(all)
+}
+
+/// What designs are compared under: all settings that are neither of the hardware nor the level.
+fn workload(point: &Point) -> String {
+    let settings = point.settings.iter().filter(|set| !set.is_of_design() && set.path != "timing");
+    settings.map(|set| format!("{}={}", set.path, set.value)).collect::<Vec<_>>().join(", ")
+}
+
+/// Note about a finished level.
+pub(crate) fn note(coarse: Level, fine: Level, screened: &Screened<'_>) -> String {
+    let most = |of: usize| screened.ranges.values().map(|range| range[of]).fold(0.0, f64::max);
+    let [time, energy] = [0, 1].map(|of| 100.0 * (libm::exp(most(of)) - 1.0));
+    let (kept, all) = (screened.kept, screened.kept + screened.dropped.len());
+    format!(
+        "{kept} of {all} designs ran at {}: it differs from {} by a factor that varies by {time:.2} % in time and {energy:.2} % in energy",
+        fine.name(),
+        coarse.name()
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::HashMap;
+
+    use output::progress::Progress;
+
+    use super::*;
+    use crate::{Shard, Status, Work};
+
+    fn points(count: usize) -> Vec<Point> {
+        let point = |number: usize| Point { id: format!("{:03}", (number * 37) % 101), settings: Vec::new() };
+        (0..count).map(point).collect()
+    }
+
+    /// Costs on a circle and outside of it, with a factor between levels that varies by at most `range`.
+    fn designs(points: &[Point], range: f64) -> Vec<(Cost, Cost)> {
+        let unit = |number: usize, salt: u64| {
+            pipeline::random::unit(pipeline::random::mix(number as u64 * 7 + salt))
+        };
+        let one = |(number, _): (usize, &Point)| {
+            let angle = unit(number, 1) * std::f64::consts::FRAC_PI_2;
+            let out = 1.0 - 0.5 * unit(number, 2).powi(3);
+            let fine = [1.0 - out * angle.cos(), 1.0 - out * angle.sin()];
+            let factor = |salt| 0.3 + range * (unit(number, salt) - 0.5);
+            ([fine[0] - factor(3), fine[1] - factor(4)], fine)
+        };
+        points.iter().enumerate().map(one).collect()
+    }
+
+    /// Runs until no more designs are kept; returns them.
+    fn run<'a>(points: &'a [Point], costs: &[(Cost, Cost)]) -> Vec<&'a str> {
+        let mut ran: Vec<bool> = vec![false; points.len()];
+        loop {
+            let design = |(at, point): (usize, &'a Point)| Design {
+                point,
+                coarse: Some(costs[at].0),
+                fine: ran[at].then_some(costs[at].1),
+            };
+            let designs: Vec<Design<'a>> = points.iter().enumerate().map(design).collect();
+            let kept: Vec<&str> = kept(&designs).iter().map(|point| point.id.as_str()).collect();
+            let next: Vec<bool> = points
+                .iter()
+                .zip(&ran)
+                .map(|(point, ran)| *ran || kept.contains(&point.id.as_str()))
+                .collect();
+            if next == ran {
+                return points
+                    .iter()
+                    .zip(ran)
+                    .filter(|(_, ran)| *ran)
+                    .map(|(point, _)| point.id.as_str())
+                    .collect();
+            }
+            ran = next;
+        }
+    }
+
+    fn frontier<'a>(points: &'a [Point], costs: &[(Cost, Cost)]) -> Vec<&'a str> {
+        let fine = |at: usize| costs[at].1;
+        let dominated =
+            |at: usize| (0..points.len()).any(|other| (0..2).all(|of| fine(other)[of] < fine(at)[of]));
+        (0..points.len()).filter(|&at| !dominated(at)).map(|at| points[at].id.as_str()).collect()
+    }
+
+    /// Designs of a small GPU: clocks, rates and queues.
+    const DESIGNS: &str = r#"
+        name: "designs",
+        settings: {"scene": "SCENE", "frames": (0, 1), "size": SIZE, "samples": 2LEVEL},
+        axes: [
+            Values(path: "gpu.core_hz", values: [200e6, 400e6, 800e6]),
+            Values(path: "gpu.units.dram.channels", values: [1, 2, 4]),
+            Values(path: "gpu.units.shader.cores", values: [1, 2, 4]),
+            Values(path: "gpu.units.traversal.rates.tiles_visited", values: [0.25, 0.5, 1, 2]),
+            Values(path: "gpu.units.depth.queue", values: [4, 16]),
+        ],
+    "#;
+
+    /// Plan of these designs with further fields, run in a folder: costs by settings without the level, at the last level.
+    fn costs(scene: &str, size: &str, more: &str) -> (HashMap<String, Cost>, Status, f64) {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("designs.ron");
+        // Without screening all designs run at the finest level.
+        let level = if more.is_empty() { ", \"timing\": \"stepped\"" } else { "" };
+        let text = DESIGNS.replace("SCENE", scene).replace("SIZE", size).replace("LEVEL", level);
+        std::fs::write(&file, format!("({text}{more})")).unwrap();
+        let plan = Plan::load(&file, false, None).unwrap();
+        let into = Folder::at(folder.path().join("out"));
+        into.write_plan(&plan).unwrap();
+        let started = cpu_time::ProcessTime::now();
+        let work = Work::new(&plan, &into, Shard::default(), false).unwrap();
+        let status = work.run(&Progress::new(true)).unwrap();
+        let host_s = started.elapsed().as_secs_f64();
+        let last = plan.of_level(plan.screen.len().max(1) - 1);
+        let of = |point: &Point| {
+            let settings = point.settings.iter().filter(|set| set.path != "timing");
+            let name =
+                settings.map(|set| format!("{}={}", set.path, set.value)).collect::<Vec<_>>().join(" ");
+            Some((name, cost(into.result(point).unwrap()?.outcome.measured()?)))
+        };
+        (last.iter().filter_map(of).collect(), status, host_s)
+    }
+
+    /// Share of the true frontier that screening has found, and by how much a frontier design at worst lost.
+    fn recall(screened: &HashMap<String, Cost>, truth: &HashMap<String, Cost>) -> (f64, f64) {
+        let is_better = |a: &Cost, b: &Cost| (0..2).all(|of| a[of] <= b[of]) && a != b;
+        let optimal: Vec<(&String, &Cost)> =
+            truth.iter().filter(|(_, cost)| !truth.values().any(|other| is_better(other, cost))).collect();
+        let found = optimal.iter().filter(|(name, _)| screened.contains_key(*name)).count();
+        // How far the nearest design found is behind one of the frontier, in the worse of time and energy.
+        let behind = |cost: &Cost| {
+            let lost = |other: &Cost| (0..2).map(|of| other[of] - cost[of]).fold(f64::MIN, f64::max);
+            screened.values().map(lost).fold(f64::INFINITY, f64::min).max(0.0)
+        };
+        let regret = optimal.iter().map(|(_, cost)| behind(cost)).fold(0.0, f64::max);
+        (found as f64 / optimal.len() as f64, libm::exp(regret) - 1.0)
+    }
+
+    #[test]
+    fn screening_finds_the_frontier_of_all_designs_with_fewer_runs() {
+        let (truth, ..) = costs("tiny", "(32, 24)", "");
+        let (screened, status, _) = costs("tiny", "(32, 24)", "screen: [bound, packet, stepped],");
+        let (recall, regret) = recall(&screened, &truth);
+        println!(
+            "recall {recall:.3}, regret {regret:.4}, {} of {} at the last level",
+            screened.len(),
+            truth.len()
+        );
+        assert_eq!((status.finished, status.failed), (3 * truth.len(), 0));
+        assert!(status.screened_out > 0 && screened.len() < truth.len() / 2);
+        assert!(recall == 1.0 && regret == 0.0);
+    }
+
+    #[test]
+    #[ignore = "takes minutes; prints the numbers of docs/guide/sweeps.md"]
+    fn screening_of_a_larger_frame() {
+        for (scene, size) in [("default", "(320, 180)"), ("tiny", "(64, 48)")] {
+            let (truth, _, all_s) = costs(scene, size, "");
+            let (screened, _, screened_s) = costs(scene, size, "screen: [bound, packet, stepped],");
+            let (recall, regret) = recall(&screened, &truth);
+            println!(
+                "{scene}: {} designs, recall {recall:.3}, regret {regret:.4}, {} at stepped, {:.1} % of the time",
+                truth.len(),
+                screened.len(),
+                100.0 * screened_s / all_s
+            );
+        }
+    }
+
+    #[test]
+    fn the_frontier_is_kept_where_factors_stay_within_their_range() {
+        let points = points(100);
+        for range in [0.0, 0.01, 0.05] {
+            let costs = designs(&points, range);
+            let (kept, frontier) = (run(&points, &costs), frontier(&points, &costs));
+            assert!(frontier.iter().all(|id| kept.contains(id)), "{range}: {frontier:?}, {kept:?}");
+            assert!(kept.len() < 60, "{range}: {} kept", kept.len());
+        }
+    }
+
+    #[test]
+    fn a_design_that_only_the_coarse_level_slanders_is_lost() {
+        // The best design by far, at a coarse level that finds it the worst; all others agree.
+        let points = points(100);
+        let mut costs = designs(&points, 0.0);
+        let last = (0..100).max_by_key(|&at| points[at].id.clone()).unwrap();
+        costs[last] = ([2.0, 2.0], [-1.0, -1.0]);
+        assert!(!run(&points, &costs).contains(&points[last].id.as_str()));
+    }
+
+    #[test]
+    fn designs_that_failed_before_are_not_kept() {
+        let points = points(3);
+        let design = |point| Design { point, coarse: None, fine: None };
+        assert!(kept(&points.iter().map(design).collect::<Vec<_>>()).is_empty());
+    }
+}
