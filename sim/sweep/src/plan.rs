@@ -110,11 +110,18 @@ fn refused(refusal: Refusal, spec: &SweepSpec, (file, text): (&str, &str), point
     let of_workload = message.strip_prefix("set: ");
     let message = of_workload.or(message.strip_prefix("--set ")).unwrap_or(&message).to_owned();
     let begins = |setting: &Setting| {
-        let name = setting.path.strip_prefix("workload.").unwrap_or(&setting.path);
-        let rest = message.strip_prefix(&setting.path).or_else(|| message.strip_prefix(name));
+        let option = setting.path.strip_prefix("workload.").unwrap_or(match &*setting.path {
+            "lens_radius" => "lens",
+            "frame_rate_hz" => "rate",
+            path => path,
+        });
+        let rest = message.strip_prefix(&setting.path).or_else(|| message.strip_prefix(option));
         rest.is_some_and(|rest| rest.starts_with(['=', ':']))
     };
-    let quotes = |setting: &Setting| message.contains(&format!("`{}`", setting.value));
+    let quotes = |setting: &Setting| {
+        let Setting { value, .. } = setting;
+        message.contains(&format!("`{value}`")) || message.starts_with(&format!("{value}: "))
+    };
     let first = points.settings(0);
     let named = first.iter().find(|setting| begins(setting)).map(|setting| setting.path.clone());
     let path = path.or_else(|| {
@@ -194,7 +201,12 @@ mod tests {
                 "sweep.ron:1: axes[0]: samples: `x`: it is not a whole number",
             ),
             ("Values(path: \"timing\", values: [\"boundd\"])", "did you mean `bound`?"),
-            ("Values(path: \"workload.bins\", values: [8])", "only workloads have options"),
+            (
+                "Values(path: \"workload.bins\", values: [8])",
+                "`workload.bins`: `tiny` is a scene; only workloads have options",
+            ),
+            ("Values(path: \"lens_radius\", values: [-1])", "lens: -1: the radius of the lens"),
+            ("Values(path: \"gpu\", values: [\"none.ron\"])", "`gpu`: none.ron: cannot read it"),
             ("Values(path: \"platform.units.shade.idle_unit_w\", values: [0])", "did you mean `shader`?"),
             ("Values(path: \"table.rows.draws.nominal_pi\", values: [200])", "did you mean `nominal_pj`?"),
         ] {

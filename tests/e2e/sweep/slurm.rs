@@ -162,6 +162,46 @@ fn points() -> String {
         .replace("axes: [", "repetitions: 6, axes: [")
 }
 
+/// A program called `sbatch` in place of Slurm.
+#[test]
+fn both_scripts_are_submitted_or_the_message_of_sbatch_is_shown() {
+    let inputs = Inputs::new();
+    let (file, out, bin) = (inputs.put("tiles.ron", SWEEP), inputs.path("out"), inputs.path("bin"));
+    fs::create_dir(&bin).unwrap();
+    let submit = |sbatch: Option<&str>| {
+        if let Some(script) = sbatch {
+            let path = Path::new(&bin).join("sbatch");
+            fs::write(&path, format!("#!/bin/sh\necho \"$@\" >> '{bin}/log'\n{script}\n")).unwrap();
+            let executable = std::os::unix::fs::PermissionsExt::from_mode(0o755);
+            fs::set_permissions(&path, executable).unwrap();
+        }
+        let mut command = Command::new(env!("CARGO_BIN_EXE_quintile"));
+        let path = if sbatch.is_some() { format!("{bin}:/usr/bin:/bin") } else { bin.clone() };
+        command.args(["sweep", "slurm", &file, "--out", &out, "--submit"]).env("PATH", path).output().unwrap()
+    };
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    let missing = submit(None);
+    assert_eq!(missing.status.code(), Some(1));
+    assert!(text(&missing.stderr).contains("leave out --submit"), "{}", text(&missing.stderr));
+    let both = submit(Some("echo '17;cluster'"));
+    assert!(
+        text(&both.stdout).contains("submitted as job 17, and job 17 to merge"),
+        "{}",
+        text(&both.stdout)
+    );
+    let log = fs::read_to_string(Path::new(&bin).join("log")).unwrap();
+    let expected = format!("--parsable {out}/array.sh\n--parsable --dependency=afterany:17 {out}/merge.sh\n");
+    assert_eq!(log, expected);
+    let refused =
+        submit(Some("case \"$*\" in *merge*) echo 'no such partition' >&2; exit 1;; esac; echo 18"));
+    assert_eq!(refused.status.code(), Some(1));
+    for says in ["no such partition", "the array is submitted as job 18"] {
+        assert!(text(&refused.stderr).contains(says), "{}", text(&refused.stderr));
+    }
+    let other = submit(Some("echo hello"));
+    assert!(text(&other.stderr).contains("it printed `hello`"), "{}", text(&other.stderr));
+}
+
 #[test]
 #[cfg_attr(not(slurm), ignore = "Slurm and munge are not installed")]
 fn a_cluster_merges_to_the_bytes_of_a_local_run_though_a_task_is_killed_and_one_requeued() {
