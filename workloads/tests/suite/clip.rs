@@ -29,7 +29,7 @@ fn planes_across_the_image_leave_a_part_of_it_bit_for_bit() {
     for (more, x, y) in [
         ("x: (0.25, 0.5)", [24, 48], [0, 54]),
         ("y: (0.5, 1)", [0, 96], [27, 54]),
-        ("x: (0.375, 1), y: (0, 0.5)", [36, 96], [0, 27]),
+        ("x: (0.25, 1), y: (0, 0.5)", [24, 96], [0, 27]),
     ] {
         let part = image(&format!(", visible: ({more})"));
         let inside = |at: usize| (x[0]..x[1]).contains(&(at % 96)) && (y[0]..y[1]).contains(&(at / 96));
