@@ -35,6 +35,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod bound;
 mod error;
 mod model;
 mod pacing;
@@ -45,6 +46,7 @@ mod structure;
 mod system;
 mod table;
 
+pub use bound::Bound;
 pub use error::{ModelError, PacingError, PlatformError, TableError, TimelineError};
 pub use model::{FramePower, PowerModel};
 pub use pacing::{PacedFrame, Pacing, Run, pace};
@@ -62,4 +64,4 @@ pub use structure::{
     Structure, madds,
 };
 pub use system::{Cause, Circumstances, Pulse, Surrounded, SurroundedFrame, overlay};
-pub use table::{Bound, EnergyRow, EnergyTable, Entry, Supply};
+pub use table::{EnergyRow, EnergyTable, Entry, Supply};

@@ -2,12 +2,13 @@
 
 use activity::{Bin, Counts, Event, Timeline, Unit};
 
+use crate::bound::Bound;
 use crate::error::{ModelError, TimelineError};
 use crate::parts::{Energy, PARTS, Part};
 use crate::platform::Platform;
 use crate::quantity::Watts;
 use crate::structure::Scaling;
-use crate::table::{Bound, EnergyRow, EnergyTable, Supply};
+use crate::table::{EnergyRow, EnergyTable, Supply};
 
 /// An energy table and a platform, with voltages applied.
 #[derive(Clone, Debug, PartialEq)]

@@ -3,27 +3,15 @@
 use std::path::Path;
 
 use activity::{Event, spec};
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 
 use crate::TableError;
+use crate::bound::Bound;
 use crate::quantity::{Basis, Nanometres, Picojoules, Source, Volts};
 use crate::structure::Scaling;
 
 /// Built-in tables by name.
 const BUILTIN: [(&str, &str); 1] = [("28nm", include_str!("../tables/28nm.ron"))];
-
-/// End of the interval of each row.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Bound {
-    /// Smallest energies that the sources allow.
-    Low,
-    /// Nominal energies.
-    #[default]
-    Nominal,
-    /// Largest energies that the sources allow.
-    High,
-}
 
 /// Entry of one event.
 #[derive(Clone, Debug, PartialEq)]

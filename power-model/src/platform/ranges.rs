@@ -3,8 +3,8 @@
 use serde::Deserialize;
 
 use super::Platform;
+use crate::bound::Bound;
 use crate::quantity::{Ratio, Source, Watts};
-use crate::table::Bound;
 
 /// Range of numbers that are uncertain for one reason and so are off together, as multiples of those in the file.
 #[derive(Clone, Debug, PartialEq, Deserialize)]

@@ -3,8 +3,8 @@
 use activity::Unit;
 
 use super::{Platform, UnitPower};
+use crate::bound::Bound;
 use crate::structure::Scaling;
-use crate::table::Bound;
 
 /// Share of the leakage that is left between frames, of a platform that does not say it: power gating leaves memories and what is
 /// always on.

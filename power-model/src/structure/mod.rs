@@ -8,7 +8,7 @@ mod weights;
 use activity::{Event, Unit};
 use serde::Serialize;
 
-use crate::table::Bound;
+use crate::bound::Bound;
 
 pub use self::logic::{LANE_MADDS, REGISTER_BYTES, madds};
 pub use self::scaling::Scaling;

@@ -1,16 +1,11 @@
 //! Hardware of a GPU: the structure that its file describes, its area, and its power beside that of the GPU of the platform.
 
-use std::collections::BTreeMap;
-
 use activity::{Event, Unit};
 use pipeline::CacheSpec;
-use power_model::{
-    Charge, Estimate, LANE_MADDS, Memory, Platform, PowerModel, REGISTER_BYTES, Scaling, Structure, madds,
-};
-use serde::Serialize;
+use power_model::{Charge, LANE_MADDS, Memory, Platform, REGISTER_BYTES, Scaling, Structure, madds};
 use timing::{Clock, Common, LINE_BYTES};
 
-use crate::{GpuError, GpuSpec, Plan};
+use crate::{GpuError, GpuSpec};
 
 /// Bytes of a line.
 const LINE: f64 = LINE_BYTES as f64;
@@ -26,11 +21,6 @@ const KB: f64 = 1024.0;
 const STATED_LLC_BYTES: f64 = 4096.0 * KB;
 /// The same of the embedded DRAM.
 const STATED_EDRAM_BYTES: f64 = 131_072.0 * KB;
-
-/// Area of the GPU of `plan` on the node of its platform, in square millimetres.
-pub fn area_mm2(plan: &Plan) -> Estimate {
-    structure(&plan.gpu).area_mm2(plan.platform.node_nm)
-}
 
 /// What `gpu` costs over the GPU that `platform` was made for.
 ///
@@ -276,46 +266,5 @@ fn queues(gpu: &GpuSpec, unit: Unit) -> [Memory; 2] {
     [waiting, in_flight]
 }
 
-/// Hardware of a run, in `summary.json`.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct HardwareSummary {
-    /// Process node in nanometres.
-    pub node_nm: u32,
-    /// GPU for which the numbers of the platform hold.
-    pub made_for: String,
-    /// Area in square millimetres.
-    pub area_mm2: Estimate,
-    /// Leakage in watts, of the core.
-    pub leakage_w: f64,
-    /// Leakage over that of the GPU of the platform.
-    pub leakage_ratio: Estimate,
-    /// Power between frames in watts.
-    pub idle_w: f64,
-    /// Power of each unit while it is busy in watts, without its events.
-    pub clock_tree_w: BTreeMap<&'static str, f64>,
-    /// Power of each unit while it is idle in watts.
-    pub idle_unit_w: BTreeMap<&'static str, f64>,
-}
-
-impl HardwareSummary {
-    /// Hardware of `plan`.
-    pub(super) fn new(plan: &Plan) -> Self {
-        let units = Unit::ALL.into_iter().filter(|&unit| plan.gpu.units.has(unit));
-        let watts = |state: usize, model: &PowerModel| {
-            units.clone().map(|unit| (unit.name(), model.unit_w(unit)[state])).collect()
-        };
-        Self {
-            node_nm: plan.platform.node_nm,
-            made_for: plan.platform.made_for.clone(),
-            area_mm2: area_mm2(plan),
-            leakage_w: plan.model.leakage_w(),
-            leakage_ratio: plan.scaling.leakage,
-            idle_w: plan.platform.idle_w.value(),
-            clock_tree_w: watts(0, &plan.model),
-            idle_unit_w: watts(1, &plan.model),
-        }
-    }
-}
-
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
