@@ -33,7 +33,7 @@ fn main() {
     // Tests on real scenes count as ignored where there are none.
     println!("cargo:rerun-if-env-changed=QUINTILE_SCENES");
     println!(
-        "cargo:rustc-check-cfg=cfg(real_scenes, collision_data, superuser, may_mount, slurm, ray, readers)"
+        "cargo:rustc-check-cfg=cfg(real_scenes, collision_data, superuser, may_mount, slurm, ray, readers, optuna)"
     );
     if let Some(scenes) = std::env::var_os("QUINTILE_SCENES") {
         println!("cargo:rustc-cfg=real_scenes");
@@ -46,7 +46,11 @@ fn main() {
     }
     let packages = python_packages();
     let has = |names: &[&str]| names.iter().all(|name| packages.iter().any(|package| package == name));
-    for (cfg, names) in [("ray", &["ray"][..]), ("readers", &["pandas", "pyarrow", "polars", "duckdb"])] {
+    for (cfg, names) in [
+        ("ray", &["ray"][..]),
+        ("optuna", &["optuna"]),
+        ("readers", &["pandas", "pyarrow", "polars", "duckdb"]),
+    ] {
         if has(names) {
             println!("cargo:rustc-cfg={cfg}");
         }
@@ -82,7 +86,7 @@ fn python_packages() -> Vec<String> {
     let python = std::env::var("QUINTILE_PYTHON").unwrap_or_else(|_| "python3".to_owned());
     let find =
         "import sys, importlib.util as u; print(*[name for name in sys.argv[1:] if u.find_spec(name)])";
-    let names = ["ray", "pandas", "pyarrow", "polars", "duckdb"];
+    let names = ["ray", "optuna", "pandas", "pyarrow", "polars", "duckdb"];
     let found = Command::new(python).args(["-c", find]).args(names).output();
     let text = found.map(|found| String::from_utf8_lossy(&found.stdout).into_owned()).unwrap_or_default();
     text.split_whitespace().map(str::to_owned).collect()

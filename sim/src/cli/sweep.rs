@@ -10,8 +10,8 @@ use rayon::ThreadPool;
 use run::Input;
 use serde::Serialize;
 use sweep::{
-    Expected, Folder, Plan, Report, Shard, SlurmArray, SlurmJob, Status, SweepError, Work, merge, submit,
-    write_scripts,
+    Answer, Expected, Folder, Plan, Question, Report, Search, Shard, SlurmArray, SlurmJob, Status,
+    SweepError, Work, merge, submit, write_scripts,
 };
 use traces::io::atomic::write_file;
 use traces::pareto::{RatedPoint, write_csv};
@@ -57,6 +57,8 @@ pub enum Step {
     Slurm(SlurmArgs),
     /// Print how many points are finished, from the files of the sweep alone
     Status(StatusArgs),
+    /// Answer an optimizer: read places on the axes from standard input, a line of JSON each, and print what a point there costs
+    Ask(AskArgs),
     /// Write DIR/results.parquet, with a row for each point
     Merge(MergeArgs),
     /// Print the designs on the frontier of time and energy for each workload, and the main effects of settings; write both
@@ -130,6 +132,29 @@ pub struct SlurmArgs {
     pub submit: bool,
 }
 
+/// Arguments of `sweep ask`.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Example:\n  echo '{\"at\": [0.5, 0.25]}' | quintile sweep ask caches.ron --out caches\n\n\
+    The first line printed has the axes: the settings of each, and the number of its values. A place on an axis is from 0 to 1; \
+    value i of n is at (i + 0.5) / n. Each line read is answered by a line. Points are kept in DIR as those of `sweep run`, so that \
+    nothing runs twice, and `sweep merge` and `sweep report` have them. sim/sweep/drivers/optuna_sweep.py searches by this."
+)]
+pub struct AskArgs {
+    /// The sweep file, with the space of the search
+    #[arg(value_name = "FILE.ron")]
+    pub file: PathBuf,
+    /// Folder of the search; created if missing
+    #[arg(long, value_name = "DIR", default_value = "sweep")]
+    pub out: PathBuf,
+    /// Take the settings under `quick` of the sweep file
+    #[arg(long)]
+    pub quick: bool,
+    /// Worker threads
+    #[command(flatten)]
+    pub threads: ThreadArgs,
+}
+
 /// The folder of a sweep.
 #[derive(Debug, Args)]
 pub struct FolderArgs {
@@ -201,6 +226,7 @@ pub(super) fn run(args: &SweepArgs, terminal: &Terminal, stop: &Stop) -> Result<
         Step::Run(args) => run_points(args, terminal, stop),
         Step::Slurm(args) => slurm(args, terminal),
         Step::Status(args) => status(args, terminal),
+        Step::Ask(args) => ask(args),
         Step::Merge(args) => merged(args),
         Step::Report(args) => report(args),
     }
@@ -324,6 +350,27 @@ fn commands(args: &FileArgs) -> [Vec<String>; 2] {
 /// The path from the root; an empty one is the current directory.
 fn absolute(path: &Path) -> PathBuf {
     std::env::current_dir().map_or_else(|_| path.to_owned(), |directory| directory.join(path))
+}
+
+fn ask(args: &AskArgs) -> Result<(), Failure> {
+    let pool = args.threads.pool()?;
+    let folder = Folder::at(&args.out);
+    let program = program();
+    let mut search = Search::new(&args.file, args.quick, Some(&program), &folder)?;
+    print_json(&serde_json::json!({ "axes": search.dimensions() }), false)?;
+    for line in std::io::stdin().lines() {
+        let line = line.map_err(|error| Failure { message: format!("standard input: {error}"), code: 1 })?;
+        let answer = match serde_json::from_str::<Question>(&line) {
+            Ok(question) => pool.install(|| search.answer(&question))?,
+            Err(error) => {
+                let reason = format!("`{line}` is no question: {error}; write {{\"at\": [0.5]}}");
+                Answer { error: Some(reason), ..Answer::default() }
+            }
+        };
+        print_json(&answer, false)?;
+    }
+    search.finish()?;
+    Ok(())
 }
 
 fn status(args: &StatusArgs, terminal: &Terminal) -> Result<(), Failure> {

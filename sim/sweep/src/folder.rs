@@ -95,6 +95,11 @@ impl Folder {
         self.check(plan)
     }
 
+    /// Whether it has a plan.
+    pub(crate) fn holds_plan(&self) -> bool {
+        self.root.join(PLAN).exists()
+    }
+
     fn header(&self) -> Result<Option<Header>, SweepError> {
         let path = self.root.join(PLAN);
         let file = match File::open(&path) {

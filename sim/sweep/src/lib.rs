@@ -9,9 +9,11 @@
 //! - [`Shard`]: which points a task runs. [`Work`]: runs those that are not finished.
 //! - [`merge()`]: all results in one table, the same bytes for any number of shards and threads.
 //! - [`Report`]: designs on the frontier of time and energy, and main effects.
+//! - [`Search`]: points that an optimizer asks for.
 //!
 //! A point has no state but its file, so a sweep may be stopped at any moment and continued anywhere.
 
+mod ask;
 mod axis;
 mod constraint;
 mod detail;
@@ -33,6 +35,7 @@ mod spec;
 mod trials;
 
 pub use self::run::{Expected, Status, Work};
+pub use ask::{Answer, Dimension, Question, Search};
 pub use axis::Axis;
 pub use error::SweepError;
 pub use execute::{EventCounts, Measured, measured};

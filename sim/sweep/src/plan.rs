@@ -79,7 +79,7 @@ impl Plan {
         trials
             .try_settings(spec.points == Combination::Grid, &mut ticker)
             .map_err(|refusal| refused(refusal, &spec, (&file, &text), &points))?;
-        let version = format!("{} {}", env!("CARGO_PKG_VERSION"), program.unwrap_or_default());
+        let version = version(program);
         let count = points.varied.len();
         let id = |at| {
             ticker.tick(|| format!("{at} of {count} points planned"));
@@ -137,6 +137,19 @@ fn refused(refusal: Refusal, spec: &SweepSpec, (file, text): (&str, &str), point
     let file = line.map_or_else(|| file.to_owned(), |line| format!("{file}:{line}"));
     let path = if named.is_some() { String::new() } else { format!("`{path}`: ") };
     SweepError::Setting { file, message: format!("{place}: {path}{message}"), is_usage }
+}
+
+/// Version of the program in ids.
+fn version(program: Option<&str>) -> String {
+    format!("{} {}", env!("CARGO_PKG_VERSION"), program.unwrap_or_default())
+}
+
+/// Id of the first of `points`.
+///
+/// # Errors
+/// If one of its input files cannot be read.
+pub(crate) fn id_of(points: &Points, program: Option<&str>) -> Result<String, SweepError> {
+    Ok(id(points.settings(0), &Trials::new(points).inputs_of(0)?, &version(program)))
 }
 
 /// Id of a point.

@@ -271,7 +271,7 @@ mod tests {
 
     #[test]
     #[ignore = "takes minutes; prints the numbers of docs/guide/sweeps.md"]
-    fn screening_of_a_larger_frame() {
+    fn screening_and_all_designs_at_stepped() {
         for (scene, size) in [("default", "(320, 180)"), ("tiny", "(64, 48)")] {
             let (truth, _, all_s) = costs(scene, size, "");
             let (screened, _, screened_s) = costs(scene, size, "screen: [bound, packet, stepped],");

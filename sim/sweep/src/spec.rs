@@ -266,6 +266,17 @@ impl SweepSpec {
         let entries = self.forbidden.iter().enumerate();
         entries.filter(move |(_, entry)| entry.iter().all(has)).map(|(index, _)| index)
     }
+
+    /// The place in the file that leaves out a point with these settings beside those of all points.
+    pub(crate) fn excludes(&self, settings: &[Setting], common: &[Setting]) -> Option<String> {
+        if let Some(index) = self.forbids(settings).next() {
+            return Some(format!("forbidden[{index}]"));
+        }
+        let constraints = self.parsed_constraints().unwrap_or_default();
+        let holds = |constraint: &Constraint| constraint.holds(&[settings, common]).unwrap_or(false);
+        let broken = constraints.iter().position(|constraint| !holds(constraint));
+        broken.map(|index| format!("constraints[{index}]"))
+    }
 }
 
 /// Whether two values are equal, as numbers where both are.

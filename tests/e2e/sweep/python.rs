@@ -34,6 +34,39 @@ fn ray_merges_to_the_bytes_of_a_local_run() {
 }
 
 #[test]
+#[cfg_attr(not(optuna), ignore = "Python has no package `optuna`; QUINTILE_PYTHON names another interpreter")]
+fn a_search_is_compared_with_random_points_and_with_all() {
+    let inputs = Inputs::new();
+    let file = inputs.put(
+        "space.ron",
+        r#"(
+            name: "space",
+            settings: {"scene": "tiny", "frames": (0, 1), "size": (16, 12), "samples": 1},
+            axes: [
+                Range(path: "gpu.core_hz", from: 100e6, to: 800e6, step: 2, log: true),
+                Values(path: "gpu.units.dram.channels", values: [1, 2, 4]),
+                Values(path: "gpu.units.shader.cores", values: [1, 2, 4]),
+            ],
+        )"#,
+    );
+    let out = inputs.path("out");
+    let arguments =
+        [&*file, "--out", &out, "--points", "12", "--truth", "--quintile", env!("CARGO_BIN_EXE_quintile")];
+    let driver = "sim/sweep/drivers/optuna_sweep.py";
+    let found: Value = serde_json::from_str(&python(driver, &arguments)).unwrap();
+    assert_eq!(found["all"], json!({"points": 36, "hypervolume": 1.0}));
+    for method in ["nsga2", "random"] {
+        let share = found[method]["hypervolume"].as_f64().unwrap();
+        assert!(share > 0.0 && share <= 1.0, "{found}");
+        assert!((1..=12).contains(&found[method]["points"].as_u64().unwrap()), "{found}");
+    }
+    assert_eq!(point_files(&out).len(), 36);
+    // The search is a sweep as any other.
+    assert!(!merged(&out).is_empty());
+    assert_eq!(found, serde_json::from_str::<Value>(&python(driver, &arguments)).unwrap(), "by its seed");
+}
+
+#[test]
 #[cfg_attr(
     not(readers),
     ignore = "Python lacks one of pandas, pyarrow, polars and duckdb; QUINTILE_PYTHON names another interpreter"
