@@ -201,6 +201,12 @@ impl LineAccess {
         matches!(self.kind, LineKind::Hit | LineKind::Below | LineKind::Fetch)
     }
 
+    /// Whether the L2 alone sees the request: no level below it, and no line moves from or to memory.
+    pub fn stays_in_l2(&self) -> bool {
+        let none = [LevelRequests::default(); LEVELS.len()];
+        self.kind != LineKind::Fetch && self.written[0] == Self::NONE && self.levels == none
+    }
+
     /// The line read from memory.
     pub fn fetched(&self) -> Option<u32> {
         (self.kind == LineKind::Fetch).then_some(self.line)

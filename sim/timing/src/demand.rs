@@ -295,10 +295,16 @@ impl DemandBuilder {
 
 /// Append `lines` to `store`, grouped by client in the order of the ports. Returns the number per client.
 fn sorted(lines: &[LineAccess], store: &mut Vec<LineAccess>) -> [u32; CLIENTS.len()] {
+    let mut of_units = [0; Unit::COUNT];
+    lines.iter().for_each(|access| of_units[access.client as usize] += 1);
     CLIENTS.map(|client| {
-        let before = store.len();
-        store.extend(lines.iter().filter(|access| access.client == client));
-        (store.len() - before) as u32
+        let count = of_units[client as usize];
+        if count == lines.len() {
+            store.extend_from_slice(lines);
+        } else if count > 0 {
+            store.extend(lines.iter().filter(|access| access.client == client));
+        }
+        count as u32
     })
 }
 
