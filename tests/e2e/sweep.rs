@@ -212,7 +212,7 @@ fn a_report_has_frontier_and_effects() {
     let report: serde_json::Value = serde_json::from_str(&done(&["report", &out, "--json"]).stdout).unwrap();
     assert_eq!(report["left_out"], 1);
     let designs = report["workloads"]["tiny"].as_array().unwrap();
-    let of = |design: &serde_json::Value, key: &str| design[key].as_f64().unwrap();
+    let of = |design: &serde_json::Value, key: &str| design[key]["value"].as_f64().unwrap();
     let best = |key: &str| designs.iter().map(|design| of(design, key)).fold(f64::INFINITY, f64::min);
     for key in ["time_s", "energy_j"] {
         let first = designs.iter().find(|design| of(design, key) == best(key)).unwrap();
@@ -224,7 +224,8 @@ fn a_report_has_frontier_and_effects() {
     assert_eq!(points, [2, 1, 1, 2]);
     let read = |name: &str| fs::read_to_string(Path::new(&out).join(name)).unwrap();
     assert!(read("frontier.svg").contains("coarse_tile_px="));
-    assert_eq!((read("frontier.csv").lines().count(), read("effects.csv").lines().count()), (4, 5));
+    assert_eq!((read("designs.csv").lines().count(), read("effects.csv").lines().count()), (4, 5));
+    assert!(read("report.html").contains("3 designs in 1 workload"));
     let text = done(&["report", &out]).stdout;
     assert!(text.contains("design on the frontier") && text.contains("1 point left out"), "{text}");
 }

@@ -1,5 +1,6 @@
 //! `quintile sweep`.
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
@@ -10,19 +11,18 @@ use rayon::ThreadPool;
 use run::Input;
 use serde::Serialize;
 use sweep::{
-    Answer, Expected, Folder, Plan, Question, Report, Search, Shard, SlurmArray, SlurmJob, Status,
-    SweepError, Work, merge, submit, write_scripts,
+    Answer, Expected, Folder, Plan, Question, RatedDesign, Report, ReportOptions, Search, Shard, SlurmArray,
+    SlurmJob, Status, SweepError, Work, merge, submit, write_scripts,
 };
 use traces::io::atomic::write_file;
-use traces::pareto::{RatedPoint, write_csv};
 
 use super::Failure;
 use super::outputs::{print, print_json};
 use super::run::REVISION;
 use super::stop::Stop;
-use super::trace::pareto::{Groups, ParetoShow, picture};
 use super::trace::{PlotFormat, write_picture};
 use crate::cli::args::{LookArgs, ThreadArgs};
+use crate::cli::parse::percent;
 
 /// Arguments of `sweep`.
 #[derive(Debug, Args)]
@@ -61,8 +61,8 @@ pub enum Step {
     Ask(AskArgs),
     /// Write DIR/results.parquet, with a row for each point
     Merge(MergeArgs),
-    /// Print the designs on the frontier of time and energy for each workload, and the main effects of settings; write both
-    /// into DIR as CSV, and a plot
+    /// Write DIR/report.html, with tables and a picture beside it: frontiers of time, energy and area, best designs, effects and
+    /// interactions of settings; and print the frontiers
     Report(ReportArgs),
 }
 
@@ -194,6 +194,9 @@ pub struct ReportArgs {
     /// The sweep
     #[command(flatten)]
     pub folder: FolderArgs,
+    /// How far from the best a design may be to be chosen for what else it costs, for example 5%
+    #[arg(long, value_name = "P%", default_value = "5%", value_parser = percent, allow_hyphen_values = true)]
+    pub within: f64,
     /// Style of the plot
     #[command(flatten)]
     pub look: LookArgs,
@@ -390,57 +393,55 @@ fn merged(args: &MergeArgs) -> Result<(), Failure> {
 
 fn report(args: &ReportArgs) -> Result<(), Failure> {
     let folder = args.folder.folder();
-    let report = Report::of(&folder)?;
+    let report = Report::of(&folder, ReportOptions { within: args.within })?;
     let file = |name: &str| folder.path().join(name);
-    write_file(&file("frontier.csv"), |out| write_csv(&report.workloads, out))?;
-    write_file(&file("effects.csv"), |out| report.write_effects(out))?;
+    report.tables().into_iter().try_for_each(|(name, table)| write_file(&file(name), |out| table(out)))?;
+    let look = args.look.look();
+    write_picture(&report.picture(&look), &file("frontier.svg"), PlotFormat::Svg)?;
+    let page = report.html(&look).map_err(|error| Failure { message: error.to_string(), code: 1 })?;
+    write_file(&file("report.html"), |out| out.write_all(page.as_bytes()))?;
     let name = folder.path().display().to_string();
-    let picture = picture(&name, ParetoShow::Energy, &args.look, &named_on_frontier(&report.workloads));
-    write_picture(&picture, &file("frontier.svg"), PlotFormat::Svg)?;
     if args.folder.json {
         return print_json(&Printed { out: name, done: &report }, true);
     }
-    print(&format!("{}\n{}\n{}", frontiers(&report), effects(&report), left_out(&report)))
-}
-
-/// Groups in which only points on the frontier have names: many names would hide the points.
-fn named_on_frontier(groups: &Groups) -> Groups {
-    let mut groups = groups.clone();
-    for design in groups.values_mut().flatten().filter(|design| !design.on_frontier) {
-        design.point.label.clear();
-    }
-    groups
+    let html = file("report.html").display().to_string();
+    print(&format!("{}\n{}\n{}\nreport: {html}", frontiers(&report), winners(&report), left_out(&report)))
 }
 
 /// Designs on the frontier, the fastest first.
 fn frontiers(report: &Report) -> Table {
-    let mut table = Table::new(["workload", "busy time", "busy energy", "design on the frontier"]);
+    let mut table = Table::new([
+        "workload",
+        "busy time",
+        "busy energy",
+        "area",
+        "ranks by time",
+        "design on the frontier",
+    ]);
     for (workload, designs) in &report.workloads {
-        let mut optimal: Vec<&RatedPoint> = designs.iter().filter(|design| design.on_frontier).collect();
-        optimal.sort_by(|a, b| a.point.time_s.total_cmp(&b.point.time_s));
-        for RatedPoint { point, .. } in optimal {
-            let [time, energy] =
-                [(point.time_s, "s"), (point.energy_j, "J")].map(|(value, unit)| si(value, unit));
-            table.row([workload.clone(), time, energy, point.label.clone()]);
+        let mut optimal: Vec<&RatedDesign> = designs.iter().filter(|design| design.on_frontier).collect();
+        optimal.sort_by(|a, b| a.design.time_s.value.total_cmp(&b.design.time_s.value));
+        for rated in optimal {
+            let design = &rated.design;
+            let [time, energy] = [(design.time_s.value, "s"), (design.energy_j.value, "J")]
+                .map(|(value, unit)| si(value, unit));
+            let area = design.area_mm2.map_or("-".to_owned(), |area| format!("{area:.1} mm2"));
+            let [best, worst] = rated.time_ranks;
+            let ranks = if best == worst { best.to_string() } else { format!("{best} to {worst}") };
+            table.row([workload.clone(), time, energy, area, ranks, design.design.clone()]);
         }
     }
     table
 }
 
-/// Main effects.
-fn effects(report: &Report) -> Table {
-    let mut table = Table::new(["workload", "setting", "value", "points", "time ratio", "energy ratio"]);
-    for effect in &report.effects {
-        let [time, energy] = [effect.time_ratio, effect.energy_ratio].map(|ratio| format!("{ratio:.3}"));
-        let (workload, setting, value) = (&effect.workload, &effect.setting, &effect.value);
-        table.row([
-            workload.clone(),
-            setting.clone(),
-            value.clone(),
-            effect.points.to_string(),
-            time,
-            energy,
-        ]);
+/// Best designs, and how many others they cannot be told from.
+fn winners(report: &Report) -> Table {
+    let mut table = Table::new(["workload", "best by", "cost", "undecided", "design"]);
+    for winner in &report.winners {
+        let undecided = format!("{} of {}", winner.undecided, winner.designs.saturating_sub(1));
+        let cost = si(winner.value, winner.measure.unit());
+        let measure = winner.measure.name().to_owned();
+        table.row([winner.workload.clone(), measure, cost, undecided, winner.design.clone()]);
     }
     table
 }
@@ -448,7 +449,7 @@ fn effects(report: &Report) -> Table {
 fn left_out(report: &Report) -> String {
     match report.left_out {
         0 => "all points are in".to_owned(),
-        count => format!("{} left out, failed or not finished", counted(count, "point")),
+        count => format!("{} left out, failed, screened out or not finished", counted(count, "point")),
     }
 }
 

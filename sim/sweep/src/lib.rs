@@ -43,7 +43,10 @@ pub use folder::Folder;
 pub use merge::{RESULTS, merge};
 pub use plan::{Plan, Point};
 pub use points::combinations;
-pub use report::{Effect, Report};
+pub use report::{
+    ALL_WORKLOADS, Cost, Design, Effect, Failure, Interaction, Measure, NearBest, PageError, Pair,
+    RatedDesign, Report, ReportOptions, Share, Winner,
+};
 pub use setting::{Setting, Text, is_option, with};
 pub use shard::Shard;
 pub use slurm::{SlurmArray, SlurmJob, submit, write_scripts};

@@ -96,7 +96,7 @@ impl From<ParetoError> for Failure {
     }
 }
 
-pub(in crate::cli) type Groups = BTreeMap<String, Vec<RatedPoint>>;
+type Groups = BTreeMap<String, Vec<RatedPoint>>;
 
 pub(super) fn run(args: &ParetoArgs, terminal: &Terminal) -> Result<(), Failure> {
     may_hold_results("--out", args.out.as_deref(), [args.table.as_path()])?;
@@ -159,7 +159,7 @@ fn place(show: ParetoShow, p: &Point) -> (f64, f64, f64, f64) {
 
 /// All groups in one picture: points with their names and deviations, and each group's frontier as steps, as between two settings
 /// there is none.
-pub(in crate::cli) fn picture(subject: &str, show: ParetoShow, look: &LookArgs, groups: &Groups) -> Picture {
+fn picture(subject: &str, show: ParetoShow, look: &LookArgs, groups: &Groups) -> Picture {
     let place = |s: &RatedPoint| place(show, &s.point);
     let all = || groups.values().flatten();
     let of = |on: bool| {

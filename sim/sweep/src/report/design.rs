@@ -1,0 +1,194 @@
+//! Designs: what is set in GPU, platform and energy table, with what it costs.
+
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+
+use output::MeanSd;
+use serde::Serialize;
+
+use crate::execute::Measured;
+use crate::plan::{Plan, Point};
+use crate::setting::Setting;
+
+/// A measured point.
+pub(crate) struct Row<'a> {
+    pub workload: String,
+    pub design: String,
+    settings: Vec<&'a Setting>,
+    conditions: Vec<&'a Setting>,
+    time_s: f64,
+    /// Nominal, low and high.
+    energy_j: [f64; 3],
+    time_error: Option<f64>,
+    energy_error: Option<f64>,
+    area_mm2: Option<f64>,
+}
+
+/// A quantity of a design: mean over its runs, and what is known of its error.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Cost {
+    /// Mean.
+    pub value: f64,
+    /// Standard deviation between runs that differ in their seed.
+    pub deviation: f64,
+    /// Stated error of the timing level, relative: half a 95 % interval. `None` without a bound.
+    pub error: Option<f64>,
+    /// With all energies of the table at their low end.
+    pub low: f64,
+    /// With all energies of the table at their high end.
+    pub high: f64,
+}
+
+/// A design of a workload.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Design {
+    /// Its settings in short.
+    pub design: String,
+    /// Settings of the hardware that vary, by path.
+    pub settings: BTreeMap<String, String>,
+    /// Settings of the work that vary, by path.
+    pub conditions: BTreeMap<String, String>,
+    /// Runs, which differ in their seed.
+    pub runs: usize,
+    /// Busy time of a frame in seconds.
+    pub time_s: Cost,
+    /// Busy energy of a frame in joules.
+    pub energy_j: Cost,
+    /// Area in square millimetres, if it is known.
+    pub area_mm2: Option<f64>,
+}
+
+/// Settings in short.
+pub(crate) fn label<'a>(
+    settings: impl IntoIterator<Item = &'a Setting>,
+    names: &BTreeMap<&str, &str>,
+) -> String {
+    let name = |set: &Setting| format!("{}={}", names.get(&*set.path).unwrap_or(&&*set.path), set.value);
+    settings.into_iter().map(name).collect::<Vec<_>>().join(" ")
+}
+
+impl<'a> Row<'a> {
+    pub fn new(point: &'a Point, measured: &Measured, names: &BTreeMap<&str, &str>) -> Self {
+        let (settings, conditions): (Vec<&Setting>, Vec<&Setting>) = point
+            .settings
+            .iter()
+            .filter(|setting| setting.path != "seed")
+            .partition(|setting| setting.is_of_design());
+        let scene = measured.used.get("scene").cloned();
+        let others = conditions.iter().filter(|set| set.path != "scene");
+        let workload = scene.into_iter().chain(others.map(|set| label([*set], names)));
+        Self {
+            workload: workload.collect::<Vec<_>>().join(", "),
+            design: label(settings.iter().copied(), names),
+            settings,
+            conditions,
+            time_s: measured.busy_ms * 1e-3,
+            energy_j: [measured.busy_mj, measured.busy_low_mj, measured.busy_high_mj].map(|mj| mj * 1e-3),
+            time_error: measured.cycles_error,
+            energy_error: measured.energy_error,
+            area_mm2: Some(measured.area_mm2[0]),
+        }
+    }
+}
+
+fn last_name(path: &str) -> &str {
+    path.rsplit('.').next().unwrap_or(path)
+}
+
+/// The last name of each path that varies, or the whole path where two end in the same one.
+pub(crate) fn short_names(plan: &Plan) -> BTreeMap<&str, &str> {
+    let settings = plan.points.iter().flat_map(|point| &point.settings);
+    let paths: BTreeSet<&str> = settings.map(|setting| setting.path.as_str()).collect();
+    let name = |path: &&'_ str| {
+        let last = last_name(path);
+        paths.iter().filter(|other| last_name(other) == last).count() == 1
+    };
+    paths.iter().map(|path| (*path, if name(path) { last_name(path) } else { *path })).collect()
+}
+
+/// Designs in order of first use, with means and standard deviations over their runs.
+pub(crate) fn designs(rows: &[Row<'_>]) -> Vec<Design> {
+    let mut places: HashMap<&str, usize> = HashMap::new();
+    let mut runs: Vec<Vec<&Row<'_>>> = Vec::new();
+    for row in rows {
+        let place = *places.entry(&row.design).or_insert_with(|| {
+            runs.push(Vec::new());
+            runs.len() - 1
+        });
+        runs[place].push(row);
+    }
+    runs.iter().filter_map(|runs| mean(runs)).collect()
+}
+
+fn mean(runs: &[&Row<'_>]) -> Option<Design> {
+    let of = |value: &dyn Fn(&Row<'_>) -> f64| MeanSd::of(runs.iter().map(|row| value(row)));
+    // The largest error of the runs; none has a bound if one has not.
+    let error = |of: fn(&Row<'_>) -> Option<f64>| {
+        runs.iter().map(|row| of(row)).try_fold(0.0, |most: f64, error| Some(most.max(error?)))
+    };
+    let time = of(&|row| row.time_s)?;
+    let energy = of(&|row| row.energy_j[0])?;
+    let [low, high] = [1, 2].map(|end| of(&|row| row.energy_j[end]).map_or(energy.mean, |ends| ends.mean));
+    let texts = |settings: &[&Setting]| {
+        settings.iter().map(|set| (set.path.clone(), set.value.clone())).collect::<BTreeMap<_, _>>()
+    };
+    let first = runs.first()?;
+    Some(Design {
+        design: first.design.clone(),
+        settings: texts(&first.settings),
+        conditions: texts(&first.conditions),
+        runs: runs.len(),
+        time_s: Cost {
+            value: time.mean,
+            deviation: time.sd,
+            error: error(|row| row.time_error),
+            low: time.mean,
+            high: time.mean,
+        },
+        energy_j: Cost {
+            value: energy.mean,
+            deviation: energy.sd,
+            error: error(|row| row.energy_error),
+            low,
+            high,
+        },
+        area_mm2: first.area_mm2,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_short_where_they_are_unique() {
+        let paths = ["gpu.a.queue", "gpu.b.queue", "gpu.core_hz"];
+        let settings = paths.map(|path| Setting::new(path, "1")).into();
+        let points = vec![Point { id: String::new(), settings }];
+        let plan = Plan { name: String::new(), settings: Vec::new(), points, screen: Vec::new() };
+        let names: Vec<&str> = short_names(&plan).into_values().collect();
+        assert_eq!(names, ["gpu.a.queue", "gpu.b.queue", "core_hz"]);
+    }
+
+    #[test]
+    fn runs_of_one_design_are_averaged() {
+        let row = |design: &str, time_s: f64, time_error| Row {
+            workload: String::new(),
+            design: design.to_owned(),
+            settings: Vec::new(),
+            conditions: Vec::new(),
+            time_s,
+            energy_j: [5.0, 4.0, 9.0],
+            time_error,
+            energy_error: Some(0.0),
+            area_mm2: None,
+        };
+        let rows = [row("a", 1.0, Some(0.1)), row("b", 9.0, None), row("a", 3.0, Some(0.2))];
+        let designs = designs(&rows);
+        assert_eq!(designs.len(), 2);
+        let a = &designs[0];
+        assert_eq!((a.time_s.value, a.time_s.error, a.runs), (2.0, Some(0.2), 2));
+        assert_eq!((a.energy_j.value, a.energy_j.low, a.energy_j.high), (5.0, 4.0, 9.0));
+        assert!((a.time_s.deviation - 2_f64.sqrt()).abs() < 1e-12 && designs[1].time_s.deviation == 0.0);
+        assert_eq!(designs[1].time_s.error, None);
+    }
+}

@@ -1,0 +1,181 @@
+//! What a sweep found: frontiers, winners, effects, and how sure all of that is.
+//!
+//! ```text
+//! results -> Row -> Design (runs that differ in their seed are one) -> frontier, ranks, winners, effects -> Report -> files, page
+//! ```
+
+mod design;
+mod effects;
+mod flips;
+mod frontier;
+mod page;
+mod pictures;
+mod ranks;
+mod tables;
+mod winners;
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+pub use design::{Cost, Design};
+pub use effects::{Effect, Interaction, Share};
+pub use frontier::RatedDesign;
+pub use page::PageError;
+pub use winners::{Measure, NearBest, Pair, Winner};
+
+use self::design::{Row, designs, short_names};
+use crate::execute::Outcome;
+use crate::{Folder, SweepError};
+
+/// What a report is asked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ReportOptions {
+    /// How far from the best a design may be to be chosen for what else it costs, relative.
+    pub within: f64,
+}
+
+impl Default for ReportOptions {
+    fn default() -> Self {
+        Self { within: 0.05 }
+    }
+}
+
+/// Report of a sweep.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Report {
+    /// Name of the sweep.
+    pub sweep: String,
+    /// How far from the best the designs in `near_best` may be.
+    pub within: f64,
+    /// Designs by workload, in the order of the plan, compared within the workload.
+    pub workloads: BTreeMap<String, Vec<RatedDesign>>,
+    /// Best design of each workload by each measure.
+    pub winners: Vec<Winner>,
+    /// Cheapest design near the best, by each measure.
+    pub near_best: Vec<NearBest>,
+    /// The best design against the next ones.
+    pub pairs: Vec<Pair>,
+    /// Main effects.
+    pub effects: Vec<Effect>,
+    /// Two-way interactions, the strongest first.
+    pub interactions: Vec<Interaction>,
+    /// Shares of variance.
+    pub shares: Vec<Share>,
+    /// Points that failed or were screened out.
+    pub failed: Vec<Failure>,
+    /// Points that failed or are not finished; they are left out.
+    pub left_out: usize,
+}
+
+/// A point that failed or was screened out.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Failure {
+    /// Its settings.
+    pub settings: String,
+    /// Why.
+    pub reason: String,
+}
+
+/// Name of the effects over all workloads.
+pub const ALL_WORKLOADS: &str = "all workloads";
+
+impl Report {
+    /// Report of the sweep in `folder`.
+    ///
+    /// # Errors
+    /// If the plan or a result cannot be read.
+    pub fn of(folder: &Folder, options: ReportOptions) -> Result<Self, SweepError> {
+        let plan = folder.plan()?;
+        let names = short_names(&plan);
+        let read = |point| {
+            let outcome = folder.result(point)?.map(|result| result.outcome);
+            Ok(match outcome {
+                Some(Outcome::Measured(measured)) => Some(Ok(Row::new(point, &measured, &names))),
+                Some(Outcome::Error(reason) | Outcome::ScreenedOut(reason)) => {
+                    Some(Err(Failure { settings: design::label(&point.settings, &names), reason }))
+                }
+                None => None,
+            })
+        };
+        let read: Vec<_> = plan.points.par_iter().map(read).collect::<Result<_, SweepError>>()?;
+        let (mut rows, mut failed) = (Vec::new(), Vec::new());
+        for point in read.into_iter().flatten() {
+            match point {
+                Ok(row) => rows.push(row),
+                Err(failure) => failed.push(failure),
+            }
+        }
+        let left_out = plan.points.len() - rows.len();
+        let of_rows = Self::of_rows(rows, options);
+        Ok(Self { sweep: plan.name, failed, left_out, ..of_rows })
+    }
+
+    /// Report of measured points.
+    fn of_rows(rows: Vec<Row<'_>>, options: ReportOptions) -> Self {
+        let mut by_workload: BTreeMap<String, Vec<Row<'_>>> = BTreeMap::new();
+        for row in rows {
+            by_workload.entry(row.workload.clone()).or_default().push(row);
+        }
+        Self::of_designs(
+            by_workload.iter().map(|(workload, rows)| (workload.clone(), designs(rows))).collect(),
+            options,
+        )
+    }
+
+    /// Report of designs by workload.
+    fn of_designs(by_workload: BTreeMap<String, Vec<Design>>, options: ReportOptions) -> Self {
+        let mut report = Self {
+            sweep: String::new(),
+            within: options.within,
+            workloads: BTreeMap::new(),
+            winners: Vec::new(),
+            near_best: Vec::new(),
+            pairs: Vec::new(),
+            effects: Vec::new(),
+            interactions: Vec::new(),
+            shares: Vec::new(),
+            failed: Vec::new(),
+            left_out: 0,
+        };
+        if by_workload.len() > 1 {
+            let all: Vec<&Design> = by_workload.values().flatten().collect();
+            report.add_effects(ALL_WORKLOADS, &all, true);
+        }
+        for (workload, designs) in by_workload {
+            report.add_effects(&workload, &designs.iter().collect::<Vec<_>>(), false);
+            report.winners.extend(winners::winners(&workload, &designs));
+            report.near_best.extend(winners::near_best(&workload, &designs, options.within));
+            report.pairs.extend(winners::pairs(&workload, &designs));
+            report.workloads.insert(workload, frontier::rated(designs));
+        }
+        report
+    }
+
+    /// Adds effects of the settings of designs, and with `conditions` those of the work.
+    fn add_effects(&mut self, workload: &str, designs: &[&Design], conditions: bool) {
+        let found = effects::Factorial::new(workload, designs, conditions);
+        self.effects.extend(found.effects());
+        self.interactions.extend(found.interactions());
+        self.shares.extend(found.shares());
+    }
+}
+
+/// Costs of designs with these times and energies, for tests: exact, with equal ends of the energy table.
+#[cfg(test)]
+pub(crate) fn exact(settings: &[(&str, &str)], time_s: f64, energy_j: f64) -> Design {
+    let cost = |value| Cost { value, deviation: 0.0, error: Some(0.0), low: value, high: value };
+    let settings: BTreeMap<String, String> =
+        settings.iter().map(|(path, value)| ((*path).to_owned(), (*value).to_owned())).collect();
+    let label = settings.iter().map(|(path, value)| format!("{path}={value}")).collect::<Vec<_>>().join(" ");
+    Design {
+        design: label,
+        settings,
+        conditions: BTreeMap::new(),
+        runs: 1,
+        time_s: cost(time_s),
+        energy_j: cost(energy_j),
+        area_mm2: None,
+    }
+}
