@@ -309,7 +309,14 @@ fn slurm(args: &SlurmArgs, terminal: &Terminal) -> Result<(), Failure> {
     opened.folder.write_plan(&opened.plan)?;
     let expected = opened.probe(Shard::default(), false)?;
     let Opened { plan, pool, .. } = opened;
-    let tasks = args.tasks.map(|count| count as usize);
+    let tasks = match args.tasks.map(|count| count as usize) {
+        Some(count) if count > 1 && !plan.screen.is_empty() => {
+            let message = "--tasks: a sweep that screens runs as one task; leave it out".to_owned();
+            return Err(Failure { message, code: 2 });
+        }
+        given if plan.screen.is_empty() => given,
+        _ => Some(1),
+    };
     let array = SlurmArray::new(&expected, pool.current_num_threads(), args.task_threads.into(), tasks);
     let [out, directory] = [&*args.sweep.out, Path::new("")].map(absolute);
     let [run, merge] = commands(&args.sweep);
