@@ -214,9 +214,44 @@ enum What {
     Family(Box<StressScene>),
 }
 
-/// Other passes of workloads, by an option.
-const VARIANTS: [(&str, &str, &str); 2] =
-    [("multiview", "view_by_view", "true"), ("soft-shadows", "accumulate", "true")];
+/// A workload with other passes than by default.
+struct Variant {
+    workload: &'static str,
+    /// What is added to the name of the workload.
+    label: &'static str,
+    set: &'static [(&'static str, &'static str)],
+    /// Samples of a pixel, where passes depend on their number.
+    samples: Option<u32>,
+}
+
+impl Variant {
+    const fn new(
+        workload: &'static str,
+        label: &'static str,
+        set: &'static [(&'static str, &'static str)],
+    ) -> Self {
+        Self { workload, label, set, samples: None }
+    }
+}
+
+/// Options that bring passes of other types.
+const VARIANTS: [Variant; 15] = [
+    Variant::new("multiview", "view_by_view", &[("view_by_view", "true")]),
+    Variant::new("soft-shadows", "accumulate", &[("accumulate", "true")]),
+    Variant::new("compute", "mip_chain", &[("kernel", "mip_chain")]),
+    Variant::new("compute", "reduction", &[("kernel", "reduction")]),
+    Variant::new("compute", "histogram", &[("kernel", "histogram")]),
+    Variant::new("deferred", "forward", &[("method", "forward")]),
+    Variant::new("deferred", "volumes", &[("lighting", "volumes")]),
+    Variant { samples: Some(4), ..Variant::new("deferred", "4 samples resolved", &[]) },
+    Variant { samples: Some(4), ..Variant::new("deferred", "volumes, resolved", &[("lighting", "volumes")]) },
+    Variant::new("ccd", "narrow", &[("narrow", "true")]),
+    Variant::new("sampling", "noise", &[("points", "noise")]),
+    Variant::new("sampling", "volume", &[("points", "volume")]),
+    Variant::new("sampling", "volume in 5D", &[("points", "volume"), ("dimensions", "5")]),
+    Variant::new("occlusion", "samples", &[("query", "samples")]),
+    Variant::new("occlusion", "any", &[("query", "any")]),
+];
 /// Widths that images of workloads are reduced to in pixels, at most by the factor [`MAX_REDUCTION`].
 const WORKLOAD_PX: [u32; 2] = [128, 256];
 const MAX_REDUCTION: u32 = 8;
@@ -228,10 +263,10 @@ pub(super) fn all(files: &[String], quick: bool) -> Result<Vec<Subject>, RunErro
         subjects.push(of_family(name, value)?);
     }
     for (name, _) in catalog::names() {
-        subjects.push(of_workload(name, None, quick)?);
+        subjects.push(of_workload(&Variant::new(name, "", &[]), quick)?);
     }
-    for (name, option, value) in VARIANTS {
-        subjects.push(of_workload(name, Some((option, value)), quick)?);
+    for variant in &VARIANTS {
+        subjects.push(of_workload(variant, quick)?);
     }
     Ok(subjects)
 }
@@ -244,15 +279,16 @@ fn of_scene(name: &str, quick: bool) -> Result<Subject, RunError> {
     Ok(Subject { name: label.into_owned(), kind: SubjectKind::Scene, what: middle_frame(job) })
 }
 
-fn of_workload(name: &str, option: Option<(&str, &str)>, quick: bool) -> Result<Subject, RunError> {
-    let set = option.map(|(option, value)| (option.to_owned(), value.to_owned()));
-    let options = OptionSource { file: None, set: set.into_iter().collect() };
-    let (overrides, path) = (Overrides::default(), Path::new(name));
-    let (_, whole) = catalog::load(path, &options, &request(&overrides))?;
+fn of_workload(variant: &Variant, quick: bool) -> Result<Subject, RunError> {
+    let Variant { workload, label, set, samples } = *variant;
+    let set = set.iter().map(|(option, value)| ((*option).to_owned(), (*value).to_owned())).collect();
+    let options = OptionSource { file: None, set };
+    let overrides = Overrides { samples, ..Overrides::default() };
+    let (_, whole) = catalog::load(Path::new(workload), &options, &request(&overrides))?;
     let to = Reduction::to_width(whole.settings(), WORKLOAD_PX[usize::from(!quick)], MAX_REDUCTION);
-    let job = catalog::remade(name, &options, &request(&overrides), &to)?;
-    let label = option.map_or(name.to_owned(), |(option, _)| format!("{name} {option}"));
-    Ok(Subject { name: label, kind: SubjectKind::Workload, what: middle_frame(job) })
+    let job = catalog::remade(workload, &options, &request(&overrides), &to)?;
+    let name = format!("{workload} {label}").trim_end().to_owned();
+    Ok(Subject { name, kind: SubjectKind::Workload, what: middle_frame(job) })
 }
 
 fn request(overrides: &Overrides) -> Request<'_> {
@@ -289,7 +325,9 @@ impl Subject {
 
     /// Whether the GPU has the units that the frame needs.
     pub fn runs_on(&self, gpu: &GpuSpec) -> bool {
-        self.name != "compute" || gpu.pipeline.compute.is_some()
+        gpu.pipeline.compute.is_some()
+            || !self.name.starts_with("compute")
+            || self.name.ends_with("mip_chain")
     }
 
     /// Renders the frame, every packet to `emit`.

@@ -2,7 +2,7 @@
 
 use activity::{Event, Timeline, Unit};
 use cpu_time::{ProcessTime, ThreadTime};
-use power_model::{EnergyTable, FramePower, Platform, PowerModel};
+use power_model::{Bound, EnergyTable, FramePower, Platform, PowerModel};
 use run::{GpuSpec, RunError};
 use serde::Serialize;
 use timing::stepped::{self, StepOptions, Stream};
@@ -87,7 +87,9 @@ pub(super) fn rows(
     stream: &Packets,
     speed: &mut Speed,
 ) -> Result<Vec<TimingRow>, RunError> {
-    let model = PowerModel::new(&EnergyTable::builtin("28nm")?, &Platform::builtin("reference")?)?;
+    let platform = Platform::builtin("reference")?;
+    let scaling = run::scaling(gpu, &platform)?;
+    let model = PowerModel::on(&EnergyTable::builtin("28nm")?, &platform, Bound::Nominal, &scaling)?;
     let power = |timed: &Timed| {
         model.frame(&timed.timeline).map_err(|source| RunError::Timeline { frame: 0, source })
     };
