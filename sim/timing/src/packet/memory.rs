@@ -30,8 +30,8 @@ pub(super) struct Fetched {
 
 /// Consecutive lines with the same route.
 #[derive(Clone, Copy, Debug)]
-struct Run {
-    head: LineAccess,
+struct Run<'a> {
+    head: &'a LineAccess,
     count: u32,
     turn: Turn,
     /// Delay from the request of the first line to that of the last.
@@ -125,7 +125,7 @@ impl Memory {
         let mut pacer =
             RequestPacer { at: start, used: 0, lines_per_cycle: self.lines_per_cycle[port], period };
         let mut remaining = lines;
-        while let Some(&head) = remaining.first() {
+        while let Some(head) = remaining.first() {
             // A run fits into the port's queue.
             let max_count = remaining.len().min(self.queue as usize);
             let count = self.alike(&remaining[..max_count]);
@@ -172,22 +172,27 @@ impl Memory {
 
     /// Pass a run through the L2; its first line arrives at `seen`. Returns when the first and the last line
     /// are accepted.
-    fn take(&mut self, run: &Run, seen: Time, fetched: &mut Fetched) -> (Time, Time) {
+    fn take(&mut self, run: &Run<'_>, seen: Time, fetched: &mut Fetched) -> (Time, Time) {
         let Run { head, count, turn, last: later } = *run;
         let (mut first, end) = self.l2.reserve_as(turn, seen, u64::from(count) * self.period);
         let mut last = end.saturating_sub(self.period).max(first + later);
         if head.kind == LineKind::Hit {
             fetched.arrived = fetched.arrived.max(last + self.latency);
         }
+        if head.stays_in_l2() {
+            fetched.moved = fetched.moved.max(last + self.period);
+            self.end = self.end.max(last + self.period);
+            return (first, last);
+        }
         let Passed { mut accepted, period, latency, backlog, found } =
-            self.levels.pass(&head, (count, turn), Span { from: first, to: last }, self.period);
+            self.levels.pass(head, (count, turn), Span { from: first, to: last }, self.period);
         if let Some(arrived) = found {
             fetched.arrived = fetched.arrived.max(arrived + self.latency);
         }
         // What the queues of the channels do not hold waits in front of the level above.
         let seen = Span { from: accepted.from + period, to: accepted.to + period };
         let came = seen.from;
-        let seen = self.dram.admits(&head, count, seen);
+        let seen = self.dram.admits(head, count, seen);
         accepted = Span { from: seen.from - period, to: seen.to - period };
         fetched.moved = fetched.moved.max(seen.to);
         for line in head.moved() {
