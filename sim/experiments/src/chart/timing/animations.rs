@@ -325,9 +325,7 @@ impl Subject {
 
     /// Whether the GPU has the units that the frame needs.
     pub fn runs_on(&self, gpu: &GpuSpec) -> bool {
-        gpu.pipeline.compute.is_some()
-            || !self.name.starts_with("compute")
-            || self.name.ends_with("mip_chain")
+        !self.name.starts_with("compute") || gpu.pipeline.compute.is_some()
     }
 
     /// Renders the frame, every packet to `emit`.
