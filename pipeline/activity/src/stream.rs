@@ -357,7 +357,8 @@ mod tests {
         };
         let packet = |number: usize, next: &mut dyn FnMut() -> u32| {
             let mut packet = Packet::new(KINDS[number % KINDS.len()], next() % 3);
-            (packet.batch, packet.draw) = (next() % 2, if next() > u32::MAX / 4 { Packet::NONE } else { next() });
+            (packet.batch, packet.draw) =
+                (next() % 2, if next() > u32::MAX / 4 { Packet::NONE } else { next() });
             (packet.tile, packet.triangle) = (next().wrapping_mul(2), next());
             // More sets of events than have a place.
             (0..next() % 6)

@@ -8,11 +8,8 @@ use pipeline::frame::HeatMap;
 use power_model::Bound;
 use serde::{Deserialize, Serialize, Serializer};
 use timing::Level;
-use traces::device::RATES_HZ;
 use workloads::Overrides;
 use workloads::job::OptionSource;
-
-use crate::RunError;
 
 /// Default rate of the recorder in Hz. The method of per-frame energy is described at this rate.
 pub(crate) const DEFAULT_RATE_HZ: f64 = 50e3;
@@ -162,24 +159,6 @@ pub struct RunOptions {
     pub heat: Vec<HeatQuantity>,
     /// Width, title and font size of plots.
     pub plot_style: Look,
-}
-
-impl RunOptions {
-    /// Checks rate and packet loss of the recorder.
-    pub(crate) fn check_recorder(&self) -> Result<(), RunError> {
-        if let Some(rate) = self.trace_rate_hz.filter(|rate| !RATES_HZ.contains(rate)) {
-            return Err(RunError::Setting(format!(
-                "trace rate: {rate}; a recorder takes 1 to 1e7 samples a second"
-            )));
-        }
-        if !(0.0..1.0).contains(&self.packet_loss) {
-            let loss = self.packet_loss;
-            return Err(RunError::Setting(format!(
-                "packet loss: {loss}; a share from 0 to below 1 can be lost"
-            )));
-        }
-        Ok(())
-    }
 }
 
 /// Serializes a path as text. Bytes that are not Unicode are replaced, so that writing the summary cannot

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use activity::inputs;
 use pipeline::Viewport;
 use power_model::{EnergyTable, Pacing, Platform, PowerModel, Scaling};
+use traces::device::RATES_HZ;
 use warnings::Warning;
 use workloads::job::{Reduction, Request};
 use workloads::{Job, Rendering, Settings, catalog};
@@ -71,7 +72,7 @@ impl Plan {
         options: RunOptions,
         load_job: impl FnOnce(&RunOptions, &mut Changes<'_>) -> Result<(String, Box<dyn Job>), RunError>,
     ) -> Result<Self, RunError> {
-        options.check_recorder()?;
+        check_recorder(&options)?;
         let mut changes = Changes::new(&options.changes)?;
         let (name, job) = load_job(&options, &mut changes)?;
         let settings = job.settings();
@@ -170,6 +171,20 @@ impl Powered {
         let pairing = check_pairing(options, gpu, (platform, table), &scaling);
         Ok(Self { platform: platform.on(&scaling, options.bound), scaling, model, pairing })
     }
+}
+
+/// Checks rate and packet loss of the recorder.
+fn check_recorder(options: &RunOptions) -> Result<(), RunError> {
+    if let Some(rate) = options.trace_rate_hz.filter(|rate| !RATES_HZ.contains(rate)) {
+        return Err(RunError::Setting(format!(
+            "trace rate: {rate}; a recorder takes 1 to 1e7 samples a second"
+        )));
+    }
+    if !(0.0..1.0).contains(&options.packet_loss) {
+        let loss = options.packet_loss;
+        return Err(RunError::Setting(format!("packet loss: {loss}; a share from 0 to below 1 can be lost")));
+    }
+    Ok(())
 }
 
 /// Size of a run, from the parts of a plan.

@@ -31,7 +31,8 @@ const BELOW_EXPERIMENTS: &[&str] =
     &["activity", "output", "pipeline", "power-model", "run", "timing", "traces", "warnings", "workloads"];
 
 /// Crates below the sweeps.
-const BELOW_SWEEP: &[&str] = &["activity", "output", "pipeline", "power-model", "run", "traces", "workloads"];
+const BELOW_SWEEP: &[&str] =
+    &["activity", "output", "pipeline", "power-model", "run", "timing", "traces", "workloads"];
 
 /// Crates below the command.
 const BELOW_COMMAND: [&str; 11] = [

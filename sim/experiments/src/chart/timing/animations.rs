@@ -245,7 +245,7 @@ const VARIANTS: [Variant; 15] = [
     Variant::new("deferred", "volumes", &[("lighting", "volumes")]),
     Variant { samples: Some(4), ..Variant::new("deferred", "4 samples resolved", &[]) },
     Variant { samples: Some(4), ..Variant::new("deferred", "volumes, resolved", &[("lighting", "volumes")]) },
-    Variant::new("ccd", "narrow", &[("narrow", "true")]),
+    Variant::new("ccd", "narrow", &[("narrow", "true"), ("balls", "4")]),
     Variant::new("sampling", "noise", &[("points", "noise")]),
     Variant::new("sampling", "volume", &[("points", "volume")]),
     Variant::new("sampling", "volume in 5D", &[("points", "volume"), ("dimensions", "5")]),
