@@ -64,8 +64,8 @@ def nsga2(sweep, points, seed):
     sampler = optuna.samplers.NSGAIISampler(population_size=population, seed=seed)
     study = optuna.create_study(directions=["minimize", "minimize"], sampler=sampler)
     found = []
-    for _ in range(points):
-        trial = study.ask()
+
+    def costs(trial):
         number = itertools.count()
         at = [
             place(
@@ -77,10 +77,11 @@ def nsga2(sweep, points, seed):
         ]
         point = sweep.ask(at)
         if point is None:
-            study.tell(trial, state=optuna.trial.TrialState.FAIL)
-            continue
+            raise optuna.TrialPruned
         found.append(point)
-        study.tell(trial, sweep.costs[point])
+        return sweep.costs[point]
+
+    study.optimize(costs, n_trials=points)
     return found
 
 

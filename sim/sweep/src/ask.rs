@@ -1,4 +1,4 @@
-//! Points that a search asks for one after another: a place on each axis in, time and energy out.
+//! Points that a search requests one after another: a place on each axis in, time and energy out.
 
 use std::collections::HashSet;
 use std::path::Path;
@@ -23,7 +23,7 @@ pub struct Search<'a> {
     known: HashSet<String>,
 }
 
-/// An axis as it is told to the optimizer.
+/// An axis as the optimizer gets it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Dimension {
     /// Settings that change along it.
@@ -40,7 +40,7 @@ pub struct Question {
     pub at: Vec<f64>,
 }
 
-/// The answer: what a point costs, or why it cannot be told.
+/// The answer: what a point costs, or why there is no answer.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Answer {
     /// Settings of the point.
@@ -142,7 +142,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Writes the plan of all points that were asked for, beside those of an earlier plan, so that they can be merged.
+    /// Writes the plan of all points that were requested, beside those of an earlier plan, so that they can be merged.
     ///
     /// # Errors
     /// If it cannot be written.

@@ -176,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn what_moves_both_alike_moves_no_order() {
+    fn what_moves_both_in_the_same_way_moves_no_order() {
         let (a, b) = (cost(1.0, 0.0, [0.2, 5.0]), cost(1.01, 0.0, [0.2, 5.0]));
         assert!(flips(&a, &b) < 1e-12, "{}", flips(&a, &b));
         let [low, high] = Difference::new(&a, &b).interval().unwrap();
