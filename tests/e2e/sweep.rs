@@ -221,7 +221,7 @@ fn a_report_has_frontier_and_effects() {
     // Three points: tiles of 4 pixels with both coarse tiles, tiles of 8 pixels with one.
     let effects = report["effects"].as_array().unwrap();
     let points: Vec<u64> = effects.iter().map(|effect| effect["points"].as_u64().unwrap()).collect();
-    assert_eq!(points, [2, 1, 1, 2]);
+    assert_eq!(points, [1, 2, 2, 1]);
     let read = |name: &str| fs::read_to_string(Path::new(&out).join(name)).unwrap();
     assert!(read("frontier.svg").contains("coarse_tile_px="));
     assert_eq!((read("designs.csv").lines().count(), read("effects.csv").lines().count()), (4, 5));

@@ -2,7 +2,7 @@
 //!
 //! The logarithm of a cost is its mean, plus a part that all designs share, plus a part of its own. Shared is the place of the truth
 //! between the ends of the energy table: one standard normal number for the table, with 95 % of it between low and high, so that
-//! what moves both designs alike moves no order. Of its own are the stated error of the timing level and the mean over seeds, both
+//! what moves both designs in the same way moves no order. Of its own are the stated error of the timing level and the mean over seeds, both
 //! normal and independent.
 
 use core::f64::consts::{FRAC_1_SQRT_2, PI};

@@ -1,4 +1,4 @@
-//! What a sweep found: frontiers, winners, effects, and how sure all of that is.
+//! What a sweep found: frontiers, winners, effects, and the confidence in all of that.
 //!
 //! ```text
 //! results -> Row -> Design (runs that differ in their seed are one) -> frontier, ranks, winners, effects -> Report -> files, page
@@ -29,7 +29,7 @@ use self::design::{Row, designs, short_names};
 use crate::execute::Outcome;
 use crate::{Folder, SweepError};
 
-/// What a report is asked for.
+/// What a report is made for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ReportOptions {
     /// How far from the best a design may be to be chosen for what else it costs, relative.

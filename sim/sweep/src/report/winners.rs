@@ -1,4 +1,4 @@
-//! Best designs of a workload, how sure that is, and what is nearly as good for less.
+//! Best designs of a workload, the confidence in that, and what is nearly as good for less.
 
 use serde::Serialize;
 

@@ -128,7 +128,7 @@ impl Memory {
         while let Some(head) = remaining.first() {
             // A run fits into the port's queue.
             let max_count = remaining.len().min(self.queue as usize);
-            let count = self.alike(&remaining[..max_count]);
+            let count = self.on_one_route(&remaining[..max_count]);
             remaining = &remaining[count as usize..];
             // The queue of the port has room one cycle after the L2 accepts an earlier request.
             let queue = &self.ports[port];
@@ -149,17 +149,17 @@ impl Memory {
     }
 
     /// Number of lines from the first of `lines` on that take its route.
-    fn alike(&self, lines: &[LineAccess]) -> u32 {
+    fn on_one_route(&self, lines: &[LineAccess]) -> u32 {
         let Some((head, others)) = lines.split_first() else { return 0 };
         // Most lines go no further than the L2, and need no look at memory.
-        let alike = if head.stays_in_l2() {
+        let following = if head.stays_in_l2() {
             let is_read = head.is_read();
             others.iter().take_while(|line| line.stays_in_l2() && line.is_read() == is_read).count()
         } else {
             let route = self.route(head);
             others.iter().take_while(|line| self.route(line) == route).count()
         };
-        1 + alike as u32
+        1 + following as u32
     }
 
     /// Route of a line: where it is read, its requests to the levels below, and the memory groups of the lines it
