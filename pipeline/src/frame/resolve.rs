@@ -17,6 +17,7 @@ use crate::depth::DepthTile;
 use crate::memory::{LINE_BYTES, MemorySystem};
 use crate::random::mix;
 use crate::sampling::TileSamples;
+use crate::shading::{QuadSet, lane_of};
 use crate::surface::{SurfaceSpec, Texels};
 
 /// The images; each pixel is the mean of its samples.
@@ -128,8 +129,18 @@ fn resolve_bin(pass: &Pass<'_>, bin: &Bin) -> Vec<([u32; 2], Vec<Vec3>)> {
 struct Scratch {
     /// Slots of a tile, grouped by triangle.
     slots: Vec<u16>,
-    /// Cells of one triangle shaded so far.
-    shaded: ByCell<Vec3>,
+    /// Cells of one triangle.
+    cells: ShadedCells,
+}
+
+/// Cells that the samples of one triangle see, and their colours.
+#[derive(Default)]
+struct ShadedCells {
+    quads: QuadSet,
+    /// By quad and lane.
+    colours: Vec<Vec3>,
+    /// Index in `colours` of each sample.
+    of_sample: Vec<u32>,
 }
 
 /// Colours of a tile: those stored, or those of the visible triangles, each cell of which is shaded once, or every sample.
@@ -163,7 +174,7 @@ fn resolve_tile(
             group.iter().for_each(|&slot| add(slot as usize, pass.settings.background));
             continue;
         }
-        shade_group(pass, (triangle, group), (samples, origin), &mut scratch.shaded, &mut add);
+        shade_group(pass, (triangle, group), (samples, origin), &mut scratch.cells, &mut add);
     }
     means(pass, &sums, pixels)
 }
@@ -173,27 +184,44 @@ fn shade_group(
     pass: &Pass<'_>,
     (triangle, slots): (u32, &[u16]),
     (samples, origin): (&TileSamples, [u32; 2]),
-    shaded: &mut ByCell<Vec3>,
+    cells: &mut ShadedCells,
     add: &mut impl FnMut(usize, Vec3),
 ) {
     let (side, per_pixel) = (pass.settings.spec.tile_px, pass.settings.samples.per_pixel());
     let (corners, moving) = pass.moving_corners(triangle);
-    let mut grid = Grid::new(pass, (&corners, moving), samples, origin);
     let surface = ShadedTriangle::new(pass, triangle);
-    let lane = surface.lane();
-    shaded.clear();
-    for slot in slots.iter().map(|&slot| slot as usize) {
-        let colour = match pass.shading {
-            Shading::PerSample => {
-                let at = (own_pixel(samples, slot, origin, side), samples.in_pixel(slot, per_pixel));
-                surface.shade_at(&lane, &SampleView::of_slot(&corners, samples, slot, at)).truncate()
-            }
-            Shading::Cached => {
-                let cell = grid.cell(slot);
-                *shaded.entry(cell).or_insert_with(|| surface.shade(&lane, cell).truncate())
-            }
-        };
-        add(slot, colour);
+    let slots = slots.iter().map(|&slot| slot as usize);
+    match pass.shading {
+        Shading::PerSample => slots.for_each(|slot| {
+            let at = (own_pixel(samples, slot, origin, side), samples.in_pixel(slot, per_pixel));
+            let view = SampleView::of_slot(&corners, samples, slot, at);
+            add(slot, surface.shade_at(&surface.lane(), &view).truncate());
+        }),
+        Shading::Cached => {
+            let mut grid = Grid::new(pass, (&corners, moving), samples, origin);
+            cells.shade(&surface, slots.clone().map(|slot| grid.cell(slot)));
+            slots.zip(cells.in_order()).for_each(|(slot, colour)| add(slot, colour));
+        }
+    }
+}
+
+impl ShadedCells {
+    /// Shades the `cells` that samples see, each once.
+    fn shade(&mut self, surface: &ShadedTriangle<'_>, cells: impl Iterator<Item = [i32; 2]>) {
+        let Self { quads, colours, of_sample } = self;
+        quads.clear();
+        of_sample.clear();
+        of_sample.extend(cells.map(|cell| (4 * quads.request(cell, 0) + lane_of(cell)) as u32));
+        colours.clear();
+        let lane = surface.lane();
+        for quad in quads.quads() {
+            colours.extend(surface.shade_quad(&lane, quad).map(Vec4::truncate));
+        }
+    }
+
+    /// Colours in the order of the samples.
+    fn in_order(&self) -> impl Iterator<Item = Vec3> {
+        self.of_sample.iter().map(|&at| self.colours[at as usize])
     }
 }
 
@@ -251,6 +279,14 @@ impl TileResolve {
 /// Call `each` for every line that holds one of `pixels` of a tile, with the mask of these pixels. The first byte of the tile and
 /// the bytes of a pixel are given.
 pub(super) fn tile_lines([first_byte, pixel_bytes]: [u64; 2], pixels: u64, mut each: impl FnMut(u64, u64)) {
+    if LINE_BYTES.is_multiple_of(pixel_bytes) && first_byte.is_multiple_of(LINE_BYTES) {
+        return tile_lines_of_pixels(
+            first_byte / LINE_BYTES,
+            (LINE_BYTES / pixel_bytes) as u32,
+            pixels,
+            each,
+        );
+    }
     let (mut remaining, mut open) = (pixels, None);
     while remaining != 0 {
         let pixel = u64::from(remaining.trailing_zeros());
@@ -267,6 +303,17 @@ pub(super) fn tile_lines([first_byte, pixel_bytes]: [u64; 2], pixels: u64, mut e
         }
     }
     open.into_iter().for_each(|(line, held)| each(line, held));
+}
+
+/// The same where each line holds `count` whole pixels, a power of two.
+fn tile_lines_of_pixels(first_line: u64, count: u32, pixels: u64, mut each: impl FnMut(u64, u64)) {
+    let (of_line, mut remaining) = (u64::MAX >> (64 - count), pixels);
+    while remaining != 0 {
+        let line = remaining.trailing_zeros() >> count.ilog2();
+        let held = remaining & of_line << (line << count.ilog2());
+        each(first_line + u64::from(line), held);
+        remaining &= !held;
+    }
 }
 
 /// Values by cell.

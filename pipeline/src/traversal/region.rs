@@ -155,6 +155,17 @@ impl TimePieces {
         both
     }
 
+    /// Keep the part in a range of time.
+    pub fn clip(&mut self, range: [f32; 2]) {
+        let [piece] = &mut self.pieces[..self.len] else {
+            *self = self.meet(&Self::one(Piece { t: range, faces: [true; 2] }));
+            return;
+        };
+        piece.t = [piece.t[0].max(range[0]), piece.t[1].min(range[1])];
+        let is_left = piece.t[0] <= piece.t[1] && piece.faces != [false; 2];
+        self.len = usize::from(is_left);
+    }
+
     /// Hull from the first time to the last.
     pub fn hull(&self) -> Option<[f32; 2]> {
         let pieces = self.pieces();
