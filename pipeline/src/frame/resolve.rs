@@ -17,13 +17,14 @@ use crate::depth::DepthTile;
 use crate::memory::{LINE_BYTES, MemorySystem};
 use crate::random::mix;
 use crate::sampling::TileSamples;
-use crate::shading::{QuadSet, lane_of};
+use crate::shading::{QuadAccess, QuadSet, lane_of};
 use crate::surface::{SurfaceSpec, Texels};
 
 /// The images; each pixel is the mean of its samples.
 pub(super) fn resolve(pass: &Pass<'_>, bins: &[Bin]) -> Vec<Vec<Vec3>> {
     let viewport = pass.settings.viewport;
-    let tiles: Vec<_> = bins.par_iter().map(|bin| resolve_bin(pass, bin)).collect();
+    let tiles: Vec<_> =
+        bins.par_iter().map_init(Scratch::default, |scratch, bin| resolve_bin(pass, bin, scratch)).collect();
     let mut images = vec![vec![pass.settings.background; viewport.pixels()]; pass.views.len()];
     let side = pass.settings.spec.tile_px;
     for (origin, pixels) in tiles.into_iter().flatten() {
@@ -104,9 +105,8 @@ fn first(pass: &Pass<'_>, plane: &Plane) -> Option<Texels> {
 }
 
 /// Touched tiles of a bin: first pixel and pixels of each, view by view and row by row.
-fn resolve_bin(pass: &Pass<'_>, bin: &Bin) -> Vec<([u32; 2], Vec<Vec3>)> {
-    let mut samples = TileSamples::default();
-    let mut scratch = Scratch::default();
+fn resolve_bin(pass: &Pass<'_>, bin: &Bin, scratch: &mut Scratch) -> Vec<([u32; 2], Vec<Vec3>)> {
+    let mut samples = std::mem::take(&mut scratch.samples);
     let mut resolved = Vec::new();
     for (index, tile) in bin.tiles.iter().enumerate() {
         let Some(tile) = tile else { continue };
@@ -119,21 +119,23 @@ fn resolve_bin(pass: &Pass<'_>, bin: &Bin) -> Vec<([u32; 2], Vec<Vec3>)> {
             origin,
             settings.spec.tile_px,
         );
-        resolved.push((origin, resolve_tile(pass, tile, &samples, origin, &mut scratch)));
+        resolved.push((origin, resolve_tile(pass, tile, &samples, origin, scratch)));
     }
+    scratch.samples = samples;
     resolved
 }
 
 /// Memory reused by a worker.
 #[derive(Default)]
 struct Scratch {
+    samples: TileSamples,
     /// Slots of a tile, grouped by triangle.
     slots: Vec<u16>,
     /// Cells of one triangle.
     cells: ShadedCells,
 }
 
-/// Cells that the samples of one triangle see, and their colours.
+/// Cells that the samples of one triangle see in a tile, and their colours.
 #[derive(Default)]
 struct ShadedCells {
     quads: QuadSet,
@@ -141,6 +143,59 @@ struct ShadedCells {
     colours: Vec<Vec3>,
     /// Index in `colours` of each sample.
     of_sample: Vec<u32>,
+    known: KnownColours,
+}
+
+/// Colours of cells shaded before, in this tile or another one: with blur, many tiles see a cell. Each key has one place, and the
+/// last one keeps it.
+struct KnownColours(Vec<KnownQuad>);
+
+/// Colours of some cells of a quad.
+#[derive(Clone, Copy)]
+struct KnownQuad {
+    triangle: u32,
+    quad: [i32; 2],
+    /// Mask of the cells that were shaded.
+    lanes: u8,
+    colours: [Vec3; 4],
+}
+
+impl Default for KnownColours {
+    fn default() -> Self {
+        let none =
+            KnownQuad { triangle: DepthTile::NO_TRIANGLE, quad: [0; 2], lanes: 0, colours: [Vec3::ZERO; 4] };
+        Self(vec![none; 1 << Self::BITS])
+    }
+}
+
+impl KnownColours {
+    /// Places, enough for a row of bins of an image: as its logarithm.
+    const BITS: u32 = 15;
+
+    /// Colours of the requested cells of a quad. Those that are not known are shaded.
+    fn of(
+        &mut self,
+        triangle: u32,
+        access: &QuadAccess,
+        shade: impl FnOnce(&QuadAccess) -> [Vec4; 4],
+    ) -> &[Vec3; 4] {
+        let [x, y] = access.quad.map(|part| u64::from(part as u16));
+        let key = u64::from(triangle) << 32 | x << 16 | y;
+        let place = key.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> (64 - Self::BITS);
+        let known = &mut self.0[place as usize];
+        if (known.triangle, known.quad) != (triangle, access.quad) {
+            (known.triangle, known.quad, known.lanes) = (triangle, access.quad, 0);
+        }
+        let lanes = access.lanes & !known.lanes;
+        if lanes != 0 {
+            let shaded = shade(&QuadAccess { lanes, ..*access });
+            for lane in (0..4).filter(|lane| lanes >> lane & 1 == 1) {
+                known.colours[lane] = shaded[lane].truncate();
+            }
+            known.lanes |= lanes;
+        }
+        &known.colours
+    }
 }
 
 /// Colours of a tile: those stored, or those of the visible triangles, each cell of which is shaded once, or every sample.
@@ -189,33 +244,38 @@ fn shade_group(
 ) {
     let (side, per_pixel) = (pass.settings.spec.tile_px, pass.settings.samples.per_pixel());
     let (corners, moving) = pass.moving_corners(triangle);
-    let surface = ShadedTriangle::new(pass, triangle);
     let slots = slots.iter().map(|&slot| slot as usize);
     match pass.shading {
-        Shading::PerSample => slots.for_each(|slot| {
-            let at = (own_pixel(samples, slot, origin, side), samples.in_pixel(slot, per_pixel));
-            let view = SampleView::of_slot(&corners, samples, slot, at);
-            add(slot, surface.shade_at(&surface.lane(), &view).truncate());
-        }),
+        Shading::PerSample => {
+            let surface = ShadedTriangle::new(pass, triangle);
+            slots.for_each(|slot| {
+                let at = (own_pixel(samples, slot, origin, side), samples.in_pixel(slot, per_pixel));
+                let view = SampleView::of_slot(&corners, samples, slot, at);
+                add(slot, surface.shade_at(&surface.lane(), &view).truncate());
+            });
+        }
         Shading::Cached => {
             let mut grid = Grid::new(pass, (&corners, moving), samples, origin);
-            cells.shade(&surface, slots.clone().map(|slot| grid.cell(slot)));
+            cells.shade(pass, triangle, slots.clone().map(|slot| grid.cell(slot)));
             slots.zip(cells.in_order()).for_each(|(slot, colour)| add(slot, colour));
         }
     }
 }
 
 impl ShadedCells {
-    /// Shades the `cells` that samples see, each once.
-    fn shade(&mut self, surface: &ShadedTriangle<'_>, cells: impl Iterator<Item = [i32; 2]>) {
-        let Self { quads, colours, of_sample } = self;
+    /// Finds the colours of the `cells` that samples see on a triangle.
+    fn shade(&mut self, pass: &Pass<'_>, triangle: u32, cells: impl Iterator<Item = [i32; 2]>) {
+        let Self { quads, colours, of_sample, known } = self;
         quads.clear();
         of_sample.clear();
         of_sample.extend(cells.map(|cell| (4 * quads.request(cell, 0) + lane_of(cell)) as u32));
         colours.clear();
-        let lane = surface.lane();
-        for quad in quads.quads() {
-            colours.extend(surface.shade_quad(&lane, quad).map(Vec4::truncate));
+        let mut surface = None;
+        for access in quads.quads() {
+            colours.extend(known.of(triangle, access, |access| {
+                let surface = surface.get_or_insert_with(|| ShadedTriangle::new(pass, triangle));
+                surface.shade_quad(&surface.lane(), access)
+            }));
         }
     }
 
