@@ -57,6 +57,22 @@ impl<'a> Grid<'a> {
         [0, 1].map(|axis| self.cells.at[axis][lane])
     }
 
+    /// Appends the cells of the samples in `slots` to `found`.
+    pub fn cells(&self, slots: &[u16], found: &mut Vec<[i32; 2]>) {
+        let own = |&slot: &u16| own_pixel(self.samples, slot.into(), self.origin, self.side_px);
+        if self.plain {
+            return found.extend(slots.iter().map(own));
+        }
+        let first = found.len();
+        let mut in_front = true;
+        let (grid, all_in_front) = (self, &mut in_front);
+        dispatch(Width::widest(), CellsOf { grid, slots, found, all_in_front });
+        if !in_front {
+            let cells = found[first..].iter_mut().zip(slots);
+            cells.filter(|(cell, _)| **cell == BEHIND).for_each(|(cell, slot)| *cell = own(slot));
+        }
+    }
+
     /// Finds the cells of the block from `base` on.
     fn find(&mut self, base: usize) {
         self.cells.base = base;
@@ -88,6 +104,65 @@ impl Kernel for Block<'_> {
                 *cell = cell_at(place);
             }
         }
+    }
+}
+
+/// Stands for the cell of a sample whose surface point is behind the camera; beyond all cells.
+const BEHIND: [i32; 2] = [i32::MIN; 2];
+
+/// The cells of any samples of a tile, gathered sixteen at a time.
+struct CellsOf<'a, 'g> {
+    grid: &'a Grid<'g>,
+    slots: &'a [u16],
+    found: &'a mut Vec<[i32; 2]>,
+    /// Cleared if the point of any sample is not.
+    all_in_front: &'a mut bool,
+}
+
+impl Kernel for CellsOf<'_, '_> {
+    #[inline(always)]
+    fn run<V: Lanes>(self) {
+        let Grid { corners, reference, image, samples, .. } = self.grid;
+        let mut cells = Cells { base: 0, at: [[0; LANES]; 2], in_front: 0 };
+        for slots in self.slots.chunks(LANES) {
+            let gathered = Gathered::new(samples, slots);
+            let rows = gathered.rows();
+            Block { corners, reference, image: *image, rows, cells: &mut cells }.run::<V>();
+            for lane in 0..slots.len() {
+                let is_in_front = cells.in_front >> lane & 1 == 1;
+                *self.all_in_front &= is_in_front;
+                self.found.push(if is_in_front { [cells.at[0][lane], cells.at[1][lane]] } else { BEHIND });
+            }
+        }
+    }
+}
+
+/// Data of up to sixteen samples of a tile; other lanes repeat the last one.
+struct Gathered {
+    slope: [[f32; LANES]; 2],
+    lens: [[f32; LANES]; 2],
+    t: [f32; LANES],
+}
+
+impl Gathered {
+    #[inline(always)]
+    fn new(samples: &TileSamples, slots: &[u16]) -> Self {
+        let mut gathered = Self { slope: [[0.0; LANES]; 2], lens: [[0.0; LANES]; 2], t: [0.0; LANES] };
+        for lane in 0..LANES {
+            let slot = usize::from(slots[lane.min(slots.len() - 1)]);
+            for axis in 0..2 {
+                gathered.slope[axis][lane] = samples.slope[axis][slot];
+                gathered.lens[axis][lane] = samples.lens[axis][slot];
+            }
+            gathered.t[lane] = samples.t[slot];
+        }
+        gathered
+    }
+
+    #[inline(always)]
+    fn rows(&self) -> SampleRows<'_> {
+        let Self { slope: [slope_x, slope_y], lens: [lens_x, lens_y], t } = self;
+        SampleRows { slope: [slope_x, slope_y], lens: [lens_x, lens_y], t }
     }
 }
 

@@ -138,6 +138,8 @@ struct Scratch {
 /// Cells that the samples of one triangle see in a tile, and their colours.
 #[derive(Default)]
 struct ShadedCells {
+    /// Cell of each sample.
+    cells: Vec<[i32; 2]>,
     quads: QuadSet,
     /// By quad and lane.
     colours: Vec<Vec3>,
@@ -209,7 +211,12 @@ fn resolve_tile(
     let (side, per_pixel) = (pass.settings.spec.tile_px, pass.settings.samples.per_pixel());
     let pixels = (side * side) as usize;
     let mut sums = vec![Vec3::ZERO; pixels * pass.views.len()];
+    let is_whole = pass.views == [0..per_pixel];
     let mut add = |slot: usize, colour: Vec3| {
+        if is_whole {
+            sums[samples.pixel[slot] as usize] += colour;
+            return;
+        }
         let (pixel, index) = (samples.pixel[slot] as usize, samples.in_pixel(slot, per_pixel));
         let views = pass.views.iter().enumerate().filter(|(_, samples)| samples.contains(&index));
         views.for_each(|(view, _)| sums[view * pixels + pixel] += colour);
@@ -234,17 +241,17 @@ fn resolve_tile(
     means(pass, &sums, pixels)
 }
 
-/// Calls `add` with the colours of the samples in `slots` of the tile at `origin`, which see `triangle`.
+/// Calls `add` with the colours of the samples in the slots `group` of the tile at `origin`, which see `triangle`.
 fn shade_group(
     pass: &Pass<'_>,
-    (triangle, slots): (u32, &[u16]),
+    (triangle, group): (u32, &[u16]),
     (samples, origin): (&TileSamples, [u32; 2]),
     cells: &mut ShadedCells,
     add: &mut impl FnMut(usize, Vec3),
 ) {
     let (side, per_pixel) = (pass.settings.spec.tile_px, pass.settings.samples.per_pixel());
     let (corners, moving) = pass.moving_corners(triangle);
-    let slots = slots.iter().map(|&slot| slot as usize);
+    let slots = group.iter().map(|&slot| slot as usize);
     match pass.shading {
         Shading::PerSample => {
             let surface = ShadedTriangle::new(pass, triangle);
@@ -255,20 +262,22 @@ fn shade_group(
             });
         }
         Shading::Cached => {
-            let mut grid = Grid::new(pass, (&corners, moving), samples, origin);
-            cells.shade(pass, triangle, slots.clone().map(|slot| grid.cell(slot)));
+            let grid = Grid::new(pass, (&corners, moving), samples, origin);
+            cells.shade(pass, triangle, |cells| grid.cells(group, cells));
             slots.zip(cells.in_order()).for_each(|(slot, colour)| add(slot, colour));
         }
     }
 }
 
 impl ShadedCells {
-    /// Finds the colours of the `cells` that samples see on a triangle.
-    fn shade(&mut self, pass: &Pass<'_>, triangle: u32, cells: impl Iterator<Item = [i32; 2]>) {
-        let Self { quads, colours, of_sample, known } = self;
+    /// Finds the colours of the cells that samples see on a triangle, which `find` lists.
+    fn shade(&mut self, pass: &Pass<'_>, triangle: u32, find: impl FnOnce(&mut Vec<[i32; 2]>)) {
+        let Self { cells, quads, colours, of_sample, known } = self;
         quads.clear();
+        cells.clear();
+        find(cells);
         of_sample.clear();
-        of_sample.extend(cells.map(|cell| (4 * quads.request(cell, 0) + lane_of(cell)) as u32));
+        of_sample.extend(cells.iter().map(|&cell| (4 * quads.request(cell, 0) + lane_of(cell)) as u32));
         colours.clear();
         let mut surface = None;
         for access in quads.quads() {

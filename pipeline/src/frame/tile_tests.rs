@@ -165,11 +165,12 @@ impl Subject<'_> {
         remaining: &mut Remaining,
         context: &mut TestContext<'_>,
     ) -> Option<()> {
-        let tests = [TestPlan::SIDES, TestPlan::FACING, TestPlan::EDGES];
-        tests
-            .into_iter()
-            .filter(|&test| plan.has(test))
-            .try_for_each(|test| self.step(test, tile, remaining, context))
+        for test in [TestPlan::SIDES, TestPlan::FACING, TestPlan::EDGES] {
+            if plan.has(test) {
+                self.step(test, tile, remaining, context)?;
+            }
+        }
+        Some(())
     }
 
     /// Run the last test of a plan on the part kept by the tests before it, and record the outcome.

@@ -33,6 +33,8 @@ pub(super) struct Scratch {
     sharpened: Vec<bool>,
     hits: Hits,
     fragments: Fragments,
+    /// Cells of the shaded samples of a packet.
+    cells: Vec<[i32; 2]>,
     quads: QuadSet,
 }
 
@@ -282,15 +284,22 @@ impl<'a, 'p> Worker<'a, 'p> {
         let Settings { spec, samples: source, .. } = *self.pass.settings;
         let (samples, side) = (&self.scratch.samples[index], spec.tile_px);
         let per_pixel = source.per_pixel();
-        let mut grid = Grid::new(self.pass, (corners, moving), samples, origin);
-        for slot in self.scratch.fragments.shaded.iter().map(|&slot| slot as usize) {
-            let (cell, index) = match self.pass.shading {
-                Shading::Cached => (grid.cell(slot), 0),
-                Shading::PerSample => {
-                    (own_pixel(samples, slot, origin, side), samples.in_pixel(slot, per_pixel) as u16)
+        let (quads, shaded) = (&mut self.scratch.quads, &self.scratch.fragments.shaded);
+        match self.pass.shading {
+            Shading::Cached => {
+                let cells = &mut self.scratch.cells;
+                cells.clear();
+                Grid::new(self.pass, (corners, moving), samples, origin).cells(shaded, cells);
+                for &cell in cells.iter() {
+                    quads.request(cell, 0);
                 }
-            };
-            self.scratch.quads.request(cell, index);
+            }
+            Shading::PerSample => {
+                for slot in shaded.iter().map(|&slot| usize::from(slot)) {
+                    let index = samples.in_pixel(slot, per_pixel) as u16;
+                    quads.request(own_pixel(samples, slot, origin, side), index);
+                }
+            }
         }
         let first = self.log.quads.len();
         self.scratch.quads.drain_into(&mut self.log.quads);
