@@ -18,6 +18,7 @@ use crate::memory::{LINE_BYTES, MemorySystem};
 use crate::random::mix;
 use crate::sampling::TileSamples;
 use crate::shading::{QuadAccess, QuadSet, lane_of};
+use crate::simd::prefetch;
 use crate::surface::{SurfaceSpec, Texels};
 
 /// The images; each pixel is the mean of its samples.
@@ -154,6 +155,7 @@ struct KnownColours(Vec<KnownQuad>);
 
 /// Colours of some cells of a quad.
 #[derive(Clone, Copy)]
+#[repr(align(64))]
 struct KnownQuad {
     triangle: u32,
     quad: [i32; 2],
@@ -172,7 +174,18 @@ impl Default for KnownColours {
 
 impl KnownColours {
     /// Places, enough for a row of bins of an image: as its logarithm.
-    const BITS: u32 = 15;
+    const BITS: u32 = 16;
+
+    fn place(triangle: u32, quad: [i32; 2]) -> usize {
+        let [x, y] = quad.map(|part| u64::from(part as u16));
+        let key = u64::from(triangle) << 32 | x << 16 | y;
+        (key.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> (64 - Self::BITS)) as usize
+    }
+
+    /// Prefetches what is known of a quad.
+    fn prefetch(&self, triangle: u32, quad: [i32; 2]) {
+        prefetch(&self.0[Self::place(triangle, quad)]);
+    }
 
     /// Colours of the requested cells of a quad. Those that are not known are shaded.
     fn of(
@@ -181,10 +194,7 @@ impl KnownColours {
         access: &QuadAccess,
         shade: impl FnOnce(&QuadAccess) -> [Vec4; 4],
     ) -> &[Vec3; 4] {
-        let [x, y] = access.quad.map(|part| u64::from(part as u16));
-        let key = u64::from(triangle) << 32 | x << 16 | y;
-        let place = key.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> (64 - Self::BITS);
-        let known = &mut self.0[place as usize];
+        let known = &mut self.0[Self::place(triangle, access.quad)];
         if (known.triangle, known.quad) != (triangle, access.quad) {
             (known.triangle, known.quad, known.lanes) = (triangle, access.quad, 0);
         }
@@ -279,6 +289,7 @@ impl ShadedCells {
         of_sample.clear();
         of_sample.extend(cells.iter().map(|&cell| (4 * quads.request(cell, 0) + lane_of(cell)) as u32));
         colours.clear();
+        quads.quads().iter().for_each(|access| known.prefetch(triangle, access.quad));
         let mut surface = None;
         for access in quads.quads() {
             colours.extend(known.of(triangle, access, |access| {

@@ -66,6 +66,8 @@ impl<'a, 'p> Worker<'a, 'p> {
 
     /// Rasterize the `listed` triangles of a batch.
     pub fn rasterize(mut self, batch: &[Ready], listed: &[u32]) -> BinLog {
+        // About as many packets as triangles; logs that grow are copied.
+        self.log.work.reserve(listed.len());
         for &index in listed {
             let ready = &batch[index as usize];
             let draw = self.pass.locate(ready.triangle.id).0 as u32;

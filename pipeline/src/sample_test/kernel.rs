@@ -251,8 +251,9 @@ impl SampleTest<'_, '_> {
         self.hits.hit += seen.count_ones();
         self.note(base, seen, |pixels| &mut pixels.hit);
         self.note(base, nearer, |pixels| &mut pixels.written);
-        self.hits.read_pixels |= self.pixels_of(base, seen);
-        self.hits.written_pixels |= self.pixels_of(base, nearer);
+        let pixels = self.pixels_of(base, seen);
+        self.hits.read_pixels |= pixels;
+        self.hits.written_pixels |= if nearer == seen { pixels } else { self.pixels_of(base, nearer) };
         self.hits.written.extend(lanes_of(nearer).map(|lane| (base + lane) as u16));
     }
 
