@@ -399,6 +399,17 @@ mod tests {
     }
 
     #[test]
+    fn codes_change_at_the_borders() {
+        let near = |border: &f32| [border.next_down(), *border, border.next_up()];
+        let all = BORDERS.iter().flat_map(near).chain((0..5000).map(|step| step as f32 * 2.1e-4));
+        for linear in all {
+            let expected = BORDERS.partition_point(|&border| border <= linear) as u8;
+            assert_eq!(linear_to_srgb8(linear), expected, "{linear}");
+        }
+        assert_eq!(linear_to_srgb8(-0.0), 0);
+    }
+
+    #[test]
     fn wrapping() {
         let inside = |wrap| [-5.0_f32, -1.0, 0.0, 3.0, 4.0, 9.0].map(|first| both_wrapped(first, 4, wrap)[0]);
         assert_eq!(inside(Wrap::Clamp), [0, 0, 0, 3, 3, 3]);

@@ -221,7 +221,7 @@ fn resolve_tile(
     let (side, per_pixel) = (pass.settings.spec.tile_px, pass.settings.samples.per_pixel());
     let pixels = (side * side) as usize;
     let mut sums = vec![Vec3::ZERO; pixels * pass.views.len()];
-    let is_whole = pass.views == [0..per_pixel];
+    let is_whole = matches!(&pass.views[..], [view] if *view == (0..per_pixel));
     let mut add = |slot: usize, colour: Vec3| {
         if is_whole {
             sums[samples.pixel[slot] as usize] += colour;
@@ -419,4 +419,66 @@ impl Hasher for CellHasher {
     }
 
     fn write_usize(&mut self, _length: usize) {}
+}
+
+#[cfg(test)]
+mod tests {
+    use std::cell::RefCell;
+
+    use super::*;
+
+    /// Lines of a tile pixel by pixel.
+    fn one_by_one([first_byte, pixel_bytes]: [u64; 2], pixels: u64) -> Vec<(u64, u64)> {
+        let mut lines: Vec<(u64, u64)> = Vec::new();
+        for pixel in (0..64).filter(|pixel| pixels >> pixel & 1 == 1) {
+            let first = first_byte + pixel * pixel_bytes;
+            for line in first / LINE_BYTES..=(first + pixel_bytes - 1) / LINE_BYTES {
+                match lines.last_mut().filter(|(known, _)| *known == line) {
+                    Some((_, held)) => *held |= 1 << pixel,
+                    None => lines.push((line, 1 << pixel)),
+                }
+            }
+        }
+        lines
+    }
+
+    #[test]
+    fn lines_of_a_tile_hold_its_pixels() {
+        for (pixel_bytes, first_byte) in
+            [4, 8, 12, 32, 64, 96, 128].iter().flat_map(|&bytes| [0, 64 * 7, 36].map(|first| (bytes, first)))
+        {
+            for pixels in [u64::MAX, 1, 1 << 63, 0xF0F0_0000_1234_8001, mix(pixel_bytes), mix(first_byte)] {
+                let mut lines = Vec::new();
+                tile_lines([first_byte, pixel_bytes], pixels, |line, held| lines.push((line, held)));
+                assert_eq!(
+                    lines,
+                    one_by_one([first_byte, pixel_bytes], pixels),
+                    "{pixel_bytes} {first_byte} {pixels:x}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn a_known_colour_is_not_shaded_again() {
+        let (mut known, shaded) = (KnownColours::default(), RefCell::new(Vec::new()));
+        let colour = |quad: [i32; 2], lane: usize| Vec3::new(quad[0] as f32, quad[1] as f32, lane as f32);
+        let shade = |access: &QuadAccess| {
+            shaded.borrow_mut().push((access.quad, access.lanes));
+            [0, 1, 2, 3].map(|lane| colour(access.quad, lane).extend(1.0))
+        };
+        for (triangle, quad, lanes) in [
+            (1, [3, 4], 0b0001),
+            (1, [3, 4], 0b0101),
+            (1, [3, 4], 0b0100),
+            (1, [-3, 4], 0b1000),
+            (2, [3, 4], 1),
+        ] {
+            let colours = known.of(triangle, &QuadAccess { quad, sample: 0, lookups: 1, lanes }, shade);
+            for lane in (0..4).filter(|lane| lanes >> lane & 1 == 1) {
+                assert_eq!(colours[lane], colour(quad, lane));
+            }
+        }
+        assert_eq!(*shaded.borrow(), [([3, 4], 1), ([3, 4], 4), ([-3, 4], 8), ([3, 4], 1)]);
+    }
 }

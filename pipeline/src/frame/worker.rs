@@ -104,7 +104,7 @@ impl<'a, 'p> Worker<'a, 'p> {
         }
         for row in tiles.y0..tiles.y1 {
             for column in tiles.x0..tiles.x1 {
-                let before = self.pass.heat.then(|| (self.tests, self.log.work.len()));
+                let before = self.pass.heat.then_some((self.tests, self.log.work.len()));
                 self.tests.visited += 1;
                 self.fine(&subject, &remaining, [column * side, row * side]);
                 if let Some(before) = before {
