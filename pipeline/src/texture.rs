@@ -151,7 +151,9 @@ impl Level {
     }
 }
 
-static TO_LINEAR: LazyLock<[f32; 256]> = LazyLock::new(|| std::array::from_fn(|code| decode(code as f64)));
+/// Linear value of a code, and the value of a code of opacity.
+static TO_LINEAR: LazyLock<[[f32; 2]; 256]> =
+    LazyLock::new(|| std::array::from_fn(|code| [decode(code as f64), code as f32 / 255.0]));
 
 fn decode(code: f64) -> f32 {
     let c = code / 255.0;
@@ -161,7 +163,7 @@ fn decode(code: f64) -> f32 {
 /// Linear value in [0, 1] of an 8-bit sRGB code (IEC 61966-2-1:1999). It uses `libm`, so bytes do not depend
 /// on the machine.
 pub fn srgb8_to_linear(code: u8) -> f32 {
-    TO_LINEAR[code as usize]
+    TO_LINEAR[code as usize][0]
 }
 
 /// Linear values half way between neighbouring codes.
@@ -171,9 +173,21 @@ static BORDERS: LazyLock<[f32; 255]> =
 /// Weights of the channels of linear sRGB in its luminance (IEC 61966-2-1).
 pub const LUMINANCE: Vec3 = Vec3::new(0.2126, 0.7152, 0.0722);
 
+/// Bits of a number that [`AT_LEAST`] leaves out.
+const LEFT_OUT: u32 = 17;
+
+/// Code of the smallest number with given leading bits, up to 1.
+static AT_LEAST: LazyLock<Vec<u8>> = LazyLock::new(|| {
+    let smallest = (0..=1_f32.to_bits() >> LEFT_OUT).map(|leading| f32::from_bits(leading << LEFT_OUT));
+    smallest.map(|linear| BORDERS.partition_point(|&border| border <= linear) as u8).collect()
+});
+
 /// Nearest 8-bit sRGB code of a linear value. Values outside [0, 1] are clamped, NaN becomes 0.
 pub fn linear_to_srgb8(linear: f32) -> u8 {
-    BORDERS.partition_point(|&border| border <= linear) as u8
+    let linear = if linear > 0.0 { linear.min(1.0) } else { 0.0 };
+    let known = AT_LEAST[(linear.to_bits() >> LEFT_OUT) as usize];
+    let more = BORDERS[usize::from(known)..].iter().take_while(|&&border| border <= linear).count();
+    known + more as u8
 }
 
 /// Side of the block of texels in a line; blocks of 4x4 let neighbours in both directions share lines.
@@ -254,9 +268,10 @@ impl<'a> Sampler<'a> {
 
     fn bilinear(&self, level: &Level, uv: Vec2) -> Vec4 {
         let (taps, fraction) = self.taps(level, uv);
+        let values: &[[f32; 2]; 256] = &TO_LINEAR;
         let [a, b, c, d] = taps.map(|[x, y]| {
-            let [r, g, b, alpha] = level.texels[(y * level.width + x) as usize];
-            Vec4::new(srgb8_to_linear(r), srgb8_to_linear(g), srgb8_to_linear(b), f32::from(alpha) / 255.0)
+            let [r, g, b, alpha] = level.texels[(y * level.width + x) as usize].map(usize::from);
+            Vec4::new(values[r][0], values[g][0], values[b][0], values[alpha][1])
         });
         a.lerp(b, fraction.x).lerp(c.lerp(d, fraction.x), fraction.y)
     }
@@ -270,8 +285,8 @@ impl<'a> Sampler<'a> {
 pub(crate) fn taps(size: [u32; 2], wrap: [Wrap; 2], uv: Vec2) -> ([[u32; 2]; 4], Vec2) {
     let at = uv * Vec2::new(size[0] as f32, size[1] as f32) - Vec2::splat(0.5);
     let first = Vec2::new(floor(at.x), floor(at.y));
-    let x = [0, 1].map(|step| wrapped(first.x, step, size[0], wrap[0]));
-    let y = [0, 1].map(|step| wrapped(first.y, step, size[1], wrap[1]));
+    let [x, y] = [(first.x, size[0], wrap[0]), (first.y, size[1], wrap[1])]
+        .map(|(first, side, wrap)| both_wrapped(first, side, wrap));
     ([[x[0], y[0]], [x[1], y[0]], [x[0], y[1]], [x[1], y[1]]], at - first)
 }
 
@@ -287,18 +302,27 @@ fn block(level: &Level, x: u32, y: u32) -> u32 {
     y / BLOCK * level.width.div_ceil(BLOCK) + x / BLOCK
 }
 
-/// Texel `first + step` wrapped into `0..side`.
-fn wrapped(first: f32, step: i64, side: u32, wrap: Wrap) -> u32 {
-    let (texel, side) = ((first as i64).saturating_add(step), i64::from(side));
-    // Divisions are slow, and few fetches wrap.
-    if (0..side).contains(&texel) {
-        return texel as u32;
+/// Texel `first` and the next one, wrapped into `0..side`.
+#[inline]
+fn both_wrapped(first: f32, side: u32, wrap: Wrap) -> [u32; 2] {
+    let (texel, side) = (first as i64, i64::from(side));
+    // Few fetches wrap.
+    if texel >= 0 && texel < side - 1 {
+        return [texel as u32, texel as u32 + 1];
     }
+    [texel, texel.saturating_add(1)].map(|texel| wrapped(texel, side, wrap))
+}
+
+/// Texel wrapped into `0..side`.
+fn wrapped(texel: i64, side: i64, wrap: Wrap) -> u32 {
+    // Divisions are slow.
+    let within =
+        |count: i64| if count & (count - 1) == 0 { texel & (count - 1) } else { texel.rem_euclid(count) };
     let inside = match wrap {
         Wrap::Clamp => texel.clamp(0, side - 1),
-        Wrap::Repeat => texel.rem_euclid(side),
+        Wrap::Repeat => within(side),
         Wrap::Mirror => {
-            let turn = texel.rem_euclid(2 * side);
+            let turn = within(2 * side);
             turn.min(2 * side - 1 - turn)
         }
     };
@@ -375,8 +399,19 @@ mod tests {
     }
 
     #[test]
+    fn codes_change_at_the_borders() {
+        let near = |border: &f32| [border.next_down(), *border, border.next_up()];
+        let all = BORDERS.iter().flat_map(near).chain((0..5000).map(|step| step as f32 * 2.1e-4));
+        for linear in all {
+            let expected = BORDERS.partition_point(|&border| border <= linear) as u8;
+            assert_eq!(linear_to_srgb8(linear), expected, "{linear}");
+        }
+        assert_eq!(linear_to_srgb8(-0.0), 0);
+    }
+
+    #[test]
     fn wrapping() {
-        let inside = |wrap| [-5.0_f32, -1.0, 0.0, 3.0, 4.0, 9.0].map(|first| wrapped(first, 0, 4, wrap));
+        let inside = |wrap| [-5.0_f32, -1.0, 0.0, 3.0, 4.0, 9.0].map(|first| both_wrapped(first, 4, wrap)[0]);
         assert_eq!(inside(Wrap::Clamp), [0, 0, 0, 3, 3, 3]);
         assert_eq!(inside(Wrap::Repeat), [3, 3, 0, 3, 0, 1]);
         assert_eq!(inside(Wrap::Mirror), [3, 0, 0, 3, 3, 1]);

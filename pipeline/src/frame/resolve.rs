@@ -17,12 +17,15 @@ use crate::depth::DepthTile;
 use crate::memory::{LINE_BYTES, MemorySystem};
 use crate::random::mix;
 use crate::sampling::TileSamples;
+use crate::shading::{QuadAccess, QuadSet, lane_of};
+use crate::simd::prefetch;
 use crate::surface::{SurfaceSpec, Texels};
 
 /// The images; each pixel is the mean of its samples.
 pub(super) fn resolve(pass: &Pass<'_>, bins: &[Bin]) -> Vec<Vec<Vec3>> {
     let viewport = pass.settings.viewport;
-    let tiles: Vec<_> = bins.par_iter().map(|bin| resolve_bin(pass, bin)).collect();
+    let tiles: Vec<_> =
+        bins.par_iter().map_init(Scratch::default, |scratch, bin| resolve_bin(pass, bin, scratch)).collect();
     let mut images = vec![vec![pass.settings.background; viewport.pixels()]; pass.views.len()];
     let side = pass.settings.spec.tile_px;
     for (origin, pixels) in tiles.into_iter().flatten() {
@@ -103,9 +106,8 @@ fn first(pass: &Pass<'_>, plane: &Plane) -> Option<Texels> {
 }
 
 /// Touched tiles of a bin: first pixel and pixels of each, view by view and row by row.
-fn resolve_bin(pass: &Pass<'_>, bin: &Bin) -> Vec<([u32; 2], Vec<Vec3>)> {
-    let mut samples = TileSamples::default();
-    let mut scratch = Scratch::default();
+fn resolve_bin(pass: &Pass<'_>, bin: &Bin, scratch: &mut Scratch) -> Vec<([u32; 2], Vec<Vec3>)> {
+    let mut samples = std::mem::take(&mut scratch.samples);
     let mut resolved = Vec::new();
     for (index, tile) in bin.tiles.iter().enumerate() {
         let Some(tile) = tile else { continue };
@@ -118,18 +120,94 @@ fn resolve_bin(pass: &Pass<'_>, bin: &Bin) -> Vec<([u32; 2], Vec<Vec3>)> {
             origin,
             settings.spec.tile_px,
         );
-        resolved.push((origin, resolve_tile(pass, tile, &samples, origin, &mut scratch)));
+        resolved.push((origin, resolve_tile(pass, tile, &samples, origin, scratch)));
     }
+    scratch.samples = samples;
     resolved
 }
 
 /// Memory reused by a worker.
 #[derive(Default)]
 struct Scratch {
+    samples: TileSamples,
     /// Slots of a tile, grouped by triangle.
     slots: Vec<u16>,
-    /// Cells of one triangle shaded so far.
-    shaded: ByCell<Vec3>,
+    /// Cells of one triangle.
+    cells: ShadedCells,
+}
+
+/// Cells that the samples of one triangle see in a tile, and their colours.
+#[derive(Default)]
+struct ShadedCells {
+    /// Cell of each sample.
+    cells: Vec<[i32; 2]>,
+    quads: QuadSet,
+    /// By quad and lane.
+    colours: Vec<Vec3>,
+    /// Index in `colours` of each sample.
+    of_sample: Vec<u32>,
+    known: KnownColours,
+}
+
+/// Colours of cells shaded before, in this tile or another one: with blur, many tiles see a cell. Each key has one place, and the
+/// last one keeps it.
+struct KnownColours(Vec<KnownQuad>);
+
+/// Colours of some cells of a quad.
+#[derive(Clone, Copy)]
+#[repr(align(64))]
+struct KnownQuad {
+    triangle: u32,
+    quad: [i32; 2],
+    /// Mask of the cells that were shaded.
+    lanes: u8,
+    colours: [Vec3; 4],
+}
+
+impl Default for KnownColours {
+    fn default() -> Self {
+        let none =
+            KnownQuad { triangle: DepthTile::NO_TRIANGLE, quad: [0; 2], lanes: 0, colours: [Vec3::ZERO; 4] };
+        Self(vec![none; 1 << Self::BITS])
+    }
+}
+
+impl KnownColours {
+    /// Places, enough for a row of bins of an image: as its logarithm.
+    const BITS: u32 = 16;
+
+    fn place(triangle: u32, quad: [i32; 2]) -> usize {
+        let [x, y] = quad.map(|part| u64::from(part as u16));
+        let key = u64::from(triangle) << 32 | x << 16 | y;
+        (key.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> (64 - Self::BITS)) as usize
+    }
+
+    /// Prefetches what is known of a quad.
+    fn prefetch(&self, triangle: u32, quad: [i32; 2]) {
+        prefetch(&self.0[Self::place(triangle, quad)]);
+    }
+
+    /// Colours of the requested cells of a quad. Those that are not known are shaded.
+    fn of(
+        &mut self,
+        triangle: u32,
+        access: &QuadAccess,
+        shade: impl FnOnce(&QuadAccess) -> [Vec4; 4],
+    ) -> &[Vec3; 4] {
+        let known = &mut self.0[Self::place(triangle, access.quad)];
+        if (known.triangle, known.quad) != (triangle, access.quad) {
+            (known.triangle, known.quad, known.lanes) = (triangle, access.quad, 0);
+        }
+        let lanes = access.lanes & !known.lanes;
+        if lanes != 0 {
+            let shaded = shade(&QuadAccess { lanes, ..*access });
+            for lane in (0..4).filter(|lane| lanes >> lane & 1 == 1) {
+                known.colours[lane] = shaded[lane].truncate();
+            }
+            known.lanes |= lanes;
+        }
+        &known.colours
+    }
 }
 
 /// Colours of a tile: those stored, or those of the visible triangles, each cell of which is shaded once, or every sample.
@@ -143,7 +221,12 @@ fn resolve_tile(
     let (side, per_pixel) = (pass.settings.spec.tile_px, pass.settings.samples.per_pixel());
     let pixels = (side * side) as usize;
     let mut sums = vec![Vec3::ZERO; pixels * pass.views.len()];
+    let is_whole = matches!(&pass.views[..], [view] if *view == (0..per_pixel));
     let mut add = |slot: usize, colour: Vec3| {
+        if is_whole {
+            sums[samples.pixel[slot] as usize] += colour;
+            return;
+        }
         let (pixel, index) = (samples.pixel[slot] as usize, samples.in_pixel(slot, per_pixel));
         let views = pass.views.iter().enumerate().filter(|(_, samples)| samples.contains(&index));
         views.for_each(|(view, _)| sums[view * pixels + pixel] += colour);
@@ -163,37 +246,62 @@ fn resolve_tile(
             group.iter().for_each(|&slot| add(slot as usize, pass.settings.background));
             continue;
         }
-        shade_group(pass, (triangle, group), (samples, origin), &mut scratch.shaded, &mut add);
+        shade_group(pass, (triangle, group), (samples, origin), &mut scratch.cells, &mut add);
     }
     means(pass, &sums, pixels)
 }
 
-/// Calls `add` with the colours of the samples in `slots` of the tile at `origin`, which see `triangle`.
+/// Calls `add` with the colours of the samples in the slots `group` of the tile at `origin`, which see `triangle`.
 fn shade_group(
     pass: &Pass<'_>,
-    (triangle, slots): (u32, &[u16]),
+    (triangle, group): (u32, &[u16]),
     (samples, origin): (&TileSamples, [u32; 2]),
-    shaded: &mut ByCell<Vec3>,
+    cells: &mut ShadedCells,
     add: &mut impl FnMut(usize, Vec3),
 ) {
     let (side, per_pixel) = (pass.settings.spec.tile_px, pass.settings.samples.per_pixel());
     let (corners, moving) = pass.moving_corners(triangle);
-    let mut grid = Grid::new(pass, (&corners, moving), samples, origin);
-    let surface = ShadedTriangle::new(pass, triangle);
-    let lane = surface.lane();
-    shaded.clear();
-    for slot in slots.iter().map(|&slot| slot as usize) {
-        let colour = match pass.shading {
-            Shading::PerSample => {
+    let slots = group.iter().map(|&slot| slot as usize);
+    match pass.shading {
+        Shading::PerSample => {
+            let surface = ShadedTriangle::new(pass, triangle);
+            slots.for_each(|slot| {
                 let at = (own_pixel(samples, slot, origin, side), samples.in_pixel(slot, per_pixel));
-                surface.shade_at(&lane, &SampleView::of_slot(&corners, samples, slot, at)).truncate()
-            }
-            Shading::Cached => {
-                let cell = grid.cell(slot);
-                *shaded.entry(cell).or_insert_with(|| surface.shade(&lane, cell).truncate())
-            }
-        };
-        add(slot, colour);
+                let view = SampleView::of_slot(&corners, samples, slot, at);
+                add(slot, surface.shade_at(&surface.lane(), &view).truncate());
+            });
+        }
+        Shading::Cached => {
+            let grid = Grid::new(pass, (&corners, moving), samples, origin);
+            cells.shade(pass, triangle, |cells| grid.cells(group, cells));
+            slots.zip(cells.in_order()).for_each(|(slot, colour)| add(slot, colour));
+        }
+    }
+}
+
+impl ShadedCells {
+    /// Finds the colours of the cells that samples see on a triangle, which `find` lists.
+    fn shade(&mut self, pass: &Pass<'_>, triangle: u32, find: impl FnOnce(&mut Vec<[i32; 2]>)) {
+        let Self { cells, quads, colours, of_sample, known } = self;
+        quads.clear();
+        cells.clear();
+        find(cells);
+        of_sample.clear();
+        of_sample.extend(cells.iter().map(|&cell| (4 * quads.request(cell, 0) + lane_of(cell)) as u32));
+        colours.clear();
+        quads.quads().iter().for_each(|access| known.prefetch(triangle, access.quad));
+        let mut surface = None;
+        for access in quads.quads() {
+            colours.extend(known.of(triangle, access, |access| {
+                let surface = surface.get_or_insert_with(|| ShadedTriangle::new(pass, triangle));
+                surface.shade_quad(&surface.lane(), access)
+            }));
+        }
+    }
+
+    /// Colours in the order of the samples.
+    fn in_order(&self) -> impl Iterator<Item = Vec3> {
+        self.of_sample.iter().map(|&at| self.colours[at as usize])
     }
 }
 
@@ -251,6 +359,14 @@ impl TileResolve {
 /// Call `each` for every line that holds one of `pixels` of a tile, with the mask of these pixels. The first byte of the tile and
 /// the bytes of a pixel are given.
 pub(super) fn tile_lines([first_byte, pixel_bytes]: [u64; 2], pixels: u64, mut each: impl FnMut(u64, u64)) {
+    if LINE_BYTES.is_multiple_of(pixel_bytes) && first_byte.is_multiple_of(LINE_BYTES) {
+        return tile_lines_of_pixels(
+            first_byte / LINE_BYTES,
+            (LINE_BYTES / pixel_bytes) as u32,
+            pixels,
+            each,
+        );
+    }
     let (mut remaining, mut open) = (pixels, None);
     while remaining != 0 {
         let pixel = u64::from(remaining.trailing_zeros());
@@ -267,6 +383,17 @@ pub(super) fn tile_lines([first_byte, pixel_bytes]: [u64; 2], pixels: u64, mut e
         }
     }
     open.into_iter().for_each(|(line, held)| each(line, held));
+}
+
+/// The same where each line holds `count` whole pixels, a power of two.
+fn tile_lines_of_pixels(first_line: u64, count: u32, pixels: u64, mut each: impl FnMut(u64, u64)) {
+    let (of_line, mut remaining) = (u64::MAX >> (64 - count), pixels);
+    while remaining != 0 {
+        let line = remaining.trailing_zeros() >> count.ilog2();
+        let held = remaining & of_line << (line << count.ilog2());
+        each(first_line + u64::from(line), held);
+        remaining &= !held;
+    }
 }
 
 /// Values by cell.
@@ -292,4 +419,66 @@ impl Hasher for CellHasher {
     }
 
     fn write_usize(&mut self, _length: usize) {}
+}
+
+#[cfg(test)]
+mod tests {
+    use std::cell::RefCell;
+
+    use super::*;
+
+    /// Lines of a tile pixel by pixel.
+    fn one_by_one([first_byte, pixel_bytes]: [u64; 2], pixels: u64) -> Vec<(u64, u64)> {
+        let mut lines: Vec<(u64, u64)> = Vec::new();
+        for pixel in (0..64).filter(|pixel| pixels >> pixel & 1 == 1) {
+            let first = first_byte + pixel * pixel_bytes;
+            for line in first / LINE_BYTES..=(first + pixel_bytes - 1) / LINE_BYTES {
+                match lines.last_mut().filter(|(known, _)| *known == line) {
+                    Some((_, held)) => *held |= 1 << pixel,
+                    None => lines.push((line, 1 << pixel)),
+                }
+            }
+        }
+        lines
+    }
+
+    #[test]
+    fn lines_of_a_tile_hold_its_pixels() {
+        for (pixel_bytes, first_byte) in
+            [4, 8, 12, 32, 64, 96, 128].iter().flat_map(|&bytes| [0, 64 * 7, 36].map(|first| (bytes, first)))
+        {
+            for pixels in [u64::MAX, 1, 1 << 63, 0xF0F0_0000_1234_8001, mix(pixel_bytes), mix(first_byte)] {
+                let mut lines = Vec::new();
+                tile_lines([first_byte, pixel_bytes], pixels, |line, held| lines.push((line, held)));
+                assert_eq!(
+                    lines,
+                    one_by_one([first_byte, pixel_bytes], pixels),
+                    "{pixel_bytes} {first_byte} {pixels:x}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn a_known_colour_is_not_shaded_again() {
+        let (mut known, shaded) = (KnownColours::default(), RefCell::new(Vec::new()));
+        let colour = |quad: [i32; 2], lane: usize| Vec3::new(quad[0] as f32, quad[1] as f32, lane as f32);
+        let shade = |access: &QuadAccess| {
+            shaded.borrow_mut().push((access.quad, access.lanes));
+            [0, 1, 2, 3].map(|lane| colour(access.quad, lane).extend(1.0))
+        };
+        for (triangle, quad, lanes) in [
+            (1, [3, 4], 0b0001),
+            (1, [3, 4], 0b0101),
+            (1, [3, 4], 0b0100),
+            (1, [-3, 4], 0b1000),
+            (2, [3, 4], 1),
+        ] {
+            let colours = known.of(triangle, &QuadAccess { quad, sample: 0, lookups: 1, lanes }, shade);
+            for lane in (0..4).filter(|lane| lanes >> lane & 1 == 1) {
+                assert_eq!(colours[lane], colour(quad, lane));
+            }
+        }
+        assert_eq!(*shaded.borrow(), [([3, 4], 1), ([3, 4], 4), ([-3, 4], 8), ([3, 4], 1)]);
+    }
 }

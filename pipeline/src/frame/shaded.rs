@@ -7,17 +7,14 @@ use glam::{Vec2, Vec3, Vec4};
 use super::Shading;
 use super::cells::reference;
 use super::pass::{Draw, Pass};
-use crate::geometry::{Clip, Viewport};
+use crate::geometry::{Clip, Geometry, Viewport};
 use crate::sample_test::exact;
 use crate::sampling::{Sample, TileSamples};
 use crate::setup::Corner;
 use crate::shader::{Lane, Lines, Outputs, Program, Shader, ShadingPoint};
 use crate::shading;
-use crate::shading::{QuadAccess, REFERENCE_TIME, weights_at};
+use crate::shading::{QUAD_LANES, QuadAccess, REFERENCE_TIME, cells_of, quad_weights, weights_at};
 use crate::texture::{Footprint, Sampler};
-
-/// Places of the lanes of a quad.
-const LANES: [[i32; 2]; 4] = [[0, 0], [1, 0], [0, 1], [1, 1]];
 
 /// Work of the lanes of a quad.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -36,6 +33,29 @@ impl QuadWork {
     }
 }
 
+/// Attributes of the vertices, those that there are.
+struct Attributes {
+    /// Positions at [`REFERENCE_TIME`].
+    middle: [Vec3; 3],
+    normals: Option<[Vec3; 3]>,
+    uvs: Option<[Vec2; 3]>,
+    colors: Option<[Vec3; 3]>,
+}
+
+impl Attributes {
+    fn new(geometry: &Geometry<'_>, vertices: [usize; 3]) -> Self {
+        fn of<T: Copy>(values: &[T], vertices: [usize; 3]) -> Option<[T; 3]> {
+            (!values.is_empty()).then(|| vertices.map(|vertex| values[vertex]))
+        }
+        Self {
+            middle: vertices.map(|v| (geometry.open()[v] + geometry.close()[v]) * 0.5),
+            normals: of(geometry.normals(), vertices),
+            uvs: of(geometry.uvs(), vertices),
+            colors: of(geometry.colors(), vertices),
+        }
+    }
+}
+
 /// One triangle as a surface for shading.
 pub(super) struct ShadedTriangle<'a> {
     pass: &'a Pass<'a>,
@@ -44,6 +64,7 @@ pub(super) struct ShadedTriangle<'a> {
     corners: [Corner; 3],
     reference: [[f32; 3]; 3],
     sampler: Option<Sampler<'a>>,
+    attributes: Attributes,
     /// Corners as the sample test sees them, if pixels are shaded at centroids.
     covering: Option<[Corner; 3]>,
 }
@@ -59,7 +80,8 @@ impl<'a> ShadedTriangle<'a> {
             .zip(pass.addresses.textures[draw])
             .map(|(texture, address)| Sampler::new(texture, address));
         let covering = covering(pass, draw, triangle);
-        Self { pass, draw, vertices, corners, reference, sampler, covering }
+        let attributes = Attributes::new(&pass.draws[draw].geometry, vertices);
+        Self { pass, draw, vertices, corners, reference, sampler, attributes, covering }
     }
 
     /// Barycentric weights of the point at which a cell is shaded: its middle, or the centroid of the covered samples.
@@ -108,16 +130,44 @@ impl<'a> ShadedTriangle<'a> {
         self.shader().outputs(lane, &at, texel)
     }
 
+    /// The same for the requested cells of a quad, by lane.
+    pub fn shade_quad(&self, lane: &Lane, access: &QuadAccess) -> [Vec4; 4] {
+        let weights = self.weights_in(access.quad);
+        let footprint = self.sampler.map(|sampler| self.footprint(&sampler, &weights));
+        let mut colours = [Vec4::ZERO; 4];
+        for (index, cell) in cells_of(access.quad).into_iter().enumerate() {
+            if access.lanes >> index & 1 == 1 {
+                let weights =
+                    self.centroid(cell).map_or(weights[index], |at| weights_at(&self.reference, at));
+                let (at, texel) = self.of_weights(cell, weights, footprint.as_ref());
+                colours[index] = self.shader().shade(lane, &at, texel);
+            }
+        }
+        colours
+    }
+
+    /// Weights of the middles of the cells of a quad, by lane.
+    fn weights_in(&self, quad: [i32; 2]) -> [[f32; 3]; 4] {
+        quad_weights(&self.reference, quad, self.pass.origin)
+    }
+
     /// Shader input and texel of a cell.
     fn of_cell(&self, cell: [i32; 2]) -> (ShadingPoint, Vec4) {
-        let weights = self.weights_of(cell);
-        let texel = self.sampler.map_or(Vec4::ONE, |sampler| {
-            let uv = self.uv(weights);
-            sampler.sample(uv, &self.footprint(&sampler, cell.map(|c| c >> 1)))
-        });
-        let geometry = &self.pass.draws[self.draw].geometry;
-        let middle = self.vertices.map(|v| (geometry.open()[v] + geometry.close()[v]) * 0.5);
-        (ShadingPoint { pixel: cell, ..self.point(weights, middle) }, texel)
+        let of_quad = |sampler: Sampler<'_>| self.footprint(&sampler, &self.weights_in(cell.map(|c| c >> 1)));
+        self.of_weights(cell, self.weights_of(cell), self.sampler.map(of_quad).as_ref())
+    }
+
+    /// Shader input and texel of a cell that is shaded at the point with the given weights, in a quad with this footprint.
+    fn of_weights(
+        &self,
+        cell: [i32; 2],
+        weights: [f32; 3],
+        footprint: Option<&Footprint>,
+    ) -> (ShadingPoint, Vec4) {
+        let texture = self.sampler.as_ref().zip(footprint);
+        let texel =
+            texture.map_or(Vec4::ONE, |(sampler, footprint)| sampler.sample(self.uv(weights), footprint));
+        (ShadingPoint { pixel: cell, ..self.point(weights, self.attributes.middle) }, texel)
     }
 
     /// A lane for its shader.
@@ -151,13 +201,11 @@ impl<'a> ShadedTriangle<'a> {
 
     /// Work of shading the four cells of a quad; `line` gets every line that they read through the texture cache.
     pub fn quad(&self, quad: [i32; 2], mut line: impl FnMut(u64)) -> QuadWork {
-        let of_cell = |[x, y]: [i32; 2], lane: &Lane| {
-            self.run_all(lane, self.of_cell([2 * quad[0] + x, 2 * quad[1] + y]));
-        };
+        let of_cell = |cell, lane: &Lane| self.run_all(lane, self.of_cell(cell));
         let fetches = self.fetch(quad, &mut line);
-        let cells = LANES.map(|[x, y]| [2 * quad[0] + x, 2 * quad[1] + y]);
-        let centroids = cells.iter().filter(|cell| self.centroid(**cell).is_some()).count() as u32;
-        QuadWork { centroids, ..self.work(LANES.into_iter(), of_cell, line).fetching(fetches) }
+        let centroids =
+            cells_of(quad).into_iter().filter(|&cell| self.centroid(cell).is_some()).count() as u32;
+        QuadWork { centroids, ..self.work(cells_of(quad).into_iter(), of_cell, line).fetching(fetches) }
     }
 
     fn run_all(&self, lane: &Lane, (at, texel): (ShadingPoint, Vec4)) {
@@ -192,45 +240,37 @@ impl<'a> ShadedTriangle<'a> {
     /// Bilinear fetches of the texture for the four cells of a quad; `line` gets every memory line they read.
     fn fetch(&self, quad: [i32; 2], mut line: impl FnMut(u64)) -> u32 {
         let Some(sampler) = self.sampler else { return 0 };
-        let footprint = self.footprint(&sampler, quad);
-        for [x, y] in LANES {
-            let weights = self.weights_of([2 * quad[0] + x, 2 * quad[1] + y]);
+        let weights = self.weights_in(quad);
+        let footprint = self.footprint(&sampler, &weights);
+        for (cell, weights) in cells_of(quad).into_iter().zip(weights) {
+            let weights = self.centroid(cell).map_or(weights, |at| weights_at(&self.reference, at));
             sampler.lines(self.uv(weights), &footprint, &mut line);
         }
         4 * Sampler::fetches(&footprint)
     }
 
     /// Footprint of a quad, from the differences between its cells.
-    fn footprint(&self, sampler: &Sampler<'_>, quad: [i32; 2]) -> Footprint {
-        let at = |dx, dy| {
-            let cell = [2 * quad[0] + dx, 2 * quad[1] + dy];
-            self.uv(shading::cell_weights(&self.reference, cell, self.pass.origin))
-        };
-        let corner = at(0, 0);
-        sampler.footprint(at(1, 0) - corner, at(0, 1) - corner)
+    fn footprint(&self, sampler: &Sampler<'_>, weights: &[[f32; 3]; 4]) -> Footprint {
+        let corner = self.uv(weights[0]);
+        sampler.footprint(self.uv(weights[1]) - corner, self.uv(weights[2]) - corner)
     }
 
     fn uv(&self, weights: [f32; 3]) -> Vec2 {
-        let uvs = self.pass.draws[self.draw].geometry.uvs();
-        if uvs.is_empty() { Vec2::ZERO } else { (0..3).map(|k| uvs[self.vertices[k]] * weights[k]).sum() }
+        self.attributes.uvs.map_or(Vec2::ZERO, |uvs| (0..3).map(|k| uvs[k] * weights[k]).sum())
     }
 
     /// Cells on a border extrapolate, so the colour is clamped to its range.
     fn color(&self, weights: [f32; 3]) -> Vec3 {
-        let colors = self.pass.draws[self.draw].geometry.colors();
-        if colors.is_empty() {
-            return Vec3::ONE;
-        }
-        (0..3).map(|k| colors[self.vertices[k]] * weights[k]).sum::<Vec3>().clamp(Vec3::ZERO, Vec3::ONE)
+        self.attributes.colors.map_or(Vec3::ONE, |colors| {
+            (0..3).map(|k| colors[k] * weights[k]).sum::<Vec3>().clamp(Vec3::ZERO, Vec3::ONE)
+        })
     }
 
     fn point(&self, weights: [f32; 3], corners: [Vec3; 3]) -> ShadingPoint {
-        let geometry = &self.pass.draws[self.draw].geometry;
         let position: Vec3 = (0..3).map(|k| corners[k] * weights[k]).sum();
         let flat = || (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize_or_zero();
-        let normals = geometry.normals();
-        let mean = || (0..3).map(|k| normals[self.vertices[k]] * weights[k]).sum::<Vec3>();
-        let smooth = (!normals.is_empty()).then(mean).and_then(Vec3::try_normalize).unwrap_or_else(flat);
+        let mean = |normals: [Vec3; 3]| (0..3).map(|k| normals[k] * weights[k]).sum::<Vec3>();
+        let smooth = self.attributes.normals.map(mean).and_then(Vec3::try_normalize).unwrap_or_else(flat);
         let eye = self.pass.eye;
         let to_camera = (eye.truncate() - position * eye.w).normalize_or_zero();
         let normal = if smooth.dot(to_camera) < 0.0 { -smooth } else { smooth };
@@ -351,7 +391,7 @@ impl ShadedTriangle<'_> {
 
     /// Views of the four lanes of a quad.
     fn views_of(&self, access: &QuadAccess, samples: &[Vec<Sample>; 4]) -> impl Iterator<Item = SampleView> {
-        LANES.into_iter().zip(samples).map(|(offset, of_pixel)| {
+        QUAD_LANES.into_iter().zip(samples).map(|(offset, of_pixel)| {
             let pixel = [0, 1].map(|axis| (2 * access.quad[axis] + offset[axis]) as u32);
             let view =
                 SampleView::of_sample(&self.corners, self.pass, pixel, &of_pixel[access.sample as usize]);

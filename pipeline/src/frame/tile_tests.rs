@@ -65,26 +65,26 @@ impl Remaining {
         }
     }
 
-    /// The part in the regions `spans` of the lens, or `None` if it is empty.
-    pub fn in_regions(&self, spans: Option<&LensSpans>) -> Option<Self> {
-        Self { spans: spans.filter(|_| self.within.lens).copied(), ..*self }.narrowed(self.within)
+    /// Keep the part in the regions `spans` of the lens. `None` if it is empty.
+    pub fn keep_regions(&mut self, spans: Option<&LensSpans>) -> Option<()> {
+        self.spans = spans.filter(|_| self.within.lens).copied();
+        self.narrow(self.within)
     }
 
-    /// The part inside the box `within`, or `None` if it is empty.
-    pub fn narrowed(&self, within: Box5) -> Option<Self> {
-        let (spans, within) = match &self.spans {
-            Some(spans) => spans.within(&within).map(|(spans, hull)| (Some(spans), hull))?,
-            None => (None, within),
-        };
-        let times = self.times.meet(&TimePieces::one(Piece { t: within.t, faces: [true; 2] }));
-        Some(Self {
-            within: Box5 { t: times.hull()?, ..within },
-            times,
-            spans,
-            edges: None,
-            facing: self.facing,
-            screened: self.screened,
-        })
+    /// Keep the part inside the box `within`. `None` if it is empty.
+    pub fn narrow(&mut self, mut within: Box5) -> Option<()> {
+        if let Some(spans) = &mut self.spans {
+            (*spans, within) = spans.within(&within)?;
+        }
+        self.times.clip(within.t);
+        self.within = Box5 { t: self.times.hull()?, ..within };
+        self.edges = None;
+        Some(())
+    }
+
+    /// The same part at the start of the tests of a finer tile, where edges of a coarser one are not valid.
+    pub fn at_finer(&self) -> Self {
+        Self { edges: None, facing: false, ..*self }
     }
 
     /// Boxes of the remaining samples in a piece of the time.
@@ -117,33 +117,30 @@ impl Remaining {
 }
 
 impl Subject<'_> {
-    /// Run the tests at `tile` on the part `remaining` so far. `None` if the triangle is not visible there.
+    /// Run the tests at `tile` on the part `remaining` so far, and keep what is left. `None` if the triangle is not visible there.
     pub fn test(
         &self,
         tile: &TestTile,
-        remaining: &Remaining,
+        remaining: &mut Remaining,
         context: &mut TestContext<'_>,
-    ) -> Option<Remaining> {
-        // Edges of a coarser tile are not valid here.
-        let mut remaining = Remaining { edges: None, facing: false, ..*remaining };
+    ) -> Option<()> {
         let lines = self.lines.filter(|_| context.features.lens_lines && remaining.within.lens);
         if let Some(lines) = lines {
             let left = lens_lines_over(lines, &tile.rect, remaining.within, context.work)?;
-            let Some(left) = remaining.narrowed(left) else {
+            if remaining.narrow(left).is_none() {
                 context.work.culled_lens += 1;
                 return None;
-            };
-            remaining = left;
+            }
         }
-        let allowed = self.allowed(tile, &remaining, context.features);
+        let allowed = self.allowed(tile, remaining, context.features);
         if !context.features.auto || allowed == TestPlan(0) {
             return self.run_plan(allowed, tile, remaining, context);
         }
-        let workload = self.workload(allowed, tile, &remaining);
+        let workload = self.workload(allowed, tile, remaining);
         match context.selector.choose(&workload) {
-            Some(plan) => plan.steps().try_fold(remaining, |remaining, step| {
-                self.step_recorded(&workload, step, tile, remaining, context)
-            }),
+            Some(plan) => plan
+                .steps()
+                .try_for_each(|step| self.step_recorded(&workload, step, tile, remaining, context)),
             None => self.explore(&workload, tile, remaining, context),
         }
     }
@@ -165,14 +162,15 @@ impl Subject<'_> {
         &self,
         plan: TestPlan,
         tile: &TestTile,
-        remaining: Remaining,
+        remaining: &mut Remaining,
         context: &mut TestContext<'_>,
-    ) -> Option<Remaining> {
-        let tests = [TestPlan::SIDES, TestPlan::FACING, TestPlan::EDGES];
-        tests
-            .into_iter()
-            .filter(|&test| plan.has(test))
-            .try_fold(remaining, |remaining, test| self.step(test, tile, remaining, context))
+    ) -> Option<()> {
+        for test in [TestPlan::SIDES, TestPlan::FACING, TestPlan::EDGES] {
+            if plan.has(test) {
+                self.step(test, tile, remaining, context)?;
+            }
+        }
+        Some(())
     }
 
     /// Run the last test of a plan on the part kept by the tests before it, and record the outcome.
@@ -181,59 +179,61 @@ impl Subject<'_> {
         workload: &Workload,
         plan: TestPlan,
         tile: &TestTile,
-        remaining: Remaining,
+        remaining: &mut Remaining,
         context: &mut TestContext<'_>,
-    ) -> Option<Remaining> {
-        let Some((test, _)) = plan.last() else { return Some(remaining) };
+    ) -> Option<()> {
+        let Some((test, _)) = plan.last() else { return Some(()) };
         let (volume, madds) = (remaining.volume(self.triangle.moving), context.work.tile_madds());
-        let narrowed = self.step(test, tile, remaining, context);
-        let after = narrowed.map_or(0.0, |narrowed| narrowed.volume(self.triangle.moving));
-        let kept = if volume > 0.0 { after / volume } else { f64::from(u8::from(narrowed.is_some())) };
+        let is_left = self.step(test, tile, remaining, context);
+        let after = is_left.map_or(0.0, |()| remaining.volume(self.triangle.moving));
+        let kept = if volume > 0.0 { after / volume } else { f64::from(u8::from(is_left.is_some())) };
         let samples = f64::from(tile.samples) * volume;
         context.selector.record(
             workload,
             plan,
             &TestResult { madds: context.work.tile_madds() - madds, samples, kept },
         );
-        narrowed
+        is_left
     }
 
-    /// Run all plans on `remaining` and record them; returns the result of the fullest plan.
+    /// Run all plans on `remaining` and record them; keeps the result of the fullest plan.
     fn explore(
         &self,
         workload: &Workload,
         tile: &TestTile,
-        remaining: Remaining,
+        remaining: &mut Remaining,
         context: &mut TestContext<'_>,
-    ) -> Option<Remaining> {
+    ) -> Option<()> {
         let before = context.work.tile_madds();
-        let mut by_plan = [Some(remaining); TestPlan::COUNT];
+        let mut by_plan = [Some(*remaining); TestPlan::COUNT];
         for plan in workload.allowed.within() {
             let Some((_, parent)) = plan.last() else { continue };
-            let parent = by_plan[parent.0 as usize];
-            by_plan[plan.0 as usize] =
-                parent.and_then(|remaining| self.step_recorded(workload, plan, tile, remaining, context));
+            let mut part = by_plan[parent.0 as usize];
+            let is_left =
+                part.as_mut().and_then(|part| self.step_recorded(workload, plan, tile, part, context));
+            by_plan[plan.0 as usize] = part.filter(|_| is_left.is_some());
         }
         context.selector.record_exploration(workload, context.work.tile_madds() - before);
-        by_plan[workload.allowed.0 as usize]
+        *remaining = by_plan[workload.allowed.0 as usize]?;
+        Some(())
     }
 
     fn step(
         &self,
         test: u8,
         tile: &TestTile,
-        mut remaining: Remaining,
+        remaining: &mut Remaining,
         context: &mut TestContext<'_>,
-    ) -> Option<Remaining> {
+    ) -> Option<()> {
         match test {
-            TestPlan::SIDES => return self.side_planes(&tile.rect, &remaining, context.work),
+            TestPlan::SIDES => self.side_planes(&tile.rect, remaining, context.work),
             TestPlan::FACING => {
-                self.facing(&tile.rect, &mut remaining, context.features.facing_splits, context.work)?;
+                self.facing(&tile.rect, remaining, context.features.facing_splits, context.work)?;
                 remaining.facing = true;
+                Some(())
             }
-            _ => self.edge_bounds(&tile.rect, &mut remaining, context.work)?,
+            _ => self.edge_bounds(&tile.rect, remaining, context.work),
         }
-        Some(remaining)
     }
 
     /// Workload of `remaining` at `tile` for the test selector.
@@ -251,22 +251,22 @@ impl Subject<'_> {
     }
 
     /// Side planes over the whole lens, or over each of its regions.
-    fn side_planes(&self, rect: &TileRect, remaining: &Remaining, work: &mut TileWork) -> Option<Remaining> {
+    fn side_planes(&self, rect: &TileRect, remaining: &mut Remaining, work: &mut TileWork) -> Option<()> {
         let (triangle, shear, within) = (self.triangle, self.shear, &remaining.within);
-        let (next, madds) = match &remaining.spans {
-            None => {
-                let (next, madds) = narrow_counted::<f64>(triangle, shear, rect, within);
-                (next.map(|next| (None, next)), madds)
-            }
+        let (next, madds) = match &mut remaining.spans {
+            None => narrow_counted::<f64>(triangle, shear, rect, within),
             Some(spans) => {
                 let (next, madds) = spans.narrow_counted::<f64>(triangle, shear, rect, within);
-                (next.map(|(spans, next)| (Some(spans), next)), madds)
+                let keep = |(kept, next)| {
+                    *spans = kept;
+                    next
+                };
+                (next.map(keep), madds)
             }
         };
         work.side_plane_madds += madds;
         work.culled_sides += u32::from(next.is_none());
-        let (spans, within) = next?;
-        Remaining { spans, ..*remaining }.narrowed(within)
+        remaining.narrow(next?)
     }
 
     fn facing(

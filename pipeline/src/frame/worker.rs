@@ -33,6 +33,8 @@ pub(super) struct Scratch {
     sharpened: Vec<bool>,
     hits: Hits,
     fragments: Fragments,
+    /// Cells of the shaded samples of a packet.
+    cells: Vec<[i32; 2]>,
     quads: QuadSet,
 }
 
@@ -64,6 +66,8 @@ impl<'a, 'p> Worker<'a, 'p> {
 
     /// Rasterize the `listed` triangles of a batch.
     pub fn rasterize(mut self, batch: &[Ready], listed: &[u32]) -> BinLog {
+        // About as many packets as triangles; logs that grow are copied.
+        self.log.work.reserve(listed.len());
         for &index in listed {
             let ready = &batch[index as usize];
             let draw = self.pass.locate(ready.triangle.id).0 as u32;
@@ -91,16 +95,19 @@ impl<'a, 'p> Worker<'a, 'p> {
             tiles: Some(count),
             samples: count * self.samples_of_a_tile(),
         };
-        let Some(remaining) = Remaining::all(ready.within).in_regions(self.pass.spans.as_ref()) else {
+        let mut remaining = Remaining::all(ready.within);
+        let is_left = remaining
+            .keep_regions(self.pass.spans.as_ref())
+            .and_then(|()| subject.test(&coarse_tile, &mut remaining, &mut self.context()));
+        if is_left.is_none() {
             return;
-        };
-        let Some(remaining) = subject.test(&coarse_tile, &remaining, &mut self.context()) else { return };
+        }
         for row in tiles.y0..tiles.y1 {
             for column in tiles.x0..tiles.x1 {
-                let before = (self.tests, self.log.work.len());
+                let before = self.pass.heat.then_some((self.tests, self.log.work.len()));
                 self.tests.visited += 1;
                 self.fine(&subject, &remaining, [column * side, row * side]);
-                if self.pass.heat {
+                if let Some(before) = before {
                     self.note_tests(before, [column * side, row * side]);
                 }
             }
@@ -157,15 +164,17 @@ impl<'a, 'p> Worker<'a, 'p> {
     fn tile(&mut self, subject: &Subject<'_>, remaining: &Remaining, origin: [u32; 2]) {
         let rect = TileRect::new(self.pass.settings.viewport, origin, self.pass.settings.spec.tile_px);
         let tile = TestTile { rect, tiles: None, samples: self.samples_of_a_tile() };
-        let Some(mut remaining) = subject.test(&tile, remaining, &mut self.context()) else { return };
+        let mut remaining = remaining.at_finer();
+        if subject.test(&tile, &mut remaining, &mut self.context()).is_none() {
+            return;
+        }
         let index = self.tile_index(origin);
         self.fill(index, origin, remaining.within.lens);
         if let Some((within, in_front)) =
             self.visible_part(subject.triangle, &tile.rect, &remaining.within, index)
         {
-            if within != remaining.within {
-                let Some(narrowed) = remaining.narrowed(within) else { return };
-                remaining = narrowed;
+            if within != remaining.within && remaining.narrow(within).is_none() {
+                return;
             }
             let tested = self.samples(subject, &tile, &mut remaining, (index, origin));
             if self.scratch.hits.screened + self.scratch.hits.tested > 0 {
@@ -274,17 +283,23 @@ impl<'a, 'p> Worker<'a, 'p> {
 
     /// Request the quads of the shaded samples of a tile, seen on a triangle with the given corners that may be moving.
     fn request_quads(&mut self, (corners, moving): (&[Corner; 3], bool), index: usize, origin: [u32; 2]) {
-        let Settings { spec, viewport, samples: source, .. } = *self.pass.settings;
+        let Settings { spec, samples: source, .. } = *self.pass.settings;
         let (samples, side) = (&self.scratch.samples[index], spec.tile_px);
         let per_pixel = source.per_pixel();
-        let mut grid = Grid::new(self.pass, (corners, moving), samples, origin);
-        for slot in self.scratch.fragments.shaded.iter().map(|&slot| slot as usize) {
-            match self.pass.shading {
-                Shading::Cached => self.scratch.quads.request(grid.cell(slot), 0),
-                Shading::PerSample => {
-                    let index =
-                        samples.in_image(slot, origin, side, viewport, per_pixel) % per_pixel as usize;
-                    self.scratch.quads.request(own_pixel(samples, slot, origin, side), index as u16);
+        let (quads, shaded) = (&mut self.scratch.quads, &self.scratch.fragments.shaded);
+        match self.pass.shading {
+            Shading::Cached => {
+                let cells = &mut self.scratch.cells;
+                cells.clear();
+                Grid::new(self.pass, (corners, moving), samples, origin).cells(shaded, cells);
+                for &cell in cells.iter() {
+                    quads.request(cell, 0);
+                }
+            }
+            Shading::PerSample => {
+                for slot in shaded.iter().map(|&slot| usize::from(slot)) {
+                    let index = samples.in_pixel(slot, per_pixel) as u16;
+                    quads.request(own_pixel(samples, slot, origin, side), index);
                 }
             }
         }

@@ -68,6 +68,8 @@ pub enum Access {
 pub struct Cache {
     ways: usize,
     sets: u64,
+    /// One less than the number of sets if that is a power of two, so that no division is needed.
+    set_mask: Option<u64>,
     replacement: Replacement,
     /// Misses so far.
     misses: u64,
@@ -97,29 +99,51 @@ impl Cache {
         if !sane.contains(&entries) || !sane.contains(&ways) || entries % ways != 0 {
             return Err(CacheError { entries, ways });
         }
-        let lines = vec![Line::EMPTY; entries as usize];
-        Ok(Self { ways: ways as usize, sets: u64::from(entries / ways), replacement, misses: 0, lines })
+        let (lines, sets) = (vec![Line::EMPTY; entries as usize], u64::from(entries / ways));
+        let set_mask = sets.is_power_of_two().then(|| sets - 1);
+        Ok(Self { ways: ways as usize, sets, set_mask, replacement, misses: 0, lines })
+    }
+
+    /// Entries of the set of `key`.
+    #[inline]
+    fn set(&mut self, key: u64) -> &mut [Line] {
+        let set = self.set_mask.map_or_else(|| key % self.sets, |mask| key & mask);
+        let first = set as usize * self.ways;
+        &mut self.lines[first..first + self.ways]
     }
 
     /// Access `key`; `write` marks it as dirty. The set is the key modulo the number of sets. `u64::MAX` is
     /// not a valid key.
+    #[inline]
     pub fn access(&mut self, key: u64, write: bool) -> Access {
-        let first = (key % self.sets) as usize * self.ways;
-        let set = &mut self.lines[first..first + self.ways];
+        let newest = &mut self.set(key)[0];
+        if newest.key == key {
+            newest.dirty |= write;
+            return Access::Hit;
+        }
+        self.access_others(key, write)
+    }
+
+    /// [`Self::access`] of a key that is not the first of its set.
+    fn access_others(&mut self, key: u64, write: bool) -> Access {
+        let (is_lru, last) = (self.replacement == Replacement::Lru, self.ways - 1);
+        let set = self.set(key);
         if let Some(way) = set.iter().position(|line| line.key == key) {
             set[way].dirty |= write;
-            if self.replacement == Replacement::Lru {
+            if is_lru {
                 to_front(set, way);
             }
             return Access::Hit;
         }
+        let is_full = set[last] != Line::EMPTY;
         self.misses += 1;
         let way = match self.replacement {
-            Replacement::Random { seed } if set[self.ways - 1] != Line::EMPTY => {
+            Replacement::Random { seed } if is_full => {
                 (mix(seed ^ mix(self.misses)) % self.ways as u64) as usize
             }
-            _ => self.ways - 1,
+            _ => last,
         };
+        let set = self.set(key);
         to_front(set, way);
         let victim = std::mem::replace(&mut set[0], Line { key, dirty: write });
         if victim.dirty { Access::MissEvicting(victim.key) } else { Access::Miss }
@@ -127,11 +151,10 @@ impl Cache {
 
     /// Remove `key` without writing it back.
     pub fn discard(&mut self, key: u64) {
-        let first = (key % self.sets) as usize * self.ways;
-        let set = &mut self.lines[first..first + self.ways];
+        let set = self.set(key);
         if let Some(way) = set.iter().position(|line| line.key == key) {
             set[way..].rotate_left(1);
-            set[self.ways - 1] = Line::EMPTY;
+            set[set.len() - 1] = Line::EMPTY;
         }
     }
 

@@ -220,22 +220,58 @@ impl SampleTest<'_, '_> {
         if self.hits.covered.is_some() {
             return self.list(base, crossing, active);
         }
-        let mut inside = crossing.shown(self.triangle.faces) & active;
+        let inside = crossing.shown(self.triangle.faces) & active;
         if inside != 0 {
-            let mut depth = [0.0; LANES];
-            crossing.depth().store(&mut depth);
-            while inside != 0 {
-                let lane = inside.trailing_zeros() as usize;
-                inside &= inside - 1;
-                self.keep(base + lane, depth[lane]);
-            }
+            self.keep_inside(base, inside, crossing.depth());
         }
-        let mut tie = crossing.tie() & active;
-        while tie != 0 {
-            let lane = tie.trailing_zeros() as usize;
-            tie &= tie - 1;
-            self.keep_exact(base, lane);
+        let tie = crossing.tie() & active;
+        if tie != 0 {
+            lanes_of(tie).for_each(|lane| self.keep_exact(base, lane));
         }
+    }
+
+    /// Store the nearest hits among the lanes `inside`.
+    #[inline(always)]
+    fn keep_inside<V: Lanes>(&mut self, base: usize, inside: Mask, depth: V) {
+        let (Some(depths), Some(owners)) =
+            (block_mut(self.target.depth, base), block_mut(self.target.triangle, base))
+        else {
+            let mut each = [0.0; LANES];
+            depth.store(&mut each);
+            return self.keep_each(base, inside, &each);
+        };
+        let seen = depth.gt(V::splat(self.near)) & inside;
+        let stored = V::load(depths);
+        let mut nearer = stored.gt(depth) & seen;
+        for lane in lanes_of(depth.equal(stored) & seen) {
+            nearer |= Mask::from(self.triangle.id < owners[lane]) << lane;
+        }
+        depth.or_else(nearer, stored).store(depths);
+        V::put(nearer, self.triangle.id, owners);
+        self.hits.hit += seen.count_ones();
+        self.note(base, seen, |pixels| &mut pixels.hit);
+        self.note(base, nearer, |pixels| &mut pixels.written);
+        let pixels = self.pixels_of(base, seen);
+        self.hits.read_pixels |= pixels;
+        self.hits.written_pixels |= if nearer == seen { pixels } else { self.pixels_of(base, nearer) };
+        self.hits.written.extend(lanes_of(nearer).map(|lane| (base + lane) as u16));
+    }
+
+    /// The same, lane by lane, at the end of a tile that does not fill its last block.
+    #[cold]
+    fn keep_each(&mut self, base: usize, inside: Mask, depths: &[f32; LANES]) {
+        lanes_of(inside).for_each(|lane| self.keep(base + lane, depths[lane]));
+    }
+
+    /// Pixels of some samples of a block.
+    #[inline(always)]
+    fn pixels_of(&self, base: usize, mask: Mask) -> u64 {
+        let pixels = &self.samples.pixel[base..base + LANES];
+        let mut found = 0;
+        for lane in lanes_of(mask) {
+            found |= 1 << pixels[lane];
+        }
+        found
     }
 
     /// Record the pixels of samples, if requested.
@@ -311,7 +347,6 @@ impl SampleTest<'_, '_> {
         true
     }
 
-    #[inline(always)]
     fn keep(&mut self, slot: usize, depth: f32) {
         if !self.sees(slot, depth) {
             return;
@@ -344,6 +379,22 @@ struct SeenBlock {
 #[inline(always)]
 fn within<V: Lanes>(position: V, [lo, hi]: [f32; 2]) -> Mask {
     position.ge(V::splat(lo)) & V::splat(hi).ge(position)
+}
+
+/// The whole block from `base` on.
+#[inline(always)]
+fn block_mut<T>(array: &mut [T], base: usize) -> Option<&mut [T; LANES]> {
+    array.get_mut(base..base + LANES)?.first_chunk_mut()
+}
+
+/// Numbers of the lanes of a mask.
+#[inline(always)]
+fn lanes_of(mut mask: Mask) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let lane = mask.trailing_zeros() as usize;
+        mask &= mask.wrapping_sub(1);
+        (lane < LANES).then_some(lane)
+    })
 }
 
 /// Lanes of the block at `base` that belong to `run`.

@@ -35,6 +35,25 @@ impl Sample {
     }
 }
 
+/// A sample of a block of pixels.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Timed {
+    /// The sample.
+    pub sample: Sample,
+    /// The pixel in the block, row by row, times the samples per pixel, plus the index in the pixel.
+    pub index: u16,
+    /// The pixel in the block, row by row.
+    pub pixel: u8,
+}
+
+impl Timed {
+    /// Sorts samples by time; the index breaks ties.
+    fn sort(samples: &mut [Self]) {
+        // Times are not negative, so their bits sort as they do.
+        samples.sort_unstable_by_key(|timed| (timed.sample.t.to_bits(), timed.index));
+    }
+}
+
 /// Source of samples. A sample is a pure function of the source, the pixel and the index; workers request the
 /// same samples repeatedly.
 pub trait SampleSource: Send + Sync + std::fmt::Debug {
@@ -44,9 +63,8 @@ pub trait SampleSource: Send + Sync + std::fmt::Debug {
     /// Write the [`Self::per_pixel`] samples of pixel (`px`, `py`) into `into`.
     fn pixel_into(&self, px: u32, py: u32, into: &mut [Sample]);
 
-    /// Samples of the block of 8x8 pixels that starts at (`px`, `py`), sorted by time, if the source has
-    /// them. Each is the pixel in the block times `per_pixel` plus the index in the pixel.
-    fn block_by_time(&self, _px: u32, _py: u32) -> Option<&[u16]> {
+    /// Samples of the block of 8x8 pixels that starts at (`px`, `py`), sorted by time, if the source has them.
+    fn block_by_time(&self, _px: u32, _py: u32) -> Option<&[Timed]> {
         None
     }
 

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{LensRegion, LensRegions, LensShape, Pattern, Sample, SampleSource};
+use super::{LensRegion, LensRegions, LensShape, Pattern, Sample, SampleSource, Timed};
 use crate::random::word;
 
 /// Samples of a square block of pixels. The block repeats over the image. Each copy is shifted cyclically by
@@ -13,9 +13,8 @@ pub struct SampleTable {
     seed: u64,
     samples: Vec<Sample>,
     regions: Vec<LensRegion>,
-    /// For each block of [`Self::SHIFT_PX`] pixels squared, its samples sorted by time: the pixel in the block
-    /// times `per_pixel` plus the index in the pixel.
-    by_time: Vec<u16>,
+    /// For each block of [`Self::SHIFT_PX`] pixels squared, its samples sorted by time.
+    by_time: Vec<Timed>,
 }
 
 /// Why a sample table is invalid.
@@ -146,20 +145,19 @@ impl SampleTable {
         Ok(table)
     }
 
-    fn sorted_blocks(&self) -> Vec<u16> {
-        let blocks = Self::SIDE_PX / Self::SHIFT_PX;
-        let per_block = Self::SHIFT_PX * Self::SHIFT_PX * self.per_pixel;
+    fn sorted_blocks(&self) -> Vec<Timed> {
+        let (blocks, side) = (Self::SIDE_PX / Self::SHIFT_PX, Self::SHIFT_PX);
         let mut sorted = Vec::with_capacity(self.samples.len());
         for block in 0..blocks * blocks {
-            let (x0, y0) = (block % blocks * Self::SHIFT_PX, block / blocks * Self::SHIFT_PX);
-            let mut order: Vec<u16> = (0..per_block).map(|index| index as u16).collect();
-            // Times are not negative, so their bits sort as they do; the index breaks ties.
-            order.sort_by_key(|&index| {
-                let (pixel, sample) = (u32::from(index) / self.per_pixel, u32::from(index) % self.per_pixel);
-                let (x, y) = (x0 + pixel % Self::SHIFT_PX, y0 + pixel / Self::SHIFT_PX);
-                self.samples[((y * Self::SIDE_PX + x) * self.per_pixel + sample) as usize].t.to_bits()
-            });
-            sorted.extend(order);
+            let (x0, y0) = (block % blocks * side, block / blocks * side);
+            let first = sorted.len();
+            sorted.extend((0..side * side * self.per_pixel).map(|index| {
+                let (pixel, sample) = (index / self.per_pixel, index % self.per_pixel);
+                let at = (y0 + pixel / side) * Self::SIDE_PX + x0 + pixel % side;
+                let sample = self.samples[(at * self.per_pixel + sample) as usize];
+                Timed { sample, index: index as u16, pixel: pixel as u8 }
+            }));
+            Timed::sort(&mut sorted[first..]);
         }
         sorted
     }
@@ -200,7 +198,7 @@ impl SampleSource for SampleTable {
         into.copy_from_slice(self.pixel(px, py));
     }
 
-    fn block_by_time(&self, px: u32, py: u32) -> Option<&[u16]> {
+    fn block_by_time(&self, px: u32, py: u32) -> Option<&[Timed]> {
         let (x, y) = self.block_pixel(px, py);
         let block = y / Self::SHIFT_PX * (Self::SIDE_PX / Self::SHIFT_PX) + x / Self::SHIFT_PX;
         let per_block = (Self::SHIFT_PX * Self::SHIFT_PX * self.per_pixel) as usize;

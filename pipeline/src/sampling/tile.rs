@@ -1,6 +1,6 @@
 //! Samples of one tile, in the layout of the sample test.
 
-use super::{Sample, SampleSource, SampleTable};
+use super::{Sample, SampleSource, SampleTable, Timed};
 use crate::geometry::{Shear, Viewport};
 
 /// Samples of one tile as arrays, sorted by time so that a time interval is a contiguous range. Arrays are
@@ -32,7 +32,9 @@ pub struct TileSamples {
     /// Pixel in the tile, row by row.
     pub pixel: Vec<u8>,
     order: Vec<u16>,
-    gathered: Vec<Sample>,
+    /// Samples of a tile whose source has not sorted them.
+    gathered: Vec<Timed>,
+    of_pixel: Vec<Sample>,
 }
 
 impl TileSamples {
@@ -51,74 +53,92 @@ impl TileSamples {
         [px, py]: [u32; 2],
         side_px: u32,
     ) {
-        let per_pixel = source.per_pixel();
         let inside = [side_px.min(viewport.width() - px), side_px.min(viewport.height() - py)];
-        self.gather(source, [px, py], inside, side_px);
-        self.sort_by_time(source, [px, py], inside, side_px);
-        (self.len, self.parallel) = (self.order.len(), shear.parallel);
+        let is_block = [SampleTable::SHIFT_PX; 2] == inside && side_px == SampleTable::SHIFT_PX;
+        if let Some(sorted) = source.block_by_time(px, py).filter(|_| is_block) {
+            return self.fill_sorted(sorted, viewport, shear, ([px, py], inside, side_px));
+        }
+        let mut gathered = std::mem::take(&mut self.gathered);
+        self.gather(source, ([px, py], inside, side_px), &mut gathered);
+        self.fill_sorted(&gathered, viewport, shear, ([px, py], inside, side_px));
+        self.gathered = gathered;
+    }
+
+    /// Gathers the samples of a tile's pixels `inside` the image, sorted by time.
+    fn gather(
+        &mut self,
+        source: &dyn SampleSource,
+        ([px, py], inside, side_px): ([u32; 2], [u32; 2], u32),
+        gathered: &mut Vec<Timed>,
+    ) {
+        let per_pixel = source.per_pixel();
+        self.of_pixel.resize(per_pixel as usize, Sample::default());
+        gathered.clear();
+        for pixel in 0..side_px * side_px {
+            let [column, row] = [pixel % side_px, pixel / side_px];
+            if column < inside[0] && row < inside[1] {
+                source.pixel_into(px + column, py + row, &mut self.of_pixel);
+                let timed = |(index, sample): (u32, &Sample)| {
+                    let index = (pixel * per_pixel + index) as u16;
+                    Timed { sample: *sample, index, pixel: pixel as u8 }
+                };
+                gathered.extend((0..).zip(&self.of_pixel).map(timed));
+            }
+        }
+        Timed::sort(gathered);
+    }
+
+    /// Fills the arrays with samples that are sorted by time. The first pixel of the tile, its pixels inside the image and its side
+    /// are given.
+    fn fill_sorted(
+        &mut self,
+        sorted: &[Timed],
+        viewport: Viewport,
+        shear: &Shear,
+        ([px, py], inside, side_px): ([u32; 2], [u32; 2], u32),
+    ) {
+        (self.len, self.parallel) = (sorted.len(), shear.parallel);
         self.resize(self.len.next_multiple_of(Self::LANES));
         let sides = [viewport.width(), viewport.height()];
         let middle = [(px, inside[0], sides[0]), (py, inside[1], sides[1])].map(|(first, count, side)| {
             0.5 * (Viewport::edge(first, side) + Viewport::edge(first + count, side))
         });
-        for slot in 0..self.len {
-            let index = u32::from(self.order[slot]);
-            let (pixel, s) = (index / per_pixel, self.gathered[index as usize]);
-            let x = Viewport::edge(px + pixel % side_px, viewport.width()) + s.x;
-            let y = Viewport::edge(py + pixel / side_px, viewport.height()) + s.y;
-            (self.x[slot], self.y[slot]) = (x, y);
-            [self.from_middle[0][slot], self.from_middle[1][slot]] = [x - middle[0], y - middle[1]];
-            (self.u[slot], self.v[slot], self.t[slot]) = (s.u, s.v, s.t);
-            for (axis, at, place) in [(0, x, s.u), (1, y, s.v)] {
-                [self.slope[axis][slot], self.lens[axis][slot]] = shear.ray(axis, at, place);
+        let mut edges = [[0.0; 2]; 64];
+        for (row, edges) in (0..side_px).zip(edges.chunks_exact_mut(side_px as usize)) {
+            for (column, edge) in (0..side_px).zip(edges) {
+                *edge = [Viewport::edge(px + column, sides[0]), Viewport::edge(py + row, sides[1])];
             }
-            self.pixel[slot] = pixel as u8;
         }
+        self.place(sorted, &edges);
+        self.follow(shear, middle);
     }
 
-    /// Samples of the tile's pixels inside the image, each at its pixel times `per_pixel` plus its index.
-    fn gather(
-        &mut self,
-        source: &dyn SampleSource,
-        [px, py]: [u32; 2],
-        [columns, rows]: [u32; 2],
-        side_px: u32,
-    ) {
-        let per_pixel = source.per_pixel() as usize;
-        self.gathered.resize((side_px * side_px) as usize * per_pixel, Sample::default());
-        for row in 0..rows {
-            for column in 0..columns {
-                let first = (row * side_px + column) as usize * per_pixel;
-                source.pixel_into(px + column, py + row, &mut self.gathered[first..first + per_pixel]);
-            }
+    /// Fills the arrays that hold samples as they are, and the image positions, with the first corners of the pixels.
+    fn place(&mut self, sorted: &[Timed], edges: &[[f32; 2]; 64]) {
+        let Self { x, y, u, v, t, pixel, order, .. } = self;
+        let across = x.iter_mut().zip(y).zip(u).zip(v).zip(t).zip(pixel);
+        for (arrays, timed) in across.zip(sorted) {
+            let (((((x, y), u), v), t), pixel) = arrays;
+            let s = &timed.sample;
+            let [left, top] = edges[usize::from(timed.pixel % 64)];
+            (*x, *y) = (left + s.x, top + s.y);
+            (*u, *v, *t, *pixel) = (s.u, s.v, s.t, timed.pixel);
         }
+        order.clear();
+        order.extend(sorted.iter().map(|timed| timed.index));
     }
 
-    fn sort_by_time(
-        &mut self,
-        source: &dyn SampleSource,
-        [px, py]: [u32; 2],
-        inside: [u32; 2],
-        side_px: u32,
-    ) {
-        self.order.clear();
-        if [side_px; 2] == inside
-            && side_px == SampleTable::SHIFT_PX
-            && let Some(order) = source.block_by_time(px, py)
-        {
-            self.order.extend(order);
-            return;
-        }
-        let per_pixel = source.per_pixel();
-        for row in 0..inside[1] {
-            for column in 0..inside[0] {
-                let first = (row * side_px + column) * per_pixel;
-                self.order.extend((first..first + per_pixel).map(|index| index as u16));
+    /// Fills the arrays that follow from these.
+    fn follow(&mut self, shear: &Shear, middle: [f32; 2]) {
+        let Self { x, y, u, v, from_middle, slope, lens, len, .. } = self;
+        for (axis, (at, places)) in [(x, u), (y, v)].into_iter().enumerate() {
+            let (slope, lens) = (&mut slope[axis][..*len], &mut lens[axis][..*len]);
+            let all = at[..*len].iter().zip(&places[..*len]).zip(slope).zip(lens).zip(&mut from_middle[axis]);
+            for ((((at, place), slope), lens), from_middle) in all {
+                *from_middle = at - middle[axis];
+                [*slope, *lens] = shear.ray(axis, *at, *place);
             }
         }
-        // Times are not negative, so their bits sort as they do; the sort is stable, so the index breaks
-        // ties.
-        self.order.sort_by_key(|&index| self.gathered[index as usize].t.to_bits());
     }
 
     /// Index in the whole image of the sample in `slot` of the tile of `side_px` pixels whose first pixel is
@@ -147,14 +167,17 @@ impl TileSamples {
         let [slope_x, slope_y] = &mut self.slope;
         let [near_x, near_y] = &mut self.from_middle;
         let of_image = [&mut self.x, &mut self.y, near_x, near_y, slope_x, slope_y];
+        // What is beyond the samples stays or becomes padding; the samples are overwritten.
+        let pads = |array: &mut Vec<f32>, len: usize, padding: f32| {
+            array.resize(padded, padding);
+            array[len..].fill(padding);
+        };
         for array in of_image.into_iter().chain([&mut self.u, &mut self.v, lens_x, lens_y]) {
-            array.clear();
-            array.resize(padded, 0.0);
+            pads(array, self.len, 0.0);
         }
-        self.t.clear();
-        self.t.resize(padded, Self::PADDING_TIME);
-        self.pixel.clear();
+        pads(&mut self.t, self.len, Self::PADDING_TIME);
         self.pixel.resize(padded, 0);
+        self.pixel[self.len..].fill(0);
     }
 
     /// Range of samples with `lo <= t <= hi`.

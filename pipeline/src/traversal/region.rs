@@ -155,6 +155,17 @@ impl TimePieces {
         both
     }
 
+    /// Keep the part in a range of time.
+    pub fn clip(&mut self, range: [f32; 2]) {
+        let [piece] = &mut self.pieces[..self.len] else {
+            *self = self.meet(&Self::one(Piece { t: range, faces: [true; 2] }));
+            return;
+        };
+        piece.t = [piece.t[0].max(range[0]), piece.t[1].min(range[1])];
+        let is_left = piece.t[0] <= piece.t[1] && piece.faces != [false; 2];
+        self.len = usize::from(is_left);
+    }
+
     /// Hull from the first time to the last.
     pub fn hull(&self) -> Option<[f32; 2]> {
         let pieces = self.pieces();
@@ -331,6 +342,29 @@ impl<N: Number, C: Coordinate> View<N, C> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn clipping_is_meeting_one_piece() {
+        let faces = [[true, false], [false, true], [true; 2], [false; 2]];
+        for count in 0..4 {
+            let mut timeline = TimePieces::empty();
+            for (piece, from) in (0..count).zip([0.0, 0.25, 0.6]) {
+                timeline.push(Piece { t: [from, from + 0.2], faces: faces[piece] });
+            }
+            for (t, faces) in [[0.0, 1.0], [0.1, 0.3], [0.22, 0.24], [0.45, 0.7], [0.7, 0.5]]
+                .iter()
+                .zip(faces.iter().cycle())
+            {
+                let mut timeline = timeline;
+                if count == 1 {
+                    timeline.pieces[0].faces = *faces;
+                }
+                let met = timeline.meet(&TimePieces::one(Piece { t: *t, faces: [true; 2] }));
+                timeline.clip(*t);
+                assert_eq!(timeline.pieces(), met.pieces());
+            }
+        }
+    }
 
     #[test]
     fn a_full_timeline_grows_rather_than_forgets() {

@@ -131,18 +131,18 @@ impl<N: Number, C: Coordinate> Side<'_, N, C> {
     fn through_lens(&self, within: &mut Box5<C>) -> (bool, u32) {
         let lens = if self.axis == 0 { within.u } else { within.v };
         let (slack, mut times, mut places, mut roots) = (self.slack(), None, None, 0);
-        for (corner, &edge) in
-            self.triangle.corners.iter().flat_map(|c| self.edges().iter().map(move |e| (c, e)))
-        {
-            let d = self.at_ends(|end| {
-                let [x, w] = [self.axis, 2].map(|axis| self.at(corner, axis, within.t[end]));
-                let (flat, shift) = (self.flat(x, edge, w), self.a * w - self.s);
-                lens.map(|place| self.inward(flat + N::of(place) * shift, slack))
-            });
-            let over_time = [0, 1].map(|place| d.map(|end| end[place]));
-            times = union(times, above(within.t, &over_time, &mut roots));
-            let over_lens = &d[..if self.triangle.moving { 2 } else { 1 }];
-            places = union(places, above(lens, over_lens, &mut roots));
+        for corner in &self.triangle.corners {
+            for &edge in self.edges() {
+                let d = self.at_ends(|end| {
+                    let [x, w] = [self.axis, 2].map(|axis| self.at(corner, axis, within.t[end]));
+                    let (flat, shift) = (self.flat(x, edge, w), self.a * w - self.s);
+                    lens.map(|place| self.inward(flat + N::of(place) * shift, slack))
+                });
+                let over_time = [0, 1].map(|place| d.map(|end| end[place]));
+                times = union(times, above(within.t, &over_time, &mut roots));
+                let over_lens = &d[..if self.triangle.moving { 2 } else { 1 }];
+                places = union(places, above(lens, over_lens, &mut roots));
+            }
         }
         let (Some(t), Some(places)) = (times, places) else { return (false, roots) };
         within.t = t;

@@ -51,7 +51,7 @@ pub(super) fn write_all(
     maps: &[HeatMap],
     image: &[Vec3],
 ) -> Result<Vec<HeatPicture>, RunError> {
-    let brightness = brightness(image);
+    let brightness = if plan.options.heat.is_empty() { Vec::new() } else { brightness(image) };
     let write = |&of: &HeatQuantity| {
         let heat = match of {
             HeatQuantity::Event(event) => {
