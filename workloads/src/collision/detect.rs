@@ -6,7 +6,7 @@ use super::bounds::Bounds;
 use super::contact_probe;
 use super::object::Object;
 use super::pair::{Method, Pair, Search, Verdict};
-use super::pass::{Part, PassBackend, Scratch};
+use super::pass::{FragmentBudget, Part, PassBackend, Resources, Scratch};
 
 /// Verdict on objects `a` and `b`, `a < b`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -54,6 +54,12 @@ pub(super) fn upscale_factor(small: f64) -> f64 {
     f64::from_bits((BIAS + exponent) << 52)
 }
 
+/// Most triangles in the window of a pair that is drawn unrefined after refinement.
+const MAX_TRIANGLES_UNREFINED: usize = 64;
+/// Most fragments of such a pair: along three axes, two triangles of each object that fill an image of 128 pixels and
+/// 16 time bins.
+pub(super) const UNREFINED_FRAGMENTS: u64 = 3 * 2 * 2 * 128 * 128 * 16;
+
 impl Search {
     /// Whether `a` and `b` may collide.
     pub(super) fn pair(&self, a: &Object, b: &Object, scratch: &mut Scratch) -> Verdict {
@@ -83,21 +89,52 @@ impl Search {
         scratch: &mut Scratch,
         backend: &mut impl PassBackend,
     ) -> Verdict {
-        let Some(mut pair) = Pair::new(objects, [0.0, 1.0], self) else { return Verdict::Apart };
-        let by_depth = self.method == Method::DepthOnly;
-        if by_depth && !self.zoom {
-            return pair.by_depth(scratch, backend);
+        if self.zoom {
+            return self.refined(objects, scratch, backend);
         }
+        self.unrefined(objects, &mut Resources { scratch, budget: FragmentBudget::unlimited(), backend })
+    }
+
+    /// Draws a pair once, at the requested resolution. A pair that exceeds the budget stays.
+    fn unrefined(&self, objects: [&Object; 2], resources: &mut Resources<'_, impl PassBackend>) -> Verdict {
+        let Some(mut pair) = Pair::new(objects, [0.0, 1.0], self) else { return Verdict::Apart };
+        if self.method == Method::DepthOnly {
+            return pair.by_depth(resources);
+        }
+        if pair.tighten() { pair.once(resources) } else { Verdict::Apart }
+    }
+
+    /// Refines a pair. One of few triangles that stays is drawn unrefined, too, as refinement may end with tiles that
+    /// are larger than those of the requested resolution.
+    fn refined(
+        &self,
+        objects: [&Object; 2],
+        scratch: &mut Scratch,
+        backend: &mut impl PassBackend,
+    ) -> Verdict {
+        let Some(mut pair) = Pair::new(objects, [0.0, 1.0], self) else { return Verdict::Apart };
         if !pair.tighten() {
             return Verdict::Apart;
-        }
-        if !self.zoom {
-            return pair.once(scratch, backend);
         }
         if contact_probe::finds_contact(pair.parts(), &pair.window) {
             return pair.maybe(0, true);
         }
-        if by_depth {
+        let few = pair.triangles() <= MAX_TRIANGLES_UNREFINED;
+        let verdict = self.closer(&mut pair, scratch, backend);
+        if !few || !verdict.may_collide() || verdict.is_contact() {
+            return verdict;
+        }
+        let budget = FragmentBudget::of(UNREFINED_FRAGMENTS);
+        let unrefined = Self { zoom: false, ..*self };
+        match unrefined.unrefined(objects, &mut Resources { scratch, budget, backend }) {
+            Verdict::Apart => Verdict::Apart,
+            Verdict::Maybe { .. } => verdict,
+        }
+    }
+
+    /// Refines what remains of a pair, in the frame of the larger object if that moves.
+    fn closer(&self, pair: &mut Pair<'_>, scratch: &mut Scratch, backend: &mut impl PassBackend) -> Verdict {
+        if self.method == Method::DepthOnly {
             return pair.refine_by_depth(scratch, backend);
         }
         let Some(seen) = InFrame::new(pair.parts(), &pair.window) else {

@@ -50,7 +50,7 @@ pub enum Verdict {
     Maybe {
         /// Space and time that contain every contact.
         bounds: Bounds,
-        /// Overlapping tiles of the last pass.
+        /// Overlapping tiles of the last pass; with refinement, of its last.
         tiles: u64,
         /// Whether two triangles were found to cross or to share a corner, beyond rounding errors.
         seen: bool,
@@ -124,11 +124,9 @@ impl<'a> Pair<'a> {
         Some(Self { objects, lists, window: Bounds { time, ..shared }, search })
     }
 
-    /// Searches by depths alone, without time bins.
-    pub fn by_depth(&self, scratch: &mut Scratch, backend: &mut impl PassBackend) -> Verdict {
-        let resolution = self.search.resolution;
-        let budget = FragmentBudget::unlimited();
-        match self.depths(resolution, &mut Resources { scratch, budget, backend }) {
+    /// Searches by depths alone, without time bins. A pair that exceeds the budget stays.
+    pub fn by_depth(&self, resources: &mut Resources<'_, impl PassBackend>) -> Verdict {
+        match self.depths(self.search.resolution, resources) {
             Some(0) => Verdict::Apart,
             tiles => self.maybe(tiles.unwrap_or(0), false),
         }
@@ -148,12 +146,10 @@ impl<'a> Pair<'a> {
         Some(fewest)
     }
 
-    /// Searches once, at the requested resolution.
-    pub fn once(&mut self, scratch: &mut Scratch, backend: &mut impl PassBackend) -> Verdict {
+    /// Searches once, at the requested resolution. A pair that exceeds the budget stays.
+    pub fn once(&mut self, resources: &mut Resources<'_, impl PassBackend>) -> Verdict {
         let Search { resolution, bins, .. } = *self.search;
-        let params = PassParams { resolution, bins, fit: Fit::Edges };
-        let budget = FragmentBudget::unlimited();
-        match self.round(params, &mut Resources { scratch, budget, backend }) {
+        match self.round(PassParams { resolution, bins, fit: Fit::Edges }, resources) {
             PairResult::Apart => Verdict::Apart,
             PairResult::BudgetExceeded => self.maybe(0, false),
             PairResult::Overlap(Round { window, tiles, seen }) => {
@@ -408,6 +404,7 @@ impl Pair<'_> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::detect::UNREFINED_FRAGMENTS;
     use super::super::families::slide;
     use super::super::pass::{Fragment, Pass};
     use super::super::{Method, Object, Search, detect};
@@ -422,7 +419,8 @@ mod tests {
         }
     }
 
-    /// Two triangles that are closer than any tile can separate.
+    /// Two triangles that are closer than any tile can separate. Both budgets are spent: that of refinement, and that
+    /// of the search at full resolution.
     #[test]
     fn refinement_ends_with_every_method() {
         let slanted = |x: f64| [[x, 0.0, 0.0], [x + 1.0, 0.0, 1.0], [x, 1.0, 1.0]];
@@ -432,8 +430,34 @@ mod tests {
             let mut drawn = Drawn(0);
             let verdict =
                 search.pair_observed(&object(0.0), &object(1e-7), &mut Scratch::default(), &mut drawn);
-            assert!(verdict.may_collide() && drawn.0 <= MAX_FRAGMENTS + 8, "{method:?}: {}", drawn.0);
+            let most = MAX_FRAGMENTS + UNREFINED_FRAGMENTS;
+            assert!(verdict.may_collide() && drawn.0 <= most + 8, "{method:?}: {}", drawn.0);
         }
+    }
+
+    /// Plates that move and fill every image in every time bin, closer than a tile can separate.
+    #[test]
+    fn the_search_at_full_resolution_ends_at_its_budget() {
+        let plate = |x: f64, moved: f64| {
+            let corner = |y: f64, z: f64| [x + y + z + moved, y + moved, z + moved];
+            let [a, b, c, d] = [corner(0.0, 0.0), corner(1.0, 0.0), corner(1.0, 1.0), corner(0.0, 1.0)];
+            [[a, b, c], [a, c, d]]
+        };
+        let object = |x: f64, moved: f64| {
+            let [open, close] = [plate(x, 0.0), plate(x, moved)];
+            Object::from_ends(vec![[open[0], close[0]], [open[1], close[1]]], 0.0).unwrap()
+        };
+        let [a, b] = [object(0.0, 0.0), object(1e-7, 1e-3)];
+        let drawn = |zoom: bool| {
+            let (search, mut drawn) = (Search { resolution: 288, zoom, ..Search::default() }, Drawn(0));
+            let verdict = search.pair_observed(&a, &b, &mut Scratch::default(), &mut drawn);
+            assert!(verdict.may_collide());
+            drawn.0
+        };
+        let [refined, unlimited] = [true, false].map(drawn);
+        let most = MAX_FRAGMENTS + UNREFINED_FRAGMENTS;
+        assert!(unlimited > most, "{unlimited}");
+        assert!(refined <= most + 8 && refined > UNREFINED_FRAGMENTS / 4, "{refined}");
     }
 
     #[test]
@@ -457,9 +481,15 @@ mod tests {
         let falling = |z: f64| [[0.3, 0.3, z], [0.31, 0.3, z + 1.0], [0.3, 0.32, z + 1.0]];
         let [a, b] =
             [[floor; 2], [falling(1.0), falling(0.22)]].map(|ends| Object::from_ends(vec![ends], 0.0));
-        let mut drawn = Drawn(0);
-        let search = Search::default();
-        let verdict = search.pair_observed(&a.unwrap(), &b.unwrap(), &mut Scratch::default(), &mut drawn);
-        assert!(verdict.may_collide() && drawn.0 < MAX_FRAGMENTS / 4, "{}: {verdict:?}", drawn.0);
+        let (a, b) = (a.unwrap(), b.unwrap());
+        let drawn = |zoom: bool| {
+            let (search, mut drawn) = (Search { zoom, ..Search::default() }, Drawn(0));
+            let verdict = search.pair_observed(&a, &b, &mut Scratch::default(), &mut drawn);
+            assert!(verdict.may_collide());
+            drawn.0
+        };
+        // The pair is refined, then drawn once as without refinement.
+        let [both, once] = [true, false].map(drawn);
+        assert!(once > 0 && both > once && both - once < MAX_FRAGMENTS / 4, "{both} {once}");
     }
 }

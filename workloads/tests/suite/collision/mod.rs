@@ -5,6 +5,7 @@ mod exact;
 mod oracle;
 mod public;
 mod reference_rates;
+mod refinement;
 
 use pipeline::random::{mix, unit};
 use workloads::collision::{Method, Object, Search, detect};
