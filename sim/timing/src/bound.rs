@@ -26,6 +26,7 @@ use crate::data_unit::DataUnit;
 use crate::demand::{CLIENTS, DemandBuilder, ServiceDemand, Station, port};
 use crate::draws::{ByDraw, PassParts};
 use crate::passes::Passes;
+use crate::service::time_of;
 use crate::spec::MachineSpec;
 use crate::work::{UnitSpeeds, UnitWork};
 use crate::{Clock, Recorder, Timed};
@@ -486,15 +487,15 @@ impl Uncontended {
         lines + below.sum::<Time>()
     }
 
-    /// Time that the clients of a packet take to request its lines beyond their service in the cycles of `work`, and
+    /// Time that the clients of a packet take to request its lines beyond their service in `work`, and
     /// the answers to all of them but one.
     pub fn requests(&self, demand: &ServiceDemand, work: &UnitWork) -> Time {
         let clients = [Station::Depth, Station::Colour]
             .into_iter()
             .filter(|station| port(station.unit()).is_some_and(|port| demand.lines[port] > 0));
         let beyond = |station: &Station| {
-            let cycles = work[station.unit() as usize] - u64::from(demand.service[*station as usize]);
-            self.period[*station as usize] * cycles
+            let beyond = work[station.unit() as usize] - demand.service[*station as usize];
+            time_of(beyond, self.period[*station as usize])
         };
         let answers = self.line * (clients.clone().count() as Time).saturating_sub(1);
         clients.map(|station| beyond(&station)).sum::<Time>() + answers
@@ -503,9 +504,8 @@ impl Uncontended {
     /// Time of a packet from its first station to its last.
     pub fn packet(&self, demand: &ServiceDemand, program: Time, counts: &PacketCounts) -> Time {
         let first = if demand.front { Station::Command } else { Station::Traversal } as usize;
-        let at = |station: usize| {
-            self.latency[station] + self.period[station] * Time::from(demand.service[station])
-        };
+        let at =
+            |station: usize| self.latency[station] + time_of(demand.service[station], self.period[station]);
         let units: Time = (first..=demand.last as usize).map(at).sum();
         units + program + self.answer(demand, counts)
     }

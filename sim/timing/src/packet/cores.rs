@@ -3,12 +3,13 @@
 use super::calendar::{Calendar, QueueTimes};
 use super::drain::{Drain, OnCores};
 use super::memory::Memory;
-use super::station::aligned;
+use super::station::{Service, aligned};
 use super::{Span, Visit};
 use crate::clock::{Clocks, Time};
 use crate::data_unit::DataUnit;
 use crate::demand::{DemandBuilder, ServiceDemand, Station, share};
 use crate::draws::Left;
+use crate::service::{Server, Work, time_of};
 use crate::spec::MachineSpec;
 
 /// Cycles per slot of the calendars.
@@ -38,10 +39,21 @@ pub(super) struct Run {
     pub waited: Time,
     /// When the first and the last warp have them.
     pub ready: Span,
-    /// When its data unit works on it.
-    pub data: Span,
+    /// When its data unit works on it, from the first cycle to the last.
+    pub data: Option<Service>,
     /// When its lines pass the L2 and memory.
     pub memory: Span,
+}
+
+impl Run {
+    /// Record the service of some of its warps by their data unit.
+    fn note_data(&mut self, service: Service) {
+        let Some(before) = &mut self.data else {
+            self.data = Some(service);
+            return;
+        };
+        (before.to, before.work) = (service.to, before.work + service.work);
+    }
 }
 
 /// State of one kind of packets (vertices or pixels) on the cores. Packets of a kind leave in order.
@@ -63,7 +75,7 @@ struct DataState {
     latency: Time,
     free: Time,
     departed: Time,
-    next_request: Time,
+    server: Server,
     queue: QueueTimes,
     behind: QueueTimes,
 }
@@ -78,7 +90,7 @@ impl DataState {
             latency: period * Time::from(common.latency_cycles),
             free: 0,
             departed: 0,
-            next_request: 0,
+            server: Server::default(),
             queue: QueueTimes::new(common.queue),
             behind: QueueTimes::new(common.in_flight),
         }
@@ -154,7 +166,7 @@ impl Cores {
             departed: taken,
             waited: 0,
             ready: Span::NONE,
-            data: Span::NONE,
+            data: None,
             memory: Span::NONE,
         };
         let uses_data = kind == 1 && demand.uses_data();
@@ -243,24 +255,22 @@ impl Cores {
         let demand = visit.demand;
         let state = &mut self.data[demand.data_unit() as usize];
         let (unit, period) = (state.unit, state.period);
-        let cycles = |part: u32| {
+        let of_warp = |part: u32| {
             let data = demand.data.map(|whole| share(whole, part, chunk.of).len() as u32);
-            period * Time::from(builder.data_cycles(unit, data))
+            builder.data_work(unit, data)
         };
-        let service: Time = (chunk.first..chunk.first + chunk.count).map(cycles).sum();
-        let each = service / Time::from(chunk.count);
+        let work: Work = (chunk.first..chunk.first + chunk.count).map(of_warp).sum();
+        let each = time_of(work / Work::from(chunk.count), period);
         let start = aligned(sent.from.max(state.free), period);
-        let mut served = (start + service).max(sent.to + each);
-        let busy_to = start + service;
+        let service = Service::of(&mut state.server, start, period, work);
+        let mut served = service.to.max(sent.to + each);
         let all = demand.lines_of(unit.port());
         let part = |part: u32| share(all.len() as u32, part, chunk.of).start as usize;
         let base = all.start - demand.first_line;
         let range = base + part(chunk.first)..base + part(chunk.first + chunk.count);
         let mut arrived = 0;
         if !range.is_empty() {
-            let from = start.max(state.next_request);
-            let fetched = memory.request(unit.port(), &visit.lines[range], visit.turn, from, period);
-            state.next_request = fetched.last_request + period;
+            let fetched = memory.request(unit.port(), &visit.lines[range], visit.turn, start);
             served = served.max(fetched.last_request);
             arrived = fetched.arrived;
             run.memory = run.memory.with(fetched.first, fetched.moved);
@@ -274,7 +284,7 @@ impl Cores {
         let first =
             (start + each).max(departed.saturating_sub(served.saturating_sub(start + each))).min(departed);
         state.behind.note_all(chunk.count, first, departed);
-        run.data = run.data.with(start, busy_to);
+        run.note_data(service);
         Span { from: first + state.latency, to: departed + state.latency }
     }
 

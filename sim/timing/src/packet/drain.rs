@@ -12,6 +12,7 @@ use std::collections::{BinaryHeap, VecDeque};
 use crate::clock::{Clocks, Time};
 use crate::demand::{ServiceDemand, Station};
 use crate::draws::Left;
+use crate::service::time_of;
 use crate::spec::MachineSpec;
 
 use super::Span;
@@ -133,7 +134,7 @@ impl Drain {
 
     /// Add the next packet.
     pub fn note(&mut self, demand: &ServiceDemand, mut packet: OnCores) {
-        packet.behind = self.cores.behind_period * Time::from(demand.service[Station::Colour as usize]);
+        packet.behind = time_of(demand.service[Station::Colour as usize], self.cores.behind_period);
         packet.latency = if demand.last == Station::Colour { self.cores.latencies[1] } else { 0 };
         self.last = Some(Left { pass: demand.pass, draw: demand.draw, batch: demand.batch, at: 0 });
         self.longest = self.longest.max(Time::from(packet.steps) * self.cores.alu);
