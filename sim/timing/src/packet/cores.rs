@@ -9,7 +9,7 @@ use crate::clock::{Clocks, Time};
 use crate::data_unit::DataUnit;
 use crate::demand::{DemandBuilder, ServiceDemand, Station, share};
 use crate::draws::Left;
-use crate::service::{Server, Work, time_of};
+use crate::service::{CYCLE, Server, Work, time_of};
 use crate::spec::MachineSpec;
 
 /// Cycles per slot of the calendars.
@@ -59,7 +59,9 @@ impl Run {
 /// State of one kind of packets (vertices or pixels) on the cores. Packets of a kind leave in order.
 #[derive(Clone, Debug)]
 struct PacketFifo {
+    /// When its next warp may be sent, and how many warps of that cycle have been.
     sent: Time,
+    sender: Server,
     departed: Time,
     flights: QueueTimes,
     /// Warp slots of the cores. Each kind has its own queue, as the times of the two kinds are not sorted
@@ -101,8 +103,9 @@ impl DataState {
 #[derive(Clone, Debug)]
 pub(super) struct Cores {
     fifos: [PacketFifo; 2],
-    /// Warp launches, one per cycle.
+    /// Warps sent, and the part of a cycle that one takes.
     sends: Calendar,
+    send_work: Work,
     lanes: Calendar,
     /// Warp slots of the cores, which both kinds share.
     slots: Calendar,
@@ -121,10 +124,17 @@ impl Cores {
         let spec = &machine.shader;
         let period = clocks.period(spec.clock);
         let slots = QueueTimes::new(spec.cores.get() * spec.warps.get());
-        let fifo = PacketFifo { sent: 0, departed: 0, flights: QueueTimes::new(spec.in_flight.get()), slots };
+        let fifo = PacketFifo {
+            sent: 0,
+            sender: Server::default(),
+            departed: 0,
+            flights: QueueTimes::new(spec.in_flight.get()),
+            slots,
+        };
         Self {
             fifos: [fifo.clone(), fifo],
-            sends: Calendar::new(Time::from(SLOT_CYCLES) * period, 1),
+            sends: Calendar::new(Time::from(SLOT_CYCLES) * period, spec.warps_per_cycle.get()),
+            send_work: CYCLE.div_ceil(spec.warps_per_cycle.get().into()),
             lanes: Calendar::new(Time::from(SLOT_CYCLES) * period, spec.cores.get() * spec.lanes.get()),
             slots: Calendar::new(Time::from(SLOT_CYCLES) * period, spec.cores.get() * spec.warps.get()),
             cores: spec.cores.get(),
@@ -174,7 +184,6 @@ impl Cores {
             let chunk = Chunk { first, count: WARPS_PER_CHUNK.min(warps - first), of: warps };
             let from = room.max(self.fifos[kind].sent);
             let sent = self.send(kind, from, chunk.count, uses_data.then_some(demand.data_unit()));
-            self.fifos[kind].sent = sent.to + self.period;
             let mut ready = Span { from: sent.from + self.period, to: sent.to + self.period };
             if uses_data {
                 ready = self.data(visit, &chunk, ready, builder, memory, &mut run);
@@ -230,7 +239,7 @@ impl Cores {
         self.drain.left(batch, calendar)
     }
 
-    /// Send warps, one per cycle, as slots on the cores and in front of the data unit become free. Returns when the
+    /// Send warps, as many in a cycle as the machine can, as slots on the cores and in front of the data unit become free. Returns when the
     /// first and the last warp are sent.
     fn send(&mut self, kind: usize, from: Time, warps: u32, unit: Option<DataUnit>) -> Span {
         let room = |count| {
@@ -239,7 +248,11 @@ impl Cores {
         };
         let (first, last) = (room(1), room(warps));
         let (begin, sent) = self.sends.reserve(from.max(first), u64::from(warps) * self.period);
-        Span { from: begin, to: sent.saturating_sub(self.period).max(begin).max(last) }
+        let (fifo, work) = (&mut self.fifos[kind], self.send_work);
+        let end = begin + self.period * ((fifo.sender.used_at(begin) + Work::from(warps - 1) * work) / CYCLE);
+        let to = sent.saturating_sub(self.period).max(end).max(last);
+        fifo.sent = fifo.sender.serve(begin, self.period, Work::from(warps) * work) + (to - end);
+        Span { from: begin, to }
     }
 
     /// Fetch the data of some warps. Returns when the first and the last warp have them.

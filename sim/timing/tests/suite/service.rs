@@ -160,3 +160,53 @@ proptest! {
         prop_assert!(found >= u64::from(works.iter().sum::<u32>() / 4));
     }
 }
+
+/// Packets of one warp, each with one event of a data unit, or of two.
+fn warps(rate: f64, per_cycle: u32, counts: &[(Event, u32)], kind: PacketKind) -> (MachineSpec, Packets) {
+    let mut machine = plain();
+    machine.shader.warps_per_cycle = size(per_cycle);
+    (machine.shader.cores, machine.shader.warps) = (size(4), size(64));
+    machine.texture.rates = rates(&format!("{{\"texture_fetches\": {rate}}}"));
+    machine.compute.as_mut().unwrap().rates = rates(&format!("{{\"shared_cycles\": {rate}}}"));
+    (machine, vec![(packet(kind, counts), Vec::new()); PACKETS as usize])
+}
+
+#[test]
+fn data_units_reach_their_rates_with_warps_of_one_event() {
+    let texels = [(Event::PixelInvocations, 4), (Event::TextureFetches, 1)];
+    let shared = [(Event::GroupLanes, 4), (Event::SharedCycles, 1)];
+    for (counts, kind) in [(texels, PacketKind::Tile), (shared, PacketKind::Compute)] {
+        for rate in [1.0, 2.0, 4.0, 2.5, 0.5] {
+            let (machine, packets) = warps(rate, 4, &counts, kind);
+            let expected = PACKETS as f64 / rate;
+            let cycles = [
+                stepped(&machine, &packets),
+                packet_level(&machine, clocks(), &packets),
+                bound_level(&machine, clocks(), &packets),
+            ]
+            .map(|timed| timed.cycles as f64);
+            assert!(
+                cycles.iter().all(|cycles| (cycles - expected).abs() < 0.02 * expected + 16.0),
+                "{kind:?} at {rate}: {cycles:?} for {expected}"
+            );
+        }
+    }
+}
+
+#[test]
+fn warps_are_sent_at_their_rate() {
+    for per_cycle in [1, 2, 3, 4] {
+        let (machine, packets) = warps(1e3, per_cycle, &[(Event::PixelInvocations, 4)], PacketKind::Tile);
+        let expected = PACKETS as f64 / f64::from(per_cycle);
+        let cycles = [
+            stepped(&machine, &packets),
+            packet_level(&machine, clocks(), &packets),
+            bound_level(&machine, clocks(), &packets),
+        ]
+        .map(|timed| timed.cycles as f64);
+        assert!(
+            cycles.iter().all(|cycles| (cycles - expected).abs() < 0.02 * expected + 16.0),
+            "{per_cycle} a cycle: {cycles:?} for {expected}"
+        );
+    }
+}
