@@ -467,27 +467,15 @@ impl Tally {
 
     /// Record the events of a service, and that `unit` was busy with it.
     pub fn serve(&mut self, unit: Unit, counts: &PacketCounts, service: &Service) {
-        let Service { from, to, period, work, .. } = *service;
-        let at = &self.cursors[unit as usize];
-        let rest = if from < at.from || from >= at.to || to > at.to {
-            self.count_outside_bin(unit, counts, from, to);
-            self.busy_outside_bin(unit, service)
-        } else {
-            work
-        };
-        self.cursors[unit as usize].work(rest, period);
-    }
-
-    /// Record busy time up to the last cycle of a service. Returns the work in that cycle.
-    #[cold]
-    fn busy_outside_bin(&mut self, unit: Unit, service: &Service) -> Work {
         let Service { from, to, used, work, period } = *service;
-        if from == to {
-            return work;
+        let at = &mut self.cursors[unit as usize];
+        if from >= at.from && to + period <= at.to {
+            return at.work(work, period);
         }
-        let used_ps = self.clocks.ps_below(used * period) / CYCLE;
-        self.recorder.busy(unit, self.clocks.ps(from) + used_ps, self.clocks.ps(to), 1, 1);
-        (used + work) % CYCLE
+        self.count(unit, counts, from, to);
+        let begin_ps = self.clocks.ps_after(from, used * period, CYCLE);
+        let end_ps = self.clocks.ps_after(to, (used + work) % CYCLE * period, CYCLE);
+        self.recorder.busy(unit, begin_ps, end_ps, 1, 1);
     }
 
     /// Record the end of a packet: all units have done their part of `counts`.

@@ -2,10 +2,11 @@
 
 use activity::{Event, LineKind, Packet, PacketKind, Unit};
 use proptest::prelude::*;
-use timing::{MachineSpec, Rates};
+use timing::{Clocks, MachineSpec, Rates, Recorder};
 
 use crate::common::{
-    Packets, bound_level, clocks, packet, packet_level, plain, rates, read, size, stepped, tile, tiles,
+    Packets, bound_level, clocks, packet, packet_level, packet_level_into, plain, rates, read, size, stepped,
+    tile, tiles,
 };
 
 /// Events per cycle, and packets of one event each.
@@ -208,5 +209,25 @@ fn warps_are_sent_at_their_rate() {
             cycles.iter().all(|cycles| (cycles - expected).abs() < 0.02 * expected + 16.0),
             "{per_cycle} a cycle: {cycles:?} for {expected}"
         );
+    }
+}
+
+#[test]
+fn no_unit_is_busy_for_longer_than_a_bin() {
+    for clocks in [Clocks::new(400e6, 400e6), Clocks::new(925e6, 1375e6), Clocks::new(333e6, 401e6)] {
+        let mut machine = plain();
+        *rates_of(&mut machine, Unit::Traversal) = rates("{\"tiles_visited\": 48}");
+        machine.z_cull.queue = size(1000);
+        let packets = tiles((0..5000).map(|n| vec![(Event::TilesVisited, 1 + n * n % 97)]));
+        let work: f64 = (0..5000_u32).map(|n| f64::from(1 + n * n % 97) / 48.0).sum();
+        for bin_ps in [10_000, 100_000] {
+            let bins = Recorder::new(bin_ps, 1 << 12);
+            let timeline = packet_level_into(bins, &machine, clocks.unwrap(), &packets).timeline;
+            let busy = |bin: &activity::Bin| bin.busy_ps[Unit::Traversal as usize];
+            assert!(timeline.bins.iter().all(|bin| busy(bin) <= timeline.bin_ps), "{clocks:?}");
+            let found = timeline.busy_ps()[Unit::Traversal as usize] as f64;
+            let expected = work * clocks.unwrap().ps(clocks.unwrap().period(timing::Clock::Core)) as f64;
+            assert!((found / expected - 1.0).abs() < 1e-3, "{found} of {expected}");
+        }
     }
 }
