@@ -26,6 +26,7 @@ use crate::data_unit::DataUnit;
 use crate::demand::{CLIENTS, DemandBuilder, ServiceDemand, Station, port};
 use crate::draws::{ByDraw, PassParts};
 use crate::passes::Passes;
+use crate::service::time_of;
 use crate::spec::MachineSpec;
 use crate::work::{UnitSpeeds, UnitWork};
 use crate::{Clock, Recorder, Timed};
@@ -165,8 +166,8 @@ impl BoundClock {
     }
 }
 
-/// What can be full: the cores, twice, and the clients.
-const FULL: usize = 2 + CLIENTS.len();
+/// What can be full: the cores, twice, the way of warps to them, and the clients.
+const FULL: usize = 3 + CLIENTS.len();
 
 /// Consecutive packets of one path that fit in its queues together, or a barrier.
 #[derive(Clone, Debug, Default)]
@@ -177,8 +178,8 @@ struct Segment {
     /// Time of a barrier without contention; `None` for other packets.
     pub barrier: Option<Time>,
     pub work: UnitWork,
-    /// Grains for which the cores are full if no packet waits, by packets and by warps, and those for which clients are full of
-    /// lines under way.
+    /// Grains for which the cores are full if no packet waits, by packets and by warps, those in which warps are sent, and those for
+    /// which clients are full of lines under way.
     pub full: [f64; FULL],
     pub packets: u32,
 }
@@ -440,8 +441,8 @@ impl Uncontended {
         steps * (self.operation - self.cycle * (self.wide - cycles.min(self.wide)))
     }
 
-    /// Time for which the packet fills the cores, by packets and by warps or, for a group, by groups, and each client. Warps hold
-    /// their places while they wait for their lines, too.
+    /// Time for which the packet fills the cores, by packets and by warps or, for a group, by groups, the way to them, and each
+    /// client. Warps hold their places while they wait for their lines, too.
     fn full(
         &self,
         demand: &ServiceDemand,
@@ -462,11 +463,12 @@ impl Uncontended {
         let needed = if demand.group.is_some() { 1.0 } else { f64::from(warps) };
         let mut full = [0.0; FULL];
         (full[0], full[1]) = (held / packets, held * needed / places);
+        full[2] = (Time::from(warps) * self.cycle) as f64 / f64::from(shader.warps_per_cycle);
         for port in (0..CLIENTS.len()).filter(|&port| reads[port]) {
             // At data units warps wait.
             let is_of_warps = DataUnit::ALL.iter().any(|unit| unit.port() == port);
             let waiting = if is_of_warps { warps.min(demand.lines[port]) } else { 1 };
-            full[2 + port] = answer * f64::from(waiting) / self.in_flight[port];
+            full[3 + port] = answer * f64::from(waiting) / self.in_flight[port];
         }
         full
     }
@@ -486,15 +488,15 @@ impl Uncontended {
         lines + below.sum::<Time>()
     }
 
-    /// Time that the clients of a packet take to request its lines beyond their service in the cycles of `work`, and
+    /// Time that the clients of a packet take to request its lines beyond their service in `work`, and
     /// the answers to all of them but one.
     pub fn requests(&self, demand: &ServiceDemand, work: &UnitWork) -> Time {
         let clients = [Station::Depth, Station::Colour]
             .into_iter()
             .filter(|station| port(station.unit()).is_some_and(|port| demand.lines[port] > 0));
         let beyond = |station: &Station| {
-            let cycles = work[station.unit() as usize] - u64::from(demand.service[*station as usize]);
-            self.period[*station as usize] * cycles
+            let beyond = work[station.unit() as usize] - demand.service[*station as usize];
+            time_of(beyond, self.period[*station as usize])
         };
         let answers = self.line * (clients.clone().count() as Time).saturating_sub(1);
         clients.map(|station| beyond(&station)).sum::<Time>() + answers
@@ -503,9 +505,8 @@ impl Uncontended {
     /// Time of a packet from its first station to its last.
     pub fn packet(&self, demand: &ServiceDemand, program: Time, counts: &PacketCounts) -> Time {
         let first = if demand.front { Station::Command } else { Station::Traversal } as usize;
-        let at = |station: usize| {
-            self.latency[station] + self.period[station] * Time::from(demand.service[station])
-        };
+        let at =
+            |station: usize| self.latency[station] + time_of(demand.service[station], self.period[station]);
         let units: Time = (first..=demand.last as usize).map(at).sum();
         units + program + self.answer(demand, counts)
     }

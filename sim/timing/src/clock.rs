@@ -58,6 +58,12 @@ impl Clocks {
         }
     }
 
+    /// Picoseconds from 0 to `at` and `part` / `of` of a grain after it, rounded up.
+    pub(crate) fn ps_after(&self, at: Time, part: u64, of: u64) -> u64 {
+        let parts = u128::from(at) * u128::from(of) + u128::from(part);
+        (parts * u128::from(PS_PER_MS)).div_ceil(u128::from(self.grains_per_ms) * u128::from(of)) as u64
+    }
+
     /// Picoseconds in `length`, rounded down.
     pub(crate) fn ps_below(&self, length: Time) -> u64 {
         match length.checked_mul(PS_PER_MS) {

@@ -1,11 +1,12 @@
-//! Service demand of packets: the cycles a packet needs at each station of one machine. All levels read the
-//! same demands.
+//! Service demand of packets: the work of each station of one machine for a packet. All levels read the same
+//! demands.
 
 use std::ops::Range;
 
 use activity::{Event, LineAccess, Packet, PacketCounts, PacketKind, Unit, Waits};
 
 use crate::data_unit::{DATA_EVENTS, DataUnit};
+use crate::service::{CYCLE, Work, work_of};
 use crate::work::UnitWork;
 use crate::{LINE_BYTES, MachineSpec};
 
@@ -92,8 +93,8 @@ pub struct ServiceDemand {
     pub barrier: Option<Waits>,
     /// Last station with work.
     pub last: Station,
-    /// Cycles of service at each station; 0 at the shader cores.
-    pub service: [u32; Station::COUNT],
+    /// Work of each station; 0 at the shader cores.
+    pub service: [Work; Station::COUNT],
     /// Shader threads.
     pub threads: u32,
     /// Operations per thread.
@@ -237,49 +238,50 @@ impl DemandBuilder {
                 || port(station.unit()).is_some_and(|port| demand.lines[port] > 0);
             if used {
                 demand.last = *station;
-                demand.service[*station as usize] = self.cycles(*station, counts);
+                demand.service[*station as usize] = self.work(*station, counts);
             }
         }
         demand
     }
 
-    /// Cycles of a data unit for its events `data`, without line requests. The slowest of its events counts.
-    pub fn data_cycles(&self, unit: DataUnit, data: [u32; DATA_EVENTS]) -> u32 {
+    /// Work of a data unit for its events `data`, without line requests. The slowest of its events counts.
+    pub fn data_work(&self, unit: DataUnit, data: [u32; DATA_EVENTS]) -> Work {
         let cycles = self.data_cycles[unit as usize];
         let parts = data.into_iter().zip(cycles).map(|(count, cycles)| f64::from(count) * cycles);
-        whole(parts.fold(0.0, f64::max))
+        work_of(parts.fold(0.0, f64::max))
     }
 
     /// Add the work of a packet to `work`. A client of the L2 works until it has requested its last line.
     pub(crate) fn add_work(&self, demand: &ServiceDemand, counts: &PacketCounts, work: &mut UnitWork) {
-        let mut add = |unit: Unit, amount: u32| work[unit as usize] += u64::from(amount);
+        let mut add = |unit: Unit, amount: u64| work[unit as usize] += amount;
         let service = |station: Station| demand.service[station as usize];
         let unit = demand.data_unit();
-        let data = if demand.uses_data() { self.data_cycles(unit, demand.data) } else { 0 };
+        let data = if demand.uses_data() { self.data_work(unit, demand.data) } else { 0 };
         Station::ALL.into_iter().for_each(|station| add(station.unit(), service(station)));
         add(unit.unit(), data);
-        add(Unit::Shader, counts[Event::ShaderOps]);
-        add(Unit::Llc, counts[Event::LlcReads] + counts[Event::LlcWrites]);
-        add(Unit::Edram, counts[Event::EdramReads] + counts[Event::EdramWrites]);
-        add(Unit::Dram, (counts[Event::DramReadBytes] + counts[Event::DramWriteBytes]) / LINE_BYTES);
+        add(Unit::Shader, counts[Event::ShaderOps].into());
+        add(Unit::Llc, u64::from(counts[Event::LlcReads]) + u64::from(counts[Event::LlcWrites]));
+        add(Unit::Edram, u64::from(counts[Event::EdramReads]) + u64::from(counts[Event::EdramWrites]));
+        let bytes = u64::from(counts[Event::DramReadBytes]) + u64::from(counts[Event::DramWriteBytes]);
+        add(Unit::Dram, bytes / u64::from(LINE_BYTES));
         if demand.lines == [0; CLIENTS.len()] {
             return;
         }
         let served =
             [service(Station::Command), service(Station::Depth), data, service(Station::Colour), data];
         for (port, served) in served.into_iter().enumerate() {
-            let requests = demand.lines[port].div_ceil(self.lines_per_cycle[port]);
+            let requests = u64::from(demand.lines[port]) * CYCLE / u64::from(self.lines_per_cycle[port]);
             add(CLIENTS[port], requests.saturating_sub(served));
-            add(Unit::L2, demand.lines[port]);
+            add(Unit::L2, demand.lines[port].into());
         }
     }
 
-    /// Cycles of service at `station` for `counts`, without line requests. The parts of a unit work in
-    /// parallel, so the slowest one counts.
-    fn cycles(&self, station: Station, counts: &PacketCounts) -> u32 {
+    /// Work of `station` for `counts`, without line requests. The parts of a unit work in parallel, so the slowest
+    /// one counts.
+    fn work(&self, station: Station, counts: &PacketCounts) -> Work {
         let parts =
             self.costs[station as usize].iter().map(|&(event, cycles)| f64::from(counts[event]) * cycles);
-        whole(parts.fold(0.0, f64::max))
+        work_of(parts.fold(0.0, f64::max))
     }
 
     /// Number of the packet's batch in the frame: batches of a pass follow those of the pass before.
@@ -308,14 +310,6 @@ fn sorted(lines: &[LineAccess], store: &mut Vec<LineAccess>) -> [u32; CLIENTS.le
     })
 }
 
-/// Round up, except for excess within rounding error.
-fn whole(cycles: f64) -> u32 {
-    let cycles = (cycles - 1e-6).max(0.0);
-    // `f64::ceil` is a function call on x86-64 without SSE4.1.
-    let below = cycles as u32;
-    below.saturating_add(u32::from(f64::from(below) < cycles))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -333,14 +327,5 @@ mod tests {
             assert_eq!((unit as usize, port(unit.unit())), (number, Some(unit.port())));
             assert!(unit.events().iter().all(|event| event.unit() == unit.unit()));
         }
-    }
-
-    #[test]
-    fn cycles_round_up_except_for_rounding_errors() {
-        assert_eq!(
-            [0.0, 0.2, 1.0, 3.0 * (1.0 / 3.0), 49.0 * (1.0 / 49.0), 2.1].map(whole),
-            [0, 1, 1, 1, 1, 3]
-        );
-        assert_eq!([4.2e9, 1e10, 1e300].map(whole), [4_200_000_000, u32::MAX, u32::MAX]);
     }
 }

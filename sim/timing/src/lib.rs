@@ -40,6 +40,7 @@ mod packet;
 mod passes;
 mod recorder;
 pub mod sampled;
+mod service;
 mod spec;
 mod stalls;
 pub mod stepped;
@@ -55,6 +56,7 @@ pub use frame_clock::{FrameClock, Level, Machine, TimingError};
 pub use packet::{MAX_CYCLES, PacketClock};
 pub use passes::PassTime;
 pub use recorder::Recorder;
+pub use service::{CYCLE, Work};
 pub use spec::{
     Chips, ClientSpec, Clock, Common, Cycles, DramSpec, Entries, MachineSpec, Rates, RowBytes, ShaderSpec,
     SharedCacheSpec, UnitSpec, WaitCycles, Width,

@@ -98,6 +98,9 @@ pub struct ShaderSpec {
     pub warp_lanes: Width,
     /// Warps that fit on a core.
     pub warps: Width,
+    /// Warps that are sent to the cores in a cycle.
+    #[serde(default = "one")]
+    pub warps_per_cycle: Width,
     /// Cycles between consecutive operations of a warp.
     pub alu_latency_cycles: Cycles,
     /// Bytes of memory in each core that the lanes of a group share.

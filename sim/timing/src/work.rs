@@ -3,9 +3,11 @@
 use activity::Unit;
 
 use crate::clock::{Clocks, Time};
+use crate::service::CYCLE;
 use crate::spec::MachineSpec;
 
-/// Work of every unit: operations for the cores, lines for the L2, the levels below it and memory, cycles for all others.
+/// Work of every unit: operations for the cores, lines for the L2, the levels below it and memory, parts of cycles
+/// ([`Work`](crate::Work)) for all others.
 pub(crate) type UnitWork = [u64; Unit::COUNT];
 
 /// Speeds of the units.
@@ -23,7 +25,7 @@ impl UnitSpeeds {
             Unit::Llc => machine.llc.as_ref().map_or(1.0, |level| level.lines_per_cycle.into()),
             Unit::Edram => machine.edram.as_ref().map_or(1.0, |level| level.lines_per_cycle.into()),
             Unit::Dram => f64::from(machine.dram.channels) / f64::from(machine.dram.burst_cycles),
-            _ => 1.0,
+            _ => CYCLE as f64,
         };
         let grains_per_work =
             Unit::ALL.map(|unit| clocks.period(machine.common(unit).clock) as f64 / servers(unit));

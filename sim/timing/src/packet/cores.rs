@@ -3,12 +3,13 @@
 use super::calendar::{Calendar, QueueTimes};
 use super::drain::{Drain, OnCores};
 use super::memory::Memory;
-use super::station::aligned;
+use super::station::{Service, aligned};
 use super::{Span, Visit};
 use crate::clock::{Clocks, Time};
 use crate::data_unit::DataUnit;
 use crate::demand::{DemandBuilder, ServiceDemand, Station, share};
 use crate::draws::Left;
+use crate::service::{CYCLE, Server, Work, time_of};
 use crate::spec::MachineSpec;
 
 /// Cycles per slot of the calendars.
@@ -38,16 +39,29 @@ pub(super) struct Run {
     pub waited: Time,
     /// When the first and the last warp have them.
     pub ready: Span,
-    /// When its data unit works on it.
-    pub data: Span,
+    /// When its data unit works on it, from the first cycle to the last.
+    pub data: Option<Service>,
     /// When its lines pass the L2 and memory.
     pub memory: Span,
+}
+
+impl Run {
+    /// Record the service of some of its warps by their data unit.
+    fn note_data(&mut self, service: Service) {
+        let Some(before) = &mut self.data else {
+            self.data = Some(service);
+            return;
+        };
+        (before.to, before.work) = (service.to, before.work + service.work);
+    }
 }
 
 /// State of one kind of packets (vertices or pixels) on the cores. Packets of a kind leave in order.
 #[derive(Clone, Debug)]
 struct PacketFifo {
+    /// When its next warp may be sent, and how many warps of that cycle have been.
     sent: Time,
+    sender: Server,
     departed: Time,
     flights: QueueTimes,
     /// Warp slots of the cores. Each kind has its own queue, as the times of the two kinds are not sorted
@@ -63,7 +77,7 @@ struct DataState {
     latency: Time,
     free: Time,
     departed: Time,
-    next_request: Time,
+    server: Server,
     queue: QueueTimes,
     behind: QueueTimes,
 }
@@ -78,7 +92,7 @@ impl DataState {
             latency: period * Time::from(common.latency_cycles),
             free: 0,
             departed: 0,
-            next_request: 0,
+            server: Server::default(),
             queue: QueueTimes::new(common.queue),
             behind: QueueTimes::new(common.in_flight),
         }
@@ -89,8 +103,9 @@ impl DataState {
 #[derive(Clone, Debug)]
 pub(super) struct Cores {
     fifos: [PacketFifo; 2],
-    /// Warp launches, one per cycle.
+    /// Warps sent, and the part of a cycle that one takes.
     sends: Calendar,
+    send_work: Work,
     lanes: Calendar,
     /// Warp slots of the cores, which both kinds share.
     slots: Calendar,
@@ -109,10 +124,17 @@ impl Cores {
         let spec = &machine.shader;
         let period = clocks.period(spec.clock);
         let slots = QueueTimes::new(spec.cores.get() * spec.warps.get());
-        let fifo = PacketFifo { sent: 0, departed: 0, flights: QueueTimes::new(spec.in_flight.get()), slots };
+        let fifo = PacketFifo {
+            sent: 0,
+            sender: Server::default(),
+            departed: 0,
+            flights: QueueTimes::new(spec.in_flight.get()),
+            slots,
+        };
         Self {
             fifos: [fifo.clone(), fifo],
-            sends: Calendar::new(Time::from(SLOT_CYCLES) * period, 1),
+            sends: Calendar::new(Time::from(SLOT_CYCLES) * period, spec.warps_per_cycle.get()),
+            send_work: CYCLE.div_ceil(spec.warps_per_cycle.get().into()),
             lanes: Calendar::new(Time::from(SLOT_CYCLES) * period, spec.cores.get() * spec.lanes.get()),
             slots: Calendar::new(Time::from(SLOT_CYCLES) * period, spec.cores.get() * spec.warps.get()),
             cores: spec.cores.get(),
@@ -154,7 +176,7 @@ impl Cores {
             departed: taken,
             waited: 0,
             ready: Span::NONE,
-            data: Span::NONE,
+            data: None,
             memory: Span::NONE,
         };
         let uses_data = kind == 1 && demand.uses_data();
@@ -162,7 +184,6 @@ impl Cores {
             let chunk = Chunk { first, count: WARPS_PER_CHUNK.min(warps - first), of: warps };
             let from = room.max(self.fifos[kind].sent);
             let sent = self.send(kind, from, chunk.count, uses_data.then_some(demand.data_unit()));
-            self.fifos[kind].sent = sent.to + self.period;
             let mut ready = Span { from: sent.from + self.period, to: sent.to + self.period };
             if uses_data {
                 ready = self.data(visit, &chunk, ready, builder, memory, &mut run);
@@ -218,7 +239,7 @@ impl Cores {
         self.drain.left(batch, calendar)
     }
 
-    /// Send warps, one per cycle, as slots on the cores and in front of the data unit become free. Returns when the
+    /// Send warps, as many in a cycle as the machine can, as slots on the cores and in front of the data unit become free. Returns when the
     /// first and the last warp are sent.
     fn send(&mut self, kind: usize, from: Time, warps: u32, unit: Option<DataUnit>) -> Span {
         let room = |count| {
@@ -227,7 +248,11 @@ impl Cores {
         };
         let (first, last) = (room(1), room(warps));
         let (begin, sent) = self.sends.reserve(from.max(first), u64::from(warps) * self.period);
-        Span { from: begin, to: sent.saturating_sub(self.period).max(begin).max(last) }
+        let (fifo, work) = (&mut self.fifos[kind], self.send_work);
+        let end = begin + self.period * ((fifo.sender.used_at(begin) + Work::from(warps - 1) * work) / CYCLE);
+        let to = sent.saturating_sub(self.period).max(end).max(last);
+        fifo.sent = fifo.sender.serve(begin, self.period, Work::from(warps) * work) + (to - end);
+        Span { from: begin, to }
     }
 
     /// Fetch the data of some warps. Returns when the first and the last warp have them.
@@ -243,24 +268,22 @@ impl Cores {
         let demand = visit.demand;
         let state = &mut self.data[demand.data_unit() as usize];
         let (unit, period) = (state.unit, state.period);
-        let cycles = |part: u32| {
+        let of_warp = |part: u32| {
             let data = demand.data.map(|whole| share(whole, part, chunk.of).len() as u32);
-            period * Time::from(builder.data_cycles(unit, data))
+            builder.data_work(unit, data)
         };
-        let service: Time = (chunk.first..chunk.first + chunk.count).map(cycles).sum();
-        let each = service / Time::from(chunk.count);
+        let work: Work = (chunk.first..chunk.first + chunk.count).map(of_warp).sum();
+        let each = time_of(work / Work::from(chunk.count), period);
         let start = aligned(sent.from.max(state.free), period);
-        let mut served = (start + service).max(sent.to + each);
-        let busy_to = start + service;
+        let service = Service::of(&mut state.server, start, period, work);
+        let mut served = service.to.max(sent.to + each);
         let all = demand.lines_of(unit.port());
         let part = |part: u32| share(all.len() as u32, part, chunk.of).start as usize;
         let base = all.start - demand.first_line;
         let range = base + part(chunk.first)..base + part(chunk.first + chunk.count);
         let mut arrived = 0;
         if !range.is_empty() {
-            let from = start.max(state.next_request);
-            let fetched = memory.request(unit.port(), &visit.lines[range], visit.turn, from, period);
-            state.next_request = fetched.last_request + period;
+            let fetched = memory.request(unit.port(), &visit.lines[range], visit.turn, start);
             served = served.max(fetched.last_request);
             arrived = fetched.arrived;
             run.memory = run.memory.with(fetched.first, fetched.moved);
@@ -274,7 +297,7 @@ impl Cores {
         let first =
             (start + each).max(departed.saturating_sub(served.saturating_sub(start + each))).min(departed);
         state.behind.note_all(chunk.count, first, departed);
-        run.data = run.data.with(start, busy_to);
+        run.note_data(service);
         Span { from: first + state.latency, to: departed + state.latency }
     }
 

@@ -12,6 +12,7 @@ use std::collections::{BinaryHeap, VecDeque};
 use crate::clock::{Clocks, Time};
 use crate::demand::{ServiceDemand, Station};
 use crate::draws::Left;
+use crate::service::time_of;
 use crate::spec::MachineSpec;
 
 use super::Span;
@@ -85,6 +86,8 @@ struct CoreSizes {
     in_flight: usize,
     period: Time,
     alu: Time,
+    /// Time in which a warp is sent.
+    send: f64,
     lanes: f64,
     lanes_of_core: u64,
     /// Latency of the cores and of the unit behind, and its cycle.
@@ -104,6 +107,7 @@ impl Drain {
             in_flight: spec.in_flight.get() as usize,
             period,
             alu: period * Time::from(spec.alu_latency_cycles),
+            send: period as f64 / f64::from(spec.warps_per_cycle),
             lanes: f64::from(spec.cores.get()) * f64::from(spec.lanes.get()),
             lanes_of_core: spec.lanes.get().into(),
             latencies: [Station::Pixel, Station::Colour].map(latency),
@@ -133,7 +137,7 @@ impl Drain {
 
     /// Add the next packet.
     pub fn note(&mut self, demand: &ServiceDemand, mut packet: OnCores) {
-        packet.behind = self.cores.behind_period * Time::from(demand.service[Station::Colour as usize]);
+        packet.behind = time_of(demand.service[Station::Colour as usize], self.cores.behind_period);
         packet.latency = if demand.last == Station::Colour { self.cores.latencies[1] } else { 0 };
         self.last = Some(Left { pass: demand.pass, draw: demand.draw, batch: demand.batch, at: 0 });
         self.longest = self.longest.max(Time::from(packet.steps) * self.cores.alu);
@@ -155,7 +159,7 @@ impl Drain {
         }
     }
 
-    /// Send up to `most` warps, one a cycle, to slots that become free together. Returns their number; `None` if no warp is there
+    /// Send up to `most` warps, a few a cycle, to slots that become free together. Returns their number; `None` if no warp is there
     /// to free a slot.
     fn send(&mut self, most: u32) -> Option<u32> {
         let free = self.slot()?;
@@ -165,7 +169,7 @@ impl Drain {
         if *slots == 0 {
             self.slots.pop_front();
         }
-        self.sent = self.sent.max(free) + (Time::from(count) * self.cores.period) as f64;
+        self.sent = self.sent.max(free) + f64::from(count) * self.cores.send;
         Some(count)
     }
 

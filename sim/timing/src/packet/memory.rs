@@ -49,6 +49,16 @@ struct RequestPacer {
 }
 
 impl RequestPacer {
+    fn new(machine: &MachineSpec, clocks: &Clocks, unit: Unit) -> Self {
+        let common = machine.common(unit);
+        Self {
+            at: 0,
+            used: 0,
+            lines_per_cycle: common.lines_per_cycle.max(1),
+            period: clocks.period(common.clock),
+        }
+    }
+
     /// Delay from the next request to the last of `count` requests.
     fn delay_of_last(&self, count: u32) -> Time {
         Time::from((self.used + count - 1) / self.lines_per_cycle) * self.period
@@ -84,8 +94,8 @@ pub(super) struct Memory {
     levels: Levels,
     l2: Calendar,
     ports: [QueueTimes; CLIENTS.len()],
-    /// Lines per cycle that the client of each port can request.
-    lines_per_cycle: [u32; CLIENTS.len()],
+    /// The requests of the client of each port so far.
+    pacers: [RequestPacer; CLIENTS.len()],
     /// When the last request of each port is accepted; requests of a port stay in order.
     order: [Time; CLIENTS.len()],
     period: Time,
@@ -103,7 +113,7 @@ impl Memory {
             levels: Levels::new(machine, clocks),
             l2: Calendar::new(Time::from(SLOT_CYCLES) * period, spec.lines_per_cycle.get()),
             ports: std::array::from_fn(|_| QueueTimes::new(spec.queue.get())),
-            lines_per_cycle: CLIENTS.map(|unit| machine.common(unit).lines_per_cycle),
+            pacers: CLIENTS.map(|unit| RequestPacer::new(machine, clocks, unit)),
             order: [0; CLIENTS.len()],
             period,
             latency: period * Time::from(spec.latency_cycles),
@@ -112,18 +122,11 @@ impl Memory {
         }
     }
 
-    /// Request `lines` one after another from `start` on, for a client with cycles of `period` grains.
-    pub fn request(
-        &mut self,
-        port: usize,
-        lines: &[LineAccess],
-        turn: Turn,
-        start: Time,
-        period: Time,
-    ) -> Fetched {
+    /// Request `lines` one after another from `start` on, and after those before them.
+    pub fn request(&mut self, port: usize, lines: &[LineAccess], turn: Turn, start: Time) -> Fetched {
         let mut fetched = Fetched { last_request: start, first: Time::MAX, last: 0, arrived: 0, moved: 0 };
-        let mut pacer =
-            RequestPacer { at: start, used: 0, lines_per_cycle: self.lines_per_cycle[port], period };
+        let mut pacer = self.pacers[port];
+        pacer.delay_until(start);
         let mut remaining = lines;
         while let Some(head) = remaining.first() {
             // A run fits into the port's queue.
@@ -137,7 +140,7 @@ impl Memory {
             );
             let run = Run { head, count, turn, last: pacer.delay_of_last(count) };
             fetched.last_request = pacer.at + run.last;
-            let seen = (pacer.at + period).max(self.order[port]);
+            let seen = (pacer.at + pacer.period).max(self.order[port]);
             let (first, last) = self.take(&run, seen, &mut fetched);
             self.order[port] = last;
             self.ports[port].note_all(run.count, first + self.period, last + self.period);
@@ -145,6 +148,7 @@ impl Memory {
             fetched.last = last;
             pacer.advance(count, fetched.last_request);
         }
+        self.pacers[port] = pacer;
         fetched
     }
 

@@ -4,10 +4,13 @@
 //!
 //! ```text
 //! start(p, k)  = max(arrive(p, k), free(p))
-//! served(p, k) = max(start(p, k) + service(p, k), last request)
+//! served(p, k) = max(start(p, k) + floor(used(p) + service(p, k)), last request)
 //! leave(p, k)  = max(served(p, k), last line, leave(p, k - 1), start(n, k - queue(n)) + 1)
 //! arrive(n, k) = leave(p, k) + latency(p)
 //! ```
+//!
+//! `used` is the part of the cycle `start` that earlier packets took; a unit goes on with the next packet in the same
+//! cycle.
 //!
 //! This is the recurrence of tandem queues with finite buffers and blocking after service (Dallery and
 //! Gershwin 1992). For units that share nothing it equals the level `stepped`, to the cycle. Shared resources
@@ -38,12 +41,13 @@ use activity::{Counts, LineAccess, Packet, PacketCounts, Unit, Waits};
 use calendar::{Calendar, Turn};
 use cores::Cores;
 use memory::Memory;
-use station::StationState;
+use station::{Service, StationState};
 
 use crate::clock::{Clocks, Time};
 use crate::demand::{DemandBuilder, ServiceDemand, Station};
 use crate::draws::DrawTimes;
 use crate::passes::Passes;
+use crate::service::{CYCLE, Work};
 use crate::spec::MachineSpec;
 use crate::stepped::Stream;
 use crate::{Clock, Recorder, Timed};
@@ -316,7 +320,7 @@ impl PacketClock {
         if let Some(fetched) = served.fetched {
             *memory = memory.with(fetched.first, fetched.moved);
         }
-        self.tally.serve(visit.station.unit(), counts, served.start, served.busy_to);
+        self.tally.serve(visit.station.unit(), counts, &served.service);
         served.leave
     }
 
@@ -326,8 +330,8 @@ impl PacketClock {
         self.tally.count(Unit::Shader, counts, run.taken, run.done);
         *memory = memory.with(run.memory.from, run.memory.to);
         let unit = visit.demand.data_unit().unit();
-        if run.data.from <= run.data.to {
-            self.tally.serve(unit, counts, run.data.from, run.data.to);
+        if let Some(service) = &run.data {
+            self.tally.serve(unit, counts, service);
         } else if visit.demand.group.is_some() {
             self.tally.count(unit, counts, run.taken, run.done);
         }
@@ -420,8 +424,18 @@ struct Cursor {
     from: Time,
     to: Time,
     start_ps: u64,
-    /// Grains of work in the bin.
+    /// Grains of work in the bin, and the part of a grain beyond them, in units of 1 / [`CYCLE`].
     busy: Time,
+    part: Work,
+}
+
+impl Cursor {
+    /// Add work in cycles of `period` grains.
+    fn work(&mut self, work: Work, period: Time) {
+        let part = self.part + work % CYCLE * period;
+        self.busy += work / CYCLE * period + part / CYCLE;
+        self.part = part % CYCLE;
+    }
 }
 
 /// Events over time. A packet whose work is inside the current bin of a unit costs one comparison: its events
@@ -451,16 +465,17 @@ impl Tally {
         }
     }
 
-    /// Record the same, and that `unit` was busy meanwhile.
-    pub fn serve(&mut self, unit: Unit, counts: &PacketCounts, from: Time, to: Time) {
+    /// Record the events of a service, and that `unit` was busy with it.
+    pub fn serve(&mut self, unit: Unit, counts: &PacketCounts, service: &Service) {
+        let Service { from, to, used, work, period } = *service;
         let at = &mut self.cursors[unit as usize];
-        if from < at.from || from >= at.to || to > at.to {
-            self.count_outside_bin(unit, counts, from, to);
-            let (from_ps, to_ps) = (self.clocks.ps(from), self.clocks.ps(to));
-            self.recorder.busy(unit, from_ps, to_ps, 1, 1);
-        } else {
-            at.busy += to - from;
+        if from >= at.from && to + period <= at.to {
+            return at.work(work, period);
         }
+        self.count(unit, counts, from, to);
+        let begin_ps = self.clocks.ps_after(from, used * period, CYCLE);
+        let end_ps = self.clocks.ps_after(to, (used + work) % CYCLE * period, CYCLE);
+        self.recorder.busy(unit, begin_ps, end_ps, 1, 1);
     }
 
     /// Record the end of a packet: all units have done their part of `counts`.
@@ -486,12 +501,13 @@ impl Tally {
         let Self { recorder, total, written, cursors, .. } = self;
         let cursor = &mut cursors[unit as usize];
         let (total, written) = (total.of_mut(unit), written.of_mut(unit));
-        if total == written && cursor.busy == 0 {
+        if total == written && cursor.busy == 0 && cursor.part == 0 {
             return;
         }
         recorder.add(unit, cursor.start_ps, |at| total[at] - written[at]);
         written.copy_from_slice(total);
-        let busy_ps = self.clocks.ps_below(std::mem::take(&mut cursor.busy));
+        let (busy, part) = (std::mem::take(&mut cursor.busy), std::mem::take(&mut cursor.part));
+        let busy_ps = self.clocks.ps_below(busy) + self.clocks.ps_below(part) / CYCLE;
         recorder.busy(unit, cursor.start_ps, cursor.start_ps + busy_ps, 1, 1);
     }
 
@@ -500,7 +516,7 @@ impl Tally {
         let bin_ps = self.recorder.bin_ps();
         let start_ps = at_ps / bin_ps * bin_ps;
         let (from, to) = (self.clocks.grain_from(start_ps), self.clocks.grain_up_to(start_ps + bin_ps));
-        self.cursors[unit as usize] = Cursor { from, to, start_ps, busy: 0 };
+        self.cursors[unit as usize] = Cursor { from, to, start_ps, ..Cursor::default() };
     }
 
     /// The recorder, with everything written.

@@ -5,6 +5,7 @@ use super::calendar::QueueTimes;
 use super::memory::{Fetched, Memory};
 use crate::clock::{Clocks, Time};
 use crate::demand::{Station, port};
+use crate::service::{Server, Work};
 use crate::spec::MachineSpec;
 
 /// First edge of a clock at or after `at`. Most times are edges already.
@@ -19,20 +20,39 @@ pub(super) struct StationState {
     /// The input queue, by the times at which its packets began service.
     pub queue: QueueTimes,
     period: Time,
-    /// When it can serve the next packet, and when it can request the next line.
+    /// When it can serve the next packet, and how far it has served.
     free: Time,
-    next_request: Time,
+    server: Server,
     departed: Time,
     port: Option<usize>,
     /// Packets that wait for their lines after service.
     behind: Option<QueueTimes>,
 }
 
+/// Service of a packet by a unit.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Service {
+    /// The cycles in which it begins and ends.
+    pub from: Time,
+    pub to: Time,
+    /// The part of the first cycle that other packets used.
+    pub used: Work,
+    pub work: Work,
+    pub period: Time,
+}
+
+impl Service {
+    /// Let `server` do `work` from the cycle at `from` on.
+    pub fn of(server: &mut Server, from: Time, period: Time, work: Work) -> Self {
+        let used = server.used_at(from);
+        Self { from, to: server.serve(from, period, work), used, work, period }
+    }
+}
+
 /// Times of a packet at a unit.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Served {
-    pub start: Time,
-    pub busy_to: Time,
+    pub service: Service,
     pub leave: Time,
     pub fetched: Option<Fetched>,
 }
@@ -47,7 +67,7 @@ impl StationState {
             queue: QueueTimes::new(common.queue),
             period,
             free: 0,
-            next_request: 0,
+            server: Server::default(),
             departed: 0,
             port,
             behind: port.map(|_| QueueTimes::new(common.in_flight)),
@@ -82,7 +102,9 @@ impl StationState {
     /// Serve a packet.
     pub fn serve(&mut self, visit: &Visit<'_>, memory: &mut Memory) -> Served {
         let start = visit.arrive.max(self.free);
-        let busy_to = start + self.period * Time::from(visit.demand.service[visit.station as usize]);
+        let work = visit.demand.service[visit.station as usize];
+        let service = Service::of(&mut self.server, start, self.period, work);
+        let busy_to = service.to;
         let fetched = self.fetch(visit, start, memory);
         let last_request =
             fetched.as_ref().map_or(busy_to, |fetched| self.later(busy_to, fetched.last_request));
@@ -106,7 +128,7 @@ impl StationState {
         }
         self.departed = leave;
         self.queue.note(start + 1);
-        Served { start, busy_to, leave, fetched }
+        Served { service, leave, fetched }
     }
 
     fn fetch(&mut self, visit: &Visit<'_>, start: Time, memory: &mut Memory) -> Option<Fetched> {
@@ -117,8 +139,6 @@ impl StationState {
         let range = visit.demand.lines_of(port);
         let first = visit.demand.first_line;
         let lines = &visit.lines[range.start - first..range.end - first];
-        let fetched = memory.request(port, lines, visit.turn, start.max(self.next_request), self.period);
-        self.next_request = fetched.last_request + self.period;
-        Some(fetched)
+        Some(memory.request(port, lines, visit.turn, start))
     }
 }

@@ -16,6 +16,7 @@ use crate::data_unit::DataUnit;
 use crate::demand::{DemandBuilder, Station, port};
 use crate::draws::DrawTimes;
 use crate::passes::Passes;
+use crate::service::{CYCLE, Work};
 use crate::spec::{Common, MachineSpec};
 use crate::stalls::Reason;
 use crate::{Recorder, Timed};
@@ -74,7 +75,8 @@ impl<'a> Machine<'a> {
                 Stage::new(period(station), in_flight, lines_per_cycle)
             })
         };
-        let mut servers = [1; Unit::COUNT];
+        // Stages are busy for a part of a cycle.
+        let mut servers = [CYCLE as u32; Unit::COUNT];
         servers[Unit::Shader as usize] = machine.shader.cores.get() * machine.shader.lanes.get();
         servers[Unit::L2 as usize] = machine.l2.lines_per_cycle.get();
         for (unit, spec) in LEVELS.into_iter().zip(machine.levels()) {
@@ -217,7 +219,7 @@ impl<'a> Machine<'a> {
         let ticked = stage.tick(now, input, port, &mut self.waits, &mut at);
         let reason =
             if stage.is_free() { self.shared.sources.idle_reason(station, now) } else { ticked.reason };
-        self.meter.set(station.unit(), now, u32::from(ticked.busy), reason, &mut self.shared.recorder);
+        self.meter.set(station.unit(), now, ticked.busy as u32, reason, &mut self.shared.recorder);
         fed || ticked.acted
     }
 
@@ -243,7 +245,7 @@ impl<'a> Machine<'a> {
             (true, _) => Reason::Starved(Unit::Shader),
             _ => ticked.reason,
         };
-        self.meter.set(unit.unit(), now, u32::from(ticked.busy), reason, &mut self.shared.recorder);
+        self.meter.set(unit.unit(), now, ticked.busy as u32, reason, &mut self.shared.recorder);
         ticked.acted
     }
 
@@ -291,7 +293,7 @@ pub(super) struct StationEnv<'w, 'a> {
 }
 
 impl StageEnv for StationEnv<'_, '_> {
-    fn work(&self, id: u32) -> (u32, std::ops::Range<usize>) {
+    fn work(&self, id: u32) -> (Work, std::ops::Range<usize>) {
         let demand = &self.shared.stream.demands[id as usize];
         let lines = port(self.station.unit()).map_or(0..0, |port| demand.lines_of(port));
         (demand.service[self.station as usize], lines)
@@ -379,14 +381,14 @@ pub(super) struct DataEnv<'w, 'a> {
 }
 
 impl StageEnv for DataEnv<'_, '_> {
-    fn work(&self, id: u32) -> (u32, std::ops::Range<usize>) {
+    fn work(&self, id: u32) -> (Work, std::ops::Range<usize>) {
         let warp = self.shader.warp(id);
         let demand = &self.shared.stream.demands[warp.packet as usize];
         let data = warp.data(demand);
         let all = demand.lines_of(self.unit.port());
         let part = crate::demand::share(all.len() as u32, warp.part, warp.parts);
         let range = all.start + part.start as usize..all.start + part.end as usize;
-        (self.shared.builder.data_cycles(self.unit, data), range)
+        (self.shared.builder.data_work(self.unit, data), range)
     }
 
     fn line(&self, at: usize) -> LineAccess {

@@ -53,6 +53,7 @@ pub(super) struct Shader {
     next_kind: usize,
     lanes: u64,
     warp_lanes: u32,
+    warps_per_cycle: u32,
     in_flight: usize,
     period: Time,
     alu: Time,
@@ -89,6 +90,7 @@ impl Shader {
             next_kind: 0,
             lanes: u64::from(spec.lanes),
             warp_lanes: spec.warp_lanes.get(),
+            warps_per_cycle: spec.warps_per_cycle.get(),
             in_flight: spec.in_flight.get() as usize,
             period,
             alu: period * Time::from(spec.alu_latency_cycles),
@@ -110,8 +112,8 @@ impl Shader {
         &mut self,
         now: Time,
         demands: &[ServiceDemand],
-        inputs: [&mut Queue<u32>; 2],
-        data: [&mut Queue<u32>; DataUnit::ALL.len()],
+        mut inputs: [&mut Queue<u32>; 2],
+        mut data: [&mut Queue<u32>; DataUnit::ALL.len()],
         env: &mut impl CoreEnv,
     ) -> (bool, u32, Option<Reason>) {
         let mut acted = false;
@@ -125,17 +127,23 @@ impl Shader {
             busy += worked;
         }
         let mut reason = None;
-        for (kind, input) in inputs.into_iter().enumerate() {
-            loop {
-                let retired = self.retire(kind, now, env, &mut reason);
-                let taken = self.take(kind, now, demands, input);
-                acted |= retired || taken;
-                if !(retired || taken) {
-                    break;
+        for _ in 0..self.warps_per_cycle {
+            for (kind, input) in inputs.iter_mut().enumerate() {
+                loop {
+                    let retired = self.retire(kind, now, env, &mut reason);
+                    let taken = self.take(kind, now, demands, input);
+                    acted |= retired || taken;
+                    if !(retired || taken) {
+                        break;
+                    }
                 }
             }
+            let sent = self.send(now, demands, data.each_mut().map(|queue| &mut **queue));
+            acted |= sent;
+            if !sent {
+                break;
+            }
         }
-        acted |= self.send(now, demands, data);
         let resident = self.fifos.iter().any(|fifo| !fifo.flights.is_empty());
         let fetching = DataUnit::ALL.into_iter().find(|&unit| self.fetching[unit as usize] > 0);
         let why = Reason::Starved(fetching.map_or(Unit::Shader, DataUnit::unit));
@@ -244,7 +252,7 @@ impl Shader {
         })
     }
 
-    /// Send one warp per cycle, alternately of vertices and of pixels or groups.
+    /// Send a warp, alternately of vertices and of pixels or groups.
     fn send(
         &mut self,
         now: Time,

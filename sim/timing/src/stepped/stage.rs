@@ -9,12 +9,13 @@ use super::memory::{NO_WAIT, Request};
 use super::queue::Queue;
 use super::queue::Waits;
 use crate::clock::Time;
+use crate::service::{CYCLE, Server, Work};
 use crate::stalls::Reason;
 
 /// Interface of a stage to its surroundings.
 pub(super) trait StageEnv {
-    /// Service cycles of `id`, and its lines.
-    fn work(&self, id: u32) -> (u32, Range<usize>);
+    /// Work of `id`, and its lines.
+    fn work(&self, id: u32) -> (Work, Range<usize>);
     /// Line number `at`.
     fn line(&self, at: usize) -> LineAccess;
     /// Whether `id` is a barrier, which waits until the L2 has acknowledged each of its lines.
@@ -29,7 +30,8 @@ pub(super) trait StageEnv {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ticked {
     pub acted: bool,
-    pub busy: bool,
+    /// The part of the cycle for which it works.
+    pub busy: Work,
     pub reason: Reason,
 }
 
@@ -37,7 +39,7 @@ pub(super) struct Ticked {
 struct Serving {
     id: u32,
     from: Time,
-    /// End of the service, apart from requests.
+    /// Cycle in which the service ends, apart from requests.
     done_at: Time,
     /// Lines not yet requested.
     lines: Range<usize>,
@@ -52,6 +54,7 @@ pub(super) struct Stage {
     /// Items that may wait for their lines.
     in_flight: usize,
     serving: Option<Serving>,
+    server: Server,
     waiting: VecDeque<(u32, u32)>,
     /// Lines it can request per cycle, and the last cycle with requests and their number.
     lines_per_cycle: u32,
@@ -65,6 +68,7 @@ impl Stage {
             period,
             in_flight: in_flight as usize,
             serving: None,
+            server: Server::default(),
             waiting: VecDeque::new(),
             lines_per_cycle,
             last_requests: (0, 0),
@@ -96,7 +100,7 @@ impl Stage {
             }
             acted = true;
         }
-        let busy = self.serving.as_ref().is_some_and(|serving| now < serving.done_at);
+        let works_on = self.serving.as_ref().is_some_and(|serving| now < serving.done_at);
         let has_requests = self.serving.as_ref().is_some_and(|serving| !serving.lines.is_empty());
         // Requesting lines at the full rate is work; a full port is a stall.
         let reason = match (&self.serving, blocked) {
@@ -104,7 +108,8 @@ impl Stage {
             (Some(_), Some(by)) => Reason::Blocked(by),
             _ => Reason::Idle,
         };
-        Ticked { acted, busy: busy || (has_requests && self.requested_at(now) > 0), reason }
+        let requests = has_requests && self.requested_at(now) > 0;
+        Ticked { acted, busy: if works_on || requests { CYCLE } else { self.server.used_at(now) }, reason }
     }
 
     /// Whether it serves no packet. The caller then knows why.
@@ -196,11 +201,11 @@ impl Stage {
         }
         let Some(id) = input.head(now) else { return false };
         input.pop(now);
-        let (cycles, lines) = env.work(id);
+        let (work, lines) = env.work(id);
         let barrier = env.is_barrier(id);
         let answered = lines.clone().filter(|&at| barrier || env.line(at).is_read()).count() as u32;
         let wait = if answered > 0 { waits.open(answered) } else { NO_WAIT };
-        let done_at = now + self.period * Time::from(cycles);
+        let done_at = self.server.serve(now, self.period, work);
         self.serving = Some(Serving { id, from: now, done_at, lines, wait, barrier });
         true
     }
@@ -213,6 +218,10 @@ impl Stage {
             .front()
             .filter(|(_, wait)| *wait != NO_WAIT)
             .and_then(|(_, wait)| waits.ready_at(*wait));
-        [serving, waiting, input.head_at()].into_iter().flatten().filter(|&at| at > now).min()
+        [serving, self.server.used_until(self.period), waiting, input.head_at()]
+            .into_iter()
+            .flatten()
+            .filter(|&at| at > now)
+            .min()
     }
 }

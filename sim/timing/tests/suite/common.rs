@@ -45,6 +45,7 @@ pub fn plain() -> MachineSpec {
             lanes: size(4),
             warp_lanes: size(4),
             warps: size(8),
+            warps_per_cycle: size(1),
             alu_latency_cycles: size(1),
             shared_bytes: size(1024),
         },

@@ -12,4 +12,5 @@ mod passes;
 mod random_gpus;
 mod rates;
 mod sampled;
+mod service;
 mod waiting;
