@@ -34,13 +34,15 @@ pub struct Recorder {
     bins: Vec<Bin>,
     max_bins: usize,
     end_ps: u64,
+    /// Largest number of servers of a unit.
+    servers: u64,
 }
 
 impl Recorder {
     /// A recorder that starts with bins of `bin_ps` picoseconds and keeps at most `max_bins`; both at least
     /// 2.
     pub fn new(bin_ps: u64, max_bins: usize) -> Self {
-        Self { bin_ps: bin_ps.max(2), bins: Vec::new(), max_bins: max_bins.max(2), end_ps: 0 }
+        Self { bin_ps: bin_ps.max(2), bins: Vec::new(), max_bins: max_bins.max(2), end_ps: 0, servers: 1 }
     }
 
     /// Record the events of `unit` evenly from `start_ps` to `end_ps`, without busy time.
@@ -97,7 +99,13 @@ impl Recorder {
     pub fn busy(&mut self, unit: Unit, start_ps: u64, end_ps: u64, busy: u64, of: u64) {
         let span = self.span(start_ps, end_ps);
         let bin_ps = self.bin_ps;
-        let mut add = |bin: usize, share: u64| self.bins[bin].busy_ps[unit as usize] += share;
+        // `bound` gives parts of its time in place of servers.
+        let servers = of.min(MAX_SERVERS);
+        self.servers = self.servers.max(servers);
+        let mut add = |bin: usize, share: u64| {
+            let busy_ps = &mut self.bins[bin].busy_ps[unit as usize];
+            *busy_ps = without_rounding(*busy_ps + share, bin_ps, servers);
+        };
         if busy == of {
             return span.for_each(|(bin, from, to)| add(bin, to - from));
         }
@@ -159,8 +167,22 @@ impl Recorder {
     pub fn finish(mut self) -> Timeline {
         let duration_ps = self.end_ps.max(1);
         self.reach(duration_ps - 1);
+        let (last, servers) = (((duration_ps - 1) / self.bin_ps) as usize, self.servers);
+        let length_ps = duration_ps - last as u64 * self.bin_ps;
+        let of_units = self.bins[last].busy_ps.iter_mut();
+        of_units.for_each(|busy_ps| *busy_ps = without_rounding(*busy_ps, length_ps, servers));
         Timeline { bin_ps: self.bin_ps, duration_ps, bins: self.bins }
     }
+}
+
+/// Most servers of a unit whose rounding is forgiven: cores times lanes of the largest machines.
+const MAX_SERVERS: u64 = 1 << 14;
+
+/// Busy time of a unit in a bin of `length_ps`. Shares of `servers`, and the part of a cycle with which a bin begins, are rounded one by
+/// one, so that together they may exceed the bin by 1 ps for each.
+fn without_rounding(busy_ps: u64, length_ps: u64, servers: u64) -> u64 {
+    let excess = busy_ps.checked_sub(length_ps).filter(|&excess| excess <= servers + 1);
+    busy_ps - excess.unwrap_or(0)
 }
 
 /// Fractional bits of a [`fraction`].
@@ -262,6 +284,26 @@ mod tests {
         assert_eq!(timeline.busy_ps()[Unit::SampleTest as usize], 327);
         assert_eq!(timeline.bins[0].busy_ps[Unit::SampleTest as usize], 50);
         assert_eq!(timeline.duration_ps, 377);
+    }
+
+    #[test]
+    fn servers_that_are_all_busy_are_busy_for_no_longer_than_the_bin() {
+        for servers in [1, 2, 3, 6, 7] {
+            let mut recorder = Recorder::new(100, 1000);
+            for _ in 0..servers {
+                recorder.busy(Unit::Dram, 0, 950, 1, servers);
+            }
+            let timeline = recorder.finish();
+            let busy_ps: Vec<u64> =
+                timeline.bins.iter().map(|bin| bin.busy_ps[Unit::Dram as usize]).collect();
+            assert_eq!(busy_ps.len(), 10);
+            let (last, whole) = busy_ps.split_last().unwrap();
+            assert!(
+                whole.iter().all(|&busy_ps| busy_ps <= 100 && busy_ps + servers > 100),
+                "{servers}: {busy_ps:?}"
+            );
+            assert!(*last <= 50 && *last + servers > 50, "{servers}: {busy_ps:?}");
+        }
     }
 
     #[test]

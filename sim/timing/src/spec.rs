@@ -338,6 +338,12 @@ impl Rates {
     pub fn iter(&self) -> impl Iterator<Item = (Event, f64)> + '_ {
         self.0.iter().map(|(&event, &rate)| (event, rate))
     }
+
+    /// All of them times `factor`, within their limits.
+    #[must_use]
+    pub fn scaled(&self, factor: f64) -> Self {
+        Self(self.iter().map(|(event, rate)| (event, (rate * factor).clamp(MIN_RATE, MAX_RATE))).collect())
+    }
 }
 
 impl<'de> Deserialize<'de> for Rates {

@@ -52,7 +52,8 @@ impl Run {
             self.data = Some(service);
             return;
         };
-        (before.to, before.work) = (service.to, before.work + service.work);
+        (before.to, before.used[1]) = (service.to, service.used[1]);
+        before.work += service.work;
     }
 }
 

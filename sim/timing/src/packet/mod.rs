@@ -473,8 +473,8 @@ impl Tally {
             return at.work(work, period);
         }
         self.count(unit, counts, from, to);
-        let begin_ps = self.clocks.ps_after(from, used * period, CYCLE);
-        let end_ps = self.clocks.ps_after(to, (used + work) % CYCLE * period, CYCLE);
+        let [begin_ps, end_ps] =
+            [(from, used[0]), (to, used[1])].map(|(at, used)| self.clocks.ps_after(at, used * period, CYCLE));
         self.recorder.busy(unit, begin_ps, end_ps, 1, 1);
     }
 

@@ -35,8 +35,8 @@ pub(super) struct Service {
     /// The cycles in which it begins and ends.
     pub from: Time,
     pub to: Time,
-    /// The part of the first cycle that other packets used.
-    pub used: Work,
+    /// The part of the first cycle that other packets used, and that of the last one up to its end.
+    pub used: [Work; 2],
     pub work: Work,
     pub period: Time,
 }
@@ -44,8 +44,9 @@ pub(super) struct Service {
 impl Service {
     /// Let `server` do `work` from the cycle at `from` on.
     pub fn of(server: &mut Server, from: Time, period: Time, work: Work) -> Self {
-        let used = server.used_at(from);
-        Self { from, to: server.serve(from, period, work), used, work, period }
+        let before = server.used_at(from);
+        let to = server.serve(from, period, work);
+        Self { from, to, used: [before, server.used_at(to)], work, period }
     }
 }
 
