@@ -21,7 +21,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let study = catalog::all().find(|study| study.name == name).ok_or("unknown study")?;
     let (look, progress) = (Look::default(), Progress::new(true));
     let done = OutDir::with(Path::new(folder), study.claim(), |dir| {
-        study.run(&Request { quick: true, scenes: &[], dir, look: &look, progress: &progress })
+        let look = &look;
+        study.run(&Request { quick: true, scenes: &[], seed: None, dir, look, progress: &progress })
     })??;
     print!("{}", done.text);
     println!("{} points between speed and accuracy", done.tradeoff.len());

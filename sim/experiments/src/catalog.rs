@@ -14,6 +14,7 @@ use crate::chart::points::PointsChart;
 use crate::chart::sampled::SampledChart;
 use crate::chart::sampling::SamplingChart;
 use crate::chart::soft_shadows::SoftShadowsChart;
+use crate::chart::stated_errors::StatedErrorsChart;
 use crate::chart::tile_tests::TileTests;
 use crate::chart::timing::TimingChart;
 use crate::stress::Report;
@@ -35,6 +36,7 @@ pub static CHARTS: &[Entry] = &[
     Entry::of::<SampledChart>(),
     Entry::of::<SamplingChart>(),
     Entry::of::<SoftShadowsChart>(),
+    Entry::of::<StatedErrorsChart>(),
     Entry::of::<TileTests>(),
     Entry::of::<TimingChart>(),
 ];

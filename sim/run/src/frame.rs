@@ -55,6 +55,15 @@ pub struct CrashedFrame {
     pub panic: Box<dyn Any + Send>,
 }
 
+/// Text of the panic with this payload.
+pub fn panic_message(payload: &(dyn Any + Send)) -> String {
+    if let Some(crashed) = payload.downcast_ref::<CrashedFrame>() {
+        return panic_message(&*crashed.panic);
+    }
+    let text = payload.downcast_ref::<String>().map(String::as_str);
+    text.or_else(|| payload.downcast_ref::<&str>().copied()).unwrap_or("no message").to_owned()
+}
+
 /// Panics in the frame that `QUINTILE_PANIC_IN_FRAME` names: a test hook of debug builds.
 fn panic_if_requested(number: u32) {
     if cfg!(debug_assertions)

@@ -45,6 +45,7 @@ mod sampled;
 mod simulate;
 mod simulated;
 mod stalls;
+mod stated;
 mod summary;
 pub mod visibility;
 mod warn;
@@ -59,7 +60,7 @@ pub use choice::{Choice, Dimensions, ProbeSummary, Verified, cheapest_level};
 pub use distinct::Distinct;
 pub use dry_run::{DryRun, Expected, duration};
 pub use error::RunError;
-pub use frame::{CrashedFrame, frames_of};
+pub use frame::{CrashedFrame, frames_of, panic_message};
 pub use gpu::{GpuError, GpuSpec, PowerFiles};
 pub use hardware::{scaling, structure};
 pub use heat::HeatPicture;
@@ -75,6 +76,7 @@ pub use sampled::{Forecast, FramePreview, Previewer, Previews, Signatures};
 pub use simulate::MachineTexts;
 pub use simulated::{FrameCost, Modelled, Observed, Origin, Quantity, RunFrame, SampledSummary, Simulated};
 pub use stalls::StallShares;
+pub use stated::{CONFIDENCE, StatedError};
 pub use summary::{Detection, Figures, FrameRow, Summary};
 
 /// Results of a run.

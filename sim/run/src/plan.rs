@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use activity::inputs;
 use pipeline::Viewport;
-use power_model::{EnergyTable, Pacing, Platform, PowerModel, Scaling};
+use power_model::{Bound, EnergyTable, ModelError, Pacing, Platform, PowerModel, Scaling};
 use traces::device::RATES_HZ;
 use warnings::Warning;
 use workloads::job::{Reduction, Request};
@@ -28,8 +28,10 @@ pub struct Plan {
     pub viewport: Viewport,
     /// The hardware.
     pub gpu: GpuSpec,
-    /// The platform, with its watts scaled to the GPU.
+    /// The platform, with its watts scaled to the GPU, at the bound of the options.
     pub platform: Platform,
+    /// The platform as in its file.
+    unscaled: Platform,
     /// Energy table, in joules per event, as in its file.
     pub table: EnergyTable,
     /// What the GPU costs over the one that the platform was made for.
@@ -96,13 +98,15 @@ impl Plan {
             None => file_or_name(table, EnergyTable::load, EnergyTable::builtin)?,
         };
         let (files, changed) = (Vec::new(), changes.files);
-        let Powered { platform, scaling, model, pairing } = Powered::new(&options, &gpu, &platform, &table)?;
+        let Powered { platform, unscaled, scaling, model, pairing } =
+            Powered::new(&options, &gpu, platform, &table)?;
         Ok(Self {
             name,
             job,
             viewport,
             gpu,
             platform,
+            unscaled,
             table,
             scaling,
             model,
@@ -119,11 +123,19 @@ impl Plan {
     /// # Errors
     /// If platform and table do not match, or the recording would be too large.
     pub fn on(self, gpu: GpuSpec, platform: Platform, table: EnergyTable) -> Result<Self, RunError> {
-        let Powered { platform, scaling, model, pairing } =
-            Powered::new(&self.options, &gpu, &platform, &table)?;
-        let plan = Self { gpu, platform, table, scaling, model, pairing, ..self };
+        let Powered { platform, unscaled, scaling, model, pairing } =
+            Powered::new(&self.options, &gpu, platform, &table)?;
+        let plan = Self { gpu, platform, unscaled, table, scaling, model, pairing, ..self };
         plan.size().check()?;
         Ok(plan)
+    }
+
+    /// The power model with all energies and watts at `bound`.
+    ///
+    /// # Errors
+    /// If table and platform do not match.
+    pub fn model_at(&self, bound: Bound) -> Result<PowerModel, ModelError> {
+        PowerModel::on(&self.table, &self.unscaled, bound, &self.scaling)
     }
 
     pub(super) fn size(&self) -> Size {
@@ -154,6 +166,7 @@ impl Plan {
 /// Power of a GPU: platform and model scaled to it.
 struct Powered {
     platform: Platform,
+    unscaled: Platform,
     scaling: Scaling,
     model: PowerModel,
     pairing: Option<Warning>,
@@ -163,13 +176,13 @@ impl Powered {
     fn new(
         options: &RunOptions,
         gpu: &GpuSpec,
-        platform: &Platform,
+        unscaled: Platform,
         table: &EnergyTable,
     ) -> Result<Self, RunError> {
-        let scaling = hardware::scaling(gpu, platform)?;
-        let model = PowerModel::on(table, platform, options.bound, &scaling)?;
-        let pairing = check_pairing(options, gpu, (platform, table), &scaling);
-        Ok(Self { platform: platform.on(&scaling, options.bound), scaling, model, pairing })
+        let scaling = hardware::scaling(gpu, &unscaled)?;
+        let model = PowerModel::on(table, &unscaled, options.bound, &scaling)?;
+        let pairing = check_pairing(options, gpu, (&unscaled, table), &scaling);
+        Ok(Self { platform: unscaled.on(&scaling, options.bound), unscaled, scaling, model, pairing })
     }
 }
 

@@ -19,7 +19,7 @@ use crate::provenance::SCHEMA;
 use crate::stalls::{self, StallShares};
 use crate::{
     Choice, HardwareSummary, Host, Input, Measurement, Modelled, Plan, Provenance, Resolution, RunOptions,
-    SampledSummary, Simulated, Verified, warn,
+    SampledSummary, Simulated, StatedError, Verified, warn,
 };
 
 /// Contents of `summary.json`.
@@ -81,6 +81,8 @@ pub struct Summary {
     pub counts_hash: String,
     /// Choice for the requested accuracy or time budget.
     pub choice: Option<Choice>,
+    /// Stated error of cycles and busy energy, over those at `stepped`.
+    pub stated_error: StatedError,
     /// Actual errors, with `--verify`.
     pub verified: Option<Verified>,
     /// Simulated frames and confidence intervals of a sampled run.
@@ -181,11 +183,12 @@ impl Summary {
         ]
     }
 
-    /// Choice, confidence intervals and actual errors as text rows; empty for a plain run.
+    /// Choice, confidence intervals, stated and actual errors as text rows.
     pub fn accuracy_rows(&self) -> Vec<(&'static str, String)> {
         let mut rows: Vec<(&'static str, String)> = Vec::new();
         rows.extend(self.choice.as_ref().map(|choice| ("chosen", choice.line())));
         rows.extend(self.sampled.as_ref().map(|sampled| ("predicted", sampled.line())));
+        rows.push(("stated error", self.stated_error.line()));
         rows.extend(self.verified.as_ref().map(|verified| ("actual error", verified.line())));
         rows
     }
@@ -245,11 +248,23 @@ impl Summary {
                 simulated.known().fold(0, |seed, frame| hash(seed, &frame.counts))
             ),
             choice: None,
+            stated_error: stated_error(plan, simulated),
             verified: None,
             sampled: simulated.sampled.clone(),
             frames: rows(plan, simulated, measurement),
             host,
         }
+    }
+}
+
+/// Stated error of the timing level, and of the prediction of frames.
+fn stated_error(plan: &Plan, simulated: &Simulated) -> StatedError {
+    let of_level = StatedError::of_frames(plan.options.timing, simulated.in_order());
+    match &simulated.sampled {
+        Some(SampledSummary { cycles_per_frame, busy_energy_per_frame_j, .. }) => {
+            of_level.beside(cycles_per_frame.relative_half_width, busy_energy_per_frame_j.relative_half_width)
+        }
+        None => of_level,
     }
 }
 

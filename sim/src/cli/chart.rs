@@ -61,6 +61,9 @@ pub struct ChartArgs {
     /// Another scene for `sampled`, `tile-tests` or `timing`, by name or file; may be given several times
     #[arg(long, value_name = "SCENE")]
     pub scene: Vec<String>,
+    /// Seed of the GPUs of `stated-errors`, instead of its own
+    #[arg(long, value_name = "N", value_parser = crate::cli::parse::seed)]
+    pub seed: Option<u64>,
     /// Smaller images, fewer samples and a coarser reference: seconds for one chart instead of minutes, minutes for `all`
     #[arg(long)]
     pub quick: bool,
@@ -150,7 +153,11 @@ impl From<OutputError> for Failure {
 pub(super) fn run(args: &ChartArgs, terminal: &Terminal) -> Result<(), Failure> {
     let takes_scenes = !matches!(args.chart, ChartArg::One(chart) if !chart.takes_scenes);
     if !args.scene.is_empty() && !takes_scenes {
-        return Err(Failure { message: scene_not_taken(), code: 2 });
+        let message = not_taken("--scene", |chart| chart.takes_scenes);
+        return Err(Failure { message, code: 2 });
+    }
+    if args.seed.is_some() && matches!(args.chart, ChartArg::One(chart) if !chart.takes_seed) {
+        return Err(Failure { message: not_taken("--seed", |chart| chart.takes_seed), code: 2 });
     }
     // What can be known to be wrong is reported before minutes of work.
     let out = Destination { folder: args.out.clone(), force: args.force };
@@ -164,8 +171,8 @@ pub(super) fn run(args: &ChartArgs, terminal: &Terminal) -> Result<(), Failure> 
     let pool = args.threads.pool()?;
     let (look, progress) = (args.look.look(), Progress::on(terminal, args.json));
     let make = |study: &Entry, dir: &OutDir| {
-        let request =
-            Request { quick: args.quick, scenes: &args.scene, dir, look: &look, progress: &progress };
+        let ChartArgs { quick, ref scene, seed, .. } = *args;
+        let request = Request { quick, scenes: scene, seed, dir, look: &look, progress: &progress };
         Ok(study.run(&request)?)
     };
     match args.chart {
@@ -178,11 +185,12 @@ pub(super) fn run(args: &ChartArgs, terminal: &Terminal) -> Result<(), Failure> 
     }
 }
 
-fn scene_not_taken() -> String {
-    let takers: Vec<String> =
-        CHARTS.iter().filter(|chart| chart.takes_scenes).map(|chart| format!("`{}`", chart.name)).collect();
-    let (last, others) = takers.split_last().map_or(("", &[][..]), |(last, others)| (last, others));
-    format!("--scene goes with `chart all`, {} and {last}; leave it out", others.join(", "))
+/// Message about an option that goes with some charts alone.
+fn not_taken(option: &str, takes: fn(&Entry) -> bool) -> String {
+    let takers = CHARTS.iter().filter(|chart| takes(chart)).map(|chart| format!("`{}`", chart.name));
+    let mut takers: Vec<String> = std::iter::once("`chart all`".to_owned()).chain(takers).collect();
+    let last = takers.pop().unwrap_or_default();
+    format!("{option} goes with {} and {last}; leave it out", takers.join(", "))
 }
 
 /// Prints a study that is written.
@@ -235,6 +243,7 @@ fn run_all(
 fn command(args: &ChartArgs) -> String {
     let mut words = vec!["quintile chart all".to_owned()];
     words.extend(args.scene.iter().map(|scene| format!("--scene {scene}")));
+    words.extend(args.seed.map(|seed| format!("--seed {seed}")));
     words.extend(args.quick.then(|| "--quick".to_owned()));
     words.push(format!("--out {}", args.out.display()));
     words.join(" ")

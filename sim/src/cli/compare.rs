@@ -72,6 +72,9 @@ fn runs_text(runs: &RunComparison, all: bool) -> String {
     for warning in &runs.warnings {
         text += &format!("not the same work: {warning}\n");
     }
+    for quantity in &runs.undecided {
+        text += &format!("undecided: {quantity}\n");
+    }
     if runs.settings.is_empty() {
         text += "settings: no difference\n";
     } else {

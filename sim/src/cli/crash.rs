@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use output::table::shell_line;
 use output::terminal::Terminal;
-use run::CrashedFrame;
+use run::{CrashedFrame, panic_message};
 use traces::io::atomic;
 
 use super::stop::Stop;
@@ -40,7 +40,7 @@ impl Crashes {
             let is_captured = backtrace.status() == BacktraceStatus::Captured;
             let crash = Crash {
                 place: place.unwrap_or_else(|| "an unknown place".to_owned()),
-                message: message(info.payload()),
+                message: panic_message(info.payload()),
                 backtrace: is_captured.then(|| backtrace.to_string()),
             };
             recorded.lock().unwrap_or_else(PoisonError::into_inner).push(crash);
@@ -51,7 +51,7 @@ impl Crashes {
     /// Message about the panic with this payload, in a call with these arguments.
     pub fn report(&self, payload: &(dyn Any + Send), arguments: &[String]) -> String {
         let frame = payload.downcast_ref::<CrashedFrame>();
-        let message = message(frame.map_or(payload, |crashed| &*crashed.panic));
+        let message = panic_message(payload);
         let recorded = self.recorded.lock().unwrap_or_else(PoisonError::into_inner);
         // Several threads may panic; take the one whose payload arrived.
         let crash = recorded.iter().find(|crash| crash.message == message).or(recorded.first());
@@ -71,11 +71,6 @@ impl Crashes {
         .trim_end()
         .to_owned()
     }
-}
-
-fn message(payload: &(dyn Any + Send)) -> String {
-    let text = payload.downcast_ref::<String>().map(String::as_str);
-    text.or_else(|| payload.downcast_ref::<&str>().copied()).unwrap_or("no message").to_owned()
 }
 
 /// Arguments that run one frame, with its own folder of results; arguments of other commands are unchanged.

@@ -171,8 +171,7 @@ fn timed(args: &TimeArgs, recorded: &RecordedRun, gpus: &[PathBuf]) -> Result<Ve
     let timed = recorded.timed(&plans.iter().collect::<Vec<_>>())?;
     let row = |((gpu, plan), timed): ((&PathBuf, &Plan), TimedFrames<'_>)| {
         let frames = timed.powered(&plan.model)?;
-        let in_order: Vec<_> = recorded.groups().iter().map(|&group| &frames[group]).collect();
-        Ok(TimedRow { gpu: gpu.display().to_string(), measured: measured(plan, &in_order)? })
+        Ok(TimedRow { gpu: gpu.display().to_string(), measured: measured(plan, &frames, recorded.groups())? })
     };
     gpus.iter().zip(&plans).zip(timed).map(row).collect()
 }

@@ -441,7 +441,7 @@ fn frontiers(report: &Report) -> Table {
     table
 }
 
-/// Best designs, and how many others they cannot be told from.
+/// Best designs, and how many others they cannot be distinguished from.
 fn winners(report: &Report) -> Table {
     let mut table = Table::new(["workload", "best by", "cost", "undecided", "design"]);
     for winner in &report.winners {

@@ -1,10 +1,9 @@
-//! What is kept of a run beside its sums: passes, both ends of the energy table, and the stated error of its timing level.
+//! What is kept of a run beside its sums: passes and both ends of the energy table.
 
 use activity::Bin;
-use power_model::{Bound, ModelError, PowerModel};
+use power_model::{Bound, ModelError};
 use run::{Plan, RunFrame, passes_of};
 use serde::{Deserialize, Serialize};
-use timing::Level;
 
 /// Time and energy of the passes of one name, mean per frame.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -36,7 +35,7 @@ pub(crate) fn passes(plan: &Plan, frames: &[&RunFrame]) -> Vec<PassMeans> {
 pub(crate) fn energy_ends(plan: &Plan, frames: &[&RunFrame]) -> Result<[f64; 2], ModelError> {
     let count = frames.len().max(1) as f64;
     let at = |bound: Bound| {
-        let model = PowerModel::on(&plan.table, &plan.platform, bound, &plan.scaling)?;
+        let model = plan.model_at(bound)?;
         let energy_j = |frame: &&RunFrame| {
             let counts = frame.observed().map(|observed| observed.counts).unwrap_or_default();
             model.energy_of(&Bin { counts, busy_ps: frame.busy_ps }, frame.power.duration_ps()).total_j()
@@ -44,28 +43,4 @@ pub(crate) fn energy_ends(plan: &Plan, frames: &[&RunFrame]) -> Result<[f64; 2],
         Ok::<f64, ModelError>(frames.iter().map(energy_j).sum::<f64>() / count)
     };
     Ok([at(Bound::Low)?, at(Bound::High)?])
-}
-
-/// Stated error of a timing level: relative half-widths of 95 % intervals.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct StatedError {
-    /// Of cycles.
-    pub cycles: f64,
-    /// Of energy.
-    pub energy: f64,
-}
-
-/// Errors over `stepped` of single frames on `mobile`, `reference` and `discrete`, as `quintile chart timing --quick` measures them
-/// (table in docs/model/timing.md): 95 % of cycles, the worst of energy.
-const PACKET: StatedError = StatedError { cycles: 0.041, energy: 0.043 };
-const BOUND: StatedError = StatedError { cycles: 0.36, energy: 0.24 };
-
-/// Stated error of a level; `None` without a bound: with an accuracy warning the level says that it may be far off.
-pub(crate) fn stated_error(timing: Level, accuracy_warnings: &str) -> Option<StatedError> {
-    let error = match timing {
-        Level::Stepped => StatedError { cycles: 0.0, energy: 0.0 },
-        Level::Packet => PACKET,
-        Level::Bound => BOUND,
-    };
-    accuracy_warnings.is_empty().then_some(error)
 }

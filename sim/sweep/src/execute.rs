@@ -1,13 +1,12 @@
 //! One point: its run, and what is kept of it.
 
-use std::any::Any;
 use std::collections::{BTreeMap, BTreeSet};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use activity::Event;
 use output::progress::Progress;
 use power_model::{FramePower, pace};
-use run::{Distinct, Plan, RunError, RunFrame, area_mm2, frames_of};
+use run::{Distinct, Plan, RunError, RunFrame, StatedError, area_mm2, frames_of, panic_message};
 use serde::{Deserialize, Serialize};
 
 use crate::detail::{self, PassMeans};
@@ -83,10 +82,10 @@ pub struct Measured {
     pub area_mm2: [f64; 3],
     /// Codes of accuracy warnings of the timing level, comma-separated.
     pub accuracy_warnings: String,
-    /// Stated error of the cycles by the timing level, relative; `None` without a bound.
-    pub cycles_error: Option<f64>,
-    /// Stated error of the energy by the timing level, relative; `None` without a bound.
-    pub energy_error: Option<f64>,
+    /// Stated error of the cycles by the timing level, relative.
+    pub cycles_error: f64,
+    /// Stated error of the busy energy by the timing level, relative.
+    pub energy_error: f64,
     /// Passes by name.
     pub passes: Vec<PassMeans>,
     /// Event counts, sums.
@@ -131,7 +130,7 @@ impl From<EventCounts> for BTreeMap<String, u64> {
 
 /// Runs the point `id` with these settings. A failure and a panic are results, too.
 pub(crate) fn execute(id: &str, settings: &[Setting]) -> PointResult {
-    let run = || setting::options(settings).and_then(Plan::resolve).and_then(|plan| drawn(&plan));
+    let run = || setting::planned(settings).and_then(|plan| drawn(&plan));
     PointResult { id: id.to_owned(), outcome: guarded(run).into() }
 }
 
@@ -139,28 +138,24 @@ pub(crate) fn execute(id: &str, settings: &[Setting]) -> PointResult {
 pub(crate) fn guarded<T>(run: impl FnOnce() -> Result<T, RunError>) -> Result<T, String> {
     match catch_unwind(AssertUnwindSafe(run)) {
         Ok(result) => result.map_err(|error| error.to_string()),
-        Err(panic) => Err(crash(&*panic)),
+        Err(panic) => Err(format!("internal error, please report it: {}", panic_message(&*panic))),
     }
-}
-
-fn crash(panic: &(dyn Any + Send)) -> String {
-    let text = panic.downcast_ref::<&str>().copied().or(panic.downcast_ref::<String>().map(String::as_str));
-    format!("internal error, please report it: {}", text.unwrap_or("a panic"))
 }
 
 /// Draws and measures all frames of a run.
 fn drawn(plan: &Plan) -> Result<Measured, RunError> {
     let distinct = Distinct::new(&*plan.job)?;
     let drawn = frames_of(plan, distinct.numbers(), &Progress::new(true))?;
-    let frames: Vec<&RunFrame> = distinct.groups().iter().map(|&group| &drawn[group]).collect();
-    measured(plan, &frames)
+    measured(plan, &drawn, distinct.groups())
 }
 
-/// Numbers of a run of `plan` with these frames, in order.
+/// Numbers of a run of `plan` whose frames are those of `distinct` that `groups` names, in order.
 ///
 /// # Errors
 /// If the frames cannot follow each other at the pace of the plan.
-pub fn measured(plan: &Plan, frames: &[&RunFrame]) -> Result<Measured, RunError> {
+pub fn measured(plan: &Plan, distinct: &[RunFrame], groups: &[usize]) -> Result<Measured, RunError> {
+    let frames: Vec<&RunFrame> = groups.iter().map(|&group| &distinct[group]).collect();
+    let frames = &*frames;
     let powers: Vec<&FramePower> = frames.iter().map(|frame| &frame.power).collect();
     let paced = pace(&powers, &plan.platform, plan.pacing)?;
     let count = frames.len() as f64;
@@ -173,7 +168,7 @@ pub fn measured(plan: &Plan, frames: &[&RunFrame]) -> Result<Measured, RunError>
     let bytes = |event: Event| counts.get(event).unwrap_or(0);
     let [low_j, high_j] = detail::energy_ends(plan, frames)?;
     let accuracy_warnings = accuracy_warnings(frames);
-    let stated = detail::stated_error(plan.options.timing, &accuracy_warnings);
+    let stated = StatedError::of_frames(plan.options.timing, frames.iter().copied());
     Ok(Measured {
         used: used(plan),
         cycles,
@@ -187,8 +182,8 @@ pub fn measured(plan: &Plan, frames: &[&RunFrame]) -> Result<Measured, RunError>
         dram_bytes: bytes(Event::DramReadBytes) + bytes(Event::DramWriteBytes),
         area_mm2: [area.nominal, area.low, area.high],
         accuracy_warnings,
-        cycles_error: stated.map(|error| error.cycles),
-        energy_error: stated.map(|error| error.energy),
+        cycles_error: stated.cycles,
+        energy_error: stated.energy,
         passes: detail::passes(plan, frames),
         counts,
     })
@@ -231,21 +226,43 @@ mod tests {
         execute("a", &settings).outcome
     }
 
+    fn numbers(settings: &[(&str, &str)]) -> Measured {
+        match outcome(settings) {
+            Outcome::Measured(measured) => *measured,
+            Outcome::Error(reason) | Outcome::ScreenedOut(reason) => panic!("{reason}"),
+        }
+    }
+
+    fn near(a: f64, b: f64) -> bool {
+        (a / b - 1.0).abs() < 1e-9
+    }
+
+    #[test]
+    fn ends_of_the_energy_are_those_of_runs_at_either_bound() {
+        // The GPU of the platform, and one whose watts are scaled.
+        for cores in ["2", "8"] {
+            let at = |bound| numbers(&[("gpu.units.shader.cores", cores), ("bound", bound)]);
+            let (low, high) = (at("low").busy_mj, at("high").busy_mj);
+            for bound in ["low", "nominal", "high"] {
+                let measured = at(bound);
+                let ends = [measured.busy_low_mj, measured.busy_high_mj];
+                assert!(
+                    near(ends[0], low) && near(ends[1], high),
+                    "{cores}, {bound}: {ends:?}, {low} to {high}"
+                );
+            }
+        }
+    }
+
     #[test]
     fn a_point_is_measured() {
-        let Outcome::Measured(measured) = outcome(&[("samples", "2")]) else { panic!() };
+        let measured = numbers(&[("samples", "2")]);
         assert!(measured.cycles > 0 && measured.busy_mj > 0.0 && measured.frame_mj > measured.busy_mj);
         assert_eq!((&*measured.used["samples"], &*measured.used["frame_count"]), ("2", "2"));
         // 64 x 48 pixels.
         assert!(
             (measured.nj_per_pixel - measured.frame_mj * 1e6 / 3072.0).abs() < 1e-9 * measured.nj_per_pixel
         );
-        let both = |bound| match outcome(&[("samples", "2"), ("bound", bound)]) {
-            Outcome::Measured(other) => other.busy_mj,
-            Outcome::Error(reason) | Outcome::ScreenedOut(reason) => panic!("{reason}"),
-        };
-        let near = |a: f64, b: f64| (a / b - 1.0).abs() < 1e-9;
-        assert!(near(measured.busy_low_mj, both("low")) && near(measured.busy_high_mj, both("high")));
         let sum = |of: fn(&PassMeans) -> f64| measured.passes.iter().map(of).sum::<f64>();
         assert!(near(sum(|pass| pass.ms), measured.busy_ms) && near(sum(|pass| pass.mj), measured.busy_mj));
         assert!((measured.frame_ms - 1e3 / 60.0).abs() < 1e-3, "{}", measured.frame_ms);

@@ -110,10 +110,6 @@ fn numbers(rows: &[Outcome]) -> Vec<Column> {
         name: name.to_owned(),
         values: Values::Number(rows.iter().map(|row| row.measured().map(of)).collect()),
     };
-    let optional = |name: &str, of: fn(&Measured) -> Option<f64>| Column {
-        name: name.to_owned(),
-        values: Values::Number(rows.iter().map(|row| row.measured().and_then(of)).collect()),
-    };
     let warnings = rows.iter().map(|row| row.measured().map(|row| row.accuracy_warnings.clone())).collect();
     vec![
         whole("cycles", |row| row.cycles),
@@ -129,8 +125,8 @@ fn numbers(rows: &[Outcome]) -> Vec<Column> {
         number("area_low_mm2", |row| row.area_mm2[1]),
         number("area_high_mm2", |row| row.area_mm2[2]),
         Column { name: "accuracy_warnings".to_owned(), values: Values::Text(warnings) },
-        optional("cycles_error", |row| row.cycles_error),
-        optional("energy_error", |row| row.energy_error),
+        number("cycles_error", |row| row.cycles_error),
+        number("energy_error", |row| row.energy_error),
     ]
 }
 

@@ -1,7 +1,7 @@
 //! Settings of a point by path, and the options of a run made from them.
 
 use activity::spec::suggestion;
-use run::{Change, InputFile, RunError, RunOptions};
+use run::{Change, InputFile, Plan, RunError, RunOptions};
 use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::{Map, Value, json};
 
@@ -131,12 +131,20 @@ pub(crate) fn check_path(path: &str) -> Result<(), String> {
     Err(format!("unknown setting `{path}`, {}", suggestion(first.unwrap_or(path), &known)))
 }
 
+/// A run with `settings`, planned.
+///
+/// # Errors
+/// The first setting or input that is invalid.
+pub(crate) fn planned(settings: &[Setting]) -> Result<Plan, RunError> {
+    options(settings).and_then(Plan::resolve)
+}
+
 /// Options of a run with `settings`.
 ///
 /// # Errors
 /// [`RunError::Setting`] for a value of the wrong type. Values in input files and options of workloads are checked when the
 /// run is planned.
-pub(crate) fn options(settings: &[Setting]) -> Result<RunOptions, RunError> {
+fn options(settings: &[Setting]) -> Result<RunOptions, RunError> {
     check_scene(settings)?;
     let mut options = RunOptions::default();
     for setting in settings {

@@ -7,12 +7,12 @@ use std::iter::Sum;
 use cpu_time::ProcessTime;
 use output::progress::Progress;
 use rayon::prelude::*;
-use run::{Distinct, MACHINES_IN_TURN, Recording, RunError, RunFrame, TimedFrames};
+use run::{Distinct, MACHINES_IN_TURN, Recording, RunError, TimedFrames};
 
 use crate::SweepError;
 use crate::execute::{Measured, Outcome, PointResult, execute, guarded, measured};
 use crate::plan::{Plan, Point};
-use crate::setting::{Setting, Stage, options};
+use crate::setting::{self, Setting, Stage};
 
 /// Most bytes of the packets that are kept for a group. Points of a larger one are drawn one by one.
 const MAX_BYTES: usize = 1 << 30;
@@ -103,7 +103,7 @@ fn machine<'p>(points: &'p [PlannedPoint<'_>]) -> Option<&'p run::Plan> {
 }
 
 fn run_of(plan: &Plan, point: &Point) -> Result<run::Plan, RunError> {
-    options(&plan.settings_of(point)).and_then(run::Plan::resolve)
+    setting::planned(&plan.settings_of(point))
 }
 
 /// The frames of a group, drawn once.
@@ -148,12 +148,7 @@ impl Drawing {
     }
 
     fn measured(&self, run: &run::Plan, timed: &TimedFrames<'_>) -> Result<Measured, RunError> {
-        measured(run, &self.in_order(&timed.powered(&run.model)?))
-    }
-
-    /// Frames of the run in order.
-    fn in_order<'f>(&self, frames: &'f [RunFrame]) -> Vec<&'f RunFrame> {
-        self.distinct.groups().iter().map(|&group| &frames[group]).collect()
+        measured(run, &timed.powered(&run.model)?, self.distinct.groups())
     }
 }
 

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use output::progress::Progress;
-use run::{Input, Plan};
+use run::Input;
 
 use crate::SweepError;
 use crate::points::Points;
@@ -108,7 +108,7 @@ impl<'a> Trials<'a> {
         if let Some(tried) = self.tried.get(&at) {
             return tried.clone();
         }
-        let planned = setting::options(&self.points.settings(at)).and_then(Plan::resolve);
+        let planned = setting::planned(&self.points.settings(at));
         let inputs = self.inputs.entry(key(&self.points.varied[at])).or_default();
         let tried = match planned {
             Ok(plan) => {

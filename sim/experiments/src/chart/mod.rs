@@ -14,6 +14,7 @@
 //! - [`sampled`]: frames predicted from few against all of them.
 //! - [`sampling`]: image error over samples per pixel and over host time.
 //! - [`soft_shadows`]: soft shadows in one pass against accumulation buffering.
+//! - [`stated_errors`]: errors of timing levels on GPUs drawn at random, and how often the stated ones hold.
 //! - [`tile_tests`]: what each combination of tile tests gains over what it costs.
 //! - [`timing`]: every level of timing against the reference.
 //! - [`statistics`]: power laws, quantiles, errors of images.
@@ -32,6 +33,7 @@ pub mod points;
 pub mod sampled;
 pub mod sampling;
 pub mod soft_shadows;
+pub mod stated_errors;
 pub mod statistics;
 pub mod tile_tests;
 pub mod timing;

@@ -31,6 +31,8 @@ pub trait Study: Serialize + Sized {
     const FILES: &'static [&'static str];
     /// Whether other scenes than its own can be given.
     const TAKES_SCENES: bool = false;
+    /// Whether it draws what it measures at random, by a seed that can be given.
+    const TAKES_SEED: bool = false;
     /// Whether the time it took is printed.
     const SHOWS_TIME: bool = false;
     /// Effort of the measurement.
@@ -39,6 +41,11 @@ pub trait Study: Serialize + Sized {
     const FULL: Self::Effort;
     /// A preview in seconds.
     const QUICK: Self::Effort;
+
+    /// The effort with another seed, where it takes one.
+    fn seeded(effort: Self::Effort, _seed: u64) -> Self::Effort {
+        effort
+    }
 
     /// Measures, on `scenes` besides its own where it takes any.
     ///
@@ -118,6 +125,8 @@ pub struct Request<'a> {
     pub quick: bool,
     /// Scenes besides its own.
     pub scenes: &'a [String],
+    /// Seed of what is drawn at random, instead of its own.
+    pub seed: Option<u64>,
     /// The folder for its files.
     pub dir: &'a OutDir,
     /// Style of pictures.
@@ -174,6 +183,8 @@ pub struct Entry {
     pub about: &'static str,
     /// Whether other scenes than its own can be given.
     pub takes_scenes: bool,
+    /// Whether a seed can be given.
+    pub takes_seed: bool,
     claim: fn() -> Claim,
     run: fn(&Request<'_>) -> Result<Done, StudyError>,
 }
@@ -181,7 +192,14 @@ pub struct Entry {
 impl Entry {
     /// The entry of a study.
     pub const fn of<S: Study>() -> Self {
-        Self { name: S::NAME, about: S::ABOUT, takes_scenes: S::TAKES_SCENES, claim: S::claim, run: run::<S> }
+        Self {
+            name: S::NAME,
+            about: S::ABOUT,
+            takes_scenes: S::TAKES_SCENES,
+            takes_seed: S::TAKES_SEED,
+            claim: S::claim,
+            run: run::<S>,
+        }
     }
 
     /// The files it may write.
@@ -201,6 +219,10 @@ impl Entry {
 fn run<S: Study>(request: &Request<'_>) -> Result<Done, StudyError> {
     let started = Instant::now();
     let effort = if request.quick { S::QUICK } else { S::FULL };
+    let effort = match request.seed {
+        Some(seed) => S::seeded(effort, seed),
+        None => effort,
+    };
     let scenes = if S::TAKES_SCENES { request.scenes } else { &[] };
     let found = S::measure(effort, scenes, request.progress)?;
     let mut done = Done::new(&found, request.dir, request.look)?;

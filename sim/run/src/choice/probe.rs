@@ -5,7 +5,7 @@ use std::time::Instant;
 use activity::{Counts, Event};
 use cpu_time::ThreadTime;
 use output::progress::Progress;
-use pipeline::{Gpu, PipelineSpec};
+use pipeline::PipelineSpec;
 use timing::{FrameClock, Level, Recorder};
 use workloads::Job;
 use workloads::job::Reduction;
@@ -13,7 +13,7 @@ use workloads::job::Reduction;
 use super::Findings;
 use super::{ProbeSummary, with_blur_thresholds};
 use crate::recording::PacketBuffer;
-use crate::{Distinct, FrameCost, Plan, RunError, frame};
+use crate::{Distinct, FrameCost, GpuSpec, Plan, RunError, frame, job_frame};
 
 /// Largest number of probed frames: the middles of as many equal parts of the run.
 const MAX_FRAMES: usize = 3;
@@ -73,8 +73,8 @@ impl Probe {
 
 /// Draws a frame once and times it at every level, and draws it once more without small motion and blur.
 fn probe_frame(plan: &Plan, job: &dyn Job, number: u32, findings: &mut Findings) -> Result<(), RunError> {
-    let spec = &plan.gpu.pipeline;
-    let drawn = ProbedFrame::draw(plan, job, number, spec)?;
+    let gpu = &plan.gpu;
+    let drawn = ProbedFrame::draw(job, number, gpu)?;
     let [stepped, packet, bound] = Level::ALL.map(|level| drawn.timed(plan, level));
     let timed = [stepped?, packet?, bound?];
     let cost = |level: Level| timed[level as usize].0;
@@ -83,8 +83,9 @@ fn probe_frame(plan: &Plan, job: &dyn Job, number: u32, findings: &mut Findings)
         findings.add(level, error, timing_s, drawn.pipeline_s);
     }
     let by = plan.viewport.width() as f32 / job.settings().width as f32;
-    let thresholds = PipelineSpec { features: with_blur_thresholds(spec.features, by), ..*spec };
-    let reduced = ProbedFrame::draw(plan, job, number, &thresholds)?;
+    let features = with_blur_thresholds(gpu.pipeline.features, by);
+    let thresholds = GpuSpec { pipeline: PipelineSpec { features, ..gpu.pipeline }, ..gpu.clone() };
+    let reduced = ProbedFrame::draw(job, number, &thresholds)?;
     if drawn.counts != reduced.counts {
         let error = relative_error(&reduced.timed(plan, Level::Packet)?.0, &cost(Level::Packet));
         findings.add_dimensions(error, [&drawn, &reduced].map(|probed| madds(&probed.counts)));
@@ -93,14 +94,12 @@ fn probe_frame(plan: &Plan, job: &dyn Job, number: u32, findings: &mut Findings)
 }
 
 impl ProbedFrame {
-    fn draw(plan: &Plan, job: &dyn Job, number: u32, spec: &PipelineSpec) -> Result<Self, RunError> {
+    fn draw(job: &dyn Job, number: u32, gpu: &GpuSpec) -> Result<Self, RunError> {
         let started = Instant::now();
         let mut packets = PacketBuffer::default();
-        let mut gpu =
-            Gpu::new(spec, |packet, lines| packets.push(packet, lines)).map_err(RunError::setting)?;
-        job.frame(number, &mut gpu).map_err(RunError::on(&plan.gpu))?;
-        let counts = gpu.finish().counts();
-        Ok(Self { number, packets, counts, pipeline_s: started.elapsed().as_secs_f64() })
+        let emit = |packet: &_, lines: &_| packets.push(packet, lines);
+        let (_, report) = job_frame::draw(gpu, None, &*job.prepare(number)?, emit)?;
+        Ok(Self { number, packets, counts: report.counts(), pipeline_s: started.elapsed().as_secs_f64() })
     }
 
     /// Cost of the frame at `level`, and the CPU seconds of the timing model.

@@ -18,6 +18,8 @@ pub struct RunComparison {
     pub files: [String; 2],
     /// Reasons why the two runs may not be comparable.
     pub warnings: Vec<String>,
+    /// Quantities whose order the stated errors of the runs leave open.
+    pub undecided: Vec<String>,
     /// Settings and inputs that differ.
     pub settings: Vec<Setting>,
     /// All numbers of both runs, in the order of the file.
@@ -54,7 +56,7 @@ const RESULTS: [&str; 5] =
     ["modelled.units", "modelled.units_not_modelled", "modelled.limits", "camera.ron", "settings.triangles"];
 
 /// Keys of numbers: key, name of the group, and unit if the key's name does not end in one.
-const GROUPS: [(&str, &str, &str); 12] = [
+const GROUPS: [(&str, &str, &str); 14] = [
     ("truth", "frames (truth)", ""),
     ("measured", "frames (measured)", ""),
     ("power_by_part_w", "power", "W"),
@@ -66,7 +68,9 @@ const GROUPS: [(&str, &str, &str); 12] = [
     ("counts", "counters", ""),
     ("checks", "checks", ""),
     ("detection", "detection", ""),
+    ("stated_error", "stated errors", ""),
     ("verified", "actual errors", ""),
+    ("hardware", "hardware", ""),
 ];
 
 /// Keys of `frames` whose means are compared.
@@ -80,6 +84,7 @@ pub(super) fn compare(a: &Path, b: &Path) -> Result<RunComparison, CompareError>
     Ok(RunComparison {
         files: paths.map(|path: PathBuf| path.display().to_string()),
         warnings: warnings(&runs),
+        undecided: undecided(&runs),
         settings,
         values: values(&runs),
     })
@@ -130,6 +135,34 @@ fn warnings(runs: &[Value; 2]) -> Vec<String> {
         ));
     }
     warnings
+}
+
+/// Quantities that differ by less than the stated errors of both runs together.
+fn undecided(runs: &[Value; 2]) -> Vec<String> {
+    let mean = |run: &Value, of: fn(&Value) -> Option<f64>| {
+        let numbers = run["frames"].as_array()?.iter().map(of).collect::<Option<Vec<f64>>>()?;
+        Some(numbers.iter().sum::<f64>() / numbers.len() as f64).filter(|mean| *mean > 0.0)
+    };
+    let quantity = |(name, error, of): (&str, &str, fn(&Value) -> Option<f64>)| {
+        let [a, b] = [mean(&runs[0], of)?, mean(&runs[1], of)?];
+        let [of_a, of_b] = runs.each_ref().map(|run| run["stated_error"][error].as_f64());
+        let reach = libm::log1p(of_a?) + libm::log1p(of_b?);
+        let ratio = b / a;
+        (a != b && libm::log(ratio).abs() <= reach).then(|| {
+            let [low, high] = [ratio / libm::exp(reach), ratio * libm::exp(reach)];
+            format!(
+                "{name}: B over A is {ratio:.4}, and between {low:.4} and {high:.4} within the stated errors"
+            )
+        })
+    };
+    let quantities: [(&str, &str, fn(&Value) -> Option<f64>); 2] = [
+        ("busy time", "cycles", |frame| frame["busy_s"].as_f64()),
+        ("busy energy", "energy", |frame| {
+            let parts = frame["energy_by_part_j"].as_object()?.iter().filter(|(part, _)| *part != "idle");
+            parts.map(|(_, energy)| energy.as_f64()).sum()
+        }),
+    ];
+    quantities.into_iter().filter_map(quantity).collect()
 }
 
 /// A JSON value as text: strings without quotes, `-` for null, input files by path and the first digits of their SHA-256.
@@ -254,6 +287,23 @@ mod tests {
         let cycles = values.iter().find(|change| change.name == "cycles").unwrap();
         assert_eq!((cycles.a, cycles.is_equal()), (Some(20.0), true));
         assert!(warnings(&runs).is_empty());
+    }
+
+    #[test]
+    fn orders_within_the_stated_errors_are_undecided() {
+        let run = |busy_s: f64, energy_j: f64, error: f64| {
+            json!({
+                "frames": [{"busy_s": busy_s, "energy_by_part_j": {"dram": energy_j, "idle": 100.0}}],
+                "stated_error": {"cycles": error, "energy": error},
+            })
+        };
+        let found = undecided(&[run(1.0, 1.0, 0.05), run(1.08, 2.0, 0.05)]);
+        assert_eq!(
+            found,
+            ["busy time: B over A is 1.0800, and between 0.9796 and 1.1907 within the stated errors"]
+        );
+        assert!(undecided(&[run(1.0, 1.0, 0.0), run(1.08, 2.0, 0.05)]).is_empty());
+        assert!(undecided(&[run(1.0, 1.0, 0.05), json!({"frames": []})]).is_empty());
     }
 
     #[test]

@@ -18,8 +18,8 @@ pub(crate) struct Row<'a> {
     time_s: f64,
     /// Nominal, low and high.
     energy_j: [f64; 3],
-    time_error: Option<f64>,
-    energy_error: Option<f64>,
+    time_error: f64,
+    energy_error: f64,
     area_mm2: Option<f64>,
 }
 
@@ -30,8 +30,8 @@ pub struct Cost {
     pub value: f64,
     /// Standard deviation between runs that differ in their seed.
     pub deviation: f64,
-    /// Stated error of the timing level, relative: half a 95 % interval. `None` without a bound.
-    pub error: Option<f64>,
+    /// Stated error of the timing level: the truth is at most `1 + error` times as large and at least `1 / (1 + error)` times.
+    pub error: f64,
     /// With all energies of the table at their low end.
     pub low: f64,
     /// With all energies of the table at their high end.
@@ -121,10 +121,8 @@ pub(crate) fn designs(rows: &[Row<'_>]) -> Vec<Design> {
 
 fn mean(runs: &[&Row<'_>]) -> Option<Design> {
     let of = |value: &dyn Fn(&Row<'_>) -> f64| MeanSd::of(runs.iter().map(|row| value(row)));
-    // The largest error of the runs; none has a bound if one has not.
-    let error = |of: fn(&Row<'_>) -> Option<f64>| {
-        runs.iter().map(|row| of(row)).try_fold(0.0, |most: f64, error| Some(most.max(error?)))
-    };
+    // The largest error of the runs.
+    let error = |of: fn(&Row<'_>) -> f64| runs.iter().map(|row| of(row)).fold(0.0, f64::max);
     let time = of(&|row| row.time_s)?;
     let energy = of(&|row| row.energy_j[0])?;
     let [low, high] = [1, 2].map(|end| of(&|row| row.energy_j[end]).map_or(energy.mean, |ends| ends.mean));
@@ -179,16 +177,16 @@ mod tests {
             time_s,
             energy_j: [5.0, 4.0, 9.0],
             time_error,
-            energy_error: Some(0.0),
+            energy_error: 0.0,
             area_mm2: None,
         };
-        let rows = [row("a", 1.0, Some(0.1)), row("b", 9.0, None), row("a", 3.0, Some(0.2))];
+        let rows = [row("a", 1.0, 0.1), row("b", 9.0, 0.4), row("a", 3.0, 0.2)];
         let designs = designs(&rows);
         assert_eq!(designs.len(), 2);
         let a = &designs[0];
-        assert_eq!((a.time_s.value, a.time_s.error, a.runs), (2.0, Some(0.2), 2));
+        assert_eq!((a.time_s.value, a.time_s.error, a.runs), (2.0, 0.2, 2));
         assert_eq!((a.energy_j.value, a.energy_j.low, a.energy_j.high), (5.0, 4.0, 9.0));
         assert!((a.time_s.deviation - 2_f64.sqrt()).abs() < 1e-12 && designs[1].time_s.deviation == 0.0);
-        assert_eq!(designs[1].time_s.error, None);
+        assert_eq!(designs[1].time_s.error, 0.4);
     }
 }

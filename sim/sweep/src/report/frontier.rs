@@ -22,8 +22,7 @@ pub struct RatedDesign {
     pub design: Design,
     /// Whether no other is at least as good in time, energy and area, and better in one of them.
     pub on_frontier: bool,
-    /// Share of random draws within all stated uncertainties in which it is on the frontier. `None` of more than 400 designs, or
-    /// if an error has no bound.
+    /// Share of random draws within all stated uncertainties in which it is on the frontier. `None` of more than 400 designs.
     pub probability: Option<f64>,
     /// Best and worst rank by time within the stated error of the timing level; undecided if they differ.
     pub time_ranks: [usize; 2],
@@ -88,8 +87,7 @@ pub(crate) fn nondominated(points: &[[f64; 3]]) -> Vec<bool> {
 
 /// Share of draws in which each design is on the frontier.
 fn probabilities(designs: &[Design]) -> Option<Vec<f64>> {
-    let is_bounded = |design: &Design| design.time_s.error.is_some() && design.energy_j.error.is_some();
-    if designs.len() > MAX_DRAWN || !designs.iter().all(is_bounded) {
+    if designs.len() > MAX_DRAWN {
         return None;
     }
     let costs: Vec<[LogCost; 2]> = designs
@@ -120,7 +118,7 @@ mod tests {
     fn two_blurred_designs_share_the_frontier() {
         let blurred = || {
             let mut design = exact(&[], 1.0, 1.0);
-            (design.time_s.error, design.energy_j.error) = (Some(0.1), Some(0.1));
+            (design.time_s.error, design.energy_j.error) = (0.1, 0.1);
             design
         };
         // Each is dominated by the other in a quarter of all draws.

@@ -165,7 +165,7 @@ impl Report {
 /// Costs of designs with these times and energies, for tests: exact, with equal ends of the energy table.
 #[cfg(test)]
 pub(crate) fn exact(settings: &[(&str, &str)], time_s: f64, energy_j: f64) -> Design {
-    let cost = |value| Cost { value, deviation: 0.0, error: Some(0.0), low: value, high: value };
+    let cost = |value| Cost { value, deviation: 0.0, error: 0.0, low: value, high: value };
     let settings: BTreeMap<String, String> =
         settings.iter().map(|(path, value)| ((*path).to_owned(), (*value).to_owned())).collect();
     let label = settings.iter().map(|(path, value)| format!("{path}={value}")).collect::<Vec<_>>().join(" ");

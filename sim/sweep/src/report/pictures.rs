@@ -2,6 +2,8 @@
 
 use output::plot::{AxisSpec, Chart, ChartPanel, Look, Mark, Paint, Picture, Series};
 
+use traces::pareto::nondominated;
+
 use super::{RatedDesign, Report};
 
 /// A quantity of a design: name, unit, and its value.
@@ -26,7 +28,7 @@ impl Report {
         let at = |rated: &RatedDesign| Some((x.2(rated)?, y.2(rated)?));
         let mut series = Vec::new();
         for (number, (workload, designs)) in self.workloads.iter().enumerate() {
-            let steps = steps(designs.iter().filter_map(at).collect());
+            let steps = steps(&designs.iter().filter_map(at).collect::<Vec<_>>());
             if steps.len() > 1 {
                 series.push(
                     Series::new(workload.clone(), Mark::Steps(steps)).painted(Paint::Like(2 + number % 6)),
@@ -54,15 +56,13 @@ impl Report {
 }
 
 /// Points that no other dominates in both coordinates, from left to right.
-fn steps(mut points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
-    points.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
-    let mut lowest = f64::INFINITY;
-    points.retain(|point| {
-        let is_lower = point.1 < lowest;
-        lowest = lowest.min(point.1);
-        is_lower
-    });
-    points
+fn steps(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
+    let on = nondominated(points);
+    let mut steps: Vec<_> =
+        points.iter().copied().zip(on).filter_map(|(point, on)| on.then_some(point)).collect();
+    steps.sort_by(|a, b| a.0.total_cmp(&b.0));
+    steps.dedup();
+    steps
 }
 
 #[cfg(test)]
@@ -71,7 +71,7 @@ mod tests {
 
     #[test]
     fn steps_fall_from_left_to_right() {
-        let points = vec![(2.0, 1.0), (1.0, 3.0), (1.0, 2.0), (3.0, 1.0), (1.5, 2.5)];
-        assert_eq!(steps(points), [(1.0, 2.0), (2.0, 1.0)]);
+        let points = vec![(2.0, 1.0), (1.0, 3.0), (1.0, 2.0), (3.0, 1.0), (1.5, 2.5), (2.0, 1.0)];
+        assert_eq!(steps(&points), [(1.0, 2.0), (2.0, 1.0)]);
     }
 }

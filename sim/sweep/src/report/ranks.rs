@@ -3,7 +3,7 @@
 use super::design::Cost;
 
 /// For each cost the best and the worst rank that it can have within the stated errors, from 1. Both are the same if the rank is
-/// decided; costs without a bound, and those equal to the last bit, are not.
+/// decided; that of costs equal to the last bit is not.
 pub(crate) fn ranks(costs: &[&Cost]) -> Vec<[usize; 2]> {
     let ends: Vec<[f64; 2]> = costs.iter().map(|cost| ends(cost)).collect();
     let sorted = |end: usize| {
@@ -22,10 +22,7 @@ pub(crate) fn ranks(costs: &[&Cost]) -> Vec<[usize; 2]> {
 
 /// Interval of a cost by the stated error of its timing level.
 fn ends(cost: &Cost) -> [f64; 2] {
-    match cost.error {
-        Some(error) => [cost.value * (1.0 - error), cost.value * (1.0 + error)],
-        None => [f64::NEG_INFINITY, f64::INFINITY],
-    }
+    [cost.value / (1.0 + cost.error), cost.value * (1.0 + cost.error)]
 }
 
 #[cfg(test)]
@@ -33,7 +30,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn ranked(costs: &[(f64, Option<f64>)]) -> Vec<[usize; 2]> {
+    fn ranked(costs: &[(f64, f64)]) -> Vec<[usize; 2]> {
         let cost = |&(value, error)| Cost { value, deviation: 0.0, error, low: value, high: value };
         let costs: Vec<Cost> = costs.iter().map(cost).collect();
         ranks(&costs.iter().collect::<Vec<_>>())
@@ -41,23 +38,20 @@ mod tests {
 
     #[test]
     fn ranks_within_the_error_are_undecided() {
-        let exact = Some(0.0);
+        let exact = 0.0;
         assert_eq!(ranked(&[(2.0, exact), (1.0, exact), (3.0, exact)]), [[2, 2], [1, 1], [3, 3]]);
-        let five = Some(0.05);
+        let five = 0.05;
         assert_eq!(ranked(&[(1.0, five), (1.08, five), (2.0, five)]), [[1, 2], [1, 2], [3, 3]]);
-        assert_eq!(ranked(&[(1.0, exact), (5.0, None), (2.0, exact)]), [[1, 2], [1, 3], [2, 3]]);
+        assert_eq!(ranked(&[(1.0, exact), (5.0, 9.0), (2.0, exact)]), [[1, 2], [1, 3], [2, 3]]);
         assert_eq!(ranked(&[(1.0, exact), (1.0, exact)]), [[1, 2], [1, 2]]);
     }
 
     proptest! {
         #[test]
         fn oracle_by_comparing_all_pairs(costs in prop::collection::vec((1_u8..20, 0_u8..30), 0..30)) {
-            let costs: Vec<(f64, Option<f64>)> =
-                costs.into_iter().map(|(a, b)| (f64::from(a), Some(f64::from(b) / 100.0))).collect();
-            let ends = |(value, error): (f64, Option<f64>)| {
-                let error = error.unwrap_or_default();
-                [value * (1.0 - error), value * (1.0 + error)]
-            };
+            let costs: Vec<(f64, f64)> =
+                costs.into_iter().map(|(a, b)| (f64::from(a), f64::from(b) / 100.0)).collect();
+            let ends = |(value, error): (f64, f64)| [value / (1.0 + error), value * (1.0 + error)];
             let expected: Vec<[usize; 2]> = costs.iter().map(|&own| {
                 let [low, high] = ends(own);
                 let count = |is: &dyn Fn([f64; 2]) -> bool| costs.iter().filter(|&&other| is(ends(other))).count();

@@ -80,7 +80,7 @@ pub struct Winner {
     pub value: f64,
     /// Designs of the workload.
     pub designs: usize,
-    /// Others whose order to it flips with more than 2.5 %, or is not known: among all these the winner is undecided.
+    /// Others whose order to it flips with more than 2.5 %: among all these the winner is undecided.
     pub undecided: usize,
 }
 
@@ -97,12 +97,12 @@ pub struct Pair {
     pub other: String,
     /// Cost of the other over that of the best.
     pub ratio: f64,
-    /// Lower end of its 95 % interval; `None` if an error has no bound.
-    pub low: Option<f64>,
+    /// Lower end of its 95 % interval.
+    pub low: f64,
     /// Upper end.
-    pub high: Option<f64>,
-    /// Probability that the other is better; `None` if an error has no bound.
-    pub flips: Option<f64>,
+    pub high: f64,
+    /// Probability that the other is better.
+    pub flips: f64,
 }
 
 /// Cheapest design by one measure of those near the best by another.
@@ -138,9 +138,7 @@ pub(crate) fn winners(workload: &str, designs: &[Design]) -> Vec<Winner> {
         let sorted = sorted(designs, measure);
         let (best, others) = sorted.split_first()?;
         let log = measure.log(best);
-        let is_undecided = |other: &&&Design| {
-            Difference::new(&log, &measure.log(other)).flips().is_none_or(|flips| flips > UNDECIDED)
-        };
+        let is_undecided = |other: &&&Design| Difference::new(&log, &measure.log(other)).flips() > UNDECIDED;
         Some(Winner {
             workload: workload.to_owned(),
             measure,
@@ -159,15 +157,15 @@ pub(crate) fn pairs(workload: &str, designs: &[Design]) -> Vec<Pair> {
         let sorted = sorted(designs, measure);
         let pair = |best: &Design, other: &Design| {
             let difference = Difference::new(&measure.log(best), &measure.log(other));
-            let interval = difference.interval();
+            let [low, high] = difference.interval();
             Pair {
                 workload: workload.to_owned(),
                 measure,
                 best: best.design.clone(),
                 other: other.design.clone(),
                 ratio: difference.ratio(),
-                low: interval.map(|[low, _]| low),
-                high: interval.map(|[_, high]| high),
+                low,
+                high,
                 flips: difference.flips(),
             }
         };
@@ -233,11 +231,11 @@ mod tests {
     fn a_winner_within_the_errors_is_undecided() {
         let mut designs = [named("a", 1.0, 1.0), named("b", 1.01, 2.0), named("c", 3.0, 3.0)];
         assert!(winners("w", &designs).iter().all(|winner| winner.undecided == 0));
-        designs.iter_mut().for_each(|design| design.time_s.error = Some(0.05));
+        designs.iter_mut().for_each(|design| design.time_s.error = 0.05);
         assert_eq!(winners("w", &designs)[0].undecided, 1);
-        designs[2].time_s.error = None;
+        designs[2].time_s.error = 9.0;
         assert_eq!(winners("w", &designs)[0].undecided, 2);
         let pairs = pairs("w", &designs);
-        assert!(pairs[0].flips.unwrap() > 0.3 && pairs[1].flips.is_none());
+        assert!(pairs[0].flips > 0.3 && pairs[1].flips > 0.1);
     }
 }

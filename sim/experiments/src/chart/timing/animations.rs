@@ -164,7 +164,7 @@ const FAMILIES: [(&str, f64); 4] =
 
 /// The packets of a frame, each with the end of its lines.
 #[derive(Default)]
-pub(super) struct Packets {
+pub(in crate::chart) struct Packets {
     pub packets: Vec<(Packet, usize)>,
     pub lines: Vec<LineAccess>,
 }
@@ -191,7 +191,7 @@ impl Packets {
 }
 
 /// A frame that can be rendered for any GPU.
-pub(super) struct Subject {
+pub(in crate::chart) struct Subject {
     name: String,
     pub kind: SubjectKind,
     what: What,
@@ -256,7 +256,7 @@ const VARIANTS: [Variant; 15] = [
 const WORKLOAD_PX: [u32; 2] = [128, 256];
 const MAX_REDUCTION: u32 = 8;
 
-pub(super) fn all(files: &[String], quick: bool) -> Result<Vec<Subject>, RunError> {
+pub(in crate::chart) fn all(files: &[String], quick: bool) -> Result<Vec<Subject>, RunError> {
     let scenes = SCENES.iter().map(|name| (*name).to_owned()).chain(files.iter().cloned());
     let mut subjects: Vec<Subject> = scenes.map(|name| of_scene(&name, quick)).collect::<Result<_, _>>()?;
     for (name, value) in FAMILIES {

@@ -80,6 +80,13 @@ impl Speed {
     }
 }
 
+/// The power model of a GPU on the platform of the reference GPU, scaled to its hardware.
+pub(in crate::chart) fn power_model(gpu: &GpuSpec) -> Result<PowerModel, RunError> {
+    let platform = Platform::builtin("reference")?;
+    let scaling = run::scaling(gpu, &platform)?;
+    Ok(PowerModel::on(&EnergyTable::builtin("28nm")?, &platform, Bound::Nominal, &scaling)?)
+}
+
 /// A row for each level but the reference.
 pub(super) fn rows(
     (scene, kind): (&str, Option<SubjectKind>),
@@ -87,9 +94,7 @@ pub(super) fn rows(
     stream: &Packets,
     speed: &mut Speed,
 ) -> Result<Vec<TimingRow>, RunError> {
-    let platform = Platform::builtin("reference")?;
-    let scaling = run::scaling(gpu, &platform)?;
-    let model = PowerModel::on(&EnergyTable::builtin("28nm")?, &platform, Bound::Nominal, &scaling)?;
+    let model = power_model(gpu)?;
     let power = |timed: &Timed| {
         model.frame(&timed.timeline).map_err(|source| RunError::Timeline { frame: 0, source })
     };
@@ -134,7 +139,7 @@ pub(super) fn rows(
 }
 
 /// A frame's packets as service demands of one machine, written once for all levels.
-pub(super) struct Written {
+pub(in crate::chart) struct Written {
     clocks: Clocks,
     builder: DemandBuilder,
     stream: Stream,
@@ -157,7 +162,11 @@ impl Written {
 }
 
 /// The frame at a level, and the host's seconds for it: timing alone, as the stream is written.
-pub(super) fn timed(level: Level, gpu: &GpuSpec, written: &Written) -> Result<(Timed, f64), RunError> {
+pub(in crate::chart) fn timed(
+    level: Level,
+    gpu: &GpuSpec,
+    written: &Written,
+) -> Result<(Timed, f64), RunError> {
     let Written { clocks, builder, stream, totals, .. } = written;
     let started = ThreadTime::now();
     let recorder = Recorder::new(BIN_PS, MAX_BINS);

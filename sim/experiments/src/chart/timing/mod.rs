@@ -1,8 +1,8 @@
 //! `quintile chart timing`: every level of timing against the reference, over scenes and GPUs.
 
-mod animations;
+pub(super) mod animations;
 mod failures;
-mod measure;
+pub(super) mod measure;
 mod picture;
 
 use std::collections::BTreeMap;

@@ -1,0 +1,226 @@
+//! `quintile chart stated-errors`: errors of timing levels on GPUs drawn at random, the errors that a run states from them, and how often
+//! those hold.
+//!
+//! Scenes and workloads are in two halves, and so are the GPUs. An error is stated from one half of both and judged on the other, so
+//! neither frame nor GPU is known to it.
+
+mod figures;
+mod picture;
+mod random_gpu;
+
+use output::OutputError;
+use output::progress::Progress;
+use rayon::prelude::*;
+use run::{GpuSpec, RunError};
+use serde::Serialize;
+use timing::{AccuracyWarning, Level, Timed};
+
+use self::random_gpu::RandomGpu;
+use super::timing::animations::{self, Packets, Subject};
+use super::timing::measure::{Written, power_model, timed};
+use crate::study::table::Sheet;
+use crate::study::{Gallery, Study, StudyError};
+
+pub use figures::{Accuracy, Flips, Group};
+
+/// Levels that have errors.
+const LEVELS: [Level; 2] = [Level::Packet, Level::Bound];
+/// The GPU that the others are drawn around.
+const HOME: &str = "reference";
+/// Least number of GPUs with which a share of runs is a finding.
+const MIN_GPUS: u64 = 24;
+/// Least share of runs within their stated error: the promise of 95 %, less what a finite number of GPUs moves it.
+const MIN_HELD: f64 = 0.93;
+
+/// Effort.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct StatedErrorsEffort {
+    /// GPUs.
+    pub gpus: u64,
+    /// What they are drawn by.
+    pub seed: u64,
+}
+
+/// A frame on a GPU at a level. Errors are logarithms of the level's number over that at `stepped`.
+#[derive(Clone, Debug, Serialize)]
+pub struct ErrorRow {
+    /// The scene, family or workload.
+    pub subject: String,
+    /// Its place in the list of subjects.
+    pub subject_number: usize,
+    /// Number of the GPU.
+    pub gpu: u64,
+    /// The level.
+    pub level: Level,
+    /// Codes of its accuracy warnings.
+    pub warns: String,
+    /// Error of cycles.
+    pub cycles_log: f64,
+    /// Error of the energy of the frame.
+    pub energy_log: f64,
+    /// Seconds of the frame at `stepped`.
+    pub stepped_s: f64,
+    /// Joules at `stepped`.
+    pub stepped_j: f64,
+    /// Root mean square of the binary logarithms of the GPU's numbers over those of `reference`.
+    pub distance: f64,
+    /// Memory channels.
+    pub channels: u32,
+    /// Bytes of a memory row.
+    pub row_bytes: u32,
+    /// Packets over cycles, at `stepped`.
+    pub packets_per_cycle: f64,
+}
+
+impl ErrorRow {
+    fn is_warned(&self) -> bool {
+        !self.warns.is_empty()
+    }
+}
+
+/// The whole chart.
+#[derive(Clone, Debug, Serialize)]
+pub struct StatedErrorsChart {
+    /// Effort.
+    pub effort: StatedErrorsEffort,
+    /// Errors of levels, and what their warnings say.
+    pub levels: Vec<Accuracy>,
+    /// Stated errors, and how often they hold.
+    pub groups: Vec<Group>,
+    /// Pairs of GPUs whose order a level turns round.
+    pub flips: Vec<Flips>,
+    /// A row for each frame, GPU and level.
+    pub rows: Vec<ErrorRow>,
+}
+
+impl Study for StatedErrorsChart {
+    const NAME: &'static str = "stated-errors";
+    const ABOUT: &'static str =
+        "Errors of timing levels on GPUs drawn at random, and how often the stated errors of runs hold";
+    const PICTURES: &'static [&'static str] = &["stated_errors"];
+    const FILES: &'static [&'static str] =
+        &["stated_errors.csv", "stated_errors_runs.csv", "stated_errors.json"];
+    const TAKES_SEED: bool = true;
+
+    type Effort = StatedErrorsEffort;
+    const FULL: StatedErrorsEffort = StatedErrorsEffort { gpus: 24, seed: 1 };
+    const QUICK: StatedErrorsEffort = StatedErrorsEffort { gpus: 4, seed: 1 };
+
+    fn seeded(effort: StatedErrorsEffort, seed: u64) -> StatedErrorsEffort {
+        StatedErrorsEffort { seed, ..effort }
+    }
+
+    fn measure(
+        effort: StatedErrorsEffort,
+        _scenes: &[String],
+        progress: &Progress,
+    ) -> Result<Self, StudyError> {
+        let home = GpuSpec::load(HOME)?;
+        let gpus: Vec<RandomGpu> =
+            (0..effort.gpus).map(|number| RandomGpu::new(&home, effort.seed, number)).collect();
+        let subjects = animations::all(&[], true)?;
+        let bar = progress.bar("frames", subjects.len() as u64 * effort.gpus);
+        let mut rows = Vec::new();
+        for (number, subject) in subjects.iter().enumerate() {
+            // What is drawn depends on the pipeline alone, which all of them share.
+            let stream = subject.stream(&home)?;
+            let on = |(gpu_number, gpu): (usize, &RandomGpu)| {
+                let rows = errors((number, subject), (gpu_number as u64, gpu), &stream);
+                bar.inc();
+                rows
+            };
+            let found: Vec<_> = gpus.par_iter().enumerate().map(on).collect::<Result<_, _>>()?;
+            rows.extend(found.into_iter().flatten());
+        }
+        let levels = LEVELS.map(|level| Accuracy::of(level, &rows)).into();
+        Ok(Self { effort, levels, groups: figures::groups(&rows), flips: figures::flips(&rows), rows })
+    }
+
+    fn draw(&self, to: &Gallery<'_>) -> Result<(), OutputError> {
+        let subject = format!(
+            "single frames on {} GPUs drawn at random; rings: the level warned; line: stated without a warning",
+            self.effort.gpus
+        );
+        to.chart("stated_errors", ["Errors of timing levels away from home", &subject], self.panels())
+    }
+
+    fn tables(&self) -> Vec<Sheet> {
+        vec![self.level_sheet(), self.group_sheet(), self.flip_sheet(), self.row_sheet()]
+    }
+
+    /// Stated errors hold as often as they say, on frames and GPUs that they were not made from.
+    fn fault(&self) -> Option<String> {
+        let broken = |group: &&Group| group.held_out_cycles.is_some_and(|share| share < MIN_HELD);
+        let group = self.groups.iter().filter(|_| self.effort.gpus >= MIN_GPUS).find(broken)?;
+        let held = 100.0 * group.held_out_cycles?;
+        let warned = if group.warns { "with" } else { "without" };
+        let level = group.level.name();
+        Some(format!("errors of `{level}` {warned} a warning, stated for 95 % of runs, hold for {held:.1} %"))
+    }
+}
+
+/// The errors of all levels for a frame on a GPU.
+fn errors(
+    (subject_number, subject): (usize, &Subject),
+    (gpu_number, gpu): (u64, &RandomGpu),
+    stream: &Packets,
+) -> Result<Vec<ErrorRow>, RunError> {
+    let spec = &gpu.spec;
+    let model = power_model(spec)?;
+    let written = Written::new(spec, stream)?;
+    let cost = |level: Level| -> Result<(Timed, f64), RunError> {
+        let (timed, _) = timed(level, spec, &written)?;
+        let failed = |error| {
+            let (subject, gpu, level) = (subject.name(), &spec.name, level.name());
+            RunError::Setting(format!("{subject} on the GPU `{gpu}` at `{level}`: {error}"))
+        };
+        let power = model.frame(&timed.timeline).map_err(failed)?;
+        Ok((timed, power.energy().total_j()))
+    };
+    let (truth, stepped_j) = cost(Level::Stepped)?;
+    let row = |level: Level| {
+        let (found, energy_j) = cost(level)?;
+        let warns = AccuracyWarning::all(level, &found).into_iter().map(|warning| warning.code().name());
+        Ok(ErrorRow {
+            subject: subject.name().to_owned(),
+            subject_number,
+            gpu: gpu_number,
+            level,
+            warns: warns.collect::<Vec<_>>().join(" "),
+            cycles_log: libm::log(found.cycles as f64 / truth.cycles as f64),
+            energy_log: libm::log(energy_j / stepped_j),
+            stepped_s: truth.cycles as f64 / spec.core_hz,
+            stepped_j,
+            distance: gpu.distance,
+            channels: spec.units.dram.channels.get(),
+            row_bytes: spec.units.dram.row_bytes.get(),
+            packets_per_cycle: stream.packets.len() as f64 / truth.cycles as f64,
+        })
+    };
+    LEVELS.into_iter().map(row).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::study::written;
+
+    #[test]
+    fn the_chart_states_errors_that_its_own_runs_hold() {
+        let effort = StatedErrorsEffort { gpus: 2, seed: 5 };
+        let (folder, chart, done) = written::<StatedErrorsChart>(effort);
+        // A frame on a GPU at either level, and all frames have one.
+        assert_eq!(chart.rows.len() % 4, 0);
+        assert!(chart.rows.iter().all(|row| row.cycles_log.is_finite() && row.energy_log.is_finite()));
+        for level in &chart.levels {
+            assert_eq!(level.runs, chart.rows.len() / 2);
+            assert_eq!(
+                level.far_warned + level.far_silent + level.near_warned + level.near_silent,
+                level.runs
+            );
+        }
+        let text = std::fs::read_to_string(folder.path().join("stated_errors.csv")).unwrap();
+        assert!(text.starts_with("level,warns,runs,cycles,energy"), "{text}");
+        assert!(done.text.contains("packet") && done.fault.is_none());
+    }
+}
