@@ -338,13 +338,7 @@ mod tests {
     #[test]
     #[ignore = "takes minutes; prints how often screening finds the frontier, for docs/guide/sweeps.md"]
     fn screening_by_many_draws() {
-        let frames = [
-            ("default", "(320, 180)"),
-            ("tiny", "(64, 48)"),
-            ("tiny", "(32, 24)"),
-            ("deferred", "(96, 54)"),
-            ("soft-shadows", "(64, 36)"),
-        ];
+        let frames = [("default", "(320, 180)"), ("tiny", "(64, 48)"), ("tiny", "(32, 24)")];
         for (scene, size) in frames {
             let (points, costs) = at_all_levels(scene, size);
             let pairs =
