@@ -137,13 +137,16 @@ fn warnings(runs: &[Value; 2]) -> Vec<String> {
     warnings
 }
 
+/// A number of a frame: its name, the name of its stated error, and its value.
+type OfFrame = (&'static str, &'static str, fn(&Value) -> Option<f64>);
+
 /// Quantities that differ by less than the stated errors of both runs together.
 fn undecided(runs: &[Value; 2]) -> Vec<String> {
     let mean = |run: &Value, of: fn(&Value) -> Option<f64>| {
         let numbers = run["frames"].as_array()?.iter().map(of).collect::<Option<Vec<f64>>>()?;
         Some(numbers.iter().sum::<f64>() / numbers.len() as f64).filter(|mean| *mean > 0.0)
     };
-    let quantity = |(name, error, of): (&str, &str, fn(&Value) -> Option<f64>)| {
+    let quantity = |(name, error, of): OfFrame| {
         let [a, b] = [mean(&runs[0], of)?, mean(&runs[1], of)?];
         let [of_a, of_b] = runs.each_ref().map(|run| run["stated_error"][error].as_f64());
         let reach = libm::log1p(of_a?) + libm::log1p(of_b?);
@@ -155,7 +158,7 @@ fn undecided(runs: &[Value; 2]) -> Vec<String> {
             )
         })
     };
-    let quantities: [(&str, &str, fn(&Value) -> Option<f64>); 2] = [
+    let quantities: [OfFrame; 2] = [
         ("busy time", "cycles", |frame| frame["busy_s"].as_f64()),
         ("busy energy", "energy", |frame| {
             let parts = frame["energy_by_part_j"].as_object()?.iter().filter(|(part, _)| *part != "idle");

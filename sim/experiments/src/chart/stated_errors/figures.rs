@@ -38,6 +38,9 @@ pub struct Accuracy {
     pub near_silent: usize,
 }
 
+/// The logarithm of an error of a run.
+type Log = fn(&ErrorRow) -> f64;
+
 /// Size of an error from the logarithm of a ratio: 0.05 for 1.05 and for 1/1.05.
 fn size(log: f64) -> f64 {
     libm::expm1(log.abs())
@@ -47,7 +50,7 @@ impl Accuracy {
     /// Over the rows of a level.
     pub(super) fn of(level: Level, rows: &[ErrorRow]) -> Self {
         let rows: Vec<&ErrorRow> = rows.iter().filter(|row| row.level == level).collect();
-        let of = |log: fn(&ErrorRow) -> f64| quantiles(rows.iter().map(move |row| 100.0 * size(log(row))));
+        let of = |log: Log| quantiles(rows.iter().map(move |row| 100.0 * size(log(row))));
         let (cycles, energy) = (of(|row| row.cycles_log), of(|row| row.energy_log));
         let count = |far: bool, warned: bool| {
             let is = |row: &&&ErrorRow| (size(row.cycles_log) > FAR, row.is_warned()) == (far, warned);
@@ -111,7 +114,7 @@ fn held(errors: impl Iterator<Item = f64>, bound: impl Fn() -> f64) -> Option<f6
 }
 
 /// Share of errors within the bounds from the other half of frames and of GPUs.
-fn held_out(rows: &[&ErrorRow], log: fn(&ErrorRow) -> f64) -> Option<f64> {
+fn held_out(rows: &[&ErrorRow], log: Log) -> Option<f64> {
     let part = |half: usize| {
         let is = move |row: &&&ErrorRow| row.subject_number % 2 == half && row.gpu % 2 == half as u64;
         rows.iter().filter(is).map(move |row| size(log(row)))
@@ -130,9 +133,8 @@ pub(super) fn groups(rows: &[ErrorRow]) -> Vec<Group> {
     let of = |(level, warns): (Level, bool)| {
         let rows: Vec<&ErrorRow> =
             rows.iter().filter(|row| (row.level, row.is_warned()) == (level, warns)).collect();
-        let sizes = |log: fn(&ErrorRow) -> f64| rows.iter().map(move |row| size(log(row)));
-        let (cycles, energy): (fn(&ErrorRow) -> f64, fn(&ErrorRow) -> f64) =
-            (|row| row.cycles_log, |row| row.energy_log);
+        let sizes = |log: Log| rows.iter().map(move |row| size(log(row)));
+        let (cycles, energy): (Log, Log) = (|row| row.cycles_log, |row| row.energy_log);
         let stated = StatedError::at(level, warns);
         Group {
             level,
