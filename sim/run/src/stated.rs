@@ -19,7 +19,7 @@ const TABLE: &str = include_str!("../stated_errors.csv");
 pub const CONFIDENCE: f64 = 0.95;
 
 /// Stated error of a run. Infinite without a bound, as `null` in JSON.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct StatedError {
     /// Of cycles.
     pub cycles: f64,

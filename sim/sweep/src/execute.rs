@@ -154,8 +154,7 @@ fn drawn(plan: &Plan) -> Result<Measured, RunError> {
 /// # Errors
 /// If the frames cannot follow each other at the pace of the plan.
 pub fn measured(plan: &Plan, distinct: &[RunFrame], groups: &[usize]) -> Result<Measured, RunError> {
-    let frames: Vec<&RunFrame> = groups.iter().map(|&group| &distinct[group]).collect();
-    let frames = &*frames;
+    let frames: &[&RunFrame] = &groups.iter().map(|&group| &distinct[group]).collect::<Vec<_>>();
     let powers: Vec<&FramePower> = frames.iter().map(|frame| &frame.power).collect();
     let paced = pace(&powers, &plan.platform, plan.pacing)?;
     let count = frames.len() as f64;

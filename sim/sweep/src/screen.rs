@@ -59,33 +59,20 @@ fn may_be_optimal(design: &Design<'_>, designs: &[Design<'_>], range: Cost) -> b
     !designs.iter().filter_map(|other| other.coarse).any(|other| is_far_better(&other))
 }
 
-/// The choice of designs that run at both levels whatever they cost.
-#[derive(Clone, Copy, Debug)]
-struct Calibration {
-    /// Number of designs of a workload.
-    designs: usize,
-    /// What they are drawn by.
-    seed: u32,
+/// Order in which designs are drawn: as random as a hash, and the same for every build of the program, as ids are not.
+fn draw_order(point: &Point) -> String {
+    let settings = point.settings.iter().filter(|setting| setting.path != "timing");
+    let mut lines: Vec<String> = settings.map(|set| format!("{:?}={:?}", set.path, set.value)).collect();
+    lines.sort();
+    sha256_of_text(&lines.join("\n"))
 }
 
-impl Calibration {
-    const DEFAULT: Self = Self { designs: CALIBRATED, seed: 0 };
-
-    /// Order in which designs are drawn: as random as a hash, and the same for every build of the program, as ids are not.
-    fn order(&self, point: &Point) -> String {
-        let settings = point.settings.iter().filter(|setting| setting.path != "timing");
-        let mut lines: Vec<String> = settings.map(|set| format!("{:?}={:?}", set.path, set.value)).collect();
-        lines.sort();
-        sha256_of_text(&format!("{}\n{}", self.seed, lines.join("\n")))
-    }
-}
-
-/// Designs of one workload that run at the fine level: those to calibrate, and those that may be on its frontier.
-fn kept<'a>(designs: &[Design<'a>], calibration: Calibration) -> Vec<&'a Point> {
+/// Designs of one workload that run at the fine level: `calibrated` of them to compare levels, and those that may be on its frontier.
+fn kept<'a>(designs: &[Design<'a>], calibrated: usize) -> Vec<&'a Point> {
     let mut known: Vec<&Design<'_>> = designs.iter().filter(|design| design.coarse.is_some()).collect();
-    known.sort_by_cached_key(|design| calibration.order(design.point));
+    known.sort_by_cached_key(|design| draw_order(design.point));
     let calibrated: Vec<&str> =
-        known.iter().take(calibration.designs).map(|design| design.point.id.as_str()).collect();
+        known.iter().take(calibrated).map(|design| design.point.id.as_str()).collect();
     let range = range(designs);
     let is_kept = |design: &&Design<'_>| {
         let is_calibrated = design.coarse.is_some() && calibrated.contains(&design.point.id.as_str());
@@ -125,7 +112,7 @@ pub(crate) fn screened<'a>(plan: &'a Plan, folder: &Folder, fine: usize) -> Resu
     let name = plan.screen[fine - 1].name();
     let mut all = Screened { kept: 0, pending: Vec::new(), dropped: Vec::new(), ranges: BTreeMap::new() };
     for (workload, designs) in workloads {
-        let kept = kept(&designs, Calibration::DEFAULT);
+        let kept = kept(&designs, CALIBRATED);
         let ids: HashSet<&str> = kept.iter().map(|point| point.id.as_str()).collect();
         let dropped = designs.iter().filter(|design| !ids.contains(design.point.id.as_str()));
         let reason = |design: &Design<'_>| match design.coarse {
@@ -192,10 +179,10 @@ mod tests {
 
     /// Runs until no more designs are kept; returns them.
     fn run<'a>(points: &'a [Point], costs: &[(Cost, Cost)]) -> Vec<&'a str> {
-        run_by(points, costs, Calibration::DEFAULT)
+        run_by(points, costs, CALIBRATED)
     }
 
-    fn run_by<'a>(points: &'a [Point], costs: &[(Cost, Cost)], calibration: Calibration) -> Vec<&'a str> {
+    fn run_by<'a>(points: &'a [Point], costs: &[(Cost, Cost)], calibrated: usize) -> Vec<&'a str> {
         let mut ran: Vec<bool> = vec![false; points.len()];
         loop {
             let design = |(at, point): (usize, &'a Point)| Design {
@@ -204,7 +191,7 @@ mod tests {
                 fine: ran[at].then_some(costs[at].1),
             };
             let designs: Vec<Design<'a>> = points.iter().enumerate().map(design).collect();
-            let kept: Vec<&str> = kept(&designs, calibration).iter().map(|point| point.id.as_str()).collect();
+            let kept: Vec<&str> = kept(&designs, calibrated).iter().map(|point| point.id.as_str()).collect();
             let next: Vec<bool> = points
                 .iter()
                 .zip(&ran)
@@ -319,7 +306,7 @@ mod tests {
     /// Costs of the designs at all levels, by settings.
     fn at_all_levels(scene: &str, size: &str) -> (Vec<Point>, Vec<[Cost; 3]>) {
         let [bound, packet, stepped] =
-            ["bound", "packet", "stepped"].map(|level| costs_at(scene, size, level));
+            ["bound", "packet", "stepped"].map(|level| costs(scene, size, level).0);
         let mut all: Vec<(String, [Cost; 3])> = bound
             .into_iter()
             .map(|(name, cost)| (name.clone(), [cost, packet[&name], stepped[&name]]))
@@ -329,10 +316,6 @@ mod tests {
             (Point { id: name.clone(), settings: vec![crate::Setting::new("gpu", name)] }, costs)
         };
         all.into_iter().map(point).unzip()
-    }
-
-    fn costs_at(scene: &str, size: &str, level: &str) -> HashMap<String, Cost> {
-        costs(scene, size, level).0
     }
 
     #[test]
@@ -347,13 +330,16 @@ mod tests {
             for designs in [8, 19, 39] {
                 let (mut whole, mut last) = (0, 0);
                 for seed in 0..200 {
-                    let calibration = Calibration { designs, seed };
-                    let survivors = run_by(&points, &pairs(0), calibration);
+                    // Another setting is another draw.
+                    let mut points = points.clone();
+                    let set = crate::Setting::new("seed", seed.to_string());
+                    points.iter_mut().for_each(|point| point.settings.push(set.clone()));
+                    let survivors = run_by(&points, &pairs(0), designs);
                     let chosen = |at: &usize| survivors.contains(&points[*at].id.as_str());
                     let places: Vec<usize> = (0..points.len()).filter(chosen).collect();
                     let left: Vec<Point> = places.iter().map(|&at| points[at].clone()).collect();
                     let of_left: Vec<(Cost, Cost)> = places.iter().map(|&at| pairs(1)[at]).collect();
-                    let found = run_by(&left, &of_left, calibration);
+                    let found = run_by(&left, &of_left, designs);
                     whole += u32::from(truth.iter().all(|id| found.contains(id)));
                     last += found.len();
                 }
@@ -377,11 +363,11 @@ mod tests {
     }
 
     #[test]
-    fn a_design_that_only_the_coarse_level_slanders_is_lost() {
+    fn a_design_that_the_coarse_level_alone_finds_bad_is_lost() {
         // The best design by far, at a coarse level that finds it the worst; all others agree.
         let points = points(100);
         let mut costs = designs(&points, 0.0);
-        let last = (0..100).max_by_key(|&at| Calibration::DEFAULT.order(&points[at])).unwrap();
+        let last = (0..100).max_by_key(|&at| draw_order(&points[at])).unwrap();
         costs[last] = ([2.0, 2.0], [-1.0, -1.0]);
         assert!(!run(&points, &costs).contains(&points[last].id.as_str()));
     }
@@ -390,6 +376,6 @@ mod tests {
     fn designs_that_failed_before_are_not_kept() {
         let points = points(3);
         let design = |point| Design { point, coarse: None, fine: None };
-        assert!(kept(&points.iter().map(design).collect::<Vec<_>>(), Calibration::DEFAULT).is_empty());
+        assert!(kept(&points.iter().map(design).collect::<Vec<_>>(), CALIBRATED).is_empty());
     }
 }

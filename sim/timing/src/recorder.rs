@@ -34,15 +34,13 @@ pub struct Recorder {
     bins: Vec<Bin>,
     max_bins: usize,
     end_ps: u64,
-    /// Largest number of servers of a unit.
-    servers: u64,
 }
 
 impl Recorder {
     /// A recorder that starts with bins of `bin_ps` picoseconds and keeps at most `max_bins`; both at least
     /// 2.
     pub fn new(bin_ps: u64, max_bins: usize) -> Self {
-        Self { bin_ps: bin_ps.max(2), bins: Vec::new(), max_bins: max_bins.max(2), end_ps: 0, servers: 1 }
+        Self { bin_ps: bin_ps.max(2), bins: Vec::new(), max_bins: max_bins.max(2), end_ps: 0 }
     }
 
     /// Record the events of `unit` evenly from `start_ps` to `end_ps`, without busy time.
@@ -95,22 +93,12 @@ impl Recorder {
         self.bins[bin].counts[event] += times;
     }
 
-    /// Record that `busy` of the `of` servers of `unit` worked from `start_ps` to `end_ps`.
+    /// Record that `busy` of the `of` servers of `unit`, at least one, worked from `start_ps` to `end_ps`. Its time in each bin is
+    /// rounded down, so that servers recorded one by one are together busy for no longer than the bin.
     pub fn busy(&mut self, unit: Unit, start_ps: u64, end_ps: u64, busy: u64, of: u64) {
-        let span = self.span(start_ps, end_ps);
-        let bin_ps = self.bin_ps;
-        // `bound` gives parts of its time in place of servers.
-        let servers = of.min(MAX_SERVERS);
-        self.servers = self.servers.max(servers);
-        let mut add = |bin: usize, share: u64| {
-            let busy_ps = &mut self.bins[bin].busy_ps[unit as usize];
-            *busy_ps = without_rounding(*busy_ps + share, bin_ps, servers);
-        };
-        if busy == of {
-            return span.for_each(|(bin, from, to)| add(bin, to - from));
+        for (bin, from, to) in self.span(start_ps, end_ps) {
+            self.bins[bin].busy_ps[unit as usize] += part(to - from, busy, of);
         }
-        let mut shares = Shares::new(busy, of, bin_ps);
-        span.for_each(|(bin, from, to)| add(bin, shares.next(to - from)));
     }
 
     /// Extend the frame to `end_ps` at least.
@@ -167,22 +155,16 @@ impl Recorder {
     pub fn finish(mut self) -> Timeline {
         let duration_ps = self.end_ps.max(1);
         self.reach(duration_ps - 1);
-        let (last, servers) = (((duration_ps - 1) / self.bin_ps) as usize, self.servers);
-        let length_ps = duration_ps - last as u64 * self.bin_ps;
-        let of_units = self.bins[last].busy_ps.iter_mut();
-        of_units.for_each(|busy_ps| *busy_ps = without_rounding(*busy_ps, length_ps, servers));
         Timeline { bin_ps: self.bin_ps, duration_ps, bins: self.bins }
     }
 }
 
-/// Most servers of a unit whose rounding is forgiven: cores times lanes of the largest machines.
-const MAX_SERVERS: u64 = 1 << 14;
-
-/// Busy time of a unit in a bin of `length_ps`. Shares of `servers`, and the part of a cycle with which a bin begins, are rounded one by
-/// one, so that together they may exceed the bin by 1 ps for each.
-fn without_rounding(busy_ps: u64, length_ps: u64, servers: u64) -> u64 {
-    let excess = busy_ps.checked_sub(length_ps).filter(|&excess| excess <= servers + 1);
-    busy_ps - excess.unwrap_or(0)
+/// `whole * share / of`, rounded down.
+pub(crate) fn part(whole: u64, share: u64, of: u64) -> u64 {
+    match whole.checked_mul(share) {
+        Some(product) => product / of,
+        None => (u128::from(whole) * u128::from(share) / u128::from(of)) as u64,
+    }
 }
 
 /// Fractional bits of a [`fraction`].
@@ -201,58 +183,6 @@ fn share(whole: u64, fraction: u64) -> u64 {
     match whole.checked_mul(fraction) {
         Some(product) => product >> FRACTION_BITS,
         None => ((u128::from(whole) * u128::from(fraction)) >> FRACTION_BITS) as u64,
-    }
-}
-
-/// Shares of a whole for consecutive parts of a length. Prefix sums are rounded down, so the shares add up to
-/// the whole.
-struct Shares {
-    whole: u64,
-    length: u64,
-    /// Remainder carried from the parts so far, in units of 1 / `length`.
-    carry: u64,
-    /// The most frequent part length, with quotient and remainder of its share.
-    usual: UsualPart,
-}
-
-/// A part length with its share of the whole.
-#[derive(Clone, Copy)]
-struct UsualPart {
-    length: u64,
-    quotient: u64,
-    remainder: u64,
-}
-
-impl Shares {
-    fn new(whole: u64, length: u64, usual: u64) -> Self {
-        let mut shares =
-            Self { whole, length, carry: 0, usual: UsualPart { length: usual, quotient: 0, remainder: 0 } };
-        let (quotient, remainder) = shares.divide(usual);
-        shares.usual = UsualPart { length: usual, quotient, remainder };
-        shares
-    }
-
-    fn divide(&self, part: u64) -> (u64, u64) {
-        // The only part of length 0 takes everything.
-        let Some(length) = std::num::NonZeroU64::new(self.length) else { return (self.whole, 0) };
-        match self.whole.checked_mul(part) {
-            Some(product) => (product / length, product % length),
-            None => {
-                let (product, length) = (u128::from(self.whole) * u128::from(part), u128::from(length.get()));
-                ((product / length) as u64, (product % length) as u64)
-            }
-        }
-    }
-
-    fn next(&mut self, part: u64) -> u64 {
-        let UsualPart { length, quotient, remainder } = self.usual;
-        let (quotient, remainder) = if part == length { (quotient, remainder) } else { self.divide(part) };
-        if self.carry >= self.length - remainder {
-            self.carry -= self.length - remainder;
-            return quotient + u64::from(self.length > 0);
-        }
-        self.carry += remainder;
-        quotient
     }
 }
 

@@ -47,6 +47,7 @@ use crate::clock::{Clocks, Time};
 use crate::demand::{DemandBuilder, ServiceDemand, Station};
 use crate::draws::DrawTimes;
 use crate::passes::Passes;
+use crate::recorder::part;
 use crate::service::{CYCLE, Work};
 use crate::spec::MachineSpec;
 use crate::stepped::Stream;
@@ -406,14 +407,6 @@ fn write(
         end = if at_ps + bin_ps <= end_ps { clocks.grain_up_to(at_ps + bin_ps) } else { 0 };
     }
     flush(recorder, work, at_ps);
-}
-
-/// `whole * used / room`, rounded down.
-fn part(whole: u64, used: u64, room: u64) -> u64 {
-    match whole.checked_mul(used) {
-        Some(product) => product / room,
-        None => (u128::from(whole) * u128::from(used) / u128::from(room)) as u64,
-    }
 }
 
 /// Position of a unit: its current bin, and its work in that bin.

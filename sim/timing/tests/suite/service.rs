@@ -46,6 +46,12 @@ fn stream((unit, event, kind, _): (Unit, Event, PacketKind, u64), rate: f64) -> 
     (machine, vec![(packet(kind, &[(event, 1)]), Vec::new()); PACKETS as usize])
 }
 
+/// Cycles at `stepped`, `packet` and `bound`.
+fn at_all_levels(machine: &MachineSpec, packets: &Packets) -> [f64; 3] {
+    let (found, bound) = (packet_level(machine, clocks(), packets), bound_level(machine, clocks(), packets));
+    [stepped(machine, packets), found, bound].map(|timed| timed.cycles as f64)
+}
+
 #[test]
 fn every_unit_reaches_its_rate_with_packets_of_one_event() {
     for of_unit in UNITS {
@@ -91,12 +97,7 @@ fn requests_of_several_packets_fit_in_a_cycle() {
         machine.depth.rates = rates("{\"depth_reads\": 8}");
         let of = |n: u32| (tile(&[(Event::DepthReads, 1)]), vec![read(Unit::Depth, n, LineKind::Hit)]);
         let packets: Packets = (0..PACKETS as u32).map(of).collect();
-        let cycles = [
-            stepped(&machine, &packets),
-            packet_level(&machine, clocks(), &packets),
-            bound_level(&machine, clocks(), &packets),
-        ]
-        .map(|timed| timed.cycles as f64);
+        let cycles = at_all_levels(&machine, &packets);
         let expected = PACKETS as f64 / f64::from(lines);
         assert!(cycles.iter().all(|cycles| (cycles - expected).abs() < 12.0), "{cycles:?} for {expected}");
     }
@@ -180,12 +181,7 @@ fn data_units_reach_their_rates_with_warps_of_one_event() {
         for rate in [1.0, 2.0, 4.0, 2.5, 0.5] {
             let (machine, packets) = warps(rate, 4, &counts, kind);
             let expected = PACKETS as f64 / rate;
-            let cycles = [
-                stepped(&machine, &packets),
-                packet_level(&machine, clocks(), &packets),
-                bound_level(&machine, clocks(), &packets),
-            ]
-            .map(|timed| timed.cycles as f64);
+            let cycles = at_all_levels(&machine, &packets);
             assert!(
                 cycles.iter().all(|cycles| (cycles - expected).abs() < 0.02 * expected + 16.0),
                 "{kind:?} at {rate}: {cycles:?} for {expected}"
@@ -199,12 +195,7 @@ fn warps_are_sent_at_their_rate() {
     for per_cycle in [1, 2, 3, 4] {
         let (machine, packets) = warps(1e3, per_cycle, &[(Event::PixelInvocations, 4)], PacketKind::Tile);
         let expected = PACKETS as f64 / f64::from(per_cycle);
-        let cycles = [
-            stepped(&machine, &packets),
-            packet_level(&machine, clocks(), &packets),
-            bound_level(&machine, clocks(), &packets),
-        ]
-        .map(|timed| timed.cycles as f64);
+        let cycles = at_all_levels(&machine, &packets);
         assert!(
             cycles.iter().all(|cycles| (cycles - expected).abs() < 0.02 * expected + 16.0),
             "{per_cycle} a cycle: {cycles:?} for {expected}"

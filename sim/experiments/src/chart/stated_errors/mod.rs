@@ -141,7 +141,7 @@ impl Study for StatedErrorsChart {
             "single frames on {} GPUs drawn at random; rings: the level warned; line: stated without a warning",
             self.effort.gpus
         );
-        to.chart("stated_errors", ["Errors of timing levels away from home", &subject], self.panels())
+        to.chart("stated_errors", ["Errors of timing levels on random GPUs", &subject], self.panels())
     }
 
     fn tables(&self) -> Vec<Sheet> {

@@ -1,9 +1,9 @@
 //! GPUs drawn at random around the reference one, to see how far timing levels are off away from GPUs that they were developed on.
 
 use activity::Bounded;
-use pipeline::random::{mix, unit};
 use run::GpuSpec;
 use timing::Rates;
+use traces::random::Random;
 
 /// Factors of rates, and clocks in hertz. Numbers between are drawn evenly by their logarithm.
 const RATE_FACTORS: [f64; 2] = [0.25, 16.0];
@@ -27,7 +27,7 @@ pub(super) struct RandomGpu {
 impl RandomGpu {
     /// The GPU `number` of a seed: another one than `home` in clocks, rates, queues, cores and memory.
     pub fn new(home: &GpuSpec, seed: u64, number: u64) -> Self {
-        let mut draw = Draw { state: mix(mix(seed).wrapping_add(number)), squares: 0.0, count: 0 };
+        let mut draw = Draw { random: Random::new(seed, number), squares: 0.0, count: 0 };
         let mut gpu = home.clone();
         gpu.name = format!("random {seed}.{number}");
         gpu.core_hz = draw.between(gpu.core_hz, CLOCKS_HZ);
@@ -58,32 +58,29 @@ impl RandomGpu {
         dram.channels = draw.one_of(dram.channels, &CHANNELS);
         dram.banks = draw.one_of(dram.banks, &BANKS);
         dram.row_bytes = draw.one_of(dram.row_bytes, &ROWS_BYTES);
-        Self { spec: gpu, distance: (draw.squares / f64::from(draw.count)).sqrt() }
+        Self { spec: gpu, distance: (draw.squares / draw.count as f64).sqrt() }
     }
 }
 
 /// Numbers drawn one after another, and how far they are from those they replace.
 struct Draw {
-    state: u64,
+    random: Random,
     squares: f64,
-    count: u32,
+    /// Numbers drawn so far.
+    count: u64,
 }
 
 impl Draw {
-    fn unit(&mut self) -> f64 {
-        self.state = self.state.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        unit(mix(self.state))
-    }
-
-    fn differs(&mut self, factor: f64) {
-        self.squares += libm::log2(factor).powi(2);
+    /// The next number that `of` makes of an even one in (0, 1), in place of `home`.
+    fn next(&mut self, home: f64, of: impl FnOnce(f64) -> f64) -> f64 {
+        let drawn = of(self.random.uniform(self.count));
+        self.squares += libm::log2(drawn / home).powi(2);
         self.count += 1;
+        drawn
     }
 
     fn between(&mut self, home: f64, [low, high]: [f64; 2]) -> f64 {
-        let drawn = low * libm::pow(high / low, self.unit());
-        self.differs(drawn / home);
-        drawn
+        self.next(home, |even| low * libm::pow(high / low, even))
     }
 
     /// All rates of a unit times the same number.
@@ -96,8 +93,8 @@ impl Draw {
         home: Bounded<MIN, MAX>,
         values: &[u32],
     ) -> Bounded<MIN, MAX> {
-        let drawn = values[(self.unit() * values.len() as f64) as usize];
-        self.differs(f64::from(drawn) / f64::from(home.get()));
+        let of = |even: f64| values[(even * values.len() as f64) as usize].into();
+        let drawn = self.next(home.get().into(), of) as u32;
         // All values are within the limits of the fields that they are drawn for.
         Bounded::new(drawn).unwrap_or(home)
     }
