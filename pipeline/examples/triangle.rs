@@ -30,6 +30,7 @@ fn hardware() -> PipelineSpec {
             depth: lines,
             colour: lines,
             texture: lines,
+            bins: None,
             l2: lines,
             llc: None,
             edram: None,

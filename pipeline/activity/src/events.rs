@@ -93,10 +93,14 @@ activity! {
         TrianglesOutside "triangles_outside" "A triangle dropped because it is outside the view at all times."
         TrianglesFaceCulled "triangles_face_culled" "A triangle dropped because it always shows a culled face."
         TrianglesSetUp "triangles_set_up" "A triangle that goes on to traversal."
+        BinEntries "bin_entries" "A triangle entered in the list of a bin."
+        BinLinesWritten "bin_lines_written" "A line of set-up records or lists of bins written to the triangle buffer."
         SetupMadds "setup_madds" "A multiply-add of triangle set-up."
     }
     Traversal "traversal" "Finds the tiles a triangle may touch, with the u, v, t box of each." {
         CoarseTilesVisited "coarse_tiles_visited" "A coarse tile tested."
+        BinLinesRead "bin_lines_read" "A line of set-up records or lists of bins read from the triangle buffer."
+        BinMisses "bin_misses" "A line read that was not in the triangle buffer."
         TilesVisited "tiles_visited" "A fine tile tested."
         TilesCulledSides "tiles_culled_sides" "A tile, coarse or fine, culled by the side planes over u, v and t."
         TilesCulledLens "tiles_culled_lens" "A tile, coarse or fine, culled by the dual-space lens lines."

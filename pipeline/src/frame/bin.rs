@@ -228,6 +228,8 @@ pub(super) struct Work {
     pub small_pixels: [u64; 2],
     /// One past the last entry of this work in [`BinLog::quads`].
     pub quads_end: u32,
+    /// Entries of the list of the bin that are read up to this work.
+    pub listed_end: u32,
 }
 
 /// Work of one bin in one batch, in the order of the modelled hardware.

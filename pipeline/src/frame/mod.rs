@@ -2,6 +2,7 @@
 
 mod attachments;
 mod bin;
+mod bin_memory;
 mod cells;
 mod conservative_pass;
 mod dispatch;
@@ -82,13 +83,14 @@ fn rasterize<F: FnMut(Finished<'_>)>(pass: &Pass<'_>, replay: &mut Replay<'_>, d
             for log in [Some(log), last.get(number)].into_iter().flatten() {
                 done(Finished::Tests(number, bin, log));
                 let emit = &mut |packet: &Packet, lines: &[LineAccess]| done(Finished::Packet(packet, lines));
-                replay.bin(batch, log, emit);
+                replay.bin(batch, (number, &lists[number]), log, emit);
             }
             if next.is_none() {
                 let emit = &mut |packet: &Packet, lines: &[LineAccess]| done(Finished::Packet(packet, lines));
                 replay.resolve(batch, bin, emit);
             }
         }
+        replay.end_batch();
         batch += 1;
     }
     bins

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use glam::Vec4;
 
 use super::attachments::{Attachment, Attachments, Binding, Load, Store, Surfaces};
+use super::replay::INDEX_BYTES;
 use super::{Features, PassError, Settings, Shading};
 use crate::buffer::{BufferBinding, Buffers};
 use crate::depth::{BoxGrid, DepthBoxes, DepthTile};
@@ -421,7 +422,11 @@ pub(super) fn resident<'s>(
         .iter()
         .map(|draw| {
             let (count, stride) = (draw.geometry.open().len() as u64, draw.geometry.vertex_bytes());
-            let new = || VertexBuffer { address: space.take(count * u64::from(stride)).address(), stride };
+            let triangles = draw.geometry.triangles().len() as u64;
+            let new = || {
+                let address = space.take(count * u64::from(stride)).address();
+                VertexBuffer { address, stride, indices: space.take(triangles * INDEX_BYTES).address() }
+            };
             draw.resident.vertices.unwrap_or_else(new)
         })
         .collect();
@@ -502,13 +507,15 @@ impl<'a> Draw<'a> {
     }
 }
 
-/// Vertices in memory. A pass that draws them at one time of the shutter still reads both ends.
+/// Vertices and indices in memory. A pass that draws them at one time of the shutter still reads both ends.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct VertexBuffer {
     /// First byte.
     pub address: u64,
     /// Bytes of a vertex.
     pub stride: u32,
+    /// First byte of the indices.
+    pub indices: u64,
 }
 
 /// Addresses of a draw's data.

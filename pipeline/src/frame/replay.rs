@@ -3,11 +3,12 @@
 use activity::{Event, LineAccess, Packet, PacketCounts, PacketKind};
 
 use super::Shading;
-use super::bin::Bin;
-use super::bin::{BinLog, Work};
+use super::bin::{Bin, BinLog, Work};
+use super::bin_memory::BinMemory;
 use super::pass::{Pass, Plane, Query, SAMPLE_BYTES, VertexBuffer};
 use super::resolve::{SampleLine, TileResolve, tile_lines};
 use super::shaded::{QuadWork, ShadedTriangle};
+use super::vertices::Ready;
 use crate::memory::{Access, Cache, CacheError, LINE_BYTES, MemorySystem};
 use crate::random::mix;
 use crate::sampling::Sample;
@@ -19,6 +20,9 @@ pub(super) struct Replay<'a> {
     memory: &'a mut MemorySystem,
     shading: Cache,
     reuse: Reuse,
+    /// Last line of indices that was read.
+    last_indices: u64,
+    bins: Option<BinMemory>,
     /// Depth lines that no longer hold the clear value.
     depth_used: Vec<bool>,
     /// The same of colours, by target.
@@ -28,6 +32,9 @@ pub(super) struct Replay<'a> {
     /// Samples of queries that passed so far, by draw.
     pub passed: Vec<u64>,
 }
+
+/// Bytes of the three indices of a triangle.
+pub(super) const INDEX_BYTES: u64 = 12;
 
 /// Recently shaded vertices, first in first out.
 struct Reuse {
@@ -66,16 +73,34 @@ impl<'a> Replay<'a> {
             passed: vec![0; pass.draws.len()],
             shading: Cache::new(spec.shading_cache)?,
             reuse: Reuse { recent: vec![(usize::MAX, 0); spec.vertex_reuse as usize], next: 0 },
+            last_indices: u64::MAX,
+            bins: BinMemory::new(pass),
             depth_used: used(&pass.depth),
             colour_used: pass.colours.iter().map(used).collect(),
         })
     }
 
-    /// Fetch and shade the vertices of a triangle that were not shaded recently.
+    /// Begin a batch of triangles, whose vertices come next.
+    pub fn begin_batch(&mut self) {
+        self.bins.iter_mut().for_each(BinMemory::begin);
+    }
+
+    /// End the first batch that has not ended: all its triangles are drawn.
+    pub fn end_batch(&mut self) {
+        self.bins.iter_mut().for_each(|bins| bins.end(self.memory));
+    }
+
+    /// Write a triangle to its bins.
+    pub fn set_up(&mut self, ready: &Ready, counts: &mut PacketCounts) {
+        self.bins.iter_mut().for_each(|bins| bins.write(self.pass, ready, self.memory, counts));
+    }
+
+    /// Fetch the indices of a triangle, and fetch and shade its vertices that were not shaded recently.
     pub fn vertices(&mut self, draw: usize, triangle: u32, counts: &mut PacketCounts) {
         let geometry = &self.pass.draws[draw].geometry;
         let ops = self.pass.projection.vertex_ops() + self.pass.programs[draw].vertex_ops;
-        let VertexBuffer { address, stride: bytes } = self.pass.addresses.vertices[draw];
+        let VertexBuffer { address, stride: bytes, indices } = self.pass.addresses.vertices[draw];
+        self.indices(indices + self.pass.locate(triangle).1 as u64 * INDEX_BYTES, counts);
         let ends = if geometry.is_still() && self.pass.still_camera { 1 } else { 2 };
         for vertex in self.pass.corners(triangle).1 {
             if self.reuse.contains_or_insert((draw, vertex as u32)) {
@@ -90,6 +115,15 @@ impl<'a> Replay<'a> {
         }
     }
 
+    /// Fetch the indices of a triangle at `address`, unless they are in the line before.
+    fn indices(&mut self, address: u64, counts: &mut PacketCounts) {
+        for line in address / LINE_BYTES..=(address + INDEX_BYTES - 1) / LINE_BYTES {
+            if std::mem::replace(&mut self.last_indices, line) != line {
+                self.memory.vertices(line * LINE_BYTES, LINE_BYTES, counts);
+            }
+        }
+    }
+
     /// Emit a packet with the lines requested from the L2 since the previous packet.
     pub fn emit(&mut self, packet: &Packet, emit: &mut impl FnMut(&Packet, &[LineAccess])) {
         emit(packet, self.memory.log());
@@ -97,9 +131,17 @@ impl<'a> Replay<'a> {
     }
 
     /// Emit the packets of one bin in one batch. Work of a query whose answer an earlier packet gave is not done.
-    pub fn bin(&mut self, batch: u32, log: &BinLog, emit: &mut impl FnMut(&Packet, &[LineAccess])) {
-        let mut first_quad = 0;
+    pub fn bin(
+        &mut self,
+        batch: u32,
+        (number, list): (usize, &[u32]),
+        log: &BinLog,
+        emit: &mut impl FnMut(&Packet, &[LineAccess]),
+    ) {
+        let (mut first_quad, mut first_listed) = (0, 0);
         for work in &log.work {
+            let listed_end = work.listed_end.max(first_listed);
+            let from = std::mem::replace(&mut first_listed, listed_end);
             let quads = &log.quads[first_quad..work.quads_end as usize];
             first_quad = work.quads_end as usize;
             // Bounds of loaded depths are for later draws, too.
@@ -107,7 +149,11 @@ impl<'a> Replay<'a> {
                 continue;
             }
             self.passed[work.draw as usize] += u64::from(work.passed);
-            let packet = self.tile(batch, work, quads);
+            let mut packet = self.tile(batch, work, quads);
+            let listed = &list[from as usize..listed_end as usize];
+            if let Some(bins) = &self.bins {
+                bins.read((number, from), listed, self.memory, &mut packet.counts);
+            }
             self.emit(&packet, emit);
         }
     }

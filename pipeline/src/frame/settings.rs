@@ -205,9 +205,10 @@ impl PipelineSpec {
             ("memory.texture", self.memory.texture),
             ("memory.l2", self.memory.l2),
         ];
-        let levels = ["memory.llc", "memory.edram"].into_iter().zip(self.memory.levels());
-        let levels = levels.filter_map(|(field, cache)| Some((field, cache?)));
-        for (field, cache) in caches.into_iter().chain(levels) {
+        let [llc, edram] = self.memory.levels();
+        let optional = [("memory.bins", self.memory.bins), ("memory.llc", llc), ("memory.edram", edram)];
+        let optional = optional.into_iter().filter_map(|(field, cache)| Some((field, cache?)));
+        for (field, cache) in caches.into_iter().chain(optional) {
             Cache::new(cache).map_err(|source| SpecError::Cache { field, source })?;
         }
         Ok(())

@@ -41,6 +41,7 @@ pub(super) fn front_end(
 ) -> Vec<Ready> {
     let outcomes: Vec<_> =
         batch.clone().into_par_iter().with_min_len(256).map(|id| outcome(pass, id)).collect();
+    replay.begin_batch();
     let new = |kind| Packet {
         batch: batch.start / pass.settings.spec.batch_triangles,
         ..Packet::new(kind, pass.number)
@@ -126,6 +127,7 @@ fn emit_packet(
         packet.counts[Event::Indices] += 3;
         packet.counts[Event::SetupMadds] += madds + thresholds + ready.as_ref().map_or(0, Ready::line_madds);
         replay.vertices(draw, id, &mut packet.counts);
+        ready.iter().for_each(|ready| replay.set_up(ready, &mut packet.counts));
     }
     replay.emit(&packet, emit);
 }

@@ -46,6 +46,8 @@ pub(super) struct Worker<'a, 'p> {
     log: BinLog,
     /// Draw of the current triangle.
     draw: u32,
+    /// Entries of the list that were read.
+    listed: u32,
     /// Tile tests since the last packet.
     tests: TileWork,
     /// Depth bounds of the current triangle.
@@ -61,7 +63,7 @@ impl<'a, 'p> Worker<'a, 'p> {
             flags.resize(bin.tiles.len(), false);
         }
         let (log, tests) = (BinLog::default(), TileWork::default());
-        Self { pass, bin, scratch, log, draw: Packet::NONE, tests, bounder: None }
+        Self { pass, bin, scratch, log, draw: Packet::NONE, listed: 0, tests, bounder: None }
     }
 
     /// Rasterize the `listed` triangles of a batch.
@@ -75,6 +77,7 @@ impl<'a, 'p> Worker<'a, 'p> {
                 self.record_tests();
                 self.draw = draw;
             }
+            self.listed += 1;
             self.triangle(ready);
         }
         self.record_tests();
@@ -346,6 +349,7 @@ impl<'a, 'p> Worker<'a, 'p> {
             coloured_pixels: fragments.coloured_pixels,
             small_pixels,
             quads_end: self.log.quads.len() as u32,
+            listed_end: self.listed,
         });
     }
 
@@ -360,6 +364,7 @@ impl<'a, 'p> Worker<'a, 'p> {
             tile: Bin::tile_number(self.pass, self.bin.origin),
             tests: std::mem::take(&mut self.tests),
             quads_end: self.log.quads.len() as u32,
+            listed_end: self.listed,
             ..Work::default()
         });
     }

@@ -39,8 +39,8 @@ pub struct AddressSpace {
 }
 
 impl AddressSpace {
-    /// End of the addresses: a line has a number of 32 bits.
-    pub const END: u64 = LINE_BYTES << 32;
+    /// End of the addresses of surfaces, vertices and textures. A line has a number of 32 bits; the upper half is for bins.
+    pub const END: u64 = LINE_BYTES << 31;
 
     /// A new surface of `bytes`.
     pub fn take(&mut self, bytes: u64) -> MemoryRange {

@@ -197,7 +197,7 @@ mod tests {
     fn spec(l2: CacheSpec, llc: Option<CacheSpec>, edram: Option<CacheSpec>) -> MemorySpec {
         let one = CacheSpec::lru(1, 1);
         let compression = Compression::default();
-        MemorySpec { depth: one, colour: one, texture: one, l2, llc, edram, compression }
+        MemorySpec { depth: one, colour: one, texture: one, bins: None, l2, llc, edram, compression }
     }
 
     fn hierarchies() -> [MemorySpec; 4] {

@@ -18,6 +18,9 @@ pub struct MemorySpec {
     pub colour: CacheSpec,
     /// Texture cache.
     pub texture: CacheSpec,
+    /// Triangle buffer: cache of bins, which are set-up records and lists of triangles. Without it bins take no memory.
+    #[serde(default)]
+    pub bins: Option<CacheSpec>,
     /// L2, shared by all.
     pub l2: CacheSpec,
     /// Last-level cache below the L2: what the GPU can use of it.
@@ -53,6 +56,7 @@ pub struct MemorySystem {
     depth: Client,
     colour: Client,
     texture: Client,
+    bins: Option<Cache>,
     l2: SharedCaches,
     compressed: CompressedLines,
 }
@@ -70,6 +74,7 @@ impl MemorySystem {
             depth: client(spec.depth, Event::DepthLines, Event::DepthMisses)?,
             colour: client(spec.colour, Event::ColourLines, Event::ColourMisses)?,
             texture: client(spec.texture, Event::TextureLines, Event::TextureMisses)?,
+            bins: spec.bins.map(Cache::new).transpose()?,
             l2: SharedCaches::new(spec.l2, spec.levels())?,
             compressed: CompressedLines::default(),
         })
@@ -127,6 +132,40 @@ impl MemorySystem {
         let first = address / LINE_BYTES;
         let last = (address + bytes.max(1) - 1) / LINE_BYTES;
         (first..=last).for_each(|line| self.l2.access(Unit::Command, line, false, counts));
+    }
+
+    /// Write the line of bins at `address`, which is new or in part so, by set-up.
+    pub fn write_bin(&mut self, address: u64, counts: &mut PacketCounts) {
+        let Some(bins) = &mut self.bins else { return };
+        counts[Event::BinLinesWritten] += 1;
+        if let Access::MissEvicting(victim) = bins.access(address / LINE_BYTES, true) {
+            self.l2.access(Unit::Setup, victim, true, counts);
+        }
+    }
+
+    /// Read the line of bins at `address` by the tile loop.
+    pub fn read_bin(&mut self, address: u64, counts: &mut PacketCounts) {
+        let Some(bins) = &mut self.bins else { return };
+        counts[Event::BinLinesRead] += 1;
+        let line = address / LINE_BYTES;
+        let found = bins.access(line, false);
+        if found == Access::Hit {
+            return;
+        }
+        counts[Event::BinMisses] += 1;
+        if let Access::MissEvicting(victim) = found {
+            self.l2.access(Unit::Traversal, victim, true, counts);
+        }
+        self.l2.access(Unit::Traversal, line, false, counts);
+    }
+
+    /// Discard the line of bins at `address`, as all triangles of its batch are drawn.
+    pub fn discard_bin(&mut self, address: u64) {
+        let line = address / LINE_BYTES;
+        if let Some(bins) = &mut self.bins {
+            bins.discard(line);
+            self.l2.discard(line);
+        }
     }
 
     /// Read or write the line at `address` for a group of lanes. Groups have no cache above the L2, which knows the bytes of a
@@ -279,6 +318,7 @@ mod tests {
             depth: small,
             colour: small,
             texture: small,
+            bins: None,
             l2,
             llc: None,
             edram: None,

@@ -306,8 +306,16 @@ fn vertices_are_reused_first_in_first_out() {
 fn compressed(soup: &Soup, lens: bool, compression: Compression) -> (Counts, Vec<Vec3>) {
     let small = CacheSpec::lru(8, 4);
     let l2 = CacheSpec::lru(32, 4);
-    let memory =
-        MemorySpec { depth: small, colour: small, texture: small, l2, llc: None, edram: None, compression };
+    let memory = MemorySpec {
+        depth: small,
+        colour: small,
+        texture: small,
+        bins: None,
+        l2,
+        llc: None,
+        edram: None,
+        compression,
+    };
     let spec = PipelineSpec { memory, ..spec(Features::ALL) };
     let table = SampleTable::low_discrepancy(8, 3, LensShape::Disk).unwrap();
     let viewport = Viewport::new(70, 50).unwrap();

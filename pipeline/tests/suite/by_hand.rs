@@ -67,8 +67,8 @@ const BY_HAND: [(Event, u64); 25] = [
     (Event::ColourLines, 12 * 32 + 4 * 2 * 20 + 16 * (32 + 4)),
     (Event::SamplesResolved, 8192),
     (Event::PixelsResolved, 1024),
-    // The vertices fill one line; cleared lines are not read, and only the image is written back.
-    (Event::DramReadBytes, 64),
+    // The vertices fill one line and so do the indices; cleared lines are not read, and only the image is written back.
+    (Event::DramReadBytes, 2 * 64),
     (Event::DramWriteBytes, 4 * 1024),
     (Event::TextureFetches, 0),
     (Event::TextureLines, 0),

@@ -3,6 +3,7 @@
 
 mod accounting;
 mod analytic;
+mod bins;
 mod by_hand;
 mod centroid;
 mod clipping;

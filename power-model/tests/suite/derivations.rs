@@ -105,6 +105,8 @@ fn front(event: Event) -> Option<Interval> {
         Event::ShaderOps => shader_op(),
         Event::TrianglesIn => sram(32, 96.0, READ),
         Event::TrianglesSetUp => sram(32, 128.0, WRITE),
+        Event::BinEntries => sram(32, 32.0, WRITE),
+        Event::BinMisses => sum([sram(32, 64.0, WRITE), sram(32, 64.0, READ)]),
         Event::SetupMadds
         | Event::TileMadds
         | Event::DepthIntervalMadds

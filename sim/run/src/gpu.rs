@@ -3,7 +3,7 @@
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
-use activity::{LEVELS, spec};
+use activity::{LEVELS, Unit, spec};
 use output::table::digits;
 use pipeline::PipelineSpec;
 use power_model::{EnergyTable, Platform, Scaling};
@@ -200,20 +200,29 @@ impl GpuSpec {
 }
 
 impl GpuSpec {
-    /// Checks that each level below the L2 has both a size and a rate.
+    /// Checks that bins and each level below the L2 have both a size and a rate.
     fn check_levels(&self) -> Result<(), (String, String)> {
+        let of_level = |((level, size), rate): ((Unit, Option<_>), Option<_>)| {
+            (
+                level.name(),
+                size.is_some(),
+                rate.is_some(),
+                "a level below the L2 needs",
+                "latency, queue and lines per cycle",
+            )
+        };
         let levels = LEVELS.into_iter().zip(self.pipeline.memory.levels()).zip(self.units.levels());
-        for ((level, size), rate) in levels {
-            let (size_field, rate_field) =
-                (format!("pipeline.memory.{}", level.name()), format!("units.{}", level.name()));
-            let (given, missing, what) = match (size, rate) {
-                (Some(_), None) => (size_field, rate_field, "latency, queue and lines per cycle"),
-                (None, Some(_)) => (rate_field, size_field, "entries and ways"),
+        let bins = (self.pipeline.memory.bins.is_some(), self.units.bins.is_some());
+        let bins = ("bins", bins.0, bins.1, "bins in memory need", "packets in flight");
+        for (name, has_size, has_rate, who, rate) in std::iter::once(bins).chain(levels.map(of_level)) {
+            let (size_field, rate_field) = (format!("pipeline.memory.{name}"), format!("units.{name}"));
+            let (given, missing, what) = match (has_size, has_rate) {
+                (true, false) => (size_field, rate_field, rate),
+                (false, true) => (rate_field, size_field, "entries and ways"),
                 _ => continue,
             };
             let message = format!(
-                "`{given}` is given and `{missing}` is missing: a level below the L2 needs both; add its {what}, or leave \
-                 both out"
+                "`{given}` is given and `{missing}` is missing: {who} both; add its {what}, or leave both out"
             );
             return Err((given, message));
         }
@@ -366,7 +375,9 @@ mod tests {
         let text = message(
             &REFERENCE.replace("l2: (entries: 4096", "llc: (entries: 8, ways: 2), l2: (entries: 4096"),
         );
-        assert!(text.starts_with("gpu.ron:19:") && text.contains("`units.llc` is missing"), "{text}");
+        assert!(text.starts_with("gpu.ron:20:") && text.contains("`units.llc` is missing"), "{text}");
+        let text = message(&REFERENCE.replace("bins: (in_flight: 16),", ""));
+        assert!(text.contains("`pipeline.memory.bins` is given and `units.bins` is missing"), "{text}");
         let text = message(&iris.replace("edram: (entries: 2097152, ways: 16),", ""));
         assert!(text.contains("`units.edram` is given and `pipeline.memory.edram` is missing"), "{text}");
         // Impossible geometry, unknown keys, sizes out of range.

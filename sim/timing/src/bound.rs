@@ -491,7 +491,7 @@ impl Uncontended {
     /// Time that the clients of a packet take to request its lines beyond their service in `work`, and
     /// the answers to all of them but one.
     pub fn requests(&self, demand: &ServiceDemand, work: &UnitWork) -> Time {
-        let clients = [Station::Depth, Station::Colour]
+        let clients = [Station::Setup, Station::Traversal, Station::Depth, Station::Colour]
             .into_iter()
             .filter(|station| port(station.unit()).is_some_and(|port| demand.lines[port] > 0));
         let beyond = |station: &Station| {

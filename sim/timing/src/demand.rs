@@ -61,7 +61,8 @@ impl Station {
 }
 
 /// Clients of the L2, in the order of its ports.
-pub const CLIENTS: [Unit; 5] = [Unit::Command, Unit::Depth, Unit::Texture, Unit::Colour, Unit::Compute];
+pub const CLIENTS: [Unit; 7] =
+    [Unit::Command, Unit::Depth, Unit::Texture, Unit::Colour, Unit::Compute, Unit::Setup, Unit::Traversal];
 
 /// Port of a client of the L2; `None` for other units.
 pub fn port(unit: Unit) -> Option<usize> {
@@ -178,7 +179,7 @@ impl DemandBuilder {
         Self {
             costs,
             data_cycles: DataUnit::ALL.map(|unit| unit.events().map(cycles)),
-            lines_per_cycle: CLIENTS.map(|unit| machine.common(unit).lines_per_cycle),
+            lines_per_cycle: CLIENTS.map(|unit| machine.common(unit).lines_per_cycle.max(1)),
             pass: 0,
             first_batch: 0,
             last_batch: 0,
@@ -267,8 +268,10 @@ impl DemandBuilder {
         if demand.lines == [0; CLIENTS.len()] {
             return;
         }
-        let served =
-            [service(Station::Command), service(Station::Depth), data, service(Station::Colour), data];
+        let [command, depth, colour, setup, traversal] =
+            [Station::Command, Station::Depth, Station::Colour, Station::Setup, Station::Traversal]
+                .map(service);
+        let served = [command, depth, data, colour, data, setup, traversal];
         for (port, served) in served.into_iter().enumerate() {
             let requests = u64::from(demand.lines[port]) * CYCLE / u64::from(self.lines_per_cycle[port]);
             add(CLIENTS[port], requests.saturating_sub(served));

@@ -58,8 +58,8 @@ pub use passes::PassTime;
 pub use recorder::Recorder;
 pub use service::{CYCLE, Work};
 pub use spec::{
-    Chips, ClientSpec, Clock, Common, Cycles, DramSpec, Entries, MachineSpec, Rates, RowBytes, ShaderSpec,
-    SharedCacheSpec, UnitSpec, WaitCycles, Width,
+    BinsSpec, Chips, ClientSpec, Clock, Common, Cycles, DramSpec, Entries, MachineSpec, Rates, RowBytes,
+    ShaderSpec, SharedCacheSpec, UnitSpec, WaitCycles, Width,
 };
 pub use stalls::{Reason, Stalls, UnitTime};
 

@@ -108,6 +108,17 @@ pub struct ShaderSpec {
     pub shared_bytes: Bounded<0, 1_048_576>,
 }
 
+/// How set-up writes bins to memory and the tile loop reads them.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BinsSpec {
+    /// Packets of the tile loop that may wait for their triangles after service, at least 1.
+    pub in_flight: Entries,
+    /// Lines that each of both can request from the L2 per cycle.
+    #[serde(default = "one")]
+    pub lines_per_cycle: Width,
+}
+
 /// A cache that all clients share: the L2 or a level below it.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -170,6 +181,8 @@ pub struct MachineSpec {
     pub shading_cache: UnitSpec,
     pub texture: ClientSpec,
     pub colour: ClientSpec,
+    #[serde(default)]
+    pub bins: Option<BinsSpec>,
     #[serde(default)]
     pub compute: Option<ClientSpec>,
     pub l2: SharedCacheSpec,
@@ -269,8 +282,8 @@ impl MachineSpec {
                 let s = &self.shader;
                 bare(s.clock, s.latency_cycles, s.queue.get(), s.in_flight.get())
             }
-            Unit::Setup => self.setup.common(),
-            Unit::Traversal => self.traversal.common(),
+            Unit::Setup => self.with_bins(self.setup.common(), false),
+            Unit::Traversal => self.with_bins(self.traversal.common(), true),
             Unit::ZCull => self.z_cull.common(),
             Unit::SampleTest => self.sample_test.common(),
             Unit::Depth => self.depth.common(),
@@ -283,6 +296,13 @@ impl MachineSpec {
             Unit::Edram => self.edram.as_ref().unwrap_or(&self.l2).common(),
             Unit::Dram => bare(self.dram.clock, self.dram.latency_cycles, self.dram.queue.get(), 0),
         }
+    }
+
+    /// A unit that reads or writes bins. Nothing waits for what is written.
+    fn with_bins<'a>(&self, common: Common<'a>, reads: bool) -> Common<'a> {
+        let Some(bins) = self.bins else { return common };
+        let in_flight = if reads { bins.in_flight.get() } else { 0 };
+        Common { in_flight, lines_per_cycle: bins.lines_per_cycle.get(), ..common }
     }
 
     /// Check that every rate belongs to the unit it is written for, and that a channel of memory can queue all lines of

@@ -20,6 +20,7 @@ pub fn hardware() -> PipelineSpec {
             depth: lines,
             colour: lines,
             texture: lines,
+            bins: None,
             l2: CacheSpec::lru(4096, 8),
             llc: None,
             edram: None,

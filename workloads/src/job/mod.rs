@@ -325,6 +325,7 @@ pub(crate) mod testing {
                 depth: lines,
                 colour: lines,
                 texture: lines,
+                bins: None,
                 l2: lines,
                 llc: None,
                 edram: None,

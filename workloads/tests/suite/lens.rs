@@ -95,6 +95,7 @@ pub fn first_image(scene: &Scene) -> Vec<Vec3> {
             depth: cache,
             colour: cache,
             texture: cache,
+            bins: None,
             l2: cache,
             llc: None,
             edram: None,

@@ -196,6 +196,7 @@ pub fn spec(features: Features) -> PipelineSpec {
             depth: lines,
             colour: lines,
             texture: lines,
+            bins: None,
             l2: CacheSpec::lru(4096, 8),
             llc: None,
             edram: None,

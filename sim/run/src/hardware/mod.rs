@@ -93,6 +93,11 @@ fn fixed(gpu: &GpuSpec) -> Vec<Memory> {
     let access = Charge::access;
     let vertices = f64::from(gpu.pipeline.vertex_reuse) * VERTEX_BYTES;
     let vertices_read = vec![Charge::shares(Event::VertexInvocations, 0.93, 0.0), access(Event::TrianglesIn)];
+    let triangles = gpu.pipeline.memory.bins.map_or(32.0 * KB, |buffer| f64::from(buffer.entries) * LINE);
+    let triangles_read =
+        [Event::CoarseTilesVisited, Event::TrianglesSetUp, Event::BinEntries, Event::BinMisses]
+            .map(access)
+            .to_vec();
     let depth = &gpu.pipeline.depth;
     let boxes: f64 = depth.boxes.iter().map(|&count| f64::from(count)).product();
     let kept = if depth.z_min { 2.0 } else { 1.0 };
@@ -112,7 +117,7 @@ fn fixed(gpu: &GpuSpec) -> Vec<Memory> {
         },
         Memory {
             accesses: rate(gpu, Event::CoarseTilesVisited),
-            ..memory("triangles", Unit::Traversal, 32.0 * KB, 128.0, vec![access(Event::CoarseTilesVisited)])
+            ..memory("triangles", Unit::Traversal, triangles, 128.0, triangles_read)
         },
         Memory {
             accesses: rate(gpu, Event::TilesVisited),

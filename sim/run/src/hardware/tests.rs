@@ -6,12 +6,13 @@ use proptest::prelude::*;
 use super::*;
 
 /// Numbers of a GPU file that add hardware where they grow: path from `gpu`, and where drawing starts.
-pub(crate) const GROW: [(&str, f64); 39] = [
+pub(crate) const GROW: [(&str, f64); 40] = [
     ("pipeline.vertex_reuse", 32.0),
     ("pipeline.shading_cache.entries", 1024.0),
     ("pipeline.memory.depth.entries", 256.0),
     ("pipeline.memory.colour.entries", 256.0),
     ("pipeline.memory.texture.entries", 256.0),
+    ("pipeline.memory.bins.entries", 512.0),
     ("pipeline.memory.l2.entries", 4096.0),
     ("pipeline.compute.banks", 2.0),
     ("pipeline.compute.atomic_units", 1.0),

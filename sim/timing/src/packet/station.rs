@@ -71,7 +71,7 @@ impl StationState {
             server: Server::default(),
             departed: 0,
             port,
-            behind: port.map(|_| QueueTimes::new(common.in_flight)),
+            behind: (common.in_flight > 0).then(|| QueueTimes::new(common.in_flight)),
         }
     }
 

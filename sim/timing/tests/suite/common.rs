@@ -57,6 +57,7 @@ pub fn plain() -> MachineSpec {
         shading_cache: unit("{\"shading_lookups\": 1}"),
         texture: client("{\"texture_fetches\": 1}"),
         colour: client("{\"colour_writes\": 1}"),
+        bins: None,
         compute: Some(client("{\"shared_cycles\": 1, \"atomic_steps\": 1}")),
         l2: SharedCacheSpec {
             clock: Clock::Core,

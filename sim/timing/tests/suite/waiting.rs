@@ -1,7 +1,7 @@
 //! Packets wait for what they depend on, at the levels `stepped` and `packet`.
 
 use activity::{Event, LineAccess, LineKind, Packet, PacketKind, Unit};
-use timing::MachineSpec;
+use timing::{BinsSpec, MachineSpec};
 
 use crate::common::{Packets, client, clocks, packet_level, plain, read, size, stepped, tile};
 
@@ -55,12 +55,22 @@ fn the_front_end_waits_for_the_tiles_of_the_batch_before_the_last() {
 
 #[test]
 fn a_packet_waits_for_its_lines() {
-    let mut machine = plain();
+    waits_for_lines(plain(), Unit::Depth, |machine| machine.depth.in_flight = size(1));
+}
+
+#[test]
+fn a_tile_waits_for_its_triangle_in_memory() {
+    let bins = |in_flight| Some(BinsSpec { in_flight: size(in_flight), lines_per_cycle: size(1) });
+    let machine = MachineSpec { bins: bins(64), ..plain() };
+    waits_for_lines(machine, Unit::Traversal, |machine| machine.bins = bins(1));
+}
+
+fn waits_for_lines(mut machine: MachineSpec, unit: Unit, narrow_to_one: impl Fn(&mut MachineSpec)) {
     machine.dram.latency_cycles = size(500);
     let packet = |line| {
         (
-            tile(&[(Event::DepthReads, 1), (Event::ColourWrites, 1)]),
-            vec![read(Unit::Depth, line, LineKind::Fetch)],
+            tile(&[(Event::TilesVisited, 1), (Event::DepthReads, 1), (Event::ColourWrites, 1)]),
+            vec![read(unit, line, LineKind::Fetch)],
         )
     };
     let one = vec![packet(0)];
@@ -72,13 +82,39 @@ fn a_packet_waits_for_its_lines() {
         assert!(last < first + 64 * 4, "{name}: {last}");
         // With one waiting packet at a time, each waits separately.
         let mut narrow = machine.clone();
-        narrow.depth.in_flight = size(1);
+        narrow_to_one(&mut narrow);
         let in_turn = cycles(&narrow, &many);
         assert!(in_turn > 31 * 500, "{name}: {in_turn}");
         [first, last, in_turn]
     });
     for (truth, found) in taken[0].into_iter().zip(taken[1]) {
         assert!(truth.abs_diff(found) * 50 <= truth, "{truth} {found}");
+    }
+}
+
+#[test]
+fn written_bins_keep_set_up_waiting_for_no_answer_but_for_the_l2() {
+    let bins = Some(BinsSpec { in_flight: size(4), lines_per_cycle: size(1) });
+    let mut machine = MachineSpec { bins, ..plain() };
+    let write = |line| LineAccess::new(Unit::Setup, line, LineKind::Write);
+    let stream = |lines: u32| -> Packets {
+        let front = |n: u32| {
+            (
+                of(0, PacketKind::Vertices, &[(Event::TrianglesIn, 1)]).0,
+                (0..lines).map(|k| write(8 * n + k)).collect(),
+            )
+        };
+        (0..200).map(front).collect()
+    };
+    for (name, cycles) in LEVELS {
+        // One line a cycle hides behind the triangle; three take three cycles.
+        let [none, one, three] = [0, 1, 3].map(|lines| cycles(&machine, &stream(lines)));
+        assert!(one <= none + 2, "{name}: {one} {none}");
+        assert!(three.abs_diff(600) < 24, "{name}: {three}");
+    }
+    machine.l2.latency_cycles = size(400);
+    for (name, cycles) in LEVELS {
+        assert!(cycles(&machine, &stream(3)) < 600 + 24 + 400, "{name}");
     }
 }
 

@@ -161,6 +161,7 @@ pub fn spec() -> PipelineSpec {
             depth: lines,
             colour: lines,
             texture: lines,
+            bins: None,
             l2: pipeline::CacheSpec::lru(4096, 16),
             llc: None,
             edram: None,
