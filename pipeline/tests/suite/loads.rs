@@ -99,8 +99,8 @@ fn every_lane_loads_and_a_quad_reads_each_line_once() {
         assert_eq!(values, (0..pixels).map(expected).collect::<Vec<_>>());
         let lanes = [Event::VertexInvocations, Event::HelperInvocations, Event::PixelInvocations];
         assert_eq!(lanes.map(|event| counts[event]), [3, 0, 256]);
-        // Three vertices of 13 operations and 12 bytes, which are in one line.
-        let of_vertices = [0, 3 * 13, 0, 0, 64, 0];
+        // Three vertices of 13 operations and 12 bytes, which are in one line, and the line of their indices.
+        let of_vertices = [0, 3 * 13, 0, 0, 2 * 64, 0];
         std::array::from_fn::<u64, 6, _>(|at| counts[events[at]] - of_vertices[at])
     };
     // A row of the image is a line of 64 bytes: each of 64 quads reads two, and sixteen lines are missed once.

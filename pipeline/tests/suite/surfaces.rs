@@ -550,7 +550,8 @@ fn loads_stores_and_clears_are_counted() {
                 Event::DepthLines,
                 Event::L2Reads,
             ];
-            let vertices = 4;
+            // A line of vertices for each of four, and one of indices.
+            let vertices = 4 + 1;
             let counts = events.map(|event| drawn.counts[event]);
             let mut written = [counts[0], counts[1], counts[2], counts[3], counts[4] - vertices].to_vec();
             written.push(report.counts()[Event::DramWriteBytes]);
