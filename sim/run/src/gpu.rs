@@ -376,7 +376,7 @@ mod tests {
             &REFERENCE.replace("l2: (entries: 4096", "llc: (entries: 8, ways: 2), l2: (entries: 4096"),
         );
         assert!(text.starts_with("gpu.ron:20:") && text.contains("`units.llc` is missing"), "{text}");
-        let text = message(&REFERENCE.replace("bins: (in_flight: 16),", ""));
+        let text = message(&REFERENCE.replace("bins: (in_flight: 128),", ""));
         assert!(text.contains("`pipeline.memory.bins` is given and `units.bins` is missing"), "{text}");
         let text = message(&iris.replace("edram: (entries: 2097152, ways: 16),", ""));
         assert!(text.contains("`units.edram` is given and `pipeline.memory.edram` is missing"), "{text}");
