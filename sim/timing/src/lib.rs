@@ -31,6 +31,7 @@
 
 mod address;
 mod bound;
+mod chips;
 mod clock;
 mod data_unit;
 mod demand;
@@ -58,7 +59,7 @@ pub use passes::PassTime;
 pub use recorder::Recorder;
 pub use service::{CYCLE, Work};
 pub use spec::{
-    Chips, ClientSpec, Clock, Common, Cycles, DramSpec, Entries, MachineSpec, Rates, RowBytes, ShaderSpec,
+    Chips, ClientSpec, Clock, Common, Cycles, DramSpec, Entries, MachineSpec, Rates, RefreshSpec, RowBytes, ShaderSpec,
     SharedCacheSpec, UnitSpec, WaitCycles, Width,
 };
 pub use stalls::{Reason, Stalls, UnitTime};

@@ -14,6 +14,28 @@ pub(super) enum Turn {
     Late,
 }
 
+/// Times in which nothing works: `length` from `first` on, and again every `interval`.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Pauses {
+    pub first: Time,
+    pub interval: Time,
+    pub length: Time,
+}
+
+impl Pauses {
+    /// All pauses before `at`.
+    fn before(&self, at: Time) -> Time {
+        let Some(since) = at.checked_sub(self.first) else { return 0 };
+        since / self.interval * self.length + (since % self.interval).min(self.length)
+    }
+
+    /// The first time from `at` on that is in no pause.
+    pub fn after(&self, at: Time) -> Time {
+        let Some(since) = at.checked_sub(self.first) else { return at };
+        at + self.length.saturating_sub(since % self.interval)
+    }
+}
+
 /// Time slots of equal length, each with capacity for the same amount of work. Requests come in stream order,
 /// not in time order. A request may use capacity before that of earlier requests.
 ///
@@ -29,6 +51,7 @@ pub(super) struct Calendar {
     /// The part of it that came late, and the part that is no work.
     shared: Vec<u64>,
     blocked: Vec<u64>,
+    pauses: Option<Pauses>,
     yielded: Time,
     /// For each slot, a lower bound of the first slot from it on with free capacity (union-find with path
     /// compression).
@@ -48,9 +71,15 @@ impl Calendar {
             used: Vec::new(),
             shared: Vec::new(),
             blocked: Vec::new(),
+            pauses: None,
             yielded: 0,
             next_free: Vec::new(),
         }
+    }
+
+    /// The same with pauses.
+    pub fn with_pauses(self, pauses: Option<Pauses>) -> Self {
+        Self { pauses, ..self }
     }
 
     /// Reserve `work` from `at` on. Returns when it begins and ends.
@@ -107,7 +136,8 @@ impl Calendar {
             self.reach(slot);
             self.shared.resize(self.used.len(), 0);
             let free = self.capacity - self.used[slot];
-            let half = (self.capacity / 2).saturating_sub(self.shared[slot]);
+            let blocked = self.blocked.get(slot).copied().unwrap_or(0);
+            let half = ((self.capacity - blocked) / 2).saturating_sub(self.shared[slot]);
             let here = remaining.min(free.max(half));
             // In turn with as much other work, if there is any.
             let before = self.used[slot].min(2 * self.shared[slot]);
@@ -173,6 +203,22 @@ impl Calendar {
         if slot >= known {
             self.used.resize(slot + 1, 0);
             self.next_free.extend(known as u32..=slot as u32);
+            if let Some(pauses) = self.pauses {
+                self.pause(known, &pauses);
+            }
+        }
+    }
+
+    /// Take the pauses out of the capacity of all slots from `first` on.
+    fn pause(&mut self, first: usize, pauses: &Pauses) {
+        self.blocked.resize(self.used.len(), 0);
+        for slot in first..self.used.len() {
+            let paused = pauses.before(self.start_of(slot + 1)) - pauses.before(self.start_of(slot));
+            let blocked = paused * self.servers;
+            (self.blocked[slot], self.used[slot]) = (blocked, blocked);
+            if blocked == self.capacity {
+                self.next_free[slot] = slot as u32 + 1;
+            }
         }
     }
 

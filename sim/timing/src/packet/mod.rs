@@ -31,6 +31,7 @@
 mod calendar;
 mod cores;
 mod drain;
+mod dram;
 mod levels;
 mod memory;
 mod station;
