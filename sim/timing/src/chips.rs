@@ -79,8 +79,10 @@ impl ChipTimes {
 /// How often a bus turns if its queues are full: once each way for so many lines.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TurnPolicy {
-    /// Time of a turn to writes and of one back to reads.
+    /// Time for which the bus idles for a turn to writes and one back to reads.
     pub pair: Time,
+    /// The same if all lines are of one bank, which has to open another row for each turn.
+    pub pair_in_bank: Time,
     /// Places for lines, or for writes if they have their own.
     places: f64,
     drains: bool,
@@ -91,8 +93,13 @@ pub(crate) struct TurnPolicy {
 impl TurnPolicy {
     pub fn new(spec: &DramSpec, times: &ChipTimes) -> Self {
         let places = spec.write_queue.map_or(spec.queue.get(), |queue| queue.get());
+        let pair = times.write_to_read + times.read_to_write;
+        let row = |from: usize, to: usize, turn: Time| {
+            (times.to_precharge[from] + times.precharge + times.activate[to]).saturating_sub(times.burst).max(turn)
+        };
         Self {
-            pair: times.write_to_read + times.read_to_write,
+            pair,
+            pair_in_bank: if pair > 0 { row(0, 1, times.read_to_write) + row(1, 0, times.write_to_read) } else { 0 },
             // In a queue of both the place of the last line one way is taken before the turn.
             places: f64::from(places) - if spec.write_queue.is_some() { 0.0 } else { 0.5 },
             drains: spec.write_queue.is_some(),

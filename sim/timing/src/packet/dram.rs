@@ -61,6 +61,8 @@ struct Bank {
     former: HashMap<u32, Time>,
     /// Time for rows that may not have to be opened.
     disputed: Time,
+    /// The latest row that was read and that was written, and lines of the channel up to then.
+    kinds: [(u32, u64); 2],
 }
 
 /// Chips that share the bus of a channel with other ranks.
@@ -82,19 +84,20 @@ struct BusTurns {
 }
 
 impl BusTurns {
-    /// Add `count` lines of a kind. Returns the time for which the bus idles because of them.
-    fn add(&mut self, is_write: bool, count: u64, policy: &TurnPolicy) -> Time {
-        if policy.pair == 0 {
+    /// Add `count` lines of a kind, with a turn there and back that takes `pair`. Returns the time for which the bus idles because
+    /// of them.
+    fn add(&mut self, kind: usize, count: u64, pair: Time, policy: &TurnPolicy) -> Time {
+        if pair == 0 {
             return 0;
         }
-        self.mix[usize::from(is_write)] += count;
+        self.mix[kind] += count;
         let lines = self.mix[0] + self.mix[1];
         let pairs_per_line = policy.pairs(self.mix) / lines.max(1) as f64;
-        self.owed += policy.pair as f64 * pairs_per_line * count as f64;
+        self.owed += pair as f64 * pairs_per_line * count as f64;
         if lines > policy.memory {
             self.mix = self.mix.map(|kind| kind / 2);
         }
-        if self.owed < policy.pair as f64 {
+        if self.owed < pair as f64 {
             return 0;
         }
         let owed = self.owed as Time;
@@ -301,6 +304,7 @@ impl Dram {
         let rank_of_bank = address.bank * channel.ranks.len() / channel.banks.len();
         let rank = &mut channel.ranks[rank_of_bank];
         let bank = &mut channel.banks[address.bank];
+        let turns_rows = is_alone && self.turns.pair > 0 && bank.turns_rows(kind, address.row, channel.lines, self.queue);
         let work = burst * Time::from(count);
         let open = bank.joins(address.row, seen.from, channel.lines, self.queue);
         let opened = match open {
@@ -330,7 +334,7 @@ impl Dram {
                 before.closes = begin;
                 // The bus idles from the end of the last transfer on if the queue has lines of this bank alone. Those that joined
                 // their row would fill the gap.
-                if is_alone {
+                if is_alone && !turns_rows {
                     channel
                         .bus
                         .block(begin + burst, opens.saturating_sub(burst).min(before.joined));
@@ -340,7 +344,8 @@ impl Dram {
         };
         let ready = opened.max(seen.from);
         let ready = rank.refresh.map_or(ready, |pauses| pauses.after(ready));
-        let turned = channel.turns.add(is_write, count.into(), &self.turns);
+        let pair = if turns_rows { self.turns.pair_in_bank } else { self.turns.pair };
+        let turned = channel.turns.add(kind, count.into(), pair, &self.turns);
         if turned > 0 {
             channel.bus.block(ready, turned);
         }
@@ -391,7 +396,7 @@ impl Dram {
 impl Bank {
     /// A bank that remembers `rows` rows.
     fn new(time: Calendar, rows: usize) -> Self {
-        Self { time, rows: vec![OpenRow::NONE; rows].into(), former: HashMap::new(), disputed: 0 }
+        Self { time, rows: vec![OpenRow::NONE; rows].into(), former: HashMap::new(), disputed: 0, kinds: [(u32::MAX, 0); 2] }
     }
 
     /// Count the time `opens` of a row that lines open again which came at `came`, if these and the lines before of that row may
@@ -403,6 +408,13 @@ impl Bank {
         if known.or_else(|| self.former.get(&row).copied()).is_some_and(|last| came < last + longest_way) {
             self.disputed += opens;
         }
+    }
+
+    /// Note lines of a kind and a row. Whether lines of the other kind, not far from them, are of another row.
+    fn turns_rows(&mut self, kind: usize, row: u32, lines: u64, queue: u64) -> bool {
+        self.kinds[kind] = (row, lines);
+        let (other, last) = self.kinds[1 - kind];
+        other != row && other != u32::MAX && lines - last < queue
     }
 
     /// The rows that open after that at place `at` do so later, as more lines of it go first.
