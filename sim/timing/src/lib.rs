@@ -86,6 +86,8 @@ pub struct Timed {
     /// Share of the frame for which a memory bank opens rows that it may not have to: lines of the same row that may wait side by
     /// side, in an order that is not known; only at the level `packet`.
     pub disputed: Option<f64>,
+    /// Share of the frame for which the busiest bus of memory moves lines, turns, or waits for a refresh; only at the level `packet`.
+    pub taken: Option<f64>,
     /// Share of the frame that batches and passes may overlap, the longest packet of each; only at the level `bound`.
     pub overlap: Option<f64>,
     /// The passes of the frame, by number.

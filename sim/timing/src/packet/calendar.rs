@@ -42,8 +42,9 @@ impl Pauses {
 /// Work is measured in grains of one server, so a single server needs no division.
 #[derive(Clone, Debug)]
 pub(super) struct Calendar {
-    /// Binary logarithm of the slot length in grains.
-    shift: u32,
+    /// Slot length in grains, and its binary logarithm if it is a power of two.
+    length: Time,
+    shift: Option<u32>,
     servers: u64,
     /// Capacity of a slot.
     capacity: u64,
@@ -59,13 +60,13 @@ pub(super) struct Calendar {
 }
 
 impl Calendar {
-    /// A calendar with slots of at least `length` grains (rounded up to a power of two), for `servers`
-    /// servers.
+    /// A calendar with slots of `length` grains, at least 1, for `servers` servers. How fine grains are, which clocks decide, does
+    /// not change what fits in a slot.
     pub fn new(length: Time, servers: u32) -> Self {
-        let length = length.next_power_of_two();
         let servers = u64::from(servers);
         Self {
-            shift: length.trailing_zeros(),
+            length,
+            shift: length.is_power_of_two().then(|| length.trailing_zeros()),
             servers,
             capacity: length * servers,
             used: Vec::new(),
@@ -84,7 +85,7 @@ impl Calendar {
 
     /// Reserve `work` from `at` on. Returns when it begins and ends.
     pub fn reserve(&mut self, at: Time, work: u64) -> (Time, Time) {
-        let mut slot = self.find_free((at >> self.shift) as usize);
+        let mut slot = self.find_free(self.slot_of(at));
         let begin = self.end_of_slot_work(slot, at);
         let mut remaining = work;
         loop {
@@ -104,7 +105,7 @@ impl Calendar {
 
     /// Take so much capacity from `at` on, in which nothing works.
     pub fn block(&mut self, at: Time, capacity: u64) {
-        let mut slot = self.find_free((at >> self.shift) as usize);
+        let mut slot = self.find_free(self.slot_of(at));
         let mut remaining = capacity;
         while remaining > 0 {
             let here = remaining.min(self.capacity - self.used[slot]);
@@ -130,7 +131,7 @@ impl Calendar {
     /// Reserve `work` from `at` on in turn with what is reserved already: up to half of a full slot makes room and
     /// moves on to later slots.
     fn share(&mut self, at: Time, work: u64) -> (Time, Time) {
-        let mut slot = (at >> self.shift) as usize;
+        let mut slot = self.slot_of(at);
         let (mut remaining, mut moved, mut begin) = (work, 0, None);
         loop {
             self.reach(slot);
@@ -170,7 +171,11 @@ impl Calendar {
     }
 
     fn start_of(&self, slot: usize) -> Time {
-        (slot as Time) << self.shift
+        slot as Time * self.length
+    }
+
+    fn slot_of(&self, at: Time) -> usize {
+        self.shift.map_or_else(|| at / self.length, |shift| at >> shift) as usize
     }
 
     /// End of the work reserved in a slot so far, if none of it ends before `at`.
@@ -232,7 +237,12 @@ impl Calendar {
         let blocked = self.blocked.iter().chain(std::iter::repeat(&0));
         let worked = self.used.iter().zip(blocked).map(|(used, blocked)| used - blocked).zip(0..);
         let worked = worked.filter(|(work, _)| *work > 0);
-        worked.map(|(work, at): (u64, Time)| (at << self.shift, (at + 1) << self.shift, work, self.capacity))
+        worked.map(|(work, at)| (self.start_of(at), self.start_of(at + 1), work, self.capacity))
+    }
+
+    /// Work before `end`, and what else takes its place.
+    pub fn taken(&self, end: Time) -> u64 {
+        self.used[..self.used.len().min(self.slot_of(end))].iter().sum()
     }
 }
 

@@ -1,9 +1,10 @@
 //! What memory chips allow, in closed form: refresh, turns of the bus, rows that stay open, activations, ranks.
 
 use activity::{Event, LineAccess, LineKind, Unit};
-use timing::{MachineSpec, RefreshSpec};
+use timing::stepped::StepOptions;
+use timing::{Clocks, MachineSpec, RefreshSpec, Timed};
 
-use crate::common::{Packets, bound_level, clocks, packet_level, plain, size, stepped, tile};
+use crate::common::{Packets, bound_level, clocks, packet_level, plain, size, stepped, stepped_as, tile};
 
 /// A machine that only memory limits: a bus that takes 8 cycles a line, one bank of one row.
 fn machine() -> MachineSpec {
@@ -170,4 +171,47 @@ fn two_ranks_hide_what_one_cannot() {
     let of_both = |count: u32| stream((0..count).map(|n| (n / 2 % 64 + n % 2 * 64, false)));
     machine.dram.refresh = Some(RefreshSpec { interval_cycles: size(400), busy_cycles: size(21) });
     is(added(&machine, of_both, 400, 4000), 4000.0 * 8.0, 1.0);
+}
+
+/// A core of so many hertz with memory of 1 MHz, at `stepped`, `packet` and `bound`.
+fn with_slow_memory(core_hz: f64, machine: &MachineSpec, packets: &Packets) -> [Timed; 3] {
+    let clocks = Clocks::new(core_hz, 1e6).unwrap();
+    [
+        stepped_as(machine, clocks, packets, &StepOptions::default()),
+        packet_level(machine, clocks, packets),
+        bound_level(machine, clocks, packets),
+    ]
+}
+
+/// Lines that several clients read and write, in several rows.
+fn mixed() -> Packets {
+    let line = |n: u32| if n % 5 < 2 { (4096 + 3 * n % 509, true) } else { (7 * n % 1021, false) };
+    stream((0..600).map(line))
+}
+
+#[test]
+fn a_frame_is_as_long_as_its_cycles() {
+    // CL of a slow memory is long, and nothing waits for the lines that are written last.
+    let mut machine = machine();
+    (machine.dram.cas_cycles, machine.dram.banks, machine.dram.row_bytes) = (size(30), size(8), size(512));
+    for packets in [mixed(), stream((0..100).map(|n| (n, true)))] {
+        for timed in with_slow_memory(333e6, &machine, &packets) {
+            let cycles = timed.timeline.duration_ps as f64 * 333e-6;
+            assert!((cycles / timed.cycles as f64 - 1.0).abs() < 2e-4, "{cycles} for {}", timed.cycles);
+        }
+    }
+}
+
+#[test]
+fn a_clock_that_hardly_differs_takes_the_same_time() {
+    // Clocks of 333 and 333.3 MHz have grains of other lengths.
+    let mut machine = machine();
+    (machine.dram.banks, machine.dram.row_bytes, machine.dram.burst_cycles) = (size(8), size(512), size(4));
+    for packets in [mixed(), reads(400, 1), reads(400, 9)] {
+        let [one, other] = [333e6, 333.3e6].map(|hz| with_slow_memory(hz, &machine, &packets));
+        for (one, other) in one.iter().zip(&other) {
+            let [one, other] = [one, other].map(|timed| timed.timeline.duration_ps as f64);
+            assert!((other / one - 1.0).abs() < 2e-3, "{one} and {other} ps");
+        }
+    }
 }
