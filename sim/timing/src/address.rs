@@ -9,14 +9,14 @@ use crate::spec::DramSpec;
 pub struct RowAddress {
     /// Channel.
     pub channel: usize,
-    /// Bank in the channel.
+    /// Bank in the channel, counted through its ranks.
     pub bank: usize,
     /// Row in the bank.
     pub row: u32,
 }
 
 /// AddressMap from line numbers to channels, banks and rows. Chunks of lines go round the channels, then along a
-/// row, then round the banks.
+/// row, then round the banks of a rank and the ranks.
 #[derive(Clone, Copy, Debug)]
 pub struct AddressMap {
     lines_per_chunk: Divisor,
@@ -53,7 +53,7 @@ impl AddressMap {
     pub fn new(spec: &DramSpec) -> Self {
         let [chunk, row] =
             [spec.interleave_bytes, spec.row_bytes].map(|bytes| (bytes.get() / LINE_BYTES).max(1));
-        Self::with(chunk, row, spec.channels.get(), spec.banks.get())
+        Self::with(chunk, row, spec.channels.get(), spec.ranks.get() * spec.banks.get())
     }
 
     fn with(lines_per_chunk: u32, lines_per_row: u32, channels: u32, banks: u32) -> Self {

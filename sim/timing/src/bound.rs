@@ -21,6 +21,7 @@
 use activity::{Counts, Event, LineAccess, LineKind, Packet, PacketCounts, Unit, Waits};
 
 use crate::address::AddressMap;
+use crate::chips::{ChipTimes, Refresh, TurnPolicy};
 use crate::clock::{Clocks, Time};
 use crate::data_unit::DataUnit;
 use crate::demand::{CLIENTS, DemandBuilder, ServiceDemand, Station, port};
@@ -40,14 +41,14 @@ pub fn bound(machine: &MachineSpec, clocks: Clocks, totals: &Totals, mut recorde
         lengths[segment.phase].add(segment, speeds);
         add(passes.work(segment.pass), &segment.work);
     }
-    let rows = totals.rows();
+    let memory = totals.memory();
     let mut times = Vec::with_capacity(lengths.len());
     let mut now: Time = 0;
     let mut overlap: Time = 0;
     // Barriers come last in their phase.
-    for ((phase, length), rows) in totals.phases.iter().zip(&lengths).zip(&rows) {
+    for ((phase, length), memory) in totals.phases.iter().zip(&lengths).zip(&memory) {
         let busy = speeds.times(&length.work);
-        let end = now + length.of(phase, &busy, *rows);
+        let end = now + length.of(phase, &busy, memory.chips);
         overlap += phase.longest_overlap().min(end - now);
         write(&mut recorder, &clocks, &phase.counts, &busy, [now, end]);
         times.push([now, end - length.barriers, end]);
@@ -62,7 +63,7 @@ pub fn bound(machine: &MachineSpec, clocks: Clocks, totals: &Totals, mut recorde
     }
     recorder.lasts(clocks.ps(now));
     let timeline = recorder.finish();
-    let share = crate::ratio_to_busiest(clocks.ps(rows.iter().sum()), &timeline);
+    let share = crate::ratio_to_busiest(clocks.ps(memory.iter().map(|memory| memory.rows).sum()), &timeline);
     Timed {
         cycles: clocks.cycles(Clock::Core, now),
         stalls: None,
@@ -70,6 +71,7 @@ pub fn bound(machine: &MachineSpec, clocks: Clocks, totals: &Totals, mut recorde
         packets: totals.segments().map(|segment| u64::from(segment.packets)).sum(),
         rows: Some(share),
         disputed: None,
+        taken: None,
         overlap: Some(overlap as f64 / now.max(1) as f64),
         passes: passes.finish(machine, &clocks, timeline.duration_ps, &totals.parts()),
         spans: Vec::new(),
@@ -106,15 +108,15 @@ impl PhaseLength {
         add(&mut self.work, &segment.work);
     }
 
-    /// Length of `phase`, with the busy time of its units and its row time.
-    fn of(&self, phase: &Phase, busy: &[Time; Unit::COUNT], rows: Time) -> Time {
+    /// Length of `phase`, with the busy time of its units and what its lines take of the chips of memory.
+    fn of(&self, phase: &Phase, busy: &[Time; Unit::COUNT], chips: Time) -> Time {
         let floors = phase.floors(self.barriers > 0);
         let [front, tiles] = std::array::from_fn(|path| {
             let [fill, fill_stage] = phase.fill(path);
             (self.paths[path] + fill).max(self.stages[path] + fill_stage).max(floors[path])
         });
         let fill = phase.fill(0)[0].max(phase.fill(1)[0]);
-        let shared = busy.iter().copied().fold(rows, Time::max) + fill;
+        let shared = busy.iter().copied().fold(chips, Time::max) + fill;
         shared.max(front).max(tiles + self.barriers)
     }
 }
@@ -237,8 +239,8 @@ pub struct Totals {
     open: [Segment; 2],
     closed: Vec<Segment>,
     banks: Banks,
-    /// Row time of the busiest bank, for each phase before the last.
-    rows: Vec<Time>,
+    /// Times of memory, for each phase before the last.
+    memory: Vec<MemoryTime>,
     phases: Vec<Phase>,
     /// Work of every draw, by pass.
     draws: Vec<ByDraw<UnitWork>>,
@@ -273,7 +275,7 @@ impl Totals {
             open: [open(0), open(1)],
             closed: Vec::new(),
             banks: Banks::new(machine, clocks),
-            rows: Vec::new(),
+            memory: Vec::new(),
             phases: Vec::new(),
             draws: Vec::new(),
             empty: [true; 2],
@@ -349,22 +351,22 @@ impl Totals {
     /// Add phases up to `phase`.
     fn reach(&mut self, phase: usize) {
         if self.phases.len() <= phase {
-            self.rows.resize(phase, 0);
-            if let Some(last) = self.rows.last_mut() {
+            self.memory.resize(phase, MemoryTime::default());
+            if let Some(last) = self.memory.last_mut() {
                 *last += self.banks.take_longest();
             }
             self.phases.resize(phase + 1, Phase::default());
         }
     }
 
-    /// Row time of the busiest bank in each phase.
-    fn rows(&self) -> Vec<Time> {
-        let mut rows = self.rows.clone();
-        rows.resize(self.phases.len(), 0);
-        if let Some(last) = rows.last_mut() {
+    /// Times of memory in each phase.
+    fn memory(&self) -> Vec<MemoryTime> {
+        let mut memory = self.memory.clone();
+        memory.resize(self.phases.len(), MemoryTime::default());
+        if let Some(last) = memory.last_mut() {
             *last += self.banks.clone().take_longest();
         }
-        rows
+        memory
     }
 
     /// Parts of the time of each pass: the time of each draw's work in its busiest unit.
@@ -512,32 +514,60 @@ impl Uncontended {
     }
 }
 
-/// Time each bank spends closing and opening rows. This is a lower bound: lines of each client come in stream
-/// order, and clients never close each other's rows.
+/// Times that memory needs at least, since the last look.
+#[derive(Clone, Copy, Debug, Default)]
+struct MemoryTime {
+    /// The busiest bank, closing and opening rows.
+    rows: Time,
+    /// The busiest bank, rank or bus, with refresh.
+    chips: Time,
+}
+
+impl std::ops::AddAssign for MemoryTime {
+    fn add_assign(&mut self, other: Self) {
+        self.rows += other.rows;
+        self.chips += other.chips;
+    }
+}
+
+/// Time each bank spends closing and opening rows, and what rows and lines take of ranks and buses. This is a lower bound:
+/// lines of each client come in stream order, and clients never close each other's rows.
 #[derive(Clone, Debug)]
 struct Banks {
     map: AddressMap,
     banks: usize,
-    /// Time to close a row and open another. Data moves meanwhile, as row and column commands have separate
+    banks_per_rank: usize,
+    times: ChipTimes,
+    turns: TurnPolicy,
+    /// Time to close a row and open another, read or written. Data moves meanwhile, as row and column commands have separate
     /// wires.
-    row: Time,
+    row: [Time; 2],
     /// Last row of each bank and client.
     rows: Vec<[u32; CLIENTS.len()]>,
     busy: Vec<Time>,
+    /// Rows opened in each rank, and lines read and written in each channel.
+    opened: Vec<u64>,
+    moved: Vec<[u64; 2]>,
 }
 
 impl Banks {
     pub fn new(machine: &MachineSpec, clocks: &Clocks) -> Self {
         let spec = &machine.dram;
-        let banks = spec.banks.get() as usize;
-        let all = spec.channels.get() as usize * banks;
-        let row = spec.precharge_cycles.get() + spec.activate_cycles.get();
+        let [channels, ranks, banks_per_rank] =
+            [spec.channels, spec.ranks, spec.banks].map(|count| count.get() as usize);
+        let banks = ranks * banks_per_rank;
+        let times = ChipTimes::new(spec, clocks);
         Self {
             map: AddressMap::new(spec),
             banks,
-            row: clocks.period(spec.clock) * Time::from(row),
-            rows: vec![[u32::MAX; CLIENTS.len()]; all],
-            busy: vec![0; all],
+            banks_per_rank,
+            turns: TurnPolicy::new(spec, &times),
+            row: [0, 1].map(|kind| times.row_cycle(kind)),
+            times,
+            rows: vec![[u32::MAX; CLIENTS.len()]; channels * banks],
+            busy: vec![0; channels * banks],
+            opened: vec![0; channels * ranks],
+            moved: vec![[0; 2]; channels],
         }
     }
 
@@ -552,15 +582,37 @@ impl Banks {
         let Some(client) = port(access.client) else { return };
         let address = self.map.locate(line);
         let bank = address.channel * self.banks + address.bank;
+        let kind = usize::from(access.fetched() != Some(line));
+        self.moved[address.channel][kind] += 1;
         if std::mem::replace(&mut self.rows[bank][client], address.row) != address.row {
-            self.busy[bank] += self.row;
+            self.busy[bank] += self.row[kind];
+            self.opened[bank / self.banks_per_rank] += 1;
         }
     }
 
-    /// Time of the busiest bank since the last call.
-    pub fn take_longest(&mut self) -> Time {
-        let longest = self.busy.iter().copied().max().unwrap_or(0);
+    /// Least times since the last call.
+    pub fn take_longest(&mut self) -> MemoryTime {
+        let rows = self.busy.iter().copied().max().unwrap_or(0);
+        let opened = self.opened.iter().copied().max().unwrap_or(0) * self.times.spacing();
+        let moved = self.moved.iter().map(|&lines| self.on_bus(lines)).max().unwrap_or(0);
         self.busy.fill(0);
-        longest
+        self.opened.fill(0);
+        self.moved.fill([0; 2]);
+        MemoryTime { rows, chips: self.with_refresh(rows.max(opened).max(moved)) }
+    }
+
+    /// Time of lines on the bus of a channel, with its turns.
+    fn on_bus(&self, lines: [u64; 2]) -> Time {
+        let turns = self.turns.pair as f64 * self.turns.pairs(lines);
+        (lines[0] + lines[1]) * self.times.burst + turns as Time
+    }
+
+    /// `time`, and that of the refreshes meanwhile, if a single rank leaves nothing to do then.
+    fn with_refresh(&self, time: Time) -> Time {
+        let refresh = self.times.refreshes().filter(|_| self.banks == self.banks_per_rank);
+        refresh.map_or(time, |Refresh { interval, busy }| {
+            let pause = busy + self.times.activate[0];
+            time + time / interval.saturating_sub(pause).max(1) * pause
+        })
     }
 }

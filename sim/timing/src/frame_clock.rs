@@ -224,12 +224,13 @@ impl AccuracyWarning {
 /// Utilization of memory, if it is high and no unit decides the time.
 ///
 /// A unit that is busy all the time takes that long in any order. Waits for memory that is rarely busy are short. Between the two
-/// they depend on the order of lines, which the calendars do not know. The busiest bank counts as a unit.
+/// they depend on the order of lines, which the calendars do not know. The busiest bank counts as a unit, and a bus that turns or waits for
+/// a refresh as busy.
 fn memory_order(timed: &Timed) -> Option<f64> {
     let share = |busy_ps: u64| busy_ps as f64 / timed.timeline.duration_ps.max(1) as f64;
     let busy_ps = timed.timeline.busy_ps();
     let busiest = busy_ps.iter().copied().max().map_or(0.0, share);
-    let busiest = busiest * timed.rows.unwrap_or(0.0).max(1.0);
+    let busiest = (busiest * timed.rows.unwrap_or(0.0).max(1.0)).max(timed.taken.unwrap_or(0.0));
     let memory = share(busy_ps[Unit::Dram as usize]);
     (memory >= MIN_MEMORY && busiest < 1.0 / (1.0 + MAX_ERROR)).then_some(memory)
 }

@@ -31,6 +31,7 @@
 
 mod address;
 mod bound;
+mod chips;
 mod clock;
 mod data_unit;
 mod demand;
@@ -58,7 +59,7 @@ pub use passes::PassTime;
 pub use recorder::Recorder;
 pub use service::{CYCLE, Work};
 pub use spec::{
-    BinsSpec, Chips, ClientSpec, Clock, Common, Cycles, DramSpec, Entries, MachineSpec, Rates, RowBytes,
+    BinsSpec, Chips, ClientSpec, Clock, Common, Cycles, DramSpec, Entries, MachineSpec, Rates, RefreshSpec, RowBytes,
     ShaderSpec, SharedCacheSpec, UnitSpec, WaitCycles, Width,
 };
 pub use stalls::{Reason, Stalls, UnitTime};
@@ -85,6 +86,8 @@ pub struct Timed {
     /// Share of the frame for which a memory bank opens rows that it may not have to: lines of the same row that may wait side by
     /// side, in an order that is not known; only at the level `packet`.
     pub disputed: Option<f64>,
+    /// Share of the frame for which the busiest bus of memory moves lines, turns, or waits for a refresh; only at the level `packet`.
+    pub taken: Option<f64>,
     /// Share of the frame that batches and passes may overlap, the longest packet of each; only at the level `bound`.
     pub overlap: Option<f64>,
     /// The passes of the frame, by number.

@@ -63,17 +63,14 @@ pub struct ClientSpec {
     /// Packets (warps) that may wait for their lines after service, at least 1.
     pub in_flight: Entries,
     /// Lines it can request from the L2 per cycle.
-    #[serde(default = "one")]
+    #[serde(default = "least")]
     pub lines_per_cycle: Width,
     /// Events per cycle.
     pub rates: Rates,
 }
 
-fn one() -> Width {
-    Width::MIN
-}
-
-fn nothing() -> Bounded<0, 1_048_576> {
+/// What a field is that a file leaves out: one copy, no cycles, no bytes.
+fn least<const MIN: u32, const MAX: u32>() -> Bounded<MIN, MAX> {
     Bounded::MIN
 }
 
@@ -99,12 +96,12 @@ pub struct ShaderSpec {
     /// Warps that fit on a core.
     pub warps: Width,
     /// Warps that are sent to the cores in a cycle.
-    #[serde(default = "one")]
+    #[serde(default = "least")]
     pub warps_per_cycle: Width,
     /// Cycles between consecutive operations of a warp.
     pub alu_latency_cycles: Cycles,
     /// Bytes of memory in each core that the lanes of a group share.
-    #[serde(default = "nothing")]
+    #[serde(default = "least")]
     pub shared_bytes: Bounded<0, 1_048_576>,
 }
 
@@ -136,7 +133,18 @@ pub struct SharedCacheSpec {
     pub lines_per_cycle: Width,
 }
 
-/// Memory chips.
+/// Refresh of the chips: every `interval_cycles` all banks of a rank close and are out of use for `busy_cycles`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RefreshSpec {
+    /// Cycles between the refreshes of a rank (tREFI); ranks take turns.
+    pub interval_cycles: Cycles,
+    /// Cycles until a row can open again (tRFC).
+    pub busy_cycles: Cycles,
+}
+
+/// Memory chips. Constraints of the chips that a file leaves out are not modelled: they are 0, and there is one rank
+/// without refresh.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DramSpec {
@@ -146,11 +154,18 @@ pub struct DramSpec {
     /// Cycles of a request in the controller and on the way, in addition to the time of the chips; at least
     /// 1.
     pub latency_cycles: Cycles,
-    /// Lines that may wait at a channel, at least 2.
+    /// Lines that may wait at a channel, at least 2; lines to read if there is a `write_queue`.
     pub queue: Bounded<2, 65_536>,
+    /// Lines to write that may wait at a channel. Reads go first until it is full or no read waits; then all writes in it go.
+    /// Without it reads and writes share `queue`, and any line may go first.
+    #[serde(default)]
+    pub write_queue: Option<Entries>,
     /// Channels; not necessarily a power of two.
     pub channels: Chips,
-    /// Banks per channel.
+    /// Ranks per channel: sets of chips that share its bus.
+    #[serde(default = "least")]
+    pub ranks: Chips,
+    /// Banks per rank.
     pub banks: Chips,
     /// Bytes per row of a channel.
     pub row_bytes: RowBytes,
@@ -162,8 +177,38 @@ pub struct DramSpec {
     pub cas_cycles: WaitCycles,
     /// Cycles from the activation of a row to the first column command (tRCD).
     pub activate_cycles: WaitCycles,
+    /// The same to a first column command that writes (tRCDWR), if that is another time.
+    #[serde(default)]
+    pub activate_write_cycles: Option<WaitCycles>,
     /// Cycles to close a row (tRP).
     pub precharge_cycles: WaitCycles,
+    /// Cycles from the activation of a row until it may close (tRAS).
+    #[serde(default = "least")]
+    pub row_cycles: WaitCycles,
+    /// Cycles from the column command that reads a line until its row may close (tRTP, after the last burst).
+    #[serde(default = "least")]
+    pub read_to_precharge_cycles: WaitCycles,
+    /// Cycles from the column command that writes a line until its row may close (CWL, burst and tWR).
+    #[serde(default = "least")]
+    pub write_to_precharge_cycles: WaitCycles,
+    /// Cycles between the activations of rows in a rank (tRRD).
+    #[serde(default = "least")]
+    pub activate_to_activate_cycles: WaitCycles,
+    /// Cycles in which a rank opens at most four rows (tFAW).
+    #[serde(default = "least")]
+    pub four_activates_cycles: WaitCycles,
+    /// Cycles without commands for lines from a write to a read of the same rank (CWL + tWTR).
+    #[serde(default = "least")]
+    pub write_to_read_cycles: WaitCycles,
+    /// Cycles without commands for lines from a read to a write (CL - CWL and the turn of the bus).
+    #[serde(default = "least")]
+    pub read_to_write_cycles: WaitCycles,
+    /// Cycles for which the bus idles between lines of different ranks (tRTRS).
+    #[serde(default = "least")]
+    pub rank_to_rank_cycles: WaitCycles,
+    /// Refresh; none if missing.
+    #[serde(default)]
+    pub refresh: Option<RefreshSpec>,
 }
 
 /// Every unit of the block diagram.
@@ -339,6 +384,30 @@ impl MachineSpec {
                  request reads a line and each level may write one back"
             );
             return Err(("dram.queue".to_owned(), message));
+        }
+        self.dram.validate(1 + levels)
+    }
+}
+
+impl DramSpec {
+    /// Check what single fields cannot: a request may write `most_written` lines to a channel, and chips work between refreshes.
+    fn validate(&self, most_written: u32) -> Result<(), (String, String)> {
+        if let Some(queue) = self.write_queue.map(|queue| queue.get()).filter(|&queue| queue < most_written) {
+            let message = format!(
+                "`write_queue` of `units.dram` is {queue}; it has to be at least {most_written}, as the L2 and each level below it \
+                 may write a line back for one request"
+            );
+            return Err(("dram.write_queue".to_owned(), message));
+        }
+        let Some(refresh) = self.refresh else { return Ok(()) };
+        let [interval, busy] = [refresh.interval_cycles, refresh.busy_cycles].map(|cycles| cycles.get());
+        let least = 2 * (busy + self.precharge_cycles.get() + self.activate_cycles.get());
+        if interval < least {
+            let message = format!(
+                "`refresh.interval_cycles` of `units.dram` is {interval}; it has to be at least {least}, twice the time to close the \
+                 rows, refresh and open one again, or memory does little else"
+            );
+            return Err(("dram.refresh.interval_cycles".to_owned(), message));
         }
         Ok(())
     }

@@ -14,14 +14,37 @@ pub(super) enum Turn {
     Late,
 }
 
+/// Times in which nothing works: `length` from `first` on, and again every `interval`.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Pauses {
+    pub first: Time,
+    pub interval: Time,
+    pub length: Time,
+}
+
+impl Pauses {
+    /// All pauses before `at`.
+    fn before(&self, at: Time) -> Time {
+        let Some(since) = at.checked_sub(self.first) else { return 0 };
+        since / self.interval * self.length + (since % self.interval).min(self.length)
+    }
+
+    /// The first time from `at` on that is in no pause.
+    pub fn after(&self, at: Time) -> Time {
+        let Some(since) = at.checked_sub(self.first) else { return at };
+        at + self.length.saturating_sub(since % self.interval)
+    }
+}
+
 /// Time slots of equal length, each with capacity for the same amount of work. Requests come in stream order,
 /// not in time order. A request may use capacity before that of earlier requests.
 ///
 /// Work is measured in grains of one server, so a single server needs no division.
 #[derive(Clone, Debug)]
 pub(super) struct Calendar {
-    /// Binary logarithm of the slot length in grains.
-    shift: u32,
+    /// Slot length in grains, and its binary logarithm if it is a power of two.
+    length: Time,
+    shift: Option<u32>,
     servers: u64,
     /// Capacity of a slot.
     capacity: u64,
@@ -29,6 +52,7 @@ pub(super) struct Calendar {
     /// The part of it that came late, and the part that is no work.
     shared: Vec<u64>,
     blocked: Vec<u64>,
+    pauses: Option<Pauses>,
     yielded: Time,
     /// For each slot, a lower bound of the first slot from it on with free capacity (union-find with path
     /// compression).
@@ -36,26 +60,32 @@ pub(super) struct Calendar {
 }
 
 impl Calendar {
-    /// A calendar with slots of at least `length` grains (rounded up to a power of two), for `servers`
-    /// servers.
+    /// A calendar with slots of `length` grains, at least 1, for `servers` servers. How fine grains are, which clocks decide, does
+    /// not change what fits in a slot.
     pub fn new(length: Time, servers: u32) -> Self {
-        let length = length.next_power_of_two();
         let servers = u64::from(servers);
         Self {
-            shift: length.trailing_zeros(),
+            length,
+            shift: length.is_power_of_two().then(|| length.trailing_zeros()),
             servers,
             capacity: length * servers,
             used: Vec::new(),
             shared: Vec::new(),
             blocked: Vec::new(),
+            pauses: None,
             yielded: 0,
             next_free: Vec::new(),
         }
     }
 
+    /// The same with pauses.
+    pub fn with_pauses(self, pauses: Option<Pauses>) -> Self {
+        Self { pauses, ..self }
+    }
+
     /// Reserve `work` from `at` on. Returns when it begins and ends.
     pub fn reserve(&mut self, at: Time, work: u64) -> (Time, Time) {
-        let mut slot = self.find_free((at >> self.shift) as usize);
+        let mut slot = self.find_free(self.slot_of(at));
         let begin = self.end_of_slot_work(slot, at);
         let mut remaining = work;
         loop {
@@ -75,7 +105,7 @@ impl Calendar {
 
     /// Take so much capacity from `at` on, in which nothing works.
     pub fn block(&mut self, at: Time, capacity: u64) {
-        let mut slot = self.find_free((at >> self.shift) as usize);
+        let mut slot = self.find_free(self.slot_of(at));
         let mut remaining = capacity;
         while remaining > 0 {
             let here = remaining.min(self.capacity - self.used[slot]);
@@ -101,13 +131,14 @@ impl Calendar {
     /// Reserve `work` from `at` on in turn with what is reserved already: up to half of a full slot makes room and
     /// moves on to later slots.
     fn share(&mut self, at: Time, work: u64) -> (Time, Time) {
-        let mut slot = (at >> self.shift) as usize;
+        let mut slot = self.slot_of(at);
         let (mut remaining, mut moved, mut begin) = (work, 0, None);
         loop {
             self.reach(slot);
             self.shared.resize(self.used.len(), 0);
             let free = self.capacity - self.used[slot];
-            let half = (self.capacity / 2).saturating_sub(self.shared[slot]);
+            let blocked = self.blocked.get(slot).copied().unwrap_or(0);
+            let half = ((self.capacity - blocked) / 2).saturating_sub(self.shared[slot]);
             let here = remaining.min(free.max(half));
             // In turn with as much other work, if there is any.
             let before = self.used[slot].min(2 * self.shared[slot]);
@@ -140,7 +171,11 @@ impl Calendar {
     }
 
     fn start_of(&self, slot: usize) -> Time {
-        (slot as Time) << self.shift
+        slot as Time * self.length
+    }
+
+    fn slot_of(&self, at: Time) -> usize {
+        self.shift.map_or_else(|| at / self.length, |shift| at >> shift) as usize
     }
 
     /// End of the work reserved in a slot so far, if none of it ends before `at`.
@@ -173,6 +208,22 @@ impl Calendar {
         if slot >= known {
             self.used.resize(slot + 1, 0);
             self.next_free.extend(known as u32..=slot as u32);
+            if let Some(pauses) = self.pauses {
+                self.pause(known, &pauses);
+            }
+        }
+    }
+
+    /// Take the pauses out of the capacity of all slots from `first` on.
+    fn pause(&mut self, first: usize, pauses: &Pauses) {
+        self.blocked.resize(self.used.len(), 0);
+        for slot in first..self.used.len() {
+            let paused = pauses.before(self.start_of(slot + 1)) - pauses.before(self.start_of(slot));
+            let blocked = paused * self.servers;
+            (self.blocked[slot], self.used[slot]) = (blocked, blocked);
+            if blocked == self.capacity {
+                self.next_free[slot] = slot as u32 + 1;
+            }
         }
     }
 
@@ -186,7 +237,12 @@ impl Calendar {
         let blocked = self.blocked.iter().chain(std::iter::repeat(&0));
         let worked = self.used.iter().zip(blocked).map(|(used, blocked)| used - blocked).zip(0..);
         let worked = worked.filter(|(work, _)| *work > 0);
-        worked.map(|(work, at): (u64, Time)| (at << self.shift, (at + 1) << self.shift, work, self.capacity))
+        worked.map(|(work, at)| (self.start_of(at), self.start_of(at + 1), work, self.capacity))
+    }
+
+    /// Work before `end`, and what else takes its place.
+    pub fn taken(&self, end: Time) -> u64 {
+        self.used[..self.used.len().min(self.slot_of(end))].iter().sum()
     }
 }
 

@@ -31,6 +31,7 @@
 mod calendar;
 mod cores;
 mod drain;
+mod dram;
 mod levels;
 mod memory;
 mod station;
@@ -359,6 +360,7 @@ impl PacketClock {
         }
         let timeline = recorder.finish();
         let rows = crate::ratio_to_busiest(clocks.ps(memory.rows()), &timeline);
+        let taken = clocks.ps(memory.taken(end)) as f64 / timeline.duration_ps.max(1) as f64;
         let disputed = clocks.ps(memory.disputed()) as f64 / timeline.duration_ps.max(1) as f64;
         let (parts, spans) = draws.finish(&clocks, timeline.duration_ps);
         Timed {
@@ -371,6 +373,7 @@ impl PacketClock {
             packets,
             rows: Some(rows),
             disputed: Some(disputed),
+            taken: Some(taken),
             overlap: None,
         }
     }

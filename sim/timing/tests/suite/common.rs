@@ -79,6 +79,18 @@ pub fn plain() -> MachineSpec {
             cas_cycles: size(3),
             activate_cycles: size(4),
             precharge_cycles: size(5),
+            write_queue: None,
+            activate_write_cycles: None,
+            ranks: size(1),
+            row_cycles: size(0),
+            read_to_precharge_cycles: size(0),
+            write_to_precharge_cycles: size(0),
+            activate_to_activate_cycles: size(0),
+            four_activates_cycles: size(0),
+            write_to_read_cycles: size(0),
+            read_to_write_cycles: size(0),
+            rank_to_rank_cycles: size(0),
+            refresh: None,
         },
     }
 }

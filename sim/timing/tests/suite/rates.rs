@@ -62,26 +62,26 @@ fn units_alone_reach_their_rates() {
     }
 }
 
-/// A client with enough requests per cycle reads at the bandwidth of the memory buses.
+/// A client with enough requests per cycle reads at the bandwidth of the memory buses, less what refresh takes: rows close in 18
+/// cycles, are refreshed in 98 and open in 18, every 5362.
 #[test]
 fn one_client_fills_the_buses() {
     let (found, memory) = measured("bandwidth");
+    let peak = 264.0 * (1.0 - (18.0 + 98.0 + 18.0) / 5362.0);
     for found in found {
-        assert!((0.98 * 264.0..=264.0).contains(&found), "{found} of 264 GB/s");
+        assert!((0.98 * peak..=peak).contains(&found), "{found} of {peak} GB/s");
     }
-    assert!(memory > 0.98, "{memory}");
+    assert!((memory * 264.0 / found[0] - 1.0).abs() < 0.001, "{memory}");
 }
 
-/// An HD 7970 reaches 13.3 of its 29.6 Gpixel/s when blending pixels of 8 bytes; memory is the bottleneck,
-/// not the colour units. The model reaches 16.5, the limit of 264 GB/s, as its memory has no bus turnaround
-/// and no refresh.
+/// An HD 7970 reaches 13.3 of its 29.6 Gpixel/s when blending pixels of 8 bytes (AnandTech 5261); memory is the bottleneck, not the
+/// colour units. 264 GB/s are 16.5 Gpixel/s. The bus turns, and chips are refreshed; how the card orders lines is not known.
 #[test]
 fn blended_fill_is_limited_by_memory() {
     let (found, memory) = measured("colour fill, 8 bytes");
-    for found in found {
-        assert!((0.98 * 16.5..=16.5).contains(&found), "{found} of 16.5 Gpixel/s");
-    }
-    assert!(memory > 0.98, "{memory}");
+    assert!((found[0] / 13.3 - 1.0).abs() < 0.1, "{} of 13.3 Gpixel/s", found[0]);
+    assert!((found[1] / found[0] - 1.0).abs() < 0.05, "{found:?}");
+    assert!((memory * 16.5 / found[0] - 1.0).abs() < 0.001, "{memory}");
 }
 
 /// No stream stalls the reference, events are the same at all levels, and conflicting memory rows give a
@@ -100,7 +100,8 @@ fn challenging_streams_end() {
                     "row after row" | "groups that scatter" => assert!(rows > 0.9, "{name}: {rows}"),
                     // Reads and lines written back, in different rows.
                     "one giant triangle" | "groups that stream" => {}
-                    _ => assert!(rows < 0.1, "{name}, {}: {rows}", case.name),
+                    // Below what gives a warning.
+                    _ => assert!(rows < 0.2, "{name}, {}: {rows}", case.name),
                 }
             }
         }

@@ -1,0 +1,121 @@
+//! Constraints of the memory chips in grains, the same for all levels.
+
+use crate::clock::{Clocks, Time};
+use crate::spec::DramSpec;
+
+/// Refresh of a rank in grains.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Refresh {
+    /// From one to the next.
+    pub interval: Time,
+    /// Until a row can open again.
+    pub busy: Time,
+}
+
+/// Times of the commands of a channel, in grains; [`DramSpec`] explains them.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ChipTimes {
+    pub burst: Time,
+    pub cas: Time,
+    /// From the opening of a row to the column command of a read, and of a write.
+    pub activate: [Time; 2],
+    pub precharge: Time,
+    pub latency: Time,
+    pub row: Time,
+    /// From the column command of a read, and of a write, until its row may close.
+    pub to_precharge: [Time; 2],
+    pub activate_to_activate: Time,
+    pub four_activates: Time,
+    pub write_to_read: Time,
+    pub read_to_write: Time,
+    pub rank_to_rank: Time,
+    pub refresh: Option<Refresh>,
+}
+
+impl ChipTimes {
+    pub fn new(spec: &DramSpec, clocks: &Clocks) -> Self {
+        let period = clocks.period(spec.clock);
+        let cycles = |count: u32| period * Time::from(count);
+        Self {
+            burst: cycles(spec.burst_cycles.get()),
+            cas: cycles(spec.cas_cycles.get()),
+            activate: [spec.activate_cycles, spec.activate_write_cycles.unwrap_or(spec.activate_cycles)]
+                .map(|count| cycles(count.get())),
+            precharge: cycles(spec.precharge_cycles.get()),
+            latency: cycles(spec.latency_cycles.get()),
+            row: cycles(spec.row_cycles.get()),
+            to_precharge: [spec.read_to_precharge_cycles, spec.write_to_precharge_cycles]
+                .map(|count| cycles(count.get())),
+            activate_to_activate: cycles(spec.activate_to_activate_cycles.get()),
+            four_activates: cycles(spec.four_activates_cycles.get()),
+            write_to_read: cycles(spec.write_to_read_cycles.get()),
+            read_to_write: cycles(spec.read_to_write_cycles.get()),
+            rank_to_rank: cycles(spec.rank_to_rank_cycles.get()),
+            refresh: spec.refresh.map(|refresh| Refresh {
+                interval: cycles(refresh.interval_cycles.get()),
+                busy: cycles(refresh.busy_cycles.get()),
+            }),
+        }
+    }
+}
+
+impl ChipTimes {
+    /// Least time from the opening of a row to that of the next in its bank, if one line is read or, `kind` 1, written.
+    pub fn row_cycle(&self, kind: usize) -> Time {
+        self.precharge + self.row.max(self.activate[kind] + self.to_precharge[kind])
+    }
+
+    /// Time between the activations of a rank that opens row after row.
+    pub fn spacing(&self) -> Time {
+        self.activate_to_activate.max(self.four_activates.div_ceil(4))
+    }
+
+    /// Time for which a refresh keeps all rows of a rank closed.
+    pub fn refreshes(&self) -> Option<Refresh> {
+        self.refresh.map(|refresh| Refresh { busy: self.precharge + refresh.busy, ..refresh })
+    }
+}
+
+/// How often a bus turns if its queues are full: once each way for so many lines.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TurnPolicy {
+    /// Time for which the bus idles for a turn to writes and one back to reads.
+    pub pair: Time,
+    /// The same if all lines are of one bank, which has to open another row for each turn.
+    pub pair_in_bank: Time,
+    /// Places for lines, or for writes if they have their own.
+    places: f64,
+    drains: bool,
+    /// Lines after which the share of writes is old.
+    pub memory: u64,
+}
+
+impl TurnPolicy {
+    pub fn new(spec: &DramSpec, times: &ChipTimes) -> Self {
+        let places = spec.write_queue.map_or(spec.queue.get(), |queue| queue.get());
+        let pair = times.write_to_read + times.read_to_write;
+        let row = |from: usize, to: usize, turn: Time| {
+            (times.to_precharge[from] + times.precharge + times.activate[to]).saturating_sub(times.burst).max(turn)
+        };
+        Self {
+            pair,
+            pair_in_bank: if pair > 0 { row(0, 1, times.read_to_write) + row(1, 0, times.write_to_read) } else { 0 },
+            // In a queue of both the place of the last line one way is taken before the turn.
+            places: f64::from(places) - if spec.write_queue.is_some() { 0.0 } else { 0.5 },
+            drains: spec.write_queue.is_some(),
+            memory: 8 * u64::from(places),
+        }
+    }
+
+    /// Turns there and back for so many reads and writes.
+    ///
+    /// A queue of writes drains once it is full. In a queue of both, `p` places, lines of one way go until all places wait for the
+    /// other: with a share `f` of writes `p / (1 - f)` writes and `p / f` reads in turn.
+    pub fn pairs(&self, lines: [u64; 2]) -> f64 {
+        let [reads, writes] = lines.map(|count| count as f64);
+        if self.drains {
+            return if reads > 0.0 { writes / self.places } else { 0.0 };
+        }
+        reads * writes / ((reads + writes).max(1.0) * self.places)
+    }
+}
