@@ -3,6 +3,7 @@
 use super::calendar::{Calendar, QueueTimes};
 use super::drain::{Drain, OnCores};
 use super::memory::Memory;
+use super::slots::{Occupancy, Slots};
 use super::station::{Service, aligned};
 use super::{Span, Visit};
 use crate::clock::{Clocks, Time};
@@ -14,6 +15,9 @@ use crate::spec::MachineSpec;
 
 /// Cycles per slot of the calendars.
 const SLOT_CYCLES: u32 = 64;
+
+/// Operations of a warp, one after another, in an interval of the slots.
+const OPERATIONS_PER_INTERVAL: Time = 32;
 
 /// Warps that are simulated together.
 const WARPS_PER_CHUNK: u32 = 4;
@@ -65,9 +69,8 @@ struct PacketFifo {
     sender: Server,
     departed: Time,
     flights: QueueTimes,
-    /// Warp slots of the cores. Each kind has its own queue, as the times of the two kinds are not sorted
-    /// together.
-    slots: QueueTimes,
+    /// Warp slots of the cores. Each kind has its own, as the times of the two kinds are not sorted together.
+    slots: Slots,
 }
 
 /// A data unit, which serves warps in order.
@@ -108,8 +111,8 @@ pub(super) struct Cores {
     sends: Calendar,
     send_work: Work,
     lanes: Calendar,
-    /// Warp slots of the cores, which both kinds share.
-    slots: Calendar,
+    /// How both kinds share the warp slots.
+    slots: Occupancy,
     cores: u32,
     period: Time,
     alu: Time,
@@ -124,7 +127,8 @@ impl Cores {
     pub fn new(machine: &MachineSpec, clocks: &Clocks) -> Self {
         let spec = &machine.shader;
         let period = clocks.period(spec.clock);
-        let slots = QueueTimes::new(spec.cores.get() * spec.warps.get());
+        let alu = period * Time::from(spec.alu_latency_cycles);
+        let slots = Slots::new(spec.cores.get() * spec.warps.get());
         let fifo = PacketFifo {
             sent: 0,
             sender: Server::default(),
@@ -137,10 +141,10 @@ impl Cores {
             sends: Calendar::new(Time::from(SLOT_CYCLES) * period, spec.warps_per_cycle.get()),
             send_work: CYCLE.div_ceil(spec.warps_per_cycle.get().into()),
             lanes: Calendar::new(Time::from(SLOT_CYCLES) * period, spec.cores.get() * spec.lanes.get()),
-            slots: Calendar::new(Time::from(SLOT_CYCLES) * period, spec.cores.get() * spec.warps.get()),
+            slots: Occupancy::new(spec.cores.get() * spec.warps.get(), OPERATIONS_PER_INTERVAL * alu),
             cores: spec.cores.get(),
             period,
-            alu: period * Time::from(spec.alu_latency_cycles),
+            alu,
             machine: machine.clone(),
             drain: Drain::new(machine, clocks),
             lanes_of_core: spec.lanes.get(),
@@ -192,7 +196,7 @@ impl Cores {
             run.ready = run.ready.with(ready.from, ready.to);
             run.waited = ready.to - (sent.to + self.period).min(ready.to);
             let done = self.operate(visit, &chunk, sent.from, ready);
-            self.fifos[kind].slots.note_all(chunk.count, done.from, done.to);
+            self.fifos[kind].slots.hold(chunk.count, done.from, done.to);
             run.done = run.done.max(done.to);
         }
         if kind == 1 {
@@ -323,8 +327,8 @@ impl Cores {
         };
         // Warps of both kinds take turns on the slots. How long others keep the lanes does not count, as a warp is faster with
         // fewer beside it.
-        let held = u64::from(chunk.count) * (alone + ready.from.saturating_sub(sent));
-        let held = self.slots.reserve_as(visit.turn, sent, held).1;
+        let each = alone + ready.from.saturating_sub(sent);
+        let held = self.slots.hold(visit.turn, sent, chunk.count, each);
         let last = (ready.to + alone).max(issued + self.alu.saturating_sub(self.period)).max(held);
         Span { from: last - (ready.to - ready.from).min(last - ready.from), to: last }
     }

@@ -33,6 +33,7 @@ mod cores;
 mod drain;
 mod levels;
 mod memory;
+mod slots;
 mod station;
 
 use std::collections::VecDeque;
