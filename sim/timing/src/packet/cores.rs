@@ -3,7 +3,7 @@
 use super::calendar::{Calendar, QueueTimes};
 use super::drain::{Drain, OnCores};
 use super::memory::Memory;
-use super::slots::{Occupancy, Slots};
+use super::slots::{Occupancy, Slots, Turns, Wait};
 use super::station::{Service, aligned};
 use super::{Span, Visit};
 use crate::clock::{Clocks, Time};
@@ -113,6 +113,8 @@ pub(super) struct Cores {
     lanes: Calendar,
     /// How both kinds share the warp slots.
     slots: Occupancy,
+    /// Turns of pixels and groups at the slots, for vertices that wait beside them.
+    turns: Turns,
     cores: u32,
     period: Time,
     alu: Time,
@@ -142,6 +144,7 @@ impl Cores {
             send_work: CYCLE.div_ceil(spec.warps_per_cycle.get().into()),
             lanes: Calendar::new(Time::from(SLOT_CYCLES) * period, spec.cores.get() * spec.lanes.get()),
             slots: Occupancy::new(spec.cores.get() * spec.warps.get(), OPERATIONS_PER_INTERVAL * alu),
+            turns: Turns::default(),
             cores: spec.cores.get(),
             period,
             alu,
@@ -169,7 +172,8 @@ impl Cores {
         let kind = usize::from(visit.station == Station::Pixel);
         let warps = demand.warps(self.warp_lanes);
         let fifo = &mut self.fifos[kind];
-        let taken = visit.arrive.max(fifo.sent).max(fifo.flights.room_at());
+        let came = visit.arrive.max(fifo.flights.room_at());
+        let taken = came.max(fifo.sent);
         let mut room = taken;
         if kind == 1 {
             let admitted = self.drain.admits(visit.arrive, self.most(demand, warps));
@@ -187,8 +191,14 @@ impl Cores {
         let uses_data = kind == 1 && demand.uses_data();
         for first in (0..warps).step_by(WARPS_PER_CHUNK as usize) {
             let chunk = Chunk { first, count: WARPS_PER_CHUNK.min(warps - first), of: warps };
-            let from = room.max(self.fifos[kind].sent);
+            let mut from = room.max(self.fifos[kind].sent);
+            if kind == 0 {
+                from = (0..chunk.count).fold(from, |at, _| self.turns.after(came, at));
+            }
             let sent = self.send(kind, from, chunk.count, uses_data.then_some(demand.data_unit()));
+            if kind == 1 && came < sent.from {
+                self.note_turns(demand, &chunk, came, sent);
+            }
             let mut ready = Span { from: sent.from + self.period, to: sent.to + self.period };
             if uses_data {
                 ready = self.data(visit, &chunk, ready, builder, memory, &mut run);
@@ -207,6 +217,19 @@ impl Cores {
         fifo.departed = run.departed;
         fifo.flights.note(run.departed);
         run
+    }
+
+    /// Record that some warps waited since `since` for slots and were sent at `sent`. A group has all its slots at once.
+    fn note_turns(&mut self, demand: &ServiceDemand, chunk: &Chunk, since: Time, sent: Span) {
+        match demand.group {
+            Some(_) if chunk.first == 0 => self.turns.note(Wait { since, sent: sent.from, warps: chunk.of }),
+            Some(_) => {}
+            None => {
+                let step = (sent.to - sent.from) / Time::from(chunk.count.max(2) - 1);
+                let at = |warp: u32| sent.from + step * Time::from(warp);
+                (0..chunk.count).for_each(|warp| self.turns.note(Wait { since, sent: at(warp), warps: 1 }));
+            }
+        }
     }
 
     /// Packets like that of `demand` that have room on the cores at once. Only groups need room but for their warps; all groups

@@ -129,6 +129,61 @@ impl Occupancy {
     }
 }
 
+/// Most turns that are remembered: those of the packets between the first unit and the cores.
+const MAX_TURNS: usize = 1 << 12;
+
+/// Turns of warps that waited for a slot. Where both kinds wait, their warps are sent alternately.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Turns {
+    waited: VecDeque<Wait>,
+    /// Warps of the other kind that the last one still lets pass.
+    passes: u32,
+}
+
+/// Warps that waited for a slot.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Wait {
+    /// Since when they waited, and when they were sent.
+    pub since: Time,
+    pub sent: Time,
+    /// How many there are. Those of a group have their slots together, and let one of the other kind pass each.
+    pub warps: u32,
+}
+
+impl Turns {
+    /// Some were sent, no earlier than those before them.
+    pub fn note(&mut self, wait: Wait) {
+        if self.waited.len() == MAX_TURNS {
+            self.waited.pop_front();
+        }
+        self.waited.push_back(wait);
+    }
+
+    /// When a warp of the other kind is sent that waits since `came` and could be sent at `at`, both no earlier than for those before
+    /// it: after those that wait already, were not sent before it came, and have not yet let others pass.
+    pub fn after(&mut self, came: Time, at: Time) -> Time {
+        while self.waited.front().is_some_and(|wait| wait.sent < came) {
+            self.waited.pop_front();
+        }
+        let waits = self.waited.front().filter(|wait| wait.since <= at).copied();
+        match waits {
+            Some(_) if self.passes > 0 => {
+                self.passes -= 1;
+                at
+            }
+            Some(wait) => {
+                self.waited.pop_front();
+                self.passes = wait.warps - 1;
+                wait.sent.max(at)
+            }
+            None => {
+                self.passes = 0;
+                at
+            }
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -170,5 +225,20 @@ mod tests {
         assert_eq!((cores.hold(Turn::Late, 0, 2, 32), cores.yielded()), (32, 80));
         // Half of the first two intervals is taken.
         assert_eq!(cores.hold(Turn::Late, 0, 1, 16), 48);
+    }
+
+    #[test]
+    fn warps_of_two_kinds_that_wait_are_sent_alternately() {
+        let mut turns = Turns::default();
+        for (since, sent, warps) in [(0, 10, 1), (10, 20, 1), (20, 30, 2), (25, 40, 1), (70, 90, 1)] {
+            turns.note(Wait { since, sent, warps });
+        }
+        // Those that wait since 5 go after one each, and two after the two that are sent together. At 50 none waits.
+        let mut at = 0;
+        let found = [5, 5, 5, 5, 5, 50, 80].map(|came| {
+            at = turns.after(came, came.max(at));
+            at
+        });
+        assert_eq!(found, [10, 20, 30, 30, 40, 50, 90]);
     }
 }
