@@ -3,6 +3,7 @@
 use super::calendar::{Calendar, QueueTimes};
 use super::drain::{Drain, OnCores};
 use super::memory::Memory;
+use super::slots::{Occupancy, Slots, Turns, Wait};
 use super::station::{Service, aligned};
 use super::{Span, Visit};
 use crate::clock::{Clocks, Time};
@@ -14,6 +15,9 @@ use crate::spec::MachineSpec;
 
 /// Cycles per slot of the calendars.
 const SLOT_CYCLES: u32 = 64;
+
+/// Operations of a warp, one after another, in an interval of the slots.
+const OPERATIONS_PER_INTERVAL: Time = 32;
 
 /// Warps that are simulated together.
 const WARPS_PER_CHUNK: u32 = 4;
@@ -65,9 +69,8 @@ struct PacketFifo {
     sender: Server,
     departed: Time,
     flights: QueueTimes,
-    /// Warp slots of the cores. Each kind has its own queue, as the times of the two kinds are not sorted
-    /// together.
-    slots: QueueTimes,
+    /// Warp slots of the cores. Each kind has its own, as the times of the two kinds are not sorted together.
+    slots: Slots,
 }
 
 /// A data unit, which serves warps in order.
@@ -108,8 +111,10 @@ pub(super) struct Cores {
     sends: Calendar,
     send_work: Work,
     lanes: Calendar,
-    /// Warp slots of the cores, which both kinds share.
-    slots: Calendar,
+    /// How both kinds share the warp slots.
+    slots: Occupancy,
+    /// Turns of pixels and groups at the slots, for vertices that wait beside them.
+    turns: Turns,
     cores: u32,
     period: Time,
     alu: Time,
@@ -124,7 +129,8 @@ impl Cores {
     pub fn new(machine: &MachineSpec, clocks: &Clocks) -> Self {
         let spec = &machine.shader;
         let period = clocks.period(spec.clock);
-        let slots = QueueTimes::new(spec.cores.get() * spec.warps.get());
+        let alu = period * Time::from(spec.alu_latency_cycles);
+        let slots = Slots::new(spec.cores.get() * spec.warps.get());
         let fifo = PacketFifo {
             sent: 0,
             sender: Server::default(),
@@ -137,10 +143,11 @@ impl Cores {
             sends: Calendar::new(Time::from(SLOT_CYCLES) * period, spec.warps_per_cycle.get()),
             send_work: CYCLE.div_ceil(spec.warps_per_cycle.get().into()),
             lanes: Calendar::new(Time::from(SLOT_CYCLES) * period, spec.cores.get() * spec.lanes.get()),
-            slots: Calendar::new(Time::from(SLOT_CYCLES) * period, spec.cores.get() * spec.warps.get()),
+            slots: Occupancy::new(spec.cores.get() * spec.warps.get(), OPERATIONS_PER_INTERVAL * alu),
+            turns: Turns::default(),
             cores: spec.cores.get(),
             period,
-            alu: period * Time::from(spec.alu_latency_cycles),
+            alu,
             machine: machine.clone(),
             drain: Drain::new(machine, clocks),
             lanes_of_core: spec.lanes.get(),
@@ -165,7 +172,8 @@ impl Cores {
         let kind = usize::from(visit.station == Station::Pixel);
         let warps = demand.warps(self.warp_lanes);
         let fifo = &mut self.fifos[kind];
-        let taken = visit.arrive.max(fifo.sent).max(fifo.flights.room_at());
+        let came = visit.arrive.max(fifo.flights.room_at());
+        let taken = came.max(fifo.sent);
         let mut room = taken;
         if kind == 1 {
             let admitted = self.drain.admits(visit.arrive, self.most(demand, warps));
@@ -183,8 +191,14 @@ impl Cores {
         let uses_data = kind == 1 && demand.uses_data();
         for first in (0..warps).step_by(WARPS_PER_CHUNK as usize) {
             let chunk = Chunk { first, count: WARPS_PER_CHUNK.min(warps - first), of: warps };
-            let from = room.max(self.fifos[kind].sent);
+            let mut from = room.max(self.fifos[kind].sent);
+            if kind == 0 {
+                from = (0..chunk.count).fold(from, |at, _| self.turns.after(came, at));
+            }
             let sent = self.send(kind, from, chunk.count, uses_data.then_some(demand.data_unit()));
+            if kind == 1 && came < sent.from {
+                self.note_turns(demand, &chunk, came, sent);
+            }
             let mut ready = Span { from: sent.from + self.period, to: sent.to + self.period };
             if uses_data {
                 ready = self.data(visit, &chunk, ready, builder, memory, &mut run);
@@ -192,7 +206,7 @@ impl Cores {
             run.ready = run.ready.with(ready.from, ready.to);
             run.waited = ready.to - (sent.to + self.period).min(ready.to);
             let done = self.operate(visit, &chunk, sent.from, ready);
-            self.fifos[kind].slots.note_all(chunk.count, done.from, done.to);
+            self.fifos[kind].slots.hold(chunk.count, done.from, done.to);
             run.done = run.done.max(done.to);
         }
         if kind == 1 {
@@ -203,6 +217,19 @@ impl Cores {
         fifo.departed = run.departed;
         fifo.flights.note(run.departed);
         run
+    }
+
+    /// Record that some warps waited since `since` for slots and were sent at `sent`. A group has all its slots at once.
+    fn note_turns(&mut self, demand: &ServiceDemand, chunk: &Chunk, since: Time, sent: Span) {
+        match demand.group {
+            Some(_) if chunk.first == 0 => self.turns.note(Wait { since, sent: sent.from, warps: chunk.of }),
+            Some(_) => {}
+            None => {
+                let step = (sent.to - sent.from) / Time::from(chunk.count.max(2) - 1);
+                let at = |warp: u32| sent.from + step * Time::from(warp);
+                (0..chunk.count).for_each(|warp| self.turns.note(Wait { since, sent: at(warp), warps: 1 }));
+            }
+        }
     }
 
     /// Packets like that of `demand` that have room on the cores at once. Only groups need room but for their warps; all groups
@@ -323,8 +350,8 @@ impl Cores {
         };
         // Warps of both kinds take turns on the slots. How long others keep the lanes does not count, as a warp is faster with
         // fewer beside it.
-        let held = u64::from(chunk.count) * (alone + ready.from.saturating_sub(sent));
-        let held = self.slots.reserve_as(visit.turn, sent, held).1;
+        let each = alone + ready.from.saturating_sub(sent);
+        let held = self.slots.hold(visit.turn, sent, chunk.count, each);
         let last = (ready.to + alone).max(issued + self.alu.saturating_sub(self.period)).max(held);
         Span { from: last - (ready.to - ready.from).min(last - ready.from), to: last }
     }

@@ -34,6 +34,7 @@ mod drain;
 mod dram;
 mod levels;
 mod memory;
+mod slots;
 mod station;
 
 use std::collections::VecDeque;

@@ -303,3 +303,19 @@ fn cores_run_empty_as_they_serve_warps_in_turn() {
         assert!(off.abs() < 0.02, "{tiles_of_stream} tiles: {found} of {truth}");
     }
 }
+
+/// One core with two slots, and a program twenty times as long as the others. Those go through the other slot one after another, and do
+/// not wait for the long one.
+#[test]
+fn short_programs_pass_a_long_one_on_the_other_slot() {
+    let mut machine = plain();
+    let shader = &mut machine.shader;
+    (shader.warps, shader.alu_latency_cycles) = (size(2), size(10));
+    let program = |ops: u32| vec![(Event::PixelInvocations, 1), (Event::ShaderOps, ops)];
+    let packets = tiles([program(200)].into_iter().chain((0..20).map(|_| program(10))));
+    let truth = stepped(&machine, &packets).cycles;
+    let found = packet_level(&machine, clocks(), &packets).cycles;
+    // Twenty programs of 100 cycles and a cycle to send each, after the five units before the cores; two to leave the cores and the machine.
+    assert_eq!(truth, 5 + 20 * 101 + 2);
+    assert!(found.abs_diff(truth) <= 2, "{found} of {truth}");
+}

@@ -6,7 +6,7 @@ use timing::MachineSpec;
 use timing::stepped::StepOptions;
 
 use crate::common::{
-    Packets, bound_level, clocks, packet, packet_level, plain, read, size, stepped, stepped_as, tile,
+    Packets, bound_level, clocks, packet, packet_level, plain, rates, read, size, stepped, stepped_as, tile,
 };
 
 /// Units before the cores, one cycle of latency each.
@@ -251,4 +251,28 @@ proptest! {
             prop_assert!(bins.iter().all(|bin| bin.busy_ps.iter().all(|&busy| busy <= found.timeline.bin_ps)));
         }
     }
+}
+
+/// Vertices of the next pass come while groups fill the core. Where both wait for slots they are sent alternately, so short programs of
+/// vertices wait for the long ones of groups, and set-up idles meanwhile.
+#[test]
+fn vertices_and_groups_take_turns_on_a_full_core() {
+    let mut machine = roomy(1, 8);
+    let shader = &mut machine.shader;
+    (shader.lanes, shader.warp_lanes, shader.in_flight) = (size(32), size(32), size(32));
+    machine.setup.rates = rates("{\"triangles_in\": 0.25}");
+    let vertices = |_| {
+        let counts = [(Event::VertexInvocations, 38), (Event::ShaderOps, 38 * 12), (Event::TrianglesIn, 32)];
+        (Packet { pass: 1, ..packet(PacketKind::Vertices, &counts) }, Vec::new())
+    };
+    let tile = Packet { pass: 1, ..tile(&[(Event::TilesVisited, 1)]) };
+    let all: Packets = groups(100, group(128, 90, 119, 0))
+        .into_iter()
+        .chain((0..300).map(vertices))
+        .chain([(tile, Vec::new())])
+        .collect();
+    let [truth, found, _] = cycles(&machine, &all);
+    // Each by itself: 36,000 cycles of the lanes, 38,400 of set-up.
+    assert!(truth > 48_000, "{truth}");
+    assert!(found.abs_diff(truth) * 20 <= truth, "{found} of {truth}");
 }

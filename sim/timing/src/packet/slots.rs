@@ -1,0 +1,244 @@
+//! Warp slots of the cores at the level `packet`.
+
+use std::collections::VecDeque;
+
+use super::calendar::Turn;
+use crate::clock::Time;
+
+/// Slots by the time at which they become free. A warp takes the first that is free. Programs of unequal length free slots in another
+/// order than they took them, so this is no queue.
+#[derive(Clone, Debug)]
+pub(super) struct Slots {
+    /// Times in order, and how many slots become free at each.
+    free: VecDeque<(Time, u32)>,
+    count: u32,
+}
+
+impl Slots {
+    /// `count` free slots, at least 1.
+    pub fn new(count: u32) -> Self {
+        Self { free: VecDeque::from([(0, count)]), count }
+    }
+
+    /// When `warps` slots are free; if there are fewer, when all are.
+    pub fn room_for(&self, warps: u32) -> Time {
+        let mut missing = warps.min(self.count);
+        for &(at, slots) in &self.free {
+            if slots >= missing {
+                return at;
+            }
+            missing -= slots;
+        }
+        0
+    }
+
+    /// Let `warps` warps, at least 1, take the slots that become free first. The first of them is done at `from`, the last at `to`.
+    pub fn hold(&mut self, warps: u32, from: Time, to: Time) {
+        let warps_at_once = warps.min(self.count);
+        self.take(warps_at_once);
+        let step = to.saturating_sub(from) / Time::from(warps.max(2) - 1);
+        if step == 0 {
+            return self.give(warps_at_once, to);
+        }
+        (0..warps_at_once).for_each(|behind| self.give(1, to - step * Time::from(behind)));
+    }
+
+    fn take(&mut self, warps: u32) {
+        let mut missing = warps;
+        while let Some((_, slots)) = self.free.front_mut().filter(|_| missing > 0) {
+            let taken = missing.min(*slots);
+            *slots -= taken;
+            missing -= taken;
+            if *slots == 0 {
+                self.free.pop_front();
+            }
+        }
+    }
+
+    fn give(&mut self, slots: u32, at: Time) {
+        let after = self.free.partition_point(|(before, _)| *before <= at);
+        match after.checked_sub(1).map(|last| &mut self.free[last]).filter(|(before, _)| *before == at) {
+            Some((_, there)) => *there += slots,
+            None => self.free.insert(after, (at, slots)),
+        }
+    }
+}
+
+/// How much of the slots of the cores warps of both kinds hold over time. A warp holds one slot at a time, so a long program does not keep
+/// others out of slots that it does not need.
+#[derive(Clone, Debug)]
+pub(super) struct Occupancy {
+    /// Binary logarithm of the length of an interval.
+    shift: u32,
+    /// Slot time of an interval.
+    capacity: u64,
+    /// The part of it that is held, and of that what came late.
+    held: Vec<u64>,
+    late: Vec<u64>,
+    yielded: Time,
+}
+
+impl Occupancy {
+    /// No warp on `slots` slots, by intervals of at least `length`.
+    pub fn new(slots: u32, length: Time) -> Self {
+        let shift = length.next_power_of_two().trailing_zeros();
+        Self { shift, capacity: u64::from(slots) << shift, held: Vec::new(), late: Vec::new(), yielded: 0 }
+    }
+
+    /// Let `warps` warps hold a slot each for a time `each` from `from` on. Returns when they have had it: later, if slots are taken. What
+    /// comes late gets up to half of an interval, and what is there goes on later.
+    pub fn hold(&mut self, turn: Turn, from: Time, warps: u32, each: Time) -> Time {
+        let (mut at, mut missing, mut moved) = (from, u64::from(warps) * each, 0);
+        while missing > 0 {
+            let interval = (at >> self.shift) as usize;
+            let end = (interval as Time + 1) << self.shift;
+            self.reach(interval);
+            let free = self.capacity - self.held[interval];
+            let most = match turn {
+                Turn::InOrder => free,
+                Turn::Late => free.max((self.capacity / 2).saturating_sub(self.late[interval])),
+            };
+            let here = missing.min(u64::from(warps) * (end - at)).min(most);
+            missing -= here;
+            self.held[interval] += here.min(free);
+            moved += here - here.min(free);
+            if turn == Turn::Late {
+                self.late[interval] += here;
+            }
+            at = if missing > 0 { end } else { at + here.div_ceil(u64::from(warps)) };
+        }
+        if moved > 0 {
+            let warps = (self.capacity >> self.shift) as u32;
+            let begin = ((from >> self.shift) + 1) << self.shift;
+            let yielded = self.hold(Turn::InOrder, begin, warps, moved.div_ceil(warps.into()));
+            self.yielded = self.yielded.max(yielded);
+        }
+        at
+    }
+
+    /// When the last work that made room for other work ends; 0 if none did.
+    pub fn yielded(&self) -> Time {
+        self.yielded
+    }
+
+    fn reach(&mut self, interval: usize) {
+        if interval >= self.held.len() {
+            self.held.resize(interval + 1, 0);
+            self.late.resize(interval + 1, 0);
+        }
+    }
+}
+
+/// Most turns that are remembered: those of the packets between the first unit and the cores.
+const MAX_TURNS: usize = 1 << 12;
+
+/// Turns of warps that waited for a slot. Where both kinds wait, their warps are sent alternately.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Turns {
+    waited: VecDeque<Wait>,
+    /// Warps of the other kind that the last one still lets pass.
+    passes: u32,
+}
+
+/// Warps that waited for a slot.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Wait {
+    /// Since when they waited, and when they were sent.
+    pub since: Time,
+    pub sent: Time,
+    /// How many there are. Those of a group have their slots together, and let one of the other kind pass each.
+    pub warps: u32,
+}
+
+impl Turns {
+    /// Some were sent, no earlier than those before them.
+    pub fn note(&mut self, wait: Wait) {
+        if self.waited.len() == MAX_TURNS {
+            self.waited.pop_front();
+        }
+        self.waited.push_back(wait);
+    }
+
+    /// When a warp of the other kind is sent that waits since `came` and could be sent at `at`, both no earlier than for those before
+    /// it: after those that wait already, were not sent before it came, and have not yet let others pass.
+    pub fn after(&mut self, came: Time, at: Time) -> Time {
+        while self.waited.front().is_some_and(|wait| wait.sent < came) {
+            self.waited.pop_front();
+        }
+        let waits = self.waited.front().filter(|wait| wait.since <= at).copied();
+        match waits {
+            Some(_) if self.passes > 0 => {
+                self.passes -= 1;
+                at
+            }
+            Some(wait) => {
+                self.waited.pop_front();
+                self.passes = wait.warps - 1;
+                wait.sent.max(at)
+            }
+            None => {
+                self.passes = 0;
+                at
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_warp_takes_the_slot_that_is_free_first() {
+        let mut slots = Slots::new(2);
+        slots.hold(1, 100, 100);
+        for done in [10, 20, 30] {
+            slots.hold(1, done, done);
+            assert_eq!([1, 2].map(|warps| slots.room_for(warps)), [done, 100]);
+        }
+    }
+
+    #[test]
+    fn warps_of_a_packet_end_one_after_another() {
+        let mut slots = Slots::new(4);
+        slots.hold(3, 10, 20);
+        assert_eq!([1, 2, 3, 4].map(|warps| slots.room_for(warps)), [0, 10, 15, 20]);
+        // More warps than slots: the last ones keep them.
+        slots.hold(5, 30, 50);
+        assert_eq!([1, 2, 4, 9].map(|warps| slots.room_for(warps)), [35, 40, 50, 50]);
+    }
+
+    #[test]
+    fn a_warp_holds_one_slot_however_long_it_is() {
+        let mut cores = Occupancy::new(2, 16);
+        assert_eq!(cores.hold(Turn::InOrder, 3, 1, 100), 103);
+        // The other slot is free.
+        assert_eq!(cores.hold(Turn::InOrder, 3, 1, 50), 53);
+        // Both are taken until 53.
+        assert!((53..=64).contains(&(cores.hold(Turn::InOrder, 40, 1, 10))));
+    }
+
+    #[test]
+    fn late_warps_get_half_and_the_others_go_on_later() {
+        let mut cores = Occupancy::new(4, 16);
+        assert_eq!(cores.hold(Turn::InOrder, 0, 4, 64), 64);
+        assert_eq!((cores.hold(Turn::Late, 0, 2, 32), cores.yielded()), (32, 80));
+        // Half of the first two intervals is taken.
+        assert_eq!(cores.hold(Turn::Late, 0, 1, 16), 48);
+    }
+
+    #[test]
+    fn warps_of_two_kinds_that_wait_are_sent_alternately() {
+        let mut turns = Turns::default();
+        for (since, sent, warps) in [(0, 10, 1), (10, 20, 1), (20, 30, 2), (25, 40, 1), (70, 90, 1)] {
+            turns.note(Wait { since, sent, warps });
+        }
+        // Those that wait since 5 go after one each, and two after the two that are sent together. At 50 none waits.
+        let mut at = 0;
+        let found = [5, 5, 5, 5, 5, 50, 80].map(|came| {
+            at = turns.after(came, came.max(at));
+            at
+        });
+        assert_eq!(found, [10, 20, 30, 30, 40, 50, 90]);
+    }
+}
