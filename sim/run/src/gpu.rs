@@ -395,6 +395,18 @@ mod tests {
                 .replace("latency_cycles: 40, queue: 32, channels", "latency_cycles: 40, queue: 3, channels"),
         );
         assert!(text.contains("`queue` of `units.dram` is 3") && text.contains("at least 4"), "{text}");
+        let text = message(&iris.replace("row_cycles: 28", "write_queue: 2, row_cycles: 28"));
+        assert!(text.contains("`write_queue` of `units.dram` is 2") && text.contains("at least 3"), "{text}");
+        let text = message(&iris.replace("interval_cycles: 6240", "interval_cycles: 459"));
+        assert!(
+            text.contains("`refresh.interval_cycles` of `units.dram` is 459")
+                && text.contains("at least 460"),
+            "{text}"
+        );
+        let text = message(&iris.replace("row_cycles: 28", "row_cycle: 28"));
+        assert!(text.contains("row_cycle") && text.contains("row_cycles"), "{text}");
+        let text = message(&iris.replace(", busy_cycles: 208", ""));
+        assert!(text.contains("busy_cycles"), "{text}");
     }
 
     #[test]

@@ -112,7 +112,7 @@ pub struct BinsSpec {
     /// Packets of the tile loop that may wait for their triangles after service, at least 1.
     pub in_flight: Entries,
     /// Lines that each of both can request from the L2 per cycle.
-    #[serde(default = "one")]
+    #[serde(default = "least")]
     pub lines_per_cycle: Width,
 }
 

@@ -264,10 +264,12 @@ fn queues(gpu: &GpuSpec, unit: Unit) -> [Memory; 2] {
         Unit::L2 => 5.0,
         _ => 1.0,
     };
-    let [waiting, in_flight] = [("queue", queue), ("in_flight", in_flight)].map(|(name, entries)| Memory {
-        copies,
-        ..memory(name, unit, f64::from(entries) * PACKET_BYTES, PACKET_BYTES, Vec::new())
-    });
+    let writes = gpu.units.dram.write_queue.filter(|_| unit == Unit::Dram).map_or(0, |queue| queue.get());
+    let [waiting, in_flight] =
+        [("queue", queue + writes), ("in_flight", in_flight)].map(|(name, entries)| Memory {
+            copies,
+            ..memory(name, unit, f64::from(entries) * PACKET_BYTES, PACKET_BYTES, Vec::new())
+        });
     [waiting, in_flight]
 }
 

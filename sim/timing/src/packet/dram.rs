@@ -49,7 +49,8 @@ struct OpenRow {
 }
 
 impl OpenRow {
-    const NONE: Self = Self { row: u32::MAX, since: 0, opened: 0, until: 0, may_close: 0, closes: 0, last: 0, joined: 0 };
+    const NONE: Self =
+        Self { row: u32::MAX, since: 0, opened: 0, until: 0, may_close: 0, closes: 0, last: 0, joined: 0 };
 }
 
 /// A bank: calendar of its row activations, and its latest rows, the newest first.
@@ -296,7 +297,8 @@ impl Dram {
         seen: Span,
     ) -> Time {
         let kind = usize::from(is_write);
-        let (burst, precharge, activate) = (self.times.burst, self.times.precharge, self.times.activate[kind]);
+        let (burst, precharge, activate) =
+            (self.times.burst, self.times.precharge, self.times.activate[kind]);
         let address = self.map.locate(line);
         let channel = &mut self.channels[address.channel];
         let keeps = self.times.to_precharge[kind];
@@ -304,7 +306,8 @@ impl Dram {
         let rank_of_bank = address.bank * channel.ranks.len() / channel.banks.len();
         let rank = &mut channel.ranks[rank_of_bank];
         let bank = &mut channel.banks[address.bank];
-        let turns_rows = is_alone && self.turns.pair > 0 && bank.turns_rows(kind, address.row, channel.lines, self.queue);
+        let turns_rows =
+            is_alone && self.turns.pair > 0 && bank.turns_rows(kind, address.row, channel.lines, self.queue);
         let work = burst * Time::from(count);
         let open = bank.joins(address.row, seen.from, channel.lines, self.queue);
         let opened = match open {
@@ -335,9 +338,7 @@ impl Dram {
                 // The bus idles from the end of the last transfer on if the queue has lines of this bank alone. Those that joined
                 // their row would fill the gap.
                 if is_alone && !turns_rows {
-                    channel
-                        .bus
-                        .block(begin + burst, opens.saturating_sub(burst).min(before.joined));
+                    channel.bus.block(begin + burst, opens.saturating_sub(burst).min(before.joined));
                 }
                 begin + opens
             }
@@ -396,7 +397,13 @@ impl Dram {
 impl Bank {
     /// A bank that remembers `rows` rows.
     fn new(time: Calendar, rows: usize) -> Self {
-        Self { time, rows: vec![OpenRow::NONE; rows].into(), former: HashMap::new(), disputed: 0, kinds: [(u32::MAX, 0); 2] }
+        Self {
+            time,
+            rows: vec![OpenRow::NONE; rows].into(),
+            former: HashMap::new(),
+            disputed: 0,
+            kinds: [(u32::MAX, 0); 2],
+        }
     }
 
     /// Count the time `opens` of a row that lines open again which came at `came`, if these and the lines before of that row may
@@ -464,7 +471,8 @@ impl Bank {
         }
         self.rows.copy_within(at..known.unwrap_or(self.rows.len() - 1), at + 1);
         let may_close = may_close.max(until);
-        self.rows[at] = OpenRow { row, since: seen, opened, until, may_close, closes, last: lines, joined: 0 };
+        self.rows[at] =
+            OpenRow { row, since: seen, opened, until, may_close, closes, last: lines, joined: 0 };
     }
 }
 

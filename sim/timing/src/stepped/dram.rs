@@ -143,7 +143,10 @@ impl Dram {
             map: AddressMap::new(spec),
             places: Places {
                 lines: spec.queue.get() as usize,
-                writes: spec.write_queue.map(|queue| queue.get() as usize).map(|queue| [queue, queue - most_written + 1]),
+                writes: spec
+                    .write_queue
+                    .map(|queue| queue.get() as usize)
+                    .map(|queue| [queue, queue - most_written + 1]),
             },
             period: clocks.period(spec.clock),
             times,
@@ -275,8 +278,7 @@ impl Channel {
                 let begin = banks.iter().fold(rank.refresh_at.max(moved), |begin, bank| {
                     begin.max(if bank.open.is_some() { bank.closes_at } else { bank.ready_at[0] })
                 });
-                let closing =
-                    if banks.iter().any(|bank| bank.open.is_some()) { times.precharge } else { 0 };
+                let closing = if banks.iter().any(|bank| bank.open.is_some()) { times.precharge } else { 0 };
                 let ready_at = begin + closing + refresh.busy;
                 banks.fill(Bank { open: None, ready_at: [ready_at; 2], closes_at: ready_at });
                 rank.refresh_at += refresh.interval;
@@ -286,8 +288,7 @@ impl Channel {
 
     /// When the column command of a line with an open row can be issued.
     fn column_at(&self, entry: &Entry, times: &ChipTimes) -> Time {
-        let turned =
-            if entry.reader.is_some() { self.ranks[entry.rank].reads_at } else { self.writes_at };
+        let turned = if entry.reader.is_some() { self.ranks[entry.rank].reads_at } else { self.writes_at };
         let switch = if entry.rank == self.last_rank { 0 } else { times.rank_to_rank };
         self.banks[entry.bank].ready_at[entry.kind()].max(self.bus_free_at + switch).max(turned)
     }
@@ -324,7 +325,11 @@ impl Channel {
     /// When the row command of a line whose row is not open can be issued: the open row of its bank closes, or its own opens.
     fn row_at(&self, entry: &Entry) -> Time {
         let bank = &self.banks[entry.bank];
-        if bank.open.is_some() { bank.closes_at } else { bank.ready_at[0].max(self.ranks[entry.rank].activates_at()) }
+        if bank.open.is_some() {
+            bank.closes_at
+        } else {
+            bank.ready_at[0].max(self.ranks[entry.rank].activates_at())
+        }
     }
 
     /// Open the row of the oldest line that needs and can do so, or close another that it finds open in its bank, unless a line
@@ -333,7 +338,10 @@ impl Channel {
         let wanted = |bank: usize| {
             let open = self.banks[bank].open;
             open.is_some()
-                && self.entries.iter().any(|e| e.bank == bank && open == Some(e.row) && self.is_open_to(e, now))
+                && self
+                    .entries
+                    .iter()
+                    .any(|e| e.bank == bank && open == Some(e.row) && self.is_open_to(e, now))
         };
         let can_act = |entry: &&Entry| {
             self.is_open_to(entry, now)

@@ -29,7 +29,8 @@ pub fn stream(lines: impl IntoIterator<Item = (u32, bool)>) -> Packets {
     let packet = |lines: &[LineAccess]| {
         let mut packet = tile(&[(Event::DepthReads, 1)]);
         packet.counts[Event::DramReadBytes] = 64 * lines.iter().filter(|line| line.is_read()).count() as u32;
-        packet.counts[Event::DramWriteBytes] = 64 * lines.iter().map(|line| line.written().count() as u32).sum::<u32>();
+        packet.counts[Event::DramWriteBytes] =
+            64 * lines.iter().map(|line| line.written().count() as u32).sum::<u32>();
         (packet, lines.to_vec())
     };
     all.chunks(64).map(packet).collect()

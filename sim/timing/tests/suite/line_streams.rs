@@ -2,7 +2,7 @@
 //!
 //! `tests/dramsim3.csv` has the cycles of DRAMsim3; `docs/validation.md` says how they were made.
 
-use timing::{AccuracyWarning, DramSpec, Level, MachineSpec, RefreshSpec};
+use timing::{DramSpec, MachineSpec, RefreshSpec};
 
 use crate::common::{Packets, bound_level, clocks, packet_level, plain, size, stepped};
 use crate::dram::stream;
@@ -14,14 +14,14 @@ type Line = (u32, bool);
 const MAPS: [(&str, u32); 2] = [("discrete", 12), ("reference", 2)];
 const CHUNK: u32 = 4;
 
-/// Tiles of depth, texture and colour lines, `stride` lines apart, with victims.
-fn with_victims(stride: u32) -> Vec<Line> {
+/// Tiles of depth, texture and colour lines, `stride` lines apart, with victims, and `apart` between these five.
+fn with_victims(stride: u32, apart: u32) -> Vec<Line> {
     let mut lines = Vec::new();
     for n in 0..1500 {
         for (base, victim) in [(0, Some(77)), (33, None), (55, Some(99))] {
             for k in 0..4 {
-                let line = (base + n * 4 + k) * stride;
-                lines.extend(victim.map(|far: u32| (line + far * stride, true)));
+                let line = base * apart + (n * 4 + k) * stride;
+                lines.extend(victim.map(|far: u32| (line + far * apart, true)));
                 lines.push((line, false));
             }
         }
@@ -29,7 +29,7 @@ fn with_victims(stride: u32) -> Vec<Line> {
     lines
 }
 
-fn streams() -> [(&'static str, Vec<Line>); 5] {
+fn streams() -> [(&'static str, Vec<Line>); 6] {
     let pairs = |count: u32, first: u32, far: u32| {
         (0..count).flat_map(move |n| [(first + n + far, true), (first + n, false)]).collect()
     };
@@ -37,8 +37,9 @@ fn streams() -> [(&'static str, Vec<Line>); 5] {
         ("reads-side-by-side", (0..3000 * 64).map(|n| (n, false)).collect()),
         ("blended-fill", pairs(3000 * 32, 0, 1 << 22)),
         ("giant-triangle", pairs(4000 * 8, 1 << 20, 1 << 18)),
-        ("thrashing-caches", with_victims(1)),
-        ("row-after-row", with_victims(4096)),
+        ("thrashing-caches", with_victims(1, 1)),
+        ("thrashing-apart", with_victims(1, 640)),
+        ("row-after-row", with_victims(4096, 4096)),
     ]
 }
 
@@ -101,25 +102,60 @@ fn of_dramsim3(map: &str, stream: &str, chips: &str) -> u64 {
     row.unwrap_or_else(|| panic!("{map} {stream} {chips}"))[3].parse().unwrap()
 }
 
+/// Cycles of every level for a stream, and those of DRAMsim3.
+struct Compared {
+    name: [&'static str; 3],
+    truth: u64,
+    /// At `stepped`, `packet` and `bound`.
+    found: [u64; 3],
+}
+
+impl Compared {
+    fn new(map: &'static str, chip: &'static str, (name, packets): (&'static str, &Packets)) -> Self {
+        let machine = machine(chips(chip));
+        let found = [
+            stepped(&machine, packets).cycles,
+            packet_level(&machine, clocks(), packets).cycles,
+            bound_level(&machine, clocks(), packets).cycles,
+        ];
+        Self { name: [map, name, chip], truth: of_dramsim3(map, name, chip), found }
+    }
+
+    /// Error of a level in percent, over DRAMsim3.
+    fn percent(&self, level: usize) -> f64 {
+        100.0 * (self.found[level] as f64 / self.truth as f64 - 1.0)
+    }
+}
+
+/// Streams on which `stepped` is more than 5 % from DRAMsim3: see `docs/validation.md`.
+const FAR: [[&str; 3]; 4] = [
+    ["discrete", "thrashing-caches", "gddr5"],
+    ["discrete", "thrashing-caches", "gddr5_bare"],
+    ["discrete", "thrashing-apart", "gddr5"],
+    ["discrete", "thrashing-apart", "gddr5_bare"],
+];
+
 #[test]
 fn line_streams_are_as_long_as_in_dramsim3() {
+    let mut all = Vec::new();
     for (map, channels) in MAPS {
         let parts = if map == "discrete" { ["gddr5_bare", "gddr5"] } else { ["lpddr3_bare", "lpddr3"] };
         for (name, lines) in streams() {
             let packets: Packets = stream(of_channel(&lines, channels));
-            for part in parts {
-                let machine = machine(chips(part));
-                let packet = packet_level(&machine, clocks(), &packets);
-                let warns = AccuracyWarning::all(Level::Packet, &packet).len();
-                let found = [
-                    stepped(&machine, &packets).cycles,
-                    packet.cycles,
-                    bound_level(&machine, clocks(), &packets).cycles,
-                ];
-                let truth = of_dramsim3(map, name, part);
-                let [stepped, packet, bound] = found.map(|cycles| 100.0 * (cycles as f64 / truth as f64 - 1.0));
-                println!("{map},{name},{part},{truth},{},{stepped:+.1},{packet:+.1},{bound:+.1} {warns}", found[0]);
-            }
+            all.extend(parts.map(|part| Compared::new(map, part, (name, &packets))));
         }
+    }
+    all.sort_by(|one, other| other.percent(0).abs().total_cmp(&one.percent(0).abs()));
+    for compared in &all {
+        let errors = [0, 1, 2].map(|level| format!("{:+.1} %", compared.percent(level))).join(" | ");
+        println!("| {} | {} | {} | {errors} |", compared.name.join(" | "), compared.truth, compared.found[0]);
+    }
+    let far: Vec<_> = all.iter().filter(|compared| compared.percent(0).abs() > 5.0).collect();
+    assert_eq!(far.iter().map(|compared| compared.name).collect::<Vec<_>>(), FAR);
+    // `packet` is as near to `stepped` as runs without a warning are, except for reads and writes of three rows of one bank.
+    for Compared { name, found, .. } in &all {
+        let ratio = found[1] as f64 / found[0] as f64;
+        let is_near = (1.0 / 1.055..1.055).contains(&ratio);
+        assert_eq!(is_near, name[..2] != ["discrete", "thrashing-apart"], "{name:?}: {ratio}");
     }
 }
