@@ -23,12 +23,6 @@ pub(super) struct Pauses {
 }
 
 impl Pauses {
-    /// All pauses before `at`.
-    fn before(&self, at: Time) -> Time {
-        let Some(since) = at.checked_sub(self.first) else { return 0 };
-        since / self.interval * self.length + (since % self.interval).min(self.length)
-    }
-
     /// The first time from `at` on that is in no pause.
     pub fn after(&self, at: Time) -> Time {
         let Some(since) = at.checked_sub(self.first) else { return at };
@@ -52,6 +46,7 @@ pub(super) struct Calendar {
     /// The part of it that came late, and the part that is no work.
     shared: Vec<u64>,
     blocked: Vec<u64>,
+    /// Those that are not yet taken from the slots.
     pauses: Option<Pauses>,
     yielded: Time,
     /// For each slot, a lower bound of the first slot from it on with free capacity (union-find with path
@@ -208,23 +203,30 @@ impl Calendar {
         if slot >= known {
             self.used.resize(slot + 1, 0);
             self.next_free.extend(known as u32..=slot as u32);
-            if let Some(pauses) = self.pauses {
-                self.pause(known, &pauses);
-            }
+            self.pauses = self.pauses.map(|next| self.pause(known, next));
         }
     }
 
-    /// Take the pauses out of the capacity of all slots from `first` on.
-    fn pause(&mut self, first: usize, pauses: &Pauses) {
-        self.blocked.resize(self.used.len(), 0);
-        for slot in first..self.used.len() {
-            let paused = pauses.before(self.start_of(slot + 1)) - pauses.before(self.start_of(slot));
-            let blocked = paused * self.servers;
-            (self.blocked[slot], self.used[slot]) = (blocked, blocked);
-            if blocked == self.capacity {
-                self.next_free[slot] = slot as u32 + 1;
+    /// Take the next pauses out of the capacity of the slots from `first` on, which are new.
+    fn pause(&mut self, first: usize, mut next: Pauses) -> Pauses {
+        let all = self.used.len();
+        self.blocked.resize(all, 0);
+        while next.first < self.start_of(all) {
+            let end = next.first + next.length;
+            for slot in self.slot_of(next.first).max(first)..all.min(self.slot_of(end - 1) + 1) {
+                let (from, to) = (next.first.max(self.start_of(slot)), end.min(self.start_of(slot + 1)));
+                self.blocked[slot] += to.saturating_sub(from) * self.servers;
+                self.used[slot] = self.blocked[slot];
+                if self.used[slot] == self.capacity {
+                    self.next_free[slot] = slot as u32 + 1;
+                }
             }
+            if end > self.start_of(all) {
+                break;
+            }
+            next.first += next.interval;
         }
+        next
     }
 
     /// Number of servers.
@@ -328,6 +330,21 @@ mod tests {
         assert_eq!(calendar.reserve(0, 20), (24, 44));
         let slots: Vec<_> = calendar.slots().map(|(from, _, work, _)| (from, work)).collect();
         assert_eq!(slots, [(0, 10), (16, 8), (32, 12)]);
+    }
+
+    #[test]
+    fn pauses_take_their_time_from_all_slots() {
+        let pauses = Pauses { first: 20, interval: 50, length: 25 };
+        assert_eq!(
+            [0, 19, 20, 44, 45, 69, 70, 100].map(|at| pauses.after(at)),
+            [0, 19, 45, 45, 45, 69, 95, 100]
+        );
+        let mut calendar = Calendar::new(16, 1).with_pauses(Some(pauses));
+        // 20 to 45, 70 to 95 and 120 to 145 are pauses.
+        assert_eq!(calendar.reserve(0, 40), (0, 75));
+        assert_eq!(calendar.reserve(60, 40), (75, 155));
+        assert_eq!(calendar.slots().map(|(_, _, used, _)| used).sum::<u64>(), 80);
+        assert_eq!(calendar.taken(160), 155);
     }
 
     #[test]

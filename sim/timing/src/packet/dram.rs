@@ -81,7 +81,7 @@ struct BusTurns {
     /// The latest reads and writes.
     mix: [u64; 2],
     /// Time for turns that is not taken from the bus yet, in parts of a grain.
-    owed: f64,
+    pending: f64,
 }
 
 impl BusTurns {
@@ -94,16 +94,16 @@ impl BusTurns {
         self.mix[kind] += count;
         let lines = self.mix[0] + self.mix[1];
         let pairs_per_line = policy.pairs(self.mix) / lines.max(1) as f64;
-        self.owed += pair as f64 * pairs_per_line * count as f64;
+        self.pending += pair as f64 * pairs_per_line * count as f64;
         if lines > policy.memory {
             self.mix = self.mix.map(|kind| kind / 2);
         }
-        if self.owed < pair as f64 {
+        if self.pending < pair as f64 {
             return 0;
         }
-        let owed = self.owed as Time;
-        self.owed -= owed as f64;
-        owed
+        let pending = self.pending as Time;
+        self.pending -= pending as f64;
+        pending
     }
 }
 
