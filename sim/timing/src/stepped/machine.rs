@@ -173,6 +173,7 @@ impl<'a> Machine<'a> {
             packets: stream.demands.len() as u64,
             rows: None,
             disputed: None,
+            short_queues: None,
             overlap: None,
         })
     }
