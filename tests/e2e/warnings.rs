@@ -60,8 +60,8 @@ const NOT_PROVOKED: [(&str, &str); 33] = [
         "it takes a larger GPU than those that come with the program; a unit test in `timing` has a stream of such packets",
     ),
     (
-        "memory-order",
-        "it takes memory that is busy for most of a frame, but not all; a unit test in `run` has streams on built-in GPUs",
+        "memory-queue",
+        "it takes a GPU with queues shorter than those of all GPUs that come with the program; a test in `timing` has one",
     ),
     (
         "batch-overlap",

@@ -71,7 +71,7 @@ pub fn bound(machine: &MachineSpec, clocks: Clocks, totals: &Totals, mut recorde
         packets: totals.segments().map(|segment| u64::from(segment.packets)).sum(),
         rows: Some(share),
         disputed: None,
-        taken: None,
+        short_queues: crate::short_queues(&machine.dram, &timeline),
         overlap: Some(overlap as f64 / now.max(1) as f64),
         passes: passes.finish(machine, &clocks, timeline.duration_ps, &totals.parts()),
         spans: Vec::new(),

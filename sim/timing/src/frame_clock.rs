@@ -1,6 +1,6 @@
 //! Timing levels, a clock for any of them, and warnings about inaccuracies detected in their results.
 
-use activity::{LineAccess, Packet, Unit};
+use activity::{LineAccess, Packet};
 use serde::{Deserialize, Serialize};
 use warnings::{Code, Warning};
 
@@ -125,47 +125,44 @@ pub enum AccuracyWarning {
     /// Share of the frame for which a memory bank opens rows in an order that `packet` and `bound` do not know: those that other
     /// lines may have open at `packet`, all at `bound`, there over the busy time of the busiest unit.
     MemoryRows(f64),
-    /// Utilization of memory. At `packet`, no unit is busy all the time, so what counts is which line waits for which.
-    MemoryOrder(f64),
+    /// Utilization of memory whose queues are shorter than the opening of a row: which lines are in the queue of a channel, and which
+    /// wait in front of it, decides how well rows and buses are used.
+    MemoryQueue(f64),
     /// Share of the frame that batches and passes may overlap. `bound` does not know for how much of it they do.
     BatchOverlap(f64),
     /// Core cycles per packet. At `bound`, short packets wait for one unit each, so no unit is busy for long.
     ShortPackets(f64),
 }
 
-/// The error in cycles beyond which a warning is due: what the level `packet` promises.
-const MAX_ERROR: f64 = 0.08;
-/// Smallest row time over busy time that gives a warning at `bound`.
-const MIN_ROW_RATIO: f64 = 0.2;
-/// Least utilization of memory that gives a warning if nothing else is busy.
-const MIN_MEMORY: f64 = 0.5;
+/// Smallest disputed share of the frame that gives a warning at `packet`, and smallest row time over busy time at `bound`.
+const MIN_ROWS: f64 = 0.2;
+/// Least utilization of memory with short queues that gives a warning at `packet`, and at `bound`.
+const MIN_QUEUED: [f64; 2] = [0.2, 0.15];
+/// Smallest share of the frame that batches and passes may overlap that gives a warning: half of it is what `bound` takes, and any part
+/// may be right.
+const MIN_OVERLAP: f64 = 0.16;
 /// Packets with fewer cycles than this give a warning.
 const MIN_PACKET_CYCLES: f64 = 2.0;
 
 impl AccuracyWarning {
     /// All warnings about a frame at `level`.
     pub fn all(level: Level, timed: &Timed) -> Vec<Self> {
-        // The order of lines makes `packet` wrong by at most the disputed share of the frame: below the error that the level
-        // promises, no warning is due.
-        let rows = match level {
-            Level::Packet => timed.disputed.filter(|&share| share >= MAX_ERROR),
-            _ => timed.rows.filter(|&share| share >= MIN_ROW_RATIO),
-        };
-        let order = if level == Level::Packet { memory_order(timed) } else { None };
+        let is_bound = level == Level::Bound;
+        let rows = if is_bound { timed.rows } else { timed.disputed };
+        let rows = rows.filter(|&share| share >= MIN_ROWS).map(Self::MemoryRows);
+        let least = MIN_QUEUED[usize::from(is_bound)];
+        let queues = timed.short_queues.filter(|&share| share >= least).map(Self::MemoryQueue);
+        let overlap = timed.overlap.filter(|&share| share >= MIN_OVERLAP).map(Self::BatchOverlap);
         let cycles = timed.cycles as f64 / timed.packets.max(1) as f64;
-        let short =
-            (level == Level::Bound && cycles < MIN_PACKET_CYCLES).then_some(Self::ShortPackets(cycles));
-        // Half of it is what `bound` takes, and any part may be right.
-        let overlap = timed.overlap.filter(|&share| share >= 2.0 * MAX_ERROR).map(Self::BatchOverlap);
-        let memory = rows.map(Self::MemoryRows).into_iter().chain(order.map(Self::MemoryOrder));
-        memory.chain(overlap).chain(short).collect()
+        let short = (is_bound && cycles < MIN_PACKET_CYCLES).then_some(Self::ShortPackets(cycles));
+        [rows, queues, overlap, short].into_iter().flatten().collect()
     }
 
     /// Warning code.
     pub const fn code(self) -> Code {
         match self {
             Self::MemoryRows(_) => Code::MemoryRows,
-            Self::MemoryOrder(_) => Code::MemoryOrder,
+            Self::MemoryQueue(_) => Code::MemoryQueue,
             Self::BatchOverlap(_) => Code::BatchOverlap,
             Self::ShortPackets(_) => Code::ShortPackets,
         }
@@ -174,7 +171,7 @@ impl AccuracyWarning {
     /// Severity, comparable among warnings of one kind; larger is worse.
     pub fn extent(self) -> f64 {
         match self {
-            Self::MemoryRows(share) | Self::MemoryOrder(share) | Self::BatchOverlap(share) => share,
+            Self::MemoryRows(share) | Self::MemoryQueue(share) | Self::BatchOverlap(share) => share,
             Self::ShortPackets(cycles) => -cycles,
         }
     }
@@ -193,11 +190,12 @@ impl AccuracyWarning {
                     if level == Level::Bound { "the busy time" } else { "the time" },
                 ),
             ),
-            Self::MemoryOrder(share) => Warning::new(
-                Code::MemoryOrder,
+            Self::MemoryQueue(share) => Warning::new(
+                Code::MemoryQueue,
                 format!(
-                    "memory is busy for {:.0} % of frame {frame} and no unit for all of it: times at `{name}` may be off by a \
-                     fifth, as what counts is which line waits for which; use --timing stepped, or let --accuracy choose",
+                    "memory is busy for {:.0} % of frame {frame}, and the queue of a channel is shorter than the time in which a row \
+                     opens: times at `{name}` may be a tenth too short or more, as lines wait in front of full queues in an order \
+                     that it does not know; use a longer `dram.queue`, --timing stepped, or let --accuracy choose",
                     100.0 * share,
                 ),
             ),
@@ -219,18 +217,4 @@ impl AccuracyWarning {
             ),
         }
     }
-}
-
-/// Utilization of memory, if it is high and no unit decides the time.
-///
-/// A unit that is busy all the time takes that long in any order. Waits for memory that is rarely busy are short. Between the two
-/// they depend on the order of lines, which the calendars do not know. The busiest bank counts as a unit, and a bus that turns or waits for
-/// a refresh as busy.
-fn memory_order(timed: &Timed) -> Option<f64> {
-    let share = |busy_ps: u64| busy_ps as f64 / timed.timeline.duration_ps.max(1) as f64;
-    let busy_ps = timed.timeline.busy_ps();
-    let busiest = busy_ps.iter().copied().max().map_or(0.0, share);
-    let busiest = (busiest * timed.rows.unwrap_or(0.0).max(1.0)).max(timed.taken.unwrap_or(0.0));
-    let memory = share(busy_ps[Unit::Dram as usize]);
-    (memory >= MIN_MEMORY && busiest < 1.0 / (1.0 + MAX_ERROR)).then_some(memory)
 }

@@ -86,8 +86,9 @@ pub struct Timed {
     /// Share of the frame for which a memory bank opens rows that it may not have to: lines of the same row that may wait side by
     /// side, in an order that is not known; only at the level `packet`.
     pub disputed: Option<f64>,
-    /// Share of the frame for which the busiest bus of memory moves lines, turns, or waits for a refresh; only at the level `packet`.
-    pub taken: Option<f64>,
+    /// Utilization of memory whose channels queue less than the time in which a row closes and another one opens; `None` if they queue
+    /// more, and at the level `stepped`.
+    pub short_queues: Option<f64>,
     /// Share of the frame that batches and passes may overlap, the longest packet of each; only at the level `bound`.
     pub overlap: Option<f64>,
     /// The passes of the frame, by number.
@@ -95,6 +96,14 @@ pub struct Timed {
     /// When the frame spent its time on which draw, in order; empty at the level `bound`, and at `packet` if draws take turns
     /// very often.
     pub spans: Vec<DrawSpan>,
+}
+
+/// Utilization of memory, if a queue of its channels holds less than the time in which a row closes and another one opens.
+fn short_queues(dram: &DramSpec, timeline: &activity::Timeline) -> Option<f64> {
+    let queued = dram.queue.get() * dram.burst_cycles.get();
+    let busy_ps = timeline.busy_ps()[activity::Unit::Dram as usize];
+    let is_short = queued < dram.precharge_cycles.get() + dram.activate_cycles.get();
+    is_short.then(|| busy_ps as f64 / timeline.duration_ps.max(1) as f64)
 }
 
 /// `length_ps` over the busy time of the busiest unit.

@@ -241,11 +241,6 @@ impl Calendar {
         let worked = worked.filter(|(work, _)| *work > 0);
         worked.map(|(work, at)| (self.start_of(at), self.start_of(at + 1), work, self.capacity))
     }
-
-    /// Work before `end`, and what else takes its place.
-    pub fn taken(&self, end: Time) -> u64 {
-        self.used[..self.used.len().min(self.slot_of(end))].iter().sum()
-    }
 }
 
 /// Times at which the last `capacity` entries left. The next entry is admitted when the oldest of them has
@@ -344,7 +339,6 @@ mod tests {
         assert_eq!(calendar.reserve(0, 40), (0, 75));
         assert_eq!(calendar.reserve(60, 40), (75, 155));
         assert_eq!(calendar.slots().map(|(_, _, used, _)| used).sum::<u64>(), 80);
-        assert_eq!(calendar.taken(160), 155);
     }
 
     #[test]

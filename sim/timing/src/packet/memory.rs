@@ -244,11 +244,6 @@ impl Memory {
         self.dram.rows()
     }
 
-    /// Time until `end` for which the busiest bus moves lines or cannot.
-    pub fn taken(&self, end: Time) -> Time {
-        self.dram.buses().map(|bus| bus.taken(end)).max().unwrap_or(0)
-    }
-
     /// Time of the bank with most of it for rows that may not have to be opened.
     pub fn disputed(&self) -> Time {
         self.dram.disputed()

@@ -361,8 +361,8 @@ impl PacketClock {
         }
         let timeline = recorder.finish();
         let rows = crate::ratio_to_busiest(clocks.ps(memory.rows()), &timeline);
-        let taken = clocks.ps(memory.taken(end)) as f64 / timeline.duration_ps.max(1) as f64;
         let disputed = clocks.ps(memory.disputed()) as f64 / timeline.duration_ps.max(1) as f64;
+        let short_queues = crate::short_queues(&machine.dram, &timeline);
         let (parts, spans) = draws.finish(&clocks, timeline.duration_ps);
         Timed {
             passes: passes.finish(&machine, &clocks, timeline.duration_ps, &parts),
@@ -374,7 +374,7 @@ impl PacketClock {
             packets,
             rows: Some(rows),
             disputed: Some(disputed),
-            taken: Some(taken),
+            short_queues,
             overlap: None,
         }
     }

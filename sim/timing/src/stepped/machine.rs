@@ -173,7 +173,7 @@ impl<'a> Machine<'a> {
             packets: stream.demands.len() as u64,
             rows: None,
             disputed: None,
-            taken: None,
+            short_queues: None,
             overlap: None,
         })
     }

@@ -7,6 +7,8 @@ use timing::{
     AccuracyWarning, Clocks, DemandBuilder, Level, MachineSpec, PacketClock, Recorder, Timed, Totals, bound,
 };
 
+use crate::common::size;
+
 const BATCH: u32 = 512;
 
 /// The timing part of a GPU file.
@@ -144,6 +146,34 @@ fn groups_are_close_to_the_reference() {
         }
     }
     assert_eq!(far, []);
+}
+
+/// Where the queue of a memory channel is shorter than the opening of a row, `packet` is far too short on some streams. It is not beyond 8 %
+/// without a warning.
+#[test]
+fn short_queues_of_memory_warn() {
+    let mut gpu = Gpu::builtin("reference");
+    let warns = |timed: &Timed| {
+        AccuracyWarning::all(Level::Packet, timed)
+            .into_iter()
+            .any(|warning| matches!(warning, AccuracyWarning::MemoryQueue(_)))
+    };
+    let mut far = 0;
+    for queue in [2, 4] {
+        gpu.units.dram.queue = size(queue);
+        for case in failures(&gpu.units, BATCH) {
+            let is_short = case.units.dram.queue.get() < 4;
+            let [truth, packet, _] = gpu.run(&case.units, &case.packets);
+            let off = (packet.cycles as f64 / truth.cycles as f64).ln().abs();
+            println!("{} with a queue of {queue}: {off:.3}", case.name);
+            assert!(is_short || !warns(&packet), "{} warns", case.name);
+            if is_short && off > 1.08_f64.ln() {
+                far += 1;
+                assert!(warns(&packet), "{} is off by {off}, and does not warn", case.name);
+            }
+        }
+    }
+    assert!(far > 0);
 }
 
 /// Front ends that overlap the tiles of the pass before, with lines of both.
