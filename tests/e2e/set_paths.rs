@@ -76,7 +76,8 @@ fn wrong_paths_and_values_are_refused_by_name() {
         ("tiny", "platform.units.shade.idle_unit_w=1", "did you mean `shader`?"),
         ("tiny", "platform.v_v=99", "99 V is not a number from 0.1 to 48 V"),
         ("tiny", "table.rows.draws.nominal_pj=-1", "-1 pJ is not a number"),
-        ("tiny", "gpo.core_hz=1", "did you mean `gpu`?"),
+        ("deferred", "light=3", "--set light=3: unknown option `light`"),
+        ("tiny", "gpo.core_hz=1", "did you mean `gpu.core_hz`?"),
         ("tiny", "scene.objects.0.velocity=(1, 0, 0)", "is not a scene in a .ron file"),
         (&scene, "scene.setings.samples=2", "unknown field `setings`, did you mean `settings`?"),
         (&scene, "scene.settings.samples=0", "samples"),
@@ -95,6 +96,20 @@ fn wrong_paths_and_values_are_refused_by_name() {
 }
 
 #[test]
+fn options_of_a_scene_and_several_gpus_are_refused_by_flag() {
+    let inputs = Inputs::new();
+    let (file, out) = (inputs.put("options.ron", "(bins: 8)"), inputs.path("out"));
+    for (args, says) in [
+        (["run", "tiny", "--options", &file], "--options: `tiny` is a scene"),
+        (["run", "tiny", "--gpu", "reference,mobile"], "--set gpu=reference,mobile"),
+        (["record", "tiny", "--gpu", "a.ron,b.ron"], "`quintile sweep`"),
+    ] {
+        let ended = quintile().call(args.iter().chain(&["--out", &out]));
+        assert!(ended.code == Some(2) && ended.stderr.contains(says), "{}", ended.stderr);
+    }
+}
+
+#[test]
 fn several_values_are_several_runs_that_a_table_compares() {
     let inputs = Inputs::new();
     let out = inputs.path("out");
@@ -109,6 +124,13 @@ fn several_values_are_several_runs_that_a_table_compares() {
         let folder = std::path::Path::new(&out).join(format!("gpu.pipeline.tile_px={value}"));
         assert_eq!(numbers(&Results::in_folder(&folder, ended.clone())), numbers(&alone));
     }
+    // As JSON they are a list.
+    let json = quintile()
+        .call(["run", "tiny", "--json", "--out", &inputs.path("json")].iter().chain(&TINY).chain(&sets[..4]));
+    let list: serde_json::Value = serde_json::from_str(&json.stdout).unwrap();
+    let folders: Vec<&str> =
+        list.as_array().unwrap().iter().map(|run| run["out"].as_str().unwrap()).collect();
+    assert!(folders.len() == 2 && folders[1].ends_with("gpu.pipeline.tile_px=8"), "{folders:?}");
     // Nothing is run if one value is wrong, or belongs to something else.
     for wrong in [&["--set", "gpu.pipeline.tile_px=4,7"][..], &sets] {
         let new = inputs.path("new");

@@ -76,7 +76,9 @@ fn shards_merge_to_the_bytes_of_a_local_run() {
     let planned = done(&["plan", &file, "--out", &shards]);
     assert!(planned.stdout.contains("4 of 4 runs to do, expected to take about"), "{}", planned.stdout);
     assert!(point_files(&shards).is_empty());
-    done(&["run", &file, "--out", &shards, "--shard", "2/2", "--threads", "1"]);
+    let half = done(&["run", &file, "--out", &shards, "--shard", "2/2", "--threads", "1"]);
+    let says = "shard 2/2: 2 of 2 runs finished, 0 failed; the sweep has 4 runs";
+    assert!(half.stdout.contains(says), "{}", half.stdout);
     assert_eq!(point_files(&shards).len(), 2);
     let refused = sweep(&["merge", &shards]);
     assert_eq!(refused.code, Some(1));
@@ -183,7 +185,9 @@ fn constraints_leave_out_points_and_are_named_if_they_leave_out_none() {
     let ended = done(&["run", &file, "--out", &out]);
     assert!(ended.stdout.contains("3 of 3 runs finished, 0 failed"), "{}", ended.stdout);
     let idle = ended.stderr.lines().filter(|line| line.contains("leaves out no point")).collect::<Vec<_>>();
-    assert!(idle.len() == 1 && idle[0].contains("tiles.ron: constraints[1] "), "{}", ended.stderr);
+    assert!(idle.len() == 1 && idle[0].contains("tiles.ron:5: constraints[1] "), "{}", ended.stderr);
+    let report = done(&["report", &out]).stdout;
+    assert!(report.starts_with("constraints[1] leaves out no point: check it, or remove it\n"), "{report}");
 }
 
 #[test]
@@ -227,7 +231,67 @@ fn a_report_has_frontier_and_effects() {
     assert_eq!((read("designs.csv").lines().count(), read("effects.csv").lines().count()), (4, 5));
     assert!(read("report.html").contains("3 designs in 1 workload"));
     let text = done(&["report", &out]).stdout;
-    assert!(text.contains("design on the frontier") && text.contains("1 point left out"), "{text}");
+    assert!(
+        text.contains("design on the frontier") && text.starts_with("1 point left out: 1 failed\n"),
+        "{text}"
+    );
+}
+
+#[test]
+fn a_report_of_an_unfinished_sweep_says_so_first_and_by_cause() {
+    let inputs = Inputs::new();
+    let (file, out) = (inputs.put("tiles.ron", SWEEP), inputs.path("out"));
+    done(&["run", &file, "--out", &out, "--shard", "1/2"]);
+    let text = done(&["report", &out]).stdout;
+    let says = "3 points left out: 2 not finished (`quintile sweep run` runs them), 1 failed\n";
+    assert!(text.starts_with(says), "{text}");
+    let report: serde_json::Value = serde_json::from_str(&done(&["report", &out, "--json"]).stdout).unwrap();
+    assert_eq!((&report["left_out_failed"], &report["left_out_unfinished"]), (&1.into(), &2.into()));
+    // Two designs on one axis have no interactions: a table with a header alone.
+    let table = fs::read_to_string(Path::new(&out).join("interactions.csv")).unwrap();
+    assert!(table.starts_with("workload,setting,value,") && table.lines().count() == 1, "{table}");
+}
+
+#[test]
+fn a_screened_sweep_is_compared_at_its_last_level() {
+    let inputs = Inputs::new();
+    let text = SWEEP.replace("axes: [", "screen: [bound, packet], axes: [");
+    let (file, out) = (inputs.put("tiles.ron", text), inputs.path("out"));
+    let ended = done(&["run", &file, "--out", &out]);
+    assert!(ended.stderr.contains("3 of 4 designs ran at packet"), "{}", ended.stderr);
+    let report: serde_json::Value = serde_json::from_str(&done(&["report", &out, "--json"]).stdout).unwrap();
+    let workloads: Vec<&String> = report["workloads"].as_object().unwrap().keys().collect();
+    assert_eq!(workloads, ["tiny"]);
+    assert_eq!((&report["left_out"], &report["left_out_screened"]), (&1.into(), &1.into()));
+}
+
+#[test]
+fn warnings_of_runs_are_in_rows_and_mark_designs() {
+    let inputs = Inputs::new();
+    let text = SWEEP.replace("\"tiny\"", "\"tiny\", \"platform\": \"hd_4000\"");
+    let (file, out) = (inputs.put("tiles.ron", text), inputs.path("out"));
+    done(&["run", &file, "--out", &out]);
+    merged(&out);
+    let table = InputTable::read(&Path::new(&out).join("results.parquet")).unwrap();
+    let warnings = table.texts("warnings").unwrap();
+    let expected = quintile().run("tiny", &["--platform", "hd_4000", "--frames", "0..2"]).warning_codes();
+    assert!(expected.contains(&"platform-mismatch".to_owned()), "{expected:?}");
+    for codes in [0, 1, 3].map(|row| warnings[row].split(',').collect::<Vec<_>>()) {
+        assert!(codes.contains(&"platform-mismatch") && codes.is_sorted(), "{codes:?}");
+        assert!(
+            codes.iter().all(|code| expected.iter().any(|known| known == code)),
+            "{codes:?} {expected:?}"
+        );
+    }
+    let text = done(&["report", &out]).stdout;
+    assert!(text.contains("on the frontier with platform-mismatch (*)"), "{text}");
+    let marked = |line: &&str| line.starts_with("tiny") && line.ends_with(" *");
+    assert_eq!(
+        text.lines().filter(marked).count(),
+        text.lines().filter(|line| line.starts_with("tiny")).count()
+    );
+    let csv = fs::read_to_string(Path::new(&out).join("designs.csv")).unwrap();
+    assert!(csv.lines().next().unwrap().ends_with(",warnings") && csv.contains("platform-mismatch"), "{csv}");
 }
 
 /// The scripts, run without Slurm: by the shell, with the variables of a task.
@@ -270,6 +334,12 @@ fn wrong_sweeps_and_folders_are_refused() {
         &SWEEP.replace("\"tiny\"", "\"Fox.glb\", \"scene.settings.samples\": 4"),
         2,
         "use `samples` in its place",
+    );
+    refused(&SWEEP.replace("[4, 8]", "[]"), 2, "wrong.ron:6: axes[0]: `gpu.pipeline.tile_px` has no values");
+    refused(
+        &SWEEP.replace(".pipeline.tile_px", "").replace("[4, 8]", "[\"nope.ron\"]"),
+        2,
+        "wrong.ron:6: axes[0]: `gpu`: nope.ron: cannot read it",
     );
     refused(&SWEEP.replace("axes", "axis"), 2, "unknown field `axis`, did you mean `axes`?");
     refused(&SWEEP.replace("\"tiny\"", "\"tinny\""), 2, "did you mean `tiny`?");

@@ -109,7 +109,7 @@ pub fn find(
 /// Makes the job of a name: a workload, or the rendering of the scene of that name or path. Returns the name in results, too.
 ///
 /// # Errors
-/// As [`find`] and [`crate::load`]; [`LoadError::Setting`] for options of a scene.
+/// As [`find`] and [`crate::load`]; [`LoadError::Option`] for options of a scene.
 pub fn load(
     name: &Path,
     options: &OptionSource,
@@ -125,7 +125,11 @@ pub fn load(
         let jobs: Vec<&str> = names().map(|(name, _)| name).collect();
         let message =
             format!("`{}` is a scene; only workloads have options: {}", name.display(), jobs.join(", "));
-        return Err(LoadError::Setting { setting: "set", message });
+        let option = match options.set.first() {
+            Some((name, value)) => format!("--set {name}={value}"),
+            None => "--options".to_owned(),
+        };
+        return Err(LoadError::Option { option, message });
     }
     Ok((scene.name().to_owned(), Box::new(Rendering::new(scene, request)?)))
 }

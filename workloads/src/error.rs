@@ -43,6 +43,14 @@ pub enum LoadError {
         /// Error and remedy.
         message: String,
     },
+    /// An invalid option of a workload.
+    #[error("{option}: {message}")]
+    Option {
+        /// The option as it was given, such as `--set bins=8`.
+        option: String,
+        /// Error and remedy.
+        message: String,
+    },
     /// A RON scene that cannot be read or parsed.
     #[error(transparent)]
     Spec(#[from] SpecError),
@@ -100,6 +108,7 @@ impl LoadError {
             | Self::Kind { .. }
             | Self::Format { .. }
             | Self::Setting { .. }
+            | Self::Option { .. }
             | Self::Description { .. } => true,
             Self::Spec(error) => matches!(error, SpecError::Parse { .. }),
             Self::Read { .. } | Self::Broken { .. } => false,

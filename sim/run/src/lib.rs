@@ -78,6 +78,7 @@ pub use simulated::{FrameCost, Modelled, Observed, Origin, Quantity, RunFrame, S
 pub use stalls::StallShares;
 pub use stated::{CONFIDENCE, StatedError};
 pub use summary::{Detection, Figures, FrameRow, Summary};
+pub use warn::warnings_of;
 
 /// Results of a run.
 pub struct FinishedRun {

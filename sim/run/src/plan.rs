@@ -1,6 +1,7 @@
 //! Plan of a run: its inputs, loaded and checked, and the limits of its size.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use activity::inputs;
 use pipeline::Viewport;
@@ -23,7 +24,7 @@ pub struct Plan {
     /// Name of the scene or workload.
     pub name: String,
     /// What is drawn: the scene or workload, with the changes of the options applied.
-    pub job: Box<dyn Job>,
+    pub job: Arc<dyn Job>,
     /// Size of the image.
     pub viewport: Viewport,
     /// The hardware.
@@ -58,21 +59,24 @@ impl Plan {
         Ok(Self { files, ..plan? })
     }
 
-    /// Plan of a job that is already there, on the GPU, platform and energy table that `options` name. Scene and view of the
-    /// options are not used.
-    pub(crate) fn of_job(
-        options: RunOptions,
-        name: &str,
-        job: impl FnOnce() -> Box<dyn Job>,
-    ) -> Result<Self, RunError> {
-        let load = |_: &RunOptions, _: &mut Changes<'_>| Ok((name.to_owned(), job()));
+    /// Plan of the same job on the GPU, platform and energy table that `options` name. Scene and view of the options are not used.
+    ///
+    /// # Errors
+    /// The first input that is missing or invalid.
+    pub fn beside(&self, options: RunOptions) -> Result<Self, RunError> {
+        Self::of_job(options, &self.name, Arc::clone(&self.job))
+    }
+
+    /// As [`Self::beside`], of a job that is already there.
+    pub(crate) fn of_job(options: RunOptions, name: &str, job: Arc<dyn Job>) -> Result<Self, RunError> {
+        let load = |_: &RunOptions, _: &mut Changes<'_>| Ok((name.to_owned(), job));
         let (plan, files) = inputs::record(|| Self::load(options, load));
         Ok(Self { files, ..plan? })
     }
 
     fn load(
         options: RunOptions,
-        load_job: impl FnOnce(&RunOptions, &mut Changes<'_>) -> Result<(String, Box<dyn Job>), RunError>,
+        load_job: impl FnOnce(&RunOptions, &mut Changes<'_>) -> Result<(String, Arc<dyn Job>), RunError>,
     ) -> Result<Self, RunError> {
         check_recorder(&options)?;
         let mut changes = Changes::new(&options.changes)?;
@@ -219,11 +223,14 @@ fn size_of(
 }
 
 /// Name and job of the scene or workload, with its changes.
-fn load_job(options: &RunOptions, changes: &mut Changes<'_>) -> Result<(String, Box<dyn Job>), RunError> {
+fn load_job(options: &RunOptions, changes: &mut Changes<'_>) -> Result<(String, Arc<dyn Job>), RunError> {
     let request = request(options);
     match changes.scene(&options.scene)? {
-        Some(scene) => Ok((scene.name().to_owned(), Box::new(Rendering::new(scene, &request)?))),
-        None => Ok(catalog::load(&options.scene, &options.options, &request)?),
+        Some(scene) => Ok((scene.name().to_owned(), Arc::new(Rendering::new(scene, &request)?))),
+        None => {
+            let (name, job) = catalog::load(&options.scene, &options.options, &request)?;
+            Ok((name, job.into()))
+        }
     }
 }
 

@@ -204,7 +204,7 @@ mod tests {
             (&[("gpu.core_hz", "1e8,2e8"), ("gpu.core_hz", "3e8")][..], "given twice"),
             (&[("gpu.core_hz", "1e8,")], "an empty value"),
             (&[("gpu.core_hz", "1e8,1e8")], "has 1e8 twice"),
-            (&[("gpo.core_hz", "1e8,2e8")], "did you mean `gpu`?"),
+            (&[("gpo.core_hz", "1e8,2e8")], "did you mean `gpu.core_hz`?"),
         ] {
             let error = made("tiny", sets).unwrap_err();
             assert!(error.contains(says), "{error}");

@@ -17,7 +17,7 @@ use workloads::job::OptionSource;
 use super::Failure;
 use super::lists;
 use super::outputs::{print, print_json};
-use super::run::bound;
+use super::run::{bound, one_gpu};
 use crate::cli::args::{SceneArgs, ThreadArgs};
 use crate::cli::parse::setting;
 
@@ -106,6 +106,7 @@ fn level(text: &str) -> Result<Level, String> {
 }
 
 pub(super) fn record(args: &RecordArgs, terminal: &Terminal) -> Result<(), Failure> {
+    one_gpu(&args.gpu)?;
     let mut options = RunOptions {
         scene: args.scene.clone(),
         options: OptionSource { file: args.options.clone(), set: Vec::new() },
@@ -160,7 +161,7 @@ pub(super) fn time(args: &TimeArgs) -> Result<(), Failure> {
         let [time, busy, frame] =
             [(measured.busy_ms * 1e-3, "s"), (measured.busy_mj * 1e-3, "J"), (measured.frame_mj * 1e-3, "J")]
                 .map(|(value, unit)| si(value, unit));
-        table.row([gpu, measured.cycles.to_string(), time, busy, frame, measured.accuracy_warnings]);
+        table.row([gpu, measured.cycles.to_string(), time, busy, frame, measured.warnings]);
     }
     print(&table.to_string())
 }
@@ -171,7 +172,7 @@ fn timed(args: &TimeArgs, recorded: &RecordedRun, gpus: &[PathBuf]) -> Result<Ve
     let timed = recorded.timed(&plans.iter().collect::<Vec<_>>())?;
     let row = |((gpu, plan), timed): ((&PathBuf, &Plan), TimedFrames<'_>)| {
         let frames = timed.powered(&plan.model)?;
-        Ok(TimedRow { gpu: gpu.display().to_string(), measured: measured(plan, &frames, recorded.groups())? })
+        Ok(TimedRow { gpu: gpu.display().to_string(), measured: measured(plan, frames, recorded.groups())? })
     };
     gpus.iter().zip(&plans).zip(timed).map(row).collect()
 }

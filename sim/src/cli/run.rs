@@ -21,7 +21,7 @@ use workloads::job::OptionSource;
 
 use super::Failure;
 use super::lists;
-use super::outputs::{print, print_json};
+use super::outputs::{json_text, print};
 use crate::cli::args::{LookArgs, SceneArgs, ThreadArgs};
 use crate::cli::parse::{duration, percent, rate, setting, share_below_one};
 
@@ -118,7 +118,7 @@ pub struct RunArgs {
     /// Print what the run would do, with the expected time, and stop before anything is simulated or written
     #[arg(long)]
     pub dry_run: bool,
-    /// Print only summary.json to standard output
+    /// Print only summary.json to standard output; a list of them where --set has lists
     #[arg(long)]
     pub json: bool,
     /// Style of pictures.
@@ -195,31 +195,50 @@ pub(super) const REVISION: Option<&str> = option_env!("QUINTILE_REVISION");
 pub(super) fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), Failure> {
     if let Some(summary) = &args.again {
         let (options, recorded) = again(summary, args.force, REVISION)?;
-        return one(args, terminal, (options, recorded), &args.out).map(drop);
+        let mut json = Vec::new();
+        one(args, terminal, (options, recorded), (&args.out, &mut json))?;
+        return json.first().map_or(Ok(()), |text| print(text));
     }
+    one_gpu(&args.gpu)?;
     let listed = lists::runs(&options(args), &args.set, &args.out)?;
     let is_alone = listed.iter().all(|run| run.varied.is_empty());
     if !is_alone {
         // Wrong values are refused before the first of several runs.
         listed.iter().try_for_each(|run| Plan::resolve(run.options.clone()).map(drop))?;
     }
-    let mut done = Vec::new();
+    let (mut done, mut json) = (Vec::new(), Vec::new());
     for run in listed {
-        let summary = one(args, terminal, (run.options.clone(), None), &run.out)?;
+        let summary = one(args, terminal, (run.options.clone(), None), (&run.out, &mut json))?;
         done.extend(summary.map(|summary| (run, summary)));
     }
-    match is_alone || args.json || done.is_empty() {
-        true => Ok(()),
-        false => print(&lists::table(&done).to_string()),
+    match (args.json, is_alone) {
+        (true, true) => json.first().map_or(Ok(()), |text| print(text)),
+        (true, false) => print(&format!("[\n{}\n]", json.join(",\n"))),
+        (false, false) if !done.is_empty() => print(&lists::table(&done).to_string()),
+        (false, _) => Ok(()),
     }
 }
 
-/// Runs with `options` into `out`, and prints its results; returns the summary, unless it is a dry run.
+/// Refuses several GPUs in one value.
+pub(super) fn one_gpu(gpu: &Path) -> Result<(), Failure> {
+    match gpu.to_string_lossy() {
+        several if several.contains(',') && !gpu.exists() => {
+            let message = format!(
+                "--gpu {several}: it takes one GPU; give several to --set gpu={several} of `quintile run SCENE`, or as an axis of \
+                 `quintile sweep`"
+            );
+            Err(Failure { message, code: 2 })
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Runs with `options` into `out`, and prints its results, or adds them to `json`; returns the summary, unless it is a dry run.
 fn one(
     args: &RunArgs,
     terminal: &Terminal,
     (options, recorded): (RunOptions, Option<Choice>),
-    out: &Path,
+    (out, json): (&Path, &mut Vec<String>),
 ) -> Result<Option<Summary>, Failure> {
     let started = Instant::now();
     let progress = Progress::on(terminal, args.json);
@@ -229,14 +248,19 @@ fn one(
     let dir = open(&plan, &destination)?;
     let prepared = pool.install(|| prepare(plan, recorded, REVISION, &progress))?;
     if args.dry_run {
-        return dry_run((args.json, out), &pool.install(|| DryRun::new(&prepared))?, terminal).map(|()| None);
+        let dry_run = pool.install(|| DryRun::new(&prepared))?;
+        match args.json {
+            true => json.push(json_text(&dry_run, true)?),
+            false => print_dry_run(out, &dry_run, terminal)?,
+        }
+        return Ok(None);
     }
     if !args.json && terminal.verbosity() > Verbosity::Quiet {
         pool.install(|| note_expected(&prepared, &progress))?;
     }
     let outcome = pool.install(|| prepared.run(dir, &progress))?;
     if args.json {
-        print_json(&Printed { out: out.display().to_string(), summary: &outcome.summary }, true)?;
+        json.push(json_text(&Printed { out: out.display().to_string(), summary: &outcome.summary }, true)?);
     } else {
         outcome.summary.warnings.iter().for_each(|warning| terminal.warn(warning));
         print(&format!("{}took {:.1} s", text(out, &outcome), started.elapsed().as_secs_f64()))?;
@@ -253,10 +277,7 @@ fn note_expected(prepared: &Prepared, progress: &Progress) -> Result<(), RunErro
 }
 
 /// Prints a description of the run and the folder of results.
-fn dry_run((json, out): (bool, &Path), dry_run: &DryRun, terminal: &Terminal) -> Result<(), Failure> {
-    if json {
-        return print_json(dry_run, true);
-    }
+fn print_dry_run(out: &Path, dry_run: &DryRun, terminal: &Terminal) -> Result<(), Failure> {
     dry_run.warnings.iter().for_each(|warning| terminal.warn(warning));
     let results = ("results", format!("would be written into {}; nothing was", out.display()));
     let rows = dry_run.rows().into_iter().chain([results]);

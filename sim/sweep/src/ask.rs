@@ -7,10 +7,11 @@ use serde::{Deserialize, Serialize};
 
 use crate::axis::Axis;
 use crate::execute::{Outcome, execute};
-use crate::plan::{Plan, Point, id_of};
+use crate::plan::{Plan, Point, id_of, version};
 use crate::points::Points;
 use crate::setting::Setting;
 use crate::spec::SweepSpec;
+use crate::trials::round_whole;
 use crate::{Folder, SweepError};
 
 /// A search in the space of a sweep file. Points that were run before are read from the folder.
@@ -70,13 +71,14 @@ impl<'a> Search<'a> {
         program: Option<&'a str>,
         folder: &'a Folder,
     ) -> Result<Self, SweepError> {
-        let spec = SweepSpec::load(path)?;
+        let mut spec = SweepSpec::load(path)?;
         if !spec.screen.is_empty() || spec.repetitions != 1 {
             let message = "a search runs each point once, at one level: leave `screen` and `repetitions` out"
                 .to_owned();
-            return Err(SweepError::Setting { file: path.display().to_string(), message, is_usage: true });
+            return Err(SweepError::Setting { file: path.display().to_string(), message });
         }
         let common = spec.base(quick);
+        round_whole(&mut spec.axes, &common);
         let search = Self { spec, common, program, folder, asked: Vec::new(), known: HashSet::new() };
         folder.check(&search.plan(Vec::new()))?;
         Ok(search)
@@ -157,7 +159,8 @@ impl<'a> Search<'a> {
     }
 
     fn plan(&self, points: Vec<Point>) -> Plan {
-        Plan { name: self.spec.name.clone(), settings: self.common.clone(), points, screen: Vec::new() }
+        let (name, settings) = (self.spec.name.clone(), self.common.clone());
+        Plan { name, settings, points, program: version(self.program), ..Plan::default() }
     }
 }
 

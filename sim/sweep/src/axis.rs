@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Deserialize;
 
-use crate::setting::{Setting, Text, check_path};
+use crate::setting::{Setting, Text, check_path, is_label, plain};
 
 /// What is varied.
 #[derive(Clone, Debug, Deserialize)]
@@ -34,6 +34,9 @@ pub enum Axis {
         /// Whether ratios of neighbours are equal rather than differences.
         #[serde(default)]
         log: bool,
+        /// Whether the setting takes whole numbers only, so that a place between two of them is the lower one.
+        #[serde(skip)]
+        whole: bool,
     },
     /// Settings that change together: their first values, then their second ones, and so on.
     Linked {
@@ -57,6 +60,11 @@ impl Axis {
     /// In words.
     pub(crate) fn check(&self, grid: bool) -> Result<(), String> {
         self.paths().try_for_each(check_path)?;
+        if let Some(path) = self.paths().next().filter(|_| self.paths().all(is_label)) {
+            return Err(format!(
+                "`{path}` changes no number of a run: vary what it names, with it in a Linked"
+            ));
+        }
         match self {
             Self::Values { path, values } if values.is_empty() => {
                 Err(format!("`{path}` has no values: list some"))
@@ -81,7 +89,7 @@ impl Axis {
     }
 
     fn check_range(&self, grid: bool) -> Result<(), String> {
-        let Self::Range { path, from, to, count, step, log } = self else { return Ok(()) };
+        let Self::Range { path, from, to, count, step, log, .. } = self else { return Ok(()) };
         let wrong = |message: &str| Err(format!("`{path}`: {message}"));
         if !(from.is_finite() && to.is_finite() && from < to) {
             return wrong("`from` has to be below `to`, both finite");
@@ -143,24 +151,42 @@ impl Axis {
         }
     }
 
-    /// The number of a range at `share` of the way from its first to its last.
+    /// The number of a range at `share` of the way from its first to its last. Whole numbers have equal parts of the way, or with
+    /// `log` parts as wide as the ratio to the next one.
     fn between(&self, share: f64) -> Vec<Setting> {
-        let Self::Range { path, from, to, log, .. } = self else { return Vec::new() };
+        let Self::Range { path, from, to, log, whole, .. } = self else { return Vec::new() };
+        let (low, high) = if *whole { (from.ceil(), to.floor() + 1.0) } else { (*from, *to) };
         let value = match share {
-            0.0 => *from,
-            1.0 => *to,
-            _ if *log => from * libm::pow(to / from, share),
-            _ => from + (to - from) * share,
+            0.0 => low,
+            1.0 => high,
+            _ if *log => low * libm::pow(high / low, share),
+            _ => low + (high - low) * share,
         };
+        let value = if *whole { value.floor().min(high - 1.0) } else { value };
         vec![Setting::new(path, number(value))]
+    }
+
+    /// The path of a range of any numbers that holds a whole one, and that number.
+    pub(crate) fn whole_number_between(&self) -> Option<(&str, f64)> {
+        match self {
+            Self::Range { path, from, to, count: None, step: None, .. } if from.ceil() <= *to => {
+                Some((path, from.ceil()))
+            }
+            _ => None,
+        }
+    }
+
+    /// Makes a range of any numbers one of whole numbers.
+    pub(crate) fn round(&mut self) {
+        if let Self::Range { whole, .. } = self {
+            *whole = true;
+        }
     }
 }
 
 /// A number as text, rounded to twelve digits so that no rounding error shows.
 fn number(value: f64) -> String {
-    let rounded: f64 = format!("{value:.11e}").parse().unwrap_or(value);
-    let is_plain = rounded == 0.0 || (1e-4..1e16).contains(&rounded.abs());
-    if is_plain { rounded.to_string() } else { format!("{rounded:e}") }
+    plain(format!("{value:.11e}").parse().unwrap_or(value))
 }
 
 #[cfg(test)]
@@ -168,7 +194,8 @@ mod tests {
     use super::*;
 
     fn range(count: Option<u32>, step: Option<f64>, log: bool, [from, to]: [f64; 2]) -> Vec<String> {
-        let axis = Axis::Range { path: "gpu.core_hz".to_owned(), from, to, count, step, log };
+        let path = "gpu.core_hz".to_owned();
+        let axis = Axis::Range { path, from, to, count, step, log, whole: false };
         axis.check(true).unwrap();
         (0..axis.len()).map(|index| axis.value(index)[0].value.clone()).collect()
     }
@@ -189,7 +216,40 @@ mod tests {
         let at = |share| listed.at(share)[0].value.clone();
         assert_eq!([at(0.0), at(0.49), at(0.5), at(0.999)], ["1", "1", "2", "2"]);
         let path = "gpu.core_hz".to_owned();
-        let any = Axis::Range { path, from: 1.0, to: 100.0, count: None, step: None, log: true };
-        assert!(any.check(false).is_ok() && any.at(0.5)[0].value == "10");
+        let any = |log, [from, to]: [f64; 2], whole| Axis::Range {
+            path: path.clone(),
+            from,
+            to,
+            count: None,
+            step: None,
+            log,
+            whole,
+        };
+        let log = any(true, [1.0, 100.0], false);
+        assert!(log.check(false).is_ok() && log.at(0.5)[0].value == "10");
+        // Whole numbers have equal parts of a range, or equal ratios.
+        let at = |axis: &Axis, share| axis.at(share)[0].value.clone();
+        let whole = any(false, [3.5, 7.2], true);
+        assert_eq!(
+            [0.0, 0.24, 0.26, 0.74, 0.76, 1.0].map(|at_| at(&whole, at_)),
+            ["4", "4", "5", "6", "7", "7"]
+        );
+        let whole = any(true, [1.0, 7.0], true);
+        assert_eq!(
+            [0.0, 0.3, 0.34, 0.66, 0.67, 1.0].map(|at_| at(&whole, at_)),
+            ["1", "1", "2", "3", "4", "7"]
+        );
+    }
+
+    #[test]
+    fn names_alone_are_no_axis() {
+        let values = |path: &str| Axis::Values { path: path.to_owned(), values: vec![Text("a".to_owned())] };
+        let error = values("gpu.name").check(true).unwrap_err();
+        assert!(error.contains("changes no number of a run") && error.contains("Linked"), "{error}");
+        let linked = |paths: &[&str]| Axis::Linked {
+            settings: paths.iter().map(|path| ((*path).to_owned(), vec![Text("1".to_owned())])).collect(),
+        };
+        assert!(linked(&["gpu.name", "gpu.core_hz"]).check(true).is_ok());
+        assert!(linked(&["gpu.name", "gpu.doc"]).check(true).is_err());
     }
 }

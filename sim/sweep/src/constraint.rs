@@ -40,7 +40,7 @@ const OPERATORS: [&[&str]; 5] =
 impl Value {
     fn of(text: &str) -> Self {
         match (text.parse(), text.parse()) {
-            (Ok(number), _) => Self::Number(number),
+            (Ok(number), _) if f64::is_finite(number) => Self::Number(number),
             (_, Ok(flag)) => Self::Flag(flag),
             _ => Self::Text(text.to_owned()),
         }
@@ -151,7 +151,12 @@ fn combined(operator: &str, left: Value, right: Value) -> Result<Value, String> 
         ("%", Value::Number(a), Value::Number(b)) => Value::Number(a % b),
         (_, left, _) => return Err(format!("`{operator}` does not take {}", left.kind())),
     };
-    Ok(value)
+    match value {
+        Value::Number(number) if !number.is_finite() => Err(format!(
+            "`{operator}` has no result here, as after a division by 0: leave that out before it, as in `b == 0 || a / b < 2`"
+        )),
+        value => Ok(value),
+    }
 }
 
 struct Parser<'a> {
@@ -260,6 +265,7 @@ mod tests {
             ("timing == 'bound' && !(gpu.a != 8)", true),
             ("flag == false", false),
             ("true || timing > 3", true),
+            ("gpu.b == 2.5 || gpu.a / (gpu.b - 2.5) > 1", true),
         ] {
             assert_eq!(holds(text), Ok(expected), "{text}");
         }
@@ -280,6 +286,9 @@ mod tests {
             ("timing < 'x'", "`<` does not take text"),
             ("gpu.a && flag", "between a number and true or false"),
             ("!gpu.a", "`!` does not take a number"),
+            ("gpu.a / (gpu.b - 2.5) > 1", "division by 0"),
+            ("gpu.a % 0 != 1", "division by 0"),
+            ("0 / 0 < 1", "division by 0"),
         ] {
             let error = holds(text).unwrap_err();
             assert!(error.contains(says), "{text}: {error}");

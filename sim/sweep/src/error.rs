@@ -1,10 +1,13 @@
 //! Errors of a sweep.
 
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use activity::spec::SpecError;
 use run::RunError;
 use traces::io::WriteError;
+
+use crate::place::placed;
 
 /// Why a sweep cannot be planned, run or merged.
 #[derive(Debug, thiserror::Error)]
@@ -29,8 +32,6 @@ pub enum SweepError {
         file: String,
         /// What is wrong, and what to do.
         message: String,
-        /// Whether the request is wrong, rather than an input file.
-        is_usage: bool,
     },
     /// A shard is wrong, or its variables are.
     #[error("{0}")]
@@ -54,7 +55,7 @@ pub enum SweepError {
         message: String,
     },
     /// A folder or file cannot be used.
-    #[error("{path}: {source}; check that it is a folder, that you may write there, and that the disk is not full", path = .path.display())]
+    #[error("{path}: {source}; {remedy}", path = .path.display(), remedy = remedy(.source))]
     Folder {
         /// The folder or file.
         path: PathBuf,
@@ -62,7 +63,7 @@ pub enum SweepError {
         source: std::io::Error,
     },
     /// A result cannot be written.
-    #[error("{0}; what is finished is kept: call it again to continue")]
+    #[error("{0}{remedy}", remedy = kept(.0))]
     Write(#[from] WriteError),
     /// Points are not finished.
     #[error(
@@ -91,10 +92,13 @@ impl SweepError {
     /// Whether this is a usage error (exit code 2) rather than a failure (exit code 1).
     pub fn is_usage(&self) -> bool {
         match self {
-            Self::Spec(SpecError::Read { source, .. }) => source.kind() == std::io::ErrorKind::NotFound,
+            Self::Spec(SpecError::Read { source, .. }) => source.kind() == ErrorKind::NotFound,
             Self::Spec(SpecError::Parse { .. }) => true,
-            Self::Value { .. } | Self::Shard(_) | Self::OtherSweep { .. } | Self::Plan { .. } => true,
-            Self::Setting { is_usage, .. } => *is_usage,
+            Self::Value { .. }
+            | Self::Setting { .. }
+            | Self::Shard(_)
+            | Self::OtherSweep { .. }
+            | Self::Plan { .. } => true,
             Self::Folder { .. }
             | Self::Write(_)
             | Self::Unfinished { .. }
@@ -103,8 +107,35 @@ impl SweepError {
         }
     }
 
+    /// A wrong part of the sweep in the `text` of `file`, made of the place and what is wrong there.
+    pub(crate) fn at(text: &str, file: &str) -> impl Fn((String, String)) -> Self {
+        move |(place, message)| Self::Value { file: placed(text, file, &place), place, message }
+    }
+
     /// Error of the operating system at `path`.
     pub(crate) fn folder(path: &Path) -> impl FnOnce(std::io::Error) -> Self {
         |source| Self::Folder { path: path.to_owned(), source }
+    }
+}
+
+/// Whether no call can write there.
+fn is_closed(error: &std::io::Error) -> bool {
+    matches!(error.kind(), ErrorKind::ReadOnlyFilesystem | ErrorKind::PermissionDenied)
+}
+
+/// What to do about a folder or file that cannot be used.
+fn remedy(error: &std::io::Error) -> &'static str {
+    match error.kind() {
+        ErrorKind::StorageFull => "make room on the disk",
+        _ if is_closed(error) => "give a folder that you may read and write",
+        _ => "check that it is a folder that you may read and write",
+    }
+}
+
+/// End of a message about a result that cannot be written: going on helps unless the folder is closed.
+fn kept(error: &WriteError) -> &'static str {
+    match error {
+        WriteError::Io { source, .. } if is_closed(source) => "",
+        _ => "; what is finished is kept: call it again to continue",
     }
 }

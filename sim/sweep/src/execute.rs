@@ -6,7 +6,10 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use activity::Event;
 use output::progress::Progress;
 use power_model::{FramePower, pace};
-use run::{Distinct, Plan, RunError, RunFrame, StatedError, area_mm2, frames_of, panic_message};
+use run::{
+    Distinct, Plan, RunError, RunFrame, Simulated, StatedError, area_mm2, frames_of, panic_message,
+    warnings_of,
+};
 use serde::{Deserialize, Serialize};
 
 use crate::detail::{self, PassMeans};
@@ -80,8 +83,10 @@ pub struct Measured {
     pub dram_bytes: u64,
     /// Area of the GPU in square millimetres: nominal, low, high.
     pub area_mm2: [f64; 3],
-    /// Codes of accuracy warnings of the timing level, comma-separated.
+    /// Codes of accuracy warnings of the timing level, sorted, comma-separated.
     pub accuracy_warnings: String,
+    /// Codes of all warnings but those about a recorded trace, sorted, comma-separated.
+    pub warnings: String,
     /// Stated error of the cycles by the timing level, relative.
     pub cycles_error: f64,
     /// Stated error of the busy energy by the timing level, relative.
@@ -146,15 +151,17 @@ pub(crate) fn guarded<T>(run: impl FnOnce() -> Result<T, RunError>) -> Result<T,
 fn drawn(plan: &Plan) -> Result<Measured, RunError> {
     let distinct = Distinct::new(&*plan.job)?;
     let drawn = frames_of(plan, distinct.numbers(), &Progress::new(true))?;
-    measured(plan, &drawn, distinct.groups())
+    measured(plan, drawn, distinct.groups())
 }
 
 /// Numbers of a run of `plan` whose frames are those of `distinct` that `groups` names, in order.
 ///
 /// # Errors
 /// If the frames cannot follow each other at the pace of the plan.
-pub fn measured(plan: &Plan, distinct: &[RunFrame], groups: &[usize]) -> Result<Measured, RunError> {
-    let frames: &[&RunFrame] = &groups.iter().map(|&group| &distinct[group]).collect::<Vec<_>>();
+pub fn measured(plan: &Plan, distinct: Vec<RunFrame>, groups: &[usize]) -> Result<Measured, RunError> {
+    let (frames, pictures, heat) = (groups.to_vec(), Vec::new(), Vec::new());
+    let simulated = Simulated { distinct, frames, pictures, heat, sampled: None };
+    let frames: &[&RunFrame] = &simulated.in_order().collect::<Vec<_>>();
     let powers: Vec<&FramePower> = frames.iter().map(|frame| &frame.power).collect();
     let paced = pace(&powers, &plan.platform, plan.pacing)?;
     let count = frames.len() as f64;
@@ -166,7 +173,7 @@ pub fn measured(plan: &Plan, distinct: &[RunFrame], groups: &[usize]) -> Result<
     let area = area_mm2(plan);
     let bytes = |event: Event| counts.get(event).unwrap_or(0);
     let [low_j, high_j] = detail::energy_ends(plan, frames)?;
-    let accuracy_warnings = accuracy_warnings(frames);
+    let accuracy = frames.iter().filter_map(|frame| frame.observed()).flat_map(|observed| &observed.accuracy);
     let stated = StatedError::of_frames(plan.options.timing, frames.iter().copied());
     Ok(Measured {
         used: used(plan),
@@ -180,7 +187,8 @@ pub fn measured(plan: &Plan, distinct: &[RunFrame], groups: &[usize]) -> Result<
         nj_per_pixel: frame_j / plan.pixels() as f64 * 1e9,
         dram_bytes: bytes(Event::DramReadBytes) + bytes(Event::DramWriteBytes),
         area_mm2: [area.nominal, area.low, area.high],
-        accuracy_warnings,
+        accuracy_warnings: joined(accuracy.map(|warning| warning.code().name())),
+        warnings: joined(warnings_of(plan, &simulated, &paced).iter().map(|warning| warning.code.name())),
         cycles_error: stated.cycles,
         energy_error: stated.energy,
         passes: detail::passes(plan, frames),
@@ -208,11 +216,9 @@ fn used(plan: &Plan) -> BTreeMap<String, String> {
     texts.into_iter().map(|(name, text)| (name.to_owned(), text)).collect()
 }
 
-fn accuracy_warnings(frames: &[&RunFrame]) -> String {
-    let observed = frames.iter().filter_map(|frame| frame.observed());
-    let codes: BTreeSet<&str> =
-        observed.flat_map(|observed| &observed.accuracy).map(|warning| warning.code().name()).collect();
-    codes.into_iter().collect::<Vec<_>>().join(",")
+/// Each of some codes once, sorted, comma-separated.
+fn joined(codes: impl Iterator<Item = &'static str>) -> String {
+    codes.collect::<BTreeSet<_>>().into_iter().collect::<Vec<_>>().join(",")
 }
 
 #[cfg(test)]
@@ -265,6 +271,19 @@ mod tests {
         let sum = |of: fn(&PassMeans) -> f64| measured.passes.iter().map(of).sum::<f64>();
         assert!(near(sum(|pass| pass.ms), measured.busy_ms) && near(sum(|pass| pass.mj), measured.busy_mj));
         assert!((measured.frame_ms - 1e3 / 60.0).abs() < 1e-3, "{}", measured.frame_ms);
+    }
+
+    #[test]
+    fn all_warnings_of_a_run_are_kept() {
+        assert_eq!(numbers(&[]).warnings, "");
+        assert_eq!(numbers(&[("gpu", "mobile"), ("platform", "reference")]).warnings, "platform-mismatch");
+        let both = numbers(&[("gpu", "discrete"), ("timing", "bound"), ("frames", "0..1")]);
+        let codes: Vec<&str> = both.warnings.split(',').collect();
+        assert!(codes.contains(&"platform-mismatch") && codes.is_sorted(), "{codes:?}");
+        assert!(
+            both.accuracy_warnings.split(',').all(|code| code.is_empty() || codes.contains(&code)),
+            "{codes:?}"
+        );
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! The folder of a sweep: `plan.jsonl` and a file for each finished point, each written whole or not at all.
 
+use std::collections::HashSet;
 use std::fs::{self, File};
 use std::io::{self, BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
@@ -10,7 +11,7 @@ use traces::io::atomic;
 
 use crate::SweepError;
 use crate::execute::PointResult;
-use crate::plan::{Plan, Point, SCHEMA};
+use crate::plan::{Plan, Point, SCHEMA, version};
 use crate::setting::Setting;
 
 /// File of the plan: a header, then one line per point.
@@ -22,19 +23,24 @@ const PLAN: &str = "plan.jsonl";
 struct Header {
     schema: u32,
     sweep: String,
+    /// Version of the program that planned it.
+    #[serde(default)]
+    program: String,
     /// Settings of all points.
     settings: Vec<Setting>,
     points: usize,
     /// Timing levels that screen.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     screen: Vec<Level>,
+    /// Constraints and forbidden entries that leave out no point.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    idle: Vec<String>,
 }
 
 impl Header {
     fn of(plan: &Plan) -> Self {
-        let Plan { name, settings, points, screen } = plan;
-        let (settings, screen) = (settings.clone(), screen.clone());
-        Self { schema: SCHEMA, sweep: name.clone(), settings, points: points.len(), screen }
+        let Plan { name: sweep, settings, points, screen, program, idle } = plan.clone();
+        Self { schema: SCHEMA, sweep, program, settings, points: points.len(), screen, idle }
     }
 }
 
@@ -158,7 +164,50 @@ impl Folder {
                 format!("it has {} of {} points: plan the sweep again", points.len(), header.points);
             return Err(SweepError::Plan { path, message });
         }
-        Ok(Plan { name: header.sweep, settings: header.settings, points, screen: header.screen })
+        let Header { sweep: name, settings, screen, program, idle, .. } = header;
+        Ok(Plan { name, settings, points, screen, program, idle })
+    }
+
+    /// That the plan is of another build than `program`, in words; `None` if it is not, or there is no plan.
+    ///
+    /// # Errors
+    /// If the plan cannot be read.
+    pub fn other_build(&self, program: Option<&str>) -> Result<Option<String>, SweepError> {
+        let Some(Header { program: planned, .. }) =
+            self.header()?.filter(|header| header.program != version(program))
+        else {
+            return Ok(None);
+        };
+        // A hash is long.
+        let planned: Vec<String> = planned.split(' ').map(|word| word.chars().take(12).collect()).collect();
+        Ok(Some(format!(
+            "{}: planned and run by another build of quintile ({}): `quintile sweep run FILE.ron --out DIR` makes the numbers of this one",
+            self.root.display(),
+            if planned.concat().is_empty() { "which is not known".to_owned() } else { planned.join(" ") }
+        )))
+    }
+
+    /// Results of points that are not in `plan`: of other builds of the program, settings or inputs.
+    ///
+    /// # Errors
+    /// If a folder cannot be read.
+    pub fn others(&self, plan: &Plan) -> Result<Vec<PathBuf>, SweepError> {
+        let known: HashSet<&str> = plan.points.iter().map(|point| point.id.as_str()).collect();
+        let is_other = |path: &PathBuf| {
+            let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+            name.strip_suffix(".json").is_some_and(|id| !id.starts_with('.') && !known.contains(id))
+        };
+        Ok(self.files()?.into_iter().filter(is_other).collect())
+    }
+
+    /// Removes [`Self::others`]; returns their number.
+    ///
+    /// # Errors
+    /// If there is no plan, or a file cannot be removed.
+    pub fn remove_others(&self) -> Result<usize, SweepError> {
+        let others = self.others(&self.plan()?)?;
+        others.iter().try_for_each(|path| fs::remove_file(path).map_err(SweepError::folder(path)))?;
+        Ok(others.len())
     }
 
     /// File of a point, in one of 256 folders: a folder of a million files is slow.
@@ -178,6 +227,7 @@ impl Folder {
             Ok(bytes) => match serde_json::from_slice::<PointResult>(&bytes) {
                 Ok(result) if result.id == point.id => return Ok(Stored::Whole(result)),
                 Ok(result) => format!("it holds the point {}", result.id),
+                Err(_) if is_point(&bytes, &point.id) => return Ok(Stored::OtherBuild),
                 Err(error) => format!("it is cut off or damaged: {error}"),
             },
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Stored::Missing),
@@ -193,7 +243,7 @@ impl Folder {
     pub(crate) fn result(&self, point: &Point) -> Result<Option<PointResult>, SweepError> {
         Ok(match self.stored(point)? {
             Stored::Whole(result) => Some(result),
-            Stored::Missing | Stored::Damaged(_) => None,
+            Stored::Missing | Stored::OtherBuild | Stored::Damaged(_) => None,
         })
     }
 
@@ -219,17 +269,21 @@ impl Folder {
     /// # Errors
     /// If a folder cannot be read.
     pub(crate) fn clean(&self) -> Result<(), SweepError> {
-        let points = self.root.join("points");
-        for folder in entries(&points)? {
-            for path in entries(&folder)? {
-                let whole = path.file_name().and_then(|name| Some(finished_name(name.to_str()?)?.to_owned()));
-                if whole.is_some_and(|whole| path.with_file_name(whole).exists()) {
-                    // Another process may have removed it.
-                    let _ = fs::remove_file(&path);
-                }
+        for path in self.files()? {
+            let whole = path.file_name().and_then(|name| Some(finished_name(name.to_str()?)?.to_owned()));
+            if whole.is_some_and(|whole| path.with_file_name(whole).exists()) {
+                // Another process may have removed it.
+                let _ = fs::remove_file(&path);
             }
         }
         Ok(())
+    }
+
+    /// All files of points, finished or not.
+    fn files(&self) -> Result<Vec<PathBuf>, SweepError> {
+        let folders = entries(&self.root.join("points"))?;
+        let files = folders.iter().map(|folder| entries(folder)).collect::<Result<Vec<_>, _>>()?;
+        Ok(files.into_iter().flatten().collect())
     }
 }
 
@@ -239,8 +293,15 @@ pub(crate) enum Stored {
     Whole(PointResult),
     /// A file that is not its result: what is wrong, and what to do.
     Damaged(String),
+    /// A result that a build of the program wrote which keeps other numbers.
+    OtherBuild,
     /// Nothing.
     Missing,
+}
+
+/// Whether `bytes` are a whole file of the point `id`, whatever else it holds.
+fn is_point(bytes: &[u8], id: &str) -> bool {
+    serde_json::from_slice::<serde_json::Value>(bytes).is_ok_and(|value| value["id"] == id)
 }
 
 /// Name of the file that the file called `name` was to become, such as `ID.json` of `.ID.json.PID.part`.
@@ -274,10 +335,12 @@ mod tests {
     fn plan(name: &str) -> Plan {
         let point = |id: &str| Point { id: id.to_owned(), settings: vec![Setting::new("samples", "2")] };
         Plan {
-            screen: Vec::new(),
             name: name.to_owned(),
             settings: vec![Setting::new("scene", "tiny")],
             points: vec![point("aa01"), point("ab02")],
+            program: version(Some("r1")),
+            idle: vec!["constraints[0]".to_owned()],
+            ..Plan::default()
         }
     }
 
@@ -316,6 +379,8 @@ mod tests {
             let Ok(Stored::Damaged(message)) = folder.stored(&plan.points[0]) else { panic!() };
             assert!(message.contains("aa01.json: ") && message.contains(says), "{message}");
         }
+        fs::write(&path, r#"{"id":"aa01","measured":{"cycles":1}}"#).unwrap();
+        assert!(matches!(folder.stored(&plan.points[0]).unwrap(), Stored::OtherBuild));
         let path = root.path().join(PLAN);
         let text = fs::read_to_string(&path).unwrap();
         for length in [0, 10, text.find('\n').unwrap() + 1, text.len() - 5] {
@@ -338,6 +403,24 @@ mod tests {
         left.iter().for_each(|path| fs::write(path, "{").unwrap());
         folder.clean().unwrap();
         assert_eq!(left.map(|path| path.exists()), [false, true, true]);
+        assert!(folder.result(&plan.points[0]).unwrap().is_some());
+    }
+
+    #[test]
+    fn other_builds_are_named_and_their_results_removed_on_request_alone() {
+        let root = tempfile::tempdir().unwrap();
+        let (folder, mut plan) = (Folder::at(root.path()), plan("a"));
+        assert_eq!(folder.other_build(Some("r1")).unwrap(), None);
+        folder.write_plan(&plan).unwrap();
+        assert_eq!(folder.other_build(Some("r1")).unwrap(), None);
+        let message = folder.other_build(Some("r2")).unwrap().unwrap();
+        assert!(message.contains("another build of quintile (") && message.contains(" r1)"), "{message}");
+        let failed = |id: &str| PointResult { id: id.to_owned(), outcome: Err("why".to_owned()).into() };
+        plan.points.iter().for_each(|point| folder.write_result(point, &failed(&point.id)).unwrap());
+        plan.points.remove(0);
+        folder.write_plan(&plan).unwrap();
+        assert_eq!(folder.others(&plan).unwrap(), [root.path().join("points/aa/aa01.json")]);
+        assert_eq!((folder.remove_others().unwrap(), folder.remove_others().unwrap()), (1, 0));
         assert!(folder.result(&plan.points[0]).unwrap().is_some());
     }
 

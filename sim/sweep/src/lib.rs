@@ -22,6 +22,7 @@ mod execute;
 mod folder;
 mod merge;
 mod parquet;
+mod place;
 mod plan;
 mod points;
 mod report;
@@ -44,7 +45,7 @@ pub use merge::{RESULTS, merge};
 pub use plan::{Plan, Point};
 pub use points::combinations;
 pub use report::{
-    ALL_WORKLOADS, Cost, Design, Effect, Failure, Interaction, Measure, NearBest, PageError, Pair,
+    ALL_WORKLOADS, Cost, Design, Effect, Failure, Interaction, Measure, NearBest, NoEffect, PageError, Pair,
     RatedDesign, Report, ReportOptions, Share, Winner,
 };
 pub use setting::{Setting, Text, is_option, with};

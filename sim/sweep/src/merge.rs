@@ -110,7 +110,10 @@ fn numbers(rows: &[Outcome]) -> Vec<Column> {
         name: name.to_owned(),
         values: Values::Number(rows.iter().map(|row| row.measured().map(of)).collect()),
     };
-    let warnings = rows.iter().map(|row| row.measured().map(|row| row.accuracy_warnings.clone())).collect();
+    let codes = |name: &str, of: fn(&Measured) -> &String| {
+        let codes = |row: &Outcome| row.measured().map(of).filter(|codes| !codes.is_empty()).cloned();
+        Column { name: name.to_owned(), values: Values::Text(rows.iter().map(codes).collect()) }
+    };
     vec![
         whole("cycles", |row| row.cycles),
         number("busy_ms", |row| row.busy_ms),
@@ -124,7 +127,8 @@ fn numbers(rows: &[Outcome]) -> Vec<Column> {
         number("area_mm2", |row| row.area_mm2[0]),
         number("area_low_mm2", |row| row.area_mm2[1]),
         number("area_high_mm2", |row| row.area_mm2[2]),
-        Column { name: "accuracy_warnings".to_owned(), values: Values::Text(warnings) },
+        codes("accuracy_warnings", |row| &row.accuracy_warnings),
+        codes("warnings", |row| &row.warnings),
         number("cycles_error", |row| row.cycles_error),
         number("energy_error", |row| row.energy_error),
     ]
@@ -176,12 +180,12 @@ mod tests {
                 .into(),
         };
         Plan {
-            screen: Vec::new(),
             name: "a".to_owned(),
             settings: [("scene", "tiny"), ("frames", "0..1")]
                 .map(|(path, value)| Setting::new(path, value))
                 .into(),
             points: vec![point("1", "8"), point("2", "7"), point("2", "4")],
+            ..Plan::default()
         }
     }
 

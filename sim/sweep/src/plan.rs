@@ -8,10 +8,11 @@ use serde::{Deserialize, Serialize};
 use timing::Level;
 
 use crate::SweepError;
+use crate::place::placed;
 use crate::points::Points;
 use crate::setting::Setting;
 use crate::spec::{Combination, SweepSpec};
-use crate::trials::{Refusal, Ticker, Trials};
+use crate::trials::{Refusal, Ticker, Trials, round_whole};
 
 /// Version of the files of a sweep.
 pub(crate) const SCHEMA: u32 = 2;
@@ -30,7 +31,7 @@ pub struct Point {
 }
 
 /// A planned sweep.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Plan {
     /// Name of the sweep.
     pub name: String,
@@ -41,6 +42,15 @@ pub struct Plan {
     /// Timing levels that screen designs, from the coarsest; empty without screening. All points at one level come before those at
     /// the next.
     pub screen: Vec<Level>,
+    /// Version of the program that planned it, as in the ids.
+    pub program: String,
+    /// Places in the sweep file of constraints and forbidden entries that leave out no point.
+    pub idle: Vec<String>,
+}
+
+/// What to do about a constraint or a forbidden entry at `place` that leaves out no point.
+pub(crate) fn idle(place: &str) -> String {
+    format!("{place} leaves out no point: check it, or remove it")
 }
 
 impl Plan {
@@ -65,14 +75,12 @@ impl Plan {
     ) -> Result<Self, SweepError> {
         let file = path.display().to_string();
         let text = activity::spec::read(path)?;
-        let spec = SweepSpec::parse(&text, &file)?;
-        let points = Points::new(&spec, quick).map_err(|(place, message)| SweepError::Value {
-            file: file.clone(),
-            place,
-            message,
-        })?;
+        let mut spec = SweepSpec::parse(&text, &file)?;
+        let common = spec.base(quick);
+        round_whole(&mut spec.axes, &common);
+        let points = Points::new(&spec, quick).map_err(SweepError::at(&text, &file))?;
         for place in &points.idle {
-            progress.note(&format!("{file}: {place} leaves out no point: check it, or remove it"));
+            progress.note(&format!("{}: {}", placed(&text, &file, place), idle(place)));
         }
         let mut ticker = Ticker::new(progress);
         let mut trials = Trials::new(&points);
@@ -86,9 +94,14 @@ impl Plan {
             Ok(id(points.settings(at), &trials.inputs_of(at)?, &version))
         };
         let ids = (0..count).map(id).collect::<Result<Vec<_>, SweepError>>()?;
-        let Points { common: settings, varied, .. } = points;
+        let Points { common: settings, varied, idle } = points;
         let points = ids.into_iter().zip(varied).map(|(id, settings)| Point { id, settings }).collect();
-        Ok(Self { name: spec.name, settings, points, screen: spec.screen })
+        Ok(Self { name: spec.name, settings, points, screen: spec.screen, program: version, idle })
+    }
+
+    /// Points at the last level of [`Self::screen`], which designs are compared at; all points without screening.
+    pub(crate) fn last_level(&self) -> &[Point] {
+        self.of_level(self.screen.len().saturating_sub(1))
     }
 
     /// Points at level number `level` of [`Self::screen`]; all points without screening.
@@ -105,42 +118,43 @@ impl Plan {
 
 /// The refusal of a setting, with its place in the sweep file.
 fn refused(refusal: Refusal, spec: &SweepSpec, (file, text): (&str, &str), points: &Points) -> SweepError {
-    let Refusal { message, is_usage, path } = refusal;
+    let Refusal { message, at, path } = refusal;
     // Messages are those of `quintile run`.
-    let of_workload = message.strip_prefix("set: ");
-    let message = of_workload.or(message.strip_prefix("--set ")).unwrap_or(&message).to_owned();
-    let begins = |setting: &Setting| {
-        let option = setting.path.strip_prefix("workload.").unwrap_or(match &*setting.path {
-            "lens_radius" => "lens",
-            "frame_rate_hz" => "rate",
-            path => path,
-        });
-        let rest = message.strip_prefix(&setting.path).or_else(|| message.strip_prefix(option));
-        rest.is_some_and(|rest| rest.starts_with(['=', ':']))
+    let message = message.strip_prefix("--set ").or(message.strip_prefix("--")).unwrap_or(&message);
+    let settings = points.settings(at);
+    let of = |setting: &&Setting| {
+        let rest =
+            [setting.path.as_str(), setting.option()].into_iter().find_map(|name| message.strip_prefix(name));
+        let rest = rest.filter(|rest| rest.starts_with(['=', ':']))?;
+        Some((setting.path.clone(), format!("{}{rest}", setting.path)))
     };
-    let quotes = |setting: &Setting| {
+    let is_quoted = |setting: &&Setting| {
         let Setting { value, .. } = setting;
         message.contains(&format!("`{value}`")) || message.starts_with(&format!("{value}: "))
     };
-    let first = points.settings(0);
-    let named = first.iter().find(|setting| begins(setting)).map(|setting| setting.path.clone());
-    let path = path.or_else(|| {
-        let option = first.iter().find(|setting| setting.path.starts_with("workload."));
-        option.filter(|_| of_workload.is_some()).map(|setting| setting.path.clone())
-    });
-    let quoted = || first.iter().find(|setting| quotes(setting)).map(|setting| setting.path.clone());
-    let Some(path) = named.clone().or(path).or_else(quoted) else {
-        return SweepError::Setting { file: file.to_owned(), message, is_usage };
+    let quoted = || settings.iter().find(is_quoted).map(|setting| setting.path.clone());
+    let named = settings.iter().find_map(|setting| of(&setting));
+    let named =
+        named.or_else(|| path.or_else(quoted).map(|path| (path.clone(), format!("`{path}`: {message}"))));
+    let Some((path, message)) = named else {
+        return SweepError::Setting { file: file.to_owned(), message: message.to_owned() };
     };
-    let place = spec.place_of(&path);
+    let value =
+        |path: &str| settings.iter().find(|setting| setting.path == path).map(|set| set.value.as_str());
     let line = text.find(&format!("{path:?}")).map(|at| 1 + text[..at].matches('\n').count());
     let file = line.map_or_else(|| file.to_owned(), |line| format!("{file}:{line}"));
-    let path = if named.is_some() { String::new() } else { format!("`{path}`: ") };
-    SweepError::Setting { file, message: format!("{place}: {path}{message}"), is_usage }
+    let with = match value("scene").filter(|_| path.starts_with("workload.") && spec.varies("scene")) {
+        Some(scene) => format!("with the scene `{scene}`, "),
+        None => String::new(),
+    };
+    let is_fraction = spec.is_range(&path) && value(&path).is_some_and(|value| value.contains('.'));
+    let remedy = if is_fraction { "; for whole numbers give the range a whole `step`" } else { "" };
+    let message = format!("{}: {with}{message}{remedy}", spec.place_of(&path));
+    SweepError::Setting { file, message }
 }
 
 /// Version of the program in ids.
-fn version(program: Option<&str>) -> String {
+pub(crate) fn version(program: Option<&str>) -> String {
     format!("{} {}", env!("CARGO_PKG_VERSION"), program.unwrap_or_default())
 }
 
@@ -216,9 +230,9 @@ mod tests {
             ("Values(path: \"timing\", values: [\"boundd\"])", "did you mean `bound`?"),
             (
                 "Values(path: \"workload.bins\", values: [8])",
-                "`workload.bins`: `tiny` is a scene; only workloads have options",
+                "workload.bins=8: `tiny` is a scene; only workloads have options",
             ),
-            ("Values(path: \"lens_radius\", values: [-1])", "lens: -1: the radius of the lens"),
+            ("Values(path: \"lens_radius\", values: [-1])", "lens_radius: -1: the radius of the lens"),
             ("Values(path: \"gpu\", values: [\"none.ron\"])", "`gpu`: none.ron: cannot read it"),
             ("Values(path: \"platform.units.shade.idle_unit_w\", values: [0])", "did you mean `shader`?"),
             ("Values(path: \"table.rows.draws.nominal_pi\", values: [200])", "did you mean `nominal_pj`?"),
@@ -226,6 +240,52 @@ mod tests {
             let error = of_axis(axis).unwrap_err();
             assert!(error.contains("sweep.ron:1: axes[0]: ") && error.contains(says), "{error}");
         }
+    }
+
+    #[test]
+    fn an_option_of_one_workload_names_the_other_and_its_place() {
+        let text = "(name: \"a\", axes: [Values(path: \"scene\", values: [\"glossy\", \"deferred\"]),\n\
+            Values(path: \"workload.texels\", values: [64])])";
+        let error = planned(text).unwrap_err();
+        let says =
+            "sweep.ron:2: axes[1]: with the scene `deferred`, workload.texels=64: unknown option `texels`";
+        assert!(error.contains(says), "{error}");
+    }
+
+    #[test]
+    fn whole_settings_get_whole_numbers_of_a_range() {
+        let sweep = |axes: &str| {
+            let text =
+                "(name: \"a\", settings: {\"scene\": \"tiny\"}, points: Sobol(count: 32), axes: [AXES])";
+            planned(&text.replace("AXES", axes))
+        };
+        let axes = "Range(path: \"samples\", from: 1, to: 4), Range(path: \"gpu.core_hz\", from: 1e8, to: 4e8), \
+            Range(path: \"gpu.units.depth.queue\", from: 2.5, to: 64, log: true)";
+        let plan = sweep(axes).unwrap();
+        let of = |path: &str| -> Vec<f64> {
+            let all = plan.points.iter().flat_map(|point| &point.settings).filter(|set| set.path == path);
+            all.map(|setting| setting.value.parse().unwrap()).collect()
+        };
+        let samples = of("samples");
+        let count = |value: f64| samples.iter().filter(|sample| **sample == value).count();
+        assert_eq!([1.0, 2.0, 3.0, 4.0].map(count), [8; 4]);
+        assert!(
+            of("gpu.units.depth.queue")
+                .iter()
+                .all(|queue| queue.fract() == 0.0 && (3.0..=64.0).contains(queue))
+        );
+        assert!(of("gpu.core_hz").iter().any(|hz| hz.fract() != 0.0));
+        // Without a whole number in the range, and in a grid, the message says what to do.
+        let error = sweep("Range(path: \"samples\", from: 1.2, to: 1.8)").unwrap_err();
+        assert!(
+            error.contains("samples: `1.") && error.ends_with("give the range a whole `step`"),
+            "{error}"
+        );
+        let error = of_axis("Range(path: \"samples\", from: 1, to: 2, count: 3)").unwrap_err();
+        assert!(
+            error.contains("samples: `1.5`") && error.ends_with("give the range a whole `step`"),
+            "{error}"
+        );
     }
 
     #[test]

@@ -1,17 +1,19 @@
 //! Running the points of a shard, and the state of a sweep.
 
+use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 use ::run::duration;
 use output::progress::Progress;
-use output::table::si;
+use output::table::{counted, si};
 use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::execute::{Outcome, PointResult};
 use crate::folder::Stored;
 use crate::plan::{Plan, Point};
+use crate::report::label;
 use crate::screen::{note, screened};
 use crate::shared::{Costs, Group, groups};
 use crate::{Folder, Shard, SweepError};
@@ -56,14 +58,14 @@ pub struct Status {
 }
 
 impl Status {
-    /// State of the sweep in `folder`, from its files alone; and what is wrong with damaged ones.
+    /// State of the sweep in `folder`, from its files alone; and what is wrong with files that do not count.
     ///
     /// # Errors
     /// If there is no plan, or a file cannot be read.
     pub fn of(folder: &Folder) -> Result<(Self, Vec<String>), SweepError> {
         let plan = folder.plan()?;
         let mut status = Self { points: plan.points.len(), ..Self::default() };
-        let mut damaged = Vec::new();
+        let (mut damaged, mut others) = (Vec::new(), 0);
         for point in &plan.points {
             match folder.stored(point)? {
                 Stored::Whole(result) => {
@@ -72,11 +74,20 @@ impl Status {
                     status.screened_out += usize::from(!result.outcome.ran());
                 }
                 Stored::Damaged(message) => damaged.push(message),
+                Stored::OtherBuild => others += 1,
                 Stored::Missing => {}
             }
         }
+        damaged.extend(of_other_build(others));
         Ok((status, damaged))
     }
+}
+
+/// That results of another build do not count.
+fn of_other_build(count: usize) -> Option<String> {
+    let message = "written by another build of quintile, which keeps other numbers: read them with that build, or `quintile sweep run` \
+                   runs the points again";
+    (count > 0).then(|| format!("{} {message}", counted(count, "result")))
 }
 
 /// The points of a shard that are not finished.
@@ -85,6 +96,8 @@ pub struct Work<'a> {
     folder: &'a Folder,
     runs: usize,
     pending: Vec<&'a Point>,
+    /// Points that failed before and do not run again.
+    failed: usize,
     /// What is wrong with damaged files of these points.
     damaged: Vec<String>,
     /// Whether to begin no further points.
@@ -104,10 +117,18 @@ impl<'a> Work<'a> {
         // Finer levels begin when it is known which designs are left.
         let points = plan.of_level(0).iter().enumerate();
         let points: Vec<&Point> = points.filter(|(at, _)| shard.has(*at)).map(|(_, point)| point).collect();
-        let mut damaged = Vec::new();
+        let (mut damaged, mut others, mut failed) = (Vec::new(), 0, 0);
         let mut is_pending = |point: &Point| match folder.stored(point)? {
-            Stored::Whole(result) => Ok(retry && matches!(result.outcome, Outcome::Error(_))),
+            Stored::Whole(result) => {
+                let has_failed = matches!(result.outcome, Outcome::Error(_));
+                failed += usize::from(has_failed && !retry);
+                Ok(has_failed && retry)
+            }
             Stored::Missing => Ok(true),
+            Stored::OtherBuild => {
+                others += 1;
+                Ok(true)
+            }
             Stored::Damaged(message) => {
                 damaged.push(message);
                 Ok(true)
@@ -115,8 +136,9 @@ impl<'a> Work<'a> {
         };
         let keep = |point: &&'a Point| is_pending(point).map(|keep| keep.then_some(*point)).transpose();
         let pending = points.iter().filter_map(keep).collect::<Result<Vec<_>, SweepError>>()?;
+        damaged.extend(of_other_build(others));
         let runs = if plan.screen.is_empty() { points.len() } else { plan.points.len() };
-        Ok(Self { plan, folder, runs, pending, damaged, stop: &|| false })
+        Ok(Self { plan, folder, runs, pending, failed, damaged, stop: &|| false })
     }
 
     /// The same work; [`Self::run`] begins no further point once `stop` holds.
@@ -148,7 +170,7 @@ impl<'a> Work<'a> {
             Status {
                 points: self.runs,
                 finished: self.runs - self.pending.len() + done,
-                failed,
+                failed: self.failed + failed,
                 screened_out: 0,
             }
         } else {
@@ -217,8 +239,6 @@ impl<'a> Work<'a> {
 
 /// Line about a finished run.
 fn line(point: &Point, result: &PointResult, (done, count): (usize, usize), left_s: f64) -> String {
-    let settings: Vec<String> =
-        point.settings.iter().map(|setting| format!("{}={}", setting.path, setting.value)).collect();
     let outcome = match &result.outcome {
         Outcome::Measured(measured) => {
             format!("{} cycles, {}", measured.cycles, si(measured.frame_mj * 1e-3, "J"))
@@ -227,5 +247,5 @@ fn line(point: &Point, result: &PointResult, (done, count): (usize, usize), left
         Outcome::ScreenedOut(reason) => format!("screened out: {reason}"),
     };
     let left = if done < count { format!(" ({} left)", duration(left_s)) } else { String::new() };
-    format!("{done}/{count} {}: {outcome}{left}", settings.join(" "))
+    format!("{done}/{count} {}: {outcome}{left}", label(&point.settings, &BTreeMap::new()))
 }

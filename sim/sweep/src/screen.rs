@@ -140,8 +140,16 @@ pub(crate) fn note(coarse: Level, fine: Level, screened: &Screened<'_>) -> Strin
     let most = |of: usize| screened.ranges.values().map(|range| range[of]).fold(0.0, f64::max);
     let [time, energy] = [0, 1].map(|of| 100.0 * (libm::exp(most(of)) - 1.0));
     let (kept, all) = (screened.kept, screened.kept + screened.dropped.len());
+    let nothing = match screened.dropped.is_empty() {
+        true => format!(
+            ". Screening saved nothing: {CALIBRATED} designs of a workload always run, and no other is far enough from the frontier; leave \
+             `screen` out"
+        ),
+        false => String::new(),
+    };
     format!(
-        "{kept} of {all} designs ran at {}: it differs from {} by a factor that varies by {time:.2} % in time and {energy:.2} % in energy",
+        "{kept} of {all} designs ran at {}: it differs from {} by a factor that varies by {time:.2} % in time and {energy:.2} % in \
+         energy{nothing}",
         fine.name(),
         coarse.name()
     )
@@ -370,6 +378,20 @@ mod tests {
         let last = (0..100).max_by_key(|&at| draw_order(&points[at])).unwrap();
         costs[last] = ([2.0, 2.0], [-1.0, -1.0]);
         assert!(!run(&points, &costs).contains(&points[last].id.as_str()));
+    }
+
+    #[test]
+    fn screening_that_saves_nothing_says_so() {
+        let of = |dropped| {
+            let screened = Screened { kept: 3, pending: Vec::new(), dropped, ranges: BTreeMap::new() };
+            note(Level::Bound, Level::Packet, &screened)
+        };
+        let points = points(1);
+        let dropped = vec![(&points[0], Outcome::ScreenedOut(String::new()))];
+        assert!(
+            of(Vec::new()).contains("3 of 3 designs") && of(Vec::new()).contains("saved nothing: 39 designs")
+        );
+        assert!(of(dropped.clone()).contains("3 of 4 designs") && !of(dropped).contains("nothing"));
     }
 
     #[test]

@@ -29,9 +29,24 @@ impl<'de> Deserialize<'de> for Text {
                 let items = items.iter().map(ron::to_string).collect::<Result<Vec<_>, _>>();
                 items.map(|items| Self(format!("({})", items.join(", ")))).map_err(serde::de::Error::custom)
             }
-            other => ron::to_string(&other).map(Self).map_err(serde::de::Error::custom),
+            other => {
+                ron::to_string(&other).map(|text| Self(without_zeros(text))).map_err(serde::de::Error::custom)
+            }
         }
     }
+}
+
+/// A number such as `1100000000.0` without what says nothing; other texts as they are.
+fn without_zeros(text: String) -> String {
+    let number =
+        text.parse::<f64>().ok().filter(|number| number.is_finite() && text.contains(['.', 'e', 'E']));
+    number.map_or(text, plain)
+}
+
+/// A number as text, with an exponent where it is far from 1.
+pub(crate) fn plain(number: f64) -> String {
+    let is_plain = number == 0.0 || (1e-4..1e16).contains(&number.abs());
+    if is_plain { number.to_string() } else { format!("{number:e}") }
 }
 
 /// Options of a run that can be set.
@@ -52,6 +67,9 @@ const VIEW: [&str; 10] = [
     "camera",
 ];
 
+/// Settings within a file or a workload, for lists of what is known.
+const WITHIN: [&str; 5] = ["gpu.PATH", "platform.PATH", "table.PATH", "scene.PATH", "workload.NAME"];
+
 /// First name of paths to options of a workload.
 const WORKLOAD: &str = "workload";
 
@@ -70,6 +88,15 @@ impl Setting {
     /// A setting.
     pub fn new(path: impl Into<String>, value: impl Into<String>) -> Self {
         Self { path: path.into(), value: value.into() }
+    }
+
+    /// Name of the option of `quintile run` that stands for it in messages.
+    pub(crate) fn option(&self) -> &str {
+        match &*self.path {
+            "lens_radius" => "lens",
+            "frame_rate_hz" => "rate",
+            path => path.strip_prefix("workload.").unwrap_or(path),
+        }
     }
 
     /// Whether files that a run reads may depend on it.
@@ -106,6 +133,12 @@ impl Setting {
     }
 }
 
+/// Whether `path` is a name or a description in an input file, which changes no number.
+pub(crate) fn is_label(path: &str) -> bool {
+    InputFile::of(path).is_some()
+        && path.split_once('.').is_some_and(|(_, name)| matches!(name, "name" | "doc"))
+}
+
 /// Whether `path` is an option of the run or of the view.
 pub fn is_option(path: &str) -> bool {
     OPTIONS.contains(&path) || VIEW.contains(&path)
@@ -124,11 +157,11 @@ pub(crate) fn check_path(path: &str) -> Result<(), String> {
     if is_known {
         return Ok(());
     }
-    let known: Vec<&str> = match first {
-        Some(_) => InputFile::ALL.map(InputFile::name).into_iter().chain([WORKLOAD]).collect(),
-        None => OPTIONS.into_iter().chain(VIEW).collect(),
+    let suggestion = match first {
+        Some(_) => InputFile::suggestion(path),
+        None => suggestion(path, &OPTIONS.into_iter().chain(VIEW).chain(WITHIN).collect::<Vec<_>>()),
     };
-    Err(format!("unknown setting `{path}`, {}", suggestion(first.unwrap_or(path), &known)))
+    Err(format!("unknown setting `{path}`, {suggestion}"))
 }
 
 /// A run with `settings`, planned.
@@ -137,6 +170,14 @@ pub(crate) fn check_path(path: &str) -> Result<(), String> {
 /// The first setting or input that is invalid.
 pub(crate) fn planned(settings: &[Setting]) -> Result<Plan, RunError> {
     options(settings).and_then(Plan::resolve)
+}
+
+/// A run with `settings` that draws the same as `drawn`.
+///
+/// # Errors
+/// As [`planned`].
+pub(crate) fn planned_beside(drawn: &Plan, settings: &[Setting]) -> Result<Plan, RunError> {
+    options(settings).and_then(|options| drawn.beside(options))
 }
 
 /// Options of a run with `settings`.
@@ -322,7 +363,12 @@ mod tests {
     #[test]
     fn unknown_names_and_values_get_a_suggestion() {
         assert_eq!(check_path("timming").unwrap_err(), "unknown setting `timming`, did you mean `timing`?");
-        assert!(check_path("gpo.core_hz").unwrap_err().contains("did you mean `gpu`?"));
+        assert!(check_path("gpuu.core_hz").unwrap_err().contains("did you mean `gpu.core_hz`?"));
+        let known = check_path("what").unwrap_err();
+        assert!(
+            known.contains("focus") && known.contains("gpu.PATH") && known.contains("workload.NAME"),
+            "{known}"
+        );
         assert!(check_path("platform.v_v").is_ok() && check_path("workload.x").is_ok());
         assert_eq!(
             one("timing", "stepd").unwrap_err(),

@@ -1,9 +1,14 @@
 //! Shards: each of `n` tasks runs every n-th point.
 
+use std::fmt;
+
+use serde::Serialize;
+
 use crate::SweepError;
 
 /// Part `index` of `count` parts of the points.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(into = "String")]
 pub struct Shard {
     /// Number of the part, from 0.
     index: usize,
@@ -15,6 +20,19 @@ impl Default for Shard {
     /// All points.
     fn default() -> Self {
         Self { index: 0, count: 1 }
+    }
+}
+
+impl fmt::Display for Shard {
+    /// As [`Shard::parse`] reads it.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}/{}", self.index + 1, self.count)
+    }
+}
+
+impl From<Shard> for String {
+    fn from(shard: Shard) -> Self {
+        shard.to_string()
     }
 }
 
@@ -80,7 +98,7 @@ impl Shard {
     }
 
     /// Whether it is all points.
-    pub(crate) const fn is_whole(self) -> bool {
+    pub const fn is_whole(self) -> bool {
         self.count == 1
     }
 
@@ -103,6 +121,7 @@ mod tests {
     fn shards_are_read_from_options_and_variables() {
         let slurm = |id| [("SLURM_ARRAY_TASK_ID", id), ("SLURM_ARRAY_TASK_COUNT", "4")];
         assert_eq!(Shard::parse("2/4"), Ok(Shard { index: 1, count: 4 }));
+        assert_eq!(Shard::parse("2/4").unwrap().to_string(), "2/4");
         assert_eq!(of(None, &slurm("4")), Ok(Shard { index: 0, count: 4 }));
         assert_eq!(of(Some(8), &slurm("5")), Ok(Shard { index: 5, count: 8 }));
         assert_eq!(of(Some(3), &[("PBS_ARRAY_INDEX", "2")]), Ok(Shard { index: 2, count: 3 }));

@@ -75,7 +75,7 @@ impl<'a> Group<'a> {
         self.timings.par_chunks(in_turn).filter(|_| !stop()).try_for_each(|timings| {
             let planned: Vec<Vec<PlannedPoint<'_>>> = timings
                 .iter()
-                .map(|points| points.iter().map(|point| planned(plan, point)).collect())
+                .map(|points| points.iter().map(|point| drawing.planned(plan, point)).collect())
                 .collect();
             let results = guarded(|| drawing.results(&planned));
             match results {
@@ -93,10 +93,6 @@ struct PlannedPoint<'a> {
     run: Result<run::Plan, String>,
 }
 
-fn planned<'a>(plan: &Plan, point: &'a Point) -> PlannedPoint<'a> {
-    PlannedPoint { point, run: guarded(|| run_of(plan, point)) }
-}
-
 /// The run whose times are those of all `points`.
 fn machine<'p>(points: &'p [PlannedPoint<'_>]) -> Option<&'p run::Plan> {
     points.iter().find_map(|point| point.run.as_ref().ok())
@@ -108,6 +104,8 @@ fn run_of(plan: &Plan, point: &Point) -> Result<run::Plan, RunError> {
 
 /// The frames of a group, drawn once.
 struct Drawing {
+    /// A run that draws them.
+    run: run::Plan,
     distinct: Distinct,
     recording: Recording,
 }
@@ -115,14 +113,19 @@ struct Drawing {
 impl Drawing {
     /// The frames of the first point that can run; `None` if there is none, or the frames are too large to be kept.
     fn new<'a>(plan: &Plan, mut points: impl Iterator<Item = &'a Point>) -> Option<Self> {
-        let first = points.find_map(|point| run_of(plan, point).ok())?;
+        let run = points.find_map(|point| run_of(plan, point).ok())?;
         let draw = || {
-            let distinct = Distinct::new(&*first.job)?;
-            let recording = Recording::draw(&first, distinct.numbers(), MAX_BYTES, &Progress::new(true))?;
-            Ok(recording.map(|recording| Self { distinct, recording }))
+            let distinct = Distinct::new(&*run.job)?;
+            let recording = Recording::draw(&run, distinct.numbers(), MAX_BYTES, &Progress::new(true))?;
+            Ok(recording.map(|recording| Self { run, distinct, recording }))
         };
         // What fails here fails again with the reason of each point.
         guarded(draw).ok().flatten()
+    }
+
+    /// The run of a point; what it draws is not loaded again.
+    fn planned<'a>(&self, plan: &Plan, point: &'a Point) -> PlannedPoint<'a> {
+        PlannedPoint { point, run: guarded(|| setting::planned_beside(&self.run, &plan.settings_of(point))) }
     }
 
     /// Results of points, those with the same times together: their frames are timed once.
@@ -148,7 +151,7 @@ impl Drawing {
     }
 
     fn measured(&self, run: &run::Plan, timed: &TimedFrames<'_>) -> Result<Measured, RunError> {
-        measured(run, &timed.powered(&run.model)?, self.distinct.groups())
+        measured(run, timed.powered(&run.model)?, self.distinct.groups())
     }
 }
 
@@ -238,7 +241,7 @@ mod tests {
             name: "a".to_owned(),
             settings: settings(&[("scene", "tiny"), ("frames", "0..2")]),
             points,
-            screen: Vec::new(),
+            ..Plan::default()
         }
     }
 

@@ -110,14 +110,10 @@ impl SweepSpec {
     pub fn parse(text: &str, file: &str) -> Result<Self, SweepError> {
         if text.trim().is_empty() {
             let message = "it is empty: write a sweep, such as (name: \"a\", axes: [])".to_owned();
-            return Err(SweepError::Setting { file: file.to_owned(), message, is_usage: true });
+            return Err(SweepError::Setting { file: file.to_owned(), message });
         }
         let spec: Self = spec::parse(text, file)?;
-        spec.check().map_err(|(place, message)| SweepError::Value {
-            file: file.to_owned(),
-            place,
-            message,
-        })?;
+        spec.check().map_err(SweepError::at(text, file))?;
         Ok(spec)
     }
 
@@ -146,7 +142,7 @@ impl SweepSpec {
         self.check_axes()?;
         self.check_forbidden()?;
         self.parsed_constraints()?;
-        if self.repetitions == 0 || self.repetitions > 1 && self.paths().any(|path| path == "seed") {
+        if self.repetitions == 0 || self.repetitions > 1 && self.varies("seed") {
             return wrong("repetitions", "it has to be 1 or more, and 1 where `seed` is an axis");
         }
         if self.points.count() == Some(0) {
@@ -177,7 +173,7 @@ impl SweepSpec {
             levels if !levels.is_sorted_by(|coarse, fine| coarse > fine) => {
                 wrong("levels go from the coarsest to the finest: bound, packet, stepped")
             }
-            _ if sets_timing || self.paths().any(|path| path == "timing") => {
+            _ if sets_timing || self.varies("timing") => {
                 wrong("it sets `timing`, which is also set elsewhere: leave that out")
             }
             _ => Ok(()),
@@ -244,6 +240,16 @@ impl SweepSpec {
         }
     }
 
+    /// Whether an axis varies `path`.
+    pub(crate) fn varies(&self, path: &str) -> bool {
+        self.paths().any(|known| known == path)
+    }
+
+    /// Whether a range varies `path`.
+    pub(crate) fn is_range(&self, path: &str) -> bool {
+        self.axes.iter().any(|axis| matches!(axis, Axis::Range { path: known, .. } if known == path))
+    }
+
     /// Paths of all axes.
     pub(crate) fn paths(&self) -> impl Iterator<Item = &str> {
         self.axes.iter().flat_map(Axis::paths)
@@ -302,7 +308,7 @@ mod tests {
             "gpu.pipeline.features.edges": true}, axes: [])"#;
         let spec = SweepSpec::parse(text, "a.ron").unwrap();
         let values: Vec<String> = spec.base(false).into_iter().map(|setting| setting.value).collect();
-        assert_eq!(values, ["200000000.0", "true", "4", "tiny", "(64, 48)"]);
+        assert_eq!(values, ["200000000", "true", "4", "tiny", "(64, 48)"]);
     }
 
     #[test]
@@ -311,8 +317,8 @@ mod tests {
         for (text, says) in [
             (message("(nam: \"a\", axes: [])"), "a.ron:1:2: unknown field `nam`, did you mean `name`?"),
             (message(" \n"), "a.ron: it is empty"),
-            (message("(name: \" \", axes: [])"), "a.ron: name: it is empty"),
-            (axes("Values(path: \"timming\", values: [1])"), "axes[0]: unknown setting `timming`"),
+            (message("(name: \" \", axes: [])"), "a.ron:1: name: it is empty"),
+            (axes("Values(path: \"timming\", values: [1])"), "a.ron:1: axes[0]: unknown setting `timming`"),
             (axes("Values(path: \"samples\", values: [])"), "axes[0]: `samples` has no values"),
             (
                 axes("Values(path: \"seed\", values: [1]), Values(path: \"seed\", values: [2])"),
@@ -327,7 +333,7 @@ mod tests {
             (axes("Range(path: \"gpu.core_hz\", from: 1, to: 2, count: 9999999)"), "more than a million"),
             (
                 message("(name: \"a\", axes: [], constraints: [\"1 <\"])"),
-                "constraints[0]: `1 <`: a value is missing",
+                "a.ron:1: constraints[0]: `1 <`: a value is missing",
             ),
             (
                 message("(name: \"a\", axes: [], settings: {\"samples\": 1}, constraints: [\"sample < 2\"])"),

@@ -8,6 +8,7 @@ use output::progress::Progress;
 use run::Input;
 
 use crate::SweepError;
+use crate::axis::Axis;
 use crate::points::Points;
 use crate::setting::{self, Setting};
 
@@ -25,8 +26,8 @@ const TICK: Duration = Duration::from_secs(5);
 pub(crate) struct Refusal {
     /// What is wrong, and what to do.
     pub message: String,
-    /// Whether it is a usage error.
-    pub is_usage: bool,
+    /// Number of the point.
+    pub at: usize,
     /// Setting whose points were refused.
     pub path: Option<String>,
 }
@@ -117,7 +118,7 @@ impl<'a> Trials<'a> {
             }
             Err(error) => {
                 inputs.failures += 1;
-                Err(Refusal { message: error.to_string(), is_usage: error.is_usage(), path: None })
+                Err(Refusal { message: error.to_string(), at, path: None })
             }
         };
         self.tried.insert(at, tried.clone());
@@ -146,6 +147,29 @@ impl<'a> Trials<'a> {
         }
         Ok(text)
     }
+}
+
+/// Rounds ranges of any numbers where a setting takes whole numbers only: there a number that runs, or is refused for another reason,
+/// is refused when it is written with a decimal point. `common` are the settings of all points.
+pub(crate) fn round_whole(axes: &mut [Axis], common: &[Setting]) {
+    let start = |axis: &Axis| match axis.whole_number_between() {
+        Some((path, number)) => vec![Setting::new(path, number.to_string())],
+        None => axis.at(0.0),
+    };
+    let starts: Vec<Vec<Setting>> = axes.iter().map(start).collect();
+    let is_whole = |(at, axis): (usize, &Axis)| {
+        let Some((path, number)) = axis.whole_number_between() else { return false };
+        let others = starts.iter().enumerate().filter(|(other, _)| *other != at).flat_map(|(_, sets)| sets);
+        let refused = |value: &str| {
+            let mut settings: Vec<Setting> = common.iter().chain(others.clone()).cloned().collect();
+            settings.push(Setting::new(path, value));
+            setting::planned(&settings).err().map(|error| error.to_string())
+        };
+        let (whole, point) = (number.to_string(), format!("{number}.0"));
+        refused(&point).map(|message| message.replace(&point, &whole)) != refused(&whole)
+    };
+    let whole: Vec<bool> = axes.iter().enumerate().map(is_whole).collect();
+    axes.iter_mut().zip(whole).filter(|(_, whole)| *whole).for_each(|(axis, _)| axis.round());
 }
 
 /// The settings of a point on which its input files may depend.
@@ -215,7 +239,7 @@ mod tests {
         };
         assert_eq!(refused(&[["8", "4"], ["8", "32"], ["2", "4"], ["2", "32"]], true), None);
         let never = refused(&[["7", "4"], ["7", "32"], ["2", "4"], ["2", "32"]], true).unwrap();
-        assert!(never.is_usage && never.message.contains("tile_px=7"), "{never:?}");
+        assert!(never.at == 0 && never.message.contains("tile_px=7"), "{never:?}");
         // Sampled points: one that fails may be a matter of both values.
         assert_eq!(refused(&[["8", "4"], ["4", "32"]], false), None);
         assert!(refused(&[["7", "4"], ["x", "32"]], false).is_some());

@@ -92,6 +92,12 @@ fn a_read_only_folder_is_refused_before_anything_runs_and_can_be_read() {
         assert_eq!(ended.code, Some(1), "{args:?}: {}", ended.stderr);
         let says = ended.stderr.contains(&disk) && ended.stderr.contains("Read-only file system");
         assert!(says && !ended.stderr.contains("runs to do"), "{}", ended.stderr);
+        let remedy = [
+            "name a file in a folder that is there and may be written to",
+            "give a folder that you may read and write",
+        ];
+        let has_remedy = remedy.iter().any(|remedy| ended.stderr.trim_end().ends_with(remedy));
+        assert!(has_remedy && !ended.stderr.contains("call it again"), "{}", ended.stderr);
     }
     assert!(done(&["status", &out]).stdout.contains("4 of 4 runs finished"));
 }
@@ -224,6 +230,39 @@ fn a_changed_program_runs_its_points_again() {
     let mut bytes = fs::read(&program).unwrap();
     bytes.push(0);
     fs::write(&program, bytes).unwrap();
+    let program = Quintile::new(&program);
+    for step in ["status", "merge", "report"] {
+        let ended = program.call(["sweep", step, &out]);
+        assert!(
+            ended.code == Some(0) && ended.stderr.contains("run by another build of quintile"),
+            "{}",
+            ended.stderr
+        );
+    }
     let ended = run();
     assert!(ended.code == Some(0) && ended.stderr.contains("4 of 4 runs to do"), "{}", ended.stderr);
+    // Nothing is lost without a request.
+    let status = program.call(["sweep", "status", &out]).stderr;
+    assert!(status.contains("4 results of other builds") && !status.contains("another build"), "{status}");
+    assert_eq!(point_files(&out).len(), 8);
+    let cleaned = program.call(["sweep", "clean", &out]);
+    assert!(cleaned.stdout.contains("4 results removed"), "{}", cleaned.stdout);
+    assert!(point_files(&out).len() == 4 && program.call(["sweep", "status", &out]).stderr.is_empty());
+}
+
+#[test]
+fn a_result_with_other_numbers_is_of_another_build() {
+    let inputs = Inputs::new();
+    let (file, out) = (inputs.put("tiles.ron", SWEEP), inputs.path("out"));
+    done(&["run", &file, "--out", &out]);
+    for path in point_files(&out) {
+        let text = fs::read_to_string(&path).unwrap().replace("\"cycles\":", "\"ticks\":");
+        fs::write(&path, text).unwrap();
+    }
+    let status = done(&["status", &out]);
+    assert!(status.stdout.contains("1 of 4 runs finished, 1 failed"), "{}", status.stdout);
+    let says = "3 results written by another build of quintile";
+    assert!(status.stderr.contains(says) && !status.stderr.contains("damaged"), "{}", status.stderr);
+    let run = done(&["run", &file, "--out", &out]).stderr;
+    assert!(run.contains(says) && run.contains("3 of 4 runs to do"), "{run}");
 }

@@ -81,7 +81,8 @@ impl OptionSource {
     /// Reads the options.
     ///
     /// # Errors
-    /// [`LoadError::Spec`] with the place in the file, [`LoadError::Setting`] for a single value, or for one without effect.
+    /// [`LoadError::Spec`] with the place in the file, [`LoadError::Option`] for a single value, [`LoadError::Setting`] for one without
+    /// effect.
     pub fn read<T: JobOptions>(&self) -> Result<T, LoadError> {
         let mut options = self.file.as_deref().map(spec::load).transpose()?.unwrap_or_default();
         for (name, value) in &self.set {
@@ -108,9 +109,10 @@ pub(crate) fn must_hold<const N: usize>(
 
 /// `options` with one value changed.
 fn with<T: Serialize + DeserializeOwned>(options: &T, name: &str, value: &str) -> Result<T, LoadError> {
-    let refused = |message: String| LoadError::Setting { setting: "set", message };
+    let refused =
+        |message: String| LoadError::Option { option: format!("--set {name}={}", shortened(value)), message };
     let Ok(Value::Object(fields)) = serde_json::to_value(options) else {
-        return Err(refused(format!("`{name}`: there are no options to set")));
+        return Err(refused("there are no options to set".to_owned()));
     };
     let Some(known) = fields.get(name) else {
         let known: Vec<&str> = fields.keys().map(String::as_str).collect();
@@ -121,15 +123,15 @@ fn with<T: Serialize + DeserializeOwned>(options: &T, name: &str, value: &str) -
         changed.insert(name.to_owned(), value);
         serde_json::from_value(Value::Object(changed)).map_err(|error| error.to_string())
     };
-    let (typed, reported) = (parsed(value), |message: String| refused(format!("{name}: {message}")));
+    let typed = parsed(value);
     if let Value::Object(known) = known {
-        check_fields(known, (value, &typed), |value| read(value).map(|_: T| ())).map_err(reported)?;
+        check_fields(known, (value, &typed), |value| read(value).map(|_: T| ())).map_err(refused)?;
     }
     read(typed).or_else(|error| {
         // A value that looks like a number may be a name.
         let as_text = read(Value::String(value.to_owned()));
         as_text.map_err(|as_name| {
-            reported(user_message(
+            refused(user_message(
                 value,
                 if as_name.starts_with("unknown variant") { &as_name } else { &error },
             ))
@@ -392,10 +394,13 @@ mod tests {
 
     #[test]
     fn invalid_values_are_reported() {
-        assert_eq!(set(&[("boxs", "8")]).unwrap_err(), "set: unknown option `boxs`, did you mean `boxes`?");
-        assert!(set(&[("boxes", "-1")]).unwrap_err().starts_with("set: boxes: `-1` is not a whole number"));
+        let unknown = set(&[("boxs", "8")]).unwrap_err();
+        assert_eq!(unknown, "--set boxs=8: unknown option `boxs`, did you mean `boxes`?");
+        assert!(
+            set(&[("boxes", "-1")]).unwrap_err().starts_with("--set boxes=-1: `-1` is not a whole number")
+        );
         let unknown = set(&[("method", "convex-hull")]).unwrap_err();
-        assert_eq!(unknown, "set: method: unknown value `convex-hull`; did you mean `convex_hull`?");
+        assert!(unknown.ends_with(": unknown value `convex-hull`; did you mean `convex_hull`?"), "{unknown}");
     }
 
     #[test]
@@ -409,28 +414,25 @@ mod tests {
         let long = "9".repeat(400);
         for (value, typed) in [("inf", "inf"), ("nan", "nan"), ("1e999", "1e999"), (&*long, "999...")] {
             let reported = set(&[("depth", value)]).unwrap_err();
-            assert!(
-                reported.starts_with(&format!("set: depth: `{}", typed.trim_end_matches('.'))),
-                "{reported}"
-            );
-            assert!(reported.ends_with("is not a finite number") && reported.len() < 120, "{reported}");
+            assert!(reported.contains(&format!(": `{}", typed.trim_end_matches('.'))), "{reported}");
+            assert!(reported.ends_with("is not a finite number") && reported.len() < 160, "{reported}");
         }
     }
 
     #[test]
     fn errors_in_struct_values_name_the_field() {
         for (value, says) in [
-            ("(1, 2)", "light: `(1, 2)` names no value: write it as (radius: 0.0); known: radius, target"),
-            ("5", "light: `5` names no value"),
-            ("(raduis: 1)", "light: unknown option `raduis`; did you mean `radius`?"),
+            ("(1, 2)", "`(1, 2)` names no value: write it as (radius: 0.0); known: radius, target"),
+            ("5", "`5` names no value"),
+            ("(raduis: 1)", "unknown option `raduis`; did you mean `radius`?"),
             (
                 "(radius: 1, target: (1, 2, 3))",
-                "light: target: `(radius: 1, target: (1, 2, 3))` has too many values",
+                "target: `(radius: 1, target: (1, 2, 3))` has too many values",
             ),
-            ("(radius: inf)", "light: radius: `(radius: inf)` is not a finite number"),
+            ("(radius: inf)", "radius: `(radius: inf)` is not a finite number"),
         ] {
             let reported = set(&[("light", value)]).unwrap_err();
-            assert!(reported.starts_with(&format!("set: {says}")), "{reported}");
+            assert!(reported.starts_with(&format!("--set light={value}: {says}")), "{reported}");
         }
     }
 

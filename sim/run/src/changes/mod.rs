@@ -50,6 +50,13 @@ impl InputFile {
         }
     }
 
+    /// The path that is most like `path`, or the first names that there are.
+    pub fn suggestion(path: &str) -> String {
+        let (first, rest) = path.split_once('.').unwrap_or((path, ""));
+        let names: Vec<&str> = Self::ALL.map(Self::name).into_iter().chain(["workload"]).collect();
+        suggestion(first, &names).replace("`?", &format!(".{rest}`?"))
+    }
+
     /// The file that `path` leads into, such as that of `gpu.core_hz`; `None` for other settings.
     pub fn of(path: &str) -> Option<Self> {
         let (first, _) = path.split_once('.')?;
@@ -105,9 +112,7 @@ impl<'a> Changes<'a> {
     pub fn new(changes: &'a [Change]) -> Result<Self, ChangeError> {
         match changes.iter().find(|change| InputFile::of(&change.path).is_none()) {
             Some(Change { path, .. }) => {
-                let first = path.split('.').next().unwrap_or_default();
-                let suggestion = suggestion(first, &InputFile::ALL.map(InputFile::name));
-                Err(ChangeError::File { path: path.clone(), suggestion })
+                Err(ChangeError::File { path: path.clone(), suggestion: InputFile::suggestion(path) })
             }
             None => Ok(Self { changes, files: Vec::new() }),
         }

@@ -3,6 +3,7 @@
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use activity::{Event, PacketStream};
 use flate2::Compression;
@@ -179,7 +180,7 @@ impl RecordedRun {
         let settings =
             Settings { width, height, samples, frame_rate_hz, frames: start..end, ..Settings::default() };
         let options = RunOptions { seed, ..options };
-        let plan = Plan::of_job(options, &self.about.scene, || Box::new(RecordedJob { settings }))?;
+        let plan = Plan::of_job(options, &self.about.scene, Arc::new(RecordedJob { settings }))?;
         match first_difference("pipeline", &self.about.pipeline, &pipeline_of(&plan)) {
             None => Ok(plan),
             Some((path, [drawn, asked])) => Err(RunError::Setting(format!(

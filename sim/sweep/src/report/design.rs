@@ -21,6 +21,8 @@ pub(crate) struct Row<'a> {
     time_error: f64,
     energy_error: f64,
     area_mm2: Option<f64>,
+    /// Codes of warnings, comma-separated.
+    warnings: String,
 }
 
 /// A quantity of a design: mean over its runs, and what is known of its error.
@@ -55,24 +57,33 @@ pub struct Design {
     pub energy_j: Cost,
     /// Area in square millimetres, if it is known.
     pub area_mm2: Option<f64>,
+    /// Codes of the warnings of its runs, sorted.
+    pub warnings: Vec<String>,
 }
 
-/// Settings in short.
+impl Design {
+    /// Whether platform and energy table are not those of its GPU, so that its energy is less certain than stated.
+    pub fn is_mismatched(&self) -> bool {
+        self.warnings.iter().any(|code| code == "platform-mismatch")
+    }
+}
+
+/// Settings in short; a name for the design without any.
 pub(crate) fn label<'a>(
     settings: impl IntoIterator<Item = &'a Setting>,
     names: &BTreeMap<&str, &str>,
 ) -> String {
     let name = |set: &Setting| format!("{}={}", names.get(&*set.path).unwrap_or(&&*set.path), set.value);
-    settings.into_iter().map(name).collect::<Vec<_>>().join(" ")
+    let names: Vec<String> = settings.into_iter().map(name).collect();
+    if names.is_empty() { "the only one".to_owned() } else { names.join(" ") }
 }
 
 impl<'a> Row<'a> {
-    pub fn new(point: &'a Point, measured: &Measured, names: &BTreeMap<&str, &str>) -> Self {
-        let (settings, conditions): (Vec<&Setting>, Vec<&Setting>) = point
-            .settings
-            .iter()
-            .filter(|setting| setting.path != "seed")
-            .partition(|setting| setting.is_of_design());
+    /// A point with its numbers, and short names of settings; those in `same` distinguish neither designs nor workloads.
+    pub fn new(point: &'a Point, measured: &Measured, names: &BTreeMap<&str, &str>, same: &[&str]) -> Self {
+        let others = point.settings.iter().filter(|setting| !same.contains(&setting.path.as_str()));
+        let (settings, conditions): (Vec<&Setting>, Vec<&Setting>) =
+            others.partition(|setting| setting.is_of_design());
         let scene = measured.used.get("scene").cloned();
         let others = conditions.iter().filter(|set| set.path != "scene");
         let workload = scene.into_iter().chain(others.map(|set| label([*set], names)));
@@ -86,6 +97,7 @@ impl<'a> Row<'a> {
             time_error: measured.cycles_error,
             energy_error: measured.energy_error,
             area_mm2: Some(measured.area_mm2[0]),
+            warnings: measured.warnings.clone(),
         }
     }
 }
@@ -130,6 +142,8 @@ fn mean(runs: &[&Row<'_>]) -> Option<Design> {
         settings.iter().map(|set| (set.path.clone(), set.value.clone())).collect::<BTreeMap<_, _>>()
     };
     let first = runs.first()?;
+    let codes = runs.iter().flat_map(|run| run.warnings.split(',')).filter(|code| !code.is_empty());
+    let codes: BTreeSet<&str> = codes.collect();
     Some(Design {
         design: first.design.clone(),
         settings: texts(&first.settings),
@@ -150,6 +164,7 @@ fn mean(runs: &[&Row<'_>]) -> Option<Design> {
             high,
         },
         area_mm2: first.area_mm2,
+        warnings: codes.into_iter().map(str::to_owned).collect(),
     })
 }
 
@@ -162,7 +177,7 @@ mod tests {
         let paths = ["gpu.a.queue", "gpu.b.queue", "gpu.core_hz"];
         let settings = paths.map(|path| Setting::new(path, "1")).into();
         let points = vec![Point { id: String::new(), settings }];
-        let plan = Plan { name: String::new(), settings: Vec::new(), points, screen: Vec::new() };
+        let plan = Plan { points, ..Plan::default() };
         let names: Vec<&str> = short_names(&plan).into_values().collect();
         assert_eq!(names, ["gpu.a.queue", "gpu.b.queue", "core_hz"]);
     }
@@ -179,6 +194,7 @@ mod tests {
             time_error,
             energy_error: 0.0,
             area_mm2: None,
+            warnings: if time_error < 0.2 { "b,c" } else { "a,b" }.to_owned(),
         };
         let rows = [row("a", 1.0, 0.1), row("b", 9.0, 0.4), row("a", 3.0, 0.2)];
         let designs = designs(&rows);
@@ -188,5 +204,6 @@ mod tests {
         assert_eq!((a.energy_j.value, a.energy_j.low, a.energy_j.high), (5.0, 4.0, 9.0));
         assert!((a.time_s.deviation - 2_f64.sqrt()).abs() < 1e-12 && designs[1].time_s.deviation == 0.0);
         assert_eq!(designs[1].time_s.error, 0.4);
+        assert_eq!((a.warnings.concat(), designs[1].warnings.concat()), ("abc".to_owned(), "ab".to_owned()));
     }
 }

@@ -11,8 +11,9 @@ use serde::Serialize;
 use timing::sampled::student_t;
 
 use super::design::Design;
+use super::factor::{Factor, cells, codes, factors};
 
-/// Most values of a setting for which effects are given: of more, a value is in too few points.
+/// Most values of a setting that have effects of their own: of more, a value is in too few points.
 const MAX_VALUES: usize = 20;
 
 /// Most rounds of the fit, and the change of an effect at which it ends.
@@ -28,13 +29,13 @@ struct Ratio {
 }
 
 /// Main effect of a value of a setting: over the mean of all values.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Effect {
     /// The workload.
     pub workload: String,
     /// The setting; linked settings are one, with ` + `.
     pub setting: String,
-    /// Its value.
+    /// Its value, or the first and the last of a group of values.
     pub value: String,
     /// Designs with this value.
     pub points: usize,
@@ -53,7 +54,7 @@ pub struct Effect {
 }
 
 /// Interaction of two values of two settings: over what their main effects predict.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Interaction {
     /// The workload.
     pub workload: String,
@@ -82,7 +83,7 @@ pub struct Interaction {
 }
 
 /// Share of a setting in the variance of the logarithm of time or energy, on a whole grid.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Share {
     /// The workload.
     pub workload: String,
@@ -96,12 +97,33 @@ pub struct Share {
     pub total_order: f64,
 }
 
-/// A setting, or several that are linked: their values by number.
-struct Factor {
-    name: String,
-    values: Vec<String>,
-    /// Value of each design.
-    codes: Vec<usize>,
+/// A setting whose values have no effects of their own.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct NoEffect {
+    /// The workload.
+    pub workload: String,
+    /// The setting.
+    pub setting: String,
+    /// Number of its values.
+    pub values: usize,
+    /// Why, and what there is in place of them.
+    pub reason: String,
+}
+
+impl NoEffect {
+    fn new(workload: &str, factor: &Factor, grouped: Option<&Factor>) -> Self {
+        let reason = match grouped {
+            Some(grouped) => format!(
+                "of more than {MAX_VALUES} values: effects are those of {} groups of neighbouring ones, with equal numbers of designs",
+                grouped.values.len()
+            ),
+            None => {
+                format!("more than {MAX_VALUES} values, which are no numbers that can be grouped: no effects")
+            }
+        };
+        let (workload, setting) = (workload.to_owned(), factor.name.clone());
+        Self { workload, setting, values: factor.values.len(), reason }
+    }
 }
 
 /// Additive model of a quantity.
@@ -121,6 +143,7 @@ pub(crate) struct Factorial {
     energy: Additive,
     /// Whether each combination of values is one design.
     is_whole: bool,
+    no_effects: Vec<NoEffect>,
 }
 
 impl Factorial {
@@ -131,19 +154,34 @@ impl Factorial {
             design.settings.clone().into_iter().chain(work).collect::<Vec<_>>()
         };
         let settings: Vec<Vec<(String, String)>> = designs.iter().map(|design| settings(design)).collect();
-        let all = linked(factors(&settings));
+        let all = factors(&settings);
         let whole: usize = all.iter().map(|factor| factor.values.len()).product();
         let mut seen: HashMap<Vec<usize>, usize> = HashMap::new();
         (0..designs.len()).for_each(|at| *seen.entry(codes(&all, at, None)).or_default() += 1);
-        let is_whole = whole == designs.len() && seen.len() == whole && all.iter().all(has_effects);
-        let factors: Vec<Factor> = all.into_iter().filter(has_effects).collect();
+        let is_few = |factor: &Factor| factor.values.len() <= MAX_VALUES;
+        let is_whole = whole == designs.len() && seen.len() == whole && all.iter().all(is_few);
+        let mut no_effects = Vec::new();
+        let with_effects = |factor: Factor| {
+            if is_few(&factor) {
+                return Some(factor);
+            }
+            let grouped = factor.grouped();
+            no_effects.push(NoEffect::new(workload, &factor, grouped.as_ref()));
+            grouped
+        };
+        let factors: Vec<Factor> = all.into_iter().filter_map(with_effects).collect();
         let logs = |of: fn(&Design) -> f64| designs.iter().map(|design| libm::log(of(design))).collect();
         let time = Additive::fitted(logs(|design| design.time_s.value), &factors);
         let energy = Additive::fitted(logs(|design| design.energy_j.value), &factors);
-        Self { workload: workload.to_owned(), factors, time, energy, is_whole }
+        Self { workload: workload.to_owned(), factors, time, energy, is_whole, no_effects }
     }
 
-    /// Main effects, by setting and value in order of first use.
+    /// Settings with too many values.
+    pub fn no_effects(&self) -> &[NoEffect] {
+        &self.no_effects
+    }
+
+    /// Main effects, by setting and value.
     pub fn effects(&self) -> Vec<Effect> {
         let mut effects = Vec::new();
         for (place, factor) in self.factors.iter().enumerate() {
@@ -277,63 +315,6 @@ impl Additive {
     }
 }
 
-fn has_effects(factor: &Factor) -> bool {
-    (2..=MAX_VALUES).contains(&factor.values.len())
-}
-
-/// Settings that vary, with values in order of first use.
-fn factors(settings: &[Vec<(String, String)>]) -> Vec<Factor> {
-    let mut factors: Vec<Factor> = Vec::new();
-    let mut places: HashMap<&str, usize> = HashMap::new();
-    let mut known: Vec<HashMap<&str, usize>> = Vec::new();
-    for (at, (path, value)) in
-        settings.iter().enumerate().flat_map(|(at, set)| set.iter().map(move |s| (at, s)))
-    {
-        let place = *places.entry(path).or_insert_with(|| {
-            factors.push(Factor { name: path.clone(), values: Vec::new(), codes: vec![0; settings.len()] });
-            known.push(HashMap::new());
-            known.len() - 1
-        });
-        let factor = &mut factors[place];
-        let code = *known[place].entry(value).or_insert_with(|| {
-            factor.values.push(value.clone());
-            factor.values.len() - 1
-        });
-        factor.codes[at] = code;
-    }
-    factors.retain(|factor| factor.values.len() > 1);
-    factors
-}
-
-/// Factors of which settings that always change together are one.
-fn linked(factors: Vec<Factor>) -> Vec<Factor> {
-    let mut kept: Vec<Factor> = Vec::new();
-    for factor in factors {
-        match kept.iter_mut().find(|other| other.codes == factor.codes) {
-            Some(other) => {
-                other.name = format!("{} + {}", other.name, factor.name);
-                other.values =
-                    other.values.iter().zip(&factor.values).map(|(a, b)| format!("{a} + {b}")).collect();
-            }
-            None => kept.push(factor),
-        }
-    }
-    kept
-}
-
-/// Values of a design, with 0 for the one that is left out.
-fn codes(factors: &[Factor], at: usize, without: Option<usize>) -> Vec<usize> {
-    let code = |(place, factor): (usize, &Factor)| if Some(place) == without { 0 } else { factor.codes[at] };
-    factors.iter().enumerate().map(code).collect()
-}
-
-/// Members of each of `count` cells.
-fn cells(of: impl Iterator<Item = usize>, count: usize) -> Vec<Vec<usize>> {
-    let mut cells = vec![Vec::new(); count];
-    of.enumerate().for_each(|(at, cell)| cells[cell].push(at));
-    cells
-}
-
 fn mean(values: &[f64], members: &[usize]) -> f64 {
     members.iter().map(|&at| values[at]).sum::<f64>() / members.len().max(1) as f64
 }
@@ -428,6 +409,41 @@ mod tests {
             assert!(low < truth && truth < high && (high / low).ln() < 0.06, "{of:?}");
         }
         assert_eq!(found.iter().take(4).filter(both).count(), 4, "the strongest first");
+    }
+
+    #[test]
+    fn settings_of_many_values_have_effects_of_groups() {
+        // The logarithm of time rises by 1 over the range; quarters are 1/4 apart.
+        let of = |count: usize, name: &dyn Fn(usize) -> String| -> Vec<Design> {
+            // Not in the order of their values.
+            let design = |n: usize| {
+                let n = n * 7 % count;
+                exact(&[("gpu.a", &name(n)), ("gpu.b", "1")], (n as f64 / count as f64).exp(), 1.0)
+            };
+            (0..count).map(design).collect()
+        };
+        let found = factorial(&of(40, &|n| format!("{}", 1000 * n)));
+        let effects = found.effects();
+        let values: Vec<&str> = effects.iter().map(|effect| effect.value.as_str()).collect();
+        assert_eq!(values, ["0 to 9000", "10000 to 19000", "20000 to 29000", "30000 to 39000"]);
+        for pair in effects.windows(2) {
+            let step = pair[1].time_ratio / pair[0].time_ratio;
+            assert!((step - 0.25_f64.exp()).abs() < 1e-12 && pair[0].points == 10, "{effects:?}");
+            // What values within a group do is in the interval.
+            assert!(pair[0].time_low.unwrap() < 0.96 * pair[0].time_ratio, "{effects:?}");
+        }
+        assert!(found.no_effects()[0].reason.contains("4 groups") && found.shares().is_empty());
+        let named = factorial(&of(30, &|n| format!("gpu{n}.ron")));
+        assert!(named.effects().is_empty());
+        assert_eq!((named.no_effects()[0].setting.as_str(), named.no_effects()[0].values), ("gpu.a", 30));
+    }
+
+    #[test]
+    fn effects_are_in_the_order_of_values() {
+        let designs = ["16", "2", "8"].map(|value| exact(&[("gpu.a", value)], 1.0, 1.0));
+        let values: Vec<String> =
+            factorial(&designs).effects().into_iter().map(|effect| effect.value).collect();
+        assert_eq!(values, ["2", "8", "16"]);
     }
 
     #[test]

@@ -6,6 +6,7 @@
 
 mod design;
 mod effects;
+mod factor;
 mod flips;
 mod frontier;
 mod page;
@@ -16,17 +17,20 @@ mod winners;
 
 use std::collections::BTreeMap;
 
+use output::table::counted;
 use rayon::prelude::*;
 use serde::Serialize;
 
+pub(crate) use design::label;
 pub use design::{Cost, Design};
-pub use effects::{Effect, Interaction, Share};
+pub use effects::{Effect, Interaction, NoEffect, Share};
 pub use frontier::RatedDesign;
 pub use page::PageError;
 pub use winners::{Measure, NearBest, Pair, Winner};
 
 use self::design::{Row, designs, short_names};
 use crate::execute::Outcome;
+use crate::plan::{Point, idle};
 use crate::{Folder, SweepError};
 
 /// What a report is made for.
@@ -43,7 +47,7 @@ impl Default for ReportOptions {
 }
 
 /// Report of a sweep.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Report {
     /// Name of the sweep.
     pub sweep: String,
@@ -63,10 +67,20 @@ pub struct Report {
     pub interactions: Vec<Interaction>,
     /// Shares of variance.
     pub shares: Vec<Share>,
+    /// Settings that vary and have no effects, or effects of groups of their values alone.
+    pub no_effects: Vec<NoEffect>,
     /// Points that failed or were screened out.
     pub failed: Vec<Failure>,
-    /// Points that failed or are not finished; they are left out.
+    /// Points that are left out; the sum of the next three.
     pub left_out: usize,
+    /// Of these, points that failed.
+    pub left_out_failed: usize,
+    /// Points that a coarser timing level left out.
+    pub left_out_screened: usize,
+    /// Points that are not finished.
+    pub left_out_unfinished: usize,
+    /// Constraints and forbidden entries of the sweep file that leave out no point.
+    pub idle: Vec<String>,
 }
 
 /// A point that failed or was screened out.
@@ -76,6 +90,8 @@ pub struct Failure {
     pub settings: String,
     /// Why.
     pub reason: String,
+    /// Whether it did not run, as a coarser timing level left it out.
+    pub screened_out: bool,
 }
 
 /// Name of the effects over all workloads.
@@ -89,17 +105,24 @@ impl Report {
     pub fn of(folder: &Folder, options: ReportOptions) -> Result<Self, SweepError> {
         let plan = folder.plan()?;
         let names = short_names(&plan);
+        // With screening, designs are compared at the last level.
+        let same = if plan.screen.is_empty() { &["seed"][..] } else { &["seed", "timing"] };
+        let points = plan.last_level();
+        let failure = |point: &Point, reason, screened_out| Failure {
+            settings: label(&point.settings, &names),
+            reason,
+            screened_out,
+        };
         let read = |point| {
             let outcome = folder.result(point)?.map(|result| result.outcome);
             Ok(match outcome {
-                Some(Outcome::Measured(measured)) => Some(Ok(Row::new(point, &measured, &names))),
-                Some(Outcome::Error(reason) | Outcome::ScreenedOut(reason)) => {
-                    Some(Err(Failure { settings: design::label(&point.settings, &names), reason }))
-                }
+                Some(Outcome::Measured(measured)) => Some(Ok(Row::new(point, &measured, &names, same))),
+                Some(Outcome::Error(reason)) => Some(Err(failure(point, reason, false))),
+                Some(Outcome::ScreenedOut(reason)) => Some(Err(failure(point, reason, true))),
                 None => None,
             })
         };
-        let read: Vec<_> = plan.points.par_iter().map(read).collect::<Result<_, SweepError>>()?;
+        let read: Vec<_> = points.par_iter().map(read).collect::<Result<_, SweepError>>()?;
         let (mut rows, mut failed) = (Vec::new(), Vec::new());
         for point in read.into_iter().flatten() {
             match point {
@@ -107,9 +130,43 @@ impl Report {
                 Err(failure) => failed.push(failure),
             }
         }
-        let left_out = plan.points.len() - rows.len();
+        let left_out = points.len() - rows.len();
+        let left_out_screened = failed.iter().filter(|failure| failure.screened_out).count();
         let of_rows = Self::of_rows(rows, options);
-        Ok(Self { sweep: plan.name, failed, left_out, ..of_rows })
+        Ok(Self {
+            sweep: plan.name,
+            left_out,
+            left_out_failed: failed.len() - left_out_screened,
+            left_out_screened,
+            left_out_unfinished: left_out - failed.len(),
+            idle: plan.idle,
+            failed,
+            ..of_rows
+        })
+    }
+
+    /// What a reader has to know before the numbers: which points are not in, by cause, which constraints do nothing, and designs whose
+    /// energies are those of another GPU.
+    pub fn notes(&self) -> Vec<String> {
+        let causes = [
+            (self.left_out_unfinished, "not finished (`quintile sweep run` runs them)"),
+            (self.left_out_failed, "failed"),
+            (self.left_out_screened, "screened out at a coarser timing level"),
+        ];
+        let causes: Vec<String> = causes
+            .iter()
+            .filter(|(count, _)| *count > 0)
+            .map(|(count, cause)| format!("{count} {cause}"))
+            .collect();
+        let left_out = (self.left_out > 0)
+            .then(|| format!("{} left out: {}", counted(self.left_out, "point"), causes.join(", ")));
+        let all = || self.workloads.values().flatten();
+        let mismatched = all().filter(|rated| rated.on_frontier && rated.design.is_mismatched()).count();
+        let mismatched = (mismatched > 0).then(|| {
+            let on = counted(all().filter(|rated| rated.on_frontier).count(), "design");
+            format!("{mismatched} of {on} on the frontier with platform-mismatch (*): do not compare their energies with those of others")
+        });
+        left_out.into_iter().chain(self.idle.iter().map(|place| idle(place))).chain(mismatched).collect()
     }
 
     /// Report of measured points.
@@ -126,19 +183,7 @@ impl Report {
 
     /// Report of designs by workload.
     fn of_designs(by_workload: BTreeMap<String, Vec<Design>>, options: ReportOptions) -> Self {
-        let mut report = Self {
-            sweep: String::new(),
-            within: options.within,
-            workloads: BTreeMap::new(),
-            winners: Vec::new(),
-            near_best: Vec::new(),
-            pairs: Vec::new(),
-            effects: Vec::new(),
-            interactions: Vec::new(),
-            shares: Vec::new(),
-            failed: Vec::new(),
-            left_out: 0,
-        };
+        let mut report = Self { within: options.within, ..Self::default() };
         if by_workload.len() > 1 {
             let all: Vec<&Design> = by_workload.values().flatten().collect();
             report.add_effects(ALL_WORKLOADS, &all, true);
@@ -159,6 +204,7 @@ impl Report {
         self.effects.extend(found.effects());
         self.interactions.extend(found.interactions());
         self.shares.extend(found.shares());
+        self.no_effects.extend_from_slice(found.no_effects());
     }
 }
 
@@ -177,5 +223,6 @@ pub(crate) fn exact(settings: &[(&str, &str)], time_s: f64, energy_j: f64) -> De
         time_s: cost(time_s),
         energy_j: cost(energy_j),
         area_mm2: None,
+        warnings: Vec::new(),
     }
 }

@@ -35,6 +35,7 @@ struct WinnerView<'a> {
     cost: String,
     undecided: usize,
     others: usize,
+    platform_mismatch: bool,
 }
 
 impl Report {
@@ -60,11 +61,13 @@ impl Report {
                 cost: si(winner.value, winner.measure.unit()),
                 undecided: winner.undecided,
                 others: winner.designs.saturating_sub(1),
+                platform_mismatch: winner.platform_mismatch,
             })
             .collect();
         let interactions = &self.interactions[..self.interactions.len().min(MAX_INTERACTIONS)];
         let count: usize = self.workloads.values().map(Vec::len).sum();
         Ok(environment.get_template(NAME)?.render(context! {
+            notes => self.notes(),
             report => self,
             count,
             winners,
@@ -80,6 +83,26 @@ impl Report {
 mod tests {
     use super::*;
     use crate::report::{ReportOptions, exact};
+
+    #[test]
+    fn a_page_begins_with_what_is_missing_and_marks_designs_on_other_platforms() {
+        let mut design = exact(&[("gpu.a", "2")], 2.0, 1.0);
+        design.warnings = vec!["platform-mismatch".to_owned()];
+        let mut report =
+            Report::of_designs([("w".to_owned(), vec![design])].into(), ReportOptions::default());
+        let html = report.html(&Look::default()).unwrap();
+        assert!(
+            html.contains("gpu.a=2 *")
+                && html.contains("1 of 1 design on the frontier with platform-mismatch")
+        );
+        assert!(!html.contains("left out"));
+        (report.left_out, report.left_out_failed, report.left_out_unfinished) = (3, 1, 2);
+        report.idle = vec!["constraints[1]".to_owned()];
+        let html = report.html(&Look::default()).unwrap();
+        let says = "3 points left out: 2 not finished (`quintile sweep run` runs them), 1 failed";
+        let (top, _) = html.split_once("<h2>").unwrap();
+        assert!(top.contains(says) && top.contains("constraints[1] leaves out no point"), "{top}");
+    }
 
     #[test]
     fn a_page_holds_its_designs_and_escapes_their_names() {

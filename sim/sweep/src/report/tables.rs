@@ -48,6 +48,7 @@ impl Report {
             "time_rank_worst",
             "energy_rank_best",
             "energy_rank_worst",
+            "warnings",
         ])?;
         let optional = |value: Option<f64>| value.map_or(String::new(), |value| value.to_string());
         for (workload, designs) in &self.workloads {
@@ -72,6 +73,7 @@ impl Report {
                     rated.time_ranks[1].to_string(),
                     rated.energy_ranks[0].to_string(),
                     rated.energy_ranks[1].to_string(),
+                    rated.design.warnings.join(","),
                 ])?;
             }
         }
@@ -83,8 +85,41 @@ impl Report {
 ///
 /// # Errors
 /// The errors of `out`.
-fn write_rows<T: Serialize>(rows: &[T], out: impl Write) -> io::Result<()> {
+fn write_rows<T: Serialize + Default>(rows: &[T], mut out: impl Write) -> io::Result<()> {
+    if rows.is_empty() {
+        // The names come with a row.
+        let mut csv = csv::Writer::from_writer(Vec::new());
+        csv.serialize(T::default())?;
+        let text = csv.into_inner().map_err(csv::IntoInnerError::into_error)?;
+        return text.split_inclusive(|&byte| byte == b'\n').take(1).try_for_each(|line| out.write_all(line));
+    }
     let mut csv = csv::Writer::from_writer(out);
     rows.iter().try_for_each(|row| csv.serialize(row))?;
     csv.flush()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::{ReportOptions, exact};
+
+    #[test]
+    fn empty_tables_have_the_header_of_full_ones() {
+        let texts = |report: &Report| -> Vec<String> {
+            let text = |table: Table<'_>| {
+                let mut bytes = Vec::new();
+                table(&mut bytes).unwrap();
+                String::from_utf8(bytes).unwrap()
+            };
+            report.tables().into_iter().map(|(_, table)| text(table)).collect()
+        };
+        let design = |a: &str, b: &str| exact(&[("gpu.a", a), ("gpu.b", b)], 1.0 + a.len() as f64, 1.0);
+        let designs = vec![design("1", "1"), design("1", "2"), design("22", "1"), design("22", "2")];
+        let full = Report::of_designs([("w".to_owned(), designs)].into(), ReportOptions::default());
+        let (full, empty) = (texts(&full), texts(&Report::default()));
+        for (full, empty) in full.iter().zip(&empty) {
+            assert!(full.lines().count() > 1, "{full}");
+            assert_eq!(format!("{}\n", full.lines().next().unwrap()), *empty);
+        }
+    }
 }

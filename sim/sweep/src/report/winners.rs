@@ -12,10 +12,11 @@ const MAX_PAIRS: usize = 10;
 const UNDECIDED: f64 = 0.025;
 
 /// What designs are compared by.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Measure {
     /// Busy time.
+    #[default]
     Time,
     /// Busy energy.
     Energy,
@@ -44,7 +45,7 @@ impl Measure {
         match self {
             Self::Time => "s",
             Self::Energy => "J",
-            Self::EnergyDelay => "Js",
+            Self::EnergyDelay => "J s",
             Self::Area => "mm2",
         }
     }
@@ -68,7 +69,7 @@ impl Measure {
 }
 
 /// Best design of a workload by a measure.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Winner {
     /// The workload.
     pub workload: String,
@@ -82,10 +83,12 @@ pub struct Winner {
     pub designs: usize,
     /// Others whose order to it flips with more than 2.5 %: among all these the winner is undecided.
     pub undecided: usize,
+    /// Whether platform and energy table are not those of its GPU.
+    pub platform_mismatch: bool,
 }
 
 /// The best design against another.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Pair {
     /// The workload.
     pub workload: String,
@@ -106,7 +109,7 @@ pub struct Pair {
 }
 
 /// Cheapest design by one measure of those near the best by another.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct NearBest {
     /// The workload.
     pub workload: String,
@@ -122,6 +125,8 @@ pub struct NearBest {
     pub near_ratio: f64,
     /// Its cost by `cheapest` over that of the best by `near`.
     pub cheapest_ratio: f64,
+    /// Whether platform and energy table are not those of its GPU.
+    pub platform_mismatch: bool,
 }
 
 /// Designs in the order of a measure; equal ones in the order of the plan.
@@ -146,6 +151,7 @@ pub(crate) fn winners(workload: &str, designs: &[Design]) -> Vec<Winner> {
             value: measure.of(best)?,
             designs: designs.len(),
             undecided: others.iter().filter(is_undecided).count(),
+            platform_mismatch: best.is_mismatched(),
         })
     };
     Measure::ALL.into_iter().filter_map(winner).collect()
@@ -195,6 +201,7 @@ pub(crate) fn near_best(workload: &str, designs: &[Design], within: f64) -> Vec<
             candidates: candidates.len(),
             near_ratio: near.of(chosen)? / near.of(best)?,
             cheapest_ratio: cheapest.of(chosen)? / cheapest.of(best)?,
+            platform_mismatch: chosen.is_mismatched(),
         })
     };
     let pairs = [
@@ -225,6 +232,15 @@ mod tests {
         assert_eq!(near.iter().map(|of| &*of.design).collect::<Vec<_>>(), ["gpu.a=near", "gpu.a=near"]);
         assert!((near[0].near_ratio - 1.04).abs() < 1e-12 && (near[1].cheapest_ratio - 0.52).abs() < 1e-12);
         assert_eq!(near_best("w", &designs, 0.01)[0].design, "gpu.a=fast");
+    }
+
+    #[test]
+    fn winners_on_the_platform_of_another_gpu_are_marked() {
+        let mut designs = [named("fast", 1.0, 9.0), named("lean", 2.0, 3.9)];
+        designs[0].warnings = vec!["clipped".to_owned(), "platform-mismatch".to_owned()];
+        let marks: Vec<bool> = winners("w", &designs).iter().map(|winner| winner.platform_mismatch).collect();
+        assert_eq!(marks, [true, false, false]);
+        assert!(near_best("w", &designs, 0.05)[0].platform_mismatch);
     }
 
     #[test]

@@ -1,20 +1,39 @@
 //! Warnings of a run.
 
+mod regimes;
+
 use std::collections::BTreeMap;
 
 use activity::{Counts, Event};
 use output::table::si;
-use power_model::PacedFrame;
+use power_model::{PacedFrame, Run};
 use timing::AccuracyWarning;
 use traces::frames::Flag;
 use warnings::{Code, Warning};
-use workloads::Regime;
 
+use self::regimes::of_regimes;
 use crate::measure::MIN_BUSY_SAMPLES;
 use crate::{Choice, Measurement, Observed, Plan, RunFrame, Simulated};
 
 /// All warnings of a run, sorted, without duplicates.
 pub(crate) fn gather(plan: &Plan, simulated: &Simulated, measurement: &Measurement) -> Vec<Warning> {
+    let mut all = warnings_of(plan, simulated, &measurement.run);
+    let short = short_frames(measurement);
+    // In a run of one frame, or of frames that are too short, finding only the mark is expected.
+    let unseen = short.is_some() && measurement.is_mark_alone();
+    let explained = simulated.frames.len() == 1 || unseen;
+    let of_trace = measurement.found.warnings.iter().filter(|w| !(explained && w.code == "only-mark"));
+    all.extend(of_trace.cloned());
+    all.extend(start_errors(measurement).filter(|_| short.is_none()));
+    all.extend(short);
+    all.extend(detection(measurement).filter(|_| !unseen));
+    all.extend(clipped(measurement));
+    all.extend(lost(measurement));
+    Warning::fold(all)
+}
+
+/// Warnings of a run but for those about its recorded trace, sorted, without duplicates.
+pub fn warnings_of(plan: &Plan, simulated: &Simulated, paced: &Run) -> Vec<Warning> {
     let mut all = plan.job.warnings().to_vec();
     all.extend(plan.pairing.clone());
     all.extend(of_frames(
@@ -23,23 +42,12 @@ pub(crate) fn gather(plan: &Plan, simulated: &Simulated, measurement: &Measureme
             .iter()
             .map(|frame| (frame.index, frame.observed().map_or(&[][..], |of| &of.warnings))),
     ));
-    all.extend(measurement.run.warnings.iter().cloned());
-    let short = short_frames(measurement);
-    // In a run of one frame, or of frames that are too short, finding only the mark is expected.
-    let unseen = short.is_some() && measurement.is_mark_alone();
-    let explained = simulated.frames.len() == 1 || unseen;
-    let of_trace = measurement.found.warnings.iter().filter(|w| !(explained && w.code == "only-mark"));
-    all.extend(of_trace.cloned());
+    all.extend(paced.warnings.iter().cloned());
     all.extend(accuracy(plan, simulated));
     all.extend(degenerate(simulated));
     all.extend(empty_frames(simulated));
     all.extend(heat_outside_image(simulated));
-    all.extend(start_errors(measurement).filter(|_| short.is_none()));
-    all.extend(short);
-    all.extend(detection(measurement).filter(|_| !unseen));
     all.extend(idle_above_busy(plan, simulated));
-    all.extend(clipped(measurement));
-    all.extend(lost(measurement));
     all.extend(wide_intervals(simulated));
     all.extend(costly_preview(simulated));
     all.extend(of_regimes(simulated));
@@ -287,132 +295,6 @@ fn clipped(measurement: &Measurement) -> Option<Warning> {
 
 fn lost(measurement: &Measurement) -> Option<Warning> {
     measurement.trace.losses().map(|losses| Warning::new(Code::PacketsLost, losses))
-}
-
-/// Smallest share of triangles in view for a warning about tiny triangles.
-const TINY_SHARE: f64 = 0.5;
-/// The same for slivers and blur.
-const SLIVER_OR_BLURRED_SHARE: f64 = 0.25;
-/// The same for triangles behind the camera and fast motion.
-const BEHIND_OR_FAST_SHARE: f64 = 0.1;
-
-/// Warnings about triangles for which tile tests are ineffective, each for the worst frame. Results stay
-/// correct.
-fn of_regimes(simulated: &Simulated) -> Vec<Warning> {
-    [
-        behind(simulated),
-        tiny(simulated),
-        slivers(simulated),
-        fast(simulated),
-        blurred(simulated),
-        extreme(simulated),
-        coarse(simulated),
-        cut(simulated),
-    ]
-    .into_iter()
-    .flatten()
-    .collect()
-}
-
-/// Frame with the most triangles of a regime, counted by `of`, if they are at least `share` of those in view.
-/// The text is, for example, `12 of 40 triangles in view (frame 3)`.
-fn worst_frame(simulated: &Simulated, share: f64, of: fn(&Regime) -> u64) -> Option<String> {
-    let (frame, observed) = simulated.observed().max_by_key(|(_, observed)| of(&observed.regime))?;
-    let (count, all) = (of(&observed.regime), observed.regime.in_view);
-    (count > 0 && count as f64 >= share * all as f64)
-        .then(|| format!("{count} of {all} triangles in view (frame {})", frame.index))
-}
-
-fn behind(simulated: &Simulated) -> Option<Warning> {
-    let which = worst_frame(simulated, BEHIND_OR_FAST_SHARE, |regime| regime.behind)?;
-    Some(Warning::new(
-        Code::BehindCamera,
-        format!(
-            "{which} reach behind the camera: nothing bounds their image, so they are tested all over it; move the camera, \
-             or cut large triangles into smaller ones"
-        ),
-    ))
-}
-
-fn tiny(simulated: &Simulated) -> Option<Warning> {
-    let which = worst_frame(simulated, TINY_SHARE, |regime| regime.tiny)?;
-    Some(Warning::new(
-        Code::SubSampleTriangles,
-        format!(
-            "{which} are smaller than the spacing of samples: most are hit by none, and tile tests cannot help; use a \
-             coarser mesh, a larger image or more samples"
-        ),
-    ))
-}
-
-fn slivers(simulated: &Simulated) -> Option<Warning> {
-    let which = worst_frame(simulated, SLIVER_OR_BLURRED_SHARE, |regime| regime.slivers)?;
-    Some(Warning::new(
-        Code::SliverTriangles,
-        format!(
-            "{which} are more than a hundred times as long as high: they touch many tiles and few samples; fix the mesh \
-             where it was made"
-        ),
-    ))
-}
-
-fn fast(simulated: &Simulated) -> Option<Warning> {
-    let which = worst_frame(simulated, BEHIND_OR_FAST_SHARE, |regime| regime.fast)?;
-    Some(Warning::new(
-        Code::FastMotion,
-        format!(
-            "{which} move by more than an image while the shutter is open: few samples see them, the image is noisy, and \
-             a straight way may be far from the true one; use a shorter shutter, a higher frame rate or more samples"
-        ),
-    ))
-}
-
-fn blurred(simulated: &Simulated) -> Option<Warning> {
-    let which = worst_frame(simulated, SLIVER_OR_BLURRED_SHARE, |regime| regime.blurred)?;
-    Some(Warning::new(
-        Code::BlurBeyondImage,
-        format!(
-            "{which} are out of focus by more than an image: the lens is too large for this scene; use a smaller --lens \
-             or another --focus"
-        ),
-    ))
-}
-
-fn extreme(simulated: &Simulated) -> Option<Warning> {
-    let which = worst_frame(simulated, 0.0, |regime| regime.extreme)?;
-    Some(Warning::new(
-        Code::CoordinatesOutOfRange,
-        format!(
-            "{which} have coordinates whose products leave the range of 32-bit numbers: they may not be seen, or at wrong \
-             depths; scale the scene to ordinary lengths"
-        ),
-    ))
-}
-
-fn coarse(simulated: &Simulated) -> Option<Warning> {
-    let which = worst_frame(simulated, 0.0, |regime| regime.coarse)?;
-    Some(Warning::new(
-        Code::CoordinatesCoarse,
-        format!(
-            "{which} have coordinates so large that 32-bit numbers move them by more than a quarter of a pixel: they are drawn \
-             out of place; move what the camera sees to the origin, without what is far from it"
-        ),
-    ))
-}
-
-fn cut(simulated: &Simulated) -> Option<Warning> {
-    let (frame, worst) = simulated.observed().max_by_key(|(_, observed)| observed.regime.cut)?;
-    let (count, frames) =
-        (worst.regime.cut, simulated.observed().filter(|(_, observed)| observed.regime.cut > 0).count());
-    (count > 0).then(|| {
-        let message = format!(
-            "the near plane cuts {count} triangles in front of the camera away, or parts of them (frame {}; some in {frames} of {} \
-             frames): give the camera a smaller `near`, or move it",
-            frame.index,
-            simulated.distinct.len()
-        );
-        Warning::new(Code::NearPlaneCuts, message)
-    })
 }
 
 #[cfg(test)]
