@@ -6,7 +6,7 @@ use std::path::Path;
 use std::time::Instant;
 use traces::device::{Device, DeviceSpec};
 use traces::energy::FrameTable;
-use traces::frames::{Marks, Window};
+use traces::frames::{FinderMethod, Marks, Window};
 use traces::io::{ReadOptions, parquet};
 use traces::pyramid::Pyramid;
 use traces::{CurveBuilder, Trace, stream};
@@ -43,7 +43,7 @@ fn time(path: &Path, mark_s: f64) -> Result<(), Box<dyn Error>> {
     let marks = Marks::one(mark_s, window, f64::INFINITY);
     for round in 0..3 {
         let clock = Instant::now();
-        let streamed = stream::find(path, &ReadOptions::default(), &marks)?;
+        let streamed = stream::find(path, &ReadOptions::default(), &marks, FinderMethod::SumOfSquares)?;
         let found_s = clock.elapsed().as_secs_f64();
         let mut table = Vec::new();
         FrameTable::new(streamed.energies, None).write_csv(&mut table)?;

@@ -1,21 +1,22 @@
-//! Whether the chance that a frame is right can be estimated from the trace: fits a logistic map (Platt 1999) of the finder's
-//! confidence, of how far methods agree and of how even gaps are, on all kinds of devices but one, and judges it on that one.
+//! The finder on the [`WITNESSES`]: how well it finds, and how far its confidence is a probability. Also whether a map would make it one:
+//! fits a logistic map (Platt 1999) of confidence, of how far methods agree and of how even gaps are, on all kinds of devices but one,
+//! and judges it on that one.
 //!
-//! `calibrate_confidence FIRST_SEED LAST_SEED`
+//! `calibrate_confidence FIRST_SEED LAST_SEED [STEP]`, where STEP is left out: one of `traces::frames::Step`.
 
 use std::error::Error;
 use std::process::ExitCode;
 use traces::Trace;
-use traces::frames::{FinderMethod, Found, MarkError, Marks, Options, default_window, find_with};
-use traces::score::{TOLERANCE_S, true_frames};
-use traces::synth::{Recording, SCENARIOS, Scene, WITNESSES};
+use traces::frames::{FinderMethod, Found, MarkError, Marks, Options, Step, default_window, find_with};
+use traces::score::{TOLERANCE_S, pairs, true_frames};
+use traces::synth::{Scene, WITNESSES};
 
 /// Frames of each device.
 const FRAMES: usize = 200;
-/// Places of the marks, as shares of the frames.
+/// Places of the marks, as shares of the frames, and their errors, s.
 const MARKED: [f64; 5] = [0.4, 0.1, 0.25, 0.6, 0.85];
-/// A constant, the logit of the confidence, the share of frames that squares, normalized and squares with five of the found
-/// starts as marks find as well, and the share of even gaps.
+const HAND_S: [f64; 5] = [0.05e-3, -0.1e-3, 0.1e-3, 0.0, -0.05e-3];
+/// A constant, the confidence and its logit, the share of frames that squares and normalized find as well, and the share of even gaps.
 const FEATURES: usize = 6;
 /// Bins of confidence.
 const BINS: usize = 10;
@@ -25,6 +26,7 @@ struct Case {
     kind: &'static str,
     features: [f64; FEATURES],
     confidence: f64,
+    flagged: bool,
     right: bool,
 }
 
@@ -39,81 +41,112 @@ fn main() -> ExitCode {
 }
 
 fn run() -> Result<(), Box<dyn Error>> {
-    let seeds: Vec<u64> = std::env::args().skip(1).map(|seed| seed.parse()).collect::<Result<_, _>>()?;
-    let [first, last] = seeds[..] else {
-        return Err("usage: calibrate_confidence FIRST_SEED LAST_SEED".into());
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let [first, last, step @ ..] = arguments.as_slice() else {
+        return Err("usage: calibrate_confidence FIRST_SEED LAST_SEED [STEP]".into());
     };
+    let named = |name: &String| Step::ALL.into_iter().find(|step| step.0 == name).map(|step| step.1);
+    let without = match step.first() {
+        Some(name) => Some(named(name).ok_or_else(|| format!("no step {name}: {:?}", Step::ALL))?),
+        None => None,
+    };
+    let options = Options { method: FinderMethod::Auto, without };
+    let (first, last): (u64, u64) = (first.parse()?, last.parse()?);
     let mut cases = Vec::new();
-    for seed in first..=last {
-        for scenario in &SCENARIOS {
-            let scene = scenario.scene(FRAMES, seed)?;
-            let trace = scene.record(&Recording { seed, ..Recording::default() })?;
-            cases.extend(cases_of("shared", &scene, &trace)?);
-        }
-        for witness in &WITNESSES {
+    for witness in &WITNESSES {
+        let (mut first_mark, mut worst) = (Vec::new(), Vec::new());
+        for seed in first..=last {
             let scene = witness.scene(FRAMES, seed)?;
-            cases.extend(cases_of(witness.name, &scene, &scene.record(&witness.recording(seed))?)?);
+            let trace = scene.record(&witness.recording(seed))?;
+            let f1 = cases_of(witness.name, &scene, &trace, &options, &mut cases)?;
+            println!("{} {seed}: F1 by mark {f1:.3?}", witness.name);
+            first_mark.push(f1[0]);
+            worst.push(f1.into_iter().fold(1.0, f64::min));
         }
+        let mean = |of: &[f64]| of.iter().sum::<f64>() / of.len() as f64;
+        println!(
+            "{}: F1 first mark {:.3}, worst of five {:.3}",
+            witness.name,
+            mean(&first_mark),
+            mean(&worst)
+        );
     }
-    println!(
-        "kind left out: frames, share that is right; calibration error as stated, fitted on the others, fitted on all"
-    );
-    let everywhere = fitted(&cases, |_| true);
-    for kind in WITNESSES.iter().map(|witness| witness.name).chain(["shared"]) {
-        let of: Vec<&Case> = cases.iter().filter(|case| case.kind == kind).collect();
-        let others = fitted(&cases, |case| case.kind != kind);
-        let right = of.iter().filter(|case| case.right).count() as f64 / of.len() as f64;
-        let stated = error_of(&of, |case| case.confidence);
-        let [others, all] =
-            [others, everywhere].map(|weights| error_of(&of, |case| chance(&weights, &case.features)));
-        println!("{kind}: {}, {right:.3}; {stated:.3}, {others:.3}, {all:.3}", of.len());
-    }
+    report(&cases);
     Ok(())
 }
 
-fn cases_of(kind: &'static str, scene: &Scene, trace: &Trace) -> Result<Vec<Case>, MarkError> {
+fn report(cases: &[Case]) {
+    println!(
+        "kind left out: frames, right; AUC; calibration error as stated, fitted on the others, fitted on all; wrong frames flagged, \
+         right frames flagged; by the map of the others"
+    );
+    let everywhere = fitted(cases, |_| true);
+    for kind in WITNESSES.iter().map(|witness| witness.name).chain(["all"]) {
+        let of: Vec<&Case> = cases.iter().filter(|case| case.kind == kind || kind == "all").collect();
+        let others = fitted(cases, |case| case.kind != kind);
+        let right = of.iter().filter(|case| case.right).count();
+        let stated = error_of(&of, |case| case.confidence);
+        let [mapped, all] =
+            [others, everywhere].map(|weights| error_of(&of, |case| chance(&weights, &case.features)));
+        let flagged = |right: bool, flag: &dyn Fn(&Case) -> bool| {
+            let count = of.iter().filter(|case| case.right == right && flag(case)).count();
+            format!("{count} of {}", of.iter().filter(|case| case.right == right).count())
+        };
+        let low = |case: &Case| chance(&others, &case.features) < 0.5;
+        println!(
+            "{kind}: {}, {right}; {:.3}; {stated:.3}, {mapped:.3}, {all:.3}; {}, {}; {}, {}",
+            of.len(),
+            ranked(&of),
+            flagged(false, &|case| case.flagged),
+            flagged(true, &|case| case.flagged),
+            flagged(false, &low),
+            flagged(true, &low),
+        );
+    }
+}
+
+/// F1 with each mark; adds the frames found.
+fn cases_of(
+    kind: &'static str,
+    scene: &Scene,
+    trace: &Trace,
+    options: &Options,
+    cases: &mut Vec<Case>,
+) -> Result<Vec<f64>, MarkError> {
     let truth_s: Vec<f64> = scene.truth.iter().map(|frame| frame.start_s).collect();
     let mut lengths_s: Vec<f64> = truth_s.windows(2).map(|two| two[1] - two[0]).collect();
     lengths_s.sort_by(f64::total_cmp);
     let tolerance_s = TOLERANCE_S.min(0.15 * lengths_s[lengths_s.len() / 20]);
-    let window = default_window(0.0, trace.rate_hz());
-    let search = |starts_s: Vec<f64>, method| {
-        find_with(trace, &Marks { starts_s, window, end_s: trace.end_s() }, &Options { method })
-    };
-    let mut cases = Vec::new();
-    for share in MARKED {
-        let mark_s = truth_s[(share * truth_s.len() as f64) as usize];
-        let found = search(vec![mark_s], FinderMethod::Auto)?;
-        let others = [
-            search(vec![mark_s], FinderMethod::SumOfSquares)?,
-            search(vec![mark_s], FinderMethod::Normalized)?,
-            search(five_of(&found, mark_s), FinderMethod::SumOfSquares)?,
-        ];
-        let [squares, normalized, several] = others.map(|other| agreement(&found, &other));
-        let even = even_share(&times_s(&found));
-        let right = true_frames(&times_s(&found), &truth_s, tolerance_s);
+    let mut f1 = Vec::new();
+    for (share, hand_s) in MARKED.into_iter().zip(HAND_S) {
+        let mark_s = truth_s[(share * truth_s.len() as f64) as usize] + hand_s;
+        let marks = Marks::one(mark_s, default_window(0.0, trace.rate_hz()), trace.end_s());
+        let found = find_with(trace, &marks, options)?;
+        let by = |method| find_with(trace, &marks, &Options { method, ..*options });
+        let [squares, normalized] = [by(FinderMethod::SumOfSquares)?, by(FinderMethod::Normalized)?]
+            .map(|other| agreement(&found, &other));
+        let found_s = times_s(&found);
+        let paired = pairs(&found_s, &truth_s, tolerance_s).len();
+        f1.push(2.0 * paired as f64 / (found_s.len() + truth_s.len()) as f64);
+        let even = even_share(&found_s);
+        let right = true_frames(&found_s, &truth_s, tolerance_s);
         cases.extend(right.into_iter().zip(&found.frames).map(|(right, frame)| {
             let stated = frame.confidence.clamp(0.01, 0.99);
             let logit = (stated / (1.0 - stated)).ln();
             Case {
                 kind,
-                features: [1.0, logit, squares, normalized, several, even],
+                features: [1.0, frame.confidence, logit, squares, normalized, even],
                 confidence: frame.confidence,
+                flagged: frame.flags.has_low_confidence(),
                 right,
             }
         }));
     }
-    Ok(cases)
+    Ok(f1)
 }
 
 fn times_s(found: &Found) -> Vec<f64> {
     found.starts.iter().map(|start| start.time_s).collect()
-}
-
-/// Five of the found starts, evenly chosen; the mark where there are fewer.
-fn five_of(found: &Found, mark_s: f64) -> Vec<f64> {
-    let all = times_s(found);
-    if all.len() < 12 { vec![mark_s] } else { (0..5).map(|i| all[(2 * i + 1) * all.len() / 10]).collect() }
 }
 
 /// Share of frames that another search found as well: both ends, and no start between.
@@ -134,6 +167,20 @@ fn chance(weights: &[f64; FEATURES], features: &[f64; FEATURES]) -> f64 {
     1.0 / (1.0 + (-sum).exp())
 }
 
+/// The chance that a right frame has more confidence than a wrong one (Hanley and McNeil 1982).
+fn ranked(cases: &[&Case]) -> f64 {
+    let mut sorted: Vec<&&Case> = cases.iter().collect();
+    sorted.sort_by(|a, b| a.confidence.total_cmp(&b.confidence));
+    let (mut below, mut sum) = (0.0, 0.0);
+    for same in sorted.chunk_by(|a, b| a.confidence == b.confidence) {
+        let right = same.iter().filter(|case| case.right).count() as f64;
+        let wrong = same.len() as f64 - right;
+        sum += right * (below + 0.5 * wrong);
+        below += wrong;
+    }
+    sum / (below * (cases.len() as f64 - below))
+}
+
 /// Newton's method for the likelihood, each kind with the same weight, with a slight pull to zero.
 fn fitted(cases: &[Case], used: impl Fn(&Case) -> bool) -> [f64; FEATURES] {
     let of: Vec<&Case> = cases.iter().filter(|case| used(case)).collect();
@@ -141,7 +188,6 @@ fn fitted(cases: &[Case], used: impl Fn(&Case) -> bool) -> [f64; FEATURES] {
     let shares: Vec<(&'static str, f64)> = WITNESSES
         .iter()
         .map(|witness| witness.name)
-        .chain(["shared"])
         .filter_map(|kind| of.iter().find(|case| case.kind == kind).map(|case| (kind, share(case))))
         .collect();
     let mut weights = [0.0; FEATURES];

@@ -84,7 +84,7 @@ pub enum SearchError {
     #[error("a start is proposed only for traces that fit into memory")]
     ProposalInPieces,
     /// A method or a repair that needs all samples at once.
-    #[error("only the sum of squares, without repair, reads in pieces")]
+    #[error("squares and normalized read in pieces, tracking and repair do not")]
     NotInPieces,
 }
 
@@ -103,7 +103,7 @@ impl Search {
     /// # Errors
     /// [`SearchError::NotInPieces`] if it is requested but not possible; [`SearchError::Read`].
     pub fn reads_in_pieces(&self, path: &Path, options: &ReadOptions) -> Result<bool, SearchError> {
-        if matches!(self.method, FinderMethod::Tracking | FinderMethod::Normalized) || options.repair {
+        if self.method == FinderMethod::Tracking || options.repair {
             return if self.in_pieces { Err(SearchError::NotInPieces) } else { Ok(false) };
         }
         let bytes = || std::fs::metadata(path).map_or(0, |metadata| metadata.len());
@@ -132,7 +132,7 @@ impl Search {
         let window =
             self.window.unwrap_or_else(|| default_window(repetition_s.unwrap_or(0.0), trace.rate_hz()));
         let marks = Marks { starts_s, window, end_s };
-        let mut found = find_with(trace, &marks, &Options { method: self.method })?;
+        let mut found = find_with(trace, &marks, &Options { method: self.method, without: None })?;
         if let Some(Proposal { mark_s, .. }) = proposal.filter(|_| found.starts.len() < 2) {
             return Err(SearchError::NoRepetition { mark_s });
         }
@@ -167,7 +167,7 @@ impl Search {
         let end_s = marked_end_s.unwrap_or(f64::INFINITY);
         let window = self.window.unwrap_or_else(|| default_window(0.0, f64::INFINITY));
         let marks = Marks { starts_s, window, end_s };
-        let mut streamed = stream::find(path, options, &marks)?;
+        let mut streamed = stream::find(path, options, &marks, self.method)?;
         streamed.found.warnings.extend(negative_power(streamed.total_j));
         let clock = streamed.clock;
         Ok(FrameSet {

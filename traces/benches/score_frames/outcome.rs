@@ -29,7 +29,7 @@ pub struct Outcome {
 impl Outcome {
     pub fn new(case: &Case, starts_s: Vec<f64>, method: FinderMethod) -> Result<Self, Box<dyn Error>> {
         let marks = Marks { starts_s, window: case.window, end_s: case.trace.end_s() };
-        let found = find_with(&case.trace, &marks, &Options { method })?;
+        let found = find_with(&case.trace, &marks, &Options { method, without: None })?;
         let frames = PowerIntegral::new(&case.trace).frames(&found);
         let score = score(&frames, &case.truth, TOLERANCE_S);
         let (wrong, wrong_flagged, right_flagged) = wrong(case, &frames);

@@ -4,7 +4,7 @@
 use super::marks::{Marks, Placement, Window};
 use super::spans::{Sampling, median_duration_s, spans};
 use super::threshold::{MIN_SEPARATION, Rule, Threshold};
-use super::{Flag, Found, FrameStart};
+use super::{Flag, Found, FrameStart, MIN_CONFIDENCE};
 use crate::trace::Trace;
 use warnings::{Code, Warning};
 
@@ -146,6 +146,19 @@ fn window_too_long(found: &Found, median_s: f64) -> Option<Warning> {
 }
 
 impl Found {
+    /// With other confidences of starts, except the marks, and of frames.
+    pub(super) fn with_confidence(mut self, starts: Vec<f64>, frames: Vec<f64>) -> Self {
+        let unmarked = self.starts.iter_mut().zip(starts).filter(|(start, _)| !start.marked);
+        unmarked.for_each(|(start, confidence)| start.confidence = confidence);
+        for (frame, confidence) in self.frames.iter_mut().zip(frames) {
+            frame.confidence = confidence;
+            frame.flags.set(Flag::LowConfidence, confidence < MIN_CONFIDENCE);
+        }
+        self.warnings.retain(|warning| warning.code != Code::LowConfidence);
+        self.warnings.extend(low_confidence(&self));
+        self
+    }
+
     /// Adds the warning about a window that is longer than the time after which power repeats, where the frames found do not show it:
     /// starts nearer than half the window are never found.
     pub(crate) fn warn_of_long_window(&mut self, repetition_s: Option<f64>) {

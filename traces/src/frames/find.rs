@@ -1,6 +1,7 @@
 //! Finding frames: by a given method, by the most suitable one, or from a mark that the program proposes.
 
 use super::assess::uncovered_work;
+use super::consensus::more_agreed;
 use super::marks::{MarkError, Marks, Placed, Placement, default_window, flat_mark_of};
 use super::matched::{find_matched, noise_variance};
 use super::register::register;
@@ -9,14 +10,12 @@ use super::start_refinement::refine_starts;
 use super::threshold::{Rule, Threshold};
 use super::track::{Start, track};
 use super::vsync::{Snapped, snap_to_ticks};
-use super::{FinderMethod, Found, FrameStart, SUSPECT_CONFIDENCE, marked_starts, spacing};
+use super::{FinderMethod, Found, FrameStart, SUSPECT_CONFIDENCE, marked_start, spacing};
 use super::{assess, idle_gap, periodicity};
-use crate::pairing::{TOLERANCE_S, true_frames};
 use crate::stats::upper_median;
 use crate::trace::{Metadata, Trace};
 use rayon::prelude::*;
 use serde::Serialize;
-use warnings::Code;
 
 /// Finds every frame start like the marked ones, anywhere the window fits into the trace and before the end
 /// mark, by [`FinderMethod::Auto`].
@@ -36,6 +35,40 @@ pub fn find(trace: &Trace, marks: &Marks) -> Result<Found, MarkError> {
 pub struct Options {
     /// Which method.
     pub method: FinderMethod,
+    /// A step that is left out, to measure what it is worth.
+    pub without: Option<Step>,
+}
+
+/// A step of [`FinderMethod::Tracking`] and [`FinderMethod::Auto`] that can be left out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Step {
+    /// Found starts tried as marks.
+    Consensus,
+    /// Frames of both sides of a clock step aligned.
+    ClockSteps,
+    /// Starts that split frames taken out.
+    SplitFrames,
+    /// Starts moved to where frames begin to agree.
+    StartRefinement,
+    /// Starts put on the ticks of the display.
+    DisplayTicks,
+    /// Lower confidence where the idle gap before a frame differs or is missing.
+    IdleGaps,
+    /// Lower confidence beyond a phase slip.
+    PhaseSlips,
+}
+
+impl Step {
+    /// All of them, with their names.
+    pub const ALL: [(&'static str, Self); 7] = [
+        ("consensus", Self::Consensus),
+        ("clock-steps", Self::ClockSteps),
+        ("split-frames", Self::SplitFrames),
+        ("start-refinement", Self::StartRefinement),
+        ("display-ticks", Self::DisplayTicks),
+        ("idle-gaps", Self::IdleGaps),
+        ("phase-slips", Self::PhaseSlips),
+    ];
 }
 
 /// As [`find`], with a method chosen.
@@ -45,8 +78,8 @@ pub struct Options {
 pub fn find_with(trace: &Trace, marks: &Marks, options: &Options) -> Result<Found, MarkError> {
     match options.method {
         FinderMethod::SumOfSquares | FinderMethod::Normalized => find_matched(trace, marks, options.method),
-        FinderMethod::Tracking => find_tracked(trace, marks),
-        FinderMethod::Auto => find_auto(trace, marks),
+        FinderMethod::Tracking => find_tracked(trace, marks, options.without),
+        FinderMethod::Auto => find_auto(trace, marks, options.without),
     }
 }
 
@@ -56,7 +89,13 @@ pub fn find_with(trace: &Trace, marks: &Marks, options: &Options) -> Result<Foun
 /// [`MarkError`] if the marks do not fit the trace.
 pub fn marked_only(trace: &Trace, marks: &Marks) -> Result<Found, MarkError> {
     let placement = marks.place(trace)?;
-    Ok(assess::conclude(trace, marks, &placement, marked_starts(&placement, &[]), Threshold::none()))
+    Ok(assess::conclude(
+        trace,
+        marks,
+        &placement,
+        placement.marks.iter().map(marked_start).collect(),
+        Threshold::none(),
+    ))
 }
 
 /// With fewer starts there is too little to learn from: the sum of squares is kept, unless tracking gives a
@@ -81,7 +120,7 @@ const MAX_TRACKED_SAMPLES: usize = 1 << 24;
 const MIN_COVERAGE_GAIN: f64 = 0.02;
 
 /// [`FinderMethod::Auto`].
-pub(super) fn find_auto(trace: &Trace, marks: &Marks) -> Result<Found, MarkError> {
+pub(super) fn find_auto(trace: &Trace, marks: &Marks, without: Option<Step>) -> Result<Found, MarkError> {
     let squares = find_matched(trace, marks, FinderMethod::SumOfSquares)?;
     let samples = marks.place(trace)?.samples;
     if samples < MIN_WINDOW_SAMPLES {
@@ -89,42 +128,29 @@ pub(super) fn find_auto(trace: &Trace, marks: &Marks) -> Result<Found, MarkError
     }
     if squares.starts.len() < MIN_TRACKED_STARTS {
         // A mark that hardly any frame resembles may be alone among frames that are plainly there.
-        let tracked =
-            (trace.samples() <= MAX_TRACKED_SAMPLES).then(|| find_tracked(trace, marks)).transpose()?;
+        let tracked = (trace.samples() <= MAX_TRACKED_SAMPLES)
+            .then(|| find_tracked(trace, marks, without))
+            .transpose()?;
         let plain = |tracked: &Found| enough_starts(tracked, &squares) && even_and_similar(trace, tracked);
         return Ok(tracked.filter(plain).unwrap_or(squares));
     }
     if samples < COARSE_WINDOW_SAMPLES {
         return Ok(most_even(
             squares,
-            [find_tracked(trace, marks)?, find_matched(trace, marks, FinderMethod::Normalized)?],
+            [find_tracked(trace, marks, without)?, find_matched(trace, marks, FinderMethod::Normalized)?],
         ));
     }
     let long_and_clear = trace.samples() > MAX_TRACKED_SAMPLES && squares.threshold.clarity() >= 1.0;
     if long_and_clear {
         return Ok(squares);
     }
-    let tracked = find_tracked(trace, marks)?;
-    let is_clear = squares.threshold.clarity() >= 1.0 && !is_unsure(&squares);
-    if is_clear && is_unsure(&tracked) { where_agreed(trace, marks, squares, &tracked) } else { Ok(tracked) }
-}
-
-/// The result of one method, with low confidence in frames that another method does not find.
-fn where_agreed(trace: &Trace, marks: &Marks, found: Found, other: &Found) -> Result<Found, MarkError> {
-    let times_s = |of: &Found| -> Vec<f64> { of.starts.iter().map(|start| start.time_s).collect() };
-    let agreed = true_frames(&times_s(&found), &times_s(other), TOLERANCE_S);
-    let mut starts = found.starts;
-    for (start, _) in starts.iter_mut().zip(agreed).filter(|(_, agreed)| !agreed) {
-        start.confidence *= SUSPECT_CONFIDENCE;
+    let tracked = find_tracked(trace, marks, without)?;
+    if without == Some(Step::Consensus) {
+        return Ok(tracked);
     }
-    let mut agreed = assess::conclude(trace, marks, &marks.place(trace)?, starts, found.threshold);
-    agreed.warnings.extend(found.warnings.into_iter().filter(|warning| warning.code == Code::FlatMark));
-    Ok(agreed)
-}
-
-/// Whether every start but the marks has a confidence below one half.
-fn is_unsure(found: &Found) -> bool {
-    found.starts.iter().all(|start| start.marked || start.confidence < 0.5)
+    let search =
+        |part: &Trace, marks: &Marks, method| find_with(part, marks, &Options { method, without }).ok();
+    Ok(more_agreed(trace, marks, [tracked, squares], search))
 }
 
 /// Whether tracking found enough starts for a test: many, or fewer than the sum of squares where that gives a
@@ -190,7 +216,8 @@ pub fn propose(trace: &Trace) -> Option<Proposal> {
     let judged = rises.into_iter().filter_map(|mark_s| {
         let window = default_window(0.0, part.rate_hz());
         let marks = Marks::one(mark_s, window, part.end_s());
-        let found = find_with(&part, &marks, &Options { method: FinderMethod::SumOfSquares }).ok()?;
+        let found =
+            find_with(&part, &marks, &Options { method: FinderMethod::SumOfSquares, without: None }).ok()?;
         let (regularity, similar_starts) = (found.threshold.regularity, found.starts.len());
         Some(Proposal { mark_s, regularity, similar_starts, tried })
     });
@@ -265,19 +292,30 @@ fn correlation(a: &[f64], b: &[f64]) -> f64 {
 }
 
 /// Finds the sequence of starts with the most evidence.
-fn find_tracked(trace: &Trace, marks: &Marks) -> Result<Found, MarkError> {
+fn find_tracked(trace: &Trace, marks: &Marks, without: Option<Step>) -> Result<Found, MarkError> {
+    let with = |step: Step| without != Some(step);
     let placement = marks.place(trace)?;
     let power: Vec<f64> = trace.powers_w().collect();
-    let tracked = without_false_starts(&power, track(&power, &placement).starts, &placement);
+    let mut tracked = track(&power, &placement, with(Step::ClockSteps)).starts;
+    if !with(Step::PhaseSlips) {
+        tracked.iter_mut().for_each(|start| start.confidence_factor = 1.0);
+    }
+    if with(Step::SplitFrames) {
+        tracked = without_false_starts(&power, tracked, &placement);
+    }
     let offsets: Vec<usize> = tracked.iter().map(|start| start.offset).collect();
     let marked: Vec<Option<&Placed>> =
         offsets.iter().map(|offset| placement.marks.iter().find(|mark| mark.first == *offset)).collect();
     let fixed: Vec<bool> = marked.iter().map(Option::is_some).collect();
     let anchor = placement.marks.first().map_or(0.0, |mark| mark.anchor);
     let positions = register(&power, &offsets, &fixed, libm::round(anchor) as usize, placement.samples);
-    let positions = refine_starts(&power, positions, &fixed, anchor, placement.samples);
+    let positions = match with(Step::StartRefinement) {
+        true => refine_starts(&power, positions, &fixed, anchor, placement.samples),
+        false => positions,
+    };
     let noise_w = libm::sqrt(noise_variance(&power));
-    let (positions, kept) = in_phase(&power, noise_w, positions, &tracked, &fixed, anchor, placement.samples);
+    let (positions, kept) =
+        in_phase(&power, noise_w, positions, &tracked, &fixed, anchor, placement.samples, without);
     let start = |(((start, position), kept), marked): (((&Start, f64), f64), &Option<&Placed>)| FrameStart {
         time_s: marked.map_or(trace.start_s() + (position + anchor) * trace.period_s(), |mark| mark.mark_s),
         distance_w2: start.distance_w2,
@@ -324,14 +362,21 @@ fn in_phase(
     fixed: &[bool],
     anchor: f64,
     width: usize,
+    without: Option<Step>,
 ) -> (Vec<f64>, Vec<f64>) {
     let places =
         |positions: &[f64]| -> Vec<f64> { positions.iter().map(|position| position + anchor).collect() };
     let first_mark = fixed.iter().position(|fixed| *fixed);
-    let (positions, in_phase) = match first_mark.and_then(|mark| snap_to_ticks(&positions, mark, width)) {
+    let (positions, in_phase) = match first_mark
+        .filter(|_| without != Some(Step::DisplayTicks))
+        .and_then(|mark| snap_to_ticks(&positions, mark, width))
+    {
         // What begins on a tick is in the phase of the mark, whatever happened on the way.
         Some(Snapped { positions, off_tick }) => {
             (positions, off_tick.iter().map(|off| if *off { SUSPECT_CONFIDENCE } else { 1.0 }).collect())
+        }
+        None if without == Some(Step::IdleGaps) => {
+            (positions, starts.iter().map(|start| start.confidence_factor).collect())
         }
         None => {
             let factors = spread_from_unmarked(
@@ -341,6 +386,9 @@ fn in_phase(
             (positions, product(starts.iter().map(|start| start.confidence_factor), factors))
         }
     };
+    if without == Some(Step::IdleGaps) {
+        return (positions, in_phase);
+    }
     let with_gap = spread_from_unmarked(
         idle_gap::missing_gap_confidence(power, &places(&positions), width, noise_w),
         fixed,
@@ -361,7 +409,7 @@ fn product(a: impl IntoIterator<Item = f64>, b: Vec<f64>) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::frames::{Flag, Window};
+    use crate::frames::Window;
     use crate::random::Random;
     use crate::trace::Metadata;
 
@@ -375,7 +423,7 @@ mod tests {
             window: Window { pre_s: 1e-3, post_s: 4e-3 },
             end_s: trace.end_s(),
         };
-        find_auto(&trace, &marks).unwrap()
+        find_auto(&trace, &marks, None).unwrap()
     }
 
     fn noise(sample: usize) -> f32 {
@@ -416,24 +464,6 @@ mod tests {
             let found = found(|sample| 2.0 + level * noise(sample), 100_000, 50_000);
             assert_eq!((found.method, found.starts.len()), (FinderMethod::SumOfSquares, 1));
         }
-    }
-
-    #[test]
-    fn frames_that_another_method_does_not_find_have_low_confidence() {
-        let watts =
-            |i: usize| if i % 400 < 300 { 3.0 + (i % 400 * 7 % 11) as f32 } else { 0.5 } + 0.1 * noise(i);
-        let power: Vec<f32> = (0..400 * 40).map(watts).collect();
-        let trace = Trace::new(vec![1.0; power.len()], power, RATE_HZ, 0.0, Metadata::default()).unwrap();
-        let marks = Marks::one(0.24, default_window(0.0, RATE_HZ), trace.end_s());
-        let found = find_matched(&trace, &marks, FinderMethod::SumOfSquares).unwrap();
-        let mut other = found.clone();
-        other.starts.remove(10);
-        let agreed = where_agreed(&trace, &marks, found.clone(), &other).unwrap();
-        assert!(found.frames.len() > 30 && agreed.frames.len() == found.frames.len());
-        for (index, (now, before)) in agreed.starts.iter().zip(&found.starts).enumerate() {
-            assert_eq!(now.confidence < before.confidence, index == 9 || index == 10, "{index}");
-        }
-        assert!(agreed.frames[9].flags.contains(Flag::LowConfidence));
     }
 
     #[test]

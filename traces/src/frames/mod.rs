@@ -6,6 +6,7 @@
 //! seeds of `docs/finding.md`, section *Flags*, which also has the result on seeds that were not used.
 
 mod assess;
+mod consensus;
 mod find;
 mod idle_gap;
 mod marks;
@@ -21,14 +22,12 @@ mod threshold;
 mod track;
 mod vsync;
 
-pub(crate) use assess::{conclude_at, confidence};
-pub use find::{Options, Proposal, find, find_with, marked_only, propose};
+pub use find::{Options, Proposal, Step, find, find_with, marked_only, propose};
+use marks::Placed;
+pub(crate) use marks::Placement;
 pub use marks::{MarkError, Marks, Window, default_window};
-pub(crate) use marks::{Placed, Placement, flat_mark};
-pub(crate) use matched::{misalignment_w2, noise_deviation, start_after_idle};
-pub(crate) use periodicity::{regularity, repetition_samples};
-pub(crate) use subsample::vertex;
-pub(crate) use threshold::choose;
+pub(crate) use matched::{Matched, Plan as MatchPlan, Samples, noise_deviation};
+pub(crate) use periodicity::repetition_samples;
 pub use threshold::{Population, Rule, Threshold};
 
 use core::fmt;
@@ -87,14 +86,8 @@ fn spacing(window_samples: usize) -> usize {
     (window_samples / 2).max(1)
 }
 
-fn marked_starts(placement: &Placement, profile: &[f64]) -> Vec<FrameStart> {
-    let start = |mark: &Placed| FrameStart {
-        time_s: mark.mark_s,
-        distance_w2: profile.get(mark.first).copied().unwrap_or(0.0),
-        confidence: 1.0,
-        marked: true,
-    };
-    placement.marks.iter().map(start).collect()
+fn marked_start(mark: &Placed) -> FrameStart {
+    FrameStart { time_s: mark.mark_s, distance_w2: 0.0, confidence: 1.0, marked: true }
 }
 
 /// Frames of lower confidence are flagged. Confidence is 1 at the mean distance of the matches and 0 at that of the other
@@ -177,6 +170,11 @@ impl Flags {
     /// Adds a flag.
     pub fn insert(&mut self, flag: Flag) {
         self.0 |= flag.bit();
+    }
+
+    /// Adds or removes a flag.
+    pub fn set(&mut self, flag: Flag, on: bool) {
+        self.0 = if on { self.0 | flag.bit() } else { self.0 & !flag.bit() };
     }
 
     /// Whether a flag is set.

@@ -54,38 +54,6 @@ pub(super) fn difference(power: &[f64], template: &[f64]) -> f64 {
 /// Least length of a block: long enough that little is computed twice, short enough to stay in the caches.
 const MIN_BLOCK_SAMPLES: usize = 1 << 14;
 
-/// Wider templates are correlated by transforms, narrower ones summed directly.
-const MAX_DIRECT_SAMPLES: usize = 48;
-
-/// Summed squared difference at every offset, W^2, by whichever way is faster. By transforms it is exact to
-/// about 1e-13 of the template's and the segment's own squares.
-pub(super) fn squares(power: &[f64], template: &[f64]) -> Vec<f64> {
-    let width = template.len();
-    if width < MAX_DIRECT_SAMPLES || power.len() < width {
-        return summed_squared_difference(power, template);
-    }
-    // Rounding goes with the numbers' size, so both are taken about the template's mean.
-    let mean = template.iter().sum::<f64>() / width as f64;
-    let centred: Vec<f64> = template.iter().map(|watts| watts - mean).collect();
-    let own: f64 = centred.iter().map(|x| x * x).sum();
-    let signal: Vec<f64> = power.iter().map(|watts| watts - mean).collect();
-    let mut profile = Correlator::new(&centred).correlate(&signal);
-    let square = |x: &f64| x * x;
-    profile.par_chunks_mut(RESTART_OFFSETS).enumerate().for_each(|(index, profile)| {
-        // The running sum starts anew in every chunk, so that its rounding does not grow with the trace.
-        let from = index * RESTART_OFFSETS;
-        let mut sum: f64 = signal[from..from + width].iter().map(square).sum();
-        for (k, value) in profile.iter_mut().enumerate() {
-            *value = (sum + own - 2.0 * *value).max(0.0);
-            sum += signal.get(from + k + width).map_or(0.0, square) - square(&signal[from + k]);
-        }
-    });
-    profile
-}
-
-/// Offsets after which a running sum begins anew.
-const RESTART_OFFSETS: usize = 1 << 14;
-
 /// One template, ready to be correlated with whole traces.
 pub(super) struct Correlator {
     overlap: OverlapSave<f64>,
@@ -219,39 +187,13 @@ mod tests {
     }
 
     #[test]
-    fn oracle_transforms_agree_with_the_definition_over_many_blocks_and_levels() {
-        for level in [0.0, 300.0] {
-            let power = noise(3 * MIN_BLOCK_SAMPLES + 77, level);
-            let template = &power[5000..5250];
-            let (fast, exact) = (squares(&power, template), summed_squared_difference(&power, template));
-            assert_eq!(fast.len(), exact.len());
-            for (fast, exact) in fast.iter().zip(&exact) {
-                assert!((fast - exact).abs() < 1e-9, "{fast} {exact}");
-            }
-        }
-    }
-
-    #[test]
     fn any_number_of_threads_gives_the_same_bits() {
         let power = noise(5 * MIN_BLOCK_SAMPLES, 3.0);
         let on = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(|| squares(&power, &power[100..350]))
+            pool.install(|| normalized(&power, &power[100..350]))
         };
         assert_eq!(on(1), on(3));
-    }
-
-    proptest! {
-        #[test]
-        fn property_any_lengths(samples in 1_usize..400, width in 1_usize..120) {
-            let power = noise(samples, 2.0);
-            let template = noise(width, 2.5);
-            let (fast, exact) = (squares(&power, &template), summed_squared_difference(&power, &template));
-            prop_assert_eq!(fast.len(), exact.len());
-            for (fast, exact) in fast.iter().zip(&exact) {
-                prop_assert!((fast - exact).abs() < 1e-10);
-            }
-        }
     }
 
     #[test]

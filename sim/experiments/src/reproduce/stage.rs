@@ -253,7 +253,7 @@ impl Recording {
 
     /// The same by another method.
     pub fn find_by(&self, method: FinderMethod, marked: usize) -> Result<Frames, RunError> {
-        let found = find_with(&self.trace, &self.marks(marked), &Options { method })?;
+        let found = find_with(&self.trace, &self.marks(marked), &Options { method, ..Options::default() })?;
         Ok(Frames { end_s: found.end_s, found: PowerIntegral::new(&self.trace).frames(&found) })
     }
 

@@ -65,13 +65,16 @@ struct Candidate {
 }
 
 /// Finds the sequence of starts that fits the marked ones.
-pub(super) fn track(power: &[f64], placement: &Placement) -> Tracked {
+pub(super) fn track(power: &[f64], placement: &Placement, with_clocks: bool) -> Tracked {
     let marks: Vec<usize> = placement.marks.iter().map(|mark| mark.first).collect();
     let anchor = placement.marks.first().map_or(0, |mark| libm::round(mark.anchor) as usize);
     let mut known = marks.clone();
     for _ in 0..MAX_PASSES {
         let tracker = Tracker::new(power, placement.samples, anchor, &known).run();
-        let misplaced = clocks::misplaced(power, &tracker.starts(), &known, anchor, placement.samples);
+        let misplaced = match with_clocks {
+            true => clocks::misplaced(power, &tracker.starts(), &known, anchor, placement.samples),
+            false => Vec::new(),
+        };
         if misplaced.is_empty() {
             return tracker.conclude(&marks);
         }

@@ -494,7 +494,7 @@ fn analyse(trace: &Trace, scene: &Scene, way: Way) -> Result<FinderScore, StudyE
         end_s: trace.end_s(),
     };
     let clock = Instant::now();
-    let found = find_with(trace, &marks, &Options { method })?;
+    let found = find_with(trace, &marks, &Options { method, ..Options::default() })?;
     let host_s = clock.elapsed().as_secs_f64();
     let frames = PowerIntegral::new(trace).frames(&found);
     let score = score(&frames, &scene.truth, TOLERANCE_S);

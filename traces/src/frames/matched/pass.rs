@@ -1,22 +1,20 @@
-//! The one pass over the file, and the buffers of its threads.
+//! The one pass over the samples, and the buffers of its threads.
 
-use super::StreamError;
-use super::clock::Clock;
-use super::piece::{Piece, difference, powers, templates};
+use super::piece::{Piece, powers};
 use super::screen::{Buffers, Screen, minima};
-use crate::frames::{Marks, Placed, Placement, vertex};
-use crate::io::{ReadError, ReadOptions, RowBatch, Rows};
-use crate::stats::PairSum;
+use super::template::Template;
+use crate::clock::Clock;
+use crate::frames::marks::{Marks, Placed, Placement};
+use crate::frames::subsample::vertex;
+use crate::frames::{FinderMethod, spacing};
+use crate::stats::{PairSum, mean};
 use core::ops::Range;
 use multiversion::multiversion;
 use rayon::prelude::*;
-use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
-/// Rows read at once.
-const PIECE_ROWS: usize = 1 << 20;
-/// Rows decoded at once: they are used again while they are in the second cache.
-const BATCH_ROWS: usize = 1 << 16;
+/// Samples searched at once.
+pub(super) const PIECE_SAMPLES: usize = 1 << 20;
 /// About the offsets that a thread handles at once.
 const TASK_OFFSETS: usize = 1 << 16;
 /// Farthest the lowest exact offset may lie from that of the screen, with one more for its neighbours.
@@ -27,6 +25,23 @@ const MARGIN_SAMPLES: usize = 8;
 pub(super) const HEAD_SAMPLES: usize = 1 << 21;
 /// About the most values that medians are taken from.
 const MAX_MEDIAN_VALUES: u64 = 65_536;
+
+/// Samples in order, in memory or in a file.
+pub(crate) trait Samples: Send {
+    /// Why they cannot be had.
+    type Error: Send;
+
+    /// Appends the next voltages and currents, of which the first is sample `from` of all: how many; 0 at the end.
+    fn append(
+        &mut self,
+        from: u64,
+        voltage_v: &mut Vec<f32>,
+        current_a: &mut Vec<f32>,
+    ) -> Result<usize, Self::Error>;
+
+    /// The error where some that were appended, the first of them sample `from`, are not finite.
+    fn check_finite(&self, from: u64, voltage_v: &[f32], current_a: &[f32]) -> Result<(), Self::Error>;
+}
 
 /// A minimum of the profile.
 #[derive(Clone, Copy, Debug)]
@@ -42,28 +57,29 @@ pub(super) struct Candidate {
 
 /// The result of a pass.
 #[derive(Default)]
-pub(super) struct Gathered {
+pub(crate) struct Gathered {
     /// All but those beside marks.
-    pub candidates: Vec<Candidate>,
+    pub(super) candidates: Vec<Candidate>,
     /// Offset of the last one, those included.
     last: Option<u64>,
     /// Distances at evenly spaced offsets, W^2, and steps between neighbours, W.
-    pub distances_w2: Vec<f64>,
-    pub steps_w: Vec<f64>,
-    pub head: Piece,
+    pub(super) distances_w2: Vec<f64>,
+    pub(super) steps_w: Vec<f64>,
+    pub(super) head: Piece,
     /// Sums at the requested positions.
-    pub sums_w: Vec<Option<PairSum>>,
+    pub(super) sums_w: Vec<Option<PairSum>>,
     pub total_w: PairSum,
     pub samples: u64,
 }
 
 /// The parameters of a pass.
-pub(super) struct Plan {
-    pub clock: Clock,
-    pub placement: Placement,
-    /// The marks' windows, W.
-    pub templates: Vec<Vec<f64>>,
-    pub spacing: usize,
+pub(crate) struct Plan {
+    pub(super) clock: Clock,
+    pub(super) placement: Placement,
+    /// The marks' windows.
+    pub(super) templates: Vec<Template>,
+    pub(super) spacing: usize,
+    pub(super) method: FinderMethod,
     mean_w: f32,
     screen: Screen,
     stride: u64,
@@ -72,24 +88,35 @@ pub(super) struct Plan {
 }
 
 impl Plan {
-    pub fn new(path: &Path, options: &ReadOptions, marks: &Marks, clock: Clock) -> Result<Self, StreamError> {
-        let samples = clock.samples.unwrap_or(u64::MAX >> 12);
-        let placement = marks.place_on(clock.start_s, clock.rate_hz, samples)?;
-        let templates = templates(path, options, &placement, marks, clock)?;
-        let mean_w = (templates[0].iter().sum::<f64>() / templates[0].len() as f64) as f32;
-        let centred = |t: &Vec<f64>| t.iter().map(|watts| watts - f64::from(mean_w)).collect();
-        let screen = Screen::new(&templates.iter().map(centred).collect::<Vec<_>>());
+    /// To find what resembles `windows`, the powers (W) of the marks, by [`FinderMethod::Normalized`] or else by squares.
+    pub fn new(
+        clock: Clock,
+        placement: Placement,
+        windows: Vec<Vec<f64>>,
+        marks: &Marks,
+        method: FinderMethod,
+    ) -> Self {
+        let normalized = method == FinderMethod::Normalized;
+        let mean_w = mean(&windows[0]) as f32;
+        let templates: Vec<Template> =
+            windows.into_iter().map(|watts| Template::new(watts, normalized)).collect();
+        let screen = Screen::new(&templates, f64::from(mean_w));
         let mut positions: Vec<f64> = marks.starts_s.iter().map(|&mark_s| clock.position(mark_s)).collect();
         positions.push(clock.position(marks.end_s));
-        let spacing = (placement.samples / 2).max(1);
+        let spacing = spacing(placement.samples);
         let stride = clock.samples.map_or(1024, |samples| samples.div_ceil(MAX_MEDIAN_VALUES).max(1));
-        Ok(Self { clock, placement, templates, spacing, mean_w, screen, stride, positions })
+        let method = if normalized { method } else { FinderMethod::SumOfSquares };
+        Self { clock, placement, templates, spacing, method, mean_w, screen, stride, positions }
     }
 
-    pub fn gather(&self, rows: &mut Rows) -> Result<Gathered, ReadError> {
+    /// Goes over all samples once.
+    ///
+    /// # Errors
+    /// That of the samples.
+    pub fn gather<S: Samples>(&self, samples: &mut S) -> Result<Gathered, S::Error> {
         let mut gathered = Gathered { sums_w: vec![None; self.positions.len()], ..Gathered::default() };
-        let (mut piece, mut batch, mut coming) = (Piece::default(), RowBatch::default(), Piece::default());
-        let mut read = self.read(rows, &mut batch, &mut piece)?;
+        let (mut piece, mut coming) = (Piece::default(), Piece::default());
+        let mut read = read_piece(samples, &mut piece)?;
         let (mut from, mut fresh, workspaces) = (0, 0, Workspaces::new());
         loop {
             self.look_up(&piece, &mut gathered);
@@ -102,9 +129,9 @@ impl Plan {
             }
             coming.begin_with(&piece, to.saturating_sub((self.spacing + MARGIN_SAMPLES) as u64));
             let old = coming.len();
-            // The next rows are decoded while these are searched.
+            // The next samples are read while these are searched.
             let (next, ()) = rayon::join(
-                || self.read(rows, &mut batch, &mut coming),
+                || read_piece(samples, &mut coming),
                 || {
                     gathered.keep_head(&piece, fresh);
                     self.search(&piece, from..to, &workspaces, &mut gathered);
@@ -113,23 +140,6 @@ impl Plan {
             (read, from, fresh) = (next?, to, old);
             std::mem::swap(&mut piece, &mut coming);
         }
-    }
-
-    /// Appends the next rows of the file to a piece; how many there were.
-    fn read(&self, rows: &mut Rows, batch: &mut RowBatch, piece: &mut Piece) -> Result<usize, ReadError> {
-        let mut read = 0;
-        while read < PIECE_ROWS {
-            let end = piece.end();
-            let now = rows.append(BATCH_ROWS, batch, &mut piece.voltage_v, &mut piece.current_a)?;
-            if now == 0 {
-                break;
-            }
-            self.clock.check(rows.path(), &batch.stamps, end)?;
-            piece.add_up();
-            read += now;
-        }
-        check_finite(rows, piece)?;
-        Ok(read)
     }
 
     /// Sums at the marks and at the end.
@@ -213,7 +223,7 @@ impl Plan {
     /// Exact distance and number of the template nearest to some powers.
     fn nearest(&self, power_w: &[f64]) -> (f64, usize) {
         let each =
-            self.templates.iter().zip(0..).map(|(template, mark)| (difference(power_w, template), mark));
+            self.templates.iter().zip(0..).map(|(template, mark)| (template.distance_w2(power_w), mark));
         each.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((f64::INFINITY, 0))
     }
 
@@ -225,7 +235,7 @@ impl Plan {
         let place = |offset: u64| (offset - piece.base) as usize;
         self.powers(piece, place(low)..place(high) + self.placement.samples, power_w);
         let (mut distance_w2, mark) = self.nearest(&power_w[(offset - low) as usize..]);
-        let at = |offset: u64| difference(&power_w[(offset - low) as usize..], &self.templates[mark]);
+        let at = |offset: u64| self.templates[mark].distance_w2(&power_w[(offset - low) as usize..]);
         let mut best = offset;
         let (mut before, mut after) = (f64::INFINITY, f64::INFINITY);
         let inside = |offset: u64| low < offset && offset < high;
@@ -271,12 +281,22 @@ impl Gathered {
     }
 }
 
-fn check_finite(rows: &Rows, piece: &Piece) -> Result<(), ReadError> {
-    // A sum is not finite if any part is not; the place is looked for only then.
-    if piece.sum_to(piece.end() as f64).value().is_finite() {
-        return Ok(());
+/// Appends the next samples to a piece; how many there were.
+fn read_piece<S: Samples>(samples: &mut S, piece: &mut Piece) -> Result<usize, S::Error> {
+    let mut read = 0;
+    while read < PIECE_SAMPLES {
+        let now = samples.append(piece.end(), &mut piece.voltage_v, &mut piece.current_a)?;
+        if now == 0 {
+            break;
+        }
+        piece.add_up();
+        read += now;
     }
-    rows.check_finite(&piece.voltage_v, &piece.current_a, piece.base)
+    // A sum is not finite if any part is not; the place is looked for only then.
+    if !piece.sum_to(piece.end() as f64).value().is_finite() {
+        samples.check_finite(piece.base, &piece.voltage_v, &piece.current_a)?;
+    }
+    Ok(read)
 }
 
 /// The buffers of a thread: the signal and the profile of one task.

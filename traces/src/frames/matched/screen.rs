@@ -1,6 +1,7 @@
 //! The distance of the nearest template to every window, in f32: exact enough to show where minima are; and
 //! these minima, piece by piece.
 
+use super::template::{MIN_NORM_SHARE, Template};
 use crate::overlap;
 use crate::overlap::OverlapSave;
 use multiversion::multiversion;
@@ -14,6 +15,7 @@ pub(super) struct Screen {
     overlap: OverlapSave<f32>,
     /// Sum of squares of each template.
     own: Vec<f64>,
+    normalized: bool,
     width: usize,
 }
 
@@ -22,29 +24,47 @@ pub(super) struct Screen {
 pub(super) struct Buffers {
     overlap: overlap::Buffers<f32>,
     squares: Vec<f64>,
+    norms: Vec<f64>,
 }
 
 impl Screen {
-    /// Prepares templates of equal width, W less the mean that signals will have taken off, too.
-    pub fn new(centred: &[Vec<f64>]) -> Self {
-        let width = centred.first().map_or(1, Vec::len);
+    /// Prepares templates of equal width for signals that have had `mean_w` taken off.
+    pub fn new(templates: &[Template], mean_w: f64) -> Self {
+        let width = templates.first().map_or(1, |template| template.watts.len());
+        let normalized = templates.first().is_some_and(|template| template.normalized);
         let block = (16 * width).next_power_of_two().max(MIN_BLOCK_SAMPLES);
+        let centred: Vec<Vec<f64>> = templates
+            .iter()
+            .map(|template| {
+                let mean_w = if normalized { template.mean_w } else { mean_w };
+                template.watts.iter().map(|watts| watts - mean_w).collect()
+            })
+            .collect();
         let own = centred.iter().map(|template| template.iter().map(|x| x * x).sum()).collect();
         // The factor is that of the cross term.
-        Self { overlap: OverlapSave::new(centred, -2.0, block), own, width }
+        Self { overlap: OverlapSave::new(&centred, -2.0, block), own, normalized, width }
     }
 
-    /// The summed squared difference of the nearest template at each offset. `signal` is `width - 1` longer.
+    /// The distance of the nearest template at each offset. `signal` is `width - 1` longer.
     pub fn profile(&self, signal: &[f32], into: &mut [f32], buffers: &mut Buffers) {
-        let Buffers { overlap, squares } = buffers;
+        let Buffers { overlap, squares, norms } = buffers;
         let step = self.overlap.step();
         for (index, out) in into.chunks_mut(2 * step).enumerate() {
             let from = index * 2 * step;
-            running_squares(&signal[from..from + out.len() + self.width - 1], squares);
+            let segment = &signal[from..from + out.len() + self.width - 1];
+            running_squares(segment, squares);
+            if self.normalized {
+                window_norms(segment, squares, self.width, norms);
+            }
             out.fill(f32::INFINITY);
             let (first, second) = out.split_at_mut(step.min(out.len()));
             self.overlap.pair(signal, from, overlap, |template, crosses| {
                 let own = self.own[template];
+                if self.normalized {
+                    lower_normalized(first, crosses, |cross| cross.re, norms, own);
+                    lower_normalized(second, crosses, |cross| cross.im, &norms[first.len()..], own);
+                    return;
+                }
                 lower(first, crosses, |cross| cross.re, squares, self.width, own);
                 lower(second, crosses, |cross| cross.im, &squares[first.len()..], self.width, own);
             });
@@ -68,6 +88,34 @@ fn lower(
     for (((value, cross), before), after) in values.iter_mut().zip(crosses).zip(squares).zip(after) {
         let distance = ((after - before) + own) as f32 + part(cross);
         *value = if distance < *value { distance } else { *value };
+    }
+}
+
+/// As [`lower`], to normalized distances, from the norm of each window about its mean.
+fn lower_normalized(
+    values: &mut [f32],
+    crosses: &[Complex<f32>],
+    part: impl Fn(&Complex<f32>) -> f32,
+    norms: &[f64],
+    own: f64,
+) {
+    let norm = libm::sqrt(own);
+    for ((value, cross), window) in values.iter_mut().zip(crosses).zip(norms) {
+        let scale = norm / window.max(MIN_NORM_SHARE * norm).max(f64::MIN_POSITIVE);
+        let distance = (2.0 * own + f64::from(part(cross)) * scale).max(0.0) as f32;
+        *value = if distance < *value { distance } else { *value };
+    }
+}
+
+/// The norm of every window about its mean, from the sums of squares before each sample.
+fn window_norms(signal: &[f32], squares: &[f64], width: usize, norms: &mut Vec<f64>) {
+    norms.clear();
+    let mut sum: f64 = signal[..width].iter().map(|x| f64::from(*x)).sum();
+    for from in 0..=signal.len() - width {
+        let about = squares[from + width] - squares[from] - sum * sum / width as f64;
+        norms.push(libm::sqrt(about.max(0.0)));
+        let next = signal.get(from + width).map_or(0.0, |x| f64::from(*x));
+        sum += next - f64::from(signal[from]);
     }
 }
 
@@ -165,12 +213,19 @@ mod tests {
                 .map(|from| (0..250).map(|j| f64::from(signal[(from + j) % samples])).collect())
                 .into();
             let mut profile = vec![0.0; samples - 249];
-            Screen::new(&templates).profile(&signal, &mut profile, &mut Buffers::default());
-            for (offset, &value) in profile.iter().enumerate() {
-                let square = |(t, x): (&f64, &f32)| (f64::from(*x) - t) * (f64::from(*x) - t);
-                let exact = |template: &Vec<f64>| template.iter().zip(&signal[offset..]).map(square).sum();
-                let exact = templates.iter().map(exact).fold(f64::INFINITY, f64::min);
-                assert!((f64::from(value) - exact).abs() < 2e-2 + 1e-5 * exact, "{offset}: {value} {exact}");
+            let watts: Vec<f64> = signal.iter().map(|x| f64::from(*x)).collect();
+            for normalized in [false, true] {
+                let templates: Vec<Template> =
+                    templates.iter().map(|watts| Template::new(watts.clone(), normalized)).collect();
+                Screen::new(&templates, 0.0).profile(&signal, &mut profile, &mut Buffers::default());
+                for (offset, &value) in profile.iter().enumerate() {
+                    let exact = |template: &Template| template.distance_w2(&watts[offset..]);
+                    let exact = templates.iter().map(exact).fold(f64::INFINITY, f64::min);
+                    assert!(
+                        (f64::from(value) - exact).abs() < 2e-2 + 1e-5 * exact,
+                        "{offset}: {value} {exact}"
+                    );
+                }
             }
         }
     }
