@@ -59,8 +59,8 @@ pub use passes::PassTime;
 pub use recorder::Recorder;
 pub use service::{CYCLE, Work};
 pub use spec::{
-    BinsSpec, Chips, ClientSpec, Clock, Common, Cycles, DramSpec, Entries, MachineSpec, Rates, RefreshSpec, RowBytes,
-    ShaderSpec, SharedCacheSpec, UnitSpec, WaitCycles, Width,
+    BinsSpec, Chips, ClientSpec, Clock, Common, Cycles, DramSpec, Entries, MachineSpec, Rates, RefreshSpec,
+    RowBytes, ShaderSpec, SharedCacheSpec, UnitSpec, WaitCycles, Width,
 };
 pub use stalls::{Reason, Stalls, UnitTime};
 
