@@ -392,11 +392,8 @@ mod tests {
             "row after row on reference",
         ]
         .map(|case| (case.to_owned(), Code::MemoryRows));
-        let orders = ["groups that stream on reference", "one giant triangle on reference"]
-            .map(|case| (case.to_owned(), Code::MemoryOrder));
-        let thrashing = ("thrashing caches on discrete".to_owned(), Code::MemoryOrder);
         let row = ("row after row on discrete".to_owned(), Code::MemoryRows);
-        assert_eq!(codes(Level::Packet), orders.into_iter().chain([row, thrashing]).collect::<Vec<_>>());
+        assert_eq!(codes(Level::Packet), [row]);
         assert_eq!(codes(Level::Stepped), []);
         let tiny = ("tiny triangles on discrete".to_owned(), Code::ShortPackets);
         let (overlaps, bound): (Vec<_>, Vec<_>) =
