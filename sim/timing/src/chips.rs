@@ -121,10 +121,20 @@ impl TurnPolicy {
     /// A queue of writes drains once it is full. In a queue of both, `p` places, lines of one way go until all places wait for the
     /// other: with a share `f` of writes `p / (1 - f)` writes and `p / f` reads in turn.
     pub fn pairs(&self, lines: [u64; 2]) -> f64 {
-        let [reads, writes] = lines.map(|count| count as f64);
-        if self.drains {
-            return if reads > 0.0 { writes / self.places } else { 0.0 };
+        self.pairs_per_line(lines) * (lines[0] + lines[1]) as f64
+    }
+
+    /// The same for each of the lines.
+    pub fn pairs_per_line(&self, [reads, writes]: [u64; 2]) -> f64 {
+        if reads == 0 || writes == 0 {
+            return 0.0;
         }
-        reads * writes / ((reads + writes).max(1.0) * self.places)
+        let [reads, writes] = [reads, writes].map(|count| count as f64);
+        let lines = reads + writes;
+        if self.drains {
+            writes / (lines * self.places)
+        } else {
+            reads * writes / (lines * lines * self.places)
+        }
     }
 }

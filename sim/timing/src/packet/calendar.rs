@@ -203,7 +203,10 @@ impl Calendar {
         if slot >= known {
             self.used.resize(slot + 1, 0);
             self.next_free.extend(known as u32..=slot as u32);
-            self.pauses = self.pauses.map(|next| self.pause(known, next));
+            let end = self.start_of(slot + 1);
+            if let Some(next) = self.pauses.filter(|next| next.first < end) {
+                self.pauses = Some(self.pause(known, next));
+            }
         }
     }
 

@@ -93,8 +93,7 @@ impl BusTurns {
         }
         self.mix[kind] += count;
         let lines = self.mix[0] + self.mix[1];
-        let pairs_per_line = policy.pairs(self.mix) / lines.max(1) as f64;
-        self.pending += pair as f64 * pairs_per_line * count as f64;
+        self.pending += (pair * count) as f64 * policy.pairs_per_line(self.mix);
         if lines > policy.memory {
             self.mix = self.mix.map(|kind| kind / 2);
         }
@@ -205,6 +204,7 @@ pub(super) struct Dram {
     turns: TurnPolicy,
     /// Time between activations of a rank.
     spacing: Time,
+    has_ranks: bool,
     queue: u64,
     /// Time of a full queue of lines of one bank, each of another row, and of all lines that can wait in front of a channel.
     longest_wait: Time,
@@ -252,6 +252,7 @@ impl Dram {
             channels: vec![channel; spec.channels.get() as usize],
             turns: TurnPolicy::new(spec, &times),
             spacing: times.spacing(),
+            has_ranks: spec.ranks.get() > 1,
             times,
             queue,
             longest_wait: longest_line * queue,
@@ -344,7 +345,8 @@ impl Dram {
             }
         };
         let ready = opened.max(seen.from);
-        let ready = rank.refresh.map_or(ready, |pauses| pauses.after(ready));
+        // The calendar of a bus with one rank has its pauses.
+        let ready = rank.refresh.filter(|_| self.has_ranks).map_or(ready, |pauses| pauses.after(ready));
         let pair = if turns_rows { self.turns.pair_in_bank } else { self.turns.pair };
         let turned = channel.turns.add(kind, count.into(), pair, &self.turns);
         if turned > 0 {
