@@ -2,7 +2,8 @@
 //! fits a logistic map (Platt 1999) of confidence, of how far methods agree and of how even gaps are, on all kinds of devices but one,
 //! and judges it on that one.
 //!
-//! `calibrate_confidence FIRST_SEED LAST_SEED [STEP]`, where STEP is left out: one of `traces::frames::Step`.
+//! `calibrate_confidence FIRST_SEED LAST_SEED [METHOD|STEP]`: METHOD in place of `auto`, or `auto` without STEP, one of
+//! `traces::frames::Step`.
 
 use std::error::Error;
 use std::process::ExitCode;
@@ -42,15 +43,17 @@ fn main() -> ExitCode {
 
 fn run() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let [first, last, step @ ..] = arguments.as_slice() else {
-        return Err("usage: calibrate_confidence FIRST_SEED LAST_SEED [STEP]".into());
+    let [first, last, which @ ..] = arguments.as_slice() else {
+        return Err("usage: calibrate_confidence FIRST_SEED LAST_SEED [METHOD|STEP]".into());
     };
-    let named = |name: &String| Step::ALL.into_iter().find(|step| step.0 == name).map(|step| step.1);
-    let without = match step.first() {
-        Some(name) => Some(named(name).ok_or_else(|| format!("no step {name}: {:?}", Step::ALL))?),
-        None => None,
-    };
-    let options = Options { method: FinderMethod::Auto, without };
+    let step = |name: &str| Step::ALL.into_iter().find(|step| step.0 == name).map(|step| step.1);
+    let mut options = Options::default();
+    if let Some(name) = which.first() {
+        options.without = step(name);
+        if options.without.is_none() {
+            options.method = name.parse()?;
+        }
+    }
     let (first, last): (u64, u64) = (first.parse()?, last.parse()?);
     let mut cases = Vec::new();
     for witness in &WITNESSES {

@@ -314,8 +314,7 @@ fn find_tracked(trace: &Trace, marks: &Marks, without: Option<Step>) -> Result<F
         false => positions,
     };
     let noise_w = libm::sqrt(noise_variance(&power));
-    let (positions, kept) =
-        in_phase(&power, noise_w, positions, &tracked, &fixed, anchor, placement.samples, without);
+    let (positions, kept) = in_phase(&power, noise_w, positions, &tracked, &fixed, &placement, without);
     let start = |(((start, position), kept), marked): (((&Start, f64), f64), &Option<&Placed>)| FrameStart {
         time_s: marked.map_or(trace.start_s() + (position + anchor) * trace.period_s(), |mark| mark.mark_s),
         distance_w2: start.distance_w2,
@@ -360,10 +359,11 @@ fn in_phase(
     positions: Vec<f64>,
     starts: &[Start],
     fixed: &[bool],
-    anchor: f64,
-    width: usize,
+    placement: &Placement,
     without: Option<Step>,
 ) -> (Vec<f64>, Vec<f64>) {
+    let anchor = placement.marks.first().map_or(0.0, |mark| mark.anchor);
+    let width = placement.samples;
     let places =
         |positions: &[f64]| -> Vec<f64> { positions.iter().map(|position| position + anchor).collect() };
     let first_mark = fixed.iter().position(|fixed| *fixed);

@@ -212,7 +212,7 @@ pub enum FinderMethod {
     Tracking,
     /// Tracking. With fewer than 20 samples in the window, the most even of tracking, the sum of squares and
     /// normalized; with fewer than 8 the sum of squares. Also the sum of squares for fewer than 16 frames, for more than 16
-    /// million samples without a warning, or where it is sure of some starts and tracking of none but the marks.
+    /// million samples without a warning, or where searches from the frames found agree more by it than by tracking.
     #[default]
     Auto,
 }

@@ -96,7 +96,7 @@ pub struct FindArgs {
     /// and scale), `tracking` (the most likely sequence of starts), or `auto` (chosen by the length and the clarity of the trace)
     #[arg(long, value_name = "METHOD", default_value_t)]
     pub method: FinderMethod,
-    /// Read in pieces even if the trace would fit into memory (sum of squares)
+    /// Read in pieces even if the trace would fit into memory (`squares`, or `normalized` if that is the method)
     #[arg(long)]
     pub stream: bool,
     /// Pixels in a frame, for energy per pixel
