@@ -39,11 +39,9 @@ pub struct Options {
     pub without: Option<Step>,
 }
 
-/// A step of [`FinderMethod::Tracking`] and [`FinderMethod::Auto`] that can be left out.
+/// A step of tracking that can be left out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
-    /// Found starts tried as marks.
-    Consensus,
     /// Frames of both sides of a clock step aligned.
     ClockSteps,
     /// Starts that split frames taken out.
@@ -60,8 +58,7 @@ pub enum Step {
 
 impl Step {
     /// All of them, with their names.
-    pub const ALL: [(&'static str, Self); 7] = [
-        ("consensus", Self::Consensus),
+    pub const ALL: [(&'static str, Self); 6] = [
         ("clock-steps", Self::ClockSteps),
         ("split-frames", Self::SplitFrames),
         ("start-refinement", Self::StartRefinement),
@@ -79,7 +76,7 @@ pub fn find_with(trace: &Trace, marks: &Marks, options: &Options) -> Result<Foun
     match options.method {
         FinderMethod::SumOfSquares | FinderMethod::Normalized => find_matched(trace, marks, options.method),
         FinderMethod::Tracking => find_tracked(trace, marks, options.without),
-        FinderMethod::Auto => find_auto(trace, marks, options.without),
+        FinderMethod::Auto | FinderMethod::Consensus => find_auto(trace, marks, options),
     }
 }
 
@@ -119,8 +116,9 @@ const MAX_TRACKED_SAMPLES: usize = 1 << 24;
 /// squares.
 const MIN_COVERAGE_GAIN: f64 = 0.02;
 
-/// [`FinderMethod::Auto`].
-pub(super) fn find_auto(trace: &Trace, marks: &Marks, without: Option<Step>) -> Result<Found, MarkError> {
+/// [`FinderMethod::Auto`] and [`FinderMethod::Consensus`].
+pub(super) fn find_auto(trace: &Trace, marks: &Marks, options: &Options) -> Result<Found, MarkError> {
+    let without = options.without;
     let squares = find_matched(trace, marks, FinderMethod::SumOfSquares)?;
     let samples = marks.place(trace)?.samples;
     if samples < MIN_WINDOW_SAMPLES {
@@ -145,7 +143,7 @@ pub(super) fn find_auto(trace: &Trace, marks: &Marks, without: Option<Step>) -> 
         return Ok(squares);
     }
     let tracked = find_tracked(trace, marks, without)?;
-    if without == Some(Step::Consensus) {
+    if options.method == FinderMethod::Auto {
         return Ok(tracked);
     }
     let search =
@@ -423,7 +421,7 @@ mod tests {
             window: Window { pre_s: 1e-3, post_s: 4e-3 },
             end_s: trace.end_s(),
         };
-        find_auto(&trace, &marks, None).unwrap()
+        find_auto(&trace, &marks, &Options::default()).unwrap()
     }
 
     fn noise(sample: usize) -> f32 {

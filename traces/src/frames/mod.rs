@@ -211,15 +211,19 @@ pub enum FinderMethod {
     /// to each other, and at an even period.
     Tracking,
     /// Tracking. With fewer than 20 samples in the window, the most even of tracking, the sum of squares and
-    /// normalized; with fewer than 8 the sum of squares. Also the sum of squares for fewer than 16 frames, for more than 16
-    /// million samples without a warning, or where searches from the frames found agree more by it than by tracking.
+    /// normalized; with fewer than 8 the sum of squares. Also the sum of squares for fewer than 16 frames, or for more than
+    /// 16 million samples without a warning.
     #[default]
     Auto,
+    /// The same, but the sum of squares also where searches from the frames found agree more by it than by tracking. How far
+    /// these searches agree is the confidence.
+    Consensus,
 }
 
 impl FinderMethod {
     /// All of them, in order.
-    pub const ALL: [Self; 4] = [Self::SumOfSquares, Self::Normalized, Self::Tracking, Self::Auto];
+    pub const ALL: [Self; 5] =
+        [Self::SumOfSquares, Self::Normalized, Self::Tracking, Self::Auto, Self::Consensus];
 
     /// The name on the command line.
     pub fn name(self) -> &'static str {
@@ -228,6 +232,7 @@ impl FinderMethod {
             Self::Normalized => "normalized",
             Self::Tracking => "tracking",
             Self::Auto => "auto",
+            Self::Consensus => "consensus",
         }
     }
 }
