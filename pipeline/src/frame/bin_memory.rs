@@ -9,8 +9,8 @@ use std::collections::VecDeque;
 use activity::{Event, PacketCounts};
 
 use super::pass::Pass;
-use super::vertices::Ready;
 use crate::memory::{AddressSpace, LINE_BYTES, MemorySystem};
+use crate::setup::{PixelRect, Triangle};
 
 /// Bytes of a vertex position on the image plane at one end of the shutter.
 const POSITION_BYTES: u32 = 12;
@@ -73,16 +73,16 @@ impl BinMemory {
     pub fn write(
         &mut self,
         pass: &Pass<'_>,
-        ready: &Ready,
+        (triangle, pixels): (&Triangle, &PixelRect),
         memory: &mut MemorySystem,
         counts: &mut PacketCounts,
     ) {
         let Some(batch) = self.batches.back_mut() else { return };
         let first = batch.records[batch.records.len() - 1];
-        let end = first + record_bytes(pass, ready);
+        let end = first + record_bytes(pass, triangle);
         batch.records.push(end);
         lines_of(first, end).for_each(|line| memory.write_bin(line, counts));
-        let bins = ready.pixels.tiles(pass.settings.spec.coarse_tile_px);
+        let bins = pixels.tiles(pass.settings.spec.coarse_tile_px);
         for bin in (bins.y0..bins.y1).flat_map(|row| (bins.x0..bins.x1).map(move |column| (row, column))) {
             counts[Event::BinEntries] += 1;
             memory.write_bin(batch.enter((bin.0 * self.across + bin.1) as usize), counts);
@@ -131,12 +131,12 @@ impl BatchBins {
 
 /// Bytes of the set-up record of a triangle: three vertices as they are on the image plane, with the attributes that are shaded, and
 /// its number.
-fn record_bytes(pass: &Pass<'_>, ready: &Ready) -> u64 {
-    let geometry = &pass.draws[pass.locate(ready.triangle.id).0].geometry;
+fn record_bytes(pass: &Pass<'_>, triangle: &Triangle) -> u64 {
+    let geometry = &pass.draws[pass.locate(triangle.id).0].geometry;
     let ends = |still: bool| if still { 1 } else { 2 };
     let attributes = geometry.vertex_bytes() - ends(geometry.is_still()) * POSITION_BYTES;
     let shaded = if pass.is_depth_only() { 0 } else { attributes };
-    3 * u64::from(ends(!ready.triangle.moving) * POSITION_BYTES + shaded) + NUMBER_BYTES
+    3 * u64::from(ends(!triangle.moving) * POSITION_BYTES + shaded) + NUMBER_BYTES
 }
 
 /// Addresses of the lines that hold the bytes from `first` to `end`.

@@ -6,7 +6,6 @@ use std::sync::Arc;
 use glam::Vec4;
 
 use super::attachments::{Attachment, Attachments, Binding, Load, Store, Surfaces};
-use super::replay::INDEX_BYTES;
 use super::{Features, PassError, Settings, Shading};
 use crate::buffer::{BufferBinding, Buffers};
 use crate::depth::{BoxGrid, DepthBoxes, DepthTile};
@@ -23,6 +22,8 @@ use crate::traversal::thresholds::{at_rest, blur_px, motion_px};
 
 /// Bytes of a stored depth or colour of one sample, and of a pixel of an image.
 pub(super) const SAMPLE_BYTES: u64 = 4;
+/// Bytes of the three indices of a triangle.
+pub(super) const INDEX_BYTES: u64 = 12;
 
 /// A triangle as it is drawn.
 pub(super) struct Staged {

@@ -5,13 +5,13 @@ use activity::{Event, LineAccess, Packet, PacketCounts, PacketKind};
 use super::Shading;
 use super::bin::{Bin, BinLog, Work};
 use super::bin_memory::BinMemory;
-use super::pass::{Pass, Plane, Query, SAMPLE_BYTES, VertexBuffer};
+use super::pass::{INDEX_BYTES, Pass, Plane, Query, SAMPLE_BYTES, VertexBuffer};
 use super::resolve::{SampleLine, TileResolve, tile_lines};
 use super::shaded::{QuadWork, ShadedTriangle};
-use super::vertices::Ready;
 use crate::memory::{Access, Cache, CacheError, LINE_BYTES, MemorySystem};
 use crate::random::mix;
 use crate::sampling::Sample;
+use crate::setup::{PixelRect, Triangle};
 use crate::shading::QuadAccess;
 
 /// State of a pass, and the caches of the frame.
@@ -32,9 +32,6 @@ pub(super) struct Replay<'a> {
     /// Samples of queries that passed so far, by draw.
     pub passed: Vec<u64>,
 }
-
-/// Bytes of the three indices of a triangle.
-pub(super) const INDEX_BYTES: u64 = 12;
 
 /// Recently shaded vertices, first in first out.
 struct Reuse {
@@ -90,9 +87,10 @@ impl<'a> Replay<'a> {
         self.bins.iter_mut().for_each(|bins| bins.end(self.memory));
     }
 
-    /// Write a triangle to its bins.
-    pub fn set_up(&mut self, ready: &Ready, counts: &mut PacketCounts) {
-        self.bins.iter_mut().for_each(|bins| bins.write(self.pass, ready, self.memory, counts));
+    /// Write a triangle to its bins, which are those of `pixels`.
+    pub fn set_up(&mut self, triangle: &Triangle, pixels: &PixelRect, counts: &mut PacketCounts) {
+        let (pass, memory) = (self.pass, &mut *self.memory);
+        self.bins.iter_mut().for_each(|bins| bins.write(pass, (triangle, pixels), memory, counts));
     }
 
     /// Fetch the indices of a triangle, and fetch and shade its vertices that were not shaded recently.

@@ -127,7 +127,9 @@ fn emit_packet(
         packet.counts[Event::Indices] += 3;
         packet.counts[Event::SetupMadds] += madds + thresholds + ready.as_ref().map_or(0, Ready::line_madds);
         replay.vertices(draw, id, &mut packet.counts);
-        ready.iter().for_each(|ready| replay.set_up(ready, &mut packet.counts));
+        if let Some(Ready { triangle, pixels, .. }) = ready {
+            replay.set_up(triangle, pixels, &mut packet.counts);
+        }
     }
     replay.emit(&packet, emit);
 }

@@ -360,7 +360,7 @@ mod tests {
         let text =
             message(&REFERENCE.replace("queue: 8, lines_per_cycle", "queue: 4294967295, lines_per_cycle"));
         assert!(
-            text.starts_with("gpu.ron:61:")
+            text.starts_with("gpu.ron:65:")
                 && text.contains("`queue`: 4294967295 is out of range; it has to be 1 to 65536"),
             "{text}"
         );
