@@ -60,10 +60,6 @@ const NOT_PROVOKED: [(&str, &str); 33] = [
         "it takes a larger GPU than those that come with the program; a unit test in `timing` has a stream of such packets",
     ),
     (
-        "memory-queue",
-        "it takes a GPU with queues shorter than those of all GPUs that come with the program; a test in `timing` has one",
-    ),
-    (
         "batch-overlap",
         "it takes a frame of many short batches or passes; a unit test in `run` has streams of them",
     ),
@@ -110,6 +106,7 @@ const PROVOKED: [&str; 59] = [
     "leaves-fitted-view",
     "lens-leaves-view",
     "light-ignored",
+    "memory-queue",
     "memory-rows",
     "metallic-ignored",
     "mip-chain-odd",
@@ -336,7 +333,7 @@ fn a_marked_frame_without_similar_frames() {
 
 #[test]
 fn starts_of_frames_no_longer_than_a_sample() {
-    let results = quintile().run("tiny", &["--pacing", "free", "--frames", "0..20", "--trace-rate", "5000"]);
+    let results = quintile().run("tiny", &["--pacing", "free", "--frames", "0..20", "--trace-rate", "4500"]);
     assert_warns(&results, "irregular-spacing");
 }
 
@@ -558,26 +555,30 @@ fn regimes_in_which_tile_tests_are_ineffective() {
 }
 
 /// The reference GPU with memory that opens a row for every line, slowly.
+/// A frame of `default` on `reference` with slow rows and other settings of its memory.
+fn with_slow_rows(level: &str, settings: &[&str]) -> Results {
+    let slow = ["gpu.units.dram.activate_cycles=100", "gpu.units.dram.precharge_cycles=100"];
+    let set = slow.iter().chain(settings).flat_map(|setting| ["--set", setting]);
+    let args = ["--size", "160x90", "--frames", "0..1", "--timing", level];
+    quintile().run("default", &args.into_iter().chain(set).collect::<Vec<_>>())
+}
+
 #[test]
 fn memory_rows_as_the_bottleneck() {
-    let inputs = Inputs::new();
-    let path = root().join("sim/run/gpus/reference.ron");
-    let text = fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
-    let slow = text
-        .replace("activate_cycles: 7, precharge_cycles: 7", "activate_cycles: 100, precharge_cycles: 100")
-        .replace("row_bytes: 4096, interleave_bytes: 256", "row_bytes: 64, interleave_bytes: 64")
-        .replace("l2: (entries: 4096, ways: 8)", "l2: (entries: 64, ways: 8)");
-    assert_ne!(text, slow, "the GPU has another memory now");
-    let gpu = inputs.put("slow.ron", slow);
-    let run = |gpu: &str, level: &str| {
-        let args = ["--size", "160x90", "--frames", "0..1", "--gpu", gpu, "--timing", level];
-        quintile().run("default", &args)
-    };
-    assert_warns(&run(&gpu, "packet"), "memory-rows");
-    assert_warns(&run(&gpu, "bound"), "memory-rows");
-    for (gpu, level) in [(gpu.as_str(), "stepped"), ("reference", "packet")] {
-        assert!(!run(gpu, level).warning_codes().contains(&"memory-rows".to_owned()), "{gpu} {level}");
-    }
+    let short_rows = ["gpu.units.dram.row_bytes=64", "gpu.units.dram.interleave_bytes=64"];
+    assert_warns(&with_slow_rows("bound", &short_rows), "memory-rows");
+    let warns = |run: &Results| run.warning_codes().contains(&"memory-rows".to_owned());
+    assert!(!warns(&with_slow_rows("stepped", &short_rows)));
+    assert!(!warns(
+        &quintile().run("default", &["--size", "160x90", "--frames", "0..1", "--timing", "bound"])
+    ));
+}
+
+#[test]
+fn queues_of_memory_shorter_than_the_opening_of_a_row() {
+    assert_warns(&with_slow_rows("packet", &[]), "memory-queue");
+    let long = with_slow_rows("packet", &["gpu.units.dram.queue=64"]);
+    assert!(!long.warning_codes().contains(&"memory-queue".to_owned()));
 }
 
 /// Light passes of caustics are as long for a small image; a scene has small previews.

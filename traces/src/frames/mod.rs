@@ -276,7 +276,7 @@ mod tests {
         }
         assert_eq!(
             "dtw".parse::<FinderMethod>(),
-            Err("no method dtw: choose one of squares, normalized, tracking, auto".to_owned())
+            Err("no method dtw: choose one of squares, normalized, tracking, auto, consensus".to_owned())
         );
     }
 }
