@@ -29,11 +29,11 @@ const MAX_RECENT_GROUPS: usize = 256;
 /// Most rows that are remembered per bank; the queue of a channel may hold lines of as many rows as it has places.
 const MAX_REMEMBERED_ROWS: usize = 256;
 
-/// An opened row.
+/// A row in use: from the line that opened it, or came to it after it had nothing to do, to the last line that came meanwhile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct OpenRow {
     row: u32,
-    /// Time of the request that opened it.
+    /// Time of the first request.
     since: Time,
     /// When it is open.
     opened: Time,
@@ -323,19 +323,21 @@ impl Dram {
             }
             None => {
                 bank.dispute(address.row, came, self.longest_way, activate + precharge);
-                let before = &mut bank.rows[bank.place(seen.from)];
-                let closing = if *before == OpenRow::NONE { 0 } else { precharge };
+                let at = bank.place(seen.from);
+                let before = bank.rows[at];
+                let closing = if before == OpenRow::NONE { 0 } else { precharge };
                 let opens = closing + activate;
                 // The next row can open once the last line is issued and the chips let the row close, at the latest when a full
                 // queue has left.
                 let held = closing + (activate + work - burst + keeps).max(self.times.row);
-                let closes = before.may_close.max(seen.from).min(seen.from + self.longest_wait);
+                let may_close = if before.since <= seen.from { before.may_close } else { 0 };
+                let closes = may_close.max(seen.from).min(seen.from + self.longest_wait);
                 let mut begin = bank.time.reserve_as(turn, closes, held).0;
                 if self.spacing > 0 {
                     let activates = rank.activations.reserve_as(turn, begin + closing, self.spacing).0;
                     begin = begin.max(activates.saturating_sub(closing));
                 }
-                before.closes = begin;
+                bank.rows[at].closes = begin;
                 // The bus idles from the end of the last transfer on if the queue has lines of this bank alone. Those that joined
                 // their row would fill the gap.
                 if is_alone && !turns_rows {
@@ -413,8 +415,8 @@ impl Bank {
     /// as those of a client ahead of others come late in the stream. So two lines may meet if the second comes no later after the
     /// first than all those take, `longest_way`.
     fn dispute(&mut self, row: u32, came: Time, longest_way: Time, opens: Time) {
-        let known = self.rows.iter().find(|open| open.row == row).map(|open| open.until);
-        if known.or_else(|| self.former.get(&row).copied()).is_some_and(|last| came < last + longest_way) {
+        let known = self.rows.iter().filter(|open| open.row == row).map(|open| open.until).max();
+        if known.max(self.former.get(&row).copied()).is_some_and(|last| came < last + longest_way) {
             self.disputed += opens;
         }
     }
@@ -455,26 +457,24 @@ impl Bank {
     /// Record lines of a row: those that joined the row at `joined`, or opened theirs.
     fn note(&mut self, used: RowUse, joined: Option<usize>) {
         let RowUse { row, seen, opened, issued, may_close, lines, work } = used;
-        if let Some(open) = joined.map(|at| &mut self.rows[at]) {
+        let at = self.place(seen);
+        let begins_anew = |open: &usize| *open == at && seen > self.rows[at].until;
+        if let Some(open) = joined.filter(|open| !begins_anew(open)).map(|at| &mut self.rows[at]) {
             open.until = open.until.max(issued);
             open.may_close = open.may_close.max(may_close);
             open.last = lines;
             open.joined += work;
             return;
         }
-        let at = self.place(seen);
         let closes = at.checked_sub(1).map_or(Time::MAX, |next| self.rows[next].opened);
-        let known = self.rows.iter().skip(at).position(|open| open.row == row).map(|after| at + after);
-        let until = known.map_or(issued, |known| self.rows[known].until.max(issued));
-        if known.is_none()
-            && let Some(oldest) = self.rows.last().filter(|oldest| **oldest != OpenRow::NONE)
-        {
-            self.former.insert(oldest.row, oldest.until);
+        if let Some(oldest) = self.rows.last().filter(|oldest| **oldest != OpenRow::NONE) {
+            let until = self.former.entry(oldest.row).or_default();
+            *until = oldest.until.max(*until);
         }
-        self.rows.copy_within(at..known.unwrap_or(self.rows.len() - 1), at + 1);
-        let may_close = may_close.max(until);
+        let last = self.rows.len() - 1;
+        self.rows.copy_within(at..last, at + 1);
         self.rows[at] =
-            OpenRow { row, since: seen, opened, until, may_close, closes, last: lines, joined: 0 };
+            OpenRow { row, since: seen, opened, until: issued, may_close, closes, last: lines, joined: 0 };
     }
 }
 
@@ -526,10 +526,36 @@ mod tests {
         let rows = |bank: &Bank| [0, 1, 2].map(|at: usize| (bank.rows[at].row, bank.rows[at].until));
         assert_eq!(rows(&bank)[..2], [(8, 20), (7, 30)]);
         // Four lines of other rows came in between.
-        bank.note(used(8, [40, 16, 60], 6), Some(0));
+        bank.note(used(8, [18, 16, 60], 6), Some(0));
         assert_eq!([6, 7].map(|lines| joins(&bank, 7, 9, lines)), [Some(4), None]);
         // A row that comes earlier in time, and later in the stream.
         bank.note(used(9, [3, 12, 13], 7), None);
         assert_eq!((rows(&bank), bank.rows[1].closes), ([(8, 60), (9, 13), (7, 30)], 16));
+    }
+
+    #[test]
+    fn a_row_that_is_used_again_later_keeps_no_line_waiting() {
+        let used = |seen, lines| RowUse {
+            row: 7,
+            seen,
+            opened: 4,
+            issued: seen + 6,
+            may_close: seen + 6,
+            lines,
+            work: 1,
+        };
+        let mut bank = Bank::new(Calendar::new(16, 1), 4);
+        bank.note(used(0, 1), None);
+        // While lines of it wait, and then again.
+        for (seen, lines) in [(5, 2), (11, 3), (500, 4)] {
+            let joined = bank.joins(7, seen, lines, 4);
+            assert_eq!(joined, Some(0));
+            bank.note(used(seen, lines), joined);
+        }
+        let at = |seen| bank.rows[bank.place(seen)];
+        assert_eq!(
+            [12, 400, 500].map(|seen| (at(seen).since, at(seen).may_close)),
+            [(0, 17), (0, 17), (500, 506)]
+        );
     }
 }

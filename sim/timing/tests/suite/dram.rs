@@ -2,7 +2,7 @@
 
 use activity::{Event, LineAccess, LineKind, Unit};
 use timing::stepped::StepOptions;
-use timing::{Clocks, MachineSpec, RefreshSpec, Timed};
+use timing::{BinsSpec, Clocks, MachineSpec, RefreshSpec, Timed};
 
 use crate::common::{Packets, bound_level, clocks, packet_level, plain, size, stepped, stepped_as, tile};
 
@@ -214,5 +214,25 @@ fn a_clock_that_hardly_differs_takes_the_same_time() {
             let [one, other] = [one, other].map(|timed| timed.timeline.duration_ps as f64);
             assert!((other / one - 1.0).abs() < 2e-3, "{one} and {other} ps");
         }
+    }
+}
+
+#[test]
+fn units_far_apart_in_the_pipeline_that_share_a_bank() {
+    // Triangles are read at the head of the pipeline, and colours at its end from a row of their bank: for packets in order, lines
+    // out of the order of time.
+    let mut machine = plain();
+    machine.bins = Some(BinsSpec { in_flight: size(2), lines_per_cycle: size(1) });
+    machine.sample_test.latency_cycles = size(1000);
+    let packet = |n: u32| {
+        let line = |unit, line| LineAccess::new(unit, line, LineKind::Fetch);
+        let lines = vec![line(Unit::Traversal, n / 8 * 16 + n % 8), line(Unit::Colour, (1 << 20) + n % 8)];
+        (tile(&[(Event::TilesVisited, 30), (Event::ColourWrites, 1)]), lines)
+    };
+    let packets: Packets = (0..400).map(packet).collect();
+    for queue in [8, 16, 64] {
+        machine.dram.queue = size(queue);
+        let [stepped, packet, _] = cycles(&machine, &packets);
+        assert!(stepped.abs_diff(packet) * 50 <= stepped, "{queue}: {stepped} {packet}");
     }
 }
