@@ -82,8 +82,12 @@ impl Study for AnchorsChart {
         rows.sort_by(|a, b| {
             a.is_input.cmp(&b.is_input).then(b.error_percent.abs().total_cmp(&a.error_percent.abs()))
         });
-        let error = quantiles(rows.iter().filter(|row| !row.is_input).map(|row| row.error_percent.abs()));
-        Ok(Self { effort, median_percent: error(0.5), worst_percent: error(1.0), rows })
+        let tested = rows.iter().filter(|row| !row.is_input);
+        let [median_percent, worst_percent] = {
+            let error = quantiles(tested.map(|row| row.error_percent.abs()));
+            [0.5, 1.0].map(error)
+        };
+        Ok(Self { effort, median_percent, worst_percent, rows })
     }
 
     fn draw(&self, _: &Gallery<'_>) -> Result<(), OutputError> {
