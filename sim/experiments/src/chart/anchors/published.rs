@@ -116,7 +116,7 @@ const fn fill(
 
 /// Two targets in place of one of 128 bits, which surfaces do not have.
 const FOUR_FLOATS: &[Format] = &[Format::Rg32f, Format::Rg32f];
-const GPU_PRO: &str = "GPU Pro, figure 4.6 of the chapter on compressed frame buffers";
+const GPU_PRO: &str = "GPU Pro, figure 4.6";
 const ANANDTECH_4216: &str = "AnandTech 4216, GLBenchmark 2.0";
 const ARM: &str = "Arm, Mali GPU data sheet";
 
@@ -140,7 +140,7 @@ const fn mali(
 }
 
 /// All of them.
-pub(super) const PUBLISHED: [Published; 21] = [
+pub(super) const PUBLISHED: [Published; 22] = [
     fill(
         Part::Hd7970,
         "blended fill, 4 x 16 bits",
@@ -176,6 +176,15 @@ pub(super) const PUBLISHED: [Published; 21] = [
     mali("bilinear texels", 1.0, "texel", Work::Texels { lod: 0.0 }, true),
     mali("trilinear texels", 0.5, "texel", Work::Texels { lod: 0.5 }, false),
     mali("depths read", 0.5, "texel", Work::Depths, false),
+    Published {
+        part: Part::Hd7970,
+        quantity: "bilinear texels",
+        value: 118.4,
+        unit: Unit::Giga("texel"),
+        work: Work::Texels { lod: 0.0 },
+        is_input: true,
+        source: "listed",
+    },
     // 16 pixels a clock of 230 MHz.
     Published {
         is_input: true,
