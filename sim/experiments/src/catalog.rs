@@ -1,5 +1,6 @@
 //! The list of studies.
 
+use crate::chart::anchors::AnchorsChart;
 use crate::chart::caustics::CausticsChart;
 use crate::chart::ccd::CcdChart;
 use crate::chart::compute::ComputeChart;
@@ -22,6 +23,7 @@ use crate::study::Entry;
 
 /// The charts of the book.
 pub static CHARTS: &[Entry] = &[
+    Entry::of::<AnchorsChart>(),
     Entry::of::<CausticsChart>(),
     Entry::of::<CcdChart>(),
     Entry::of::<ComputeChart>(),

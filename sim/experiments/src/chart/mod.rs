@@ -1,5 +1,6 @@
 //! Charts of the book, one module for each; each is a [`Study`](crate::study::Study).
 //!
+//! - [`anchors`]: rates beside those that others measured on parts.
 //! - [`caustics`]: shader executions of caustics, by how beams are bounded.
 //! - [`ccd`]: false positives of collision detection.
 //! - [`compute`]: cost of programs of groups, by group size, layout and contention.
@@ -19,6 +20,7 @@
 //! - [`timing`]: every level of timing against the reference.
 //! - [`statistics`]: power laws, quantiles, errors of images.
 
+pub mod anchors;
 pub mod caustics;
 pub mod ccd;
 pub mod compute;
