@@ -4,10 +4,10 @@ use std::collections::HashMap;
 
 use rayon::prelude::*;
 
-use super::bin::{BinSamples, Packet};
+use super::bin::BinSamples;
 use super::sorter::{Plan, Sorter};
 use crate::geometry::{Clip, Viewport};
-use crate::sampling::{Sample, SampleTable, Timed};
+use crate::sampling::{Sample, SampleTable};
 use crate::simd::LANES;
 
 /// Side of a tile in pixels.
@@ -15,7 +15,8 @@ const SIDE_PX: u32 = SampleTable::SHIFT_PX;
 
 /// The sorted blocks of a table, by their samples.
 pub(super) struct SortedTiles {
-    number: HashMap<*const Timed, usize>,
+    /// By the address of their samples.
+    number: HashMap<usize, usize>,
     tiles: Vec<SortedTile>,
 }
 
@@ -52,7 +53,7 @@ impl SortedTiles {
         let (mut number, mut origins) = (HashMap::new(), Vec::new());
         for (column, row) in (0..down).flat_map(|row| (0..across).map(move |column| (column, row))) {
             let origin = [column * SIDE_PX, row * SIDE_PX];
-            number.entry(source.block_by_time(origin[0], origin[1])?.as_ptr()).or_insert_with(|| {
+            number.entry(source.block_by_time(origin[0], origin[1])?.as_ptr().addr()).or_insert_with(|| {
                 origins.push(origin);
                 origins.len() - 1
             });
@@ -81,7 +82,7 @@ impl SortedTiles {
             }
             let whole = px + SIDE_PX <= viewport.width() && py + SIDE_PX <= viewport.height();
             let block = source.block_by_time(px, py).filter(|_| whole);
-            let Some(&number) = block.and_then(|block| self.number.get(&block.as_ptr())) else {
+            let Some(&number) = block.and_then(|block| self.number.get(&block.as_ptr().addr())) else {
                 return false;
             };
             let blocks_across = SIDE_PX / plan.block_px[0].min(SIDE_PX);

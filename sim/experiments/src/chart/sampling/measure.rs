@@ -61,7 +61,7 @@ fn drawn(
 pub(super) fn reference(stage: &Stage, effort: &SamplingEffort) -> Result<Vec<Vec3>, StudyError> {
     let frames = (0..effort.reference_frames).into_par_iter().map(|frame| {
         let table = table("owen", effort.reference_samples, REFERENCE_SEED + u64::from(frame))?;
-        drawn(stage, &*table, RasterPass::uncounted)
+        drawn(stage, &*table, |pass| pass.uncounted())
     });
     let frames: Vec<Vec<Vec3>> = frames.collect::<Result<_, StudyError>>()?;
     let mean = |pixel: usize| {
