@@ -12,6 +12,7 @@ mod determinism_levels;
 mod determinism_run;
 mod dry_run;
 mod energies;
+mod images;
 mod importers;
 mod info;
 mod layering;

@@ -11,7 +11,7 @@ use super::error::PassError;
 use super::heat::{FrameHeat, HeatMap};
 use super::pass::{AddressMap, Draw, Pass, RasterPass, Resident, Target, resident};
 use super::replay::Replay;
-use super::{Finished, PipelineSpec, rasterize, resolve};
+use super::{Finished, PipelineSpec, rasterize, resolve, seen};
 use crate::buffer::Buffers;
 use crate::geometry::Viewport;
 use crate::memory::{AddressSpace, MemoryRange, MemorySystem};
@@ -42,6 +42,8 @@ pub struct Gpu<'e> {
     heat: FrameHeat,
     /// Whether the tiles of the pass that was begun are those of the heat maps.
     is_on_map: bool,
+    /// Whether packets are made wherever a pass can be drawn without them, too.
+    is_counted: bool,
 }
 
 /// First addresses of what a pass of triangles reads.
@@ -171,6 +173,7 @@ impl<'e> Gpu<'e> {
             buffers,
             heat,
             is_on_map: false,
+            is_counted: true,
         })
     }
 
@@ -187,6 +190,17 @@ impl<'e> Gpu<'e> {
     /// As [`Self::new`].
     pub fn quiet(spec: &'e PipelineSpec) -> Result<Self, PassError> {
         Self::new(spec, |_, _| ())
+    }
+
+    /// A GPU for images alone. The visibility engine finds what samples see, many times as fast as the modelled hardware and to
+    /// the same bytes; such passes have no counts and no packets. Passes into surfaces, with state that depends on the order
+    /// of triangles (blending, discarding shaders, depth and stencil state, queries), with clip planes of a geometry, of
+    /// orthographic cameras and with the thresholds of [`Features`](super::Features) are drawn as on other GPUs.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn uncounted(spec: &'e PipelineSpec) -> Result<Self, PassError> {
+        Ok(Self { is_counted: false, ..Self::quiet(spec)? })
     }
 
     /// Functional parameters.
@@ -324,7 +338,8 @@ impl<'e> Gpu<'e> {
         if let Some(waits) = self.waits(&reads, pass) {
             self.barrier(waits);
         }
-        let drawn = self.pass(&prepared, pass)?;
+        let uncounted = if self.is_counted { None } else { seen::draw(&prepared, pass) };
+        let drawn = uncounted.map_or_else(|| self.pass(&prepared, pass), Ok)?;
         self.last_batch = prepared.batches().len().max(1) as u32 - 1;
         if !prepared.is_attached {
             self.keep(drawn.region);
@@ -441,6 +456,15 @@ impl RasterPass<'_> {
     /// As [`Gpu::draw`].
     pub fn visibility(&self) -> Result<Vec<(u32, u32)>, PassError> {
         Ok(self.onto(Target::Depth).with_visible().render(|_, _| ())?.visible)
+    }
+
+    /// Draws the pass for its images and what its samples see alone, as a [`Gpu::uncounted`] does. Whether it was counted
+    /// depends on the pass, so its counts mean nothing.
+    ///
+    /// # Errors
+    /// As [`Gpu::draw`].
+    pub fn uncounted(&self) -> Result<Rendered, PassError> {
+        Gpu::uncounted(self.settings.spec)?.draw(self)
     }
 
     /// Draws the pass as the only one of a frame. The counts include writing the result back to memory.

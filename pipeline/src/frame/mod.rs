@@ -18,6 +18,7 @@ mod replay;
 mod resolve;
 mod resolve_pass;
 mod screen_pass;
+mod seen;
 mod settings;
 mod shaded;
 mod target_checks;

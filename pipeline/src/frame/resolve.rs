@@ -3,6 +3,7 @@
 
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
+use std::ops::Range;
 
 use activity::{Event, PacketCounts};
 use glam::{Vec3, Vec4};
@@ -23,10 +24,22 @@ use crate::surface::{SurfaceSpec, Texels};
 
 /// The images; each pixel is the mean of its samples.
 pub(super) fn resolve(pass: &Pass<'_>, bins: &[Bin]) -> Vec<Vec<Vec3>> {
-    let viewport = pass.settings.viewport;
-    let tiles: Vec<_> =
+    if pass.views.is_empty() {
+        return Vec::new();
+    }
+    let tiles =
         bins.par_iter().map_init(Scratch::default, |scratch, bin| resolve_bin(pass, bin, scratch)).collect();
-    let mut images = vec![vec![pass.settings.background; viewport.pixels()]; pass.views.len()];
+    assemble(pass, tiles)
+}
+
+/// First pixel of a tile, and the colours of its pixels: view by view and row by row.
+pub(super) type TilePixels = ([u32; 2], Vec<Vec3>);
+
+/// The images with the pixels of touched tiles, by bin; all others have the colour of the background.
+pub(super) fn assemble(pass: &Pass<'_>, tiles: Vec<Vec<TilePixels>>) -> Vec<Vec<Vec3>> {
+    let viewport = pass.settings.viewport;
+    let empty = |view: &Range<u32>| if view.is_empty() { Vec3::ZERO } else { pass.settings.background };
+    let mut images: Vec<_> = pass.views.iter().map(|view| vec![empty(view); viewport.pixels()]).collect();
     let side = pass.settings.spec.tile_px;
     for (origin, pixels) in tiles.into_iter().flatten() {
         for (image, of_view) in images.iter_mut().zip(pixels.chunks_exact((side * side) as usize)) {
@@ -106,7 +119,7 @@ fn first(pass: &Pass<'_>, plane: &Plane) -> Option<Texels> {
 }
 
 /// Touched tiles of a bin: first pixel and pixels of each, view by view and row by row.
-fn resolve_bin(pass: &Pass<'_>, bin: &Bin, scratch: &mut Scratch) -> Vec<([u32; 2], Vec<Vec3>)> {
+fn resolve_bin(pass: &Pass<'_>, bin: &Bin, scratch: &mut Scratch) -> Vec<TilePixels> {
     let mut samples = std::mem::take(&mut scratch.samples);
     let mut resolved = Vec::new();
     for (index, tile) in bin.tiles.iter().enumerate() {
@@ -128,7 +141,7 @@ fn resolve_bin(pass: &Pass<'_>, bin: &Bin, scratch: &mut Scratch) -> Vec<([u32; 
 
 /// Memory reused by a worker.
 #[derive(Default)]
-struct Scratch {
+pub(super) struct Scratch {
     samples: TileSamples,
     /// Slots of a tile, grouped by triangle.
     slots: Vec<u16>,
@@ -210,7 +223,7 @@ impl KnownColours {
     }
 }
 
-/// Colours of a tile: those stored, or those of the visible triangles, each cell of which is shaded once, or every sample.
+/// Colours of a tile: those stored, or those of the visible triangles.
 fn resolve_tile(
     pass: &Pass<'_>,
     tile: &DepthTile,
@@ -218,37 +231,92 @@ fn resolve_tile(
     origin: [u32; 2],
     scratch: &mut Scratch,
 ) -> Vec<Vec3> {
-    let (side, per_pixel) = (pass.settings.spec.tile_px, pass.settings.samples.per_pixel());
-    let pixels = (side * side) as usize;
-    let mut sums = vec![Vec3::ZERO; pixels * pass.views.len()];
-    let is_whole = matches!(&pass.views[..], [view] if *view == (0..per_pixel));
-    let mut add = |slot: usize, colour: Vec3| {
-        if is_whole {
-            sums[samples.pixel[slot] as usize] += colour;
-            return;
-        }
-        let (pixel, index) = (samples.pixel[slot] as usize, samples.in_pixel(slot, per_pixel));
-        let views = pass.views.iter().enumerate().filter(|(_, samples)| samples.contains(&index));
-        views.for_each(|(view, _)| sums[view * pixels + pixel] += colour);
-    };
     if pass.is_ordered {
         let colours = tile.colours.first().into_iter().flatten();
-        colours.enumerate().for_each(|(slot, colour)| add(slot, colour.truncate()));
-        return means(pass, &sums, pixels);
+        let mut sums = Sums::new(pass, samples);
+        colours.enumerate().for_each(|(slot, colour)| sums.add(slot, colour.truncate()));
+        return sums.means();
     }
+    shade_tile(pass, &tile.triangle, (samples, origin), scratch)
+}
+
+/// Colours of a tile whose samples see these triangles. Each cell is shaded once, or every sample.
+pub(super) fn shade_tile(
+    pass: &Pass<'_>,
+    triangles: &[u32],
+    (samples, origin): (&TileSamples, [u32; 2]),
+    scratch: &mut Scratch,
+) -> Vec<Vec3> {
+    let mut sums = Sums::new(pass, samples);
     scratch.slots.clear();
     scratch.slots.extend(0..samples.len as u16);
     // The stable sort fixes the order of sums.
-    scratch.slots.sort_by_key(|&slot| tile.triangle[slot as usize]);
-    for group in scratch.slots.chunk_by(|&a, &b| tile.triangle[a as usize] == tile.triangle[b as usize]) {
-        let triangle = tile.triangle[group[0] as usize];
+    scratch.slots.sort_by_key(|&slot| triangles[slot as usize]);
+    for group in scratch.slots.chunk_by(|&a, &b| triangles[a as usize] == triangles[b as usize]) {
+        let triangle = triangles[group[0] as usize];
         if triangle == DepthTile::NO_TRIANGLE {
-            group.iter().for_each(|&slot| add(slot as usize, pass.settings.background));
+            group.iter().for_each(|&slot| sums.add_background(slot as usize));
             continue;
         }
-        shade_group(pass, (triangle, group), (samples, origin), &mut scratch.cells, &mut add);
+        let add = &mut |slot, colour| sums.add(slot, colour);
+        shade_group(pass, (triangle, group), (samples, origin), &mut scratch.cells, add);
     }
-    means(pass, &sums, pixels)
+    sums.means()
+}
+
+/// Sums of the colours of a tile, by view and pixel.
+struct Sums<'a> {
+    pass: &'a Pass<'a>,
+    samples: &'a TileSamples,
+    sums: Vec<Vec3>,
+    /// Samples of each pixel without a triangle.
+    missed: [u16; 64],
+    /// Whether there is one view of all samples.
+    is_whole: bool,
+}
+
+impl<'a> Sums<'a> {
+    fn new(pass: &'a Pass<'_>, samples: &'a TileSamples) -> Self {
+        let (side, per_pixel) = (pass.settings.spec.tile_px, pass.settings.samples.per_pixel());
+        let is_whole = matches!(&pass.views[..], [view] if *view == (0..per_pixel));
+        let sums = vec![Vec3::ZERO; (side * side) as usize * pass.views.len()];
+        Self { pass, samples, sums, missed: [0; 64], is_whole }
+    }
+
+    fn add(&mut self, slot: usize, colour: Vec3) {
+        let pixel = self.samples.pixel[slot] as usize;
+        if self.is_whole {
+            self.sums[pixel] += colour;
+            return;
+        }
+        let index = self.samples.in_pixel(slot, self.pass.settings.samples.per_pixel());
+        let pixels = self.sums.len() / self.pass.views.len().max(1);
+        let views = self.pass.views.iter().enumerate().filter(|(_, samples)| samples.contains(&index));
+        views.for_each(|(view, _)| self.sums[view * pixels + pixel] += colour);
+    }
+
+    fn add_background(&mut self, slot: usize) {
+        self.missed[self.samples.pixel[slot] as usize] += 1;
+        self.add(slot, self.pass.settings.background);
+    }
+
+    /// Means of the samples of each pixel of each view. A pixel without triangles has the colour of the background to the last bit,
+    /// as in tiles that no triangle touches.
+    fn means(self) -> Vec<Vec3> {
+        let Self { pass, sums, missed, .. } = self;
+        let all = pass.settings.samples.per_pixel() as u16;
+        let pixels = sums.len() / pass.views.len().max(1);
+        let views = sums.chunks_exact(pixels.max(1)).zip(&pass.views);
+        let means = views.flat_map(|(sums, view)| {
+            let count = view.len() as f32;
+            sums.iter().zip(missed).map(move |(sum, missed)| match view.is_empty() {
+                true => Vec3::ZERO,
+                false if missed == all => pass.settings.background,
+                false => *sum / count,
+            })
+        });
+        means.collect()
+    }
 }
 
 /// Calls `add` with the colours of the samples in the slots `group` of the tile at `origin`, which see `triangle`.
@@ -303,12 +371,6 @@ impl ShadedCells {
     fn in_order(&self) -> impl Iterator<Item = Vec3> {
         self.of_sample.iter().map(|&at| self.colours[at as usize])
     }
-}
-
-/// Means of the samples of each pixel of each view.
-fn means(pass: &Pass<'_>, sums: &[Vec3], pixels: usize) -> Vec<Vec3> {
-    let counts = pass.views.iter().map(|samples| samples.len().max(1) as f32);
-    sums.chunks_exact(pixels).zip(counts).flat_map(|(sums, n)| sums.iter().map(move |sum| *sum / n)).collect()
 }
 
 /// Mean of the samples of each pixel of a surface, in linear light and the order of the samples.

@@ -162,6 +162,11 @@ impl TileSamples {
         u32::from(self.order[slot]) % per_pixel
     }
 
+    /// Places of the samples, by slot: the pixel in the tile, row by row, times the samples per pixel, plus the index in the pixel.
+    pub(crate) fn places(&self) -> &[u16] {
+        &self.order
+    }
+
     fn resize(&mut self, padded: usize) {
         let [lens_x, lens_y] = &mut self.lens;
         let [slope_x, slope_y] = &mut self.slope;

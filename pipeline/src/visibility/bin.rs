@@ -1,11 +1,12 @@
 //! Samples of a bin in packets, with their bounding boxes, and tests of blocks and packets against these
 //! boxes.
 
+use crate::geometry::Viewport;
 use crate::sample_test::block::SampleRows;
 use crate::simd::{LANES, Row};
 
 /// Samples of one bin. Packets are numbered by block, cell and position in the cell.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct BinSamples {
     /// First pixel.
     pub origin: [u32; 2],
@@ -47,7 +48,7 @@ pub(super) struct CellRange {
 }
 
 /// Boxes of lens and time of the cells.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct CellBoxes {
     pub u: CellRange,
     pub v: CellRange,
@@ -68,6 +69,29 @@ pub(super) const EMPTY_RANGE: [f32; 2] = [f32::INFINITY, f32::NEG_INFINITY];
 impl BinSamples {
     /// Index of a lane without a sample.
     pub const NO_SAMPLE: u32 = u32::MAX;
+
+    /// An empty bin with numbers of blocks and cells, in the memory of another one.
+    pub fn reset(&mut self, origin: [u32; 2], viewport: Viewport, [blocks, cells]: [usize; 2]) {
+        fn refill<T: Clone>(all: &mut Vec<T>, count: usize, value: T) {
+            all.clear();
+            all.resize(count, value);
+        }
+        (self.origin, self.top) = (origin, Viewport::edge(origin[1], viewport.height()));
+        (self.rect, self.cells) = ([EMPTY_RANGE; 2], CellBoxes::default());
+        refill(&mut self.blocks, blocks.div_ceil(LANES), Boxes::nothing());
+        refill(&mut self.boxes, blocks * cells, Boxes::nothing());
+        refill(&mut self.sample_indices, blocks * cells * LANES, [Self::NO_SAMPLE; LANES]);
+        refill(&mut self.packets, blocks * cells * LANES, Packet::NOWHERE);
+    }
+
+    /// Computes what follows from the samples.
+    pub fn finish(&mut self) {
+        self.cells.finish();
+        let packets = (0..).zip(&self.sample_indices);
+        let partial = packets.filter(|(_, samples)| samples.contains(&Self::NO_SAMPLE));
+        self.partial.clear();
+        self.partial.extend(partial.map(|(at, _)| at));
+    }
 }
 
 impl Packet {
@@ -77,6 +101,15 @@ impl Packet {
         const ZERO: Row = Row::splat(0.0);
         Self { slope: [FAR; 2], lens: [ZERO; 2], t: ZERO }
     };
+
+    /// Leaves a lane without a sample.
+    pub fn clear(&mut self, lane: usize) {
+        for axis in 0..2 {
+            self.slope[axis].0[lane] = Self::NOWHERE.slope[axis].0[lane];
+            self.lens[axis].0[lane] = Self::NOWHERE.lens[axis].0[lane];
+        }
+        self.t.0[lane] = Self::NOWHERE.t.0[lane];
+    }
 
     #[inline(always)]
     pub fn rows(&self) -> SampleRows<'_> {
@@ -102,12 +135,14 @@ impl Boxes {
     }
 }
 
-impl CellRange {
-    pub fn nothing() -> Self {
+impl Default for CellRange {
+    fn default() -> Self {
         let zero = Row::splat(0.0);
         Self { lo: Row::splat(EMPTY_RANGE[0]), hi: Row::splat(EMPTY_RANGE[1]), middle: zero, half: zero }
     }
+}
 
+impl CellRange {
     pub fn include(&mut self, cell: usize, at: f32) {
         self.lo.0[cell] = self.lo.0[cell].min(at);
         self.hi.0[cell] = self.hi.0[cell].max(at);

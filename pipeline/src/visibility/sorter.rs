@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::bin::{BinSamples, Boxes, CellBoxes, CellRange, EMPTY_RANGE, Packet};
+use super::bin::BinSamples;
 use crate::geometry::{Camera, Clip, Projection, Shear, Viewport};
 use crate::sampling::{Sample, SampleSource};
 use crate::simd::LANES;
@@ -31,7 +31,7 @@ impl SampleEntry {
 }
 
 /// Sorter of the samples of a bin.
-struct Sorter<'a> {
+pub(super) struct Sorter<'a> {
     pub viewport: Viewport,
     pub source: &'a dyn SampleSource,
     pub shear: &'a Shear,
@@ -42,35 +42,25 @@ struct Sorter<'a> {
 impl Sorter<'_> {
     /// Samples of the bin whose first pixel is `origin`.
     pub fn bin(&self, origin: [u32; 2]) -> BinSamples {
-        let [across, down] = self.plan.blocks();
-        let (blocks, cells) = ((across * down) as usize, self.plan.cells());
-        let mut bin = BinSamples {
-            origin,
-            top: Viewport::edge(origin[1], self.viewport.height()),
-            rect: [EMPTY_RANGE; 2],
-            cells: CellBoxes { u: CellRange::nothing(), v: CellRange::nothing(), t: CellRange::nothing() },
-            blocks: vec![Boxes::nothing(); blocks.div_ceil(LANES)],
-            boxes: vec![Boxes::nothing(); blocks * cells],
-            partial: Vec::new(),
-            sample_indices: vec![[BinSamples::NO_SAMPLE; LANES]; blocks * cells * LANES],
-            packets: vec![Packet::NOWHERE; blocks * cells * LANES],
-        };
+        let mut bin = BinSamples::default();
+        self.fill(&mut bin, origin);
+        bin
+    }
+
+    /// The same into the memory of another bin.
+    pub fn fill(&self, bin: &mut BinSamples, origin: [u32; 2]) {
+        let ([across, down], cells) = (self.plan.blocks(), self.plan.cells());
+        let blocks = (across * down) as usize;
+        bin.reset(origin, self.viewport, [blocks, cells]);
         let (mut samples, mut pixel) =
             (Vec::new(), vec![Sample::default(); self.source.per_pixel() as usize]);
         for block in 0..blocks {
             let [column, row] = [block as u32 % across, block as u32 / across];
             let first = [column * self.plan.block_px[0], row * self.plan.block_px[1]];
             self.gather(origin, first, &mut pixel, &mut samples);
-            self.split_cells(&mut bin, block * cells, cells, &mut samples, self.plan.cell_axes);
+            self.split_cells(bin, block * cells, cells, &mut samples, self.plan.cell_axes);
         }
-        bin.cells.finish();
-        let partial = |sample_indices: &[u32; LANES]| sample_indices.contains(&BinSamples::NO_SAMPLE);
-        bin.partial = (0..)
-            .zip(&bin.sample_indices)
-            .filter(|(_, sample_indices)| partial(sample_indices))
-            .map(|(at, _)| at)
-            .collect();
-        bin
+        bin.finish();
     }
 
     /// Samples of the pixels of a block that are in the image.
@@ -272,23 +262,42 @@ impl SampleLayout {
     /// may move; otherwise time is not divided. Samples outside the clip planes of the camera see nothing.
     /// `None` for an orthographic camera, which the engine does not support.
     pub fn new(camera: &Camera, viewport: Viewport, source: &dyn SampleSource, moving: bool) -> Option<Self> {
+        let mut layout = Self::unsorted(camera, viewport, source.per_pixel(), moving)?;
+        let sorter = layout.sorter(source, camera.clip());
+        let bins = (0..layout.bin_count()).into_par_iter().map(|bin| sorter.bin(layout.origin(bin)));
+        layout.bins = bins.collect();
+        Some(layout)
+    }
+
+    /// The layout of an image without its samples, which are sorted bin by bin.
+    pub(super) fn unsorted(
+        camera: &Camera,
+        viewport: Viewport,
+        per_pixel: u32,
+        moving: bool,
+    ) -> Option<Self> {
         if camera.is_orthographic() {
             return None;
         }
         let projection = Projection::new(camera, viewport);
-        let per_pixel = source.per_pixel();
         let plan = Plan::new(per_pixel, moving, !projection.shear.is_none());
-        let across = viewport.width().div_ceil(plan.bin_px);
-        let down = viewport.height().div_ceil(plan.bin_px);
-        let bins = (0..across * down)
-            .into_par_iter()
-            .map(|bin| {
-                let origin = [bin % across * plan.bin_px, bin / across * plan.bin_px];
-                Sorter { viewport, source, shear: &projection.shear, plan: &plan, clip: camera.clip() }
-                    .bin(origin)
-            })
-            .collect();
-        Some(Self { viewport, per_pixel, projection, plan, bins })
+        Some(Self { viewport, per_pixel, projection, plan, bins: Vec::new() })
+    }
+
+    /// Sorter of its samples.
+    pub(super) fn sorter<'a>(&'a self, source: &'a dyn SampleSource, clip: Clip) -> Sorter<'a> {
+        Sorter { viewport: self.viewport, source, shear: &self.projection.shear, plan: &self.plan, clip }
+    }
+
+    /// Bins of the image.
+    pub(super) fn bin_count(&self) -> u32 {
+        self.viewport.width().div_ceil(self.plan.bin_px) * self.viewport.height().div_ceil(self.plan.bin_px)
+    }
+
+    /// First pixel of a bin.
+    pub(super) fn origin(&self, bin: u32) -> [u32; 2] {
+        let across = self.viewport.width().div_ceil(self.plan.bin_px);
+        [bin % across * self.plan.bin_px, bin / across * self.plan.bin_px]
     }
 
     /// Number of samples of the image.

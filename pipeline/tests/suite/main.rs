@@ -40,6 +40,7 @@ mod slack;
 mod state;
 mod surfaces;
 mod ties;
+mod uncounted;
 mod views;
 mod visibility;
 mod watertight;

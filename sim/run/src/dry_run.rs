@@ -90,7 +90,7 @@ impl DryRun {
             platform: plan.platform.name.clone(),
             energy_table: plan.table.name().to_owned(),
             area_mm2: area_mm2(plan),
-            timing: plan.options.timing.name(),
+            timing: plan.options.level().name(),
             pacing: plan.options.pacing.name(),
             trace_rate_hz: plan.options.trace_rate_hz,
             chosen: prepared.choice.as_ref().map(Choice::line),
@@ -189,7 +189,7 @@ impl Expected {
             sampling => (sampling.first(all).min(differ), PREVIEW_TIME_RATIO * differ as f64),
         };
         let probe = Probe { plan, number: distinct.numbers()[differ / 2] };
-        let mut frames_s = probe.frame_s(plan.options.timing)? * (whole as f64 + previews);
+        let mut frames_s = probe.frame_s(plan.options.level())? * (whole as f64 + previews);
         if plan.options.verify {
             frames_s += probe.frame_s(Level::Stepped)? * differ as f64;
         }

@@ -73,6 +73,16 @@ fn panic_if_requested(number: u32) {
     }
 }
 
+/// Result of `work` on frame `number`; a panic names the frame.
+pub(super) fn caught<T>(number: u32, work: impl FnOnce() -> T) -> T {
+    let work = || {
+        panic_if_requested(number);
+        work()
+    };
+    catch_unwind(AssertUnwindSafe(work))
+        .unwrap_or_else(|panic| resume_unwind(Box::new(CrashedFrame { frame: number, panic })))
+}
+
 /// Simulates frames of a plan and writes their images.
 pub(super) struct FrameSimulator<'a> {
     pub plan: &'a Plan,
@@ -95,12 +105,7 @@ impl FrameSimulator<'_> {
     /// Simulates group `group` once and writes the image of each of its frames.
     pub fn simulate(&self, group: usize, keep_picture: bool) -> Result<SimulatedFrame, RunError> {
         let (plan, dir, number) = (self.plan, self.dir, self.distinct.numbers()[group]);
-        let simulate = || {
-            panic_if_requested(number);
-            simulate_frame(plan, number, self.max_bins)
-        };
-        let simulated = catch_unwind(AssertUnwindSafe(simulate))
-            .unwrap_or_else(|panic| resume_unwind(Box::new(CrashedFrame { frame: number, panic })));
+        let simulated = caught(number, || simulate_frame(plan, number, self.max_bins));
         let (frame, Pictures { image, heat: maps }) = simulated?;
         let mut heat = Vec::new();
         if let Some(dir) = dir {
@@ -178,10 +183,15 @@ impl DrawnFrame {
 }
 
 fn simulate_frame(plan: &Plan, number: u32, max_bins: usize) -> Result<(RunFrame, Pictures), RunError> {
-    let level = plan.options.timing;
+    let level = plan.options.timing.ok_or_else(not_timed)?;
     let mut clock = FrameClock::new(level, plan.gpu.machine()?, Recorder::new(BIN_PS, max_bins));
     let (frame, pictures) = draw(plan, number, |packet, lines| clock.push(packet, lines))?;
     Ok((frame.powered(level, &clock.finish()?, &plan.model)?, pictures))
+}
+
+/// Error of simulating a run without a timing level.
+fn not_timed() -> RunError {
+    RunError::setting("timing: none; cycles and joules need a timing level, such as packet")
 }
 
 fn busy_shares(timeline: &Timeline) -> Vec<[f32; Unit::COUNT]> {
@@ -194,7 +204,7 @@ pub(super) fn image_name(number: u32) -> String {
     format!("images/frame_{number:04}")
 }
 
-fn write_image(plan: &Plan, dir: &OutDir, number: u32, image: &[Vec3]) -> Result<(), RunError> {
+pub(super) fn write_image(plan: &Plan, dir: &OutDir, number: u32, image: &[Vec3]) -> Result<(), RunError> {
     let pixels: Vec<[f32; 3]> = image.iter().map(Vec3::to_array).collect();
     let linear = LinearImage::new(plan.viewport.width(), plan.viewport.height(), &pixels)?;
     linear.write_png(dir, &format!("{}.png", image_name(number)))?;

@@ -134,8 +134,8 @@ pub struct RunOptions {
     pub energy: Option<PathBuf>,
     /// Column of the energy table.
     pub bound: Bound,
-    /// Timing level of the simulated frames.
-    pub timing: Level,
+    /// Timing level of the simulated frames; `None` draws images alone, without counts, time and energy.
+    pub timing: Option<Level>,
     /// Which frames are simulated.
     pub sampling: Sampling,
     /// Requested accuracy and budget: if given, a probe chooses `timing` and `sampling`.
@@ -171,6 +171,13 @@ fn as_text_if_any<S: Serializer>(path: &Option<PathBuf>, to: S) -> Result<S::Ok,
     path.as_ref().map(|path| path.to_string_lossy()).serialize(to)
 }
 
+impl RunOptions {
+    /// Timing level of the simulated frames; the default one where they are not timed.
+    pub fn level(&self) -> Level {
+        self.timing.unwrap_or_default()
+    }
+}
+
 impl Default for RunOptions {
     fn default() -> Self {
         Self {
@@ -182,7 +189,7 @@ impl Default for RunOptions {
             platform: None,
             energy: None,
             bound: Bound::Nominal,
-            timing: Level::default(),
+            timing: Some(Level::default()),
             sampling: Sampling::default(),
             requested: Requested::default(),
             verify: false,
@@ -210,15 +217,18 @@ pub enum TimingChoice {
     Bound,
     /// One frame in fifty at `packet`, the others predicted from a preview, with intervals
     Sampled,
+    /// Images alone, drawn many times as fast: no counts, cycles and joules
+    None,
 }
 
 impl TimingChoice {
-    /// Timing level of the simulated frames.
-    pub const fn level(self) -> Level {
+    /// Timing level of the simulated frames, if they are timed.
+    pub const fn level(self) -> Option<Level> {
         match self {
-            Self::Stepped => Level::Stepped,
-            Self::Packet | Self::Sampled => Level::Packet,
-            Self::Bound => Level::Bound,
+            Self::Stepped => Some(Level::Stepped),
+            Self::Packet | Self::Sampled => Some(Level::Packet),
+            Self::Bound => Some(Level::Bound),
+            Self::None => None,
         }
     }
 

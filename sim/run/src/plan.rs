@@ -15,7 +15,7 @@ use crate::RunError;
 use crate::changes::{ChangedFile, Changes};
 use crate::gpu::{GpuSpec, check_pairing};
 use crate::hardware;
-use crate::options::{DEFAULT_RATE_HZ, PacingChoice, RunOptions};
+use crate::options::{DEFAULT_RATE_HZ, PacingChoice, Requested, RunOptions};
 
 /// Plan of a run: options, and all inputs loaded and checked.
 pub struct Plan {
@@ -79,6 +79,9 @@ impl Plan {
         load_job: impl FnOnce(&RunOptions, &mut Changes<'_>) -> Result<(String, Arc<dyn Job>), RunError>,
     ) -> Result<Self, RunError> {
         check_recorder(&options)?;
+        if options.timing.is_none() {
+            check_images(&options)?;
+        }
         let mut changes = Changes::new(&options.changes)?;
         let (name, job) = load_job(&options, &mut changes)?;
         let settings = job.settings();
@@ -95,7 +98,9 @@ impl Plan {
             Some(changed) => changed,
             None => file_or_name(platform, Platform::load, Platform::builtin)?,
         };
-        size_of(settings, viewport, pacing, &platform, options.trace_rate_hz).check()?;
+        // Without time there is no trace.
+        let trace_rate_hz = options.timing.map_or(Some(0.0), |_| options.trace_rate_hz);
+        size_of(settings, viewport, pacing, &platform, trace_rate_hz).check()?;
         let table = options.energy.as_deref().unwrap_or(Path::new(&files.energy));
         let table = match changes.table(table)? {
             Some(changed) => changed,
@@ -202,6 +207,34 @@ fn check_recorder(options: &RunOptions) -> Result<(), RunError> {
         return Err(RunError::Setting(format!("packet loss: {loss}; a share from 0 to below 1 can be lost")));
     }
     Ok(())
+}
+
+/// Checks that a run of images alone asks for nothing that needs counts or time.
+fn check_images(options: &RunOptions) -> Result<(), RunError> {
+    let defaults = RunOptions::default();
+    let Requested { accuracy, budget_s } = options.requested;
+    let asked = [
+        ("--heat", !options.heat.is_empty()),
+        ("--accuracy", accuracy.is_some()),
+        ("--budget", budget_s.is_some()),
+        ("--verify", options.verify),
+        ("--platform", options.platform.is_some()),
+        ("--energy", options.energy.is_some()),
+        ("--bound", options.bound != Bound::Nominal),
+        ("--pacing", options.pacing != PacingChoice::default()),
+        ("--trace-rate", options.trace_rate_hz.is_some()),
+        ("--packet-samples", options.packet_samples != defaults.packet_samples),
+        ("--packet-loss", options.packet_loss != 0.0),
+        ("the style of plots", options.plot_style != defaults.plot_style),
+    ];
+    let asked: Vec<&str> = asked.into_iter().filter(|(_, given)| *given).map(|(name, _)| name).collect();
+    if asked.is_empty() {
+        return Ok(());
+    }
+    Err(RunError::Setting(format!(
+        "--timing none: it draws images and counts nothing, and {} needs counts or time; leave one of both out",
+        asked.join(", ")
+    )))
 }
 
 /// Size of a run, from the parts of a plan.
@@ -354,5 +387,14 @@ mod tests {
         assert!(
             message(idle).contains("120 s at 10000000 samples a second are 1.2e9 samples, more than 5e7")
         );
+    }
+
+    #[test]
+    fn what_needs_counts_or_time_is_named() {
+        let images = RunOptions { timing: None, ..RunOptions::default() };
+        assert!(check_images(&images).is_ok());
+        let asked = RunOptions { verify: true, packet_loss: 0.5, ..images };
+        let message = check_images(&asked).unwrap_err().to_string();
+        assert!(message.contains("--verify, --packet-loss needs"), "{message}");
     }
 }

@@ -10,13 +10,16 @@ use output::report::{
 };
 use output::table::{count_or_digits, grouped, shell_line, si};
 use power_model::{Bound, Part};
+use warnings::Warning;
+use workloads::scene::CameraUsed;
 
 use crate::dry_run::area_text;
 use crate::frame::image_name;
 use crate::heat::heat_name;
 use crate::pictures::{Plot, parts_in_use};
 use crate::stalls;
-use crate::{FinishedRun, HeatQuantity, Host, Input, PassSummary, RunError, WorkSummary};
+use crate::summary::SettingsSummary;
+use crate::{FinishedRun, HeatQuantity, Host, Input, PassSummary, Plan, RunError, WorkSummary};
 
 /// Largest number of draws of a pass in the report; all are in the summary.
 const MAX_DRAWS: usize = 48;
@@ -27,9 +30,9 @@ pub(super) fn report<'a>(outcome: &'a FinishedRun, plots: &[Plot]) -> Result<Rep
     Ok(Report {
         title: format!("{} on {}", plan.name, plan.gpu.name).into(),
         facts: facts(outcome),
-        warnings: warnings(outcome),
+        warnings: warnings(&outcome.summary.warnings),
         headline: outcome.summary.headline(),
-        images: images(outcome)?.into_iter().chain(heat(outcome)).collect(),
+        images: images(plan, &outcome.simulated.pictures)?.into_iter().chain(heat(outcome)).collect(),
         plots: plots.iter().map(plot).collect::<Result<_, _>>()?,
         parts: parts(outcome),
         frames: frames(outcome),
@@ -38,28 +41,29 @@ pub(super) fn report<'a>(outcome: &'a FinishedRun, plots: &[Plot]) -> Result<Rep
         units: units(outcome),
         counters: counters(outcome),
         settings: settings(outcome),
-        inputs: inputs(outcome),
+        inputs: inputs(&outcome.summary.inputs),
         files: files(outcome),
-        host: host(outcome),
+        host: host(&outcome.summary.host),
     })
 }
 
-fn warnings(outcome: &FinishedRun) -> Vec<WarningRow> {
-    let row = |w: &warnings::Warning| WarningRow {
+pub(super) fn warnings(all: &[Warning]) -> Vec<WarningRow> {
+    let row = |w: &Warning| WarningRow {
         code: w.code.name().to_owned(),
         message: w.message.clone(),
         details: w.details.clone(),
     };
-    outcome.summary.warnings.iter().map(row).collect()
+    all.iter().map(row).collect()
 }
 
-fn images(outcome: &FinishedRun) -> Result<Vec<ReportImage>, RunError> {
-    let viewport = outcome.plan.viewport;
-    let mut pictures: Vec<_> = outcome.simulated.pictures.iter().collect();
+/// The first, the middle and the last image of a run.
+pub(super) fn images(plan: &Plan, pictures: &[(u32, Vec<Vec3>)]) -> Result<Vec<ReportImage>, RunError> {
+    let viewport = plan.viewport;
+    let mut pictures: Vec<_> = pictures.iter().collect();
     // The middle image comes first and large; the others follow in order as thumbnails.
     let middle = pictures.len() / 2;
     pictures[..=middle].rotate_right(1);
-    let shown = outcome.plan.job.shows();
+    let shown = plan.job.shows();
     let first = |number: u32| match shown {
         "" => format!("frame {number}"),
         shown => format!("frame {number}: {shown}"),
@@ -226,18 +230,9 @@ fn bound(bound: Bound) -> &'static str {
 fn settings(outcome: &FinishedRun) -> Vec<FactRow> {
     let settings = &outcome.summary.settings;
     let device = outcome.measurement.device.spec();
-    let mut rows = vec![
-        FactRow::new("size", format!("{}x{} pixels", settings.width, settings.height)),
-        FactRow::new("samples per pixel", settings.samples.to_string()),
-        FactRow::new("sample table", settings.table.clone()),
-        FactRow::new("frames", frame_range(outcome)),
-        FactRow::new("frame rate", si(settings.frame_rate_hz, "Hz")),
-        FactRow::new("shutter", format!("{} of the frame period", settings.shutter)),
-    ];
-    rows.extend(settings.clip.as_ref().map(|clip| FactRow::new("animation clip", clip.clone())));
-    rows.extend(camera(outcome));
+    let mut rows = view(&outcome.plan, settings, outcome.summary.camera.as_ref());
     rows.extend([
-        FactRow::new("pacing", settings.pacing),
+        FactRow::new("pacing", outcome.plan.options.pacing.name()),
         FactRow::new(
             "recorder",
             format!(
@@ -254,14 +249,33 @@ fn settings(outcome: &FinishedRun) -> Vec<FactRow> {
     rows
 }
 
+/// Settings of image, frames and camera.
+pub(super) fn view(
+    plan: &Plan,
+    settings: &SettingsSummary,
+    camera_used: Option<&CameraUsed>,
+) -> Vec<FactRow> {
+    let mut rows = vec![
+        FactRow::new("size", format!("{}x{} pixels", settings.width, settings.height)),
+        FactRow::new("samples per pixel", settings.samples.to_string()),
+        FactRow::new("sample table", settings.table.clone()),
+        FactRow::new("frames", frame_range(plan)),
+        FactRow::new("frame rate", si(settings.frame_rate_hz, "Hz")),
+        FactRow::new("shutter", format!("{} of the frame period", settings.shutter)),
+    ];
+    rows.extend(settings.clip.as_ref().map(|clip| FactRow::new("animation clip", clip.clone())));
+    rows.extend(camera(plan, settings, camera_used));
+    rows
+}
+
 /// Camera of the first frame; for a workload without a scene only the lens.
-fn camera(outcome: &FinishedRun) -> Vec<FactRow> {
+fn camera(plan: &Plan, settings: &SettingsSummary, camera: Option<&CameraUsed>) -> Vec<FactRow> {
     let lens = |radius: f32| match radius > 0.0 {
         true => format!("radius {radius} scene units"),
         false => "none: a pinhole".to_owned(),
     };
-    let Some(camera) = &outcome.summary.camera else {
-        return vec![FactRow::new("lens", lens(outcome.summary.settings.lens_radius))];
+    let Some(camera) = camera else {
+        return vec![FactRow::new("lens", lens(settings.lens_radius))];
     };
     let vector = |[x, y, z]: [f64; 3]| format!("({x}, {y}, {z})");
     let view = match (camera.fov_deg, camera.view_height) {
@@ -269,7 +283,7 @@ fn camera(outcome: &FinishedRun) -> Vec<FactRow> {
         (None, height) => format!("{} scene units high, orthographic", height.unwrap_or_default()),
     };
     let note = |row: FactRow, note: &str| FactRow { note: note.to_owned(), ..row };
-    let given = outcome.plan.job.settings().focus.is_some();
+    let given = plan.job.settings().focus.is_some();
     vec![
         note(
             FactRow::new("camera position", vector(camera.position)),
@@ -288,19 +302,18 @@ fn camera(outcome: &FinishedRun) -> Vec<FactRow> {
 }
 
 /// Input files.
-fn inputs(outcome: &FinishedRun) -> Vec<FactRow> {
+pub(super) fn inputs(all: &[Input]) -> Vec<FactRow> {
     let row = |input: &Input| FactRow {
         name: input.path.clone(),
         value: input.sha256.clone().unwrap_or_else(|| "missing".to_owned()),
         note: input.bytes.map_or(String::new(), |bytes| format!("{} bytes", grouped(bytes))),
     };
-    outcome.summary.inputs.iter().map(row).collect()
+    all.iter().map(row).collect()
 }
 
 /// Program, command line and host.
-fn host(outcome: &FinishedRun) -> Vec<FactRow> {
-    let Host { command, directory, revision, threads, cores, cpu, system, architecture } =
-        &outcome.summary.host;
+pub(super) fn host(host: &Host) -> Vec<FactRow> {
+    let Host { command, directory, revision, threads, cores, cpu, system, architecture } = host;
     let unknown = || "unknown".to_owned();
     vec![
         FactRow::new("command", shell_line(command)),
@@ -313,8 +326,8 @@ fn host(outcome: &FinishedRun) -> Vec<FactRow> {
     ]
 }
 
-fn frame_range(outcome: &FinishedRun) -> String {
-    let frames = &outcome.plan.job.settings().frames;
+fn frame_range(plan: &Plan) -> String {
+    let frames = &plan.job.settings().frames;
     format!("{} ({}..{})", frames.end - frames.start, frames.start, frames.end)
 }
 

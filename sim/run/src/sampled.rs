@@ -295,7 +295,7 @@ impl<'a> Previewer<'a> {
             samples: Some(1),
             ..Reduction::to_width(plan.job.settings(), TARGET_WIDTH_PX, MAX_REDUCTION)
         };
-        let level = if plan.options.timing == Level::Bound { Level::Bound } else { Level::Packet };
+        let level = if plan.options.level() == Level::Bound { Level::Bound } else { Level::Packet };
         Ok(Self { plan, job: plan.reduced(&to)?, level })
     }
 

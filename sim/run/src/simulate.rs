@@ -92,7 +92,8 @@ impl MachineTexts<'_> {
             .map_or_else(|| EnergyTable::builtin("28nm"), |text| EnergyTable::parse(text, "table.ron"))?;
         let overrides =
             Overrides { size: Some((16, 12)), samples: Some(1), frames: Some(0..1), ..Overrides::default() };
-        let options = RunOptions { scene: "tiny".into(), overrides, timing: level, ..RunOptions::default() };
+        let options =
+            RunOptions { scene: "tiny".into(), overrides, timing: Some(level), ..RunOptions::default() };
         let plan = Plan::resolve(options)?.on(gpu, platform, table)?;
         let simulated = without_files(&plan, &Progress::new(true))?;
         let measurement = measure::measure(&plan, &simulated)?;

@@ -278,7 +278,7 @@ impl Modelled {
                 .filter(|unit| !unit.is_optional())
                 .map(Unit::name)
                 .collect(),
-            timing: plan.options.timing.name(),
+            timing: plan.options.level().name(),
             limits,
         }
     }

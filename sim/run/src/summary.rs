@@ -108,10 +108,38 @@ pub struct SettingsSummary {
     pub frames: u32,
     pub lens_radius: f32,
     pub focus: Option<f32>,
-    pub pacing: &'static str,
-    pub trace_rate_hz: f64,
+    /// `None` in a run of images alone.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pacing: Option<&'static str>,
+    /// `None` in a run of images alone.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub trace_rate_hz: Option<f64>,
     pub seed: u64,
     pub triangles: usize,
+}
+
+impl SettingsSummary {
+    /// Settings of image and scene. The first frame has so many triangles in all passes.
+    pub(super) fn new(plan: &Plan, triangles: usize) -> Self {
+        let scene = plan.job.settings();
+        Self {
+            width: scene.width,
+            height: scene.height,
+            samples: scene.samples,
+            table: scene.table.clone(),
+            clip: plan.job.scene().and_then(Scene::clip).map(str::to_owned),
+            frame_rate_hz: scene.frame_rate_hz,
+            shutter: scene.shutter,
+            first_frame: scene.frames.start,
+            frames: scene.frames.end - scene.frames.start,
+            lens_radius: scene.lens_radius,
+            focus: scene.focus,
+            pacing: None,
+            trace_rate_hz: None,
+            seed: plan.options.seed,
+            triangles,
+        }
+    }
 }
 
 /// Statistics over frames.
@@ -220,7 +248,11 @@ impl Summary {
             energy_table: [plan.table.name().to_owned(), format!("{:?}", plan.options.bound).to_lowercase()],
             request,
             inputs,
-            settings: settings(plan, simulated, measurement),
+            settings: SettingsSummary {
+                pacing: Some(plan.options.pacing.name()),
+                trace_rate_hz: Some(measurement.resolution.rate_hz),
+                ..SettingsSummary::new(plan, simulated.distinct.first().map_or(0, |frame| frame.triangles))
+            },
             camera,
             hardware: HardwareSummary::new(plan),
             modelled: Modelled::new(plan, simulated),
@@ -259,7 +291,7 @@ impl Summary {
 
 /// Stated error of the timing level, and of the prediction of frames.
 fn stated_error(plan: &Plan, simulated: &Simulated) -> StatedError {
-    let of_level = StatedError::of_frames(plan.options.timing, simulated.in_order());
+    let of_level = StatedError::of_frames(plan.options.level(), simulated.in_order());
     match &simulated.sampled {
         Some(SampledSummary { cycles_per_frame, busy_energy_per_frame_j, .. }) => {
             of_level.beside(cycles_per_frame.relative_half_width, busy_energy_per_frame_j.relative_half_width)
@@ -289,27 +321,6 @@ fn true_frames(measurement: &Measurement) -> Vec<FrameEnergy> {
         flags: traces::frames::Flags::default(),
     };
     measurement.run.frames.iter().map(frame).collect()
-}
-
-fn settings(plan: &Plan, simulated: &Simulated, measurement: &Measurement) -> SettingsSummary {
-    let scene = plan.job.settings();
-    SettingsSummary {
-        width: scene.width,
-        height: scene.height,
-        samples: scene.samples,
-        table: scene.table.clone(),
-        clip: plan.job.scene().and_then(Scene::clip).map(str::to_owned),
-        frame_rate_hz: scene.frame_rate_hz,
-        shutter: scene.shutter,
-        first_frame: scene.frames.start,
-        frames: scene.frames.end - scene.frames.start,
-        lens_radius: scene.lens_radius,
-        focus: scene.focus,
-        pacing: plan.options.pacing.name(),
-        trace_rate_hz: measurement.resolution.rate_hz,
-        seed: plan.options.seed,
-        triangles: simulated.distinct.first().map_or(0, |frame| frame.triangles),
-    }
 }
 
 fn detection(measurement: &Measurement) -> Detection {

@@ -191,7 +191,7 @@ fn planned(args: &TimeArgs, recorded: &RecordedRun, gpu: &Path) -> Result<Plan, 
         platform: args.platform.clone(),
         energy: args.energy.clone(),
         bound: args.bound,
-        timing: args.timing,
+        timing: Some(args.timing),
         pacing: args.pacing,
         ..RunOptions::default()
     })

@@ -246,7 +246,22 @@ fn one(
     let pool = args.threads.pool()?;
     let plan = Plan::resolve(options)?;
     let dir = open(&plan, &destination)?;
+    let is_timed = plan.options.timing.is_some();
+    if args.dry_run && !is_timed {
+        let message = "--timing none: --dry-run tells the time of what is counted; leave one of both out";
+        return Err(Failure { message: message.to_owned(), code: 2 });
+    }
     let prepared = pool.install(|| prepare(plan, recorded, REVISION, &progress))?;
+    if !is_timed {
+        let summary = pool.install(|| prepared.draw(dir, &progress))?;
+        if args.json {
+            json.push(json_text(&Printed { out: out.display().to_string(), summary: &summary }, true)?);
+        } else {
+            summary.warnings.iter().for_each(|warning| terminal.warn(warning));
+            print(&with_results(summary.lines(), out, started))?;
+        }
+        return Ok(None);
+    }
     if args.dry_run {
         let dry_run = pool.install(|| DryRun::new(&prepared))?;
         match args.json {
@@ -263,7 +278,7 @@ fn one(
         json.push(json_text(&Printed { out: out.display().to_string(), summary: &outcome.summary }, true)?);
     } else {
         outcome.summary.warnings.iter().for_each(|warning| terminal.warn(warning));
-        print(&format!("{}took {:.1} s", text(out, &outcome), started.elapsed().as_secs_f64()))?;
+        print(&with_results(text(&outcome), out, started))?;
     }
     Ok(Some(outcome.summary))
 }
@@ -312,14 +327,24 @@ fn options(args: &RunArgs) -> RunOptions {
 
 /// Summary with the folder it was written to.
 #[derive(Serialize)]
-struct Printed<'a> {
+struct Printed<'a, S> {
     out: String,
     #[serde(flatten)]
-    summary: &'a Summary,
+    summary: &'a S,
+}
+
+/// Lines with the places of the results and the time they took.
+fn with_results(lines: Vec<String>, out: &Path, started: Instant) -> String {
+    let places = [
+        format!("results: {}", out.display()),
+        format!("report:  {}", out.join("report.html").display()),
+        format!("took {:.1} s", started.elapsed().as_secs_f64()),
+    ];
+    lines.into_iter().chain(places).collect::<Vec<_>>().join("\n")
 }
 
 /// Text of a finished run for the terminal.
-fn text(out: &Path, outcome: &FinishedRun) -> String {
+fn text(outcome: &FinishedRun) -> Vec<String> {
     let (summary, settings) = (&outcome.summary, &outcome.summary.settings);
     let mut lines = vec![
         format!(
@@ -342,9 +367,7 @@ fn text(out: &Path, outcome: &FinishedRun) -> String {
         lines.push(format!("sample test efficiency {:.1} %", efficiency * 100.0));
     }
     lines.extend(summary.facts.iter().map(|(name, value)| format!("{name}: {}", count_or_digits(*value))));
-    lines.push(format!("results: {}", out.display()));
-    lines.push(format!("report:  {}\n", out.join("report.html").display()));
-    lines.join("\n")
+    lines
 }
 
 /// One line each for the choice, the predicted intervals and the actual errors.

@@ -174,7 +174,7 @@ pub fn measured(plan: &Plan, distinct: Vec<RunFrame>, groups: &[usize]) -> Resul
     let bytes = |event: Event| counts.get(event).unwrap_or(0);
     let [low_j, high_j] = detail::energy_ends(plan, frames)?;
     let accuracy = frames.iter().filter_map(|frame| frame.observed()).flat_map(|observed| &observed.accuracy);
-    let stated = StatedError::of_frames(plan.options.timing, frames.iter().copied());
+    let stated = StatedError::of_frames(plan.options.level(), frames.iter().copied());
     Ok(Measured {
         used: used(plan),
         cycles,
@@ -205,7 +205,7 @@ fn used(plan: &Plan) -> BTreeMap<String, String> {
         ("platform", plan.platform.name.clone()),
         ("energy", plan.table.name().to_owned()),
         ("bound", format!("{:?}", options.bound).to_lowercase()),
-        ("timing", options.timing.name().to_owned()),
+        ("timing", options.level().name().to_owned()),
         ("pacing", options.pacing.name().to_owned()),
         ("seed", options.seed.to_string()),
         ("width", settings.width.to_string()),

@@ -35,7 +35,7 @@ impl Schema {
     }
 
     /// Objects of the schema that are not strict: additional keys are allowed, or described keys are
-    /// optional.
+    /// optional in every kind of the object.
     pub fn gaps(&self) -> Vec<String> {
         let mut gaps = Vec::new();
         gaps_of(&self.root, "", &mut gaps);
@@ -53,6 +53,9 @@ impl Schema {
                     of => is_of(value, of),
                 },
                 "minimum" => value.as_f64().is_none_or(|number| Some(number) >= what.as_f64()),
+                "maxProperties" => {
+                    value.as_object().is_none_or(|fields| Some(fields.len() as u64) <= what.as_u64())
+                }
                 "minItems" => value.as_array().is_none_or(|items| Some(items.len() as u64) >= what.as_u64()),
                 "maxItems" => value.as_array().is_none_or(|items| Some(items.len() as u64) <= what.as_u64()),
                 "anyOf" => list(what).iter().any(|schema| {
@@ -132,9 +135,11 @@ fn gaps_of(schema: &Value, at: &str, gaps: &mut Vec<String>) {
         if schema.get("additionalProperties") != Some(&Value::Bool(false)) {
             gaps.push(format!("{at}: allows keys that it does not describe"));
         }
-        let required = schema.get("required").map_or(&[][..], list);
+        let kinds = schema.get("anyOf").map_or(&[][..], list).iter().chain([schema]);
+        let required: Vec<&Value> =
+            kinds.flat_map(|kind| kind.get("required").map_or(&[][..], list)).collect();
         for (name, property) in properties {
-            if !required.contains(&Value::from(name.as_str())) {
+            if !required.contains(&&Value::from(name.as_str())) {
                 gaps.push(format!("{at}/{name}: may be missing"));
             }
             if property.get("description").is_none() {

@@ -268,9 +268,7 @@ impl Rig {
             let run = Run { table: &self.table, run: run.clone() };
             let samples = OwnLens { run, middle, half: half as f32 };
             let settings = settings(&to, &samples);
-            Ok(RasterPass::new(&camera.with_lens(Some(lens)), draws, &settings)
-                .render(|_, _| ())?
-                .into_image())
+            Ok(RasterPass::new(&camera.with_lens(Some(lens)), draws, &settings).uncounted()?.into_image())
         };
         (0..).zip(&self.runs).map(image).collect()
     }

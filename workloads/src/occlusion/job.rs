@@ -404,7 +404,8 @@ pub fn depths(
     draws: &[Draw<'_>],
     settings: &pipeline::Settings<'_>,
 ) -> Result<Vec<f32>, PassError> {
-    Ok(depths_of(&RasterPass::new(camera, draws, settings).visibility()?))
+    let pass = RasterPass::new(camera, draws, settings).onto(Target::Depth).with_visible();
+    Ok(depths_of(&pass.uncounted()?.visible))
 }
 
 /// Depths of visible samples, as [`pipeline::Rendered::visible`] has them.

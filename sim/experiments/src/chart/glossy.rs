@@ -428,7 +428,7 @@ impl Bench {
             let refused = |error: pipeline::DrawError| StudyError::Pipeline(error.to_string());
             let geometry = Geometry::new(&corners, &corners, &[[0, 1, 2], [0, 2, 3]]).map_err(refused)?;
             let draws = [Draw::new(geometry, &White, Cull::None)];
-            let gpu = &mut Gpu::quiet(&self.gpu.pipeline)?;
+            let gpu = &mut Gpu::uncounted(&self.gpu.pipeline)?;
             let image = map.one_pass(&draws, &table, Vec3::ZERO, gpu)?.into_image();
             let width = ramp(&image, map.viewport.width() as usize) * map.texel();
             Ok(Blur { height, width, expected: map.blur(height) })
@@ -445,7 +445,7 @@ impl Bench {
             let truth = self.by_rays(&map, Lobe::Lens)?;
             let cone = self.by_rays(&map, Lobe::Cone)?;
             let table = SampleTable::new(&SampleSpec::default(), FEW, 1)?;
-            let gpu = &mut Gpu::quiet(&self.gpu.pipeline)?;
+            let gpu = &mut Gpu::uncounted(&self.gpu.pipeline)?;
             let few = map.one_pass(&self.draws()?, &table, self.scene.background(), gpu)?.into_image();
             let rmse = |image: &[Vec3]| mean_square(&errors(image, &truth)).sqrt();
             Ok(Wide { over_half, rmse_of_samples: rmse(&few), rmse_of_lobe: rmse(&cone) })

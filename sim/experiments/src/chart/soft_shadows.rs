@@ -12,7 +12,9 @@ use output::OutputError;
 use output::plot::{ChartPanel, Scale, Series};
 use output::progress::Progress;
 use pipeline::sampling::SampleSource;
-use pipeline::{Cull, Draw, Gpu, PipelineSpec, RasterPass, SampleSpec, SampleTable, Settings, Viewport};
+use pipeline::{
+    Cull, Draw, Gpu, PipelineSpec, RasterPass, SampleSpec, SampleTable, Settings, Target, Viewport,
+};
 use run::GpuSpec;
 use serde::Serialize;
 use workloads::accumulation::{RayWork, SharedSamples};
@@ -377,7 +379,8 @@ impl Bench<'_> {
     fn by_rays(&self, samples: &dyn SampleSource) -> Result<(Vec<Vec3>, RayWork, f64), StudyError> {
         let settings =
             Settings { spec: self.spec(), viewport: self.viewport, samples, background: Vec3::ZERO };
-        let seen = RasterPass::new(&self.stage.frame.camera, self.draws, &settings).visibility()?;
+        let pass = RasterPass::new(&self.stage.frame.camera, self.draws, &settings).onto(Target::Depth);
+        let seen = pass.with_visible().uncounted()?.visible;
         let started = Instant::now();
         let (image, work) = self.world.image_counted(samples, &seen, Shadows::Rays);
         Ok((image, work, started.elapsed().as_secs_f64()))
@@ -424,7 +427,7 @@ impl Bench<'_> {
 
     fn seen(&self, set: &SharedSamples) -> Result<Vec<(u32, u32)>, StudyError> {
         let view = SceneView { camera: &self.stage.frame.camera, draws: self.draws };
-        Ok(depth_pass(&view, self.viewport, set, Method::OnePass, &mut Gpu::quiet(self.spec())?)?.samples)
+        Ok(depth_pass(&view, self.viewport, set, Method::OnePass, &mut Gpu::uncounted(self.spec())?)?.samples)
     }
 
     /// Wrong shadows over the bias.

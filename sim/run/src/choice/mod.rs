@@ -95,7 +95,7 @@ pub(super) fn choose(
         Some(choice) => Choice { expected_error: choice.level_error, meets_accuracy: None, ..choice },
         None => probed(plan, distinct, &requested, progress)?,
     };
-    plan.options.timing = choice.level;
+    plan.options.timing = Some(choice.level);
     plan.options.sampling = choice.sampling;
     if choice.dimensions == Dimensions::WithoutSmallBlur {
         plan.gpu.pipeline.features = with_blur_thresholds(plan.gpu.pipeline.features, 1.0);
@@ -207,7 +207,7 @@ impl Verified {
 pub(super) fn verify(plan: &Plan, simulated: &Simulated, progress: &Progress) -> Result<Verified, RunError> {
     let mut options = plan.options.clone();
     (options.timing, options.sampling, options.requested) =
-        (Level::Stepped, Sampling::Every, Requested::default());
+        (Some(Level::Stepped), Sampling::Every, Requested::default());
     options.heat = Vec::new();
     let reference = Plan::resolve(options)?;
     let numbers: Vec<u32> = simulated.distinct.iter().map(|frame| frame.index).collect();

@@ -67,7 +67,7 @@ impl Recording {
         let time = |recorded: &RecordedFrame| {
             let clocks = plans.iter().map(|plan| {
                 let recorder = Recorder::new(BIN_PS, max_bins);
-                Ok(FrameClock::new(plan.options.timing, plan.gpu.machine()?, recorder))
+                Ok(FrameClock::new(plan.options.level(), plan.gpu.machine()?, recorder))
             });
             let mut clocks = clocks.collect::<Result<Vec<_>, RunError>>()?;
             push_all(&recorded.packets, &mut clocks)?;
@@ -75,7 +75,7 @@ impl Recording {
         };
         let frames = self.frames.par_iter().map(time).collect::<Result<Vec<_>, RunError>>()?;
         let mut timed: Vec<_> =
-            plans.iter().map(|plan| TimedFrames::new(self, plan.options.timing)).collect();
+            plans.iter().map(|plan| TimedFrames::new(self, plan.options.level())).collect();
         for (times, machine) in frames.into_iter().flat_map(|times| times.into_iter().zip(0..)) {
             timed[machine].timed.push(times);
         }
@@ -162,7 +162,8 @@ mod tests {
     fn plan(gpu: &str, timing: Level) -> Plan {
         let overrides = Overrides { frames: Some(0..2), samples: Some(2), ..Overrides::default() };
         let (scene, gpu) = ("tiny".into(), gpu.into());
-        Plan::resolve(RunOptions { scene, gpu, timing, overrides, ..RunOptions::default() }).unwrap()
+        Plan::resolve(RunOptions { scene, gpu, timing: Some(timing), overrides, ..RunOptions::default() })
+            .unwrap()
     }
 
     fn recorded(plan: &Plan, max_bytes: usize) -> Option<Recording> {

@@ -54,6 +54,16 @@ pub fn warnings_of(plan: &Plan, simulated: &Simulated, paced: &Run) -> Vec<Warni
     Warning::fold(all)
 }
 
+/// Warnings of a run of images alone, of its frames among them.
+pub(crate) fn of_images<'a>(
+    plan: &Plan,
+    frames: impl ExactSizeIterator<Item = (u32, &'a [Warning])>,
+) -> Vec<Warning> {
+    let mut all = plan.job.warnings().to_vec();
+    all.extend(of_frames(frames));
+    Warning::fold(all)
+}
+
 /// Merges warnings of frames by code: the message of the first frame, with the number of frames if messages
 /// differ.
 fn of_frames<'a>(frames: impl ExactSizeIterator<Item = (u32, &'a [Warning])>) -> Vec<Warning> {
@@ -87,7 +97,7 @@ fn accuracy(plan: &Plan, simulated: &Simulated) -> Vec<Warning> {
             None => worst.push((frame, warning)),
         }
     }
-    let level = plan.options.timing;
+    let level = plan.options.level();
     worst.iter().map(|(frame, warning)| warning.warning(*frame, level)).collect()
 }
 

@@ -290,7 +290,7 @@ impl Bench {
             let glosses: Vec<_> = draws.iter().map(|draw| Gloss { looks: draw.shader, exponent }).collect();
             let draws: Vec<_> =
                 draws.iter().zip(&glosses).map(|(draw, shader)| Draw { shader, ..*draw }).collect();
-            let found = rig.one_pass(&draws, &to, &mut Gpu::quiet(to.spec)?)?.images;
+            let found = rig.one_pass(&draws, &to, &mut Gpu::uncounted(to.spec)?)?.images;
             let truth = rig.own_cameras(&draws, &to)?;
             let pixels = |images: &[Vec<Vec3>]| images.concat();
             Ok::<_, StudyError>(mean_square(&errors(&pixels(&found), &pixels(&truth))).sqrt())

@@ -5,7 +5,10 @@ use std::time::Instant;
 use glam::{Affine3A, DVec3, Vec3};
 use output::progress::Bar;
 use pipeline::sampling::SampleSource;
-use pipeline::{Camera, Cull, Draw, Geometry, Lens, RasterPass, SampleSpec, SampleTable, Settings, Viewport};
+use pipeline::{
+    Camera, Cull, Draw, Geometry, Lens, PassError, RasterPass, Rendered, SampleSpec, SampleTable, Settings,
+    Viewport,
+};
 use rayon::prelude::*;
 use run::GpuSpec;
 use serde::Serialize;
@@ -35,12 +38,21 @@ pub(super) fn table(name: &str, samples: u32, seed: u64) -> Result<Box<dyn Sampl
     Ok(Box::new(SampleTable::new(&spec, samples, seed)?))
 }
 
-/// An image of the stage.
+/// An image of the stage, drawn by the modelled hardware.
 pub(super) fn image(stage: &Stage, samples: &dyn SampleSource) -> Result<Vec<Vec3>, StudyError> {
+    drawn(stage, samples, |pass| pass.render(|_, _| ()))
+}
+
+/// An image of the stage that `draw` draws.
+fn drawn(
+    stage: &Stage,
+    samples: &dyn SampleSource,
+    draw: impl FnOnce(&RasterPass<'_>) -> Result<Rendered, PassError>,
+) -> Result<Vec<Vec3>, StudyError> {
     let gpu = GpuSpec::load("reference")?;
     let rendered = stage.draw(|camera, draws, viewport, background| {
         let settings = Settings { spec: &gpu.pipeline, viewport, samples, background };
-        RasterPass::new(camera, draws, &settings).render(|_, _| ())
+        draw(&RasterPass::new(camera, draws, &settings))
     })??;
     Ok(rendered.into_image())
 }
@@ -48,7 +60,8 @@ pub(super) fn image(stage: &Stage, samples: &dyn SampleSource) -> Result<Vec<Vec
 /// The mean of several images of the default table with seeds of their own.
 pub(super) fn reference(stage: &Stage, effort: &SamplingEffort) -> Result<Vec<Vec3>, StudyError> {
     let frames = (0..effort.reference_frames).into_par_iter().map(|frame| {
-        image(stage, &*table("owen", effort.reference_samples, REFERENCE_SEED + u64::from(frame))?)
+        let table = table("owen", effort.reference_samples, REFERENCE_SEED + u64::from(frame))?;
+        drawn(stage, &*table, |pass| pass.uncounted())
     });
     let frames: Vec<Vec<Vec3>> = frames.collect::<Result<_, StudyError>>()?;
     let mean = |pixel: usize| {

@@ -129,7 +129,7 @@ fn plan(scene: &str, gpu: &GpuSpec, extent: Extent, level: Level) -> Result<Plan
         ..Overrides::default()
     };
     let (scene, gpu) = (scene.into(), gpu.name.as_str().into());
-    Plan::resolve(RunOptions { scene, gpu, overrides, timing: level, ..RunOptions::default() })
+    Plan::resolve(RunOptions { scene, gpu, overrides, timing: Some(level), ..RunOptions::default() })
 }
 
 /// Seed, frames simulated, cycles of all frames and host time of some choices of representatives. Each costs the previews and its share

@@ -159,7 +159,7 @@ pub(super) fn balls(points: &[[f64; 3]], radius: f64) -> Result<Figure, RunError
         pipeline::Settings { spec: &gpu.pipeline, viewport, samples: &samples, background: Vec3::ONE };
     let camera = corner_view().map_err(RunError::setting)?;
     let pass = RasterPass::new(&camera, &draws, &settings).named("points");
-    let image = Gpu::quiet(&gpu.pipeline).and_then(|mut gpu| gpu.draw(&pass)).map_err(RunError::setting)?;
+    let image = pass.uncounted().map_err(RunError::setting)?;
     let pixels = image.into_image().iter().map(|color| color.to_array()).collect();
     let caption =
         format!("{} points of a corner of the cube, {:.1} r along each side", centres.len(), side / radius);
