@@ -24,6 +24,7 @@ mod target_checks;
 mod test_selection;
 mod tile_tests;
 mod vertices;
+mod warps;
 mod worker;
 
 use activity::{LineAccess, Packet};

@@ -205,6 +205,7 @@ pub fn spec(features: Features) -> PipelineSpec {
         features,
         depth: DepthSpec::default(),
         compute: None,
+        warp_lanes: 32,
     }
 }
 
