@@ -110,27 +110,27 @@ pub trait TileShader: Sync {
 pub struct ConservativePass {
     /// Lines that hold more than the clear value.
     written: HashSet<u64>,
-    workers: Workers,
+    workers: IdleLanes,
 }
 
 /// Lanes of the workers that are not running, with the costs they know.
 #[derive(Debug, Default)]
-struct Workers(Mutex<Vec<Lanes>>);
+struct IdleLanes(Mutex<Vec<Lanes>>);
 
 /// Lanes of a worker that is running.
-struct Worker<'a> {
+struct BorrowedLanes<'a> {
     lanes: Lanes,
-    others: &'a Workers,
+    others: &'a IdleLanes,
 }
 
-impl Workers {
-    fn worker(&self) -> Worker<'_> {
+impl IdleLanes {
+    fn worker(&self) -> BorrowedLanes<'_> {
         let known = self.0.lock().ok().and_then(|mut lanes| lanes.pop());
-        Worker { lanes: known.unwrap_or_else(Lanes::remembering), others: self }
+        BorrowedLanes { lanes: known.unwrap_or_else(Lanes::remembering), others: self }
     }
 }
 
-impl Drop for Worker<'_> {
+impl Drop for BorrowedLanes<'_> {
     fn drop(&mut self) {
         if let Ok(mut lanes) = self.others.0.lock() {
             lanes.push(std::mem::take(&mut self.lanes));
@@ -208,7 +208,7 @@ impl ConservativePass {
                 Some(start)
             });
             let starts: Vec<usize> = starts.collect();
-            let log = |worker: &mut Worker<'_>, (body, start): (&&[Primitive], &usize)| {
+            let log = |worker: &mut BorrowedLanes<'_>, (body, start): (&&[Primitive], &usize)| {
                 log(body, *start, draw, shader, (&worker.lanes, warp_lanes))
             };
             let workers = || self.workers.worker();

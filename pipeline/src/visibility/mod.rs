@@ -27,7 +27,7 @@ use crate::setup::{PixelRect, SetupResult, Triangle, bounds, distribute, set_up}
 use crate::simd::{Width, dispatch};
 use cells::Facing;
 pub use raster::Tally;
-use raster::{BinSurface, Queue, Worker};
+use raster::{BinSurface, Queue, VisibleBinWorker};
 pub use sorter::SampleLayout;
 
 /// Visible triangle of every sample of a layout.
@@ -91,7 +91,7 @@ pub fn resolve_at(
             let mut tally = Tally::default();
             dispatch(
                 width,
-                Worker {
+                VisibleBinWorker {
                     layout,
                     samples,
                     surface,

@@ -28,7 +28,7 @@ pub enum LightView {
 /// Options of the job: water with waves under the sun.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct Options {
+pub struct CausticsOptions {
     /// Squares of two generator triangles along each side, 1 to 1024. 255 give the 130,050 volumes of the
     /// paper's ocean.
     pub cells: u32,
@@ -49,9 +49,9 @@ pub struct Options {
     pub look: LightView,
 }
 
-impl JobOptions for Options {}
+impl JobOptions for CausticsOptions {}
 
-impl Default for Options {
+impl Default for CausticsOptions {
     fn default() -> Self {
         Self {
             cells: 64,
@@ -66,7 +66,7 @@ impl Default for Options {
     }
 }
 
-impl Options {
+impl CausticsOptions {
     fn check(&self) -> Result<(), LoadError> {
         let (is_length, length) = (|value: f64| (1e-3..=1e4).contains(&value), "0.001 to 10000 metres");
         must_hold([
@@ -82,7 +82,7 @@ impl Options {
 
 /// The job and its ocean.
 struct Caustics {
-    options: Options,
+    options: CausticsOptions,
     ocean: Ocean,
     settings: Settings,
 }
@@ -95,12 +95,12 @@ pub(crate) const FLAGS: Flags = Flags { uses: &[Flag::Size], instead: &[] };
 /// # Errors
 /// [`LoadError`] for an invalid option or setting.
 pub fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<dyn Job>, LoadError> {
-    let options: Options = options.read()?;
+    let options: CausticsOptions = options.read()?;
     options.check()?;
     let settings =
         Settings { width: 512, height: 288, samples: 1, frame_rate_hz: 30.0, ..Settings::default() };
     let settings = settings.with(request.overrides)?;
-    let Options { cells, side_m, depth_m, wave_m, slope, .. } = options;
+    let CausticsOptions { cells, side_m, depth_m, wave_m, slope, .. } = options;
     let mut ocean = Ocean::new(cells, side_m, depth_m, [wave_m, slope], request.seed);
     ocean.pleat = options.pleat;
     if options.look == LightView::Floor {
@@ -146,7 +146,7 @@ impl Caustics {
 
     /// A camera slightly above the side, or straight above. All of the water is in the image.
     fn eye(&self) -> Option<Eye> {
-        let Options { side_m, depth_m, .. } = self.options;
+        let CausticsOptions { side_m, depth_m, .. } = self.options;
         let size @ [width, height] = [self.settings.width, self.settings.height];
         let aspect = f64::from(width) / f64::from(height);
         let middle = DVec3::new(0.12 * depth_m, -0.5 * depth_m, 0.07 * depth_m);
