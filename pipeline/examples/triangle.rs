@@ -39,6 +39,7 @@ fn hardware() -> PipelineSpec {
         features: Features::ALL,
         depth: DepthSpec::default(),
         compute: None,
+        warp_lanes: 32,
     }
 }
 

@@ -6,7 +6,7 @@ use std::ops::Deref;
 use activity::{Event, PacketCounts};
 
 use super::shared::{SharedAccess, SharedMemory};
-use super::warp::{Kind, LaneAccess, LineTouch, account};
+use super::warp::{AccessKind, LaneAccess, LineTouch, account};
 use super::{ComputePass, ComputeSpec};
 use crate::buffer::{Access, Atomic, Buffer, Buffers, Stored, Word};
 use crate::shader::Lane;
@@ -64,7 +64,7 @@ struct State<'a> {
     log: GroupLog,
     /// Accesses of the current warp, and how many of each kind the current lane made.
     warp: Vec<LaneAccess>,
-    made: Vec<(Kind, u32, u32)>,
+    made: Vec<(AccessKind, u32, u32)>,
 }
 
 /// A group of lanes.
@@ -178,25 +178,25 @@ impl GroupLane<'_, '_> {
     pub fn load<T: Word>(&self, buffer: Buffer<T>, index: u32) -> T {
         self.lane.count(1);
         let mut state = self.state.borrow_mut();
-        let is_there = state.reach(self.index, (buffer.number(), index), Kind::Load);
+        let is_there = state.reach(self.index, (buffer.number(), index), AccessKind::Load);
         T::of(if is_there { state.buffers.word(buffer.number(), index) } else { 0 })
     }
 
     /// Stores a value in a buffer. Of stores of several lanes to one word the last lane's stays.
     pub fn store<T: Word>(&self, buffer: Buffer<T>, index: u32, value: T) {
         let stored = Stored { buffer: buffer.number(), index, atomic: None, bits: value.bits() };
-        self.write(stored, Kind::Store);
+        self.write(stored, AccessKind::Store);
     }
 
     /// Changes a word of a buffer.
     pub fn atomic(&self, buffer: Buffer<u32>, index: u32, atomic: Atomic, value: u32) {
         self.write(
             Stored { buffer: buffer.number(), index, atomic: Some(atomic), bits: value },
-            Kind::Atomic,
+            AccessKind::Atomic,
         );
     }
 
-    fn write(&self, stored: Stored, kind: Kind) {
+    fn write(&self, stored: Stored, kind: AccessKind) {
         self.lane.count(1);
         let mut state = self.state.borrow_mut();
         if state.reach(self.index, (stored.buffer, stored.index), kind) {
@@ -206,20 +206,20 @@ impl GroupLane<'_, '_> {
 
     /// Word `index` of the shared memory; 0 after a fault.
     pub fn shared<T: Word>(&self, index: u32) -> T {
-        T::of(self.access_shared(index, SharedAccess::Load, Kind::SharedLoad))
+        T::of(self.access_shared(index, SharedAccess::Load, AccessKind::SharedLoad))
     }
 
     /// Stores a value in word `index` of the shared memory.
     pub fn set_shared<T: Word>(&self, index: u32, value: T) {
-        self.access_shared(index, SharedAccess::Store(value.bits()), Kind::SharedStore);
+        self.access_shared(index, SharedAccess::Store(value.bits()), AccessKind::SharedStore);
     }
 
     /// Adds to word `index` of the shared memory and returns what it was. Lanes add in their order.
     pub fn add_shared(&self, index: u32, value: u32) -> u32 {
-        self.access_shared(index, SharedAccess::Add(value), Kind::SharedAtomic)
+        self.access_shared(index, SharedAccess::Add(value), AccessKind::SharedAtomic)
     }
 
-    fn access_shared(&self, index: u32, access: SharedAccess, kind: Kind) -> u32 {
+    fn access_shared(&self, index: u32, access: SharedAccess, kind: AccessKind) -> u32 {
         self.lane.count(1);
         let mut state = self.state.borrow_mut();
         let words = state.shared.len();
@@ -240,11 +240,11 @@ impl GroupLane<'_, '_> {
 
 impl State<'_> {
     /// Notes an access of `lane` to a word of a buffer, if the pass may make it.
-    fn reach(&mut self, lane: u32, (buffer, index): (u32, u32), kind: Kind) -> bool {
+    fn reach(&mut self, lane: u32, (buffer, index): (u32, u32), kind: AccessKind) -> bool {
         let buffers = self.buffers;
         let bound = self.access.get(buffer as usize).copied().flatten();
         let fault = match bound {
-            Some(access) if kind == Kind::Load || access == Access::Write => {
+            Some(access) if kind == AccessKind::Load || access == Access::Write => {
                 let words = buffers.words(buffer);
                 let range = || Fault::Range { buffer: buffers.name(buffer).to_owned(), index, words };
                 (index >= words).then(range)
@@ -262,7 +262,7 @@ impl State<'_> {
         false
     }
 
-    fn note(&mut self, kind: Kind, buffer: u32, address: u64) {
+    fn note(&mut self, kind: AccessKind, buffer: u32, address: u64) {
         let made = self.made.iter_mut().find(|(known, of, _)| (*known, *of) == (kind, buffer));
         let nth = match made {
             Some((.., count)) => {

@@ -7,7 +7,7 @@ use crate::memory::LINE_BYTES;
 
 /// What an access of a warp does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Kind {
+pub(super) enum AccessKind {
     SharedLoad,
     SharedStore,
     SharedAtomic,
@@ -21,7 +21,7 @@ pub(super) enum Kind {
 pub(super) struct LaneAccess {
     /// How many of this kind and buffer the lane made before.
     pub nth: u32,
-    pub kind: Kind,
+    pub kind: AccessKind,
     /// Number of the buffer; 0 for shared memory.
     pub buffer: u32,
     /// Byte address; that of the word in shared memory.
@@ -29,7 +29,7 @@ pub(super) struct LaneAccess {
 }
 
 impl LaneAccess {
-    fn key(&self) -> (u32, Kind, u32) {
+    fn key(&self) -> (u32, AccessKind, u32) {
         (self.nth, self.kind, self.buffer)
     }
 }
@@ -61,10 +61,12 @@ pub(super) fn account(
     accesses.sort_unstable();
     for one in accesses.chunk_by(|a, b| a.key() == b.key()) {
         match one[0].kind {
-            Kind::SharedLoad | Kind::SharedStore | Kind::SharedAtomic => shared(one, spec.banks, counts),
-            Kind::Load => touch(one, Touched::Read, lines),
-            Kind::Store => touch(one, Touched::Written, lines),
-            Kind::Atomic => {
+            AccessKind::SharedLoad | AccessKind::SharedStore | AccessKind::SharedAtomic => {
+                shared(one, spec.banks, counts)
+            }
+            AccessKind::Load => touch(one, Touched::Read, lines),
+            AccessKind::Store => touch(one, Touched::Written, lines),
+            AccessKind::Atomic => {
                 atomic(one, spec.atomic_units, counts);
                 touch(one, Touched::Changed, lines);
             }
@@ -75,7 +77,7 @@ pub(super) fn account(
 
 /// A bank gives one word a cycle, to all lanes that ask for it. Atomics take a cycle each, and two accesses.
 fn shared(accesses: &[LaneAccess], banks: u32, counts: &mut PacketCounts) {
-    let is_atomic = accesses[0].kind == Kind::SharedAtomic;
+    let is_atomic = accesses[0].kind == AccessKind::SharedAtomic;
     let mut in_bank = vec![0_u32; banks as usize];
     let mut words = 0;
     for word in accesses.chunk_by(|a, b| a.address == b.address) {
@@ -116,7 +118,7 @@ mod tests {
     const SPEC: ComputeSpec =
         ComputeSpec { warp_lanes: 32, group_lanes: 256, shared_bytes: 4096, banks: 32, atomic_units: 2 };
 
-    fn of(kind: Kind, addresses: impl IntoIterator<Item = u64>) -> (PacketCounts, Vec<LineTouch>) {
+    fn of(kind: AccessKind, addresses: impl IntoIterator<Item = u64>) -> (PacketCounts, Vec<LineTouch>) {
         let one = |address| LaneAccess { nth: 0, kind, buffer: 0, address };
         let mut accesses = addresses.into_iter().map(one).collect();
         let (mut counts, mut lines) = (PacketCounts::default(), Vec::new());
@@ -127,7 +129,7 @@ mod tests {
     #[test]
     fn lanes_that_ask_a_bank_for_several_words_wait() {
         let cycles = |stride: u64| {
-            let (counts, _) = of(Kind::SharedLoad, (0..32).map(|lane| 4 * stride * lane));
+            let (counts, _) = of(AccessKind::SharedLoad, (0..32).map(|lane| 4 * stride * lane));
             assert_eq!(counts[Event::SharedAccesses], 32);
             [Event::SharedCycles, Event::BankConflicts].map(|event| counts[event])
         };
@@ -136,28 +138,28 @@ mod tests {
         assert_eq!([3, 33].map(cycles), [[1, 0]; 2]);
         assert_eq!(cycles(0), [1, 0], "a word goes to all lanes at once");
         // A warp twice as wide as the memory takes two cycles, none of them a conflict.
-        let (wide, _) = of(Kind::SharedStore, (0..64).map(|lane| 4 * lane));
+        let (wide, _) = of(AccessKind::SharedStore, (0..64).map(|lane| 4 * lane));
         assert_eq!([wide[Event::SharedCycles], wide[Event::BankConflicts]], [2, 0]);
     }
 
     #[test]
     fn atomics_in_shared_memory_take_a_cycle_each_on_a_word() {
-        let (counts, _) = of(Kind::SharedAtomic, [0; 32]);
+        let (counts, _) = of(AccessKind::SharedAtomic, [0; 32]);
         assert_eq!([counts[Event::SharedCycles], counts[Event::SharedAccesses]], [32, 64]);
-        let (counts, _) = of(Kind::SharedAtomic, (0..32).map(|lane| 4 * lane));
+        let (counts, _) = of(AccessKind::SharedAtomic, (0..32).map(|lane| 4 * lane));
         assert_eq!([counts[Event::SharedCycles], counts[Event::BankConflicts]], [1, 0]);
     }
 
     #[test]
     fn a_warp_touches_every_line_once() {
-        let lines = |stride: u64| of(Kind::Load, (0..32).map(|lane| 4 * stride * lane)).1.len();
+        let lines = |stride: u64| of(AccessKind::Load, (0..32).map(|lane| 4 * stride * lane)).1.len();
         assert_eq!([0, 1, 4, 16, 64].map(lines), [1, 2, 8, 32, 32]);
     }
 
     #[test]
     fn atomics_wait_for_equal_words_alone() {
         let of = |addresses: &[u64]| {
-            let (counts, lines) = of(Kind::Atomic, addresses.iter().copied());
+            let (counts, lines) = of(AccessKind::Atomic, addresses.iter().copied());
             ([Event::AtomicSteps, Event::AtomicConflicts].map(|event| counts[event]), lines.len())
         };
         assert_eq!(of(&[8; 32]), ([32, 31], 1));
@@ -171,7 +173,7 @@ mod tests {
     #[test]
     fn the_nth_accesses_of_lanes_are_one_access() {
         // Two loads of two lanes: the same two lines in a different order.
-        let one = |nth, address| LaneAccess { nth, kind: Kind::Load, buffer: 0, address };
+        let one = |nth, address| LaneAccess { nth, kind: AccessKind::Load, buffer: 0, address };
         let (mut counts, mut lines) = (PacketCounts::default(), Vec::new());
         let mut accesses = vec![one(0, 0), one(1, 64), one(0, 4), one(1, 68)];
         account(&mut accesses, &SPEC, &mut counts, &mut lines);

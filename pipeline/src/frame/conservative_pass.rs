@@ -110,27 +110,27 @@ pub trait TileShader: Sync {
 pub struct ConservativePass {
     /// Lines that hold more than the clear value.
     written: HashSet<u64>,
-    workers: Workers,
+    workers: IdleLanes,
 }
 
 /// Lanes of the workers that are not running, with the costs they know.
 #[derive(Debug, Default)]
-struct Workers(Mutex<Vec<Lanes>>);
+struct IdleLanes(Mutex<Vec<Lanes>>);
 
 /// Lanes of a worker that is running.
-struct Worker<'a> {
+struct BorrowedLanes<'a> {
     lanes: Lanes,
-    others: &'a Workers,
+    others: &'a IdleLanes,
 }
 
-impl Workers {
-    fn worker(&self) -> Worker<'_> {
+impl IdleLanes {
+    fn worker(&self) -> BorrowedLanes<'_> {
         let known = self.0.lock().ok().and_then(|mut lanes| lanes.pop());
-        Worker { lanes: known.unwrap_or_else(Lanes::remembering), others: self }
+        BorrowedLanes { lanes: known.unwrap_or_else(Lanes::remembering), others: self }
     }
 }
 
-impl Drop for Worker<'_> {
+impl Drop for BorrowedLanes<'_> {
     fn drop(&mut self) {
         if let Ok(mut lanes) = self.others.0.lock() {
             lanes.push(std::mem::take(&mut self.lanes));
@@ -140,6 +140,7 @@ impl Drop for Worker<'_> {
 
 /// What happened on the tiles of one body, in order.
 struct BodyLog<T> {
+    warp_lanes: u32,
     packets: Vec<PacketLog>,
     /// Results with the columns and rows of their tiles.
     outputs: Vec<([u32; 2], T)>,
@@ -156,8 +157,8 @@ struct PacketLog {
 }
 
 impl<T> BodyLog<T> {
-    fn new() -> Self {
-        Self { packets: Vec::new(), outputs: Vec::new(), rest: Vec::new() }
+    fn new(warp_lanes: u32) -> Self {
+        Self { warp_lanes, packets: Vec::new(), outputs: Vec::new(), rest: Vec::new() }
     }
 
     /// Work of the tile loop in the packet of a tile of `block`. The packet before it ends with what `lanes` did.
@@ -174,7 +175,7 @@ impl<T> BodyLog<T> {
 
     fn end_packet(&mut self, lanes: &Lanes) {
         if let Some(last) = self.packets.last_mut() {
-            last.lanes = lanes.finish();
+            last.lanes = lanes.finish(self.warp_lanes);
         }
     }
 }
@@ -196,7 +197,7 @@ impl ConservativePass {
         shader: &S,
         mut store: impl FnMut([u32; 2], S::Output),
     ) {
-        let first = gpu.triangles_of_pass() as u32;
+        let (first, warp_lanes) = (gpu.triangles_of_pass() as u32, gpu.spec().warp_lanes);
         let numbers = numbered(draw.primitives, first);
         vertices(gpu, draw, self.workers.worker().lanes.costs());
         for (chunk, from) in chunks(draw.primitives) {
@@ -207,8 +208,8 @@ impl ConservativePass {
                 Some(start)
             });
             let starts: Vec<usize> = starts.collect();
-            let log = |worker: &mut Worker<'_>, (body, start): (&&[Primitive], &usize)| {
-                log(body, *start, draw, shader, &worker.lanes)
+            let log = |worker: &mut BorrowedLanes<'_>, (body, start): (&&[Primitive], &usize)| {
+                log(body, *start, draw, shader, (&worker.lanes, warp_lanes))
             };
             let workers = || self.workers.worker();
             let logs: Vec<BodyLog<S::Output>> =
@@ -276,10 +277,10 @@ fn log<S: TileShader>(
     start: usize,
     draw: &ConservativeDraw<'_>,
     shader: &S,
-    lanes: &Lanes,
+    (lanes, warp_lanes): (&Lanes, u32),
 ) -> BodyLog<S::Output> {
     let across = draw.grid.columns.div_ceil(draw.block);
-    let (mut log, mut state) = (BodyLog::new(), S::BodyState::default());
+    let (mut log, mut state) = (BodyLog::new(warp_lanes), S::BodyState::default());
     for (item, primitive) in body.iter().zip(start..).filter(|(item, _)| !item.is_culled(lanes.costs()).0) {
         let after = item.rasterizer.rasterize_counted(
             &item.triangle,
@@ -305,7 +306,7 @@ fn vertices(gpu: &mut Gpu<'_>, draw: &ConservativeDraw<'_>, costs: &Costs) {
     let mut start = gpu.packet(PacketKind::Draw, Packet::NONE, None);
     start.counts[Event::Draws] = 1;
     gpu.push(&start, 0);
-    let vertex_ops = 2 * draw.projection.map_or(0, Projection::vertex_ops);
+    let vertex_ops = draw.projection.map_or(0, Projection::vertex_ops);
     let new: Vec<&Primitive> =
         draw.primitives.iter().filter(|primitive| !primitive.reuses_vertices).collect();
     let bytes = u64::from(draw.vertex_bytes);
@@ -317,9 +318,10 @@ fn vertices(gpu: &mut Gpu<'_>, draw: &ConservativeDraw<'_>, costs: &Costs) {
         counts[Event::VerticesFetched] = vertices;
         counts[Event::VertexBytes] = vertices * draw.vertex_bytes;
         counts[Event::VertexInvocations] = vertices;
-        counts[Event::ShaderOps] = vertices * vertex_ops;
         counts[Event::TrianglesIn] = triangles;
         for primitive in batch {
+            let ends = if primitive.triangle.is_moving() { 2 } else { 1 };
+            counts[Event::ShaderOps] += 3 * ends * vertex_ops;
             let (is_culled, madds) = primitive.is_culled(costs);
             let outcome = if is_culled { Event::TrianglesFaceCulled } else { Event::TrianglesSetUp };
             counts[outcome] += 1;

@@ -3,12 +3,14 @@
 //!
 //! A full-screen pass is drawn as a triangle over the image, so its lanes run in quads of pixels, with helpers. Lanes of
 //! conservative mode have none: quads are there for the differences between neighbours, and a tile shader has intervals in place
-//! of interpolated values. Each of its lanes stands alone and may be in a warp with any others.
+//! of interpolated values. Each of its lanes stands alone and may be in a warp with any others of its packet.
 
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
+use std::ops::Range;
 
 use activity::{Event, PacketCounts};
 
+use super::warps::Warps;
 use crate::depth::{Numbers, Real};
 use crate::geometry::Shear;
 use crate::memory::{LINE_BYTES, MemoryRange, MemorySystem};
@@ -46,13 +48,24 @@ impl Touch {
     }
 }
 
+/// A program that a lane ran.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Run {
+    /// Its operations.
+    ops: u32,
+    /// Which accesses of the tile were made since the program before, up to its end.
+    touches: Range<usize>,
+}
+
 /// The lanes that run for one tile.
 #[derive(Debug, Default)]
 pub struct Lanes {
     counts: RefCell<PacketCounts>,
     touches: RefCell<Vec<Touch>>,
-    /// Operations of each program that was run and not counted so far.
-    runs: RefCell<Vec<u32>>,
+    /// Programs that were run and not counted so far.
+    runs: RefCell<Vec<Run>>,
+    /// Accesses up to the end of the last program.
+    touched: Cell<usize>,
     costs: Costs,
 }
 
@@ -71,24 +84,45 @@ impl Lanes {
     pub fn run<T>(&self, program: impl FnOnce(&Lane) -> T) -> T {
         let lane = Lane::knowing(&self.costs);
         let result = program(&lane);
-        self.runs.borrow_mut().push(lane.ops());
+        let until = self.touches.borrow().len();
+        let touches = self.touched.replace(until)..until;
+        self.runs.borrow_mut().push(Run { ops: lane.ops(), touches });
         result
     }
 
-    /// Operations of the programs since it was last asked, which are then not counted as those of single lanes.
-    pub(super) fn take_runs(&self) -> Vec<u32> {
+    /// The programs since it was last asked, which are then not counted as those of single lanes.
+    pub(super) fn take_runs(&self) -> Vec<Run> {
         self.runs.take()
     }
 
-    /// Counts the lanes of a quad, by the operations of the programs that each of them ran. The n-th programs of the lanes run in
-    /// step, and each takes as long as the longest; a lane without an n-th program is a helper.
-    pub(super) fn count_quad(&self, lanes: [&[u32]; 4]) {
-        for nth in 0..lanes.iter().map(|runs| runs.len()).max().unwrap_or(0) {
-            let running = lanes.iter().filter_map(|runs| runs.get(nth));
-            self.count(Event::PixelInvocations, 4);
-            self.count(Event::HelperInvocations, 4 - running.clone().count() as u32);
-            self.count(Event::ShaderOps, 4 * running.max().copied().unwrap_or(0));
+    /// Counts the lanes of quads, by the programs that each of them ran. The n-th programs of the lanes of a warp run in step, and
+    /// each takes as long as the longest. A lane without an n-th program in a quad that has one is a helper.
+    pub(super) fn count_quads(&self, quads: &[[Vec<Run>; 4]], warp_lanes: u32) {
+        for nth in 0..quads.as_flattened().iter().map(Vec::len).max().unwrap_or(0) {
+            let mut warps = Warps::new(warp_lanes);
+            for quad in quads {
+                let lanes = quad.each_ref().map(|runs| runs.get(nth));
+                let Some(longest) = lanes.iter().flatten().map(|run| run.ops).max() else { continue };
+                warps.start(lanes.len() as u32, longest);
+                self.count(Event::PixelInvocations, lanes.len() as u32);
+                let helpers = (0..lanes.len()).filter(|lane| lanes[*lane].is_none());
+                helpers.for_each(|lane| self.help(lane, lanes));
+            }
+            self.count(Event::ShaderOps, warps.ops());
         }
+    }
+
+    /// Counts a helper lane. Its fetches are those of a neighbour, as beyond the image coordinates are clamped to its border.
+    /// Depth and colour of helpers are masked.
+    fn help(&self, lane: usize, lanes: [Option<&Run>; 4]) {
+        self.count(Event::HelperInvocations, 1);
+        let neighbour = [lane ^ 1, lane ^ 2, lane ^ 3].into_iter().find_map(|beside| lanes[beside]);
+        let Some(Run { touches, .. }) = neighbour else { return };
+        let mut all = self.touches.borrow_mut();
+        let fetched: Vec<Touch> =
+            all[touches.clone()].iter().filter(|touch| touch.client == Client::Texture).copied().collect();
+        self.count(Event::TextureFetches, fetched.len() as u32);
+        all.extend(fetched);
     }
 
     /// Fetches `bytes` at an address through the texture unit.
@@ -161,11 +195,13 @@ impl Lanes {
         self.touches.borrow_mut().push(touch);
     }
 
-    /// What the lanes did since they were last asked.
-    pub(super) fn finish(&self) -> LaneWork {
-        let runs = self.runs.take();
+    /// What the lanes did since they were last asked. They fill warps of `warp_lanes` lanes in the order in which they ran.
+    pub(super) fn finish(&self, warp_lanes: u32) -> LaneWork {
+        let (runs, mut warps) = (self.runs.take(), Warps::new(warp_lanes));
+        runs.iter().for_each(|run| warps.start(1, run.ops));
         self.count(Event::PixelInvocations, runs.len() as u32);
-        self.count(Event::ShaderOps, runs.iter().sum());
+        self.count(Event::ShaderOps, warps.ops());
+        self.touched.set(0);
         LaneWork { counts: self.counts.take(), touches: self.touches.take() }
     }
 }

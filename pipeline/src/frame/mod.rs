@@ -25,6 +25,7 @@ mod target_checks;
 mod test_selection;
 mod tile_tests;
 mod vertices;
+mod warps;
 mod worker;
 
 use activity::{LineAccess, Packet};
@@ -46,7 +47,7 @@ pub use query::{IntervalAnswer, IntervalQueries, MovingBox, SampledAnswer, Sampl
 use replay::Replay;
 pub use resolve_pass::ResolvePass;
 pub use settings::{Features, PipelineSpec, Settings, Shading, SpecError};
-use worker::Worker;
+use worker::BinWorker;
 
 /// A unit of finished work, in the order of the modelled hardware.
 enum Finished<'a> {
@@ -99,7 +100,7 @@ fn rasterize<F: FnMut(Finished<'_>)>(pass: &Pass<'_>, replay: &mut Replay<'_>, d
 
 /// Logs of shading the visible samples of every bin.
 fn shade_bins(pass: &Pass<'_>, bins: &mut [Bin]) -> Vec<BinLog> {
-    let shade = |scratch: &mut worker::Scratch, bin| Worker::new(pass, bin, scratch).shade_visible();
+    let shade = |scratch: &mut worker::Scratch, bin| BinWorker::new(pass, bin, scratch).shade_visible();
     bins.par_iter_mut().map_init(worker::Scratch::default, shade).collect()
 }
 
@@ -113,7 +114,7 @@ fn rasterize_bins(pass: &Pass<'_>, bins: &mut [Bin], ready: &[Ready], lists: &[V
         all.filter(|(number, _)| chosen(*number)).for_each_init(
             worker::Scratch::default,
             |scratch, (_, ((bin, list), log))| {
-                *log = Worker::new(pass, bin, scratch).rasterize(ready, list);
+                *log = BinWorker::new(pass, bin, scratch).rasterize(ready, list);
             },
         );
     };

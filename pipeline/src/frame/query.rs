@@ -293,7 +293,7 @@ impl Gpu<'_> {
 pub struct SampledAnswer {
     /// Fragments that pass the depth test, until the query ends.
     pub passed: u64,
-    /// Samples screened and tested.
+    /// Samples that were screened or tested; one that passes its screen and is tested then is one.
     pub tested: u64,
     /// Tiles tested, coarse ones included.
     pub tiles: u64,
@@ -306,7 +306,7 @@ pub struct SampledAnswer {
 }
 
 impl SampledAnswer {
-    /// Number of tests, including depth tests.
+    /// Number of tests: of samples, of tiles, and of depths.
     pub fn tests(&self) -> u64 {
         self.tested + self.tiles + self.compared + self.read
     }
@@ -321,7 +321,7 @@ impl SampledAnswer {
         let all = |events: &[Event]| events.iter().map(|event| counts[*event]).sum::<u64>();
         Self {
             passed,
-            tested: all(&[Event::SamplesTested, Event::SamplesScreened]),
+            tested: counts[Event::SampleReads],
             tiles: all(&[Event::TilesVisited, Event::CoarseTilesVisited]),
             compared: counts[Event::ZCullTests],
             read: counts[Event::DepthReads],

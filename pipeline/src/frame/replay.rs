@@ -8,11 +8,12 @@ use super::bin_memory::BinMemory;
 use super::pass::{INDEX_BYTES, Pass, Plane, Query, SAMPLE_BYTES, VertexBuffer};
 use super::resolve::{SampleLine, TileResolve, tile_lines};
 use super::shaded::{QuadWork, ShadedTriangle};
+use super::warps::Warps;
 use crate::memory::{Access, Cache, CacheError, LINE_BYTES, MemorySystem};
 use crate::random::mix;
 use crate::sampling::Sample;
 use crate::setup::{PixelRect, Triangle};
-use crate::shading::QuadAccess;
+use crate::shading::{QUAD_LANES, QuadAccess};
 
 /// State of a pass, and the caches of the frame.
 pub(super) struct Replay<'a> {
@@ -246,6 +247,7 @@ impl<'a> Replay<'a> {
     /// Look up the quads of a packet in the shading cache, and shade those that miss.
     fn shade(&mut self, triangle: u32, quads: &[QuadAccess], counts: &mut PacketCounts) {
         let surface = ShadedTriangle::new(self.pass, triangle);
+        let mut warps = Warps::new(self.pass.settings.spec.warp_lanes);
         for access in quads {
             counts[Event::ShadingLookups] += u32::from(access.lookups);
             let hit = self.shading.access(quad_key(triangle, access.quad), false) == Access::Hit;
@@ -255,14 +257,16 @@ impl<'a> Replay<'a> {
             }
             let memory = &mut self.memory;
             let work = surface.quad(access.quad, |line| memory.texture(line, counts));
-            count_quad(access, work, counts);
+            count_quad(access, work, &mut warps, counts);
         }
+        counts[Event::ShaderOps] += warps.ops();
     }
 
     /// Shade the quads of a packet at every sample, without a shading cache.
     fn shade_samples(&mut self, triangle: u32, quads: &[QuadAccess], counts: &mut PacketCounts) {
         let surface = ShadedTriangle::new(self.pass, triangle);
         let source = self.pass.settings.samples;
+        let mut warps = Warps::new(self.pass.settings.spec.warp_lanes);
         let mut samples: [Vec<Sample>; 4] =
             std::array::from_fn(|_| vec![Sample::default(); source.per_pixel() as usize]);
         for pixels in quads.chunk_by(|a, b| a.quad == b.quad) {
@@ -276,9 +280,10 @@ impl<'a> Replay<'a> {
                 let memory = &mut self.memory;
                 let line = |line| memory.texture(line, counts);
                 let work = surface.quad_at(access, &samples, line);
-                count_quad(access, work, counts);
+                count_quad(access, work, &mut warps, counts);
             }
         }
+        counts[Event::ShaderOps] += warps.ops();
     }
 
     /// Call `each` for every line of a tile's samples, of `sample_bytes` each, that holds one of `pixels`, with the mask of
@@ -380,13 +385,13 @@ fn compressed(pass: &Pass<'_>) -> [u64; 3] {
     if pass.is_attached { [0; 3] } else { all }
 }
 
-/// Count a quad of four lanes; lanes that were not requested are helpers.
-fn count_quad(access: &QuadAccess, work: QuadWork, counts: &mut PacketCounts) {
+/// Count a quad of four lanes, all but their operations; lanes that were not requested are helpers.
+fn count_quad(access: &QuadAccess, work: QuadWork, warps: &mut Warps, counts: &mut PacketCounts) {
     counts[Event::QuadsShaded] += 1;
     counts[Event::PixelInvocations] += 4;
     counts[Event::HelperInvocations] += 4 - access.lanes.count_ones();
     counts[Event::CentroidInvocations] += work.centroids;
-    counts[Event::ShaderOps] += 4 * work.ops;
+    warps.start(QUAD_LANES.len() as u32, work.ops);
     counts[Event::TextureFetches] += work.fetches;
 }
 

@@ -4,7 +4,7 @@ use activity::{Event, Packet, PacketKind};
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::lanes::{LaneWork, Lanes};
+use super::lanes::{LaneWork, Lanes, Run};
 use super::{Gpu, Rendered};
 use crate::geometry::Viewport;
 use crate::memory::LINE_BYTES;
@@ -14,8 +14,9 @@ const PIXEL_BYTES: u64 = 4;
 
 impl Gpu<'_> {
     /// Draws an image in a pass of its own: `pixel` gives the colour of the pixel at a column and row. What its lanes do is
-    /// counted as they do it, in quads of 2 x 2 pixels: the n-th programs of their lanes run in step, and a lane without one, as
-    /// beyond an odd side of the image, is a helper. Accesses of helpers to memory are not counted.
+    /// counted as they do it, in quads of 2 x 2 pixels: the n-th programs of the lanes of a warp run in step, and a lane without one, as
+    /// beyond an odd side of the image, is a helper. Helpers fetch what their neighbours fetch; they neither read nor write depth and
+    /// colour.
     pub fn shade_pixels(
         &mut self,
         name: &str,
@@ -46,7 +47,7 @@ impl Gpu<'_> {
         viewport: Viewport,
         pixel: impl Fn(&Lanes, [u32; 2]) -> T + Sync,
     ) -> Vec<T> {
-        let side = self.spec().tile_px;
+        let (side, warp_lanes) = (self.spec().tile_px, self.spec().warp_lanes);
         let columns: Vec<u32> = (0..viewport.width()).step_by(side as usize).collect();
         let mut values = vec![T::default(); viewport.pixels()];
         for y0 in (0..viewport.height()).step_by(side as usize) {
@@ -58,8 +59,8 @@ impl Gpu<'_> {
                     value
                 };
                 let values: Vec<T> = pixels([x0, y0], side, viewport).map(run).collect();
-                runs.count(&lanes);
-                (values, lanes.finish())
+                lanes.count_quads(&runs.quads, warp_lanes);
+                (values, lanes.finish(warp_lanes))
             };
             let tiles: Vec<(Vec<T>, LaneWork)> = columns.par_iter().map(run).collect();
             for ((x0, (of_tile, work)), column) in columns.iter().zip(tiles).zip(0..) {
@@ -106,11 +107,11 @@ impl Gpu<'_> {
     }
 }
 
-/// Operations of the programs of the pixels of a tile, by quad and lane.
+/// Programs of the pixels of a tile, by quad and lane.
 struct TileRuns {
     /// Quads in a row.
     across: u32,
-    quads: Vec<[Vec<u32>; 4]>,
+    quads: Vec<[Vec<Run>; 4]>,
 }
 
 impl TileRuns {
@@ -120,12 +121,8 @@ impl TileRuns {
     }
 
     /// Those of a pixel, by its place in the tile.
-    fn of(&mut self, [x, y]: [u32; 2]) -> &mut Vec<u32> {
+    fn of(&mut self, [x, y]: [u32; 2]) -> &mut Vec<Run> {
         &mut self.quads[(y / 2 * self.across + x / 2) as usize][(y % 2 * 2 + x % 2) as usize]
-    }
-
-    fn count(&self, lanes: &Lanes) {
-        self.quads.iter().for_each(|quad| lanes.count_quad(quad.each_ref().map(Vec::as_slice)));
     }
 }
 

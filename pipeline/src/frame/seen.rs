@@ -26,7 +26,7 @@ pub(super) fn draw(pass: &Pass<'_>, of: &RasterPass<'_>) -> Option<Rendered> {
         (of.camera, viewport, samples),
         (of.triangles() as u32, moving),
         corners,
-        Worker::default,
+        BinShader::default,
         |worker, seen| {
             let tiles = if has_images { worker.shade(pass, seen) } else { Vec::new() };
             (tiles, of.visible.then(|| seen.clone()))
@@ -71,14 +71,14 @@ fn in_image_order<'s>(pass: &Pass<'_>, bins: impl Iterator<Item = &'s SeenBin>) 
 
 /// Memory reused by a worker.
 #[derive(Default)]
-struct Worker {
+struct BinShader {
     scratch: Scratch,
     samples: TileSamples,
     /// Triangles of the samples of a tile.
     triangles: Vec<u32>,
 }
 
-impl Worker {
+impl BinShader {
     /// Colours of the tiles of a bin in which any sample sees a triangle.
     fn shade(&mut self, pass: &Pass<'_>, seen: &SeenBin) -> Vec<TilePixels> {
         let Settings { spec, viewport, samples: source, .. } = *pass.settings;

@@ -38,6 +38,13 @@ pub struct PipelineSpec {
     /// Groups of lanes; a GPU without it runs none.
     #[serde(default)]
     pub compute: Option<ComputeSpec>,
+    /// Lanes of a warp, which run in step. A GPU file has them in `units.shader`, from where they come.
+    #[serde(skip_deserializing, default = "usual_warp_lanes")]
+    pub warp_lanes: u32,
+}
+
+fn usual_warp_lanes() -> u32 {
+    32
 }
 
 /// Where visible samples are shaded. The choice changes the image.

@@ -39,7 +39,7 @@ pub(super) struct Scratch {
 }
 
 /// A worker with its results so far.
-pub(super) struct Worker<'a, 'p> {
+pub(super) struct BinWorker<'a, 'p> {
     pass: &'a Pass<'p>,
     bin: &'a mut Bin,
     scratch: &'a mut Scratch,
@@ -54,7 +54,7 @@ pub(super) struct Worker<'a, 'p> {
     bounder: Option<(u32, Bounder)>,
 }
 
-impl<'a, 'p> Worker<'a, 'p> {
+impl<'a, 'p> BinWorker<'a, 'p> {
     pub fn new(pass: &'a Pass<'p>, bin: &'a mut Bin, scratch: &'a mut Scratch) -> Self {
         let Scratch { samples, filled, sharp, sharpened, .. } = scratch;
         for (tiles, flags) in [(samples, filled), (sharp, sharpened)] {
@@ -370,7 +370,7 @@ impl<'a, 'p> Worker<'a, 'p> {
     }
 }
 
-impl Worker<'_, '_> {
+impl BinWorker<'_, '_> {
     /// Shades the visible samples of the bin, tile by tile and triangle by triangle.
     pub fn shade_visible(mut self) -> BinLog {
         for index in 0..self.bin.tiles.len() {
@@ -453,7 +453,7 @@ impl Pixel {
     }
 }
 
-impl Worker<'_, '_> {
+impl BinWorker<'_, '_> {
     /// Pixels written by `triangle` whose depths and whose colours now compress to half.
     fn small_pixels(&self, triangle: &Triangle, index: usize, origin: [u32; 2]) -> [u64; 2] {
         let Settings { spec, samples: source, .. } = *self.pass.settings;
@@ -538,7 +538,7 @@ impl ScreenSavings {
     }
 }
 
-impl Worker<'_, '_> {
+impl BinWorker<'_, '_> {
     /// Part of lens and time that stored depths leave visible in the tile, and whether no stored depth has to
     /// be read for it. `None` if the triangle is hidden.
     fn visible_part(

@@ -30,7 +30,7 @@ use crate::simd::{Width, dispatch};
 use bin::BinSamples;
 use cells::Facing;
 pub use raster::Tally;
-use raster::{BinSurface, Queue, Worker};
+use raster::{BinSurface, Queue, VisibleBinWorker};
 pub use sorter::SampleLayout;
 use tiles::SortedTiles;
 
@@ -209,7 +209,7 @@ impl FrontEnd {
         let mut tally = Tally::default();
         let queue = Queue::new(samples.sample_indices.len());
         let placed = &self.placed;
-        dispatch(width, Worker { layout, samples, surface, placed, list, tally: &mut tally, queue });
+        dispatch(width, VisibleBinWorker { layout, samples, surface, placed, list, tally: &mut tally, queue });
         tally
     }
 }

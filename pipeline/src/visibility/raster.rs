@@ -81,7 +81,7 @@ impl BinSurface {
 }
 
 /// A worker at a bin. Triangles come front to back, but any order gives the same result.
-pub(super) struct Worker<'a> {
+pub(super) struct VisibleBinWorker<'a> {
     pub layout: &'a SampleLayout,
     pub samples: &'a BinSamples,
     pub surface: &'a mut BinSurface,
@@ -91,7 +91,7 @@ pub(super) struct Worker<'a> {
     pub queue: Queue,
 }
 
-impl Kernel for Worker<'_> {
+impl Kernel for VisibleBinWorker<'_> {
     #[inline(always)]
     fn run<V: Lanes>(mut self) {
         self.surface.clear(self.samples);
@@ -99,7 +99,7 @@ impl Kernel for Worker<'_> {
     }
 }
 
-impl Worker<'_> {
+impl VisibleBinWorker<'_> {
     #[inline(always)]
     fn bin<V: Lanes, const LENS: bool>(&mut self) {
         let mut setup = CellSetup::EMPTY;

@@ -52,7 +52,7 @@ proptest! {
     fn the_counters_of_a_frame_agree_with_each_other(
         kind in kinds(), lens: bool, front: bool, textured: bool, count in 1..150_u32, switch: prop::sample::Index, seed: u64,
     ) {
-        let (soup, other) = (Soup::new(kind, count, seed), Soup::new(Kind::Still, 20, seed));
+        let (soup, other) = (Soup::new(kind, count, seed), Soup::new(SoupKind::Still, 20, seed));
         let uvs: Vec<_> = soup.open.iter().map(|p| Vec2::new(p.x, p.y)).collect();
         let texels = (0..256_u32).map(|i| [i as u8, 255 - i as u8, 7, 255]).collect();
         let checkered = Textured(Texture::from_srgb8(16, 16, texels, [Wrap::Repeat; 2]).unwrap());
@@ -66,7 +66,7 @@ proptest! {
         prop_assert_eq!(frame.counts[Event::TrianglesIn], u64::from(count) + 20);
         prop_assert_eq!(frame.counts.uses(Unit::Texture), textured && frame.packets.iter().any(
             |p| p.kind == PacketKind::Tile && p.triangle < count && p.counts[Event::QuadsShaded] > 0));
-        let moving = kind != Kind::Still && frame.counts[Event::SamplesTested] > 0;
+        let moving = kind != SoupKind::Still && frame.counts[Event::SamplesTested] > 0;
         let (least, most) = (sample_madds(false, lens), sample_madds(moving, lens));
         let (tested, madds) = (frame.counts[Event::SamplesTested], frame.counts[Event::SampleMadds]);
         prop_assert!((least * tested..=most * tested).contains(&madds), "{} {}", madds, tested);
@@ -120,7 +120,7 @@ fn beside_edges_a_test_saves_samples_over_many_frames() {
     assert!(edges.edges && edges.screen);
     for bit in (0..SWITCHES.ilog2()).filter(|&bit| switched(1 << bit).z_max || !switched(1 << bit).edges) {
         let mut totals = [0; 2];
-        for (seed, kind) in Kind::ALL.iter().copied().cycle().take(10 * Kind::ALL.len()).enumerate() {
+        for (seed, kind) in SoupKind::ALL.iter().copied().cycle().take(10 * SoupKind::ALL.len()).enumerate() {
             let (more, less) = one_apart(&Soup::new(kind, 60, seed as u64), seed % 2 == 0, SWITCHES - 1, bit);
             for (total, (features, counts)) in totals.iter_mut().zip([more, less]) {
                 *total += looked_at(&features, &counts);

@@ -77,7 +77,7 @@ fn bins_change_no_image_and_no_other_count() {
         Event::ALL.into_iter().filter(counted).map(|event| counts[event]).collect::<Vec<u64>>()
     };
     for (seed, lens) in [(1, false), (2, true), (3, true)] {
-        let soup = Soup::new(if lens { Kind::Moving } else { Kind::Still }, 300, seed);
+        let soup = Soup::new(if lens { SoupKind::Moving } else { SoupKind::Still }, 300, seed);
         let draws = [soup.draw(&Flat(Vec3::ONE), Cull::None)];
         let viewport = Viewport::new(96, 80).unwrap();
         let frame = |bins, batch_triangles| {
@@ -101,7 +101,7 @@ fn bins_change_no_image_and_no_other_count() {
 
 #[test]
 fn batches_that_fit_in_the_buffer_stay_on_the_chip() {
-    let soup = Soup::new(Kind::Moving, 300, 4);
+    let soup = Soup::new(SoupKind::Moving, 300, 4);
     let draws = [soup.draw(&Flat(Vec3::ONE), Cull::None)];
     let viewport = Viewport::new(96, 80).unwrap();
     let requests = |batch_triangles| {

@@ -153,21 +153,27 @@ impl Shader for Columns {
     }
 }
 
-/// One triangle covers the image. The loop runs column + 1 times, and both columns of a quad take as long as the second.
+/// One triangle covers the image. The loop runs column + 1 times. Eight quads are a warp: two rows of quads of a tile, all of which
+/// take as long as its last column, or two quads with four samples each, which take as long as the second. Warps of a quad take as
+/// long as its second column.
 #[test]
-fn lanes_of_a_quad_take_as_long_as_the_longest() {
+fn lanes_of_a_warp_take_as_long_as_the_longest() {
     let viewport = Viewport::new(32, 32).unwrap();
     let corners = [[-100.0, -100.0], [100.0, -100.0], [0.0, 200.0]].map(|[x, y]| Vec3::new(x, y, 1.0));
     let geometry = Geometry::new(&corners, &corners, &[[0, 1, 2]]).unwrap();
     let draws = [Draw::new(geometry, &Columns, Cull::None)];
     let table = SampleTable::low_discrepancy(4, 3, LensShape::Disk).unwrap();
     let of_quad = |quad: u64| 4 * (2 * (2 * quad + 2) + 1);
-    for (shading, runs) in [(Shading::Cached, 1), (Shading::PerSample, 4)] {
-        let spec = PipelineSpec { shading, ..spec(Features::ALL) };
+    let (cached, sampled) = ((Shading::Cached, 1), (Shading::PerSample, 4));
+    for ((shading, runs), warp_lanes) in [(cached, 4), (cached, 32), (sampled, 4), (sampled, 32)] {
+        let spec = PipelineSpec { shading, warp_lanes, ..spec(Features::ALL) };
         let settings = Settings { spec: &spec, viewport, samples: &table, background: Vec3::ZERO };
         let pass =
             RasterPass::new(&pixel_camera(viewport, 0.25), &draws, &settings).render(|_, _| ()).unwrap();
-        let expected = 3 * 13 + 16 * runs * (0..16).map(of_quad).sum::<u64>();
+        // Columns of quads in a warp.
+        let across = if warp_lanes == 4 { 1 } else { 4 / runs.min(2) };
+        let longest = |quad: u64| quad / across * across + across - 1;
+        let expected = 3 * 13 + 16 * runs * (0..16).map(|quad| of_quad(longest(quad))).sum::<u64>();
         if shading == Shading::Cached {
             assert_eq!(pass.counts[Event::ShaderOps], expected);
             assert_eq!(pass.images[0][5].x, 6.0);

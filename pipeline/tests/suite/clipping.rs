@@ -123,7 +123,7 @@ proptest! {
     /// Above a threshold of zero, smaller motion or blur is dropped, and nothing else changes.
     #[test]
     fn below_its_threshold_a_scene_is_that_without(seed: u64, lens: bool, blurred: bool) {
-        let mut soup = Soup::new(Kind::Moving, 40, seed);
+        let mut soup = Soup::new(SoupKind::Moving, 40, seed);
         for p in soup.open.iter_mut().chain(&mut soup.close) {
             p.z = p.z.max(0.5);
         }

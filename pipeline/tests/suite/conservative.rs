@@ -31,7 +31,7 @@ impl Numbers {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Kind {
+enum TriangleKind {
     Ordinary,
     Tiny,
     Huge,
@@ -44,15 +44,15 @@ enum Kind {
     Behind,
 }
 
-const KINDS: [Kind; 8] = [
-    Kind::Ordinary,
-    Kind::Tiny,
-    Kind::Huge,
-    Kind::Sliver,
-    Kind::Segment,
-    Kind::Point,
-    Kind::Grid,
-    Kind::Behind,
+const KINDS: [TriangleKind; 8] = [
+    TriangleKind::Ordinary,
+    TriangleKind::Tiny,
+    TriangleKind::Huge,
+    TriangleKind::Sliver,
+    TriangleKind::Segment,
+    TriangleKind::Point,
+    TriangleKind::Grid,
+    TriangleKind::Behind,
 ];
 
 const VIEWS: [View; 6] = [
@@ -66,23 +66,23 @@ const VIEWS: [View; 6] = [
 
 const GRID: Grid = Grid { origin: [-8.0, -8.0], tile: [1.0; 2], columns: 16, rows: 16 };
 
-fn triangle(kind: Kind, view: &View, r: &mut Numbers) -> [[[f64; 3]; 3]; 2] {
+fn triangle(kind: TriangleKind, view: &View, r: &mut Numbers) -> [[[f64; 3]; 3]; 2] {
     let middle = [r.within(-6.0, 6.0), r.within(-6.0, 6.0), r.within(1.0, 8.0)];
     let radius = match kind {
-        Kind::Tiny => 1e-6,
-        Kind::Huge => 1e6,
+        TriangleKind::Tiny => 1e-6,
+        TriangleKind::Huge => 1e6,
         _ => r.within(0.2, 4.0),
     };
     let still = r.bits().is_multiple_of(4);
     let mut end = |drift: f64| {
         let mut p = [0, 1, 2].map(|_| {
             let mut p = middle.map(|c| c + drift * r.within(-1.0, 1.0) + radius * r.within(-1.0, 1.0));
-            if kind != Kind::Behind {
+            if kind != TriangleKind::Behind {
                 p[2] = p[2].abs().max(0.3);
             } else if r.bits().is_multiple_of(3) {
                 p[2] = r.within(-4.0, 1.0);
             }
-            if kind == Kind::Grid {
+            if kind == TriangleKind::Grid {
                 p = p.map(|c| (4.0 * c).round() / 4.0);
                 p[2] = [0.5, 1.0, 2.0, 4.0][r.bits() as usize % 4];
                 p[0] = p[0].round();
@@ -90,14 +90,16 @@ fn triangle(kind: Kind, view: &View, r: &mut Numbers) -> [[[f64; 3]; 3]; 2] {
             if let View::Perspective { .. } = view { [p[0] * p[2], p[1] * p[2], p[2]] } else { p }
         });
         match kind {
-            Kind::Point => p = [p[0]; 3],
-            Kind::Segment => p[2] = p[1],
-            Kind::Sliver => p[2] = [0, 1, 2].map(|i| 0.5 * (p[0][i] + p[1][i]) + 1e-9 * r.within(-1.0, 1.0)),
+            TriangleKind::Point => p = [p[0]; 3],
+            TriangleKind::Segment => p[2] = p[1],
+            TriangleKind::Sliver => {
+                p[2] = [0, 1, 2].map(|i| 0.5 * (p[0][i] + p[1][i]) + 1e-9 * r.within(-1.0, 1.0))
+            }
             _ => {}
         }
         p
     };
-    let drift = if kind == Kind::Tiny { 1e-5 } else { 1.0 };
+    let drift = if kind == TriangleKind::Tiny { 1e-5 } else { 1.0 };
     let open = end(drift);
     [open, if still { open } else { end(drift) }]
 }
@@ -325,7 +327,9 @@ fn a_corner_cut_off_by_a_rounding_is_reported() {
 /// Reported tiles over those that dense sampling finds touched; with fewer points the ratio grows.
 #[test]
 fn the_false_positive_rate_of_tiles_is_low() {
-    for (kind, most) in [(Kind::Ordinary, 1.05), (Kind::Sliver, 1.05), (Kind::Behind, 1.6)] {
+    for (kind, most) in
+        [(TriangleKind::Ordinary, 1.05), (TriangleKind::Sliver, 1.05), (TriangleKind::Behind, 1.6)]
+    {
         for view in VIEWS {
             let ratios = [0, 2, 4].map(|halvings| {
                 let (mut found, mut r) = (Found::default(), Numbers(11));
@@ -348,7 +352,7 @@ fn the_false_positive_rate_of_tiles_is_low() {
 fn tiles_can_be_walked_by_hand() {
     let mut r = Numbers(3);
     let rasterizer = Rasterizer::new(VIEWS[3]);
-    let ends = triangle(Kind::Ordinary, &VIEWS[3], &mut r);
+    let ends = triangle(TriangleKind::Ordinary, &VIEWS[3], &mut r);
     let moving = MovingTriangle::new(ends[0], ends[1]).unwrap();
     let mut reported = HashMap::new();
     rasterizer.rasterize(&moving, &GRID, |tile, touch| {

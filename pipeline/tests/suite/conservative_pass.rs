@@ -145,11 +145,24 @@ fn the_tiles_are_those_of_the_rasterizer() {
     }
 }
 
-/// Lanes of a quad run in step: it takes as long as its longest lane, for each program that any of them runs. Lanes of tiles in
+/// Lanes of a warp run in step: it takes as long as its longest lane, for each program that any of them runs. Lanes of tiles in
 /// conservative mode have no helpers.
 #[test]
-fn lanes_of_a_full_screen_pass_wait_for_their_quad() {
+fn lanes_of_a_full_screen_pass_wait_for_their_warp() {
+    let quads = PipelineSpec { warp_lanes: 4, ..spec(Features::ALL) };
     let spec = spec(Features::ALL);
+    let wait = |spec: &PipelineSpec, at: [u32; 2]| {
+        let mut gpu = Gpu::quiet(spec).unwrap();
+        let drawn = gpu.shade_pixels("wait", Viewport::new(16, 8).unwrap(), |lanes, pixel| {
+            let ops = if pixel == at { 50 } else { 3 };
+            lanes.run(|lane| (0..ops).for_each(|_| assert!(lane.add(1.0, 2.0) > 0.0)));
+            Vec3::ZERO
+        });
+        drawn.counts[Event::ShaderOps]
+    };
+    // One lane of 128 takes longer, and its quad or its warp of eight quads with it.
+    assert_eq!(wait(&quads, [5, 3]), 3 * 124 + 4 * 50);
+    assert_eq!(wait(&spec, [5, 3]), 3 * 96 + 32 * 50);
     let counts = |programs: fn([u32; 2]) -> Vec<u32>| {
         let mut gpu = Gpu::quiet(&spec).unwrap();
         let drawn = gpu.shade_pixels("steps", Viewport::new(16, 8).unwrap(), |lanes, at| {
@@ -161,8 +174,6 @@ fn lanes_of_a_full_screen_pass_wait_for_their_quad() {
         [Event::PixelInvocations, Event::HelperInvocations, Event::ShaderOps].map(|event| drawn.counts[event])
     };
     assert_eq!(counts(|_| vec![3]), [128, 0, 3 * 128]);
-    // One lane of 128 takes longer, and its quad with it.
-    assert_eq!(counts(|at| vec![if at == [5, 3] { 50 } else { 3 }]), [128, 0, 3 * 124 + 4 * 50]);
     // A second program of three lanes of two quads.
     let second = |at: [u32; 2]| if [[0, 0], [1, 1], [8, 0]].contains(&at) { vec![3, 7] } else { vec![3] };
     assert_eq!(counts(second), [128 + 8, 8 - 3, 3 * 128 + 7 * 8]);
@@ -191,7 +202,8 @@ fn a_full_screen_pass_runs_every_pixel() {
     let lanes = 4 * 11 * 7;
     assert_eq!((drawn.counts[Event::PixelInvocations], drawn.counts[Event::ShaderOps]), (lanes, lanes));
     assert_eq!(drawn.counts[Event::HelperInvocations], lanes - pixels);
-    assert_eq!(drawn.counts[Event::TextureFetches], pixels);
+    // Helpers fetch what their neighbours do, one line each.
+    assert_eq!((drawn.counts[Event::TextureFetches], drawn.counts[Event::TextureLines]), (lanes, lanes));
     assert_eq!(drawn.into_image()[21 * 5 + 7], Vec3::splat(12.0));
     gpu.write_image("copy", viewport);
     assert_eq!(gpu.finish().counts()[Event::PixelsResolved], 2 * pixels);

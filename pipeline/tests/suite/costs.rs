@@ -23,7 +23,7 @@ fn total(c: &Counts) -> u64 {
 #[test]
 fn auto_is_as_good_as_the_best_fixed_choice() {
     let mut worse = Vec::new();
-    for kind in [Kind::Still, Kind::Moving, Kind::Crossing, Kind::Slivers, Kind::Layers] {
+    for kind in [SoupKind::Still, SoupKind::Moving, SoupKind::Crossing, SoupKind::Slivers, SoupKind::Layers] {
         for (lens, count, per_pixel, scale) in [
             (false, 300, 4, 1.0),
             (true, 300, 4, 1.0),
@@ -54,7 +54,7 @@ fn auto_is_as_good_as_the_best_fixed_choice() {
             }
         }
     }
-    assert_eq!(worse, [(Kind::Layers, true, 3000, 4)]);
+    assert_eq!(worse, [(SoupKind::Layers, true, 3000, 4)]);
 }
 
 /// Shrink every triangle about its own middle; its motion stays.

@@ -29,7 +29,7 @@ struct Scene {
 }
 
 impl Scene {
-    fn new(kind: Kind, cull: Cull, optics: Optics, borders: bool, count: u32, seed: u64) -> Self {
+    fn new(kind: SoupKind, cull: Cull, optics: Optics, borders: bool, count: u32, seed: u64) -> Self {
         let soup = Soup::new(kind, count, seed);
         let table = if borders {
             border_table(seed)
@@ -89,7 +89,14 @@ proptest! {
 
 #[test]
 fn every_combination_on_one_scene_of_each_kind() {
-    for kind in [Kind::Still, Kind::Moving, Kind::Crossing, Kind::Slivers, Kind::Grid, Kind::Layers] {
+    for kind in [
+        SoupKind::Still,
+        SoupKind::Moving,
+        SoupKind::Crossing,
+        SoupKind::Slivers,
+        SoupKind::Grid,
+        SoupKind::Layers,
+    ] {
         for ways in 0..8 {
             let [lens, borders, parallel] = [1, 2, 4].map(|bit| ways & bit != 0);
             let cull = if borders { Cull::Back } else { Cull::None };
@@ -160,7 +167,7 @@ proptest! {
 fn tiles_between_the_images_of_two_views_are_culled() {
     let eye = |middle: f32| LensRegion { u: (middle - 0.1, middle + 0.1), v: (-0.1, 0.1) };
     let table = divided(LensRegions::Rectangles(vec![eye(-0.9), eye(0.9)]), LensShape::Disk, 5);
-    for kind in [Kind::Still, Kind::Moving] {
+    for kind in [SoupKind::Still, SoupKind::Moving] {
         let camera = camera(false).with_lens(Some(Lens::new(3.0, 6.0).unwrap()));
         let soup = Soup::new(kind, 30, 3);
         let counts = |lens_regions: bool| {
@@ -182,7 +189,7 @@ fn tiles_between_the_images_of_two_views_are_culled() {
         assert!(culled(&with) > culled(&without), "{kind:?}: {} {}", culled(&with), culled(&without));
         let samples = |counts: &activity::Counts| counts[Event::SamplesScreened];
         assert!(samples(&with) <= samples(&without), "{kind:?}: {} {}", samples(&with), samples(&without));
-        assert!(kind == Kind::Still || samples(&with) < samples(&without), "views keep their own times");
+        assert!(kind == SoupKind::Still || samples(&with) < samples(&without), "views keep their own times");
         assert_eq!(with[Event::SamplesHit], without[Event::SamplesHit]);
     }
 }

@@ -54,7 +54,7 @@ fn texture() -> Texture {
 type Frame = (Vec<[u32; 3]>, activity::Counts, Stream, Vec<(u32, u32)>);
 
 fn frame(threads: usize, lens: bool, features: Features, batch_triangles: u32) -> Frame {
-    let (near, far) = (Soup::new(Kind::Moving, 300, 5), Soup::new(Kind::Crossing, 200, 6));
+    let (near, far) = (Soup::new(SoupKind::Moving, 300, 5), Soup::new(SoupKind::Crossing, 200, 6));
     let uvs: Vec<_> = near.open.iter().map(|p| Vec2::new(p.x, p.y) * 0.3).collect();
     let textured = Textured(texture());
     let mut first = near.draw(&textured, Cull::None);
@@ -114,7 +114,7 @@ fn the_size_of_batches_changes_no_sample() {
 
 #[test]
 fn the_size_of_tiles_changes_no_pixel() {
-    let (soup, viewport) = (Soup::new(Kind::Moving, 200, 8), Viewport::new(77, 45).unwrap());
+    let (soup, viewport) = (Soup::new(SoupKind::Moving, 200, 8), Viewport::new(77, 45).unwrap());
     let table = SampleTable::low_discrepancy(4, 3, LensShape::Disk).unwrap();
     let seen = |tile_px, coarse_tile_px| {
         let spec = PipelineSpec { tile_px, coarse_tile_px, ..spec(Features::ALL) };

@@ -113,7 +113,7 @@ proptest! {
     /// Equal ends in two arrays are as still as one array.
     #[test]
     fn a_frame_of_equal_ends_is_the_frame_of_a_still_mesh(lens: bool, seed: u64) {
-        let soup = Soup::new(Kind::Still, 40, seed);
+        let soup = Soup::new(SoupKind::Still, 40, seed);
         let twice = soup.open.clone();
         let viewport = Viewport::new(40, 24).unwrap();
         let table = SampleTable::low_discrepancy(4, seed, LensShape::Disk).unwrap();

@@ -1,7 +1,7 @@
 //! Heat maps: every event is counted once, at its position.
 
 use crate::common::stage::{RED, still};
-use crate::common::{Kind, Plain, Soup, camera, pixel_camera, rectangle, spec};
+use crate::common::{Plain, Soup, SoupKind, camera, pixel_camera, rectangle, spec};
 use activity::{Counts, Event};
 use glam::Vec3;
 use pipeline::frame::HeatMap;
@@ -22,7 +22,8 @@ fn maps(size: [u32; 2], spec: &PipelineSpec, draws: &[Draw<'_>], camera: &Camera
 
 #[test]
 fn every_event_is_counted_once() {
-    for (kind, tile_px, coarse_tile_px) in [(Kind::Moving, 8, 32), (Kind::Layers, 4, 16), (Kind::Still, 1, 8)]
+    for (kind, tile_px, coarse_tile_px) in
+        [(SoupKind::Moving, 8, 32), (SoupKind::Layers, 4, 16), (SoupKind::Still, 1, 8)]
     {
         let soup = Soup::new(kind, 250, 4);
         let spec = PipelineSpec { tile_px, coarse_tile_px, ..spec(Features::ALL) };
@@ -104,7 +105,7 @@ fn tests_without_a_packet_are_counted_in_their_tile() {
 /// others.
 #[test]
 fn passes_of_a_frame_add_up_on_one_map() {
-    let (spec, soup) = (spec(Features::ALL), Soup::new(Kind::Moving, 120, 4));
+    let (spec, soup) = (spec(Features::ALL), Soup::new(SoupKind::Moving, 120, 4));
     let table = SampleTable::low_discrepancy(4, 3, LensShape::Disk).unwrap();
     let (camera, draws) = (camera(true), [soup.draw(&Plain, Cull::None)]);
     let [image, map] = [[75, 53], [32, 32]].map(|[width, height]| Viewport::new(width, height).unwrap());

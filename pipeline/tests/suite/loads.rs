@@ -2,6 +2,7 @@
 
 use activity::{Counts, Event, Packet, PacketKind, Waits};
 use glam::{Vec3, Vec4};
+use pipeline::sampling::Sample;
 use pipeline::*;
 
 use crate::common::stage::*;
@@ -180,4 +181,53 @@ fn a_buffer_that_is_not_bound_reads_as_zero_and_one_of_another_frame_is_refused(
     };
     let error = other.dispatch(&groups).unwrap_err();
     assert!(error.to_string().starts_with("pass `write`: the frame has no such buffer"), "{error}");
+}
+
+/// Loads the word of its pixel, and then adds as often as the column says.
+struct Uneven(Buffer<f32>);
+
+impl Shader for Uneven {
+    fn shade(&self, lane: &Lane, at: &ShadingPoint, _: Vec4) -> Vec4 {
+        let [x, y] = at.pixel.map(|part| part as u32);
+        let mut sum = lane.load(self.0, y * SIDE + x);
+        for _ in 0..x {
+            sum = lane.add(sum, 1.0);
+        }
+        lane.branch(sum > 0.0);
+        Vec4::splat(sum)
+    }
+}
+
+/// A triangle with legs of 7.5 pixels in the first tile covers the 28 pixels with `x + y < 7` at their centres: ten quads, whose other
+/// twelve lanes are helpers. All forty load; lane `x` takes `x + 2` operations, and a warp of eight quads as long as its longest.
+#[test]
+fn helper_lanes_load_and_a_warp_waits_for_its_longest_lane() {
+    let corners = [[0.0, 0.0], [7.5, 0.0], [0.0, 7.5]];
+    let corners = corners.map(|[x, y]: [f32; 2]| Vec3::new(x - 8.0, 8.0 - y, 1.0));
+    let geometry = Geometry::new(&corners, &corners, &[[0, 1, 2]]).unwrap();
+    let viewport = Viewport::new(SIDE, SIDE).unwrap();
+    let middle = Sample { x: 0.5, y: 0.5, t: 0.5, ..Sample::default() };
+    let samples = vec![middle; (SampleTable::SIDE_PX * SampleTable::SIDE_PX) as usize];
+    let table = SampleTable::programmed(1, 0, samples).unwrap();
+    // Rows of quads of four, three, two and one: the first warp has the first two rows and a quad of the third.
+    let by_quad = [[2, 4, 6, 8].as_slice(), &[2, 4, 6], &[2, 4], &[2]].concat();
+    for (warp_lanes, of_lanes) in
+        [(4, by_quad.iter().map(|last| 4 * (last + 1)).sum::<u64>()), (32, 32 * (8 + 1) + 8 * (4 + 1))]
+    {
+        let spec = PipelineSpec { warp_lanes, ..spec(Features::ALL) };
+        let mut gpu = Gpu::quiet(&spec).unwrap();
+        let buffer = gpu.buffer("data", &[1.0_f32; 256]);
+        let bindings = [Binding::Buffer(buffer.reads())];
+        let shader = Uneven(buffer);
+        let draws = [Draw::new(geometry, &shader, Cull::None).binding(&bindings)];
+        let settings = Settings { spec: &spec, viewport, samples: &table, background: Vec3::ZERO };
+        let camera = pixel_camera(viewport, 0.25);
+        let counts = gpu.draw(&RasterPass::new(&camera, &draws, &settings)).unwrap().counts;
+        let lanes = [Event::QuadsShaded, Event::PixelInvocations, Event::HelperInvocations];
+        assert_eq!(lanes.map(|event| counts[event]), [10, 40, 12]);
+        assert_eq!(counts[Event::TextureFetches], 40, "helpers load, too");
+        // A row of the image is a line; each quad has lanes in two rows.
+        assert_eq!((counts[Event::TextureLines], counts[Event::TextureMisses]), (20, 8));
+        assert_eq!(counts[Event::ShaderOps], 3 * 13 + of_lanes, "warps of {warp_lanes}");
+    }
 }

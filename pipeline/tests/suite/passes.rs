@@ -34,7 +34,7 @@ fn barriers(packets: &[Packet]) -> Vec<(u32, Waits)> {
 
 #[test]
 fn a_pass_has_the_image_that_it_has_alone() {
-    let soups = [Soup::new(Kind::Moving, 150, 1), Soup::new(Kind::Layers, 40, 2)];
+    let soups = [Soup::new(SoupKind::Moving, 150, 1), Soup::new(SoupKind::Layers, 40, 2)];
     let draws = soups.each_ref().map(|soup| [soup.draw(&Plain, Cull::None)]);
     with(|settings| {
         let camera = camera(true);
@@ -55,7 +55,7 @@ fn a_pass_has_the_image_that_it_has_alone() {
 
 #[test]
 fn packets_add_up_to_the_work_of_draws_and_passes() {
-    let soups = [1, 2, 3].map(|seed| Soup::new(Kind::Crossing, 70, seed));
+    let soups = [1, 2, 3].map(|seed| Soup::new(SoupKind::Crossing, 70, seed));
     let draws = soups.each_ref().map(|soup| soup.draw(&Plain, Cull::None));
     with(|settings| {
         let camera = camera(true);
@@ -91,7 +91,7 @@ fn packets_add_up_to_the_work_of_draws_and_passes() {
 
 #[test]
 fn data_that_are_drawn_twice_are_read_from_memory_once() {
-    let soup = Soup::new(Kind::Moving, 200, 5);
+    let soup = Soup::new(SoupKind::Moving, 200, 5);
     let draws = [soup.draw(&Plain, Cull::None)];
     let read = |resident: bool| {
         with(|settings| {
@@ -115,7 +115,7 @@ fn screen() -> ([Vec3; 4], [Vec2; 4]) {
 
 #[test]
 fn a_pass_waits_for_the_one_it_reads_and_finds_its_result_in_the_l2() {
-    let soup = Soup::new(Kind::Still, 100, 7);
+    let soup = Soup::new(SoupKind::Still, 100, 7);
     let (corners, uvs) = screen();
     let texels = vec![[200, 100, 50, 255]; (SIDE * SIDE) as usize];
     let shader = Textured(Texture::from_srgb8(SIDE, SIDE, texels, [Wrap::Clamp; 2]).unwrap());
@@ -146,7 +146,7 @@ fn a_pass_waits_for_the_one_it_reads_and_finds_its_result_in_the_l2() {
 
 #[test]
 fn a_frame_that_is_too_large_names_its_pass() {
-    let soup = Soup::new(Kind::Still, 1, 1);
+    let soup = Soup::new(SoupKind::Still, 1, 1);
     let draws = [soup.draw(&Plain, Cull::None)];
     with(|settings| {
         let mut gpu = Gpu::quiet(settings.spec).unwrap();

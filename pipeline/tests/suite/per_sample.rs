@@ -1,6 +1,6 @@
 //! Shading of every sample at its own position, the alternative to the shading cache.
 
-use crate::common::{Flat, Kind, Plain, QUAD, Soup, camera, pixel_camera, rectangle, spec};
+use crate::common::{Flat, Plain, QUAD, Soup, SoupKind, camera, pixel_camera, rectangle, spec};
 use activity::{Counts, Event};
 use glam::{Vec2, Vec3, Vec4};
 use pipeline::*;
@@ -45,7 +45,7 @@ fn lanes(counts: &Counts) -> u64 {
 fn a_constant_colour_gives_a_constant_image() {
     let viewport = Viewport::new(40, 40).unwrap();
     let table = SampleTable::low_discrepancy(8, 3, LensShape::Disk).unwrap();
-    for kind in [Kind::Still, Kind::Moving, Kind::Crossing] {
+    for kind in [SoupKind::Still, SoupKind::Moving, SoupKind::Crossing] {
         let soup = Soup::new(kind, 60, 5);
         let images = [Shading::Cached, Shading::PerSample].map(|shading| {
             let spec = PipelineSpec { shading, ..spec(Features::ALL) };
@@ -93,7 +93,7 @@ fn a_sample_is_shaded_at_its_own_time() {
 
 #[test]
 fn every_visible_sample_is_a_lane_and_nothing_is_looked_up() {
-    for kind in [Kind::Still, Kind::Moving, Kind::Layers] {
+    for kind in [SoupKind::Still, SoupKind::Moving, SoupKind::Layers] {
         let soup = Soup::new(kind, 60, 8);
         let counts = render_with(Shading::PerSample, 8, &[soup.draw(&Plain, Cull::None)]).counts;
         assert!(counts[Event::DepthWrites] > 0);
@@ -141,7 +141,7 @@ fn textures_are_fetched_by_every_lane() {
 
 #[test]
 fn threads_change_nothing() {
-    let soup = Soup::new(Kind::Moving, 80, 11);
+    let soup = Soup::new(SoupKind::Moving, 80, 11);
     let with = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| render_with(Shading::PerSample, 8, &[soup.draw(&Plain, Cull::None)]))

@@ -82,7 +82,7 @@ pub(crate) fn state(r: &mut Uniform) -> DrawState {
 }
 
 impl Scene {
-    fn new(kind: Kind, optics: Optics, count: usize, seed: u64) -> Self {
+    fn new(kind: SoupKind, optics: Optics, count: usize, seed: u64) -> Self {
         let mut r = Uniform::new(seed ^ 7);
         let mut parts = Vec::new();
         let mut first = 0;

@@ -127,7 +127,7 @@ fn load<V>(r: &mut Uniform, is_written: bool, clear: V) -> Load<V> {
 }
 
 impl Story {
-    fn new(kind: Kind, optics: Optics, per_pixel: u32, count: usize, seed: u64) -> Self {
+    fn new(kind: SoupKind, optics: Optics, per_pixel: u32, count: usize, seed: u64) -> Self {
         let mut r = Uniform::new(seed ^ 11);
         let mut formats: Vec<Format> = (0..5).map(|_| pick(&mut r, &COLOURS)).collect();
         formats.extend([Format::D32, Format::D24S8]);

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::common::{Kind, Plain, Soup, camera, spec};
+use crate::common::{Plain, Soup, SoupKind, camera, spec};
 use activity::{Counts, Event, Unit};
 use glam::Vec3;
 use pipeline::sampling::{Sample, SampleSource};
@@ -24,7 +24,7 @@ impl SampleSource for Run<'_> {
     }
 }
 
-fn with<R>(kind: Kind, run: impl FnOnce(&Camera, &[Draw<'_>], &SampleTable, Viewport) -> R) -> R {
+fn with<R>(kind: SoupKind, run: impl FnOnce(&Camera, &[Draw<'_>], &SampleTable, Viewport) -> R) -> R {
     let soup = Soup::new(kind, 80, 11);
     let table = SampleTable::low_discrepancy(PER_PIXEL, 3, LensShape::Disk).unwrap();
     let geometry = Geometry::new(&soup.open, &soup.close, &soup.triangles).unwrap();
@@ -42,7 +42,7 @@ fn bits(image: &[Vec3]) -> Vec<[u32; 3]> {
 
 #[test]
 fn each_view_is_the_image_of_its_samples_alone() {
-    for kind in [Kind::Still, Kind::Moving, Kind::Crossing, Kind::Layers] {
+    for kind in [SoupKind::Still, SoupKind::Moving, SoupKind::Crossing, SoupKind::Layers] {
         with(kind, |camera, draws, table, viewport| {
             let spec = spec(Features::ALL);
             let views = [0..8, 0..4, 4..8, 2..5, 6..7];
@@ -63,7 +63,7 @@ fn each_view_is_the_image_of_its_samples_alone() {
 
 #[test]
 fn a_single_view_equals_render_packet_by_packet() {
-    with(Kind::Moving, |camera, draws, table, viewport| {
+    with(SoupKind::Moving, |camera, draws, table, viewport| {
         let spec = spec(Features::ALL);
         let (mut ours, mut theirs) = (Vec::new(), Vec::new());
         let settings = settings(&spec, viewport, table);
@@ -82,7 +82,7 @@ fn a_single_view_equals_render_packet_by_packet() {
 
 #[test]
 fn runs_beyond_the_samples_are_cut_and_empty_ones_black() {
-    with(Kind::Still, |camera, draws, table, viewport| {
+    with(SoupKind::Still, |camera, draws, table, viewport| {
         let spec = spec(Features::ALL);
         let settings = settings(&spec, viewport, table);
         let images = RasterPass::new(camera, draws, &settings)
@@ -98,7 +98,7 @@ fn runs_beyond_the_samples_are_cut_and_empty_ones_black() {
 
 #[test]
 fn a_pass_without_an_image_sees_the_same_shades_nothing_and_keeps_its_depths() {
-    for kind in [Kind::Moving, Kind::Layers] {
+    for kind in [SoupKind::Moving, SoupKind::Layers] {
         with(kind, |camera, draws, table, viewport| {
             let spec = spec(Features::ALL);
             let settings = settings(&spec, viewport, table);

@@ -89,7 +89,7 @@ proptest! {
 fn every_width_and_number_of_threads_gives_the_same_bytes() {
     let viewport = Viewport::new(150, 90).unwrap();
     let table = SampleTable::low_discrepancy(8, 3, LensShape::Disk).unwrap();
-    for kind in [Kind::Moving, Kind::Crossing, Kind::Slivers, Kind::Grid] {
+    for kind in [SoupKind::Moving, SoupKind::Crossing, SoupKind::Slivers, SoupKind::Grid] {
         let soup = Soup::new(kind, 300, 11);
         let expected = brute_force(&soup, Cull::None, true, viewport, &table);
         for width in Width::available() {
@@ -112,7 +112,7 @@ fn an_orthographic_camera_is_refused() {
 
 #[test]
 fn dividing_time_for_still_scenes_changes_nothing() {
-    let (soup, viewport) = (Soup::new(Kind::Still, 200, 4), Viewport::new(64, 64).unwrap());
+    let (soup, viewport) = (Soup::new(SoupKind::Still, 200, 4), Viewport::new(64, 64).unwrap());
     let table = SampleTable::low_discrepancy(16, 3, LensShape::Disk).unwrap();
     for lens in [false, true] {
         let [divided, whole] = [true, false].map(|moving| {
@@ -128,7 +128,7 @@ fn coordinates_out_of_all_proportion_are_seen_as_brute_force_sees_them() {
     let viewport = Viewport::new(48, 48).unwrap();
     let table = SampleTable::low_discrepancy(4, 1, LensShape::Disk).unwrap();
     for scale in [1e-38_f32, 1e-30, 1e-20, 1e-10, 1e10, 1e18, 1e25, 1e34] {
-        for kind in [Kind::Moving, Kind::Crossing] {
+        for kind in [SoupKind::Moving, SoupKind::Crossing] {
             let mut soup = Soup::new(kind, 60, 8);
             // Only some of them, so that the others stay to be hidden.
             for p in soup.open.iter_mut().chain(&mut soup.close).step_by(2) {

@@ -7,7 +7,7 @@ use pipeline::setup::{SetupResult, set_up};
 use pipeline::traversal::Box5;
 use pipeline::*;
 
-fn hits_at(width: Width, kind: Kind, Optics { lens, parallel }: Optics) -> (Vec<u32>, Vec<u32>, Hits) {
+fn hits_at(width: Width, kind: SoupKind, Optics { lens, parallel }: Optics) -> (Vec<u32>, Vec<u32>, Hits) {
     let (soup, viewport) = (Soup::new(kind, 200, 5), Viewport::new(64, 64).unwrap());
     let shear = if lens { Shear::new([12.0, -12.0], [2.0, -2.0]) } else { Shear::default() };
     let shear = Shear { parallel, ..shear };
@@ -38,7 +38,7 @@ fn hits_at(width: Width, kind: Kind, Optics { lens, parallel }: Optics) -> (Vec<
 fn every_width_gives_the_same_bytes() {
     let widths: Vec<Width> = Width::available().collect();
     println!("widths of this machine: {widths:?}");
-    for kind in [Kind::Still, Kind::Moving, Kind::Crossing, Kind::Slivers, Kind::Grid] {
+    for kind in [SoupKind::Still, SoupKind::Moving, SoupKind::Crossing, SoupKind::Slivers, SoupKind::Grid] {
         for ways in 0..4 {
             let optics = Optics { lens: ways & 1 != 0, parallel: ways & 2 != 0 };
             let plain = hits_at(widths[0], kind, optics);

@@ -149,7 +149,8 @@ impl GpuSpec {
     /// # Errors
     /// If the text is invalid.
     pub fn parse(text: &str, file: &str) -> Result<Self, GpuError> {
-        let spec: Self = spec::parse(text, file)?;
+        let mut spec: Self = spec::parse(text, file)?;
+        spec.pipeline.warp_lanes = spec.units.shader.warp_lanes.get();
         match spec.validate() {
             Ok(()) => Ok(spec),
             Err((field, message)) => {

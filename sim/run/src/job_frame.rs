@@ -131,7 +131,7 @@ mod tests {
     use super::*;
     use power_model::{EnergyTable, Platform};
     use workloads::Overrides;
-    use workloads::deferred::{Deferred, LightPass, Options};
+    use workloads::deferred::{Deferred, DeferredOptions, LightPass};
 
     #[test]
     fn energies_of_passes_add_up_to_that_of_the_power_over_time() {
@@ -140,7 +140,7 @@ mod tests {
         let model = PowerModel::new(&EnergyTable::builtin("28nm").unwrap(), &platform).unwrap();
         let overrides = Overrides { size: Some((160, 90)), ..Overrides::default() };
         for lighting in [LightPass::Screen, LightPass::Volumes] {
-            let options = Options { lights: 8, lighting, ..Options::default() };
+            let options = DeferredOptions { lights: 8, lighting, ..DeferredOptions::default() };
             let job = Deferred::new(options, &overrides, 1).unwrap();
             let frame = JobFrame::new(&job, 0, &gpu, &model).unwrap();
             let names: Vec<&str> = frame.passes.iter().map(|pass| pass.name.as_str()).collect();

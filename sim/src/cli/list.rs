@@ -213,8 +213,8 @@ const OPTIONS: &[WorkloadOptions] = &[
                 "light in the water from the side, or on the floor from above",
             ),
         ],
-        needs: caustics::Options::NEEDS,
-        defaults: || serde_json::to_string(&caustics::Options::default()),
+        needs: caustics::CausticsOptions::NEEDS,
+        defaults: || serde_json::to_string(&caustics::CausticsOptions::default()),
     },
     WorkloadOptions {
         workload: "ccd",
@@ -226,8 +226,8 @@ const OPTIONS: &[WorkloadOptions] = &[
             Doc("method", Names(&["fragment_box", "box_box", "depth_only"]), "comparison in a tile"),
             Doc("narrow", SWITCH, "pairs one by one within the space that their swept boxes share"),
         ],
-        needs: collision::Options::NEEDS,
-        defaults: || serde_json::to_string(&collision::Options::default()),
+        needs: collision::CollisionOptions::NEEDS,
+        defaults: || serde_json::to_string(&collision::CollisionOptions::default()),
     },
     WorkloadOptions {
         workload: "compute",
@@ -254,8 +254,8 @@ const OPTIONS: &[WorkloadOptions] = &[
             Doc("depth_bounds", SWITCH, "the depths of a tile bound its lights"),
             Doc("list", Numbers(1.0, 65536.0), "most lights of a tile"),
         ],
-        needs: compute::Options::NEEDS,
-        defaults: || serde_json::to_string(&compute::Options::default()),
+        needs: compute::ComputeOptions::NEEDS,
+        defaults: || serde_json::to_string(&compute::ComputeOptions::default()),
     },
     WorkloadOptions {
         workload: "deferred",
@@ -276,8 +276,8 @@ const OPTIONS: &[WorkloadOptions] = &[
                 "lighting for every sample, or for the first of a pixel",
             ),
         ],
-        needs: deferred::Options::NEEDS,
-        defaults: || serde_json::to_string(&deferred::Options::default()),
+        needs: deferred::DeferredOptions::NEEDS,
+        defaults: || serde_json::to_string(&deferred::DeferredOptions::default()),
     },
     WorkloadOptions {
         workload: "glossy",
@@ -307,8 +307,8 @@ const OPTIONS: &[WorkloadOptions] = &[
             Doc("map_samples", Numbers(1.0, 256.0), "samples per texel"),
             Doc("fresnel", Numbers(0.0, 1.0), "share of reflected light at normal incidence"),
         ],
-        needs: glossy::Options::NEEDS,
-        defaults: || serde_json::to_string(&glossy::Options::default()),
+        needs: glossy::GlossyOptions::NEEDS,
+        defaults: || serde_json::to_string(&glossy::GlossyOptions::default()),
     },
     WorkloadOptions {
         workload: "multiview",
@@ -344,8 +344,8 @@ const OPTIONS: &[WorkloadOptions] = &[
             Doc("view_by_view", SWITCH, "one pass for each view: the same images at another cost"),
             Doc("check_cache", SWITCH, "draw once more with an infinite cache, and warn of misses"),
         ],
-        needs: multiview::Options::NEEDS,
-        defaults: || serde_json::to_string(&multiview::Options::default()),
+        needs: multiview::MultiViewOptions::NEEDS,
+        defaults: || serde_json::to_string(&multiview::MultiViewOptions::default()),
     },
     WorkloadOptions {
         workload: "occlusion",
@@ -368,8 +368,8 @@ const OPTIONS: &[WorkloadOptions] = &[
             Doc("tile_px", Numbers(1.0, 256.0), "side of a tile of the first level in pixels"),
             Doc("boxes", Numbers(1.0, 16.0), "boxes of lens and time in a tile, along u, v and t"),
         ],
-        needs: occlusion::Options::NEEDS,
-        defaults: || serde_json::to_string(&occlusion::Options::default()),
+        needs: occlusion::OcclusionOptions::NEEDS,
+        defaults: || serde_json::to_string(&occlusion::OcclusionOptions::default()),
     },
     WorkloadOptions {
         workload: "sampling",
@@ -389,8 +389,8 @@ const OPTIONS: &[WorkloadOptions] = &[
             Doc("periodic", SWITCH, "whether the domain of darts is a torus instead of a box"),
             Doc("count", Numbers(100.0, 2e6), "points of noise on average"),
         ],
-        needs: points::job::Options::NEEDS,
-        defaults: || serde_json::to_string(&points::job::Options::default()),
+        needs: points::job::PointOptions::NEEDS,
+        defaults: || serde_json::to_string(&points::job::PointOptions::default()),
     },
     WorkloadOptions {
         workload: "soft-shadows",
@@ -414,8 +414,8 @@ const OPTIONS: &[WorkloadOptions] = &[
             ),
             Doc("accumulate", SWITCH, "accumulation instead of one pass: the same image at another cost"),
         ],
-        needs: soft_shadows::Options::NEEDS,
-        defaults: || serde_json::to_string(&soft_shadows::Options::default()),
+        needs: soft_shadows::SoftShadowOptions::NEEDS,
+        defaults: || serde_json::to_string(&soft_shadows::SoftShadowOptions::default()),
     },
 ];
 

@@ -120,6 +120,8 @@ impl Setting {
         match self.path.as_str() {
             "platform" | "energy" | "bound" | "pacing" => Stage::Power,
             "timing" | "gpu.core_hz" | "gpu.memory_hz" => Stage::Timing,
+            // What a warp does is counted as it is drawn.
+            "gpu.units.shader.warp_lanes" => Stage::Drawing,
             path if path.starts_with("gpu.units.") => Stage::Timing,
             path => match InputFile::of(path) {
                 Some(InputFile::Platform | InputFile::Table) => Stage::Power,

@@ -29,6 +29,7 @@ pub fn hardware() -> PipelineSpec {
         features: Features::ALL,
         depth: DepthSpec::default(),
         compute: None,
+        warp_lanes: 32,
     }
 }
 

@@ -3,12 +3,13 @@
 use std::ops::Range;
 
 use glam::DVec3;
+use pipeline::Lane;
 use pipeline::conservative::{Grid, MovingTriangle, Rasterizer, Touch, View};
 use pipeline::traversal::{TimeIntervals, time_interval};
 
 use super::bound::BoundingVolume;
 use super::eye::Seen;
-use super::{Eye, Method};
+use super::{Beam, Eye, Method};
 
 /// Side of a tile in pixels.
 pub(super) const TILE_PX: u32 = 8;
@@ -89,8 +90,10 @@ impl<'a> Cover<'a> {
         let rasterizer = Rasterizer::new(View::orthographic()).halving(MAX_HALVINGS);
         let (eye, grid) = (self.eye, self.grid);
         rasterizer.rasterize(&triangle, &grid, |tile, touch| {
-            let reach = reach(seen, touch);
-            self.test(tile, reach, |at| times(eye, seen, at).iter().any(|face| !face.as_slice().is_empty()));
+            let reach = reach(&Lane::default(), seen, touch);
+            self.test(tile, Some(reach), |at| {
+                times(eye, seen, at).iter().any(|face| !face.as_slice().is_empty())
+            });
         });
     }
 
@@ -101,7 +104,7 @@ impl<'a> Cover<'a> {
             let (a, b) = (face[i], face[j]);
             (a.x - x) * (b.y - y) - (b.x - x) * (a.y - y)
         };
-        let slack = slack(self.eye, face);
+        let slack = slack(&Lane::default(), self.eye, face);
         let corners = face.map(|p| p.to_array());
         // Depth increases away from the camera.
         if (face[1] - face[0]).cross(face[2] - face[0]).z <= 0.0 {
@@ -110,27 +113,24 @@ impl<'a> Cover<'a> {
         let Some(triangle) = MovingTriangle::new(corners, corners) else { return };
         let grid = self.grid;
         Rasterizer::new(View::orthographic()).rasterize(&triangle, &grid, |tile, _| {
-            self.test(tile, EVERYWHERE, |at| {
+            self.test(tile, None, |at| {
                 [(0, 1), (1, 2), (2, 0)].iter().all(|&(i, j)| edge(i, j, at) >= -slack)
             });
         });
     }
 
     /// Tests the pixels of a tile that are within reach and not yet covered.
-    fn test(&mut self, [column, row]: [u32; 2], reach: [[f64; 2]; 2], covered: impl Fn([f64; 2]) -> bool) {
+    fn test(&mut self, [column, row]: [u32; 2], reach: Option<Reach>, covered: impl Fn([f64; 2]) -> bool) {
         self.tiles += 1;
         let tile = row * self.grid.columns + column;
-        let [x0, y0] = self.first_pixel(tile);
-        let [width, height] = [self.eye.viewport().width(), self.eye.viewport().height()];
-        let (before, mut mask) = (self.masks[tile as usize], self.masks[tile as usize]);
-        for bit in (0..64_u32).filter(|bit| before >> bit & 1 == 0) {
-            let pixel = [x0 + bit % TILE_PX, y0 + bit / TILE_PX];
-            let at = self.eye.pixel_centre(pixel);
-            let near = (0..2).all(|axis| (reach[axis][0]..=reach[axis][1]).contains(&at[axis]));
-            if near && pixel[0] < width && pixel[1] < height {
-                self.tests += 1;
-                mask |= u64::from(covered(at)) << bit;
-            }
+        let first = self.first_pixel(tile);
+        let near = reach
+            .map_or(u64::MAX, |reach| within_reach(&Lane::default(), &reach, self.eye.pixel_centre(first)));
+        let before = self.masks[tile as usize];
+        let mut mask = before;
+        for bit in set_bits(near & !before & in_image(self.eye, first)) {
+            self.tests += 1;
+            mask |= u64::from(covered(self.eye.pixel_centre(pixel_of(first, bit)))) << bit;
         }
         if before == 0 && mask != 0 {
             self.used.push(tile);
@@ -139,26 +139,79 @@ impl<'a> Cover<'a> {
     }
 }
 
+/// Positions of the bits of a mask, from the lowest.
+pub(super) fn set_bits(mut mask: u64) -> impl Iterator<Item = u32> {
+    std::iter::from_fn(move || {
+        let bit = mask.trailing_zeros();
+        mask &= mask.wrapping_sub(1);
+        (bit < u64::BITS).then_some(bit)
+    })
+}
+
+/// The pixel of a bit in the mask of a tile whose first pixel is `first`.
+pub(super) fn pixel_of([x, y]: [u32; 2], bit: u32) -> [u32; 2] {
+    [x + bit % TILE_PX, y + bit / TILE_PX]
+}
+
+/// Pixels of a tile that are in the image: the scissor of the pass.
+pub(super) fn in_image(eye: &Eye, first: [u32; 2]) -> u64 {
+    let size = [eye.viewport().width(), eye.viewport().height()];
+    if (0..2).all(|axis| first[axis] + TILE_PX <= size[axis]) {
+        return u64::MAX;
+    }
+    let is_inside = |bit: &u32| (0..2).all(|axis| pixel_of(first, *bit)[axis] < size[axis]);
+    (0..u64::BITS).filter(is_inside).fold(0, |mask, bit| mask | 1 << bit)
+}
+
 /// Error of the edges of a face at a pixel by rounding.
-pub(super) fn slack(eye: &Eye, face: &[DVec3; 3]) -> f64 {
-    let largest = face.iter().map(|p| p.abs().max_element()).fold(0.0, f64::max);
+pub(super) fn slack(lane: &Lane, eye: &Eye, face: &[DVec3; 3]) -> f64 {
+    let largest = face.iter().flat_map(|p| p.abs().to_array()).fold(0.0, |most, at| lane.max(most, at));
     let side = f64::from(eye.viewport().width().max(eye.viewport().height()));
-    16.0 * f64::EPSILON * (largest + side) * (largest + side)
+    let sum = lane.add(largest, side);
+    lane.mul(lane.mul(16.0 * f64::EPSILON, sum), sum)
 }
 
 /// Most halvings of a tile's time.
 pub(super) const MAX_HALVINGS: u32 = 2;
-pub(super) const EVERYWHERE: [[f64; 2]; 2] = [[f64::NEG_INFINITY, f64::INFINITY]; 2];
+
+/// Bounds along x and y.
+pub(super) type Reach = [[f64; 2]; 2];
 
 /// Bounding box of the corners while a tile may be touched, with a margin for rounding.
-pub(super) fn reach(seen: &Seen, touch: &Touch) -> [[f64; 2]; 2] {
-    let ends = touch.t.map(|t| seen.image.corners(t));
+pub(super) fn reach(lane: &Lane, seen: &Seen, touch: &Touch) -> Reach {
+    let Beam { open, close, .. } = &seen.image;
     [0, 1].map(|axis| {
-        let all = || ends.iter().flatten().map(|p| p[axis]);
-        let (low, high) = (all().fold(f64::INFINITY, f64::min), all().fold(f64::NEG_INFINITY, f64::max));
-        let slack = 1e-9 * (1.0 + low.abs().max(high.abs()));
-        [low - slack, high + slack]
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        for (open, close) in open.iter().zip(close) {
+            let path = lane.sub(close[axis], open[axis]);
+            for at in touch.t.map(|t| lane.madd(t, path, open[axis])) {
+                (low, high) = (lane.min(low, at), lane.max(high, at));
+            }
+        }
+        let slack = lane.mul(1e-9, lane.add(1.0, lane.max(low.abs(), high.abs())));
+        [lane.sub(low, slack), lane.add(high, slack)]
     })
+}
+
+/// Pixels of a tile whose centres are within reach; `first` is the centre of its first pixel. Columns and rows are compared
+/// apart, and the columns are repeated in every row that is within by a product.
+pub(super) fn within_reach(lane: &Lane, reach: &Reach, first: [f64; 2]) -> u64 {
+    let is_within = |axis: usize, number: u32| {
+        let at = first[axis] + f64::from(number);
+        let [low, high] = reach[axis];
+        // Both are compared, as lanes of other tiles in the warp wait for either.
+        let [is_after, is_before] = [lane.branch(at >= low), lane.branch(at <= high)];
+        is_after && is_before
+    };
+    let bits = |axis: usize, step: u32, numbers: Range<u32>| {
+        let start = numbers.start;
+        let within = numbers.filter(|number| is_within(axis, *number));
+        within.fold(0_u32, |mask, number| mask | 1 << ((number - start) * step))
+    };
+    let columns = bits(0, 1, 0..TILE_PX);
+    let [upper, lower] = [0..TILE_PX / 2, TILE_PX / 2..TILE_PX]
+        .map(|rows| u64::from(lane.mul_low(columns, bits(1, TILE_PX, rows))));
+    lower << 32 | upper
 }
 
 #[cfg(test)]
@@ -197,5 +250,27 @@ mod tests {
                 assert!(!inside || tiles.contains(&tile.map(|c| c as u32)), "{round}");
             }
         }
+    }
+
+    /// Pixels within reach are those of a comparison of every centre, for boxes that hold all, some or none of a tile.
+    #[test]
+    fn pixels_within_reach_are_those_between_its_bounds() {
+        let (first, mut some) = ([-3.5, 12.5], 0);
+        let mut random = Uniform::new(5);
+        for _ in 0..500 {
+            let reach = first.map(|from| {
+                let ends = [(); 2].map(|()| random.within(from - 3.0, from + 10.0));
+                [ends[0].min(ends[1]), ends[0].max(ends[1])]
+            });
+            let found = within_reach(&Lane::default(), &reach, first);
+            for bit in 0..u64::BITS {
+                let at = pixel_of([0, 0], bit).map(f64::from);
+                let is_near =
+                    (0..2).all(|axis| (reach[axis][0]..=reach[axis][1]).contains(&(first[axis] + at[axis])));
+                assert_eq!(found >> bit & 1 == 1, is_near, "{reach:?} {bit}");
+            }
+            some += u32::from(found != 0 && found != u64::MAX);
+        }
+        assert!(some > 100, "{some}");
     }
 }

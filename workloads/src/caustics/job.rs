@@ -28,7 +28,7 @@ pub enum LightView {
 /// Options of the job: water with waves under the sun.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct Options {
+pub struct CausticsOptions {
     /// Squares of two generator triangles along each side, 1 to 1024. 255 give the 130,050 volumes of the
     /// paper's ocean.
     pub cells: u32,
@@ -49,9 +49,9 @@ pub struct Options {
     pub look: LightView,
 }
 
-impl JobOptions for Options {}
+impl JobOptions for CausticsOptions {}
 
-impl Default for Options {
+impl Default for CausticsOptions {
     fn default() -> Self {
         Self {
             cells: 64,
@@ -66,7 +66,7 @@ impl Default for Options {
     }
 }
 
-impl Options {
+impl CausticsOptions {
     fn check(&self) -> Result<(), LoadError> {
         let (is_length, length) = (|value: f64| (1e-3..=1e4).contains(&value), "0.001 to 10000 metres");
         must_hold([
@@ -82,7 +82,7 @@ impl Options {
 
 /// The job and its ocean.
 struct Caustics {
-    options: Options,
+    options: CausticsOptions,
     ocean: Ocean,
     settings: Settings,
 }
@@ -95,12 +95,12 @@ pub(crate) const FLAGS: Flags = Flags { uses: &[Flag::Size], instead: &[] };
 /// # Errors
 /// [`LoadError`] for an invalid option or setting.
 pub fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<dyn Job>, LoadError> {
-    let options: Options = options.read()?;
+    let options: CausticsOptions = options.read()?;
     options.check()?;
     let settings =
         Settings { width: 512, height: 288, samples: 1, frame_rate_hz: 30.0, ..Settings::default() };
     let settings = settings.with(request.overrides)?;
-    let Options { cells, side_m, depth_m, wave_m, slope, .. } = options;
+    let CausticsOptions { cells, side_m, depth_m, wave_m, slope, .. } = options;
     let mut ocean = Ocean::new(cells, side_m, depth_m, [wave_m, slope], request.seed);
     ocean.pleat = options.pleat;
     if options.look == LightView::Floor {
@@ -146,7 +146,7 @@ impl Caustics {
 
     /// A camera slightly above the side, or straight above. All of the water is in the image.
     fn eye(&self) -> Option<Eye> {
-        let Options { side_m, depth_m, .. } = self.options;
+        let CausticsOptions { side_m, depth_m, .. } = self.options;
         let size @ [width, height] = [self.settings.width, self.settings.height];
         let aspect = f64::from(width) / f64::from(height);
         let middle = DVec3::new(0.12 * depth_m, -0.5 * depth_m, 0.07 * depth_m);
@@ -170,6 +170,7 @@ fn facts(picture: &Picture, beams: &[Beam]) -> Vec<Fact> {
         ("shader_executions", runs),
         ("shader_executions_per_pixel", runs / picture.runs.len().max(1) as f64),
         ("executions_that_find_light", picture.useful as f64 / runs.max(1.0)),
+        ("tiles_touched", picture.tiles as f64),
         ("pixels_tested", picture.tests as f64),
         ("crossed_share_of_length", crossing(beams)),
         ("beams_left_out", picture.skipped as f64),
@@ -187,6 +188,7 @@ fn white(light: &[f64]) -> f64 {
 mod tests {
     use activity::{Counts, Event};
 
+    use super::super::draw;
     use super::*;
     use crate::job::testing::hardware;
     use crate::scene::Overrides;
@@ -207,18 +209,49 @@ mod tests {
             let (ours, counts) = drawn(&[("cells", "12"), ("wave_m", "18"), ("look", look)]);
             assert!(ours.warnings.is_empty() && ours.moving, "{:?}", ours.warnings);
             assert!(ours.image.iter().filter(|pixel| pixel.y > 0.0).count() > 500, "{look}");
-            let executions = ours.facts.iter().find(|fact| fact.name == "shader_executions").unwrap().value;
+            let [executions, tiles, tested] = of_picture(&ours);
             // The tone pass runs for every pixel and reads its light.
             let toned = counts[Event::TextureFetches];
             assert_eq!(toned, 96 * 54);
-            assert_eq!((counts[Event::PixelInvocations] - toned) as f64, executions);
-            let tested = ours.facts.iter().find(|fact| fact.name == "pixels_tested").unwrap().value;
-            assert_eq!(counts[Event::SamplesTested] as f64, tested);
-            assert!(counts[Event::SamplesHit] as f64 == executions && tested > executions);
+            // A program for every tile, and one for every pixel that is lit.
+            assert_eq!(counts[Event::PixelInvocations] - toned, executions + tiles);
+            assert_eq!([counts[Event::SamplesTested], counts[Event::SamplesHit]], [tested, executions]);
+            assert!(tested > executions);
+            // A moving triangle comes to a tile once, and marks nothing.
+            assert_eq!([counts[Event::DepthReads], counts[Event::DepthWrites]], [0; 2]);
             let (prism, prism_counts) =
                 drawn(&[("cells", "12"), ("wave_m", "18"), ("look", look), ("method", "prism")]);
             assert_eq!(prism.image, ours.image);
             assert!(prism_counts[Event::PixelInvocations] > counts[Event::PixelInvocations]);
+            // Three words of marks are read for every tile; where pixels are covered they are combined, too.
+            let [_, tiles, _] = of_picture(&prism);
+            let [read, written] = [Event::DepthReads, Event::DepthWrites].map(|event| prism_counts[event]);
+            assert_eq!(read, 3 * tiles + written);
+            assert!(written % 3 == 0 && written > 0 && written <= 3 * tiles);
+        }
+    }
+
+    /// Executions, tiles and tests of a picture.
+    fn of_picture(drawn: &Drawn) -> [u64; 3] {
+        ["shader_executions", "tiles_touched", "pixels_tested"]
+            .map(|name| drawn.facts.iter().find(|fact| fact.name == name).unwrap().value as u64)
+    }
+
+    /// The picture of the pass is that of the host, with its tiles and tests, for every method.
+    #[test]
+    fn the_pass_draws_what_the_host_draws() {
+        let (ocean, size) = (Ocean::new(10, 16.0, 5.0, [18.0, 0.4], 3), [70, 41]);
+        let view = [DVec3::new(6.0, 7.0, 20.0), DVec3::new(0.5, -2.0, 0.0), DVec3::Y];
+        let (beams, eye) = (ocean.beams(0.0), Eye::new(view, 4.0, size).unwrap());
+        let hardware = hardware();
+        for method in Method::ALL {
+            let mut gpu = Gpu::quiet(&hardware).unwrap();
+            let (picture, _) = draw_on(&mut gpu, &beams, &eye, method, Light::Volume);
+            assert_eq!(picture, draw(&beams, &eye, method, Some(Light::Volume)), "{method:?}");
+            // Still bodies are moved to the image once, moving triangles at both ends.
+            let counts = gpu.finish().counts();
+            let bytes = if method == Method::Moving { 24 } else { 12 };
+            assert_eq!(counts[Event::VertexBytes], bytes * counts[Event::VerticesFetched]);
         }
     }
 

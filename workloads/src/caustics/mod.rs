@@ -36,6 +36,6 @@ pub use check::{Coverage, MAX_CROSSED_SHARE, MIN_SQUARES_PER_WAVE, accuracy_warn
 pub use draw::{Picture, draw};
 pub use eye::Eye;
 pub(crate) use job::FLAGS;
-pub use job::{LightView, Options, job};
+pub use job::{CausticsOptions, LightView, job};
 pub use light::{Floor, Light};
 pub use photons::{Squares, error};

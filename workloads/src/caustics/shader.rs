@@ -4,19 +4,24 @@
 use glam::{DVec3, Vec3};
 use pipeline::conservative::{Grid, MovingTriangle, Rasterizer, View};
 use pipeline::memory::MemoryRange;
+use pipeline::traversal::TimeIntervals;
 use pipeline::{ConservativeDraw, Gpu, Lanes, Primitive, TileIntervals, TileShader};
 
 use super::bound::BoundingVolume;
-use super::cover::{EVERYWHERE, MAX_HALVINGS, TILE_PX, reach, slack};
+use super::cover::{MAX_HALVINGS, TILE_PX, in_image, pixel_of, reach, set_bits, slack, within_reach};
 use super::draw::Picture;
 use super::eye::Seen;
 use super::light::PixelInBeam;
 use super::{Beam, Eye, Light, Method};
 
-/// Bytes of a vertex at both ends of a beam.
-const VERTEX_BYTES: u32 = 24;
+/// Bytes of a vertex at one end of a beam.
+const VERTEX_BYTES: u32 = 12;
 /// Bytes per pixel of the buffer that accumulates light.
 const LIGHT_BYTES: u64 = 4;
+/// Bytes that mark the pixels of a tile: the number of the body that covered pixels of it last, and two words of bits.
+const MARK_BYTES: u64 = 12;
+/// Bytes from the marks of a tile to those of the next.
+const MARK_STRIDE: u64 = 16;
 /// Colour of light in water, linear RGB.
 const TINT: Vec3 = Vec3::new(0.55, 0.9, 1.0);
 /// Pixels of a tile.
@@ -73,7 +78,10 @@ pub(super) fn draw_on(
     let region = gpu.allocate(u64::from(columns * rows) * TILE_PIXELS * LIGHT_BYTES);
     let buffer = LightBuffer { region, columns };
     let (primitives, faces) = primitives(&seen, method, &grid);
-    let vertices = gpu.allocate(3 * primitives.len() as u64 * u64::from(VERTEX_BYTES));
+    // Both ends of a moving triangle; a face of a body is still.
+    let vertex_bytes = if method == Method::Moving { 2 * VERTEX_BYTES } else { VERTEX_BYTES };
+    let vertices = gpu.allocate(3 * primitives.len() as u64 * u64::from(vertex_bytes));
+    let marks = gpu.allocate(u64::from(columns * rows) * MARK_STRIDE);
     // The maps of a GPU with other tiles cannot show these.
     let of_image = (gpu.spec().tile_px == TILE_PX).then_some(viewport);
     let mut picture = Picture {
@@ -89,10 +97,10 @@ pub(super) fn draw_on(
         grid: &grid,
         block: 1,
         vertices,
-        vertex_bytes: VERTEX_BYTES,
+        vertex_bytes,
         projection: Some(eye.projection()),
     };
-    let shader = LightShader { eye, seen: &seen, faces: &faces, light, buffer };
+    let shader = LightShader { eye, seen: &seen, faces: &faces, light, buffer, marks };
     let mut pass = gpu.begin_conservative("light", of_image);
     pass.draw(gpu, &draw, &shader, |_, shaded| {
         picture.tiles += 1;
@@ -150,6 +158,8 @@ struct LightShader<'a> {
     faces: &'a [Face],
     light: Light,
     buffer: LightBuffer,
+    /// Marks of the tiles, row by row.
+    marks: MemoryRange,
 }
 
 /// Result for a tile.
@@ -160,11 +170,11 @@ struct Shaded {
     lit: Vec<(usize, f64)>,
 }
 
-/// Pixels that a beam has covered in each tile that it touches. Each runs once for a beam, as with a stencil.
+/// What a body has left in the marks of each tile that it touches.
 #[derive(Default)]
-struct Masks(Vec<([u32; 2], u64)>);
+struct Marks(Vec<([u32; 2], u64)>);
 
-impl Masks {
+impl Marks {
     fn at(&mut self, tile: [u32; 2]) -> &mut u64 {
         let place = self.0.iter().position(|(known, _)| *known == tile).unwrap_or(self.0.len());
         if place == self.0.len() {
@@ -174,42 +184,87 @@ impl Masks {
     }
 }
 
-impl TileShader for LightShader<'_> {
-    type BodyState = Masks;
-    type Output = Shaded;
+impl LightShader<'_> {
+    /// Where the marks of a tile begin.
+    fn mark(&self, [column, row]: [u32; 2]) -> u64 {
+        u64::from(row * self.buffer.columns + column) * MARK_STRIDE
+    }
 
-    fn run(&self, masks: &mut Masks, lanes: &Lanes, tile: &TileIntervals<'_>) -> Option<Shaded> {
-        let Face { beam, corners } = &self.faces[tile.primitive];
-        let seen = self.seen[*beam].as_ref()?;
+    /// Tests these pixels of a tile, and shades those that are covered; their mask.
+    fn pixels(
+        &self,
+        (lanes, seen): (&Lanes, &Seen),
+        (first, pixels): ([u32; 2], u64),
+        times_at: impl Fn([f64; 2]) -> Option<Option<[TimeIntervals; 2]>>,
+        shaded: &mut Shaded,
+    ) -> u64 {
         let (eye, viewport) = (self.eye, self.eye.viewport());
-        let (reach, slack) = match corners {
-            None => (reach(seen, tile.touch), 0.0),
-            Some(face) => (EVERYWHERE, slack(eye, face)),
-        };
-        let flat = corners.map(|face| face.map(|p| [p.x, p.y]));
-        let mask = masks.at(tile.tile);
-        let covered = *mask;
-        let mut shaded = Shaded { tests: 0, lit: Vec::new() };
-        for bit in (0..TILE_PX * TILE_PX).filter(|bit| covered >> bit & 1 == 0) {
-            let [x, y] = [tile.tile[0] * TILE_PX + bit % TILE_PX, tile.tile[1] * TILE_PX + bit / TILE_PX];
+        let mut covered = 0;
+        for bit in set_bits(pixels & in_image(eye, first)) {
+            let [x, y] = pixel_of(first, bit);
             let at = eye.pixel_centre([x, y]);
-            let near = (0..2).all(|axis| (reach[axis][0]..=reach[axis][1]).contains(&at[axis]));
-            if !near || x >= viewport.width() || y >= viewport.height() {
-                continue;
-            }
             shaded.tests += 1;
-            let times = match flat {
-                Some(face) => lanes.is_inside(&face, at, slack).then_some(None),
-                None => {
-                    let times = lanes.times_at(&seen.triangle, eye.shear(), at);
-                    times.iter().any(|face| !face.as_slice().is_empty()).then_some(Some(times))
-                }
-            };
-            let Some(times) = times else { continue };
-            *mask |= 1 << bit;
+            let Some(times) = times_at(at) else { continue };
+            covered |= 1 << bit;
             let light = lanes.run(|lane| self.light.shade(lane, &PixelInBeam { eye, seen, at, times }));
             lanes.blend(self.buffer.region, self.buffer.offset([x, y]), LIGHT_BYTES);
             shaded.lit.push(((y * viewport.width() + x) as usize, light));
+        }
+        covered
+    }
+
+    /// A tile of a moving triangle, which comes to a tile once: the pixels within its reach.
+    fn moving(&self, lanes: &Lanes, seen: &Seen, tile: &TileIntervals<'_>, shaded: &mut Shaded) {
+        let first = tile.tile.map(|at| at * TILE_PX);
+        let near = lanes
+            .run(|lane| within_reach(lane, &reach(lane, seen, tile.touch), self.eye.pixel_centre(first)));
+        let times_at = |at| {
+            let times = lanes.times_at(&seen.triangle, self.eye.shear(), at);
+            times.iter().any(|face| !face.as_slice().is_empty()).then_some(Some(times))
+        };
+        self.pixels((lanes, seen), (first, near), times_at, shaded);
+    }
+
+    /// A tile of a face of a body. A pixel runs once for a body, as with a stencil: those that an earlier face of the
+    /// body has covered are marked in memory.
+    fn face(
+        &self,
+        marks: &mut Marks,
+        (lanes, seen): (&Lanes, &Seen),
+        (corners, tile): (&[DVec3; 3], [u32; 2]),
+        shaded: &mut Shaded,
+    ) {
+        let covered = marks.at(tile);
+        lanes.read(self.marks, self.mark(tile), MARK_BYTES);
+        let (left, slack) = lanes.run(|lane| {
+            // The number in memory is that of this body if it has covered pixels of the tile.
+            let is_marked = lane.branch(*covered != 0);
+            let words = if is_marked { [*covered as u32, (*covered >> 32) as u32] } else { [0; 2] };
+            let [low, high] = words.map(|word| u64::from(lane.xor(word, u32::MAX)));
+            (high << 32 | low, slack(lane, self.eye, corners))
+        });
+        let flat = corners.map(|p| [p.x, p.y]);
+        let times_at = |at| lanes.is_inside(&flat, at, slack).then_some(None);
+        let first = tile.map(|at| at * TILE_PX);
+        let found = self.pixels((lanes, seen), (first, left), times_at, shaded);
+        if found != 0 {
+            *covered |= found;
+            lanes.merge(self.marks, self.mark(tile), MARK_BYTES);
+        }
+    }
+}
+
+impl TileShader for LightShader<'_> {
+    type BodyState = Marks;
+    type Output = Shaded;
+
+    fn run(&self, marks: &mut Marks, lanes: &Lanes, tile: &TileIntervals<'_>) -> Option<Shaded> {
+        let Face { beam, corners } = &self.faces[tile.primitive];
+        let seen = self.seen[*beam].as_ref()?;
+        let mut shaded = Shaded { tests: 0, lit: Vec::new() };
+        match corners {
+            None => self.moving(lanes, seen, tile, &mut shaded),
+            Some(corners) => self.face(marks, (lanes, seen), (corners, tile.tile), &mut shaded),
         }
         Some(shaded)
     }

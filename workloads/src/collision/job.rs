@@ -21,7 +21,7 @@ use crate::scene::Settings;
 /// Options of the job.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct Options {
+pub struct CollisionOptions {
     /// An `.mts` file; without it, balls move at random.
     pub file: Option<PathBuf>,
     /// Number of balls, 2 to 100.
@@ -37,17 +37,17 @@ pub struct Options {
     pub narrow: bool,
 }
 
-impl JobOptions for Options {
+impl JobOptions for CollisionOptions {
     const NEEDS: &'static [Need] = &[Need::new("balls", "file", &["none"])];
 }
 
-impl Default for Options {
+impl Default for CollisionOptions {
     fn default() -> Self {
         Self { file: None, balls: 12, resolution: 64, bins: 1, method: Method::FragmentBox, narrow: false }
     }
 }
 
-impl Options {
+impl CollisionOptions {
     fn check(&self) -> Result<(), LoadError> {
         must_hold([
             (
@@ -98,9 +98,9 @@ pub(crate) const FLAGS: Flags = Flags { uses: &[], instead: &[(Flag::Size, "reso
 /// # Errors
 /// [`LoadError`] for an invalid option, or a file that cannot be read.
 pub fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<dyn Job>, LoadError> {
-    let options: Options = options.read()?;
+    let options: CollisionOptions = options.read()?;
     options.check()?;
-    let Options { resolution, bins, method, narrow, .. } = options;
+    let CollisionOptions { resolution, bins, method, narrow, .. } = options;
     let settings = Settings { width: 3 * resolution, height: resolution, samples: 1, ..Settings::default() };
     let search = Search { resolution, bins, method, zoom: false };
     let settings = settings.with(request.overrides)?;

@@ -35,7 +35,7 @@ mod sweeps;
 pub use bounds::Bounds;
 pub use detect::{Answer, candidates, detect, detect_each};
 pub(crate) use job::FLAGS;
-pub use job::{Options, job};
+pub use job::{CollisionOptions, job};
 pub use object::{CaseFiles, CollisionCase, Object, components, load_cases};
 pub use pair::{Method, Search, Verdict};
 pub use plain::{PlainPasses, PlainResult};

@@ -8,7 +8,7 @@ use glam::DVec3;
 use super::bounds::{Bounds, Ends, times_inside};
 use crate::error::LoadError;
 use crate::import::Format;
-use crate::visibility::{Kind, MovingMesh, load_mts, moving};
+use crate::visibility::{InputKind, MovingMesh, load_mts, moving};
 
 /// An object: triangles, each with linear motion from time 0 to time 1.
 #[derive(Clone, Debug)]
@@ -206,13 +206,13 @@ impl CaseFiles {
         let (mut cases, mut places) = (Vec::<Self>::new(), BTreeMap::new());
         while let Some(file) = files.next() {
             let content = match kind(file)? {
-                Kind::Mts => Content::Objects,
-                Kind::Surface(format) => {
+                InputKind::Mts => Content::Objects,
+                InputKind::Surface(format) => {
                     let other = files.next().ok_or_else(|| no_partner(file))?;
-                    let Kind::Surface(closing) = kind(other)? else { return Err(no_partner(file)) };
+                    let InputKind::Surface(closing) = kind(other)? else { return Err(no_partner(file)) };
                     Content::Ends(format, other.to_owned(), closing)
                 }
-                Kind::M5d => return Err(no_partner(file)),
+                InputKind::M5d => return Err(no_partner(file)),
             };
             let case = Self { id: stem(file), start: file.to_owned(), content };
             if let Some(known) = places.insert(case.id.clone(), cases.len()) {
@@ -260,7 +260,7 @@ pub fn load_cases(files: &[impl AsRef<Path>]) -> Result<Vec<CollisionCase>, Load
 /// [`LoadError::is_usage`] for any other format; else invalid content, with its place in the file.
 pub(crate) fn load_objects(file: &Path) -> Result<Vec<MovingMesh>, LoadError> {
     match kind(file) {
-        Ok(Kind::Mts) => load_mts(file),
+        Ok(InputKind::Mts) => load_mts(file),
         Ok(_) | Err(LoadError::Kind { .. }) => {
             let message = format!(
                 "{} is not an .mts file; for two .ply, .obj or .off files use `quintile ccd`",
@@ -272,10 +272,10 @@ pub(crate) fn load_objects(file: &Path) -> Result<Vec<MovingMesh>, LoadError> {
     }
 }
 
-fn kind(path: &Path) -> Result<Kind, LoadError> {
-    match Kind::of(path) {
+fn kind(path: &Path) -> Result<InputKind, LoadError> {
+    match InputKind::of(path) {
         Err(LoadError::Kind { file, .. }) => Err(LoadError::Kind { file, known: KNOWN }),
-        Err(error) if !error.is_usage() => Kind::named(path).ok_or(error),
+        Err(error) if !error.is_usage() => InputKind::named(path).ok_or(error),
         found => found,
     }
 }

@@ -13,7 +13,7 @@ use warnings::{Code, Warning};
 use super::display::Show;
 use super::kernels::Kernels;
 use super::light_culling::LightSphere;
-use super::options::{Kernel, Options};
+use super::options::{ComputeOptions, Kernel};
 use crate::error::LoadError;
 use crate::job::{Drawn, DrawsScene, Fact, Flag, Flags, IMAGE_SIZE, Job, JobError, OptionSource, Request};
 use crate::scene::{Frame, Overrides, Scene};
@@ -42,7 +42,7 @@ const GREY: Vec3 = Vec3::splat(0.18);
 /// A scene, and what groups compute of it.
 pub struct Compute {
     scene: Scene,
-    options: Options,
+    options: ComputeOptions,
     samples: SampleTable,
     seed: u64,
 }
@@ -52,7 +52,7 @@ impl Compute {
     ///
     /// # Errors
     /// [`LoadError`] for a scene that cannot be loaded, or an invalid option or setting.
-    pub fn new(options: Options, overrides: &Overrides, seed: u64) -> Result<Self, LoadError> {
+    pub fn new(options: ComputeOptions, overrides: &Overrides, seed: u64) -> Result<Self, LoadError> {
         options.check()?;
         let samples = overrides.samples.unwrap_or(1);
         let still = Overrides {

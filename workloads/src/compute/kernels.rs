@@ -9,14 +9,14 @@ use super::block::{Blocks, Slots};
 use super::display::{Display, Show, decoded};
 use super::histogram::{Count, Scan};
 use super::light_culling::{Cull, ImagePlane, LightBuffer, LightSphere, Lists};
-use super::options::Options;
+use super::options::ComputeOptions;
 use super::reduction::{BlockSums, Mean};
 use glam::Vec3;
 
 /// The passes of groups of a frame.
 pub struct Kernels<'a, 'e> {
     gpu: &'a mut Gpu<'e>,
-    options: &'a Options,
+    options: &'a ComputeOptions,
     /// Banks of a shared memory.
     banks: u32,
     /// Events of all passes but the one that writes the image.
@@ -39,7 +39,7 @@ impl<'a, 'e> Kernels<'a, 'e> {
     ///
     /// # Errors
     /// [`PassError::Compute`] if the GPU has no compute unit.
-    pub fn new(gpu: &'a mut Gpu<'e>, options: &'a Options) -> Result<Self, PassError> {
+    pub fn new(gpu: &'a mut Gpu<'e>, options: &'a ComputeOptions) -> Result<Self, PassError> {
         let missing = || PassError::Compute { pass: "compute".to_owned(), error: ComputeError::Missing };
         let banks = gpu.spec().compute.ok_or_else(missing)?.banks;
         Ok(Self { gpu, options, banks, counts: Counts::default() })
@@ -50,7 +50,7 @@ impl<'a, 'e> Kernels<'a, 'e> {
     /// # Errors
     /// [`PassError`] if the GPU does not take the pass.
     pub fn mean_luminance(&mut self, image: &SurfaceView) -> Result<Buffer<f32>, PassError> {
-        let Options { order, group, .. } = *self.options;
+        let ComputeOptions { order, group, .. } = *self.options;
         let (slots, blocks) = (self.slots(), self.blocks(image));
         let shared_bytes = 4 * slots.words(group);
         let groups = blocks.groups();
@@ -84,7 +84,7 @@ impl<'a, 'e> Kernels<'a, 'e> {
     /// # Errors
     /// [`PassError`] if the GPU does not take the pass.
     pub fn histogram(&mut self, image: &SurfaceView) -> Result<Buffer<u32>, PassError> {
-        let Options { atomics, copies, bins, group, padded, .. } = *self.options;
+        let ComputeOptions { atomics, copies, bins, group, padded, .. } = *self.options;
         let blocks = self.blocks(image);
         let counts = self.gpu.buffer("histogram", &vec![0_u32; bins as usize]);
         let copy_words = bins + u32::from(padded);
@@ -128,7 +128,7 @@ impl<'a, 'e> Kernels<'a, 'e> {
         (camera, viewport): (&Camera, Viewport),
         lights: &[LightSphere],
     ) -> Result<(Lists, Blocks), PassError> {
-        let Options { depth_bounds, tile_px, group, list: capacity, .. } = *self.options;
+        let ComputeOptions { depth_bounds, tile_px, group, list: capacity, .. } = *self.options;
         let blocks = Blocks::tiles(depth.size(), tile_px);
         let tiles = blocks.groups()[0] * blocks.groups()[1];
         let words = self.gpu.buffer("lights", &LightBuffer::values(lights, camera));
@@ -243,7 +243,7 @@ impl<'a, 'e> Kernels<'a, 'e> {
     }
 
     fn blocks(&self, image: &SurfaceView) -> Blocks {
-        let Options { group, per_lane, step, .. } = *self.options;
+        let ComputeOptions { group, per_lane, step, .. } = *self.options;
         Blocks::new(image.size(), group, per_lane, step)
     }
 

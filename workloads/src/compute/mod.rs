@@ -2,7 +2,7 @@
 //!
 //! - [`Kernels`]: the mean luminance of an image by a reduction ([`Chain`]: by a mip chain), its histogram by atomics, and the lights of each tile by the
 //!   depths of a pre-pass.
-//! - [`Options`]: sizes of groups, layouts of shared memory and kinds of atomics; [`Blocks`], [`Order`]: which pixels a lane
+//! - [`ComputeOptions`]: sizes of groups, layouts of shared memory and kinds of atomics; [`Blocks`], [`Order`]: which pixels a lane
 //!   works on, and the steps of a tree.
 //! - [`job()`]: the workload.
 
@@ -24,7 +24,7 @@ pub(crate) use job::FLAGS;
 pub use job::{ATOMICS_PER_WORD, CHAIN, CYCLES_PER_ACCESS, Chain, Compute, job};
 pub use kernels::{Kernels, TileLights};
 pub use light_culling::LightSphere;
-pub use options::{Kernel, Options};
+pub use options::{ComputeOptions, Kernel};
 
 /// Luminance of a sample of an image in linear RGB: loads and a dot product.
 fn luminance(lane: &GroupLane<'_, '_>, image: &SurfaceView, pixel: [u32; 2], sample: u32) -> f32 {

@@ -24,7 +24,7 @@ pub enum Kernel {
 /// Options of the job.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct Options {
+pub struct ComputeOptions {
     /// What is computed.
     pub kernel: Kernel,
     /// A built-in scene or a file, drawn without motion and without a lens.
@@ -61,7 +61,7 @@ pub struct Options {
     pub list: u32,
 }
 
-impl JobOptions for Options {
+impl JobOptions for ComputeOptions {
     const NEEDS: &'static [Need] = &[
         Need::new("per_lane", "kernel", &["reduction", "histogram"]),
         Need::new("step", "kernel", &["reduction", "histogram"]),
@@ -81,7 +81,7 @@ impl JobOptions for Options {
     ];
 }
 
-impl Default for Options {
+impl Default for ComputeOptions {
     fn default() -> Self {
         Self {
             kernel: Kernel::LightCulling,
@@ -105,7 +105,7 @@ impl Default for Options {
     }
 }
 
-impl Options {
+impl ComputeOptions {
     /// Checks every value.
     ///
     /// # Errors

@@ -60,7 +60,7 @@ pub enum Rate {
 /// Options of the job.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct Options {
+pub struct DeferredOptions {
     /// A built-in scene or a file.
     pub scene: String,
     /// How surfaces are lit.
@@ -77,7 +77,7 @@ pub struct Options {
     pub rate: Rate,
 }
 
-impl JobOptions for Options {
+impl JobOptions for DeferredOptions {
     const NEEDS: &'static [Need] = &[
         Need::new("lighting", "method", &["deferred"]),
         Need::new("normals", "method", &["deferred"]),
@@ -85,14 +85,14 @@ impl JobOptions for Options {
     ];
 }
 
-impl Default for Options {
+impl Default for DeferredOptions {
     fn default() -> Self {
         let (method, lighting, normals, rate) = Default::default();
         Self { scene: "default".to_owned(), method, lights: 32, range: 4.0, lighting, normals, rate }
     }
 }
 
-impl Options {
+impl DeferredOptions {
     fn check(&self) -> Result<(), LoadError> {
         must_hold([
             ("lights", &self.lights, self.lights <= 4096, "0 to 4096"),
@@ -113,7 +113,7 @@ fn overlay(cull: Cull, blend: Blend) -> DrawState {
 /// The job with its scene and lights.
 pub struct Deferred {
     scene: Scene,
-    options: Options,
+    options: DeferredOptions,
     lights: Vec<PointLight>,
     samples: Box<dyn SampleSource>,
 }
@@ -123,7 +123,7 @@ impl Deferred {
     ///
     /// # Errors
     /// [`LoadError`] for a scene that cannot be loaded, or an invalid option.
-    pub fn new(options: Options, overrides: &Overrides, seed: u64) -> Result<Self, LoadError> {
+    pub fn new(options: DeferredOptions, overrides: &Overrides, seed: u64) -> Result<Self, LoadError> {
         Self::of(crate::load(&options.scene)?, options, overrides, seed)
     }
 
@@ -132,7 +132,12 @@ impl Deferred {
     ///
     /// # Errors
     /// [`LoadError`] for an invalid option.
-    pub fn of(scene: Scene, options: Options, overrides: &Overrides, seed: u64) -> Result<Self, LoadError> {
+    pub fn of(
+        scene: Scene,
+        options: DeferredOptions,
+        overrides: &Overrides,
+        seed: u64,
+    ) -> Result<Self, LoadError> {
         options.check()?;
         let shutter = overrides.shutter.unwrap_or(0.0);
         let multisample = || (shutter == 0.0).then(|| MULTISAMPLE.to_owned());
@@ -329,7 +334,7 @@ impl<'a> Stage<'a> {
 
     /// Lights the G-buffer.
     fn light(&self, buffer: &GBuffer, surfaces: &[Surfaced<'a>], gpu: &mut Gpu<'_>) -> Result<u64, JobError> {
-        let Options { lighting, rate, .. } = self.job.options;
+        let DeferredOptions { lighting, rate, .. } = self.job.options;
         let per_sample = rate == Rate::Sample;
         let (reader, rays) = (buffer.reader(per_sample), CameraRays::new(self.camera()));
         let Some(first) = surfaces.first() else { return Ok(0) };

@@ -11,6 +11,6 @@ mod lights;
 mod shaders;
 
 pub use buffer::NormalFormat;
-pub use job::{Deferred, LightPass, Method, Options, Rate};
+pub use job::{Deferred, DeferredOptions, LightPass, Method, Rate};
 pub(crate) use job::{FLAGS, job};
 pub use lights::point_lights;

@@ -21,7 +21,7 @@ use crate::shapes;
 /// Options of the job.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct Options {
+pub struct GlossyOptions {
     /// A built-in scene or a file; without it, the test scene of this workload.
     pub scene: Option<String>,
     /// Centre of the receiver, a horizontal rectangle seen from above; scene units.
@@ -40,9 +40,9 @@ pub struct Options {
     pub fresnel: f32,
 }
 
-impl JobOptions for Options {}
+impl JobOptions for GlossyOptions {}
 
-impl Default for Options {
+impl Default for GlossyOptions {
     fn default() -> Self {
         let Receiver { centre, half, .. } = receiver();
         Self {
@@ -58,7 +58,7 @@ impl Default for Options {
     }
 }
 
-impl Options {
+impl GlossyOptions {
     fn check(&self) -> Result<(), LoadError> {
         let refused = |setting, message: String| Err(LoadError::Setting { setting, message });
         if !self.half.iter().all(|half| (MIN_LENGTH..=MAX_LENGTH).contains(half)) {
@@ -96,7 +96,7 @@ impl Options {
 pub struct Glossy {
     scene: Scene,
     receiver: Receiver,
-    options: Options,
+    options: GlossyOptions,
     seed: u64,
 }
 
@@ -114,7 +114,7 @@ impl Glossy {
     ///
     /// # Errors
     /// [`LoadError`] for a scene that cannot be loaded, or an invalid option.
-    pub fn new(options: Options, overrides: &Overrides, seed: u64) -> Result<Self, LoadError> {
+    pub fn new(options: GlossyOptions, overrides: &Overrides, seed: u64) -> Result<Self, LoadError> {
         let scene = match &options.scene {
             Some(name) => crate::load(name)?,
             None => default_scene(options.index.is_some())?,
@@ -138,7 +138,7 @@ impl Glossy {
     fn map(&self, frame: &Frame) -> Result<Map, LoadError> {
         let world = frame.camera.open().inverse();
         let (eye, along) = (world.translation.as_dvec3(), world.matrix3.z_axis.as_dvec3());
-        let Options { roughness, texels, .. } = self.options;
+        let GlossyOptions { roughness, texels, .. } = self.options;
         Map::new(&self.receiver, (eye, along), self.effect(), roughness, texels)
     }
 

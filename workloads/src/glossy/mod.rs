@@ -16,6 +16,6 @@ mod map;
 mod receiver;
 
 pub(crate) use job::FLAGS;
-pub use job::{Glossy, Options, default_scene, job, receiver};
+pub use job::{Glossy, GlossyOptions, default_scene, job, receiver};
 pub use map::{Lobe, Map};
 pub use receiver::{Effect, Receiver, ReceiverShader};

@@ -18,7 +18,7 @@ use glam::DVec3;
 
 use crate::error::LoadError;
 use crate::scene::{Local, Node, Parts, Trs};
-use soup::{Looks, Soup};
+use soup::{Soup, TriangleMaterials};
 
 /// Name extensions of scene files, for messages.
 pub(crate) const ENDINGS: &str = ".ron, .gltf, .glb, .obj, .ply, .off or .stl";
@@ -66,7 +66,7 @@ const MAX_FRAMES: u32 = 36;
 pub(crate) fn import(path: &Path, format: Format) -> Result<Parts, LoadError> {
     let mut parts = match format {
         Format::Ron => return ron::import(path),
-        Format::Gltf => gltf::import(path, None, gltf::Looks::Own)?,
+        Format::Gltf => gltf::import(path, None, gltf::MaterialSource::Own)?,
         Format::Ply | Format::Obj | Format::Off | Format::Stl => solid(path, soup(path, format)?)?,
     };
     let frames = libm::ceil(parts.graph.last_key_s() * parts.settings.frame_rate_hz);
@@ -89,7 +89,7 @@ fn soup(path: &Path, format: Format) -> Result<Soup, LoadError> {
 fn bare(path: &Path, format: Format) -> Result<Soup, LoadError> {
     let mut soup = if format == Format::Obj { obj::surface(path)? } else { soup(path, format)? };
     soup.colors.clear();
-    soup.looks = Looks::default();
+    soup.looks = TriangleMaterials::default();
     soup.warnings.retain(|warning| warning.code == warnings::Code::CoordinatesFarFromOrigin);
     Ok(soup)
 }

@@ -24,13 +24,13 @@ pub(super) struct Soup {
     pub triangles: Vec<[u32; 3]>,
     /// Whether faces are flat where the file gives no normals.
     pub flat: bool,
-    pub looks: Looks,
+    pub looks: TriangleMaterials,
     pub warnings: Vec<Warning>,
 }
 
 /// Materials of a file's triangles; without materials they are grey, or have their vertex colours.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Looks {
+pub(super) struct TriangleMaterials {
     pub materials: Vec<Paint>,
     /// The material of each triangle, where there are materials.
     pub of_triangle: Vec<u32>,
@@ -113,7 +113,7 @@ impl Soup {
     }
 }
 
-impl Looks {
+impl TriangleMaterials {
     /// A mesh for each material that `whole` uses, with all materials; `first` is the number of the first of these.
     pub fn split(self, mut whole: Mesh, first: usize) -> (Vec<Mesh>, Vec<Material>) {
         if self.materials.is_empty() {
@@ -158,7 +158,10 @@ mod tests {
             uvs: positions.iter().map(|p| Vec2::splat(p.x as f32)).collect(),
             positions,
             triangles: vec![[0, 1, 2], [1, 3, 2], [2, 1, 0]],
-            looks: Looks { materials: vec![paint(1.0), paint(2.0), paint(1.0)], of_triangle: vec![0, 1, 0] },
+            looks: TriangleMaterials {
+                materials: vec![paint(1.0), paint(2.0), paint(1.0)],
+                of_triangle: vec![0, 1, 0],
+            },
             ..Soup::default()
         };
         let looks = soup.looks.clone();

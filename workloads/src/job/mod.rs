@@ -334,6 +334,7 @@ pub(crate) mod testing {
             features: Features::ALL,
             depth: DepthSpec::default(),
             compute: None,
+            warp_lanes: 32,
         }
     }
 }

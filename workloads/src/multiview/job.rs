@@ -29,7 +29,7 @@ pub enum Show {
 /// Options of the job. The samples per pixel are those of each view.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct Options {
+pub struct MultiViewOptions {
     /// A built-in scene or a file.
     pub scene: String,
     /// Number of views.
@@ -52,11 +52,11 @@ pub struct Options {
     pub check_cache: bool,
 }
 
-impl JobOptions for Options {
+impl JobOptions for MultiViewOptions {
     const NEEDS: &'static [Need] = &[Need::new("panel", "show", &["interlaced"])];
 }
 
-impl Default for Options {
+impl Default for MultiViewOptions {
     fn default() -> Self {
         let Layout { views, spacing, aperture, overlap } = Layout::default();
         Self {
@@ -74,7 +74,7 @@ impl Default for Options {
     }
 }
 
-impl Options {
+impl MultiViewOptions {
     /// Layout of the views.
     pub fn layout(&self) -> Layout {
         let Self { views, spacing, aperture, overlap, .. } = *self;
@@ -85,7 +85,7 @@ impl Options {
 /// The job with its scene and layout.
 pub struct MultiView {
     scene: Scene,
-    options: Options,
+    options: MultiViewOptions,
     settings: Settings,
     view: Viewport,
     seed: u64,
@@ -97,9 +97,9 @@ impl MultiView {
     ///
     /// # Errors
     /// [`LoadError`] for a scene that cannot be loaded, or an invalid option.
-    pub fn new(options: Options, overrides: &Overrides, seed: u64) -> Result<Self, LoadError> {
+    pub fn new(options: MultiViewOptions, overrides: &Overrides, seed: u64) -> Result<Self, LoadError> {
         // The views need a depth of zero disparity even if the scene has no lens.
-        let options = Options { focus: options.focus.or(overrides.focus), ..options };
+        let options = MultiViewOptions { focus: options.focus.or(overrides.focus), ..options };
         let (size, focus) = (overrides.size.or(Some((320, 180))), None);
         let scene =
             crate::load(&options.scene)?.with_overrides(&Overrides { size, focus, ..overrides.clone() })?;

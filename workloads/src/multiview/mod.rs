@@ -15,6 +15,6 @@ mod layout;
 mod rig;
 
 pub(crate) use job::FLAGS;
-pub use job::{MAX_RUNS_OVER_INFINITE_CACHE, MAX_VIEW_ANGLE_DEG, MultiView, Options, Show, job};
+pub use job::{MAX_RUNS_OVER_INFINITE_CACHE, MAX_VIEW_ANGLE_DEG, MultiView, MultiViewOptions, Show, job};
 pub use layout::{Layout, Panel};
 pub use rig::{Rig, Target, Views};

@@ -37,7 +37,7 @@ pub enum QueryKind {
 /// Options of the job: walls, boxes behind them, and the queries.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct Options {
+pub struct OcclusionOptions {
     /// Number of walls, 0 to 1000.
     pub walls: u32,
     /// Slats per wall, 1 to 1000.
@@ -58,12 +58,12 @@ pub struct Options {
     pub boxes: [u32; 3],
 }
 
-impl JobOptions for Options {
+impl JobOptions for OcclusionOptions {
     const NEEDS: &'static [Need] =
         &[Need::new("tile_px", "query", &["intervals"]), Need::new("boxes", "query", &["intervals"])];
 }
 
-impl Default for Options {
+impl Default for OcclusionOptions {
     fn default() -> Self {
         Self {
             walls: 12,
@@ -79,7 +79,7 @@ impl Default for Options {
     }
 }
 
-impl Options {
+impl OcclusionOptions {
     fn check(&self) -> Result<(), LoadError> {
         must_hold([
             ("walls", &self.walls, self.walls <= 1000, "0 to 1000"),
@@ -101,7 +101,7 @@ impl Options {
 
 /// The job and its scene.
 struct Occlusion {
-    options: Options,
+    options: OcclusionOptions,
     settings: Settings,
     samples: Arc<dyn SampleSource>,
     wall_scene: WallScene,
@@ -118,12 +118,12 @@ pub(crate) const FLAGS: Flags = Flags {
 /// # Errors
 /// [`LoadError`] for an invalid option or setting.
 pub fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<dyn Job>, LoadError> {
-    let options: Options = options.read()?;
+    let options: OcclusionOptions = options.read()?;
     options.check()?;
     let settings = Settings { width: 512, height: 288, samples: 16, ..Settings::default() };
     let settings = settings.with(request.overrides)?;
     let samples = SampleChoice::load(&settings.table)?.source(settings.samples, request.seed)?.into();
-    let Options { walls, slats, gaps, objects, motion, lens, .. } = options;
+    let OcclusionOptions { walls, slats, gaps, objects, motion, lens, .. } = options;
     let spec = WallSceneSpec { walls, slats, gaps, boxes: objects, motion, lens, seed: request.seed };
     let refused =
         || LoadError::Setting { setting: "lens", message: format!("{lens}: it has to be 0 to 1 metre") };

@@ -15,4 +15,6 @@
 mod job;
 
 pub(crate) use job::FLAGS;
-pub use job::{MAX_HALF_COVERED_SHARE, Options, QueryKind, WallScene, WallSceneSpec, depths, depths_of, job};
+pub use job::{
+    MAX_HALF_COVERED_SHARE, OcclusionOptions, QueryKind, WallScene, WallSceneSpec, depths, depths_of, job,
+};

@@ -28,7 +28,7 @@ use crate::scene::Settings;
 /// Kind of points.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Kind {
+pub enum PointKind {
     /// Points that keep their distance.
     #[default]
     Darts,
@@ -38,7 +38,7 @@ pub enum Kind {
     Volume,
 }
 
-impl Kind {
+impl PointKind {
     /// What summaries name in place of a sample table: darts and noise have candidates instead of samples.
     fn samples(self) -> &'static str {
         match self {
@@ -60,9 +60,9 @@ impl Kind {
 /// Options of the job.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct Options {
+pub struct PointOptions {
     /// Kind of points.
-    pub points: Kind,
+    pub points: PointKind,
     /// Dimensions; 0 for the fewest of the kind.
     pub dimensions: u32,
     /// Minimum distance of darts, 0.005 to 0.5, in 3D from 0.03 on; 0 for 0.02 in 2D and 0.06 in 3D.
@@ -75,7 +75,7 @@ pub struct Options {
     pub count: f64,
 }
 
-impl JobOptions for Options {
+impl JobOptions for PointOptions {
     const NEEDS: &'static [Need] = &[
         Need::new("radius", "points", &["darts"]),
         Need::new("rounds", "points", &["darts"]),
@@ -84,16 +84,16 @@ impl JobOptions for Options {
     ];
 }
 
-impl Default for Options {
+impl Default for PointOptions {
     fn default() -> Self {
-        let (points, dimensions) = (Kind::Darts, 0);
+        let (points, dimensions) = (PointKind::Darts, 0);
         Self { points, dimensions, radius: 0.0, rounds: 5, periodic: true, count: 20_000.0 }
     }
 }
 
 /// The job, its settings and its seed.
 struct Sampling {
-    options: Options,
+    options: PointOptions,
     settings: Settings,
     seed: u64,
 }
@@ -109,7 +109,7 @@ const MIN_RADIUS_3D: f64 = 0.03;
 /// # Errors
 /// [`LoadError::Setting`] for an option out of range.
 pub(crate) fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<dyn Job>, LoadError> {
-    let mut options: Options = options.read()?;
+    let mut options: PointOptions = options.read()?;
     let refused = |setting, message: String| Err(LoadError::Setting { setting, message });
     let known = options.points.dimensions();
     if options.dimensions == 0 {
@@ -120,7 +120,7 @@ pub(crate) fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<d
         let kind = format!("{:?}", options.points).to_lowercase();
         return refused("points", format!("`{kind}` has {range} dimensions, not {}", options.dimensions));
     }
-    let in_space = options.dimensions == 3 && options.points == Kind::Darts;
+    let in_space = options.dimensions == 3 && options.points == PointKind::Darts;
     if options.radius == 0.0 {
         options.radius = if in_space { 0.06 } else { 0.02 };
     }
@@ -134,7 +134,7 @@ pub(crate) fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<d
     if !(100.0..=2e6).contains(&options.count) {
         return refused("count", format!("{}: it has to be 100 to 2000000", options.count));
     }
-    if options.points != Kind::Volume && request.overrides.samples.is_some() {
+    if options.points != PointKind::Volume && request.overrides.samples.is_some() {
         return refused(
             "points",
             "these bring samples of their own: only `points=volume` takes --samples".to_owned(),
@@ -285,7 +285,7 @@ fn rejected_warning(candidates: u64, points: usize) -> Option<Warning> {
 
 impl Sampling {
     fn darts<const D: usize>(&self, seed: u64, gpu: &mut Gpu<'_>) -> Result<Drawn, JobError> {
-        let Options { radius, rounds, periodic, .. } = self.options;
+        let PointOptions { radius, rounds, periodic, .. } = self.options;
         let domain = if periodic { Domain::Torus } else { Domain::Box };
         let spec = PoissonSpec { radius, domain, seed, spacing: Spacing::Double };
         let Rasterized { found, drawn, kept, candidates, .. } = darts::<D>(&spec, rounds, gpu)?;
@@ -352,13 +352,13 @@ impl Draws for Sampling {
     fn draw(&self, &number: &u32, gpu: &mut Gpu<'_>) -> Result<Drawn, JobError> {
         let seed = mix(self.seed.wrapping_add(u64::from(number)));
         match (self.options.points, self.options.dimensions) {
-            (Kind::Darts, 2) => self.darts::<2>(seed, gpu),
-            (Kind::Darts, _) => self.darts::<3>(seed, gpu),
-            (Kind::Noise, 1) => self.noise::<1>(seed, gpu),
-            (Kind::Noise, 2) => self.noise::<2>(seed, gpu),
-            (Kind::Noise, 3) => self.noise::<3>(seed, gpu),
-            (Kind::Noise, _) => self.noise::<4>(seed, gpu),
-            (Kind::Volume, _) => self.volume(seed, gpu),
+            (PointKind::Darts, 2) => self.darts::<2>(seed, gpu),
+            (PointKind::Darts, _) => self.darts::<3>(seed, gpu),
+            (PointKind::Noise, 1) => self.noise::<1>(seed, gpu),
+            (PointKind::Noise, 2) => self.noise::<2>(seed, gpu),
+            (PointKind::Noise, 3) => self.noise::<3>(seed, gpu),
+            (PointKind::Noise, _) => self.noise::<4>(seed, gpu),
+            (PointKind::Volume, _) => self.volume(seed, gpu),
         }
     }
 }

@@ -26,7 +26,7 @@ use crate::shapes;
 /// Options of the job.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct Options {
+pub struct SoftShadowOptions {
     /// A built-in scene or a file; without it, the test scene of this workload.
     pub scene: Option<String>,
     /// The area light.
@@ -42,16 +42,16 @@ pub struct Options {
     pub accumulate: bool,
 }
 
-impl JobOptions for Options {}
+impl JobOptions for SoftShadowOptions {}
 
-impl Default for Options {
+impl Default for SoftShadowOptions {
     fn default() -> Self {
         let light = LightSpec::default();
         Self { scene: None, light, map_px: 256, bias: 0.06, points: None, accumulate: false }
     }
 }
 
-impl Options {
+impl SoftShadowOptions {
     fn check(&self) -> Result<(), LoadError> {
         let refused = |setting, message: String| Err(LoadError::Setting { setting, message });
         if !(2..=4096).contains(&self.map_px) || !self.map_px.is_multiple_of(2) {
@@ -70,7 +70,7 @@ pub struct SoftShadows {
     scene: Scene,
     light: AreaLight,
     set: SharedSamples,
-    options: Options,
+    options: SoftShadowOptions,
 }
 
 impl SoftShadows {
@@ -79,7 +79,7 @@ impl SoftShadows {
     ///
     /// # Errors
     /// [`LoadError`] for a scene that cannot be loaded, or an invalid option.
-    pub fn new(mut options: Options, overrides: &Overrides, seed: u64) -> Result<Self, LoadError> {
+    pub fn new(mut options: SoftShadowOptions, overrides: &Overrides, seed: u64) -> Result<Self, LoadError> {
         let scene =
             options.scene.as_deref().map_or_else(default_scene, crate::load)?.with_overrides(overrides)?;
         options.light.move_by(-scene.origin());

@@ -17,7 +17,7 @@ mod map;
 mod shade;
 
 pub(crate) use job::FLAGS;
-pub use job::{Options, SoftShadows, default_scene, job};
+pub use job::{SoftShadowOptions, SoftShadows, default_scene, job};
 pub use light::{AreaLight, LightSpec};
 pub use map::{DepthPass, Method, SceneView, ShadowMap, depth_pass};
 pub use shade::{Shadows, World, look_ups};

@@ -34,13 +34,13 @@ const KNOWN: &str = ".m5d, .mts, and .ply, .obj, .off or .stl, alone or as a pai
 
 /// Formats with a mesh, or with one end of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Kind {
+pub(crate) enum InputKind {
     M5d,
     Mts,
     Surface(Format),
 }
 
-impl Kind {
+impl InputKind {
     /// Format by the first bytes of the file, or else by its name.
     pub fn of(path: &Path) -> Result<Self, LoadError> {
         let head = reader::head::<8>(path)?;
@@ -85,15 +85,15 @@ impl Kind {
 pub fn load(files: &[impl AsRef<Path>], camera: Option<&str>) -> Result<VisibilityScene, LoadError> {
     let spec = camera.map(parsed_camera).transpose()?;
     let files: Vec<&Path> = files.iter().map(AsRef::as_ref).collect();
-    let kinds = files.iter().map(|path| Kind::of(path)).collect::<Result<Vec<_>, _>>()?;
+    let kinds = files.iter().map(|path| InputKind::of(path)).collect::<Result<Vec<_>, _>>()?;
     let (path, objects) = match (&files[..], &kinds[..]) {
-        ([file], [Kind::M5d]) => match &spec {
+        ([file], [InputKind::M5d]) => match &spec {
             None => return m5d::load(file),
             Some(_) => (*file, vec![m5d::world(&m5d::load(file)?)]),
         },
-        ([file], [Kind::Mts]) => (*file, load_mts(file)?),
-        ([file], [Kind::Surface(format)]) => (*file, vec![mesh::still((file, *format))?]),
-        ([start, end], [Kind::Surface(one), Kind::Surface(other)]) => {
+        ([file], [InputKind::Mts]) => (*file, load_mts(file)?),
+        ([file], [InputKind::Surface(format)]) => (*file, vec![mesh::still((file, *format))?]),
+        ([start, end], [InputKind::Surface(one), InputKind::Surface(other)]) => {
             (*start, vec![moving((start, *one), (end, *other))?])
         }
         _ => return Err(wrong_number(&files, &kinds)),
@@ -113,8 +113,8 @@ fn parsed_camera(text: &str) -> Result<CameraSpec, LoadError> {
 /// # Errors
 /// As [`load`].
 pub fn load_surface(path: &Path) -> Result<MovingMesh, LoadError> {
-    match Kind::of(path)? {
-        Kind::Surface(format) => mesh::still((path, format)),
+    match InputKind::of(path)? {
+        InputKind::Surface(format) => mesh::still((path, format)),
         _ => Err(LoadError::Kind {
             file: path.display().to_string(),
             known: ".ply, .obj, .off and .stl (also gzipped)",
@@ -129,8 +129,8 @@ fn not_a_regular_file(path: &Path) -> LoadError {
     LoadError::Setting { setting: "files", message }
 }
 
-fn wrong_number(files: &[&Path], kinds: &[Kind]) -> LoadError {
-    let whole = files.iter().zip(kinds).find(|(_, kind)| !matches!(kind, Kind::Surface(_)));
+fn wrong_number(files: &[&Path], kinds: &[InputKind]) -> LoadError {
+    let whole = files.iter().zip(kinds).find(|(_, kind)| !matches!(kind, InputKind::Surface(_)));
     let message = match whole {
         Some((file, _)) if files.len() > 1 => {
             format!("{} holds both ends of the shutter: give it alone", file.display())

@@ -3,7 +3,9 @@
 use activity::{Event, Packet, PacketKind, Waits};
 use glam::{DVec3, Vec3, Vec4};
 use pipeline::{Camera, ComputeSpec, Format, Gpu, Lane, PipelineSpec, SurfaceId, SurfaceSpec, SurfaceView};
-use workloads::compute::{Atomics, Compute, Kernel, Kernels, LightSphere, Options, Order, TileLights, bin};
+use workloads::compute::{
+    Atomics, Compute, ComputeOptions, Kernel, Kernels, LightSphere, Order, TileLights, bin,
+};
 use workloads::job::{DrawsScene, Job, OptionSource, Request};
 use workloads::scene::{Frame, Overrides};
 
@@ -17,7 +19,7 @@ fn hardware() -> PipelineSpec {
     PipelineSpec { compute: Some(COMPUTE), ..spec() }
 }
 
-fn job(options: &Options, size: (u32, u32), samples: u32) -> Compute {
+fn job(options: &ComputeOptions, size: (u32, u32), samples: u32) -> Compute {
     let overrides = Overrides { size: Some(size), samples: Some(samples), ..Overrides::default() };
     Compute::new(options.clone(), &overrides, 3).unwrap()
 }
@@ -45,7 +47,7 @@ fn pairs(order: Order, values: &mut [f32]) {
 }
 
 /// The mean by plain loops, in the order in which groups add.
-fn mean(luminances: &[f32], [width, height]: [u32; 2], samples: u32, options: &Options) -> f32 {
+fn mean(luminances: &[f32], [width, height]: [u32; 2], samples: u32, options: &ComputeOptions) -> f32 {
     let (columns, rows) = (16, options.group / 16 * options.per_lane);
     let mut sums = Vec::new();
     for (top, left) in (0..height)
@@ -72,7 +74,7 @@ fn mean(luminances: &[f32], [width, height]: [u32; 2], samples: u32, options: &O
 /// A kernel on the image of the first frame, and what is stored of it.
 fn on_image<T>(
     job: &Compute,
-    options: &Options,
+    options: &ComputeOptions,
     run: impl Fn(&mut Kernels<'_, '_>, &SurfaceView) -> T,
 ) -> (T, Vec<f32>) {
     let (spec, frame) = (hardware(), first_frame(job));
@@ -91,9 +93,9 @@ fn a_reduction_is_the_mean_of_plain_loops_bit_for_bit() {
         (Order::Sequential, 4, 256, 3),
         (Order::Interleaved, 3, 16, 64),
     ] {
-        let options = Options { order, group, per_lane, ..Options::default() };
+        let options = ComputeOptions { order, group, per_lane, ..ComputeOptions::default() };
         let job = job(&options, (100, 37), samples);
-        let run = |options: &Options| {
+        let run = |options: &ComputeOptions| {
             on_image(&job, options, |kernels, image| {
                 let mean = kernels.mean_luminance(image).unwrap();
                 kernels.values(mean)[0]
@@ -105,14 +107,14 @@ fn a_reduction_is_the_mean_of_plain_loops_bit_for_bit() {
         assert!((f64::from(found) / exact - 1.0).abs() < 1e-5 && exact > 0.01, "{found} {exact}");
         // Where partial sums lie makes no difference.
         for (stride, padded) in [(2, false), (7, true)] {
-            assert_eq!(run(&Options { stride, padded, ..options.clone() }).0, found);
+            assert_eq!(run(&ComputeOptions { stride, padded, ..options.clone() }).0, found);
         }
     }
 }
 
 #[test]
 fn the_mean_of_one_grey_is_the_grey() {
-    let options = Options { contrast: 0.0, per_lane: 2, ..Options::default() };
+    let options = ComputeOptions { contrast: 0.0, per_lane: 2, ..ComputeOptions::default() };
     let (found, luminances) = on_image(&job(&options, (64, 32), 1), &options, |kernels, image| {
         let mean = kernels.mean_luminance(image).unwrap();
         kernels.values(mean)[0]
@@ -125,7 +127,7 @@ fn the_mean_of_one_grey_is_the_grey() {
 /// A chain keeps halves and leaves out the last row or column of odd sizes.
 #[test]
 fn the_mean_of_a_mip_chain_is_that_of_its_pixels() {
-    let options = Options { kernel: Kernel::MipChain, ..Options::default() };
+    let options = ComputeOptions { kernel: Kernel::MipChain, ..ComputeOptions::default() };
     let error = |size: (u32, u32), samples: u32| {
         let (spec, job) = (hardware(), job(&options, size, samples));
         let mut gpu = Gpu::quiet(&spec).unwrap();
@@ -146,7 +148,7 @@ fn the_mean_of_a_mip_chain_is_that_of_its_pixels() {
 
 #[test]
 fn a_mip_chain_exposes_as_the_reduction_does() {
-    let image = |kernel| packets(&Options { kernel, ..Options::default() }, 2).1;
+    let image = |kernel| packets(&ComputeOptions { kernel, ..ComputeOptions::default() }, 2).1;
     let [chain, reduction] = [Kernel::MipChain, Kernel::Reduction].map(image);
     let most = chain.iter().zip(&reduction).map(|(a, b)| (*a - *b).abs().max_element()).fold(0.0, f32::max);
     assert!(most < 0.05 && chain != vec![chain[0]; chain.len()], "{most}");
@@ -155,7 +157,8 @@ fn a_mip_chain_exposes_as_the_reduction_does() {
 #[test]
 fn bank_conflicts_are_those_of_the_layout() {
     let conflicts = |order, stride, padded| {
-        let options = Options { order, stride, padded, group: 128, per_lane: 1, ..Options::default() };
+        let options =
+            ComputeOptions { order, stride, padded, group: 128, per_lane: 1, ..ComputeOptions::default() };
         let (counts, _) = on_image(&job(&options, (16, 8), 1), &options, |kernels, image| {
             kernels.mean_luminance(image).unwrap();
             *kernels.counts()
@@ -185,7 +188,7 @@ fn a_histogram_counts_every_value() {
         (Atomics::Shared, 64, 8, true, 2),
         (Atomics::Global, 256, 1, false, 1),
     ] {
-        let options = Options { atomics, bins, copies, padded, ..Options::default() };
+        let options = ComputeOptions { atomics, bins, copies, padded, ..ComputeOptions::default() };
         let ((counts, sums), luminances) =
             on_image(&job(&options, (100, 37), samples), &options, |kernels, image| {
                 let counts = kernels.histogram(image).unwrap();
@@ -213,7 +216,7 @@ fn bins_are_even_in_the_logarithm() {
 #[test]
 fn lanes_on_one_bin_wait_in_line() {
     let in_line = |atomics, copies, padded| {
-        let options = Options { atomics, copies, padded, contrast: 0.0, ..Options::default() };
+        let options = ComputeOptions { atomics, copies, padded, contrast: 0.0, ..ComputeOptions::default() };
         let (counts, _) = on_image(&job(&options, (128, 64), 1), &options, |kernels, image| {
             kernels.histogram(image).unwrap();
             (*kernels.counts(), kernels.cycles_per_shared_access(), kernels.atomics_per_word())
@@ -237,7 +240,7 @@ fn listed(
     camera: &Camera,
     [width, height]: [u32; 2],
     lights: &[LightSphere],
-    options: &Options,
+    options: &ComputeOptions,
 ) -> Vec<Vec<u32>> {
     let scale = 0.5 * height as f32 / camera.half_height();
     let side = options.tile_px;
@@ -288,7 +291,7 @@ struct Culled {
     tiles: TileLights,
 }
 
-fn culled(options: &Options, size: (u32, u32), samples: u32) -> Culled {
+fn culled(options: &ComputeOptions, size: (u32, u32), samples: u32) -> Culled {
     let (job, spec) = (job(options, size, samples), hardware());
     let (frame, mut gpu) = (first_frame(&job), Gpu::quiet(&spec).unwrap());
     let depth = job.depths(&frame, &mut gpu).unwrap();
@@ -303,7 +306,7 @@ fn culled(options: &Options, size: (u32, u32), samples: u32) -> Culled {
 fn lists_of_tiles_are_those_of_plain_loops() {
     for (tile_px, depth_bounds, samples, group) in [(16, true, 1, 128), (8, true, 3, 64), (32, false, 1, 256)]
     {
-        let options = Options { tile_px, depth_bounds, group, list: 512, ..Options::default() };
+        let options = ComputeOptions { tile_px, depth_bounds, group, list: 512, ..ComputeOptions::default() };
         let Culled { frame, depths, lights, tiles } = culled(&options, (100, 60), samples);
         let expected = listed(&depths, samples, &frame.camera, [100, 60], &lights, &options);
         let sorted = |mut list: Vec<u32>| {
@@ -314,7 +317,7 @@ fn lists_of_tiles_are_those_of_plain_loops() {
         assert_eq!(found, expected);
         assert!(expected.iter().any(|list| list.len() > 3) && expected.iter().any(|list| list.len() < 64));
         // Of a list that is too short the count is still right.
-        let short = culled(&Options { list: 2, ..options }, (100, 60), samples).tiles;
+        let short = culled(&ComputeOptions { list: 2, ..options }, (100, 60), samples).tiles;
         assert_eq!(short.counts, expected.iter().map(|list| list.len() as u32).collect::<Vec<_>>());
         assert!(short.lists.iter().all(|list| list.len() <= 2));
     }
@@ -323,7 +326,7 @@ fn lists_of_tiles_are_those_of_plain_loops() {
 /// A light that reaches a point of the image is in the list of its tile.
 #[test]
 fn no_light_is_lost() {
-    let options = Options { list: 512, ..Options::default() };
+    let options = ComputeOptions { list: 512, ..ComputeOptions::default() };
     let Culled { frame, depths, lights, tiles } = culled(&options, (96, 54), 1);
     let pose = frame.camera.open().inverse();
     let tangent = f64::from(frame.camera.half_height());
@@ -351,7 +354,7 @@ fn no_light_is_lost() {
 }
 
 /// Packets and image of a frame.
-fn packets(options: &Options, threads: usize) -> (Vec<Packet>, Vec<Vec3>) {
+fn packets(options: &ComputeOptions, threads: usize) -> (Vec<Packet>, Vec<Vec3>) {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
     pool.install(|| {
         let (spec, mut packets) = (hardware(), Vec::new());
@@ -365,7 +368,7 @@ fn packets(options: &Options, threads: usize) -> (Vec<Packet>, Vec<Vec3>) {
 #[test]
 fn groups_wait_for_what_they_read_and_results_are_the_same_for_any_threads() {
     for kernel in [Kernel::Reduction, Kernel::Histogram, Kernel::LightCulling] {
-        let options = Options { kernel, ..Options::default() };
+        let options = ComputeOptions { kernel, ..ComputeOptions::default() };
         let (packets_of_one, image) = packets(&options, 1);
         assert!(packets(&options, 3) == (packets_of_one.clone(), image.clone()), "{kernel:?}");
         let waiting: Vec<u32> = packets_of_one
@@ -382,28 +385,31 @@ fn groups_wait_for_what_they_read_and_results_are_the_same_for_any_threads() {
 
 #[test]
 fn weak_regimes_have_warnings_and_others_none() {
-    let codes = |options: Options| -> Vec<&'static str> {
+    let codes = |options: ComputeOptions| -> Vec<&'static str> {
         let (drawn, ..) = drawn_on(&hardware(), &job(&options, (96, 54), 1), 0);
         drawn.warnings.iter().map(|warning| warning.code.name()).collect()
     };
-    let reduction = Options { kernel: Kernel::Reduction, ..Options::default() };
-    assert_eq!(codes(Options { stride: 32, ..reduction.clone() }), ["bank-conflicts"]);
+    let reduction = ComputeOptions { kernel: Kernel::Reduction, ..ComputeOptions::default() };
+    assert_eq!(codes(ComputeOptions { stride: 32, ..reduction.clone() }), ["bank-conflicts"]);
     assert!(codes(reduction).is_empty());
-    let histogram = Options { kernel: Kernel::Histogram, ..Options::default() };
+    let histogram = ComputeOptions { kernel: Kernel::Histogram, ..ComputeOptions::default() };
     for atomics in [Atomics::Shared, Atomics::Global] {
-        assert_eq!(codes(Options { atomics, contrast: 0.0, ..histogram.clone() }), ["atomic-contention"]);
+        assert_eq!(
+            codes(ComputeOptions { atomics, contrast: 0.0, ..histogram.clone() }),
+            ["atomic-contention"]
+        );
     }
     // Copies of a bin are in one bank, unless they are padded.
-    let flat = Options { copies: 8, contrast: 0.0, ..histogram };
+    let flat = ComputeOptions { copies: 8, contrast: 0.0, ..histogram };
     assert_eq!(codes(flat.clone()), ["atomic-contention"]);
-    assert!(codes(Options { padded: true, ..flat }).is_empty());
-    assert_eq!(codes(Options { list: 1, ..Options::default() }), ["light-lists-full"]);
-    assert!(codes(Options { list: 512, ..Options::default() }).is_empty());
+    assert!(codes(ComputeOptions { padded: true, ..flat }).is_empty());
+    assert_eq!(codes(ComputeOptions { list: 1, ..ComputeOptions::default() }), ["light-lists-full"]);
+    assert!(codes(ComputeOptions { list: 512, ..ComputeOptions::default() }).is_empty());
 }
 
 #[test]
 fn a_gpu_without_compute_unit_is_refused_with_a_remedy() {
-    let job = job(&Options::default(), (32, 32), 1);
+    let job = job(&ComputeOptions::default(), (32, 32), 1);
     let without = spec();
     let error = Job::frame(&job, 0, &mut Gpu::quiet(&without).unwrap()).unwrap_err().to_string();
     assert!(error.contains("no compute unit; choose one with `compute` in its file"), "{error}");
@@ -428,7 +434,7 @@ fn options_are_checked() {
 fn an_unwritten_surface_has_no_view() {
     let spec = hardware();
     let mut gpu = Gpu::quiet(&spec).unwrap();
-    let job = job(&Options::default(), (32, 32), 1);
+    let job = job(&ComputeOptions::default(), (32, 32), 1);
     let depth: SurfaceId = job.depths(&first_frame(&job), &mut gpu).unwrap();
     assert!(gpu.surface_view(depth).is_some());
     let empty = SurfaceSpec::new("empty", job.viewport().unwrap(), Format::D32);

@@ -3,7 +3,7 @@
 use activity::Event;
 use glam::{DVec3, Vec3};
 use pipeline::{FrameReport, Gpu};
-use workloads::deferred::{Deferred, LightPass, Method, NormalFormat, Options, Rate};
+use workloads::deferred::{Deferred, DeferredOptions, LightPass, Method, NormalFormat, Rate};
 use workloads::job::{Drawn, Job};
 use workloads::scene::{Local, Node, Parts, Rig, Scene, SceneCamera, Settings, Trs};
 use workloads::{Alpha, Material, Overrides, shapes};
@@ -24,12 +24,12 @@ fn drawn(job: &dyn Job) -> (Drawn, FrameReport) {
     (drawn, gpu.finish())
 }
 
-fn with(options: Options, samples: u32) -> (Drawn, FrameReport) {
+fn with(options: DeferredOptions, samples: u32) -> (Drawn, FrameReport) {
     drawn(&Deferred::new(options, &overrides(samples), 1).unwrap())
 }
 
-fn forward(options: &Options, samples: u32) -> Vec<Vec3> {
-    with(Options { method: Method::Forward, ..options.clone() }, samples).0.image
+fn forward(options: &DeferredOptions, samples: u32) -> Vec<Vec3> {
+    with(DeferredOptions { method: Method::Forward, ..options.clone() }, samples).0.image
 }
 
 fn largest(a: &[Vec3], b: &[Vec3]) -> f32 {
@@ -66,11 +66,11 @@ const LIGHT: f32 = 1.5 * 1.2 / 1.6;
 fn a_lit_buffer_equals_forward_shading_within_its_formats() {
     for (normals, half_ulp) in [(NormalFormat::Rgba16f, HALF), (NormalFormat::Rgba8, BYTE)] {
         for lights in [0, 1, 4] {
-            let options = Options { lights, range: 12.0, normals, ..Options::default() };
+            let options = DeferredOptions { lights, range: 12.0, normals, ..DeferredOptions::default() };
             let (deferred, wanted) = (with(options.clone(), 1).0.image, forward(&options, 1));
             let (error, most) = (largest(&deferred, &wanted), bound(SCENE + LIGHT * lights as f32, half_ulp));
             assert!(error > 0.0 && error < most, "{normals:?}, {lights} lights: {error} of {most}");
-            let dark = forward(&Options { lights: 0, ..options.clone() }, 1);
+            let dark = forward(&DeferredOptions { lights: 0, ..options.clone() }, 1);
             assert!(lights == 0 || largest(&dark, &wanted) > most, "the light would not be missed");
         }
     }
@@ -78,15 +78,15 @@ fn a_lit_buffer_equals_forward_shading_within_its_formats() {
 
 #[test]
 fn larger_normals_err_less() {
-    let options = Options { lights: 8, range: 8.0, ..Options::default() };
+    let options = DeferredOptions { lights: 8, range: 8.0, ..DeferredOptions::default() };
     let wanted = forward(&options, 1);
-    let error = |normals| rms(&with(Options { normals, ..options.clone() }, 1).0.image, &wanted);
+    let error = |normals| rms(&with(DeferredOptions { normals, ..options.clone() }, 1).0.image, &wanted);
     assert!(error(NormalFormat::Rgba16f) < error(NormalFormat::Rgba8));
 }
 
 #[test]
 fn the_background_stays() {
-    let options = Options::default();
+    let options = DeferredOptions::default();
     let job = Deferred::new(options.clone(), &overrides(1), 1).unwrap();
     let sky = Job::scene(&job).unwrap().background();
     let (deferred, wanted) = (drawn(&job).0.image, forward(&options, 1));
@@ -99,9 +99,9 @@ fn the_background_stays() {
 
 #[test]
 fn light_volumes_add_up_to_the_loop_over_lights() {
-    let options = Options { lights: 24, range: 3.0, ..Options::default() };
+    let options = DeferredOptions { lights: 24, range: 3.0, ..DeferredOptions::default() };
     let (screen, _) = with(options.clone(), 1);
-    let (volumes, report) = with(Options { lighting: LightPass::Volumes, ..options.clone() }, 1);
+    let (volumes, report) = with(DeferredOptions { lighting: LightPass::Volumes, ..options.clone() }, 1);
     let most = screen.image.iter().map(|pixel| pixel.max_element()).fold(0.0, f32::max);
     // Each of the sums is rounded to a half.
     let error = largest(&screen.image, &volumes.image);
@@ -116,7 +116,7 @@ fn light_volumes_add_up_to_the_loop_over_lights() {
 #[test]
 fn counts_are_those_of_the_code_that_ran() {
     let ops = |lights: u32| {
-        let (_, report) = with(Options { lights, ..Options::default() }, 1);
+        let (_, report) = with(DeferredOptions { lights, ..DeferredOptions::default() }, 1);
         let names: Vec<&str> = report.passes.iter().map(|pass| pass.name.as_str()).collect();
         assert_eq!(names, ["g-buffer", "lighting", "resolve"]);
         let counts = report.passes[1].counts();
@@ -129,7 +129,7 @@ fn counts_are_those_of_the_code_that_ran() {
     assert_eq!(eight - four, 2 * (four - two), "each light runs the same code for each surface");
     // Forward rendering runs it for every fragment that is shaded, hidden ones, too.
     let of_forward = |lights| {
-        let options = Options { method: Method::Forward, lights, ..Options::default() };
+        let options = DeferredOptions { method: Method::Forward, lights, ..DeferredOptions::default() };
         let (_, report) = with(options, 1);
         assert_eq!(report.passes.len(), 2);
         report.passes[0].counts()[Event::ShaderOps]
@@ -139,7 +139,7 @@ fn counts_are_those_of_the_code_that_ran() {
 
 #[test]
 fn threads_do_not_change_a_byte() {
-    let options = Options { lights: 6, lighting: LightPass::Volumes, ..Options::default() };
+    let options = DeferredOptions { lights: 6, lighting: LightPass::Volumes, ..DeferredOptions::default() };
     let all = [1, 2, 3].map(|threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| with(options.clone(), 2))
@@ -154,10 +154,10 @@ fn threads_do_not_change_a_byte() {
 
 #[test]
 fn one_lit_sample_does_not_stand_for_a_pixel() {
-    let options = Options { lights: 4, ..Options::default() };
+    let options = DeferredOptions { lights: 4, ..DeferredOptions::default() };
     let wanted = forward(&options, 4);
     let (each, _) = with(options.clone(), 4);
-    let (one, _) = with(Options { rate: Rate::Pixel, ..options }, 4);
+    let (one, _) = with(DeferredOptions { rate: Rate::Pixel, ..options }, 4);
     let codes = |drawn: &Drawn| drawn.warnings.iter().map(|warning| warning.code.name()).collect::<Vec<_>>();
     assert_eq!((codes(&each), codes(&one)), (vec![], vec!["deferred-one-surface"]));
     let errors = [&each, &one].map(|drawn| rms(&drawn.image, &wanted));
@@ -187,17 +187,18 @@ fn pane(velocity: DVec3) -> Scene {
     Scene::new(parts).unwrap()
 }
 
-fn of(scene: Scene, options: Options, overrides: &Overrides) -> (Drawn, FrameReport) {
+fn of(scene: Scene, options: DeferredOptions, overrides: &Overrides) -> (Drawn, FrameReport) {
     drawn(&Deferred::of(scene, options, overrides, 1).unwrap())
 }
 
 #[test]
 fn blended_surfaces_are_lit_forward_over_the_lit_buffer() {
-    let options = Options { lights: 2, range: 6.0, ..Options::default() };
+    let options = DeferredOptions { lights: 2, range: 6.0, ..DeferredOptions::default() };
     let (deferred, report) = of(pane(DVec3::ZERO), options.clone(), &overrides(1));
     let names: Vec<&str> = report.passes.iter().map(|pass| pass.name.as_str()).collect();
     assert_eq!(names, ["g-buffer", "lighting", "blended", "resolve"]);
-    let (wanted, _) = of(pane(DVec3::ZERO), Options { method: Method::Forward, ..options }, &overrides(1));
+    let (wanted, _) =
+        of(pane(DVec3::ZERO), DeferredOptions { method: Method::Forward, ..options }, &overrides(1));
     let (error, most) = (largest(&deferred.image, &wanted.image), bound(SCENE + 2.0 * LIGHT, HALF));
     assert!(error < most, "{error} of {most}");
     let middle = wanted.image[(27 * 96 + 48) as usize];
@@ -206,12 +207,12 @@ fn blended_surfaces_are_lit_forward_over_the_lit_buffer() {
 
 #[test]
 fn moving_objects_have_a_surface_for_every_sample() {
-    let options = Options { lights: 2, range: 6.0, ..Options::default() };
+    let options = DeferredOptions { lights: 2, range: 6.0, ..DeferredOptions::default() };
     let overrides = Overrides { shutter: Some(1.0), table: Some("owen".to_owned()), ..overrides(16) };
     let fast = DVec3::new(20.0, 0.0, 0.0);
-    let image = |options: Options| of(pane(fast), options, &overrides).0;
-    let wanted = image(Options { method: Method::Forward, ..options.clone() });
-    let (each, one) = (image(options.clone()), image(Options { rate: Rate::Pixel, ..options }));
+    let image = |options: DeferredOptions| of(pane(fast), options, &overrides).0;
+    let wanted = image(DeferredOptions { method: Method::Forward, ..options.clone() });
+    let (each, one) = (image(options.clone()), image(DeferredOptions { rate: Rate::Pixel, ..options }));
     assert!(each.moving && each.warnings.is_empty(), "{:?}", each.warnings);
     let errors = [&each, &one].map(|drawn| rms(&drawn.image, &wanted.image));
     assert!(errors[1] > 3.0 * errors[0], "{errors:?}");
@@ -222,8 +223,11 @@ fn a_camera_that_moves_while_the_shutter_is_open_is_reported() {
     let camera = "position: (-4, 1, 5), target: (0, 0, 0), end_position: (4, 1, 5)";
     let moving = Overrides { shutter: Some(1.0), camera: Some(camera.to_owned()), ..overrides(1) };
     let codes = |overrides: &Overrides, method| {
-        let (drawn, _) =
-            of(pane(DVec3::ZERO), Options { method, lights: 0, ..Options::default() }, overrides);
+        let (drawn, _) = of(
+            pane(DVec3::ZERO),
+            DeferredOptions { method, lights: 0, ..DeferredOptions::default() },
+            overrides,
+        );
         drawn.warnings.iter().map(|warning| warning.code.name()).collect::<Vec<_>>()
     };
     assert_eq!(codes(&moving, Method::Deferred), ["deferred-moving-camera"]);
@@ -234,10 +238,10 @@ fn a_camera_that_moves_while_the_shutter_is_open_is_reported() {
 #[test]
 fn invalid_options_are_reported() {
     for bad in [
-        Options { lights: 5000, ..Options::default() },
-        Options { range: 0.0, ..Options::default() },
-        Options { range: f32::NAN, ..Options::default() },
-        Options { scene: "nowhere".to_owned(), ..Options::default() },
+        DeferredOptions { lights: 5000, ..DeferredOptions::default() },
+        DeferredOptions { range: 0.0, ..DeferredOptions::default() },
+        DeferredOptions { range: f32::NAN, ..DeferredOptions::default() },
+        DeferredOptions { scene: "nowhere".to_owned(), ..DeferredOptions::default() },
     ] {
         let error = Deferred::new(bad.clone(), &overrides(1), 1).err().unwrap();
         assert!(error.is_usage(), "{bad:?}: {error}");

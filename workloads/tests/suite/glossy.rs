@@ -5,7 +5,7 @@ use pipeline::sampling::SampleSource;
 use pipeline::{Cull, Draw, Geometry, Gpu, LensShape, SampleSpec, SampleTable};
 use workloads::Overrides;
 use workloads::accumulation::{RayWork, Rays, SharedSamples};
-use workloads::glossy::{Effect, Glossy, Lobe, Map, Options, Receiver, default_scene, receiver};
+use workloads::glossy::{Effect, Glossy, GlossyOptions, Lobe, Map, Receiver, default_scene, receiver};
 use workloads::job::Job;
 
 use crate::common::{White, drawn_on, spec};
@@ -126,20 +126,20 @@ fn more_samples_reduce_the_error() {
     assert!(more < 0.75 * few && most < 0.75 * more, "{few} {more} {most}");
 }
 
-fn drawn(options: Options) -> (Vec<Vec3>, Vec<&'static str>) {
+fn drawn(options: GlossyOptions) -> (Vec<Vec3>, Vec<&'static str>) {
     let overrides = Overrides { size: Some((48, 27)), samples: Some(4), ..Overrides::default() };
-    let job = Glossy::new(Options { texels: 16, ..options }, &overrides, 1).unwrap();
+    let job = Glossy::new(GlossyOptions { texels: 16, ..options }, &overrides, 1).unwrap();
     let (drawn, _) = drawn_on(&spec(), &job, 0);
     (drawn.image, drawn.warnings.iter().map(|warning| warning.code.name()).collect())
 }
 
 #[test]
 fn the_job_shows_the_map_on_its_receiver() {
-    let (image, codes) = drawn(Options::default());
+    let (image, codes) = drawn(GlossyOptions::default());
     assert_eq!((image.len(), codes), (48 * 27, vec![]));
-    let (dull, _) = drawn(Options { fresnel: 0.0, ..Options::default() });
+    let (dull, _) = drawn(GlossyOptions { fresnel: 0.0, ..GlossyOptions::default() });
     assert!(rmse(&image, &dull) > 0.02, "what is reflected is seen");
-    let (refracted, _) = drawn(Options { index: Some(1.3), ..Options::default() });
+    let (refracted, _) = drawn(GlossyOptions { index: Some(1.3), ..GlossyOptions::default() });
     assert!(rmse(&image, &refracted) > 0.02);
 }
 
@@ -148,7 +148,13 @@ fn the_job_shows_the_map_on_its_receiver() {
 fn a_mirror_shows_what_is_mirrored() {
     // The resolution keeps texture filtering small: a pixel is a texel or two.
     const WIDE: usize = 384;
-    let options = Options { roughness: 0.0, fresnel: 1.0, texels: 256, map_samples: 4, ..Options::default() };
+    let options = GlossyOptions {
+        roughness: 0.0,
+        fresnel: 1.0,
+        texels: 256,
+        map_samples: 4,
+        ..GlossyOptions::default()
+    };
     let overrides = Overrides { size: Some((WIDE as u32, 216)), samples: Some(4), ..Overrides::default() };
     let job = Glossy::new(options, &overrides, 1).unwrap();
     let image = job.frame(0, &mut Gpu::quiet(&spec()).unwrap()).unwrap().image;
@@ -180,15 +186,18 @@ fn a_mirror_shows_what_is_mirrored() {
 
 #[test]
 fn limitations_and_invalid_options_are_reported() {
-    assert_eq!(drawn(Options { roughness: 1.5, ..Options::default() }).1, ["lens-wider-than-receiver"]);
+    assert_eq!(
+        drawn(GlossyOptions { roughness: 1.5, ..GlossyOptions::default() }).1,
+        ["lens-wider-than-receiver"]
+    );
     for bad in [
-        Options { roughness: -1.0, ..Options::default() },
-        Options { half: [0.0, 1.0], ..Options::default() },
-        Options { centre: [0.0, 50.0, 0.0], ..Options::default() },
-        Options { map_samples: 0, ..Options::default() },
-        Options { fresnel: 2.0, ..Options::default() },
-        Options { index: Some(-1.0), ..Options::default() },
-        Options { texels: 0, ..Options::default() },
+        GlossyOptions { roughness: -1.0, ..GlossyOptions::default() },
+        GlossyOptions { half: [0.0, 1.0], ..GlossyOptions::default() },
+        GlossyOptions { centre: [0.0, 50.0, 0.0], ..GlossyOptions::default() },
+        GlossyOptions { map_samples: 0, ..GlossyOptions::default() },
+        GlossyOptions { fresnel: 2.0, ..GlossyOptions::default() },
+        GlossyOptions { index: Some(-1.0), ..GlossyOptions::default() },
+        GlossyOptions { texels: 0, ..GlossyOptions::default() },
     ] {
         let error = Glossy::new(bad.clone(), &Overrides::default(), 1).err().unwrap();
         assert!(error.is_usage(), "{bad:?}: {error}");

@@ -104,6 +104,7 @@ pub fn first_image(scene: &Scene) -> Vec<Vec3> {
         features: Features::ALL,
         depth: pipeline::depth::DepthSpec::default(),
         compute: None,
+        warp_lanes: 32,
     };
     let samples = SampleTable::low_discrepancy(4, 1, LensShape::Disk).unwrap();
     let background = Vec3::ZERO;

@@ -4,7 +4,7 @@ use activity::Event;
 use glam::{Affine3A, Vec3};
 use pipeline::{CacheSpec, Camera, Cull, Draw, Geometry, Gpu, PipelineSpec, Shading, Viewport};
 use workloads::job::Job;
-use workloads::multiview::{Layout, MultiView, Options, Rig, Show, Target, Views};
+use workloads::multiview::{Layout, MultiView, MultiViewOptions, Rig, Show, Target, Views};
 use workloads::{Overrides, Scene};
 
 use crate::common::{White, bits, drawn_on, spec};
@@ -147,9 +147,9 @@ fn shading_is_reused_between_views_within_the_cache() {
     assert!(sizes.windows(2).all(|pair| pair[1] <= pair[0] * 1.02), "{sizes:?}");
 }
 
-fn drawn(options: Options, spec: &PipelineSpec) -> (Vec<Vec3>, Vec<&'static str>, u32) {
+fn drawn(options: MultiViewOptions, spec: &PipelineSpec) -> (Vec<Vec3>, Vec<&'static str>, u32) {
     let overrides = Overrides { size: Some((64, 48)), ..Overrides::default() };
-    let options = Options { scene: "tiny".to_owned(), ..options };
+    let options = MultiViewOptions { scene: "tiny".to_owned(), ..options };
     let job = MultiView::new(options, &overrides, 1).unwrap();
     let (drawn, _) = drawn_on(spec, &job, 0);
     let codes = drawn.warnings.iter().map(|warning| warning.code.name()).collect();
@@ -159,12 +159,17 @@ fn drawn(options: Options, spec: &PipelineSpec) -> (Vec<Vec3>, Vec<&'static str>
 #[test]
 fn the_job_shows_views_side_by_side_interlaced_or_alone() {
     let spec = spec();
-    let (pair, _, width) = drawn(Options::default(), &spec);
+    let (pair, _, width) = drawn(MultiViewOptions::default(), &spec);
     assert_eq!((pair.len(), width), (128 * 48, 128));
-    let (left, ..) = drawn(Options { show: Show::One, ..Options::default() }, &spec);
+    let (left, ..) = drawn(MultiViewOptions { show: Show::One, ..MultiViewOptions::default() }, &spec);
     assert_eq!(bits(&left[64..128]), bits(&pair[128..192]), "the left half of the second row");
-    let options =
-        Options { views: 7, spacing: 0.05, overlap: 2, show: Show::Interlaced, ..Options::default() };
+    let options = MultiViewOptions {
+        views: 7,
+        spacing: 0.05,
+        overlap: 2,
+        show: Show::Interlaced,
+        ..MultiViewOptions::default()
+    };
     let (panel, _, width) = drawn(options, &spec);
     assert_eq!((panel.len(), width), (64 * 48, 64));
 }
@@ -172,15 +177,16 @@ fn the_job_shows_views_side_by_side_interlaced_or_alone() {
 #[test]
 fn each_limitation_is_reported() {
     let big = PipelineSpec { shading_cache: CacheSpec::lru(16_384, 4), ..spec() };
-    let near = Options { spacing: 0.15, aperture: 0.05, ..Options::default() };
+    let near = MultiViewOptions { spacing: 0.15, aperture: 0.05, ..MultiViewOptions::default() };
     assert_eq!(drawn(near.clone(), &big).1, Vec::<&str>::new());
     let small = PipelineSpec { shading_cache: CacheSpec::lru(1, 1), ..spec() };
     assert_eq!(drawn(near, &small).1, ["shading-cache-small"]);
-    let wide = Options { spacing: 1.5, ..Options::default() };
+    let wide = MultiViewOptions { spacing: 1.5, ..MultiViewOptions::default() };
     assert!(drawn(wide, &big).1.contains(&"view-dependent-shading"));
     // The outermost rays meet at 5.7 and at 6.3 degrees: 0.2 and 0.22 to either side of the centre, 4 away.
     for (spacing, codes) in [(0.3, &[][..]), (0.34, &["view-dependent-shading"])] {
-        let at = Options { focus: Some(4.0), aperture: 0.05, spacing, ..Options::default() };
+        let at =
+            MultiViewOptions { focus: Some(4.0), aperture: 0.05, spacing, ..MultiViewOptions::default() };
         assert_eq!(drawn(at, &big).1, codes);
     }
 }
@@ -189,11 +195,11 @@ fn each_limitation_is_reported() {
 fn invalid_options_are_mistakes_of_usage() {
     let none = Overrides::default();
     for bad in [
-        Options { views: 0, ..Options::default() },
-        Options { overlap: 3, ..Options::default() },
-        Options { views: 64, spacing: 0.5, ..Options::default() },
-        Options { focus: Some(-1.0), ..Options::default() },
-        Options { scene: "no such scene".to_owned(), ..Options::default() },
+        MultiViewOptions { views: 0, ..MultiViewOptions::default() },
+        MultiViewOptions { overlap: 3, ..MultiViewOptions::default() },
+        MultiViewOptions { views: 64, spacing: 0.5, ..MultiViewOptions::default() },
+        MultiViewOptions { focus: Some(-1.0), ..MultiViewOptions::default() },
+        MultiViewOptions { scene: "no such scene".to_owned(), ..MultiViewOptions::default() },
     ] {
         let error = MultiView::new(bad.clone(), &none, 1).err().unwrap();
         assert!(error.is_usage(), "{bad:?}: {error}");

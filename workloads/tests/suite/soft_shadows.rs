@@ -9,8 +9,8 @@ use workloads::Overrides;
 use workloads::accumulation::SharedSamples;
 use workloads::job::{Drawn, Job};
 use workloads::soft_shadows::{
-    AreaLight, DepthPass, LightSpec, Method, Options, SceneView, ShadowMap, Shadows, SoftShadows, World,
-    depth_pass,
+    AreaLight, DepthPass, LightSpec, Method, SceneView, ShadowMap, Shadows, SoftShadowOptions, SoftShadows,
+    World, depth_pass,
 };
 use workloads::visibility::Unshaded;
 
@@ -22,7 +22,7 @@ fn only_different_samples_count_against_banding() {
     let many: Vec<_> = (0..16_u8).map(|n| (f32::from(n) / 16.0, 0.0, 0.0)).collect();
     let warned = |points: Option<Vec<(f32, f32, f32)>>, samples: u32| {
         let overrides = Overrides { size: Some((8, 8)), samples: Some(samples), ..Overrides::default() };
-        let options = Options { points, map_px: 16, ..Options::default() };
+        let options = SoftShadowOptions { points, map_px: 16, ..SoftShadowOptions::default() };
         let job = SoftShadows::new(options, &overrides, 1).unwrap();
         let first = job.settings().frames.start;
         let warnings = job.frame(first, &mut Gpu::quiet(&spec()).unwrap()).unwrap().warnings;
@@ -92,7 +92,7 @@ fn map(light: &AreaLight, draws: &[Draw<'_>], side: u32, set: &SharedSamples, me
 fn one_pass_equals_accumulation_bit_for_bit() {
     let image = |accumulate: bool| {
         let overrides = Overrides { size: Some((64, 36)), ..Overrides::default() };
-        let options = Options { accumulate, map_px: 64, ..Options::default() };
+        let options = SoftShadowOptions { accumulate, map_px: 64, ..SoftShadowOptions::default() };
         let job = SoftShadows::new(options, &overrides, 1).unwrap();
         assert_eq!(job.settings().samples, 64);
         let (drawn, report) = drawn_on(&spec(), &job, 1);
@@ -246,7 +246,7 @@ fn depth_passes_write_depths_only() {
     assert_eq!(counts[Event::DramWriteBytes], map.bytes(), "each depth goes to memory once");
 }
 
-fn warned(options: Options, samples: u32) -> Vec<&'static str> {
+fn warned(options: SoftShadowOptions, samples: u32) -> Vec<&'static str> {
     let overrides = Overrides { size: Some((8, 8)), samples: Some(samples), ..Overrides::default() };
     let job = SoftShadows::new(options, &overrides, 1).unwrap();
     job.frame(0, &mut Gpu::quiet(&spec()).unwrap()).unwrap().warnings.iter().map(|w| w.code.name()).collect()
@@ -254,11 +254,11 @@ fn warned(options: Options, samples: u32) -> Vec<&'static str> {
 
 #[test]
 fn each_limitation_is_reported() {
-    let small = Options { map_px: 64, bias: 0.2, ..Options::default() };
+    let small = SoftShadowOptions { map_px: 64, bias: 0.2, ..SoftShadowOptions::default() };
     assert_eq!(warned(small.clone(), 16), Vec::<&str>::new());
     assert_eq!(warned(small.clone(), 4), ["shadow-banding"]);
-    assert_eq!(warned(Options { bias: 0.0, ..small.clone() }, 16), ["shadow-bias"]);
-    assert_eq!(warned(Options { bias: 3.0, ..small }, 16), ["shadow-bias"]);
+    assert_eq!(warned(SoftShadowOptions { bias: 0.0, ..small.clone() }, 16), ["shadow-bias"]);
+    assert_eq!(warned(SoftShadowOptions { bias: 3.0, ..small }, 16), ["shadow-bias"]);
 }
 
 /// Blended surfaces used to be drawn without depths, and so were not seen at all.
@@ -271,8 +271,11 @@ fn blended_surfaces_are_drawn_as_opaque_ones_and_reported() {
         std::fs::write(&path, format!("(objects: [(shape: Plane(size: 9)), {ball}])")).unwrap();
         let scene = Some(path.to_str().unwrap().to_owned());
         let overrides = Overrides { size: Some((32, 24)), samples: Some(16), ..Overrides::default() };
-        let job =
-            SoftShadows::new(Options { scene, map_px: 64, bias: 0.2, ..Options::default() }, &overrides, 1);
+        let job = SoftShadows::new(
+            SoftShadowOptions { scene, map_px: 64, bias: 0.2, ..SoftShadowOptions::default() },
+            &overrides,
+            1,
+        );
         job.unwrap().frame(0, &mut Gpu::quiet(&spec()).unwrap()).unwrap()
     };
     let [opaque, blended] = ["1", "0.5"].map(drawn);
@@ -290,11 +293,11 @@ fn user_defined_points_are_the_set() {
     let found: Vec<_> = set.samples().iter().map(|s| (s.u, s.v, s.t)).collect();
     assert_eq!(found, points);
     for bad in [
-        Options { points: Some(vec![(2.0, 0.0, 0.0)]), ..Options::default() },
-        Options { points: Some(Vec::new()), ..Options::default() },
-        Options { map_px: 33, ..Options::default() },
-        Options { bias: f64::NAN, ..Options::default() },
-        Options { scene: Some("no such scene".to_owned()), ..Options::default() },
+        SoftShadowOptions { points: Some(vec![(2.0, 0.0, 0.0)]), ..SoftShadowOptions::default() },
+        SoftShadowOptions { points: Some(Vec::new()), ..SoftShadowOptions::default() },
+        SoftShadowOptions { map_px: 33, ..SoftShadowOptions::default() },
+        SoftShadowOptions { bias: f64::NAN, ..SoftShadowOptions::default() },
+        SoftShadowOptions { scene: Some("no such scene".to_owned()), ..SoftShadowOptions::default() },
     ] {
         assert!(SoftShadows::new(bad, &Overrides::default(), 1).err().unwrap().is_usage());
     }

@@ -80,7 +80,7 @@ pub struct Soup {
 
 /// Kind of a soup.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Kind {
+pub enum SoupKind {
     Still,
     Moving,
     /// A third of the triangles reach behind the camera.
@@ -93,22 +93,22 @@ pub enum Kind {
     Layers,
 }
 
-impl Kind {
+impl SoupKind {
     pub const ALL: [Self; 6] =
         [Self::Still, Self::Moving, Self::Crossing, Self::Slivers, Self::Grid, Self::Layers];
 }
 
 /// All kinds with equal probability.
-pub fn kinds() -> impl Strategy<Value = Kind> {
-    prop::sample::select(&Kind::ALL[..])
+pub fn kinds() -> impl Strategy<Value = SoupKind> {
+    prop::sample::select(&SoupKind::ALL[..])
 }
 
 impl Soup {
-    pub fn new(kind: Kind, count: u32, seed: u64) -> Self {
+    pub fn new(kind: SoupKind, count: u32, seed: u64) -> Self {
         let mut r = Uniform::new(seed);
         let (mut open, mut close) = (Vec::new(), Vec::new());
         for triangle in 0..count {
-            let behind = kind == Kind::Crossing && triangle % 3 == 0;
+            let behind = kind == SoupKind::Crossing && triangle % 3 == 0;
             let middle = Vec3::new(
                 r.within(-4.0, 4.0),
                 r.within(-4.0, 4.0),
@@ -119,23 +119,23 @@ impl Soup {
             for corner in 0..3 {
                 let mut offset =
                     Vec3::new(r.within(-1.0, 1.0), r.within(-1.0, 1.0), r.within(-1.0, 1.0)) * size;
-                if kind == Kind::Slivers && corner == 2 {
+                if kind == SoupKind::Slivers && corner == 2 {
                     offset = (open[open.len() - 1] - middle) * 0.999 + offset * 1e-4;
                 }
                 let p = middle + offset;
                 let wobble = Vec3::new(r.within(-0.5, 0.5), r.within(-0.5, 0.5), r.within(-0.5, 0.5));
                 open.push(p);
-                close.push(if kind == Kind::Still { p } else { p + drift + wobble * size });
+                close.push(if kind == SoupKind::Still { p } else { p + drift + wobble * size });
             }
         }
-        if kind == Kind::Layers {
+        if kind == SoupKind::Layers {
             for end in [&mut open, &mut close] {
                 for (corner, p) in end.iter_mut().enumerate() {
                     *p = Vec3::new(p.x * 5.0, p.y * 5.0, 6.0 - 1e-5 * (corner / 3) as f32);
                 }
             }
         }
-        if kind == Kind::Grid {
+        if kind == SoupKind::Grid {
             // With 50 rows and a half field of view of 0.7, this puts vertices on pixel corners at depth 4.
             let px = |c: f32| (c * 10.0).round() * (4.0 * 0.7 / 25.0);
             let snap = |p: &mut Vec3| *p = Vec3::new(px(p.x), px(p.y), 4.0);
@@ -205,6 +205,7 @@ pub fn spec(features: Features) -> PipelineSpec {
         features,
         depth: DepthSpec::default(),
         compute: None,
+        warp_lanes: 32,
     }
 }
 

@@ -12,7 +12,7 @@ use power_model::{EnergyTable, Platform, PowerModel};
 use rayon::prelude::*;
 use run::{GpuSpec, RunError};
 use serde::Serialize;
-use workloads::deferred::{Deferred, LightPass, Method, NormalFormat, Options, Rate};
+use workloads::deferred::{Deferred, DeferredOptions, LightPass, Method, NormalFormat, Rate};
 use workloads::scene::{Local, Node, Parts, Rig, Scene, SceneCamera, Trs};
 use workloads::{Alpha, Material, Overrides, shapes};
 
@@ -288,7 +288,8 @@ impl Bench {
         let lights = if sweep == Sweep::Lights { value } else { LIGHTS };
         let samples = if sweep == Sweep::Samples { value } else { 1 };
         let Way { method, lighting, normals, rate, .. } = *way;
-        let options = Options { method, lighting, normals, rate, lights, ..Options::default() };
+        let options =
+            DeferredOptions { method, lighting, normals, rate, lights, ..DeferredOptions::default() };
         let overrides =
             Overrides { size: Some(self.effort.size), samples: Some(samples), ..Overrides::default() };
         let scene = match sweep {

@@ -11,7 +11,7 @@ use pipeline::{Texture, Wrap};
 use warnings::{Code, Warning};
 
 use super::nodes::Tree;
-use super::{Document, Looks, fetch};
+use super::{Document, MaterialSource, fetch};
 use crate::import::ignored::{self, about_material};
 use crate::import::reader;
 use crate::material::{Alpha, Material};
@@ -117,14 +117,14 @@ pub(super) struct Used {
 }
 
 impl Used {
-    pub fn new(document: &Document, tree: &Tree, looks: Looks) -> Self {
+    pub fn new(document: &Document, tree: &Tree, looks: MaterialSource) -> Self {
         let root = &document.root;
         let mut used =
             Self { meshes: vec![false; root.meshes.len()], materials: vec![false; root.materials.len()] };
         for (index, node) in root.nodes.iter().enumerate() {
             let Some(mesh) = node.mesh.filter(|_| tree.in_scene[index]) else { continue };
             used.meshes[mesh.value()] = true;
-            if looks == Looks::Own {
+            if looks == MaterialSource::Own {
                 let primitives = root.meshes[mesh.value()].primitives.iter();
                 let named = primitives.filter_map(|primitive| primitive.material);
                 named.for_each(|material| used.materials[material.value()] = true);

@@ -24,7 +24,7 @@ use materials::Used;
 
 /// Source of the materials.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Looks {
+pub(super) enum MaterialSource {
     /// The file's materials.
     Own,
     /// Other materials. Those of the file are not read and cause no warnings.
@@ -32,7 +32,7 @@ pub(super) enum Looks {
 }
 
 /// Reads the file at `path` and selects the clip named `clip`, or the first.
-pub(super) fn import(path: &Path, clip: Option<&str>, looks: Looks) -> Result<Parts, LoadError> {
+pub(super) fn import(path: &Path, clip: Option<&str>, looks: MaterialSource) -> Result<Parts, LoadError> {
     let source = Source { path };
     let document = Document::read(source)?;
     let tree = nodes::tree(&document)?;

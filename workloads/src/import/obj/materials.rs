@@ -10,7 +10,7 @@ use warnings::{Code, Warning};
 
 use super::{Statements, broken, lines};
 use crate::error::{LoadError, Source};
-use crate::import::soup::{Looks, Paint, Soup, grey, linear};
+use crate::import::soup::{Paint, Soup, TriangleMaterials, grey, linear};
 use crate::import::{ignored, reader};
 use crate::material::{Alpha, Material};
 
@@ -21,7 +21,7 @@ pub(super) fn dress(soup: &mut Soup, found: &Statements, path: &Path) -> Result<
     // All materials without a description are one grey material.
     let described = |name: u32| library.described.get(&found.materials[name as usize]);
     let mut numbers: BTreeMap<Option<u32>, u32> = BTreeMap::new();
-    let mut looks = Looks::default();
+    let mut looks = TriangleMaterials::default();
     for face in &found.faces {
         let key = face.material.filter(|name| described(*name).is_some());
         let number = *numbers.entry(key).or_insert_with(|| {
@@ -153,7 +153,7 @@ fn placed(map: &Map) -> [Vec2; 2] {
 }
 
 /// Materials with a texture on faces without texture coordinates.
-fn untextured(found: &Statements, looks: &Looks) -> Vec<Warning> {
+fn untextured(found: &Statements, looks: &TriangleMaterials) -> Vec<Warning> {
     let mut bare = vec![false; looks.materials.len()];
     for (face, material) in found.faces.iter().zip(&looks.of_triangle) {
         bare[*material as usize] |= face.corners.iter().any(|corner| corner.uv.is_none());
@@ -359,7 +359,7 @@ mod tests {
     const MTL: &str = "newmtl red\nKd 1 0 0\nbump n.png\nnewmtl wall\nKd 0.5 0.5 0.5\nmap_Kd -s 2 2 C:\\there\\wall.png\nd 0.5\n\
                        newmtl unused\nmap_Kd nothing.png\nbump n.png\n";
 
-    fn dressed(mtl: Option<&str>, image: bool) -> (Looks, Vec<String>) {
+    fn dressed(mtl: Option<&str>, image: bool) -> (TriangleMaterials, Vec<String>) {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.obj");
         std::fs::write(&path, OBJ).unwrap();

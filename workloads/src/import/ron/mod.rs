@@ -321,7 +321,8 @@ fn add_gltf(
     object: &ObjectSpec,
     (path, node): (&Path, usize),
 ) -> Result<(), LoadError> {
-    let looks = if object.material.is_some() { gltf::Looks::Replaced } else { gltf::Looks::Own };
+    let looks =
+        if object.material.is_some() { gltf::MaterialSource::Replaced } else { gltf::MaterialSource::Own };
     let asset = gltf::import(path, object.clip.as_deref(), looks);
     let mut asset = asset.map_err(|error| match error {
         LoadError::Setting { message, .. } => context.wrong(format!("{place}.clip"), message),

@@ -170,6 +170,7 @@ pub fn spec() -> PipelineSpec {
         features: pipeline::Features::ALL,
         depth: Default::default(),
         compute: None,
+        warp_lanes: 32,
     }
 }
 

@@ -106,9 +106,9 @@ pub struct MethodFrame {
     pub triangles: usize,
     /// Pixels tested.
     pub tests: u64,
-    /// Executions of the pixel shader.
+    /// Executions of the shader of the light: one for every covered pixel.
     pub executions: u64,
-    /// Operations of the shader.
+    /// Operations of all shaders.
     pub shader_ops: u64,
     /// Seconds.
     pub frame_s: f64,
@@ -133,7 +133,7 @@ fn frame(effort: &CausticsEffort, slope: f64, place: usize) -> Result<MethodFram
         method: Method::ALL[place],
         triangles: frames[0].triangles,
         tests: counts[Event::SamplesTested],
-        executions: counts[Event::PixelInvocations],
+        executions: counts[Event::SamplesHit],
         shader_ops: counts[Event::ShaderOps],
         frame_s: cost.cycles / plan.gpu.core_hz,
         frame_j: cost.energy_j,

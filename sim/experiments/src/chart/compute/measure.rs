@@ -7,7 +7,9 @@ use pipeline::Gpu;
 use pipeline::sampling::{Sample, SampleSource};
 use run::{GpuSpec, Observed, Plan, RunError, RunOptions, frames_of};
 use workloads::Overrides;
-use workloads::compute::{Atomics, CHAIN, Compute, Kernel, Kernels, LightSphere, Options, Order, TileLights};
+use workloads::compute::{
+    Atomics, CHAIN, Compute, ComputeOptions, Kernel, Kernels, LightSphere, Order, TileLights,
+};
 use workloads::job::{DrawsScene, OptionSource};
 use workloads::scene::Frame;
 
@@ -44,21 +46,21 @@ pub(super) struct Case {
     sweep: Sweep,
     value: f64,
     method: &'static str,
-    options: Options,
+    options: ComputeOptions,
 }
 
 impl Case {
     /// All cases, sweep by sweep.
     pub fn all() -> Vec<Self> {
         let [reduction, histogram, culling] = [Kernel::Reduction, Kernel::Histogram, Kernel::LightCulling]
-            .map(|kernel| Options { kernel, ..Options::default() });
-        let culling = Options { list: LIST, ..culling };
+            .map(|kernel| ComputeOptions { kernel, ..ComputeOptions::default() });
+        let culling = ComputeOptions { list: LIST, ..culling };
         let mut cases = Vec::new();
         let mut add = |sweep, value: f64, method, options| cases.push(Self { sweep, value, method, options });
         for group in GROUPS {
             let kernels = [("reduction", &reduction), ("histogram", &histogram), ("light culling", &culling)];
             for (method, kernel) in kernels {
-                add(Sweep::Group, f64::from(group), method, Options { group, ..kernel.clone() });
+                add(Sweep::Group, f64::from(group), method, ComputeOptions { group, ..kernel.clone() });
             }
         }
         let layouts = [
@@ -69,7 +71,8 @@ impl Case {
         ];
         for stride in STRIDES {
             for (method, order, padded) in layouts {
-                let options = Options { stride, order, padded, group: STRIDE_GROUP, ..reduction.clone() };
+                let options =
+                    ComputeOptions { stride, order, padded, group: STRIDE_GROUP, ..reduction.clone() };
                 add(Sweep::Stride, f64::from(stride), method, options);
             }
         }
@@ -81,20 +84,30 @@ impl Case {
         ];
         for contrast in CONTRASTS {
             for (method, atomics, copies, padded) in places {
-                let options =
-                    Options { contrast: contrast as f32, atomics, copies, padded, ..histogram.clone() };
+                let options = ComputeOptions {
+                    contrast: contrast as f32,
+                    atomics,
+                    copies,
+                    padded,
+                    ..histogram.clone()
+                };
                 add(Sweep::Contrast, contrast, method, options);
             }
         }
         for step in STEPS {
             for (method, kernel) in [("reduction", &reduction), ("histogram", &histogram)] {
-                add(Sweep::Step, f64::from(step), method, Options { step, ..kernel.clone() });
+                add(Sweep::Step, f64::from(step), method, ComputeOptions { step, ..kernel.clone() });
             }
         }
-        add(Sweep::Step, 1.0, CHAIN_METHOD, Options { kernel: Kernel::MipChain, ..Options::default() });
+        add(
+            Sweep::Step,
+            1.0,
+            CHAIN_METHOD,
+            ComputeOptions { kernel: Kernel::MipChain, ..ComputeOptions::default() },
+        );
         for tile_px in TILES {
             for (method, depth_bounds) in [("depth bounds", true), ("frustum", false)] {
-                let options = Options { tile_px, depth_bounds, ..culling.clone() };
+                let options = ComputeOptions { tile_px, depth_bounds, ..culling.clone() };
                 add(Sweep::Tile, f64::from(tile_px), method, options);
             }
         }
@@ -116,7 +129,8 @@ pub(super) struct Bench {
 
 impl Bench {
     pub fn new(size: (u32, u32)) -> Result<Self, RunError> {
-        let (gpu, options) = (GpuSpec::load(GPU)?, Options { list: LIST, ..Options::default() });
+        let (gpu, options) =
+            (GpuSpec::load(GPU)?, ComputeOptions { list: LIST, ..ComputeOptions::default() });
         let job = job(&options, size)?;
         let frame = DrawsScene::scene(&job).frame(0).map_err(RunError::setting)?;
         let mut on = Gpu::quiet(&gpu.pipeline).map_err(RunError::setting)?;
@@ -181,7 +195,7 @@ impl Bench {
         })
     }
 
-    fn lists(&self, job: &Compute, options: &Options) -> Result<TileLights, RunError> {
+    fn lists(&self, job: &Compute, options: &ComputeOptions) -> Result<TileLights, RunError> {
         let mut gpu = Gpu::quiet(&self.gpu.pipeline).map_err(RunError::setting)?;
         let depth = job.depths(&self.frame, &mut gpu).map_err(RunError::setting)?;
         let view = gpu.surface_view(depth).ok_or_else(|| RunError::setting("no depths"))?;
@@ -224,7 +238,7 @@ impl Bench {
     }
 }
 
-fn job(options: &Options, size: (u32, u32)) -> Result<Compute, RunError> {
+fn job(options: &ComputeOptions, size: (u32, u32)) -> Result<Compute, RunError> {
     let overrides = Overrides { size: Some(size), ..Overrides::default() };
     Ok(Compute::new(options.clone(), &overrides, SEED)?)
 }
@@ -252,7 +266,7 @@ fn cost(plan: &Plan, observed: &Observed) -> [f64; 3] {
     all
 }
 
-fn plan(options: &Options, size: (u32, u32)) -> Result<Plan, RunError> {
+fn plan(options: &ComputeOptions, size: (u32, u32)) -> Result<Plan, RunError> {
     let value = serde_json::to_value(options).map_err(RunError::setting)?;
     let text = |value: &serde_json::Value| value.as_str().map_or_else(|| value.to_string(), str::to_owned);
     let set = value.as_object().into_iter().flatten().map(|(name, value)| (name.clone(), text(value)));
@@ -273,7 +287,7 @@ fn found<T>(
     job: &Compute,
     gpu: &GpuSpec,
     frame: &Frame,
-    options: &Options,
+    options: &ComputeOptions,
     run: impl Fn(&mut Kernels<'_, '_>, &pipeline::SurfaceView) -> Result<T, pipeline::PassError>,
 ) -> Result<T, RunError> {
     let mut gpu = Gpu::quiet(&gpu.pipeline).map_err(RunError::setting)?;
@@ -283,7 +297,12 @@ fn found<T>(
     run(&mut kernels, &view).map_err(RunError::setting)
 }
 
-fn histogram(job: &Compute, gpu: &GpuSpec, frame: &Frame, options: &Options) -> Result<Vec<u32>, RunError> {
+fn histogram(
+    job: &Compute,
+    gpu: &GpuSpec,
+    frame: &Frame,
+    options: &ComputeOptions,
+) -> Result<Vec<u32>, RunError> {
     found(job, gpu, frame, options, |kernels, image| {
         let counts = kernels.histogram(image)?;
         Ok(kernels.values(counts))

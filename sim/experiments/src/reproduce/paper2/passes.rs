@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use run::RunError;
 use traces::energy::PowerIntegral;
 use workloads::Overrides;
-use workloads::deferred::{Deferred, LightPass, NormalFormat, Options};
+use workloads::deferred::{Deferred, DeferredOptions, LightPass, NormalFormat};
 
 use super::Passes;
 use crate::reproduce::band::{Cases, one_at_a_time};
@@ -96,13 +96,13 @@ struct Measured {
 
 impl Bench<'_> {
     fn measure(&self, row: &Passes, form: Form, point: &Point) -> Result<Measured, RunError> {
-        let options = Options {
+        let options = DeferredOptions {
             scene: row.scene.get(form).clone(),
             lights: point.lights,
             lighting: point.lighting,
             range: point.range,
             normals: point.normals,
-            ..Options::default()
+            ..DeferredOptions::default()
         };
         let overrides =
             Overrides { size: Some(point.size_px), frame_rate_hz: Some(30.0), ..Overrides::default() };

@@ -5,7 +5,7 @@ use glam::Vec3;
 use pipeline::{FrameReport, Gpu};
 use workloads::Overrides;
 use workloads::job::{Drawn, Job};
-use workloads::soft_shadows::{Options, SoftShadows};
+use workloads::soft_shadows::{SoftShadowOptions, SoftShadows};
 
 use super::Task;
 use crate::reproduce::Done;
@@ -20,7 +20,11 @@ pub(super) fn row(task: &Task<'_>) -> Result<Done, RunError> {
     let draw = |accumulate| -> Result<(Drawn, FrameReport), RunError> {
         let (size, samples) = (Some(*row.size_px.get(form)), Some(*row.places.get(form)));
         let overrides = Overrides { size, samples, ..Overrides::default() };
-        let job = SoftShadows::new(Options { accumulate, ..Options::default() }, &overrides, 1)?;
+        let job = SoftShadows::new(
+            SoftShadowOptions { accumulate, ..SoftShadowOptions::default() },
+            &overrides,
+            1,
+        )?;
         let hardware = GpuSpec::load("reference")?.pipeline;
         let mut gpu = Gpu::quiet(&hardware).map_err(RunError::setting)?;
         Ok((job.frame(*row.frame.get(form), &mut gpu)?, gpu.finish()))
