@@ -209,7 +209,10 @@ impl FrontEnd {
         let mut tally = Tally::default();
         let queue = Queue::new(samples.sample_indices.len());
         let placed = &self.placed;
-        dispatch(width, VisibleBinWorker { layout, samples, surface, placed, list, tally: &mut tally, queue });
+        dispatch(
+            width,
+            VisibleBinWorker { layout, samples, surface, placed, list, tally: &mut tally, queue },
+        );
         tally
     }
 }
