@@ -15,7 +15,7 @@ const TESTED: &str = "tests of the workload bring it about, each in a run of its
 const COMMAND: &str = "a run does not give it; tests of `quintile trace` bring it about";
 
 /// Codes without a test here, with the reason.
-const NOT_PROVOKED: [(&str, &str); 33] = [
+const NOT_PROVOKED: [(&str, &str); 32] = [
     ("ambiguous-alignment", COMMAND),
     ("anchors-off", COMMAND),
     ("clipped", COMMAND),
@@ -75,7 +75,7 @@ const NOT_PROVOKED: [(&str, &str); 33] = [
 ];
 
 /// Codes that the tests below produce, and `orthographic-view`, which `visibility_inputs` tests.
-const PROVOKED: [&str; 59] = [
+const PROVOKED: [&str; 60] = [
     "accuracy-missed",
     "alpha-ignored",
     "behind-camera",

@@ -99,7 +99,7 @@ impl BinMemory {
     ) {
         let Some(batch) = self.batches.front() else { return };
         for (entry, &triangle) in (from..).zip(listed) {
-            if entry % LINE_ENTRIES == 0 {
+            if entry.is_multiple_of(LINE_ENTRIES) {
                 memory.read_bin(batch.lists[bin].lines[(entry / LINE_ENTRIES) as usize], counts);
             }
             let record = &batch.records[triangle as usize..][..2];
@@ -120,7 +120,7 @@ impl BatchBins {
     /// Address of the line of a new entry of a bin.
     fn enter(&mut self, bin: usize) -> u64 {
         let list = &mut self.lists[bin];
-        if list.entries % LINE_ENTRIES == 0 {
+        if list.entries.is_multiple_of(LINE_ENTRIES) {
             list.lines.push(self.next_line);
             self.next_line += LINE_BYTES;
         }
