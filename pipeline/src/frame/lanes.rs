@@ -7,6 +7,7 @@
 
 use std::cell::{Cell, RefCell};
 use std::ops::Range;
+use std::panic::Location;
 
 use activity::{Event, PacketCounts};
 
@@ -49,8 +50,10 @@ impl Touch {
 }
 
 /// A program that a lane ran.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(super) struct Run {
+    /// Where the program is started in the code, which tells programs apart.
+    program: &'static Location<'static>,
     /// Its operations.
     ops: u32,
     /// Which accesses of the tile were made since the program before, up to its end.
@@ -80,13 +83,14 @@ impl Lanes {
         &self.costs
     }
 
-    /// Runs a program on a lane.
+    /// Runs a program on a lane. Only lanes that are started at one place in the code, and so run one program, share a warp.
+    #[track_caller]
     pub fn run<T>(&self, program: impl FnOnce(&Lane) -> T) -> T {
         let lane = Lane::knowing(&self.costs);
         let result = program(&lane);
         let until = self.touches.borrow().len();
         let touches = self.touched.replace(until)..until;
-        self.runs.borrow_mut().push(Run { ops: lane.ops(), touches });
+        self.runs.borrow_mut().push(Run { program: Location::caller(), ops: lane.ops(), touches });
         result
     }
 
@@ -195,12 +199,20 @@ impl Lanes {
         self.touches.borrow_mut().push(touch);
     }
 
-    /// What the lanes did since they were last asked. They fill warps of `warp_lanes` lanes in the order in which they ran.
+    /// What the lanes did since they were last asked. Those of a program fill warps of `warp_lanes` lanes in the order in which they
+    /// ran.
     pub(super) fn finish(&self, warp_lanes: u32) -> LaneWork {
-        let (runs, mut warps) = (self.runs.take(), Warps::new(warp_lanes));
-        runs.iter().for_each(|run| warps.start(1, run.ops));
+        let runs = self.runs.take();
+        let mut programs: Vec<(&Location<'_>, Warps)> = Vec::new();
+        for Run { program, ops, .. } in &runs {
+            let place = programs.iter().position(|(known, _)| known == program).unwrap_or(programs.len());
+            if place == programs.len() {
+                programs.push((*program, Warps::new(warp_lanes)));
+            }
+            programs[place].1.start(1, *ops);
+        }
         self.count(Event::PixelInvocations, runs.len() as u32);
-        self.count(Event::ShaderOps, warps.ops());
+        self.count(Event::ShaderOps, programs.into_iter().map(|(_, warps)| warps.ops()).sum());
         self.touched.set(0);
         LaneWork { counts: self.counts.take(), touches: self.touches.take() }
     }

@@ -208,3 +208,48 @@ fn a_full_screen_pass_runs_every_pixel() {
     gpu.write_image("copy", viewport);
     assert_eq!(gpu.finish().counts()[Event::PixelsResolved], 2 * pixels);
 }
+
+/// Runs a program of 2 + column operations for every tile, and then one of 100.
+struct TwoPrograms;
+
+impl TileShader for TwoPrograms {
+    type BodyState = ();
+    type Output = [u32; 2];
+
+    fn run(&self, (): &mut (), lanes: &Lanes, tile: &TileIntervals<'_>) -> Option<[u32; 2]> {
+        let adds = |lane: &Lane, count: u32| (0..count).for_each(|_| assert!(lane.add(1.0, 2.0) > 0.0));
+        lanes.run(|lane| adds(lane, 2 + tile.tile[0]));
+        lanes.run(|lane| adds(lane, 100));
+        Some(tile.tile)
+    }
+}
+
+/// Lanes of a packet share warps with those of their program alone, and wait for the longest.
+#[test]
+fn lanes_of_tiles_wait_for_those_of_their_program() {
+    let corners = [[0.5, 0.5, 2.0], [3.5, 0.5, 2.0], [0.5, 1.5, 4.0]];
+    let primitives = [primitive([corners; 2], 0)];
+    let ops = |warp_lanes: u32| {
+        let spec = PipelineSpec { warp_lanes, ..spec(Features::ALL) };
+        let (mut gpu, mut tiles) = (Gpu::quiet(&spec).unwrap(), Vec::new());
+        let vertices = gpu.allocate(72);
+        let draw = ConservativeDraw {
+            primitives: &primitives,
+            grid: &GRID,
+            block: 8,
+            vertices,
+            vertex_bytes: 24,
+            projection: None,
+        };
+        let mut pass = gpu.begin_conservative("two", None);
+        pass.draw(&mut gpu, &draw, &TwoPrograms, |_, tile| tiles.push(tile));
+        assert_eq!(tiles.len(), 7);
+        (tiles, gpu.finish().counts()[Event::ShaderOps])
+    };
+    let (tiles, alone) = ops(1);
+    let own: u64 = tiles.iter().map(|[column, _]| 2 + u64::from(*column)).sum();
+    assert_eq!(alone, own + 7 * 100);
+    let longest = tiles.iter().map(|[column, _]| 2 + u64::from(*column)).max().unwrap();
+    assert_eq!(ops(32).1, 7 * longest + 7 * 100);
+    assert!(7 * longest > own);
+}
