@@ -11,6 +11,7 @@ use super::error::PassError;
 use super::heat::{FrameHeat, HeatMap};
 use super::pass::{AddressMap, Draw, Pass, RasterPass, Resident, Target, resident};
 use super::replay::Replay;
+use super::seen::Seen;
 use super::{Finished, PipelineSpec, rasterize, resolve, seen};
 use crate::buffer::Buffers;
 use crate::geometry::Viewport;
@@ -338,8 +339,14 @@ impl<'e> Gpu<'e> {
         if let Some(waits) = self.waits(&reads, pass) {
             self.barrier(waits);
         }
-        let uncounted = if self.is_counted { None } else { seen::draw(&prepared, pass) };
-        let drawn = uncounted.map_or_else(|| self.pass(&prepared, pass), Ok)?;
+        let seen = if self.is_counted { None } else { seen::draw(&prepared, pass) };
+        let drawn = match seen {
+            Some(Seen { images, visible }) => {
+                let (counts, passed) = (Counts::default(), vec![0; prepared.draws.len()]);
+                Rendered { images, visible, counts, passed, region: prepared.result() }
+            }
+            None => self.pass(&prepared, pass)?,
+        };
         self.last_batch = prepared.batches().len().max(1) as u32 - 1;
         if !prepared.is_attached {
             self.keep(drawn.region);

@@ -1,7 +1,8 @@
 //! Passes without counts: the visibility engine finds what the samples see, and the shading of the pipeline gives the colours.
 
+use glam::Vec3;
+
 use super::Settings;
-use super::gpu::Rendered;
 use super::pass::{Pass, RasterPass};
 use super::resolve::{Scratch, TilePixels, assemble, shade_tile};
 use crate::depth::DepthTile;
@@ -9,10 +10,16 @@ use crate::geometry::Clip;
 use crate::sampling::TileSamples;
 use crate::visibility::{SeenBin, bin_by_bin};
 
+/// Result of a pass without counts, as in [`Rendered`](super::Rendered).
+pub(super) struct Seen {
+    pub images: Vec<Vec<Vec3>>,
+    pub visible: Vec<(u32, u32)>,
+}
+
 /// Draws a pass without counts, to the same bytes as the modelled hardware. `None` where the engine sees other samples than the
 /// hardware, or the result depends on the order of triangles.
-pub(super) fn draw(pass: &Pass<'_>, of: &RasterPass<'_>) -> Option<Rendered> {
-    if !is_seen_alike(pass) {
+pub(super) fn draw(pass: &Pass<'_>, of: &RasterPass<'_>) -> Option<Seen> {
+    if !sees_the_same(pass) {
         return None;
     }
     let Settings { viewport, samples, .. } = *pass.settings;
@@ -33,17 +40,14 @@ pub(super) fn draw(pass: &Pass<'_>, of: &RasterPass<'_>) -> Option<Rendered> {
         },
     )?;
     let (tiles, seen): (Vec<_>, Vec<_>) = seen.into_iter().unzip();
-    Some(Rendered {
+    Some(Seen {
         images: if has_images { assemble(pass, tiles) } else { Vec::new() },
         visible: if of.visible { in_image_order(pass, seen.iter().flatten()) } else { Vec::new() },
-        counts: Default::default(),
-        passed: vec![0; pass.draws.len()],
-        region: pass.result(),
     })
 }
 
 /// Whether the engine sees what the hardware sees: the nearest triangles of the samples, as they are and unclipped.
-fn is_seen_alike(pass: &Pass<'_>) -> bool {
+fn sees_the_same(pass: &Pass<'_>) -> bool {
     let features = &pass.settings.spec.features;
     let is_exact = features.still_px == 0.0 && features.in_focus_px == 0.0;
     let is_clipped = pass.draws.iter().any(|draw| draw.geometry.clip() != Clip::NONE);

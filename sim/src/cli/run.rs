@@ -248,7 +248,7 @@ fn one(
     let dir = open(&plan, &destination)?;
     let is_timed = plan.options.timing.is_some();
     if args.dry_run && !is_timed {
-        let message = "--timing none: --dry-run tells the time of what is counted; leave one of both out";
+        let message = "--timing none: --dry-run reports the time of what is counted; leave one of both out";
         return Err(Failure { message: message.to_owned(), code: 2 });
     }
     let prepared = pool.install(|| prepare(plan, recorded, REVISION, &progress))?;
