@@ -52,7 +52,7 @@ impl Touch {
 /// A program that a lane ran.
 #[derive(Clone, Debug)]
 pub(super) struct Run {
-    /// Where the program is started in the code, which tells programs apart.
+    /// Where the program is started in the code, which distinguishes programs.
     program: &'static Location<'static>,
     /// Its operations.
     ops: u32,
