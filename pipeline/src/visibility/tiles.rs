@@ -20,13 +20,15 @@ pub(super) struct SortedTiles {
     tiles: Vec<SortedTile>,
 }
 
-/// Packets of a tile, by block of pixels and cell.
+/// Packets of a tile, in the order of their parts.
 struct SortedTile {
-    packets: Vec<Vec<TilePacket>>,
+    packets: Vec<TilePacket>,
 }
 
 /// Sixteen samples of a tile. Lanes without a sample repeat the first one.
 struct TilePacket {
+    /// Block of pixels, times the number of cells, plus the cell.
+    part: usize,
     x: [f32; LANES],
     y: [f32; LANES],
     u: [f32; LANES],
@@ -63,7 +65,8 @@ impl SortedTiles {
         let samples = (in_tile.block_px[0] * in_tile.block_px[1] * source.per_pixel()) as usize;
         let tiles_in_block =
             plan.block_px.map(|side| (side / SIDE_PX).max(1)).iter().product::<u32>() as usize;
-        let most = tiles.iter().flat_map(|tile| &tile.packets).map(Vec::len).max()?;
+        let parts = tiles.iter().flat_map(|tile| tile.packets.chunk_by(|a, b| a.part == b.part));
+        let most = parts.map(<[_]>::len).max()?;
         let is_good = samples >= LANES * plan.cells() && most * tiles_in_block <= LANES;
         (is_good && sorter.clip == Clip::NONE).then_some(Self { number, tiles })
     }
@@ -86,15 +89,13 @@ impl SortedTiles {
                 return false;
             };
             let blocks_across = SIDE_PX / plan.block_px[0].min(SIDE_PX);
-            for (part, packets) in self.tiles[number].packets.iter().enumerate() {
-                let (part, cell) = ((part / cells) as u32, part % cells);
+            for packet in &self.tiles[number].packets {
+                let (part, cell) = ((packet.part / cells) as u32, packet.part % cells);
                 let [column, row] = [part % blocks_across, part / blocks_across];
                 let [column, row] = [x / plan.block_px[0] + column, y / plan.block_px[1] + row];
                 let block_cell = (row * across + column) as usize * cells + cell;
-                for packet in packets {
-                    sorter.place(bin, (block_cell, filled[block_cell]), packet, [x, y]);
-                    filled[block_cell] += 1;
-                }
+                sorter.place(bin, (block_cell, filled[block_cell]), packet, [x, y]);
+                filled[block_cell] += 1;
             }
         }
         bin.finish();
@@ -110,15 +111,16 @@ impl SortedTile {
         for (pixel, samples) in (0..).zip(samples.chunks_exact_mut(per_pixel)) {
             source.pixel_into(origin[0] + pixel % SIDE_PX, origin[1] + pixel / SIDE_PX, samples);
         }
-        let packet = |places: &[u32; LANES]| TilePacket::new(places, &samples, per_pixel);
-        let of_cell = |places: &[[u32; LANES]]| places.iter().filter_map(packet).collect();
-        Self { packets: bin.sample_indices.chunks_exact(LANES).map(of_cell).collect() }
+        let packet = |(number, places): (usize, &[u32; LANES])| {
+            TilePacket::new((number / LANES, places), &samples, per_pixel)
+        };
+        Self { packets: bin.sample_indices.iter().enumerate().filter_map(packet).collect() }
     }
 }
 
 impl TilePacket {
     /// The samples at these places of a tile; `None` without any.
-    fn new(places: &[u32; LANES], samples: &[Sample], per_pixel: usize) -> Option<Self> {
+    fn new((part, places): (usize, &[u32; LANES]), samples: &[Sample], per_pixel: usize) -> Option<Self> {
         let len = places.iter().position(|&place| place == BinSamples::NO_SAMPLE).unwrap_or(LANES);
         let places: [usize; LANES] =
             std::array::from_fn(|lane| places[if lane < len { lane } else { 0 }] as usize);
@@ -126,6 +128,7 @@ impl TilePacket {
         let (u, v, t) = (row(|s| s.u), row(|s| s.v), row(|s| s.t));
         let side = SIDE_PX as usize;
         (len > 0).then(|| Self {
+            part,
             x: row(|s| s.x),
             y: row(|s| s.y),
             pixel: [
