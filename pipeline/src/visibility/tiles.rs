@@ -178,24 +178,13 @@ impl Sorter<'_> {
             box_of[axis] = range(&at);
         }
         into.t.0 = packet.t;
-        let places = &mut bin.sample_indices[number];
-        for lane in 0..packet.len {
-            let [x, y] = [0, 1].map(|axis| tile[axis] + u32::from(packet.pixel[axis][lane]));
-            places[lane] = (y * self.plan.bin_px + x) * self.source.per_pixel() + packet.index[lane];
+        let pixels = packet.pixel[0].iter().zip(&packet.pixel[1]).zip(packet.index);
+        let places = bin.sample_indices[number].iter_mut().zip(pixels).take(packet.len);
+        for (place, ((&column, &row), index)) in places {
+            let [x, y] = [tile[0] + u32::from(column), tile[1] + u32::from(row)];
+            *place = (y * self.plan.bin_px + x) * self.source.per_pixel() + index;
         }
-        for lane in packet.len..LANES {
-            into.clear(lane);
-        }
-        let (block, cell) = (block_cell / cells, block_cell % cells);
-        for end in 0..2 {
-            let [x, y] = [0, 1].map(|axis| box_of[axis][end]);
-            bin.blocks[block / LANES].include(block % LANES, x, y);
-            bin.boxes[block_cell].include(turn, x, y);
-            for (range, at) in bin.rect.iter_mut().zip([x, y]) {
-                *range = [range[0].min(at), range[1].max(at)];
-            }
-            let ranges = [&mut bin.cells.u, &mut bin.cells.v, &mut bin.cells.t];
-            ranges.into_iter().zip(packet.ranges).for_each(|(range, at)| range.include(cell, at[end]));
-        }
+        (packet.len..LANES).for_each(|lane| into.clear(lane));
+        bin.include((block_cell / cells, block_cell % cells), turn, cells, (box_of, packet.ranges));
     }
 }
