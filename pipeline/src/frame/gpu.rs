@@ -193,7 +193,7 @@ impl<'e> Gpu<'e> {
         Self::new(spec, |_, _| ())
     }
 
-    /// A GPU for images alone. The visibility engine finds what samples see, many times as fast as the modelled hardware and to
+    /// A GPU for images alone. The visibility engine finds what samples see, faster than the model of the hardware and to
     /// the same bytes; such passes have no counts and no packets. Passes into surfaces, with state that depends on the order
     /// of triangles (blending, discarding shaders, depth and stencil state, queries), with clip planes of a geometry, of
     /// orthographic cameras and with the thresholds of [`Features`](super::Features) are drawn as on other GPUs.

@@ -80,6 +80,8 @@ struct BinShader {
     samples: TileSamples,
     /// Triangles of the samples of a tile.
     triangles: Vec<u32>,
+    /// Distance in a bin from the first sample of a tile to each, by its place in the tile.
+    offsets: Vec<u32>,
 }
 
 impl BinShader {
@@ -88,6 +90,11 @@ impl BinShader {
         let Settings { spec, viewport, samples: source, .. } = *pass.settings;
         let (side, per_pixel) = (spec.tile_px, source.per_pixel());
         let across = seen.side_px / side;
+        let offset = |pixel: u32| (pixel / side * seen.side_px + pixel % side) * per_pixel;
+        self.offsets.clear();
+        self.offsets.extend(
+            (0..side * side).flat_map(|pixel| (0..per_pixel).map(move |index| offset(pixel) + index)),
+        );
         let mut shaded = Vec::new();
         for (column, row) in (0..across).flat_map(|row| (0..across).map(move |column| (column, row))) {
             let [x, y] = [column, row].map(|at| at * side);
@@ -95,15 +102,12 @@ impl BinShader {
             if origin[0] >= viewport.width() || origin[1] >= viewport.height() {
                 continue;
             }
-            let Self { scratch, samples, triangles } = self;
+            let Self { scratch, samples, triangles, offsets } = self;
             samples.fill(source, viewport, &pass.projection.shear, origin, side);
-            let triangle = |&place: &u16| {
-                let (pixel, index) = (u32::from(place) / per_pixel, u32::from(place) % per_pixel);
-                let pixel = (y + pixel / side) * seen.side_px + x + pixel % side;
-                seen.triangles[(pixel * per_pixel + index) as usize]
-            };
+            let of_tile = &seen.triangles[((y * seen.side_px + x) * per_pixel) as usize..];
+            let places = samples.places().iter();
             triangles.clear();
-            triangles.extend(samples.places().iter().map(triangle));
+            triangles.extend(places.map(|&place| of_tile[offsets[usize::from(place)] as usize]));
             if triangles.iter().any(|&triangle| triangle != DepthTile::NO_TRIANGLE) {
                 shaded.push((origin, shade_tile(pass, triangles, (samples, origin), scratch)));
             }

@@ -84,6 +84,26 @@ impl BinSamples {
         refill(&mut self.packets, blocks * cells * LANES, Packet::NOWHERE);
     }
 
+    /// Widens the boxes around packet number `turn` of a cell in a block by the ranges of its samples: in x and y, and in u, v and t.
+    pub fn include(
+        &mut self,
+        (block, cell): (usize, usize),
+        turn: usize,
+        cells: usize,
+        (box_of, ranges): ([[f32; 2]; 2], [[f32; 2]; 3]),
+    ) {
+        for end in 0..2 {
+            let [x, y] = box_of.map(|range| range[end]);
+            self.blocks[block / LANES].include(block % LANES, x, y);
+            self.boxes[block * cells + cell].include(turn, x, y);
+            for (range, at) in self.rect.iter_mut().zip([x, y]) {
+                *range = [range[0].min(at), range[1].max(at)];
+            }
+            let CellBoxes { u, v, t } = &mut self.cells;
+            [u, v, t].into_iter().zip(ranges).for_each(|(range, at)| range.include(cell, at[end]));
+        }
+    }
+
     /// Computes what follows from the samples.
     pub fn finish(&mut self) {
         self.cells.finish();

@@ -20,13 +20,15 @@ pub(super) struct SortedTiles {
     tiles: Vec<SortedTile>,
 }
 
-/// Packets of a tile, by block of pixels and cell.
+/// Packets of a tile, in the order of their parts.
 struct SortedTile {
-    packets: Vec<Vec<TilePacket>>,
+    packets: Vec<TilePacket>,
 }
 
 /// Sixteen samples of a tile. Lanes without a sample repeat the first one.
 struct TilePacket {
+    /// Block of pixels, times the number of cells, plus the cell.
+    part: usize,
     x: [f32; LANES],
     y: [f32; LANES],
     u: [f32; LANES],
@@ -63,7 +65,8 @@ impl SortedTiles {
         let samples = (in_tile.block_px[0] * in_tile.block_px[1] * source.per_pixel()) as usize;
         let tiles_in_block =
             plan.block_px.map(|side| (side / SIDE_PX).max(1)).iter().product::<u32>() as usize;
-        let most = tiles.iter().flat_map(|tile| &tile.packets).map(Vec::len).max()?;
+        let parts = tiles.iter().flat_map(|tile| tile.packets.chunk_by(|a, b| a.part == b.part));
+        let most = parts.map(<[_]>::len).max()?;
         let is_good = samples >= LANES * plan.cells() && most * tiles_in_block <= LANES;
         (is_good && sorter.clip == Clip::NONE).then_some(Self { number, tiles })
     }
@@ -86,15 +89,13 @@ impl SortedTiles {
                 return false;
             };
             let blocks_across = SIDE_PX / plan.block_px[0].min(SIDE_PX);
-            for (part, packets) in self.tiles[number].packets.iter().enumerate() {
-                let (part, cell) = ((part / cells) as u32, part % cells);
+            for packet in &self.tiles[number].packets {
+                let (part, cell) = ((packet.part / cells) as u32, packet.part % cells);
                 let [column, row] = [part % blocks_across, part / blocks_across];
                 let [column, row] = [x / plan.block_px[0] + column, y / plan.block_px[1] + row];
                 let block_cell = (row * across + column) as usize * cells + cell;
-                for packet in packets {
-                    sorter.place(bin, (block_cell, filled[block_cell]), packet, [x, y]);
-                    filled[block_cell] += 1;
-                }
+                sorter.place(bin, (block_cell, filled[block_cell]), packet, [x, y]);
+                filled[block_cell] += 1;
             }
         }
         bin.finish();
@@ -110,15 +111,16 @@ impl SortedTile {
         for (pixel, samples) in (0..).zip(samples.chunks_exact_mut(per_pixel)) {
             source.pixel_into(origin[0] + pixel % SIDE_PX, origin[1] + pixel / SIDE_PX, samples);
         }
-        let packet = |places: &[u32; LANES]| TilePacket::new(places, &samples, per_pixel);
-        let of_cell = |places: &[[u32; LANES]]| places.iter().filter_map(packet).collect();
-        Self { packets: bin.sample_indices.chunks_exact(LANES).map(of_cell).collect() }
+        let packet = |(number, places): (usize, &[u32; LANES])| {
+            TilePacket::new((number / LANES, places), &samples, per_pixel)
+        };
+        Self { packets: bin.sample_indices.iter().enumerate().filter_map(packet).collect() }
     }
 }
 
 impl TilePacket {
     /// The samples at these places of a tile; `None` without any.
-    fn new(places: &[u32; LANES], samples: &[Sample], per_pixel: usize) -> Option<Self> {
+    fn new((part, places): (usize, &[u32; LANES]), samples: &[Sample], per_pixel: usize) -> Option<Self> {
         let len = places.iter().position(|&place| place == BinSamples::NO_SAMPLE).unwrap_or(LANES);
         let places: [usize; LANES] =
             std::array::from_fn(|lane| places[if lane < len { lane } else { 0 }] as usize);
@@ -126,6 +128,7 @@ impl TilePacket {
         let (u, v, t) = (row(|s| s.u), row(|s| s.v), row(|s| s.t));
         let side = SIDE_PX as usize;
         (len > 0).then(|| Self {
+            part,
             x: row(|s| s.x),
             y: row(|s| s.y),
             pixel: [
@@ -175,24 +178,13 @@ impl Sorter<'_> {
             box_of[axis] = range(&at);
         }
         into.t.0 = packet.t;
-        let places = &mut bin.sample_indices[number];
-        for lane in 0..packet.len {
-            let [x, y] = [0, 1].map(|axis| tile[axis] + u32::from(packet.pixel[axis][lane]));
-            places[lane] = (y * self.plan.bin_px + x) * self.source.per_pixel() + packet.index[lane];
+        let pixels = packet.pixel[0].iter().zip(&packet.pixel[1]).zip(packet.index);
+        let places = bin.sample_indices[number].iter_mut().zip(pixels).take(packet.len);
+        for (place, ((&column, &row), index)) in places {
+            let [x, y] = [tile[0] + u32::from(column), tile[1] + u32::from(row)];
+            *place = (y * self.plan.bin_px + x) * self.source.per_pixel() + index;
         }
-        for lane in packet.len..LANES {
-            into.clear(lane);
-        }
-        let (block, cell) = (block_cell / cells, block_cell % cells);
-        for end in 0..2 {
-            let [x, y] = [0, 1].map(|axis| box_of[axis][end]);
-            bin.blocks[block / LANES].include(block % LANES, x, y);
-            bin.boxes[block_cell].include(turn, x, y);
-            for (range, at) in bin.rect.iter_mut().zip([x, y]) {
-                *range = [range[0].min(at), range[1].max(at)];
-            }
-            let ranges = [&mut bin.cells.u, &mut bin.cells.v, &mut bin.cells.t];
-            ranges.into_iter().zip(packet.ranges).for_each(|(range, at)| range.include(cell, at[end]));
-        }
+        (packet.len..LANES).for_each(|lane| into.clear(lane));
+        bin.include((block_cell / cells, block_cell % cells), turn, cells, (box_of, packet.ranges));
     }
 }

@@ -217,7 +217,7 @@ pub enum TimingChoice {
     Bound,
     /// One frame in fifty at `packet`, the others predicted from a preview, with intervals
     Sampled,
-    /// Images alone, drawn many times as fast: no counts, cycles and joules
+    /// Images alone, drawn faster: no counts, cycles and joules
     None,
 }
 
