@@ -269,8 +269,8 @@ struct Sums<'a> {
     pass: &'a Pass<'a>,
     samples: &'a TileSamples,
     sums: Vec<Vec3>,
-    /// Samples of each pixel without a triangle.
-    missed: [u16; 64],
+    /// Samples without a triangle, in the same order.
+    missed: Vec<u16>,
     /// Whether there is one view of all samples.
     is_whole: bool,
 }
@@ -280,38 +280,47 @@ impl<'a> Sums<'a> {
         let (side, per_pixel) = (pass.settings.spec.tile_px, pass.settings.samples.per_pixel());
         let is_whole = matches!(&pass.views[..], [view] if *view == (0..per_pixel));
         let sums = vec![Vec3::ZERO; (side * side) as usize * pass.views.len()];
-        Self { pass, samples, sums, missed: [0; 64], is_whole }
+        Self { pass, samples, missed: vec![0; sums.len()], sums, is_whole }
     }
 
     fn add(&mut self, slot: usize, colour: Vec3) {
+        self.add_to(slot, colour, 0);
+    }
+
+    /// Adds a colour, and so many samples without a triangle.
+    #[inline(always)]
+    fn add_to(&mut self, slot: usize, colour: Vec3, missed: u16) {
         let pixel = self.samples.pixel[slot] as usize;
         if self.is_whole {
             self.sums[pixel] += colour;
+            self.missed[pixel] += missed;
             return;
         }
         let index = self.samples.in_pixel(slot, self.pass.settings.samples.per_pixel());
         let pixels = self.sums.len() / self.pass.views.len().max(1);
         let views = self.pass.views.iter().enumerate().filter(|(_, samples)| samples.contains(&index));
-        views.for_each(|(view, _)| self.sums[view * pixels + pixel] += colour);
+        views.for_each(|(view, _)| {
+            self.sums[view * pixels + pixel] += colour;
+            self.missed[view * pixels + pixel] += missed;
+        });
     }
 
     fn add_background(&mut self, slot: usize) {
-        self.missed[self.samples.pixel[slot] as usize] += 1;
-        self.add(slot, self.pass.settings.background);
+        self.add_to(slot, self.pass.settings.background, 1);
     }
 
     /// Means of the samples of each pixel of each view. A pixel without triangles has the colour of the background to the last bit,
     /// as in tiles that no triangle touches.
     fn means(self) -> Vec<Vec3> {
         let Self { pass, sums, missed, .. } = self;
-        let all = pass.settings.samples.per_pixel() as u16;
         let pixels = sums.len() / pass.views.len().max(1);
-        let views = sums.chunks_exact(pixels.max(1)).zip(&pass.views);
-        let means = views.flat_map(|(sums, view)| {
+        let pixels = pixels.max(1);
+        let views = sums.chunks_exact(pixels).zip(missed.chunks_exact(pixels)).zip(&pass.views);
+        let means = views.flat_map(|((sums, missed), view)| {
             let count = view.len() as f32;
-            sums.iter().zip(missed).map(move |(sum, missed)| match view.is_empty() {
+            sums.iter().zip(missed).map(move |(sum, &missed)| match view.is_empty() {
                 true => Vec3::ZERO,
-                false if missed == all => pass.settings.background,
+                false if usize::from(missed) == view.len() => pass.settings.background,
                 false => *sum / count,
             })
         });
