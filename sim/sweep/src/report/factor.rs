@@ -52,7 +52,7 @@ impl Factor {
             let mut members =
                 self.values.iter().zip(&groups).filter(|(_, of)| *of == group).map(|(value, _)| value);
             let first = members.next().cloned().unwrap_or_default();
-            members.last().map_or(first.clone(), |last| format!("{first} to {last}"))
+            members.next_back().map_or(first.clone(), |last| format!("{first} to {last}"))
         };
         let code = |code: &usize| used.iter().position(|group| *group == groups[*code]).unwrap_or_default();
         Some(Self {
