@@ -1,6 +1,6 @@
 //! Images without counts equal those of the modelled hardware, bit for bit.
 
-use crate::common::{Kind, Plain, Soup, camera, spec};
+use crate::common::{Plain, Soup, SoupKind, camera, spec};
 use glam::Vec3;
 use pipeline::sampling::{HashedSamples, SampleSource};
 use pipeline::*;
@@ -25,7 +25,7 @@ fn is_uncounted(pass: &RasterPass<'_>, what: &str) -> bool {
 }
 
 /// Two draws of the same soup, the second with its front faces culled.
-fn with<R>(kind: Kind, lens: bool, run: impl FnOnce(&Camera, &[Draw<'_>]) -> R) -> R {
+fn with<R>(kind: SoupKind, lens: bool, run: impl FnOnce(&Camera, &[Draw<'_>]) -> R) -> R {
     let soups = [Soup::new(kind, 60, 11), Soup::new(kind, 60, 12)];
     let draws = [(0, Cull::None), (1, Cull::Front)].map(|(which, cull)| {
         let soup: &Soup = &soups[which];
@@ -42,8 +42,9 @@ fn settings<'a>(spec: &'a PipelineSpec, samples: &'a dyn SampleSource) -> Settin
 #[test]
 fn the_engine_draws_the_same_images() {
     let spec = spec(Features::ALL);
-    for (kind, lens) in
-        [Kind::Still, Kind::Moving, Kind::Crossing, Kind::Layers].map(|k| [(k, false), (k, true)]).concat()
+    for (kind, lens) in [SoupKind::Still, SoupKind::Moving, SoupKind::Crossing, SoupKind::Layers]
+        .map(|k| [(k, false), (k, true)])
+        .concat()
     {
         with(kind, lens, |camera, draws| {
             for per_pixel in [1, 4, 5, 8, 24] {
@@ -67,7 +68,7 @@ fn the_engine_draws_the_same_images() {
 
 #[test]
 fn other_tiles_give_the_same_images() {
-    with(Kind::Moving, true, |camera, draws| {
+    with(SoupKind::Moving, true, |camera, draws| {
         let table = SampleTable::low_discrepancy(8, 3, LensShape::Disk).unwrap();
         for tile_px in [1, 2, 4, 8] {
             let spec = PipelineSpec { tile_px, coarse_tile_px: 4 * tile_px, ..spec(Features::NONE) };
@@ -79,7 +80,7 @@ fn other_tiles_give_the_same_images() {
 /// What the engine cannot draw to the same bytes is drawn as on other GPUs.
 #[test]
 fn other_passes_are_drawn_by_the_hardware() {
-    with(Kind::Moving, true, |camera, draws| {
+    with(SoupKind::Moving, true, |camera, draws| {
         let table = SampleTable::low_discrepancy(4, 3, LensShape::Disk).unwrap();
         let all = spec(Features::ALL);
         let with_state = |change: &dyn Fn(Draw<'_>) -> bool| {
