@@ -244,21 +244,31 @@ impl Gpu<'_> {
     ) -> Vec<IntervalAnswer> {
         let corners = self.allocate(objects.len() as u64 * u64::from(CORNERS * CORNER_BYTES));
         self.open(name, None);
-        let asked = (0..).zip(objects).map(|(number, object)| {
-            let answer = queries.ask(object);
-            self.box_vertices(number, queries.projection, &answer, corners);
-            let mut packet = self.packet(PacketKind::Tile, Packet::NONE, Some(FACES.len() as u32 * number));
-            let counts = &mut packet.counts;
-            let [_, tile_madds, depth_madds] = answer.madds.map(|madds| madds as u32);
-            counts[Event::TilesVisited] = answer.tiles as u32;
-            counts[Event::TileMadds] = tile_madds;
-            counts[Event::SidePlaneMadds] = tile_madds;
-            counts[Event::DepthIntervalMadds] = depth_madds;
-            counts[Event::ZCullTests] = answer.compared as u32;
-            self.push(&packet, 0);
-            answer
-        });
-        asked.collect()
+        let answers: Vec<_> = objects.iter().map(|object| queries.ask(object)).collect();
+        let size = self.spec().batch_triangles;
+        let asked: Vec<_> = (0..).zip(&answers).collect();
+        let batch = |number: u32| FACES.len() as u32 * number / size;
+        // All boxes of a batch are set up before the first is traversed.
+        for boxes in asked.chunk_by(|&(before, _), &(number, _)| batch(before) == batch(number)) {
+            boxes.iter().for_each(|&(number, answer)| {
+                self.box_vertices(number, queries.projection, answer, corners);
+            });
+            boxes.iter().for_each(|&(number, answer)| self.box_tiles(number, answer));
+        }
+        answers
+    }
+
+    /// Emits the tiles of a box that the query came to.
+    fn box_tiles(&mut self, number: u32, answer: &IntervalAnswer) {
+        let mut packet = self.packet(PacketKind::Tile, Packet::NONE, Some(FACES.len() as u32 * number));
+        let counts = &mut packet.counts;
+        let [_, tile_madds, depth_madds] = answer.madds.map(|madds| madds as u32);
+        counts[Event::TilesVisited] = answer.tiles as u32;
+        counts[Event::TileMadds] = tile_madds;
+        counts[Event::SidePlaneMadds] = tile_madds;
+        counts[Event::DepthIntervalMadds] = depth_madds;
+        counts[Event::ZCullTests] = answer.compared as u32;
+        self.push(&packet, 0);
     }
 
     /// Emits the draw of a box: its eight corners, and the set-up of the triangles that the query came to.

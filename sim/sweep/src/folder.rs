@@ -195,7 +195,9 @@ impl Folder {
         let known: HashSet<&str> = plan.points.iter().map(|point| point.id.as_str()).collect();
         let is_other = |path: &PathBuf| {
             let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
-            name.strip_suffix(".json").is_some_and(|id| !id.starts_with('.') && !known.contains(id))
+            let id = name.strip_suffix(".json").filter(|id| !id.starts_with('.') && !known.contains(id));
+            // Files of the user are not removed.
+            id.is_some_and(|id| fs::read(path).is_ok_and(|bytes| is_point(&bytes, id)))
         };
         Ok(self.files()?.into_iter().filter(is_other).collect())
     }
@@ -419,8 +421,11 @@ mod tests {
         plan.points.iter().for_each(|point| folder.write_result(point, &failed(&point.id)).unwrap());
         plan.points.remove(0);
         folder.write_plan(&plan).unwrap();
+        let own = root.path().join("points/aa/mine.json");
+        fs::write(&own, "{\"id\": 1}").unwrap();
         assert_eq!(folder.others(&plan).unwrap(), [root.path().join("points/aa/aa01.json")]);
         assert_eq!((folder.remove_others().unwrap(), folder.remove_others().unwrap()), (1, 0));
+        assert!(own.exists());
         assert!(folder.result(&plan.points[0]).unwrap().is_some());
     }
 

@@ -94,15 +94,18 @@ impl TurnPolicy {
     pub fn new(spec: &DramSpec, times: &ChipTimes) -> Self {
         let places = spec.write_queue.map_or(spec.queue.get(), |queue| queue.get());
         // In a queue of both the place of the last line one way is taken before the turn. Lines come to one of several channels in
-        // chunks of both kinds, and wait for the first that is full: half a chunk of the others is missing.
-        let chunk = spec.interleave_bytes.get().min(spec.row_bytes.get()) / crate::LINE_BYTES;
-        let missing = 0.5 + if spec.channels.get() > 1 { f64::from(chunk) } else { 0.0 };
+        // chunks of both kinds, and wait for the first that is full: half a chunk of the others is missing. However long the chunks
+        // are, the bus turns no more than once each way for two of them.
+        let chunk = f64::from(spec.interleave_bytes.get().min(spec.row_bytes.get()) / crate::LINE_BYTES);
+        let missing = 0.5 + if spec.channels.get() > 1 { chunk } else { 0.0 };
         let pair = times.write_to_read + times.read_to_write;
         let row = |from: usize, to: usize, turn: Time| {
             (times.to_precharge[from] + times.precharge + times.activate[to])
                 .saturating_sub(times.burst)
                 .max(turn)
         };
+        let places = f64::from(places);
+        let shared = (places - missing).max(places.min(chunk / 2.0));
         Self {
             pair,
             pair_in_bank: if pair > 0 {
@@ -110,9 +113,9 @@ impl TurnPolicy {
             } else {
                 0
             },
-            places: (f64::from(places) - if spec.write_queue.is_some() { 0.0 } else { missing }).max(1.0),
+            places: if spec.write_queue.is_some() { places } else { shared }.max(1.0),
             drains: spec.write_queue.is_some(),
-            memory: 8 * u64::from(places),
+            memory: 8 * places as u64,
         }
     }
 

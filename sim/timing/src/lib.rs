@@ -100,7 +100,8 @@ pub struct Timed {
 
 /// Utilization of memory, if a queue of its channels holds less than the time in which a row closes and another one opens.
 fn short_queues(dram: &DramSpec, timeline: &activity::Timeline) -> Option<f64> {
-    let queued = dram.queue.get() * dram.burst_cycles.get();
+    let writes = dram.write_queue.map_or(u32::MAX, |queue| queue.get());
+    let queued = dram.queue.get().min(writes) * dram.burst_cycles.get();
     let busy_ps = timeline.busy_ps()[activity::Unit::Dram as usize];
     let is_short = queued < dram.precharge_cycles.get() + dram.activate_cycles.get();
     is_short.then(|| busy_ps as f64 / timeline.duration_ps.max(1) as f64)

@@ -288,6 +288,7 @@ pub(super) fn draw(
         all.crowded += tried.crowded;
         ordered.extend(tried.kept);
     });
+    gpu.keep(results);
     all.points = in_order(ordered);
     all
 }

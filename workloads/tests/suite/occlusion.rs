@@ -1,17 +1,17 @@
 //! Occlusion queries, compared with all samples.
 
-use activity::Event;
+use activity::{Event, PacketKind};
 use glam::Vec3;
 use pipeline::depth::{BoxGrid, Pyramid};
 use pipeline::geometry::Projection;
 use pipeline::{
-    FrameReport, IntervalQueries, LensShape, MovingBox, RasterPass, SampleTable, SampledQueries, Settings,
-    Viewport,
+    FrameReport, Gpu, IntervalQueries, LensShape, MovingBox, PipelineSpec, RasterPass, SampleTable,
+    SampledQueries, Settings, Viewport,
 };
 use proptest::prelude::*;
 use workloads::Overrides;
 use workloads::catalog::find;
-use workloads::job::{OptionSource, Request};
+use workloads::job::{Job, OptionSource, Request};
 use workloads::occlusion::{WallScene, WallSceneSpec, depths};
 use workloads::visibility::Unshaded;
 
@@ -145,17 +145,42 @@ fn a_box_around_the_camera_is_never_hidden_and_one_out_of_view_is() {
     assert_eq!(hidden_boxes.by_intervals[0], [false, true]);
 }
 
-/// Image and facts of `quintile run occlusion` in a small size, and the work of the GPU.
-fn run(query: &str) -> (Vec<[u32; 3]>, [f64; 2], FrameReport) {
+/// `quintile run occlusion` in a small size.
+fn job(query: &str) -> Box<dyn Job> {
     let options = OptionSource {
         file: None,
         set: vec![("query".into(), query.into()), ("objects".into(), "40".into())],
     };
     let overrides = Overrides { size: Some((128, 72)), samples: Some(8), ..Overrides::default() };
-    let job = find("occlusion", &options, &Request { overrides: &overrides, seed: 1 }).unwrap().unwrap();
-    let (drawn, report) = crate::common::drawn_on(&crate::common::spec(), &*job, 0);
+    find("occlusion", &options, &Request { overrides: &overrides, seed: 1 }).unwrap().unwrap()
+}
+
+/// Image and facts, and the work of the GPU.
+fn run(query: &str) -> (Vec<[u32; 3]>, [f64; 2], FrameReport) {
+    let (drawn, report) = crate::common::drawn_on(&crate::common::spec(), &*job(query), 0);
     let fact = |name: &str| drawn.facts.iter().find(|fact| fact.name == name).unwrap().value;
     (bits(&drawn.image), [fact("objects_hidden"), fact("tests")], report)
+}
+
+/// Tiles of a batch begin when all its triangles are set up.
+#[test]
+fn boxes_are_set_up_before_any_of_their_batch_is_traversed() {
+    for batch_triangles in [1, 12, 50, 65536] {
+        let spec = PipelineSpec { batch_triangles, ..crate::common::spec() };
+        let (mut traversed, mut boxes) = (None, 0);
+        let mut gpu = Gpu::new(&spec, |packet, _| match packet.kind {
+            PacketKind::Tile => traversed = Some((packet.pass, packet.batch)),
+            PacketKind::Vertices => {
+                assert_ne!(traversed, Some((packet.pass, packet.batch)), "{batch_triangles}");
+                boxes += 1;
+            }
+            _ => {}
+        })
+        .unwrap();
+        job("intervals").frame(0, &mut gpu).unwrap();
+        drop(gpu);
+        assert!(boxes >= 40);
+    }
 }
 
 /// What is hidden by any kind of query has no visible sample, so the image is the same.

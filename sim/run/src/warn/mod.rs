@@ -12,6 +12,7 @@ use traces::frames::Flag;
 use warnings::{Code, Warning};
 
 use self::regimes::of_regimes;
+use crate::heat::HeatPicture;
 use crate::measure::MIN_BUSY_SAMPLES;
 use crate::{Choice, Measurement, Observed, Plan, RunFrame, Simulated};
 
@@ -134,10 +135,17 @@ fn empty_frames(simulated: &Simulated) -> Option<Warning> {
 /// Share of a heat map's quantity below which a warning is given.
 const MIN_PLACED: f64 = 0.1;
 
-/// Warning about a heat map that shows next to nothing of its quantity.
-fn heat_outside_image(simulated: &Simulated) -> Option<Warning> {
-    let worst = simulated.heat.iter().min_by(|a, b| a.placed.total_cmp(&b.placed))?;
-    (worst.placed < MIN_PLACED).then(|| {
+/// Warnings about quantities of which a heat map shows next to nothing, each for its worst frame.
+fn heat_outside_image(simulated: &Simulated) -> Vec<Warning> {
+    let mut worst: Vec<&HeatPicture> = Vec::new();
+    for picture in &simulated.heat {
+        match worst.iter_mut().find(|worst| worst.of == picture.of) {
+            Some(worst) if picture.placed < worst.placed => *worst = picture,
+            Some(_) => {}
+            None => worst.push(picture),
+        }
+    }
+    let warning = |worst: &HeatPicture| {
         let message = format!(
             "the heat map of {} shows {:.1} % of it (frame {}): the rest has no place in the image, because its passes are of \
              another size or in conservative mode; choose another quantity",
@@ -146,7 +154,8 @@ fn heat_outside_image(simulated: &Simulated) -> Option<Warning> {
             worst.frame
         );
         Warning::new(Code::HeatOutsideImage, message)
-    })
+    };
+    worst.into_iter().filter(|worst| worst.placed < MIN_PLACED).map(warning).collect()
 }
 
 /// Warnings about a choice that misses the requested accuracy or the time budget.
