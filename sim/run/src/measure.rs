@@ -292,7 +292,7 @@ mod tests {
                     worst(false)
                 );
                 println!("{text}");
-                // Of 24 frames alike these two have the largest error in one case of twelve. A mark that other frames are not
+                // Of 24 frames of one kind these two have the largest error in one case of twelve. A mark that other frames are not
                 // placed by changes both by a share of the time between frames: by 3 % where it did.
                 assert!(worst(true) <= 2.0 * worst(false).max(NO_ERROR), "{text}");
             }
