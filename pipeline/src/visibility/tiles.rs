@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use rayon::prelude::*;
 
-use super::bin::BinSamples;
+use super::bin::{BinSamples, EMPTY_RANGE};
 use super::sorter::{Plan, Sorter};
 use crate::geometry::{Clip, Viewport};
 use crate::sampling::{Sample, SampleTable};
@@ -147,7 +147,7 @@ impl TilePacket {
 
 /// Lowest and highest of some numbers.
 fn range(row: &[f32; LANES]) -> [f32; 2] {
-    row.iter().fold([f32::INFINITY, f32::NEG_INFINITY], |[lo, hi], &at| [lo.min(at), hi.max(at)])
+    row.iter().fold(EMPTY_RANGE, |[lo, hi], &at| [lo.min(at), hi.max(at)])
 }
 
 impl Sorter<'_> {

@@ -105,7 +105,8 @@ impl TurnPolicy {
                 .max(turn)
         };
         let places = f64::from(places);
-        let shared = (places - missing).max(places.min(chunk / 2.0));
+        let used =
+            if spec.write_queue.is_some() { places } else { (places - missing).max(places.min(chunk / 2.0)) };
         Self {
             pair,
             pair_in_bank: if pair > 0 {
@@ -113,7 +114,7 @@ impl TurnPolicy {
             } else {
                 0
             },
-            places: if spec.write_queue.is_some() { places } else { shared }.max(1.0),
+            places: used.max(1.0),
             drains: spec.write_queue.is_some(),
             memory: 8 * places as u64,
         }

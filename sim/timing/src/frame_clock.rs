@@ -193,9 +193,9 @@ impl AccuracyWarning {
             Self::MemoryQueue(share) => Warning::new(
                 Code::MemoryQueue,
                 format!(
-                    "memory is busy for {:.0} % of frame {frame}, and the queue of a channel is shorter than the time in which a row \
+                    "memory is busy for {:.0} % of frame {frame}, and a queue of a channel is shorter than the time in which a row \
                      opens: times at `{name}` may be a tenth too short or more, as lines wait in front of full queues in an order \
-                     that it does not know; use a longer `dram.queue`, --timing stepped, or let --accuracy choose",
+                     that it does not know; use a longer `dram.queue` (or `dram.write_queue`), --timing stepped, or let --accuracy choose",
                     100.0 * share,
                 ),
             ),

@@ -121,6 +121,33 @@ fn a_bus_turns_once_for_the_lines_that_its_queue_holds() {
 }
 
 #[test]
+fn a_bus_turns_no_more_than_once_each_way_for_two_chunks() {
+    let mut machine = machine();
+    (machine.dram.write_to_read_cycles, machine.dram.read_to_write_cycles) = (size(15), size(9));
+    machine.dram.channels = size(2);
+    // Chunks of as many lines as a queue holds, and longer ones.
+    for interleave_bytes in [1024, 2048, 4096] {
+        machine.dram.interleave_bytes = size(interleave_bytes);
+        let packets = stream((0..8000).map(|n| (n / 2 + n % 2 * 8192, n % 2 == 1)));
+        let [stepped, packet, bound] = cycles(&machine, &packets);
+        let off = |found: u64| (found as f64 / stepped as f64 - 1.0).abs();
+        assert!(off(packet) < 0.08, "{interleave_bytes}: {stepped} {packet} {bound}");
+    }
+}
+
+#[test]
+fn a_queue_of_writes_shorter_than_the_opening_of_a_row_counts_as_short() {
+    let mut machine = machine();
+    let is_short =
+        |machine: &MachineSpec| packet_level(machine, clocks(), &reads(64, 1)).short_queues.is_some();
+    assert!(!is_short(&machine));
+    for (places, expected) in [(1, true), (2, false)] {
+        machine.dram.write_queue = Some(size(places));
+        assert_eq!(is_short(&machine), expected, "{places}");
+    }
+}
+
+#[test]
 fn a_rank_opens_at_most_four_rows_in_a_window() {
     let mut machine = machine();
     let dram = &mut machine.dram;
