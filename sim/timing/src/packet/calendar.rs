@@ -91,11 +91,22 @@ impl Calendar {
                 self.next_free[slot] = slot as u32 + 1;
             }
             if remaining == 0 {
-                let on_all_servers = begin + self.on_all_servers(work + self.servers - 1);
+                let on_all_servers = begin + self.time_of(work);
                 return (begin, self.end_of_slot_work(slot, at).max(on_all_servers));
             }
             slot = self.find_free(slot + 1);
         }
+    }
+
+    /// Capacity of a slot that is free.
+    pub fn free(&mut self, slot: usize) -> u64 {
+        self.reach(slot);
+        self.capacity - self.used[slot]
+    }
+
+    /// Capacity of a slot.
+    pub fn capacity(&self) -> u64 {
+        self.capacity
     }
 
     /// Take so much capacity from `at` on, in which nothing works.
@@ -154,7 +165,7 @@ impl Calendar {
                 if moved > 0 {
                     self.yielded = self.yielded.max(self.reserve(self.start_of(slot + 1), moved).1);
                 }
-                return (begin, end.max(begin + self.on_all_servers(work + self.servers - 1)));
+                return (begin, end.max(begin + self.time_of(work)));
             }
             slot += 1;
         }
@@ -165,17 +176,24 @@ impl Calendar {
         self.yielded
     }
 
-    fn start_of(&self, slot: usize) -> Time {
+    /// When a slot begins.
+    pub fn start_of(&self, slot: usize) -> Time {
         slot as Time * self.length
     }
 
-    fn slot_of(&self, at: Time) -> usize {
+    /// The slot at a time.
+    pub fn slot_of(&self, at: Time) -> usize {
         self.shift.map_or_else(|| at / self.length, |shift| at >> shift) as usize
     }
 
     /// End of the work reserved in a slot so far, if none of it ends before `at`.
-    fn end_of_slot_work(&self, slot: usize, at: Time) -> Time {
+    pub fn end_of_slot_work(&self, slot: usize, at: Time) -> Time {
         (self.start_of(slot) + self.on_all_servers(self.used[slot])).max(at)
+    }
+
+    /// Least time of `work`, in whole grains.
+    pub fn time_of(&self, work: u64) -> Time {
+        self.on_all_servers(work + self.servers - 1)
     }
 
     /// Time of `work` on all servers.
@@ -198,7 +216,8 @@ impl Calendar {
         at
     }
 
-    fn reach(&mut self, slot: usize) {
+    /// Make all slots up to this one.
+    pub fn reach(&mut self, slot: usize) {
         let known = self.used.len();
         if slot >= known {
             self.used.resize(slot + 1, 0);

@@ -3,6 +3,7 @@
 use activity::{LEVELS, LevelRequests, LineAccess, LineKind, Unit};
 
 use super::Span;
+use super::arbiter::Arbiter;
 use super::calendar::{Calendar, QueueTimes, SLOT_CYCLES, Turn};
 use super::dram::Dram;
 use super::levels::{Levels, Passed};
@@ -89,7 +90,7 @@ struct Route {
 pub(super) struct Memory {
     dram: Dram,
     levels: Levels,
-    l2: Calendar,
+    l2: Arbiter,
     ports: [QueueTimes; CLIENTS.len()],
     /// The requests of the client of each port so far.
     pacers: [RequestPacer; CLIENTS.len()],
@@ -108,7 +109,7 @@ impl Memory {
         Self {
             dram: Dram::new(machine, clocks),
             levels: Levels::new(machine, clocks),
-            l2: Calendar::new(Time::from(SLOT_CYCLES) * period, spec.lines_per_cycle.get()),
+            l2: Arbiter::new(Calendar::new(Time::from(SLOT_CYCLES) * period, spec.lines_per_cycle.get())),
             ports: std::array::from_fn(|_| QueueTimes::new(spec.queue.get())),
             pacers: CLIENTS.map(|unit| RequestPacer::new(machine, clocks, unit)),
             order: [0; CLIENTS.len()],
@@ -138,7 +139,7 @@ impl Memory {
             let run = Run { head, count, turn, last: pacer.delay_of_last(count) };
             fetched.last_request = pacer.at + run.last;
             let seen = (pacer.at + pacer.period).max(self.order[port]);
-            let (first, last) = self.take(&run, seen, &mut fetched);
+            let (first, last) = self.take(port, &run, seen, &mut fetched);
             self.order[port] = last;
             self.ports[port].note_all(run.count, first + self.period, last + self.period);
             fetched.first = fetched.first.min(first);
@@ -171,11 +172,11 @@ impl Memory {
         Route { kind: line.is_read().then_some(line.kind), levels: line.levels, groups }
     }
 
-    /// Pass a run through the L2; its first line arrives at `seen`. Returns when the first and the last line
+    /// Pass a run of a port through the L2; its first line arrives at `seen`. Returns when the first and the last line
     /// are accepted.
-    fn take(&mut self, run: &Run<'_>, seen: Time, fetched: &mut Fetched) -> (Time, Time) {
+    fn take(&mut self, port: usize, run: &Run<'_>, seen: Time, fetched: &mut Fetched) -> (Time, Time) {
         let Run { head, count, turn, last: later } = *run;
-        let (mut first, end) = self.l2.reserve_as(turn, seen, u64::from(count) * self.period);
+        let (mut first, end) = self.l2.reserve_as(turn, port, seen, u64::from(count) * self.period);
         let mut last = end.saturating_sub(self.period).max(first + later);
         if head.kind == LineKind::Hit {
             fetched.arrived = fetched.arrived.max(last + self.latency);
@@ -226,12 +227,12 @@ impl Memory {
     pub fn yielded(&self) -> Time {
         let levels = self.levels.calendars().map(|(_, calendar)| calendar);
         let below = self.buses().chain(levels).map(Calendar::yielded);
-        below.fold(self.l2.yielded(), Time::max)
+        below.fold(self.l2.calendar().yielded(), Time::max)
     }
 
     /// Calendar of the L2.
     pub fn l2(&self) -> &Calendar {
-        &self.l2
+        self.l2.calendar()
     }
 
     /// Calendars of the levels below the L2.

@@ -65,8 +65,7 @@ fn drawn(seed: u64) -> Gpu {
 }
 
 /// Streams by GPU on which `packet` is more than 8 % off and does not warn: what was found of 120.
-const FAR: [(u64, &str); 5] = [
-    (1, "thrashing caches"),
+const FAR: [(u64, &str); 4] = [
     (1, "groups that stream"),
     (2, "groups that stream"),
     (8, "thrashing caches"),

@@ -240,7 +240,7 @@ const VARIANTS: [Variant; 15] = [
     Variant::new("soft-shadows", "accumulate", &[("accumulate", "true")]),
     Variant::new("compute", "mip_chain", &[("kernel", "mip_chain")]),
     Variant::new("compute", "reduction", &[("kernel", "reduction")]),
-    Variant::new("compute", "histogram", &[("kernel", "histogram")]),
+    Variant::new("compute", "histogram", &[("kernel", "histogram"), ("bins", "128")]),
     Variant::new("deferred", "forward", &[("method", "forward")]),
     Variant::new("deferred", "volumes", &[("lighting", "volumes")]),
     Variant { samples: Some(4), ..Variant::new("deferred", "4 samples resolved", &[]) },

@@ -28,8 +28,8 @@ pub use measure::TimingRow;
 /// Name of the cost: timing alone, without drawing, over that at `stepped`.
 pub(super) const HOST_TIME: &str = "host time of timing alone, relative to stepped";
 
-/// GPUs in the chart: small, integrated, large.
-const GPUS: [&str; 3] = ["mobile", "reference", "discrete"];
+/// GPUs in the chart: all that are built in, from small to large.
+const GPUS: [&str; 5] = ["mobile", "reference", "hd_4000", "iris_pro", "discrete"];
 
 /// A level in a few numbers. Errors are against `stepped`, in percent, over all rows.
 #[derive(Clone, Debug, Default, Serialize)]

@@ -1,0 +1,160 @@
+//! The L2 as its ports see it, at the level `packet`: they take turns where they come at the same time.
+
+use super::calendar::{Calendar, Turn};
+use crate::clock::Time;
+use crate::demand::CLIENTS;
+
+/// Slots whose ports are remembered, a power of two. Packets that are in the pipeline at the same time are closer in time.
+const REMEMBERED_SLOTS: usize = 1 << 12;
+
+/// Work of each port in a slot.
+#[derive(Clone, Copy, Debug)]
+struct SlotPorts {
+    slot: usize,
+    work: [u64; CLIENTS.len()],
+}
+
+impl SlotPorts {
+    const fn none(slot: usize) -> Self {
+        Self { slot, work: [0; CLIENTS.len()] }
+    }
+
+    /// The part of `capacity` that a port can have: all have the same if more than one comes.
+    fn part(&self, port: usize, capacity: u64) -> u64 {
+        let others = self.work.iter().enumerate().filter(|(other, work)| *other != port && **work > 0);
+        capacity / (1 + others.count() as u64)
+    }
+
+    /// Takes up to `wanted` from the other ports that have most, and leaves each at least `part`. Returns how much.
+    fn take(&mut self, port: usize, wanted: u64, part: u64) -> u64 {
+        let mut taken = 0;
+        while taken < wanted {
+            let others = self.work.iter_mut().enumerate().filter(|(other, _)| *other != port);
+            let Some(most) = others.map(|(_, work)| work).max().filter(|work| **work > part) else { break };
+            let gives = (*most - part).min(wanted - taken);
+            *most -= gives;
+            taken += gives;
+        }
+        taken
+    }
+}
+
+/// A calendar with ports that take turns.
+///
+/// Requests come in stream order. So those of a unit early in the pipeline come after those of a late unit at the same time, which
+/// are of packets before theirs, and a calendar alone would serve the late unit first. Here each port gets its part of a slot, and what
+/// was there before moves on to later slots. Work that is moved is small beside a packet, so its port does not wait for it.
+#[derive(Clone, Debug)]
+pub(super) struct Arbiter {
+    calendar: Calendar,
+    slots: Box<[SlotPorts]>,
+}
+
+impl Arbiter {
+    pub fn new(calendar: Calendar) -> Self {
+        Self { calendar, slots: vec![SlotPorts::none(0); REMEMBERED_SLOTS].into() }
+    }
+
+    /// The calendar of all ports.
+    pub fn calendar(&self) -> &Calendar {
+        &self.calendar
+    }
+
+    /// Reserve `work` for a port from `at` on. Returns when it begins and ends.
+    pub fn reserve_as(&mut self, turn: Turn, port: usize, at: Time, work: u64) -> (Time, Time) {
+        if turn == Turn::Late {
+            return self.calendar.reserve_as(turn, at, work);
+        }
+        let first = self.calendar.slot_of(at);
+        if self.calendar.free(first) >= work {
+            self.ports(first).work[port] += work;
+            return self.calendar.reserve(at, work);
+        }
+        let (mut slot, mut remaining, mut begin) = (first, work, None);
+        loop {
+            self.calendar.reach(slot);
+            let before = self.calendar.end_of_slot_work(slot, at);
+            let (here, moved) = self.share(slot, port, remaining);
+            let (from, end) = match moved {
+                0 => (before, self.calendar.end_of_slot_work(slot, at)),
+                _ => (self.calendar.start_of(slot).max(at), self.calendar.start_of(slot + 1)),
+            };
+            if here > 0 {
+                begin.get_or_insert(from);
+            }
+            remaining -= here;
+            if remaining == 0 {
+                let begin = begin.unwrap_or(at);
+                return (begin, end.max(begin + self.calendar.time_of(work)));
+            }
+            slot += 1;
+        }
+    }
+
+    /// Give a port as much of a slot as is free, or its part of it, up to `wanted`. Returns how much it has, and how much of others
+    /// made room.
+    fn share(&mut self, slot: usize, port: usize, wanted: u64) -> (u64, u64) {
+        let free = self.calendar.free(slot).min(wanted);
+        let capacity = self.calendar.capacity();
+        let ports = self.ports(slot);
+        let part = ports.part(port, capacity);
+        let more = part.saturating_sub(ports.work[port]).min(wanted).saturating_sub(free);
+        let moved = ports.take(port, more, part);
+        ports.work[port] += free + moved;
+        if free > 0 {
+            self.calendar.reserve(self.calendar.start_of(slot), free);
+        }
+        if moved > 0 {
+            self.calendar.reserve(self.calendar.start_of(slot + 1), moved);
+        }
+        (free + moved, moved)
+    }
+
+    fn ports(&mut self, slot: usize) -> &mut SlotPorts {
+        let known = &mut self.slots[slot % REMEMBERED_SLOTS];
+        if known.slot != slot {
+            *known = SlotPorts::none(slot);
+        }
+        known
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn arbiter() -> Arbiter {
+        Arbiter::new(Calendar::new(8, 1))
+    }
+
+    fn used(arbiter: &Arbiter) -> Vec<(Time, u64)> {
+        arbiter.calendar.slots().map(|(from, _, work, _)| (from, work)).collect()
+    }
+
+    #[test]
+    fn a_port_alone_has_the_calendar_for_itself() {
+        let (mut ports, mut alone) = (arbiter(), Calendar::new(8, 1));
+        for (at, work) in [(0, 3), (2, 8), (40, 30), (1, 5), (12, 9), (45, 8)] {
+            assert_eq!(
+                ports.reserve_as(Turn::InOrder, 2, at, work),
+                alone.reserve(at, work),
+                "{work} at {at}"
+            );
+        }
+        assert_eq!(used(&ports), alone.slots().map(|(from, _, work, _)| (from, work)).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn ports_that_come_at_the_same_time_take_turns() {
+        let mut ports = arbiter();
+        assert_eq!(ports.reserve_as(Turn::InOrder, 3, 0, 16), (0, 16));
+        // Half of a slot that the other port had; four lines of that move on.
+        assert_eq!(ports.reserve_as(Turn::InOrder, 1, 0, 4), (0, 8));
+        assert_eq!(used(&ports), [(0, 8), (8, 8), (16, 4)]);
+        // Its part of the first slot is used up. The next slots have half for each.
+        assert_eq!(ports.reserve_as(Turn::InOrder, 1, 0, 2), (8, 16));
+        // A third port has its part, which those with more give.
+        assert_eq!(ports.reserve_as(Turn::InOrder, 2, 0, 3), (0, 16));
+        assert_eq!(used(&ports).iter().map(|(_, work)| work).sum::<u64>(), 16 + 4 + 2 + 3);
+    }
+}
