@@ -340,7 +340,7 @@ impl<'e> Gpu<'e> {
             self.barrier(waits);
         }
         let seen = if self.is_counted { None } else { seen::draw(&prepared, pass) };
-        let drawn = match seen {
+        let mut drawn = match seen {
             Some(Seen { images, visible }) => {
                 let (counts, passed) = (Counts::default(), vec![0; prepared.draws.len()]);
                 Rendered { images, visible, counts, passed, region: prepared.result() }
@@ -348,6 +348,9 @@ impl<'e> Gpu<'e> {
             None => self.pass(&prepared, pass)?,
         };
         self.last_batch = prepared.batches().len().max(1) as u32 - 1;
+        if self.write_answers(pass.draws) {
+            drawn.counts = self.counts_of_pass();
+        }
         if !prepared.is_attached {
             self.keep(drawn.region);
         }

@@ -365,7 +365,7 @@ impl Draws for Sampling {
 
 #[cfg(test)]
 mod tests {
-    use activity::{Counts, Packet};
+    use activity::{Counts, Event, Packet};
 
     use super::super::poisson::closer;
     use super::*;
@@ -395,6 +395,8 @@ mod tests {
         let fact = |name: &str| drawn.facts.iter().find(|fact| fact.name == name).unwrap().value;
         assert!(fact("points_from_passes") > 0.9 * fact("points"), "{:?}", drawn.facts);
         assert!(drawn.image.contains(&Vec3::ONE) && report.triangles() > 1600);
+        // The passes have no other results, so what is written back when the frame ends is points.
+        assert!(report.write_back[Event::DramWriteBytes] > 0);
     }
 
     #[test]
