@@ -3,7 +3,8 @@
 use glam::Vec3;
 use pipeline::memory::MemoryRange;
 use pipeline::{
-    ConservativeDraw, ConservativePass, Gpu, Lane, Lanes, Primitive, TileIntervals, TileShader, Viewport,
+    ConservativeDraw, ConservativePass, Gpu, Lane, Lanes, Placement, Primitive, TileIntervals, TileShader,
+    Viewport,
 };
 
 use super::Method;
@@ -110,6 +111,12 @@ impl<'a, 'e> PassesOnGpu<'a, 'e> {
         Emitted { image, fragments: self.fragments }
     }
 
+    /// The number of fragments, without an image.
+    pub fn into_fragments(mut self) -> u64 {
+        self.end_pass();
+        self.fragments
+    }
+
     /// Where the boxes of a part are. The second part only reads those of the first unless boxes are compared.
     fn target(&self, which: usize, is_test: bool) -> MemoryRange {
         self.boxes[if is_test || self.method == Method::FragmentBox { 0 } else { which }]
@@ -162,12 +169,12 @@ impl TileShader for BoxShader<'_> {
 }
 
 impl PassBackend for PassesOnGpu<'_, '_> {
-    fn begin(&mut self, name: &str, follows: bool) {
+    fn begin(&mut self, name: &str, pass: &Pass, follows: bool) {
         self.end_pass();
         if follows {
             self.gpu.wait();
         }
-        self.pass = self.gpu.begin_conservative(name, None);
+        self.pass = self.gpu.begin_conservative(name, Some(self.picture.placement(pass)));
     }
 
     fn draw(
@@ -266,6 +273,24 @@ impl Picture {
     /// Counts a tile of `pass` in which a pair may collide.
     pub fn overlap(&mut self, pass: &Pass, tile: [u32; 2]) {
         self.pixel(pass, tile)[1] += 1;
+    }
+
+    /// Shares of a view, across and up, at both ends of a tile of `pass`; NaN in a flat scene.
+    fn shares(&self, pass: &Pass, tile: [u32; 2]) -> [[f64; 2]; 2] {
+        let inside = pass.bounds(tile, [0.0; 2], [0.0; 2]).space;
+        [1, 2].map(|across| {
+            let axis = (pass.axis + across) % 3;
+            let [low, high] = self.space[axis];
+            inside[axis].map(|at| (at - low) / (high - low))
+        })
+    }
+
+    /// Where the tiles of `pass` are: in the view along its axis, of three side by side.
+    fn placement(&self, pass: &Pass) -> Placement {
+        let last = [pass.grid().columns - 1, pass.grid().rows - 1];
+        let (first, last) = (self.shares(pass, [0; 2]), self.shares(pass, last));
+        let in_image = |[across, up]: [f64; 2]| [(pass.axis as f64 + across.clamp(0.0, 1.0)) / 3.0, 1.0 - up];
+        Placement { first: in_image(first.map(|ends| ends[0])), last: in_image(last.map(|ends| ends[1])) }
     }
 
     /// Pixel at the middle of a tile. The larger coordinate is on the right and above.
