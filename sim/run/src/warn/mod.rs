@@ -319,7 +319,7 @@ fn lost(measurement: &Measurement) -> Option<Warning> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{GpuSpec, Quantity, SampledSummary};
+    use crate::{GpuSpec, HeatQuantity, Quantity, SampledSummary};
     use timing::streams::failures;
     use timing::{FrameClock, Level, Recorder};
 
