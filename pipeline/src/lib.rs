@@ -78,8 +78,8 @@ pub use compute::{
 pub use frame::{
     Attachment, Attachments, Binding, ConservativeDraw, ConservativePass, Draw, Features, FrameReport, Gpu,
     IntervalAnswer, IntervalQueries, Lanes, Load, MovingBox, PassError, PassPart, PassReport, PipelineSpec,
-    Primitive, Query, RasterPass, Rendered, ResolvePass, SampledAnswer, SampledAnswers, SampledQueries,
-    Settings, Shading, Store, SurfaceId, SurfaceProblem, Target, TileIntervals, TileShader,
+    Placement, Primitive, Query, RasterPass, Rendered, ResolvePass, SampledAnswer, SampledAnswers,
+    SampledQueries, Settings, Shading, Store, SurfaceId, SurfaceProblem, Target, TileIntervals, TileShader,
 };
 pub use geometry::{
     Camera, CameraError, Clip, Cull, DrawError, Geometry, Lens, MovingVertex, Shear, Viewport,

@@ -28,6 +28,8 @@ pub struct ShadingPoint {
     pub pixel: [i32; 2],
     /// Index of the sample in its pixel; 0 for cells.
     pub sample: u32,
+    /// Number of the triangle in its draw.
+    pub triangle: u32,
 }
 
 impl ShadingPoint {
@@ -40,6 +42,7 @@ impl ShadingPoint {
         color: Vec3::ONE,
         pixel: [0; 2],
         sample: 0,
+        triangle: 0,
     };
 }
 

@@ -38,10 +38,19 @@ impl SurfaceView {
         self.layout.samples
     }
 
+    /// Address of a sample of a pixel; `None` outside of the image.
+    pub fn address(&self, pixel: [u32; 2], sample: u32) -> Option<u64> {
+        let is_inside = self.is_inside(pixel, sample);
+        is_inside.then(|| self.layout.at(pixel, sample))
+    }
+
+    fn is_inside(&self, pixel: [u32; 2], sample: u32) -> bool {
+        pixel[0] < self.size[0] && pixel[1] < self.size[1] && sample < self.samples()
+    }
+
     /// First word of a sample; beyond all words outside of the image.
     fn index(&self, pixel: [u32; 2], sample: u32) -> u32 {
-        let is_inside = pixel[0] < self.size[0] && pixel[1] < self.size[1] && sample < self.samples();
-        if is_inside { self.layout.word(pixel, sample) } else { u32::MAX - 1 }
+        if self.is_inside(pixel, sample) { self.layout.word(pixel, sample) } else { u32::MAX - 1 }
     }
 }
 

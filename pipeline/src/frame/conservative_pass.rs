@@ -10,10 +10,11 @@ use activity::{Event, Packet, PacketCounts, PacketKind};
 use rayon::prelude::*;
 
 use super::Gpu;
+use super::heat::{Block, Placement};
 use super::lanes::{LaneWork, Lanes};
 use crate::conservative::{Grid, MovingTriangle, Rasterizer, TileLoop, Touch};
 use crate::depth::{Numbers, Real};
-use crate::geometry::{Projection, Viewport};
+use crate::geometry::Projection;
 use crate::memory::MemoryRange;
 use crate::setup::difference_madds;
 use crate::tally::{Costs, Kernel};
@@ -181,9 +182,10 @@ impl<T> BodyLog<T> {
 }
 
 impl Gpu<'_> {
-    /// Begins a pass in conservative mode. Its blocks of tiles are those of an image of the size of `viewport`, if any.
-    pub fn begin_conservative(&mut self, name: &str, viewport: Option<Viewport>) -> ConservativePass {
-        self.open(name, viewport);
+    /// Begins a pass in conservative mode. Heat maps show its work on tiles where they are in the image of the frame, if they are
+    /// there at all.
+    pub fn begin_conservative(&mut self, name: &str, placement: Option<Placement>) -> ConservativePass {
+        self.open_placed(name, placement);
         ConservativePass::default()
     }
 }
@@ -215,7 +217,7 @@ impl ConservativePass {
             let logs: Vec<BodyLog<S::Output>> =
                 bodies.par_iter().zip(&starts).map_init(workers, log).collect();
             for log in logs {
-                self.body(gpu, &numbers, log, &mut store);
+                self.body(gpu, (draw, &numbers), log, &mut store);
             }
         }
     }
@@ -224,27 +226,47 @@ impl ConservativePass {
     fn body<T>(
         &mut self,
         gpu: &mut Gpu<'_>,
-        numbers: &[u32],
+        (draw, numbers): (&ConservativeDraw<'_>, &[u32]),
         log: BodyLog<T>,
         store: &mut impl FnMut([u32; 2], T),
     ) {
         let mut rest = log.rest.into_iter().peekable();
         for PacketLog { primitive, block, tests, lanes } in log.packets {
             while let Some((primitive, tests)) = rest.next_if(|(before, _)| *before < primitive) {
-                emit_tests(gpu, numbers[primitive], &tests);
+                emit_tests(gpu, numbers[primitive], &draw.scissor_of(primitive), &tests);
             }
             let mut packet = gpu.packet(PacketKind::Tile, block, Some(numbers[primitive]));
             add(&tests, &mut packet.counts);
             let written = &mut self.written;
             lanes.add_to(&mut packet.counts, gpu.memory(), |line| written.insert(line));
-            gpu.push(&packet, 0);
+            gpu.push_block(&packet, &draw.tiles_of(block));
         }
         for (tile, output) in log.outputs {
             store(tile, output);
         }
         for (primitive, tests) in rest {
-            emit_tests(gpu, numbers[primitive], &tests);
+            emit_tests(gpu, numbers[primitive], &draw.scissor_of(primitive), &tests);
         }
+    }
+}
+
+impl ConservativeDraw<'_> {
+    /// Blocks in a row.
+    fn blocks_across(&self) -> u32 {
+        self.grid.columns.div_ceil(self.block)
+    }
+
+    fn tiles_of(&self, block: u32) -> Block {
+        let of = [self.grid.columns, self.grid.rows];
+        let first = [block % self.blocks_across(), block / self.blocks_across()].map(|at| at * self.block);
+        Block { first, end: [0, 1].map(|axis| (first[axis] + self.block).min(of[axis])), of }
+    }
+
+    /// Tiles that are tested for a triangle.
+    fn scissor_of(&self, primitive: usize) -> Block {
+        let [columns, rows] = &self.primitives[primitive].scissor;
+        let of = [self.grid.columns, self.grid.rows];
+        Block { first: [columns.start, rows.start], end: [columns.end, rows.end], of }
     }
 }
 
@@ -279,7 +301,7 @@ fn log<S: TileShader>(
     shader: &S,
     (lanes, warp_lanes): (&Lanes, u32),
 ) -> BodyLog<S::Output> {
-    let across = draw.grid.columns.div_ceil(draw.block);
+    let across = draw.blocks_across();
     let (mut log, mut state) = (BodyLog::new(warp_lanes), S::BodyState::default());
     for (item, primitive) in body.iter().zip(start..).filter(|(item, _)| !item.is_culled(lanes.costs()).0) {
         let after = item.rasterizer.rasterize_counted(
@@ -336,11 +358,11 @@ fn vertices(gpu: &mut Gpu<'_>, draw: &ConservativeDraw<'_>, costs: &Costs) {
     }
 }
 
-/// Emits tests after the last tile that a triangle touches.
-fn emit_tests(gpu: &mut Gpu<'_>, triangle: u32, tests: &TileLoop) {
+/// Emits tests after the last tile that a triangle touches, among those that are tested.
+fn emit_tests(gpu: &mut Gpu<'_>, triangle: u32, tested: &Block, tests: &TileLoop) {
     let mut packet = gpu.packet(PacketKind::Tile, Packet::NONE, Some(triangle));
     add(tests, &mut packet.counts);
-    gpu.push(&packet, 0);
+    gpu.push_block(&packet, tested);
 }
 
 fn add(tests: &TileLoop, counts: &mut PacketCounts) {

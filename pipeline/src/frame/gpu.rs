@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::attachments::{Attachments, Store, SurfaceId, Surfaces};
 use super::error::PassError;
-use super::heat::{FrameHeat, HeatMap};
+use super::heat::{Block, FrameHeat, HeatMap, Placement};
 use super::pass::{AddressMap, Draw, Pass, RasterPass, Resident, Target, resident};
 use super::replay::Replay;
 use super::seen::Seen;
@@ -43,6 +43,8 @@ pub struct Gpu<'e> {
     heat: FrameHeat,
     /// Whether the tiles of the pass that was begun are those of the heat maps.
     is_on_map: bool,
+    /// Where other tiles of the pass that was begun are on the heat maps, if anywhere.
+    placement: Option<Placement>,
     /// Whether packets are made wherever a pass can be drawn without them, too.
     is_counted: bool,
 }
@@ -174,6 +176,7 @@ impl<'e> Gpu<'e> {
             buffers,
             heat,
             is_on_map: false,
+            placement: None,
             is_counted: true,
         })
     }
@@ -241,11 +244,18 @@ impl<'e> Gpu<'e> {
         self.is_on_map = viewport.is_some_and(|viewport| self.heat.is_of(viewport));
     }
 
+    /// Starts a pass over tiles of the caller, whose place in the image of the frame is given, if they are there.
+    pub(super) fn open_placed(&mut self, name: &str, placement: Option<Placement>) {
+        self.open(name, None);
+        self.placement = placement;
+    }
+
     /// Starts a pass whose packets have no place in an image.
     pub(super) fn start(&mut self, report: PassReport) {
         self.passes.push(report);
         self.last_batch = 0;
         self.is_on_map = false;
+        self.placement = None;
     }
 
     /// Whether a pass that reads or writes `region` has to wait for earlier ones.
@@ -298,12 +308,25 @@ impl<'e> Gpu<'e> {
 
     /// Emits a packet of a pass that was begun, which sets up `triangles`, with the lines requested since the one before.
     pub(super) fn push(&mut self, packet: &Packet, triangles: usize) {
+        self.heat.add(packet, self.is_on_map);
+        self.emit(packet, triangles);
+    }
+
+    /// The same for work on a block of tiles of the caller.
+    pub(super) fn push_block(&mut self, packet: &Packet, block: &Block) {
+        match self.placement {
+            Some(placement) => self.heat.add_block(packet, &placement, block),
+            None => self.heat.add(packet, self.is_on_map),
+        }
+        self.emit(packet, 0);
+    }
+
+    fn emit(&mut self, packet: &Packet, triangles: usize) {
         if let Some(report) = self.passes.last_mut() {
             report.triangles += triangles;
             report.add(packet);
         }
         self.last_batch = self.last_batch.max(packet.batch);
-        self.heat.add(packet, self.is_on_map);
         (self.emit)(packet, self.memory.log());
         self.memory.clear_log();
     }
@@ -340,7 +363,7 @@ impl<'e> Gpu<'e> {
             self.barrier(waits);
         }
         let seen = if self.is_counted { None } else { seen::draw(&prepared, pass) };
-        let drawn = match seen {
+        let mut drawn = match seen {
             Some(Seen { images, visible }) => {
                 let (counts, passed) = (Counts::default(), vec![0; prepared.draws.len()]);
                 Rendered { images, visible, counts, passed, region: prepared.result() }
@@ -348,6 +371,9 @@ impl<'e> Gpu<'e> {
             None => self.pass(&prepared, pass)?,
         };
         self.last_batch = prepared.batches().len().max(1) as u32 - 1;
+        if self.write_answers(pass.draws) {
+            drawn.counts = self.counts_of_pass();
+        }
         if !prepared.is_attached {
             self.keep(drawn.region);
         }

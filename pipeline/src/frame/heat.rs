@@ -39,6 +39,42 @@ pub struct TileHeat {
     pub count: u64,
 }
 
+/// Where the tiles of a pass in conservative mode are in the image of the frame, for its heat maps: the outer corners of the first
+/// and of the last tile, as shares of the image from its left and from its top.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Placement {
+    /// Outer corner of the tile in column and row 0.
+    pub first: [f64; 2],
+    /// Outer corner of the tile in the last column and row.
+    pub last: [f64; 2],
+}
+
+/// Tiles of a grid, from `first` to before `end`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Block {
+    pub first: [u32; 2],
+    pub end: [u32; 2],
+    /// Columns and rows of the grid.
+    pub of: [u32; 2],
+}
+
+impl Placement {
+    /// Columns and rows of the pixels of a block, at least one of each, in an image of this size.
+    fn pixels(&self, block: &Block, size: [u32; 2]) -> [[u32; 2]; 2] {
+        [0, 1].map(|axis| {
+            let at = |tile: u32| {
+                let share = f64::from(tile) / f64::from(block.of[axis].max(1));
+                let place = self.first[axis] + share * (self.last[axis] - self.first[axis]);
+                // NaN becomes 0.
+                (place * f64::from(size[axis])).round() as u32
+            };
+            let [a, b] = [at(block.first[axis]), at(block.end[axis])];
+            let low = a.min(b).min(size[axis] - 1);
+            [low, a.max(b).clamp(low + 1, size[axis])]
+        })
+    }
+}
+
 impl TileHeat {
     /// Mean number of events per pixel.
     pub fn per_pixel(&self) -> f64 {
@@ -86,6 +122,34 @@ impl HeatMap {
             }
             None => self.elsewhere += count,
         }
+    }
+
+    /// Add a packet whose events are spread over tiles, each with its share of so many pixels.
+    fn shared(&mut self, packet: &Packet, parts: &[(usize, u64)], pixels: u64) {
+        let (count, mut before) = (u64::from(packet.counts[self.event]), 0);
+        for (tile, share) in parts {
+            let until = before + share;
+            let part = count * until / pixels - count * before / pixels;
+            before = until;
+            self.tiles[*tile].count += part;
+            self.spread[*tile] += part;
+        }
+    }
+
+    /// Fine tiles in a range of pixels, with the number of its pixels in each.
+    fn parts(&self, [columns, rows]: [[u32; 2]; 2]) -> Vec<(usize, u64)> {
+        let Some(side) = self.tiles.first().map(|tile| tile.size[0].max(tile.size[1])) else {
+            return Vec::new();
+        };
+        let across = self.width.div_ceil(side);
+        let cut = |[low, high]: [u32; 2]| {
+            let tile = move |tile: u32| (tile, u64::from(high.min((tile + 1) * side) - low.max(tile * side)));
+            (low / side..high.div_ceil(side)).map(tile)
+        };
+        let of_row = |(row, high)| {
+            cut(columns).map(move |(column, wide)| ((row * across + column) as usize, wide * high))
+        };
+        cut(rows).flat_map(of_row).collect()
     }
 
     /// Add a packet. Tile tests may be in packets of other tiles; [`Self::tests`] adds them.
@@ -197,6 +261,15 @@ impl FrameHeat {
         for map in &mut self.maps {
             if is_placed { map.tile(packet) } else { map.elsewhere += u64::from(packet.counts[map.event]) }
         }
+    }
+
+    /// Add a packet of a pass in conservative mode, whose events are spread over the pixels of a block of its tiles.
+    pub fn add_block(&mut self, packet: &Packet, placement: &Placement, block: &Block) {
+        let Some(map) = self.maps.first() else { return };
+        let range = placement.pixels(block, [map.width, map.height]);
+        let parts = map.parts(range);
+        let pixels = parts.iter().map(|(_, share)| share).sum();
+        self.maps.iter_mut().for_each(|map| map.shared(packet, &parts, pixels));
     }
 
     /// The maps.

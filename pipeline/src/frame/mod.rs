@@ -39,7 +39,7 @@ use bin::{Bin, BinLog};
 pub use conservative_pass::{ConservativeDraw, ConservativePass, Primitive, TileIntervals, TileShader};
 pub use error::{PassError, PassPart, SurfaceProblem};
 pub use gpu::{FrameReport, Gpu, PassReport, Rendered};
-pub use heat::{HeatMap, TileHeat};
+pub use heat::{HeatMap, Placement, TileHeat};
 pub use lanes::Lanes;
 use pass::Pass;
 pub use pass::{Draw, Query, RasterPass, Resident, Target};

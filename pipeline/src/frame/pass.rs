@@ -24,6 +24,8 @@ use crate::traversal::thresholds::{at_rest, blur_px, motion_px};
 pub(super) const SAMPLE_BYTES: u64 = 4;
 /// Bytes of the three indices of a triangle.
 pub(super) const INDEX_BYTES: u64 = 12;
+/// Bytes of the position of a vertex at one end of the shutter.
+const POSITION_BYTES: u64 = 12;
 
 /// A triangle as it is drawn.
 pub(super) struct Staged {
@@ -499,6 +501,16 @@ impl<'a> Draw<'a> {
     #[must_use]
     pub fn binding(self, bindings: &'a [Binding<'a>]) -> Self {
         Self { bindings, ..self }
+    }
+
+    /// Addresses and bytes of the indices of a triangle and of the positions of its vertices, for programs that read them; `None`
+    /// unless the draw is [resident](super::Gpu::resident) and has the triangle.
+    pub fn data_of(&self, triangle: u32) -> Option<[(u64, u64); 4]> {
+        let VertexBuffer { address, stride, indices } = self.resident.vertices?;
+        let corners = self.geometry.triangles().get(triangle as usize)?;
+        let bytes = if self.geometry.is_still() { POSITION_BYTES } else { 2 * POSITION_BYTES };
+        let [a, b, c] = corners.map(|vertex| (address + u64::from(vertex) * u64::from(stride), bytes));
+        Some([(indices + u64::from(triangle) * INDEX_BYTES, INDEX_BYTES), a, b, c])
     }
 
     /// The draw with the texture of its shader in `region`, as an earlier pass wrote it.

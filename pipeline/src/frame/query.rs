@@ -1,6 +1,6 @@
 //! Occlusion queries (thesis, Paper VI, section 3), by samples and by intervals, with their work counted where it is done.
 
-use activity::{Counts, Event, Packet, PacketKind};
+use activity::{Counts, Event, Packet, PacketCounts, PacketKind};
 use glam::{Vec3, Vec4};
 
 use super::{Draw, FrameReport, Gpu, PassError, Query, RasterPass};
@@ -42,6 +42,8 @@ const CORNERS: u32 = 8;
 const CORNER_BYTES: u32 = 24;
 /// Bytes of a stored depth.
 const DEPTH_BYTES: u64 = 4;
+/// Bytes of the answer of a query.
+const ANSWER_BYTES: u64 = 4;
 
 impl MovingBox {
     /// Triangles, by corner index.
@@ -235,7 +237,8 @@ impl Gpu<'_> {
         }
     }
 
-    /// Asks about boxes in a pass of its own. A query ends at its first tile that may see the box.
+    /// Asks about boxes in a pass of its own. A query ends at its first tile that may see the box. The unit of depth writes the
+    /// answers to memory, a word each.
     pub fn query_boxes(
         &mut self,
         name: &str,
@@ -243,6 +246,7 @@ impl Gpu<'_> {
         objects: &[MovingBox],
     ) -> Vec<IntervalAnswer> {
         let corners = self.allocate(objects.len() as u64 * u64::from(CORNERS * CORNER_BYTES));
+        let written = self.allocate(objects.len() as u64 * ANSWER_BYTES);
         self.open(name, None);
         let answers: Vec<_> = objects.iter().map(|object| queries.ask(object)).collect();
         let size = self.spec().batch_triangles;
@@ -253,13 +257,43 @@ impl Gpu<'_> {
             boxes.iter().for_each(|&(number, answer)| {
                 self.box_vertices(number, queries.projection, answer, corners);
             });
-            boxes.iter().for_each(|&(number, answer)| self.box_tiles(number, answer));
+            boxes.iter().for_each(|&(number, answer)| self.box_tiles(number, answer, written));
         }
+        self.keep(written);
         answers
     }
 
-    /// Emits the tiles of a box that the query came to.
-    fn box_tiles(&mut self, number: u32, answer: &IntervalAnswer) {
+    /// Writes the answer of query `number`. Answers follow each other, so the first of a line needs none of what was there.
+    fn write_answer(&mut self, number: u32, answers: MemoryRange, counts: &mut PacketCounts) {
+        counts[Event::DepthWrites] += 1;
+        let address = answers.address() + u64::from(number) * ANSWER_BYTES;
+        self.memory().depth(
+            address / LINE_BYTES * LINE_BYTES,
+            true,
+            address.is_multiple_of(LINE_BYTES),
+            counts,
+        );
+    }
+
+    /// Writes the answers of the queries among the draws of the last pass; `false` if there are none.
+    pub(super) fn write_answers(&mut self, draws: &[Draw<'_>]) -> bool {
+        let asked: Vec<u32> =
+            (0..).zip(draws).filter(|(_, draw)| draw.query.is_some()).map(|(number, _)| number).collect();
+        if asked.is_empty() {
+            return false;
+        }
+        let answers = self.allocate(asked.len() as u64 * ANSWER_BYTES);
+        for (number, draw) in (0..).zip(asked) {
+            let mut packet = Packet { draw, ..self.packet(PacketKind::Tile, Packet::NONE, None) };
+            self.write_answer(number, answers, &mut packet.counts);
+            self.push(&packet, 0);
+        }
+        self.keep(answers);
+        true
+    }
+
+    /// Emits the tiles of a box that the query came to, and its answer.
+    fn box_tiles(&mut self, number: u32, answer: &IntervalAnswer, answers: MemoryRange) {
         let mut packet = self.packet(PacketKind::Tile, Packet::NONE, Some(FACES.len() as u32 * number));
         let counts = &mut packet.counts;
         let [_, tile_madds, depth_madds] = answer.madds.map(|madds| madds as u32);
@@ -268,6 +302,7 @@ impl Gpu<'_> {
         counts[Event::SidePlaneMadds] = tile_madds;
         counts[Event::DepthIntervalMadds] = depth_madds;
         counts[Event::ZCullTests] = answer.compared as u32;
+        self.write_answer(number, answers, &mut packet.counts);
         self.push(&packet, 0);
     }
 

@@ -4,6 +4,7 @@ use activity::{Event, Packet, PacketKind};
 use glam::Vec3;
 use rayon::prelude::*;
 
+use super::heat::Block;
 use super::lanes::{LaneWork, Lanes, Run};
 use super::{Gpu, Rendered};
 use crate::geometry::Viewport;
@@ -70,7 +71,9 @@ impl Gpu<'_> {
                 let tile = y0 / side * columns.len() as u32 + column;
                 let mut packet = self.packet(PacketKind::Tile, tile, None);
                 work.add_to(&mut packet.counts, self.memory(), |_| false);
-                self.push(&packet, 0);
+                let of = [viewport.width(), viewport.height()];
+                let end = [(*x0 + side).min(of[0]), (y0 + side).min(of[1])];
+                self.push_block(&packet, &Block { first: [*x0, y0], end, of });
             }
         }
         values

@@ -60,6 +60,8 @@ impl Attributes {
 pub(super) struct ShadedTriangle<'a> {
     pass: &'a Pass<'a>,
     draw: usize,
+    /// Number in the draw.
+    triangle: u32,
     vertices: [usize; 3],
     corners: [Corner; 3],
     reference: [[f32; 3]; 3],
@@ -72,6 +74,7 @@ pub(super) struct ShadedTriangle<'a> {
 impl<'a> ShadedTriangle<'a> {
     pub fn new(pass: &'a Pass<'a>, triangle: u32) -> Self {
         let (draw, vertices) = pass.corners(triangle);
+        let number = pass.locate(triangle).1 as u32;
         let corners = vertices.map(|vertex| Corner::new(&pass.vertices[draw][vertex]));
         let reference = reference(pass, &corners);
         let texture = pass.draws[draw].shader.texture();
@@ -81,7 +84,7 @@ impl<'a> ShadedTriangle<'a> {
             .map(|(texture, address)| Sampler::new(texture, address));
         let covering = covering(pass, draw, triangle);
         let attributes = Attributes::new(&pass.draws[draw].geometry, vertices);
-        Self { pass, draw, vertices, corners, reference, sampler, attributes, covering }
+        Self { pass, draw, triangle: number, vertices, corners, reference, sampler, attributes, covering }
     }
 
     /// Barycentric weights of the point at which a cell is shaded: its middle, or the centroid of the covered samples.
@@ -275,7 +278,8 @@ impl<'a> ShadedTriangle<'a> {
         let to_camera = (eye.truncate() - position * eye.w).normalize_or_zero();
         let normal = if smooth.dot(to_camera) < 0.0 { -smooth } else { smooth };
         let (uv, color) = (self.uv(weights), self.color(weights));
-        ShadingPoint { position, normal, to_camera, uv, color, ..ShadingPoint::FACING }
+        let triangle = self.triangle;
+        ShadingPoint { position, normal, to_camera, uv, color, triangle, ..ShadingPoint::FACING }
     }
 }
 

@@ -253,3 +253,57 @@ fn lanes_of_tiles_wait_for_those_of_their_program() {
     assert_eq!(ops(32).1, 7 * longest + 7 * 100);
     assert!(7 * longest > own);
 }
+
+/// What happens on tiles is on the heat maps where the tiles are in the image, evenly over their pixels: here in its right half, the first
+/// row below.
+#[test]
+fn heat_maps_have_the_work_on_tiles_in_their_pixels() {
+    let corners = [[0.5, 0.5, 2.0], [3.5, 0.5, 2.0], [0.5, 1.5, 4.0]];
+    let primitives =
+        [primitive([corners; 2], 0), primitive([corners.map(|[x, y, z]| [x + 3.0, y, z]); 2], 1)];
+    let (spec, viewport) = (spec(Features::ALL), Viewport::new(40, 24).unwrap());
+    for block in [1, 3, 8] {
+        let mut gpu = Gpu::quiet(&spec).unwrap().with_heat(&Event::ALL, viewport);
+        let [target, vertices] = [64 * 4, 3 * 24 * 2].map(|bytes| gpu.allocate(bytes));
+        let shader = Merge { target, runs: AtomicU32::new(0) };
+        let placement = Placement { first: [0.5, 1.0], last: [1.0, 0.0] };
+        let mut pass = gpu.begin_conservative("boxes", Some(placement));
+        let draw = ConservativeDraw {
+            primitives: &primitives,
+            grid: &GRID,
+            block,
+            vertices,
+            vertex_bytes: 24,
+            projection: None,
+        };
+        pass.draw(&mut gpu, &draw, &shader, |_, _| ());
+        let report = gpu.finish();
+        let counts = report.counts();
+        for map in &report.heat {
+            assert_eq!(map.total(), counts[map.event], "{:?}", map.event);
+            let pixels: f64 = map.pixels().iter().map(|&value| f64::from(value)).sum();
+            assert!((pixels - (map.total() - map.elsewhere) as f64).abs() < 1e-3, "{:?}", map.event);
+        }
+        let map = |event| report.heat.iter().find(|map| map.event == event).unwrap();
+        for event in [
+            Event::PixelInvocations,
+            Event::ShaderOps,
+            Event::TilesVisited,
+            Event::TileMadds,
+            Event::DepthLines,
+        ] {
+            assert!(map(event).total() > 0 && map(event).elsewhere == 0, "{event:?} {block}");
+        }
+        assert_eq!(map(Event::Draws).elsewhere, 1);
+        let runs = map(Event::PixelInvocations).pixels();
+        let hot = (0..24 * 40).filter(|at| runs[*at] > 0.0).map(|at| [at % 40, at / 40]);
+        let hot: Vec<[usize; 2]> = hot.collect();
+        // Fine tiles of 8 pixels; the triangles are in the first two of as many rows as there are.
+        let high = 24 / GRID.rows as usize * 2;
+        assert!(
+            hot.iter().all(|[x, y]| *x >= 16 && *y + high.next_multiple_of(8).max(8 * block as usize) >= 24),
+            "{hot:?}"
+        );
+        assert!(!hot.is_empty());
+    }
+}

@@ -2,6 +2,8 @@
 
 use activity::{Counts, Event, LineAccess, Packet, Unit};
 use glam::Vec3;
+use pipeline::depth::{BoxGrid, Pyramid};
+use pipeline::geometry::Projection;
 use pipeline::*;
 use proptest::prelude::*;
 
@@ -188,4 +190,40 @@ fn what_a_query_cannot_do_is_refused() {
     let object = MovingBox { open: [Vec3::ONE; 2], close: [Vec3::ONE; 2] };
     let refused = gpu.query_samples(&pass, Query::Any, &[object]).unwrap_err();
     assert!(matches!(refused, PassError::Surface { problem: SurfaceProblem::Unwritten, .. }), "{refused}");
+}
+
+/// Every answer is a word that the unit of depth writes, by intervals and by samples, and is in memory when the frame ends.
+#[test]
+fn answers_reach_memory() {
+    let stage = Stage::sampled(48, 32, 4);
+    let boxes: Vec<MovingBox> = (0..21_u8)
+        .map(|number| {
+            let low = Vec3::new(f32::from(number) - 10.0, -3.0, 2.0);
+            let ends = [low, low + Vec3::ONE];
+            MovingBox { open: ends, close: ends }
+        })
+        .collect();
+    let spec = spec(Features::ALL);
+    let settings =
+        Settings { spec: &spec, viewport: stage.viewport, samples: &stage.table, background: Vec3::ZERO };
+    let written = |report: &FrameReport| {
+        [Event::DepthWrites, Event::DramWriteBytes].map(|event| report.counts()[event])
+    };
+
+    let depths = vec![f32::INFINITY; stage.viewport.pixels() * 4];
+    let grid = BoxGrid::new([1; 3], false).unwrap();
+    let pyramid = Pyramid::new(stage.viewport, &stage.table, &depths, 8, grid);
+    let projection = Projection::new(&stage.camera, stage.viewport);
+    let mut gpu = Gpu::quiet(&spec).unwrap();
+    gpu.query_boxes("queries", &IntervalQueries::new(&pyramid, &projection), &boxes);
+    assert_eq!(written(&gpu.finish()), [21, 128]);
+
+    for query in [Query::Any, Query::Count] {
+        let mut gpu = Gpu::quiet(&spec).unwrap();
+        let pass = RasterPass::new(&stage.camera, &[], &settings).onto(Target::Depth);
+        gpu.query_samples(&pass, query, &boxes).unwrap();
+        let report = gpu.finish();
+        assert_eq!(written(&report), [21, 128]);
+        assert!(report.passes[0].draws.iter().all(|draw| draw[Event::DepthWrites] == 1));
+    }
 }

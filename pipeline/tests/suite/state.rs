@@ -1,4 +1,4 @@
-//! State of draws: with any states, culling and batches, image and samples are those of storing every sample of every
+//! State of draws: with any states, clip planes, discarding shaders, culling and batches, image and samples are those of storing every sample of every
 //! triangle in order.
 
 use std::ops::Range;
@@ -6,27 +6,106 @@ use std::ops::Range;
 use activity::Event;
 use glam::{Vec3, Vec4};
 use pipeline::depth::{DepthBound, DepthSpec};
+use pipeline::sampling::Sample;
 use pipeline::*;
 use proptest::prelude::*;
 
 use crate::common::stage::*;
 use crate::common::*;
 
-/// One colour for all points.
-struct Tint(Vec4);
+/// What a shader discards.
+#[derive(Clone, Copy, PartialEq)]
+enum Discards {
+    Nothing,
+    /// Every other triangle of a draw.
+    Triangles,
+    /// A chequerboard of samples, in passes that shade each at its own position; triangles in others.
+    Samples,
+}
 
-impl Shader for Tint {
-    fn shade(&self, _: &Lane, _: &ShadingPoint, _: Vec4) -> Vec4 {
-        self.0
+/// One colour for all points that are not discarded.
+struct Tint {
+    colour: Vec4,
+    discards: Discards,
+    per_sample: bool,
+}
+
+impl Tint {
+    /// Below 1 for points that are discarded.
+    fn kept(&self, triangle: u32, [x, y]: [i32; 2], sample: u32) -> f32 {
+        match self.discards {
+            Discards::Nothing => 1.0,
+            Discards::Samples if self.per_sample => ((x + y + sample as i32) % 2) as f32,
+            _ => (triangle % 2) as f32,
+        }
     }
 }
 
-/// Triangles of a soup with a state and a colour.
+impl Shader for Tint {
+    fn shade(&self, lane: &Lane, at: &ShadingPoint, _: Vec4) -> Vec4 {
+        lane.discard_below(self.kept(at.triangle, at.pixel, at.sample), 1.0);
+        self.colour
+    }
+
+    fn may_discard(&self) -> bool {
+        self.discards != Discards::Nothing
+    }
+}
+
+/// Triangles of a soup with a state, clip planes and a colour.
 struct Part {
     triangles: Range<usize>,
     state: DrawState,
+    planes: Planes,
     tint: Tint,
 }
+
+/// A range of an axis from `low` to `high`, or all of it.
+fn range(r: &mut Uniform, [low, high]: [f32; 2]) -> [f32; 2] {
+    let (a, b) = (r.within(low, high), r.within(low, high));
+    match (r.next() * 8.0) as u32 {
+        0 => [a.min(b), a.max(b)],
+        1 => [a, f32::INFINITY],
+        2 => [f32::NEG_INFINITY, a],
+        _ => ALL,
+    }
+}
+
+/// Clip planes across u, v and t, and across the image.
+struct Planes {
+    uvt: [[f32; 2]; 3],
+    image: [[f32; 2]; 2],
+}
+
+impl Planes {
+    /// None, or mostly few.
+    fn new(r: &mut Uniform, chance: f32) -> Self {
+        let is_there = r.next() < chance;
+        let mut range = |whole| if is_there { range(r, whole) } else { ALL };
+        let (lens, unit) = ([-1.0, 1.0], [0.0, 1.0]);
+        Self { uvt: [range(lens), range(lens), range(unit)], image: [range(unit), range(unit)] }
+    }
+
+    fn clip(&self) -> Clip {
+        let ([u, v, t], [x, y]) = (self.uvt, self.image);
+        Clip::new(u, v, t).unwrap().across_image(x, y).unwrap()
+    }
+
+    /// Whether a sample of a pixel is between them.
+    fn have_inside(&self, pixel: [u32; 2], sample: &Sample) -> bool {
+        let within = |[low, high]: [f32; 2], at: f32| low <= at && at < high;
+        let sides = [viewport().width(), viewport().height()].map(|side| side as f32);
+        let in_image = |(axis, at): (usize, f32)| {
+            let edge = |share: f32| ((f64::from(share) - 0.5) * f64::from(sides[axis])) as f32;
+            within(self.image[axis].map(edge), (pixel[axis] as f32 - 0.5 * sides[axis]) + at)
+        };
+        let uvt = [sample.u, sample.v, sample.t];
+        [sample.x, sample.y].into_iter().enumerate().all(in_image)
+            && self.uvt.iter().zip(uvt).all(|(range, at)| within(*range, at))
+    }
+}
+
+const ALL: [f32; 2] = [f32::NEG_INFINITY, f32::INFINITY];
 
 struct Scene {
     soup: Soup,
@@ -34,6 +113,9 @@ struct Scene {
     table: SampleTable,
     parts: Vec<Part>,
     clear: Clear,
+    /// Planes of the whole pass.
+    planes: Planes,
+    per_sample: bool,
 }
 
 const BACKGROUND: Vec3 = Vec3::new(0.125, 0.5, 0.25);
@@ -82,34 +164,38 @@ pub(crate) fn state(r: &mut Uniform) -> DrawState {
 }
 
 impl Scene {
-    fn new(kind: SoupKind, optics: Optics, count: usize, seed: u64) -> Self {
+    fn new(kind: SoupKind, optics: Optics, per_sample: bool, count: usize, seed: u64) -> Self {
         let mut r = Uniform::new(seed ^ 7);
         let mut parts = Vec::new();
         let mut first = 0;
         while first < count {
             let triangles = first..count.min(first + 1 + byte(&mut r) as usize % 9);
             first = triangles.end;
-            let tint = Tint(Vec4::new(r.next(), r.next(), r.next(), r.next()));
-            parts.push(Part { triangles, state: state(&mut r), tint });
+            let colour = Vec4::new(r.next(), r.next(), r.next(), r.next());
+            let discards = [Discards::Nothing, Discards::Nothing, Discards::Triangles, Discards::Samples];
+            let tint = Tint { colour, discards: pick(&mut r, &discards), per_sample };
+            parts.push(Part { triangles, state: state(&mut r), planes: Planes::new(&mut r, 0.5), tint });
         }
         let clear =
             Clear { depth: pick(&mut r, &[f32::INFINITY, 6.0, 0.0]), stencil: pick(&mut r, &[0, 1, 255]) };
         let table = SampleTable::low_discrepancy(4, seed, LensShape::Disk).unwrap();
-        Self { soup: Soup::new(kind, count as u32, seed), optics, table, parts, clear }
+        let planes = Planes::new(&mut r, 0.3);
+        Self { soup: Soup::new(kind, count as u32, seed), optics, table, parts, clear, planes, per_sample }
     }
 
     fn render(&self, spec: &PipelineSpec) -> Rendered {
         let settings = Settings { spec, viewport: viewport(), samples: &self.table, background: BACKGROUND };
         let draws: Vec<Draw<'_>> = self.parts.iter().map(|part| self.draw(part)).collect();
-        let camera = camera(self.optics);
+        let camera = camera(self.optics).with_clip(self.planes.clip());
         let pass = RasterPass { clear: self.clear, ..RasterPass::new(&camera, &draws, &settings) };
+        let pass = if self.per_sample { pass.shaded_per_sample() } else { pass };
         pass.with_visible().render(|_, _| ()).unwrap()
     }
 
     fn draw<'a>(&'a self, part: &'a Part) -> Draw<'a> {
         let Soup { open, close, triangles } = &self.soup;
         let geometry = Geometry::new(open, close, &triangles[part.triangles.clone()]).unwrap();
-        Draw::new(geometry, &part.tint, Cull::None).with_state(part.state)
+        Draw::new(geometry.with_clip(part.planes.clip()), &part.tint, Cull::None).with_state(part.state)
     }
 
     /// Triangle and depth of every sample, and the image.
@@ -117,13 +203,23 @@ impl Scene {
         let per_pixel = self.table.per_pixel();
         let mut seen = vec![(u32::MAX, 0); viewport().pixels() * per_pixel as usize];
         let mut image = vec![Vec3::ZERO; viewport().pixels()];
+        let places = sample_positions(&self.table, viewport());
         every_tile(&self.soup, self.optics, viewport(), &self.table, |tile| {
             let mut stored = vec![Stored::cleared(self.clear); tile.samples.len];
+            let place = |slot| tile.samples.in_image(slot, tile.origin, 8, viewport(), per_pixel);
             for part in &self.parts {
-                part.triangles.clone().for_each(|id| part.store(tile, id, &mut stored));
+                let is_kept = |id: usize, slot: usize| {
+                    let (pixel, sample) = &places[place(slot)];
+                    let (number, index) = (id - part.triangles.start, place(slot) as u32 % per_pixel);
+                    [&self.planes, &part.planes].iter().all(|planes| planes.have_inside(*pixel, sample))
+                        && part.tint.kept(number as u32, pixel.map(|at| at as i32), index) >= 1.0
+                };
+                part.triangles
+                    .clone()
+                    .for_each(|id| part.store(tile, id, &mut stored, |slot| is_kept(id, slot)));
             }
             for (slot, sample) in stored.iter().enumerate() {
-                let index = tile.samples.in_image(slot, tile.origin, 8, viewport(), per_pixel);
+                let index = place(slot);
                 seen[index] = (sample.triangle, sample.depth.to_bits());
                 image[index / per_pixel as usize] += sample.colour.truncate();
             }
@@ -148,15 +244,21 @@ impl Stored {
 }
 
 impl Part {
-    /// Stores the samples of a tile that are inside triangle `id`, front faces and back faces by themselves.
-    fn store(&self, tile: &TileOfSoup<'_>, id: usize, stored: &mut [Stored]) {
+    /// Stores the samples of a tile that are inside triangle `id` and are kept, front faces and back faces by themselves.
+    fn store(
+        &self,
+        tile: &TileOfSoup<'_>,
+        id: usize,
+        stored: &mut [Stored],
+        is_kept: impl Fn(usize) -> bool,
+    ) {
         for culled in [Cull::Back, Cull::Front]
             .into_iter()
             .filter(|&culled| self.state.cull == Cull::None || self.state.cull == culled)
         {
             let (mut depth, mut owner) = (vec![f32::INFINITY; stored.len()], vec![u32::MAX; stored.len()]);
-            for slot in tile.test(id, culled, &mut depth, &mut owner) {
-                let slot = usize::from(slot);
+            let hits = tile.test(id, culled, &mut depth, &mut owner).into_iter().map(usize::from);
+            for slot in hits.filter(|slot| is_kept(*slot)) {
                 self.sample(&mut stored[slot], depth[slot], culled == Cull::Back, id as u32);
             }
         }
@@ -187,7 +289,7 @@ impl Part {
         if rule.write || colour_mask != [false; 4] {
             at.triangle = id;
         }
-        let mixed = mixed(blend, self.tint.0, at.colour);
+        let mixed = mixed(blend, self.tint.colour, at.colour);
         (0..4)
             .filter(|&channel| colour_mask[channel])
             .for_each(|channel| at.colour[channel] = mixed[channel]);
@@ -241,14 +343,14 @@ proptest! {
     fn every_state_gives_the_image_of_storing_samples_in_order(
         kind in kinds(), lens: bool, parallel: bool, switches in 0..SWITCHES, auto: bool, waits: bool, z_min: bool, bound in 0..4_usize,
         boxes in prop::sample::select(&[[1, 1, 1], [1, 1, 4], [2, 2, 2]][..]), batch_triangles in 1..40_u32,
-        sizes in 0..3_usize, count in 1..60_usize, seed: u64,
+        sizes in 0..3_usize, count in 1..60_usize, per_sample: bool, seed: u64,
     ) {
         let (tile_px, coarse_tile_px) = [(8, 32), (4, 16), (2, 64)][sizes];
         let depth = DepthSpec { bound: DepthBound::ALL[bound], boxes, z_min };
         let spec = PipelineSpec {
             tile_px, coarse_tile_px, batch_triangles, depth, ..spec(Features { auto, hidden_surface_removal: waits, ..switched(switches) })
         };
-        let scene = Scene::new(kind, Optics { lens, parallel }, count, seed);
+        let scene = Scene::new(kind, Optics { lens, parallel }, per_sample, count, seed);
         let (ours, (seen, image)) = (scene.render(&spec), scene.reference());
         prop_assert!(ours.visible == seen, "samples differ");
         prop_assert!(ours.images[0] == image, "images differ");

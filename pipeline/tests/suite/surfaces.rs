@@ -833,3 +833,39 @@ fn dropped_contents_are_gone() {
         assert_eq!(gpu.finish().counts()[Event::DramWriteBytes], 0);
     });
 }
+
+/// Passes are drawn in the order in which they are asked for, and read what earlier ones stored, so no cycle of them can be asked for: one that
+/// reads what a later pass is to write is refused, or reads what was there before.
+#[test]
+fn a_pass_reads_what_earlier_passes_stored_and_never_what_later_ones_will() {
+    with(|stage, settings| {
+        let mut gpu = Gpu::quiet(settings.spec).unwrap();
+        let [one, two] = ["one", "two"]
+            .map(|name| gpu.create_surface(&SurfaceSpec::new(name, stage.viewport, Format::R32f)));
+        let corners = screen(1.0);
+        let add = Neighbour(Vec4::splat(1.0));
+        let draw = |gpu: &mut Gpu<'_>, name: &str, [from, into]: [SurfaceId; 2]| {
+            let (bindings, targets) = ([Binding::Surface(from)], to(&[into]));
+            let geometry = Geometry::new(&corners, &corners, &QUAD).unwrap();
+            let draws = [Draw::new(geometry, &add, Cull::None).with_state(flat()).binding(&bindings)];
+            let pass = RasterPass::new(&stage.camera, &draws, settings).named(name);
+            gpu.draw(&pass.onto(Target::Surfaces(&targets)).without_image()).map(|_| ())
+        };
+        let error = draw(&mut gpu, "there", [two, one]).unwrap_err().to_string();
+        assert!(error.starts_with("pass `there`, surface `two`: it is read, but no earlier pass"), "{error}");
+        let error = draw(&mut gpu, "both", [one, one]).unwrap_err().to_string();
+        assert!(
+            error.starts_with("pass `both`, surface `one`: it is read and written in the same pass"),
+            "{error}"
+        );
+
+        // With something in it, each pass adds one to what the last one left.
+        let draws = [still(&corners, &RED).with_state(flat())];
+        let (clear, start) = (to(&[two]), RasterPass::new(&stage.camera, &draws, settings));
+        gpu.draw(&start.onto(Target::Surfaces(&clear))).unwrap();
+        for (number, [from, into]) in (2_u8..).zip([[two, one], [one, two], [two, one]]) {
+            draw(&mut gpu, "step", [from, into]).unwrap();
+            assert_eq!(gpu.contents(into).unwrap()[0].x, f32::from(number));
+        }
+    });
+}

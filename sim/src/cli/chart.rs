@@ -280,7 +280,7 @@ pub struct ReproduceArgs {
     /// Which paper
     #[arg(value_enum, value_name = "PAPER", ignore_case = true)]
     pub paper: Paper,
-    /// Fewer values, frames and repetitions: less than a minute. Verdicts then say at how many of the settings they were reached
+    /// Fewer values, frames and repetitions: some minutes. Verdicts then say at how many of the settings they were reached
     #[arg(long)]
     pub quick: bool,
     /// Only this row, for example VI-13; may be given more than once

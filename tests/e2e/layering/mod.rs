@@ -1,6 +1,7 @@
 //! Layering: allowed dependencies between crates and between modules, and rules of every crate.
 
 mod modules;
+mod packets;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -82,22 +83,47 @@ fn crates_use_only_allowed_crates() {
 /// Every counted event comes from the pipeline: workloads, runs and experiments say what their code did, and make no packets.
 #[test]
 fn packets_are_built_in_the_pipeline_alone() {
-    let made = ["Packet::new", "PacketCounts", "PacketKind"];
     let above = ["workloads/src", "sim/run/src", "sim/experiments/src", "sim/sweep/src", "sim/src"];
     let files: Vec<PathBuf> = above.iter().flat_map(|folder| rust_files(&root().join(folder))).collect();
     assert!(files.len() > 150, "{} files", files.len());
-    let found = files.iter().filter(|file| {
-        let text = fs::read_to_string(file).expect("a source file");
-        let code = text.split("#[cfg(test)]").next().unwrap_or_default();
-        made.iter().any(|name| code.contains(name))
+    let found = files.iter().flat_map(|file| {
+        let found = packets::made(&fs::read_to_string(file).expect("a source file"));
+        found.into_iter().map(|what| format!("{}: {what}", file.display())).collect::<Vec<_>>()
     });
-    let found: Vec<_> = found.collect();
-    assert!(found.is_empty(), "{found:?}");
+    let found: Vec<String> = found.collect();
+    assert!(found.is_empty(), "{}", found.join("\n"));
     // The clocks are tested and measured with synthetic streams.
     let timing = rust_files(&root().join("sim/timing/src"));
     let builds = |file: &&PathBuf| fs::read_to_string(file).expect("a source file").contains("Packet::new");
     let found: Vec<_> = timing.iter().filter(builds).filter_map(|file| file.file_name()).collect();
     assert_eq!(found, ["streams.rs"]);
+}
+
+/// All ways to a packet of one's own are found: from nothing, from another one, by a copy that is changed, and after test modules.
+#[test]
+fn packets_made_of_others_and_after_tests_are_found() {
+    for code in [
+        "fn f() { emit(&Packet::new(kind, 0)) }",
+        "fn f(first: &Packet) { emit(&Packet { batch: 2, ..*first }) }",
+        "fn f(first: &Packet) { let mut copy = *first; copy.counts[Event::Draws] += 7; emit(&copy) }",
+        "fn f(first: &Packet) { let mut copy = *first; copy.counts = of; emit(&copy) }",
+        "fn f(first: &Packet) { let mut copy = first.clone(); copy.triangle = 3; emit(&copy) }",
+        "fn f(first: &Packet) { let mut copy = *first; change(&mut copy.counts[Event::Draws]) }",
+        "fn f(packet: &mut Packet) { fill(packet) }",
+        "fn f() { vec![Packet { batch: 2, ..first }] }",
+        "use activity::{Event, Packet as Work};",
+        "type Work = activity::Packet;",
+        "trait Fill { fn fill(&mut self); } impl Fill for Packet { fn fill(&mut self) { self.pass = 1 } }",
+        "fn f(counts: &mut PacketCounts) {}",
+    ] {
+        assert!(!packets::made(code).is_empty(), "{code}");
+        let behind = format!("#[cfg(test)] mod tests {{ fn g() {{}} }} {code}");
+        assert!(!packets::made(&behind).is_empty(), "{behind}");
+        let tested = format!("#[cfg(test)] mod tests {{ {code} }} fn g() {{}}");
+        assert!(packets::made(&tested).is_empty(), "{tested}");
+    }
+    let reads = "fn f(p: &Packet) { sum.counts += &p.counts; self.pass = 1; seen(p.tile, p.draw != Packet::NONE, Level::Packet) }";
+    assert!(packets::made(reads).is_empty(), "{:?}", packets::made(reads));
 }
 
 #[test]

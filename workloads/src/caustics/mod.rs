@@ -39,3 +39,4 @@ pub(crate) use job::FLAGS;
 pub use job::{CausticsOptions, LightView, job};
 pub use light::{Floor, Light};
 pub use photons::{Squares, error};
+pub use shader::draw_on;

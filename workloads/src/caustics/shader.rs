@@ -5,7 +5,7 @@ use glam::{DVec3, Vec3};
 use pipeline::conservative::{Grid, MovingTriangle, Rasterizer, View};
 use pipeline::memory::MemoryRange;
 use pipeline::traversal::TimeIntervals;
-use pipeline::{ConservativeDraw, Gpu, Lanes, Primitive, TileIntervals, TileShader};
+use pipeline::{ConservativeDraw, Gpu, Lanes, Placement, Primitive, TileIntervals, TileShader};
 
 use super::bound::BoundingVolume;
 use super::cover::{MAX_HALVINGS, TILE_PX, in_image, pixel_of, reach, set_bits, slack, within_reach};
@@ -28,8 +28,8 @@ const TINT: Vec3 = Vec3::new(0.55, 0.9, 1.0);
 const TILE_PIXELS: u64 = (TILE_PX * TILE_PX) as u64;
 
 /// The buffer that accumulates light, tile by tile.
-#[derive(Clone, Copy)]
-pub(super) struct LightBuffer {
+#[derive(Clone, Copy, Debug)]
+pub struct LightBuffer {
     region: MemoryRange,
     /// Tiles in a row of the image.
     columns: u32,
@@ -61,8 +61,8 @@ pub(super) fn tone_on(
     drawn.images.swap_remove(0)
 }
 
-/// Draws beams in a pass of `gpu`. The picture is that of [`super::draw()`].
-pub(super) fn draw_on(
+/// Draws beams in a pass of `gpu`. The picture is that of [`super::draw()`], and the light is in the buffer.
+pub fn draw_on(
     gpu: &mut Gpu<'_>,
     beams: &[Beam],
     eye: &Eye,
@@ -82,8 +82,6 @@ pub(super) fn draw_on(
     let vertex_bytes = if method == Method::Moving { 2 * VERTEX_BYTES } else { VERTEX_BYTES };
     let vertices = gpu.allocate(3 * primitives.len() as u64 * u64::from(vertex_bytes));
     let marks = gpu.allocate(u64::from(columns * rows) * MARK_STRIDE);
-    // The maps of a GPU with other tiles cannot show these.
-    let of_image = (gpu.spec().tile_px == TILE_PX).then_some(viewport);
     let mut picture = Picture {
         light: vec![0.0; viewport.pixels()],
         runs: vec![0; viewport.pixels()],
@@ -101,7 +99,10 @@ pub(super) fn draw_on(
         projection: Some(eye.projection()),
     };
     let shader = LightShader { eye, seen: &seen, faces: &faces, light, buffer, marks };
-    let mut pass = gpu.begin_conservative("light", of_image);
+    // The last tiles may reach beyond the image.
+    let last = [(columns, viewport.width()), (rows, viewport.height())]
+        .map(|(tiles, px)| f64::from(tiles * TILE_PX) / f64::from(px));
+    let mut pass = gpu.begin_conservative("light", Some(Placement { first: [0.0; 2], last }));
     pass.draw(gpu, &draw, &shader, |_, shaded| {
         picture.tiles += 1;
         picture.tests += u64::from(shaded.tests);

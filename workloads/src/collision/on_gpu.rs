@@ -3,7 +3,8 @@
 use glam::Vec3;
 use pipeline::memory::MemoryRange;
 use pipeline::{
-    ConservativeDraw, ConservativePass, Gpu, Lane, Lanes, Primitive, TileIntervals, TileShader, Viewport,
+    ConservativeDraw, ConservativePass, Gpu, Lane, Lanes, Placement, Primitive, TileIntervals, TileShader,
+    Viewport,
 };
 
 use super::Method;
@@ -15,6 +16,8 @@ use super::pass::{BinnedPrimitive, Fragment, FragmentBudget, Part, Pass, PassBac
 const VERTEX_BYTES: u32 = 24;
 /// Bytes of a box of time and depth: four numbers of 64 bits, in which conservative mode clips its intervals.
 const BOX_BYTES: u64 = 32;
+/// Bytes of the answer about an object: whether it meets others, by direction.
+const ANSWER_BYTES: u64 = 4;
 
 /// Places of boxes in a buffer: tile by tile of the hardware, the boxes of a pixel side by side.
 #[derive(Clone, Copy)]
@@ -55,6 +58,9 @@ pub(super) struct PassesOnGpu<'a, 'e> {
     layout: BoxLayout,
     /// Boxes of the first and of the second object.
     boxes: [MemoryRange; 2],
+    /// Answers about the objects of a pass, and how many there are so far.
+    answers: MemoryRange,
+    asked: u64,
     method: Method,
     fragments: u64,
 }
@@ -77,17 +83,38 @@ impl<'a, 'e> PassesOnGpu<'a, 'e> {
         let vertices = gpu.allocate(3 * most * u64::from(VERTEX_BYTES));
         let boxes = [(); 2].map(|()| gpu.allocate(layout.bytes()));
         let picture = Picture::new(objects, viewport.width() as usize);
-        let (pass, fragments) = Default::default();
-        Self { gpu, pass, vertices, picture, viewport, layout, boxes, method, fragments }
+        let answers = gpu.allocate(objects.len() as u64 * ANSWER_BYTES);
+        let (pass, asked, fragments) = Default::default();
+        Self { gpu, pass, vertices, picture, viewport, layout, boxes, answers, asked, method, fragments }
+    }
+
+    /// The answers of a pass are in memory when it ends, for the host to read.
+    fn end_pass(&mut self) {
+        if std::mem::take(&mut self.asked) > 0 {
+            self.gpu.keep(self.answers);
+        }
+    }
+
+    /// Where the next answer is.
+    fn next_answer(&mut self) -> u64 {
+        self.asked += 1;
+        (self.asked - 1) * ANSWER_BYTES
     }
 
     /// Writes the image and returns the totals.
-    pub fn finish(self) -> Emitted {
+    pub fn finish(mut self) -> Emitted {
+        self.end_pass();
         let (image, side) = (self.picture.image(), self.viewport.width());
         if let Some(all) = Viewport::new(3 * side, side) {
             self.gpu.write_image("image", all);
         }
         Emitted { image, fragments: self.fragments }
+    }
+
+    /// The number of fragments, without an image.
+    pub fn into_fragments(mut self) -> u64 {
+        self.end_pass();
+        self.fragments
     }
 
     /// Where the boxes of a part are. The second part only reads those of the first unless boxes are compared.
@@ -102,13 +129,22 @@ fn meets(lane: &Lane, known: &TzBox, t: [f64; 2], z: [f64; 2]) -> bool {
     !lane.branch(apart(known.t, t)) && !lane.branch(apart(known.z, z))
 }
 
-/// The shader of a pass: a fragment is compared with a box, or enlarges it.
+/// The same by depth alone, from either direction.
+fn meets_in_depth(lane: &Lane, known: &TzBox, z: [f64; 2]) -> bool {
+    let [in_front, behind] = [z[0] <= known.z[1], z[1] >= known.z[0]].map(|is| lane.branch(is));
+    in_front || behind
+}
+
+/// The shader of a pass: a fragment is compared with a box, or enlarges it. One that meets its box marks the answer of its object.
 struct BoxShader<'a> {
     primitives: &'a [BinnedPrimitive],
     pass: &'a Pass,
     target: MemoryRange,
     known: Option<&'a TzBuffer>,
     layout: BoxLayout,
+    answers: MemoryRange,
+    /// Where the answer of the object is.
+    answer: u64,
 }
 
 impl TileShader for BoxShader<'_> {
@@ -125,17 +161,20 @@ impl TileShader for BoxShader<'_> {
         };
         lanes.read(self.target, offset, BOX_BYTES);
         let place = self.pass.place(fragment.tile, fragment.bin);
-        lanes.run(|lane| meets(lane, known.at(place), tile.touch.t, tile.touch.z));
+        if lanes.run(|lane| meets(lane, known.at(place), tile.touch.t, tile.touch.z)) {
+            lanes.merge(self.answers, self.answer, ANSWER_BYTES);
+        }
         Some(fragment)
     }
 }
 
 impl PassBackend for PassesOnGpu<'_, '_> {
-    fn begin(&mut self, name: &str, follows: bool) {
+    fn begin(&mut self, name: &str, pass: &Pass, follows: bool) {
+        self.end_pass();
         if follows {
             self.gpu.wait();
         }
-        self.pass = self.gpu.begin_conservative(name, None);
+        self.pass = self.gpu.begin_conservative(name, Some(self.picture.placement(pass)));
     }
 
     fn draw(
@@ -157,12 +196,15 @@ impl PassBackend for PassesOnGpu<'_, '_> {
             vertex_bytes: VERTEX_BYTES,
             projection: None,
         };
+        let answer = if known.is_some() { self.next_answer() } else { 0 };
         let shader = BoxShader {
             primitives: &binned,
             pass,
             target: self.target(which, known.is_some()),
             known,
             layout: self.layout,
+            answers: self.answers,
+            answer,
         };
         let (picture, fragments) = (&mut self.picture, &mut self.fragments);
         self.pass.draw(self.gpu, &draw, &shader, |tile, fragment| {
@@ -177,13 +219,20 @@ impl PassBackend for PassesOnGpu<'_, '_> {
         let [columns, rows] = [pass.grid().columns, pass.grid().rows];
         let Some(viewport) = Viewport::new(columns, rows) else { return };
         let (targets, layout) = (self.boxes, self.layout);
+        let (answers, answer, method) = (self.answers, self.next_answer(), self.method);
         self.gpu.run_pixels(viewport, |lanes, tile| {
             for bin in 0..bins {
                 let place = pass.place(tile, bin);
                 let offset = layout.offset(tile, bin);
                 targets.iter().for_each(|target| lanes.read(*target, offset, BOX_BYTES));
                 let (one, other) = (first.at(place), second.at(place));
-                lanes.run(|lane| meets(lane, one, other.t, other.z));
+                let met = lanes.run(|lane| match method {
+                    Method::DepthOnly => meets_in_depth(lane, one, other.z),
+                    _ => meets(lane, one, other.t, other.z),
+                });
+                if met {
+                    lanes.merge(answers, answer, ANSWER_BYTES);
+                }
                 if merges {
                     lanes.merge(targets[0], offset, BOX_BYTES);
                 }
@@ -226,6 +275,24 @@ impl Picture {
         self.pixel(pass, tile)[1] += 1;
     }
 
+    /// Shares of a view, across and up, at both ends of a tile of `pass`; NaN in a flat scene.
+    fn shares(&self, pass: &Pass, tile: [u32; 2]) -> [[f64; 2]; 2] {
+        let inside = pass.bounds(tile, [0.0; 2], [0.0; 2]).space;
+        [1, 2].map(|across| {
+            let axis = (pass.axis + across) % 3;
+            let [low, high] = self.space[axis];
+            inside[axis].map(|at| (at - low) / (high - low))
+        })
+    }
+
+    /// Where the tiles of `pass` are: in the view along its axis, of three side by side.
+    fn placement(&self, pass: &Pass) -> Placement {
+        let last = [pass.grid().columns - 1, pass.grid().rows - 1];
+        let (first, last) = (self.shares(pass, [0; 2]), self.shares(pass, last));
+        let in_image = |[across, up]: [f64; 2]| [(pass.axis as f64 + across.clamp(0.0, 1.0)) / 3.0, 1.0 - up];
+        Placement { first: in_image(first.map(|ends| ends[0])), last: in_image(last.map(|ends| ends[1])) }
+    }
+
     /// Pixel at the middle of a tile. The larger coordinate is on the right and above.
     fn pixel(&mut self, pass: &Pass, tile: [u32; 2]) -> &mut [u32; 2] {
         let middle = pass.bounds(tile, [0.0; 2], [0.0; 2]).space;
@@ -257,6 +324,8 @@ impl Picture {
 
 #[cfg(test)]
 mod tests {
+    use activity::Event;
+
     use super::*;
 
     #[test]
@@ -268,6 +337,33 @@ mod tests {
         places.sort_unstable();
         assert!(places.windows(2).all(|pair| pair[1] - pair[0] >= BOX_BYTES));
         assert!(places[places.len() - 1] + BOX_BYTES <= layout.bytes());
+    }
+
+    /// By every method, fragments or pixels that meet mark the answer of their object, and the answers of all passes reach memory.
+    #[test]
+    fn answers_are_in_memory() {
+        let objects = super::super::families::swarm_of(6, 1);
+        let hardware = crate::job::testing::hardware();
+        for method in [Method::FragmentBox, Method::BoxBox, Method::DepthOnly] {
+            let (viewport, mut lines) = (Viewport::new(16, 16).unwrap(), std::collections::HashSet::new());
+            let mut gpu = Gpu::new(&hardware, |_, of_packet| {
+                of_packet.iter().for_each(|access| lines.extend(access.written()));
+            })
+            .unwrap();
+            let mut passes = PassesOnGpu::new((method, viewport, 1), &objects, &mut gpu);
+            let answers = passes.answers;
+            let set =
+                super::super::Sweeps { method, resolution: 16, bins: 1 }.detect_on(&objects, &mut passes);
+            assert!(!set.is_empty());
+            let marks: u32 = passes.picture.pixels.iter().map(|pixel| pixel[1]).sum();
+            let Emitted { fragments, .. } = passes.finish();
+            let counts = gpu.finish().counts();
+            // A box is eight words, an answer one; by depth alone, one direction is enough for a mark.
+            let words = counts[Event::DepthWrites] % 8;
+            assert!(method == Method::DepthOnly || words == u64::from(marks % 8), "{method:?}");
+            assert!(fragments > 0 && marks > 0);
+            assert!(lines.contains(&((answers.address() / 64) as u32)), "{method:?}");
+        }
     }
 
     #[test]

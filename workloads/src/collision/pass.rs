@@ -362,7 +362,7 @@ struct StoredFragment {
 pub(super) trait PassBackend {
     /// Begins a pass, whose boxes are empty. `follows` says whether the host has read the results of passes before to
     /// choose what it draws.
-    fn begin(&mut self, _name: &str, _follows: bool) {}
+    fn begin(&mut self, _name: &str, _pass: &Pass, _follows: bool) {}
 
     /// Draws a part, the first (0) or the second (1) of a pair, and passes its fragments to `each`. The fragments of the
     /// part are compared with the boxes of `known`, or enlarge those of the part. `false` if they exceed `budget`.
@@ -480,7 +480,7 @@ impl Comparison<'_> {
     ) -> Option<()> {
         boxes.clear(self.pass.tiles() * self.bins.len());
         if which == 0 {
-            backend.begin("pair", self.pass.axis > 0);
+            backend.begin("pair", self.pass, self.pass.axis > 0);
         }
         let part = (which, self.parts[which]);
         let all = backend.draw(self.pass, part, self.bins, budget, None, &mut |fragment| {

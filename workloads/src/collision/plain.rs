@@ -2,13 +2,18 @@
 //! the three axes, over all of the space that either sweeps, with one box of time and depth per pixel. The
 //! CPU narrows nothing, the passes are independent, and all of them are drawn.
 
+use activity::Event;
+use pipeline::{Gpu, PipelineSpec, Viewport};
+
 use super::bounds::Bounds;
 use super::detect::{MAX_SCALED_COORDINATE, upscale_factor};
 use super::object::Object;
+use super::on_gpu::PassesOnGpu;
 use super::pair::Method;
 use super::pass::{
     Comparison, Fit, Fragment, FragmentBudget, Part, Pass, PassBackend, Resources, Scratch, Tiling,
 };
+use crate::job::{IMAGE_SIZE, JobError};
 
 /// Work of the passes, and the overlapping pixels of a pair.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -46,7 +51,7 @@ impl PlainResult {
 }
 
 impl PassBackend for PlainResult {
-    fn begin(&mut self, _: &str, _: bool) {
+    fn begin(&mut self, _: &str, _: &Pass, _: bool) {
         self.passes += 1;
     }
 
@@ -73,40 +78,70 @@ impl PlainPasses {
         Self { method, resolution, scratch: Scratch::default() }
     }
 
-    /// Draws both objects in every pass.
+    /// Draws both objects in every pass, on the host.
     pub fn pair(&mut self, a: &Object, b: &Object) -> PlainResult {
+        let mut drawn = PlainResult::default();
+        let overlaps = self.overlaps(a, b, &mut drawn);
+        let passes = match self.method {
+            // The other direction is another pass.
+            Method::DepthOnly => 2 * drawn.passes,
+            _ => drawn.passes,
+        };
+        PlainResult { overlaps, passes, ..drawn }
+    }
+
+    /// The same on a GPU, where a pass by depth alone has both directions.
+    ///
+    /// # Errors
+    /// [`JobError`] if the GPU or the image cannot be made.
+    pub fn pair_on(
+        &mut self,
+        a: &Object,
+        b: &Object,
+        hardware: &PipelineSpec,
+    ) -> Result<PlainResult, JobError> {
+        let viewport = Viewport::new(self.resolution, self.resolution);
+        let viewport = viewport.ok_or_else(|| JobError::setting(IMAGE_SIZE))?;
+        let mut gpu = Gpu::quiet(hardware)?;
+        let objects = [a.clone(), b.clone()];
+        let mut passes = PassesOnGpu::new((self.method, viewport, 1), &objects, &mut gpu);
+        let overlaps = self.overlaps(a, b, &mut passes);
+        let fragments = passes.into_fragments();
+        let report = gpu.finish();
+        let (passes, draws) = (report.passes.len() as u64, report.counts()[Event::Draws]);
+        Ok(PlainResult { passes, draws, triangles: report.triangles() as u64, fragments, overlaps })
+    }
+
+    /// Pixels along x, y and z in which both objects, drawn by `backend`, may touch.
+    fn overlaps(&mut self, a: &Object, b: &Object, backend: &mut impl PassBackend) -> [u64; 3] {
         let largest = a.largest().max(b.largest());
         if largest > 0.0 && largest < MAX_SCALED_COORDINATE {
             let factor = upscale_factor(largest);
-            return self.draw_pair([&a.scaled(factor), &b.scaled(factor)]);
+            return self.draw_pair([&a.scaled(factor), &b.scaled(factor)], backend);
         }
-        self.draw_pair([a, b])
+        self.draw_pair([a, b], backend)
     }
 
-    fn draw_pair(&mut self, objects: [&Object; 2]) -> PlainResult {
-        let mut result = PlainResult::default();
+    fn draw_pair(&mut self, objects: [&Object; 2], backend: &mut impl PassBackend) -> [u64; 3] {
         if objects.iter().any(|object| object.is_empty()) {
-            return result;
+            return [0; 3];
         }
         let window = Bounds { time: [0.0, 1.0], ..objects[0].bounds.hull(&objects[1].bounds) };
         let min_width = objects.iter().map(|object| object.uncertainty).fold(window.rounding(), f64::max);
         let lists = objects.map(|object| (0..object.len() as u32).collect::<Vec<_>>());
         let parts = [0, 1].map(|which| Part { object: objects[which], list: &lists[which] });
-        for axis in 0..3 {
+        [0, 1, 2].map(|axis| {
             let tiling = Tiling { resolution: self.resolution, min_width };
             let pass = Pass::new(axis, &window, tiling, Fit::Edges);
             let comparison = Comparison { pass: &pass, parts, bins: &[Some(window)] };
-            result.overlaps[axis] = self.overlaps(&comparison, &mut result);
-            // By depth alone, the other direction is another pass.
-            result.passes += u64::from(self.method == Method::DepthOnly);
-        }
-        result
+            self.in_pass(&comparison, backend)
+        })
     }
 
     /// Pixels of a pass in which both objects may touch.
-    fn overlaps(&mut self, comparison: &Comparison<'_>, result: &mut PlainResult) -> u64 {
+    fn in_pass(&mut self, comparison: &Comparison<'_>, backend: &mut impl PassBackend) -> u64 {
         let (scratch, budget) = (&mut self.scratch, FragmentBudget::unlimited());
-        let resources = &mut Resources { scratch, budget, backend: result };
+        let resources = &mut Resources { scratch, budget, backend };
         // The budget is unlimited, so there always is a result. Without one, the pair would have to stay.
         match self.method {
             Method::DepthOnly => comparison.depths(resources).map_or(1, |[front, behind]| front.min(behind)),
@@ -151,6 +186,23 @@ mod tests {
             alone += usize::from(!result.may_collide());
         }
         assert!(alone > 0 && alone <= helped, "{alone} of {helped}");
+    }
+
+    /// The modelled hardware, in f32, keeps what the host keeps in f64, and draws each object along each axis.
+    #[test]
+    fn pairs_are_drawn_on_a_gpu_too() {
+        let hardware = crate::job::testing::hardware();
+        for case in cases(7, 1) {
+            for method in [Method::FragmentBox, Method::BoxBox, Method::DepthOnly] {
+                let mut passes = PlainPasses::new(method, 8);
+                for &(a, b) in &case.collide {
+                    let on_gpu = passes.pair_on(&case.objects[a], &case.objects[b], &hardware).unwrap();
+                    assert!(on_gpu.may_collide(), "{} {a} {b} {method:?}", case.family);
+                    assert_eq!((on_gpu.passes, on_gpu.draws), (3, 6));
+                    assert!(on_gpu.fragments > 0 && on_gpu.triangles > 0);
+                }
+            }
+        }
     }
 
     #[test]

@@ -95,7 +95,7 @@ impl Sweeps {
         let mut meets = vec![[false; 2]; objects.len()];
         let backward: Vec<usize> = set.iter().rev().copied().collect();
         for (order, name, follows) in [(set, NAMES[axis][0], axis > 0), (&backward, NAMES[axis][1], false)] {
-            backend.begin(name, follows);
+            backend.begin(name, &pass, follows);
             sweep.known.clear(pass.tiles() * bins.len());
             for &object in order {
                 let found = sweep.object(&objects[object], backend);

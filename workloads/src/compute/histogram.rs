@@ -102,6 +102,11 @@ pub(super) struct Scan {
     pub sums: Buffer<u32>,
 }
 
+impl Scan {
+    /// Bytes of shared memory for a bin: steps read one word and write the other.
+    pub const BYTES_PER_BIN: u32 = 8;
+}
+
 impl GroupShader for Scan {
     fn run(&self, group: &mut Group<'_>) {
         let size = group.size();

@@ -246,6 +246,7 @@ impl DrawsScene for Compute {
     }
 
     fn draw_frame(&self, frame: &Frame, gpu: &mut Gpu<'_>) -> Result<Drawn, JobError> {
+        gpu.spec().compute.map_or(Ok(()), |spec| self.options.check_for(&spec))?;
         match self.options.kernel {
             Kernel::Reduction => self.expose(frame, gpu),
             Kernel::MipChain => self.expose_by_chain(frame, gpu),

@@ -111,7 +111,7 @@ impl<'a, 'e> Kernels<'a, 'e> {
             name: "sums",
             groups: [1; 3],
             group_size: bins,
-            shared_bytes: 8 * bins,
+            shared_bytes: Scan::BYTES_PER_BIN * bins,
             bindings: &[counts.reads(), sums.writes()],
             shader: &Scan { counts, sums },
         })?;

@@ -1,11 +1,12 @@
 //! Options of the workload.
 
+use pipeline::ComputeSpec;
 use serde::{Deserialize, Serialize};
 
 use super::block::Order;
-use super::histogram::Atomics;
+use super::histogram::{Atomics, Scan};
 use crate::error::LoadError;
-use crate::job::{JobOptions, Need, must_hold};
+use crate::job::{JobError, JobOptions, Need, must_hold};
 
 /// What groups of lanes compute.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -106,6 +107,34 @@ impl Default for ComputeOptions {
 }
 
 impl ComputeOptions {
+    /// Checks that the groups are not too large for a GPU.
+    ///
+    /// # Errors
+    /// [`JobError::Setting`] with the option that makes them smaller.
+    pub(super) fn check_for(&self, spec: &ComputeSpec) -> Result<(), JobError> {
+        let power_below = |most: u32| 1 << most.max(1).ilog2();
+        let most = spec.group_lanes;
+        if self.group > most {
+            return Err(JobError::setting(format_args!(
+                "group {}: this GPU runs groups of up to {most} lanes; `--set group={}`",
+                self.group,
+                power_below(most)
+            )));
+        }
+        let bins = most.min(spec.shared_bytes / Scan::BYTES_PER_BIN);
+        if self.kernel == Kernel::Histogram && self.bins > bins {
+            return Err(JobError::setting(format_args!(
+                "bins {}: a group adds them up, with a lane and {} bytes of shared memory for each, and this GPU gives a group {most} lanes \
+                 and {} bytes; `--set bins={}`",
+                self.bins,
+                Scan::BYTES_PER_BIN,
+                spec.shared_bytes,
+                power_below(bins)
+            )));
+        }
+        Ok(())
+    }
+
     /// Checks every value.
     ///
     /// # Errors

@@ -14,7 +14,7 @@ use std::ops::Range;
 use pipeline::conservative::{Grid, MovingTriangle, Rasterizer, Region, View};
 use pipeline::memory::MemoryRange;
 use pipeline::random::mix;
-use pipeline::{ConservativeDraw, Gpu, Lane, Lanes, Primitive, TileIntervals, TileShader};
+use pipeline::{ConservativeDraw, Gpu, Lane, Lanes, Placement, Primitive, TileIntervals, TileShader};
 
 /// Axes: x, y, time, and both of the lens, each 0 to 1. Of the lens, -1 to 1, one half is used.
 pub(super) const AXES: usize = 5;
@@ -281,7 +281,9 @@ pub(super) fn draw(
     };
     let shader = Candidates { cells, lattice, within, results, point_bytes };
     let (mut all, mut ordered) = (Kept::default(), Vec::new());
-    let mut pass = gpu.begin_conservative(name, None);
+    // The image shows the whole of x and y, the larger y above.
+    let placement = Placement { first: [0.0, 1.0], last: [1.0, 0.0] };
+    let mut pass = gpu.begin_conservative(name, Some(placement));
     pass.draw(gpu, &draw, &shader, |_, tried| {
         all.fragments += 1;
         all.candidates += u64::from(tried.candidates);

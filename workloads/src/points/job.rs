@@ -164,6 +164,19 @@ pub struct Rasterized<const D: usize> {
     pub fragments: u64,
     /// Rounds, one pass each.
     pub passes: u32,
+    /// The uncovered regions of the last round.
+    pub voids: Vec<Cube<D>>,
+}
+
+impl<const D: usize> Rasterized<D> {
+    /// Whether a point is in a region of the last round, and so was not there before: the regions are smaller than the least
+    /// distance, so there is no earlier point in them.
+    pub fn is_in_void(&self, point: &[f64; D]) -> bool {
+        let is_in = |cube: &Cube<D>| {
+            (0..D).all(|axis| (cube.low[axis]..cube.low[axis] + cube.side).contains(&point[axis]))
+        };
+        self.voids.iter().any(is_in)
+    }
 }
 
 /// Darts at regions that are drawn on `gpu`, the first `rounds` of them; the host throws the rest.
@@ -175,8 +188,9 @@ pub fn darts<const D: usize>(
     rounds: u32,
     gpu: &mut Gpu<'_>,
 ) -> Result<Rasterized<D>, JobError> {
-    let (mut passes, mut sums) = (0, [0; 3]);
+    let (mut passes, mut sums, mut voids) = (0, [0; 3], Vec::new());
     let draw = |cubes: &[Cube<D>]| {
+        voids = cubes.to_vec();
         let Kept { points, candidates, fragments, .. } = round(cubes, passes, spec.seed, gpu)?;
         sums = [sums[0] + points.len() as u64, sums[1] + candidates, sums[2] + fragments];
         passes += 1;
@@ -184,7 +198,7 @@ pub fn darts<const D: usize>(
     };
     let (found, drawn) = poisson_disk_drawn(spec, rounds, draw)?.map_err(JobError::setting)?;
     let [kept, candidates, fragments] = sums;
-    Ok(Rasterized { found, drawn, kept, candidates, fragments, passes })
+    Ok(Rasterized { found, drawn, kept, candidates, fragments, passes, voids })
 }
 
 /// Darts on a GPU of its own, and its work.
@@ -365,7 +379,7 @@ impl Draws for Sampling {
 
 #[cfg(test)]
 mod tests {
-    use activity::{Counts, Packet};
+    use activity::{Counts, Event, Packet};
 
     use super::super::poisson::closer;
     use super::*;
@@ -395,6 +409,8 @@ mod tests {
         let fact = |name: &str| drawn.facts.iter().find(|fact| fact.name == name).unwrap().value;
         assert!(fact("points_from_passes") > 0.9 * fact("points"), "{:?}", drawn.facts);
         assert!(drawn.image.contains(&Vec3::ONE) && report.triangles() > 1600);
+        // The passes have no other results, so what is written back when the frame ends is points.
+        assert!(report.write_back[Event::DramWriteBytes] > 0);
     }
 
     #[test]

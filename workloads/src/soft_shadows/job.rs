@@ -11,7 +11,8 @@ use serde::{Deserialize, Serialize};
 use warnings::{Code, Warning};
 
 use super::light::{AreaLight, LightSpec};
-use super::map::{Method, SceneView, ShadowMap, depth_pass};
+use super::map::{Method, SceneView, ShadowMap};
+use super::seen::VisibleTriangles;
 use super::shade::{Shadows, World, look_ups};
 use crate::accumulation::SharedSamples;
 use crate::error::LoadError;
@@ -108,12 +109,12 @@ impl SoftShadows {
         if self.options.accumulate { self.set.samples().len() as u16 } else { 1 }
     }
 
-    fn facts(&self, map: &ShadowMap, look_ups: u64) -> Vec<Fact> {
+    fn facts(&self, map: &ShadowMap, fetches: u64) -> Vec<Fact> {
         Fact::all([
             ("shadow_map_bytes", map.bytes() as f64),
             ("shadow_map_passes", f64::from(self.passes())),
             ("shadow_map_samples_tested", map.counts[Event::SamplesTested] as f64),
-            ("look_ups", look_ups as f64),
+            ("shading_fetches", fetches as f64),
         ])
     }
 
@@ -186,10 +187,10 @@ impl DrawsScene for SoftShadows {
         let (camera, draws) = (frame.camera.with_lens(None), gpu.resident(&draws));
         let view = SceneView { camera: &camera, draws: &draws };
         let map = ShadowMap::new(&self.light, &draws, self.options.map_px, &self.set, self.method(), gpu)?;
-        let visible = depth_pass(&view, viewport, &self.set, self.method(), gpu)?;
+        let visible = VisibleTriangles::draw(&view, viewport, &self.set, self.method(), gpu)?;
         let world = World::new(&view, viewport, &self.light, &albedos, self.scene.background());
         let shadows = Shadows::Map { map: &map, bias: self.options.bias };
-        let shaded = look_ups(&world, &self.set, &visible.samples, shadows, gpu);
+        let shaded = look_ups(&world, &self.set, &visible, shadows, gpu);
         let facts = self.facts(&map, shaded.counts[Event::TextureFetches]);
         let mut warnings = self.regime_warnings();
         warnings.extend(self.simplified(frame));

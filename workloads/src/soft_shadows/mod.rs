@@ -8,16 +8,19 @@
 //!
 //! - [`AreaLight`]: the light as a camera.
 //! - [`ShadowMap`]: both ways of making a map, and look-ups.
+//! - [`VisibleTriangles`]: the triangle that each sample of the image sees, in surfaces.
 //! - [`World`]: shading, with a map or with rays as the ground truth.
 //! - [`job()`]: the workload; [`default_scene()`]: its default scene.
 
 mod job;
 mod light;
 mod map;
+mod seen;
 mod shade;
 
 pub(crate) use job::FLAGS;
 pub use job::{SoftShadowOptions, SoftShadows, default_scene, job};
 pub use light::{AreaLight, LightSpec};
 pub use map::{DepthPass, Method, SceneView, ShadowMap, depth_pass};
+pub use seen::VisibleTriangles;
 pub use shade::{Shadows, World, look_ups};

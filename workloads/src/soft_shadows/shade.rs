@@ -5,16 +5,20 @@ use std::cell::Cell;
 
 use glam::{DVec3, Vec3};
 use pipeline::geometry::Projection;
+use pipeline::memory::MemoryRange;
 use pipeline::sample_test::exact::weights;
 use pipeline::sampling::{Sample, SampleSource};
 use pipeline::setup::Corner;
-use pipeline::{Camera, Gpu, Lane, Lanes, Rendered, Viewport};
+use pipeline::{Camera, Draw, Gpu, Lane, Lanes, Rendered, Viewport};
 use rayon::prelude::*;
 
 use super::light::AreaLight;
 use super::map::{DEPTH_BYTES, SceneView, ShadowMap};
+use super::seen::VisibleTriangles;
 use crate::accumulation::{RayWork, Rays};
 
+/// Bytes of the reflectance of a draw.
+const ALBEDO_BYTES: u64 = 12;
 /// Ambient light, relative to the light on a surface that faces the light.
 const AMBIENT: f32 = 0.18;
 
@@ -47,6 +51,9 @@ pub struct World<'a> {
     /// Linear RGB radiance of the background.
     pub background: Vec3,
     rays: Rays,
+    draws: &'a [Draw<'a>],
+    /// First triangle of each draw.
+    first: Vec<u32>,
     projection: Projection,
 }
 
@@ -75,8 +82,14 @@ impl<'a> World<'a> {
         background: Vec3,
     ) -> Self {
         let SceneView { camera, draws } = *view;
-        let projection = Projection::new(camera, viewport);
-        Self { camera, viewport, light, albedos, background, rays: Rays::new(draws), projection }
+        let (projection, rays) = (Projection::new(camera, viewport), Rays::new(draws));
+        let first = draws.iter().scan(0, |next, draw| {
+            let first = *next;
+            *next += draw.geometry.triangles().len() as u32;
+            Some(first)
+        });
+        let first = first.collect();
+        Self { camera, viewport, light, albedos, background, rays, draws, first, projection }
     }
 
     /// Renders the image: the mean over each pixel's samples, in order.
@@ -96,7 +109,7 @@ impl<'a> World<'a> {
             let place = [place as u32 % width, place as u32 / width];
             let (lanes, rays) = (Lanes::default(), Cell::default());
             let work = Work { lanes: &lanes, rays: &rays };
-            (self.pixel(place, samples, seen, shadows, work), rays.get())
+            (self.pixel(place, samples, |index| seen[index].0, shadows, work), rays.get())
         };
         let pixels: Vec<_> = seen.par_chunks_exact(per_pixel).enumerate().map(pixel).collect();
         let mut work = RayWork::default();
@@ -104,22 +117,35 @@ impl<'a> World<'a> {
         (pixels.into_iter().map(|(colour, _)| colour).collect(), work)
     }
 
-    /// Mean of the samples of a pixel, whose visible triangles are in `seen`, each shaded on a lane of its own.
+    /// Mean of the samples of a pixel, each shaded by a program of its own; `triangle` gets the visible triangle of a sample.
     fn pixel(
         &self,
         [px, py]: [u32; 2],
         samples: &dyn SampleSource,
-        seen: &[(u32, u32)],
+        triangle: impl Fn(usize) -> u32,
         shadows: Shadows<'_>,
         work: Work<'_>,
     ) -> Vec3 {
-        let mut at = vec![Sample::default(); seen.len()];
+        let mut at = vec![Sample::default(); samples.per_pixel() as usize];
         samples.pixel_into(px, py, &mut at);
-        let colours = at.iter().zip(seen).enumerate().map(|(index, (sample, (triangle, _)))| {
-            let Some(point) = self.point([px, py], sample, *triangle) else { return self.background };
-            work.lanes.run(|lane| self.shade(lane, &point, Place { sample, index }, shadows, work))
-        });
-        colours.sum::<Vec3>() / seen.len() as f32
+        let shade = |(index, sample): (usize, &Sample)| {
+            work.lanes.run(|lane| {
+                let point = self.point([px, py], sample, triangle(index));
+                let is_seen = lane.branch(point.is_some());
+                let Some(point) = point.filter(|_| is_seen) else { return self.background };
+                self.shade(lane, &point, Place { sample, index }, shadows, work)
+            })
+        };
+        at.iter().enumerate().map(shade).sum::<Vec3>() / at.len() as f32
+    }
+
+    /// Fetches what the point of a sample is made of: positions of the triangle, and the reflectance of its draw, which are in
+    /// `albedos`.
+    fn fetch(&self, lanes: &Lanes, triangle: u32, albedos: MemoryRange) {
+        let Some(face) = self.rays.faces().get(triangle as usize) else { return };
+        let data = self.draws[face.draw].data_of(triangle - self.first[face.draw]);
+        data.iter().flatten().for_each(|&(address, bytes)| lanes.fetch(address, bytes));
+        lanes.fetch(albedos.address() + face.draw as u64 * ALBEDO_BYTES, ALBEDO_BYTES);
     }
 
     /// For each sample, whether its point is lit; `None` if it sees no surface that faces the light.
@@ -211,19 +237,24 @@ struct Work<'w> {
     rays: &'w Cell<RayWork>,
 }
 
-/// Shades the visible samples in a pass of its own.
+/// Shades the visible samples in a pass of its own. A program fetches the number of the triangle of its sample, then the
+/// triangle; where its draw is not resident, only what it reflects.
 pub fn look_ups(
     world: &World<'_>,
     samples: &dyn SampleSource,
-    seen: &[(u32, u32)],
+    seen: &VisibleTriangles,
     shadows: Shadows<'_>,
     gpu: &mut Gpu<'_>,
 ) -> Rendered {
     gpu.wait();
-    let (width, per_pixel) = (world.viewport.width() as usize, samples.per_pixel() as usize);
-    gpu.shade_pixels("look-ups", world.viewport, |lanes, [x, y]| {
-        let first = (y as usize * width + x as usize) * per_pixel;
+    let albedos = gpu.allocate(world.albedos.len() as u64 * ALBEDO_BYTES);
+    gpu.shade_pixels("look-ups", world.viewport, |lanes, pixel| {
         let work = Work { lanes, rays: &Cell::default() };
-        world.pixel([x, y], samples, &seen[first..first + per_pixel], shadows, work)
+        let triangle = |index| {
+            let triangle = seen.fetch(lanes, pixel, index);
+            world.fetch(lanes, triangle, albedos);
+            triangle
+        };
+        world.pixel(pixel, samples, triangle, shadows, work)
     })
 }

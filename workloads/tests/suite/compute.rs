@@ -407,6 +407,23 @@ fn weak_regimes_have_warnings_and_others_none() {
     assert!(codes(ComputeOptions { list: 512, ..ComputeOptions::default() }).is_empty());
 }
 
+/// As `hd_4000` and `iris_pro` have them: the message says which option fits, and it does.
+#[test]
+fn groups_that_are_too_large_are_refused_with_what_fits() {
+    let compute = Some(ComputeSpec { group_lanes: 128, shared_bytes: 4096, ..COMPUTE });
+    let small = PipelineSpec { compute, ..spec() };
+    let drawn = |options: ComputeOptions| {
+        let job = job(&options, (40, 24), 1);
+        Job::frame(&job, 0, &mut Gpu::quiet(&small).unwrap()).map_err(|error| error.to_string())
+    };
+    let histogram = ComputeOptions { kernel: Kernel::Histogram, ..ComputeOptions::default() };
+    let error = drawn(histogram.clone()).err().unwrap();
+    assert!(error.contains("bins 256") && error.contains("`--set bins=128`"), "{error}");
+    assert!(drawn(ComputeOptions { bins: 128, ..histogram.clone() }).is_ok());
+    let error = drawn(ComputeOptions { group: 512, bins: 64, ..histogram }).err().unwrap();
+    assert!(error.contains("`--set group=128`"), "{error}");
+}
+
 #[test]
 fn a_gpu_without_compute_unit_is_refused_with_a_remedy() {
     let job = job(&ComputeOptions::default(), (32, 32), 1);

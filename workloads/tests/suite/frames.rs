@@ -4,8 +4,9 @@ use std::collections::HashSet;
 use std::sync::Arc;
 
 use crate::common::{Builder, Files};
+use activity::Event;
 use glam::{Vec2, Vec3, Vec4};
-use pipeline::{Lane, Lens, ShadingPoint};
+use pipeline::{Gpu, Lane, Lens, PipelineSpec, ShadingPoint, Viewport};
 use serde_json::json;
 use workloads::catalog::find;
 use workloads::job::{Job, OptionSource, Request};
@@ -196,5 +197,37 @@ fn workloads_follow_the_camera_of_their_scene() {
 fn workloads_without_a_scene_say_what_changes() {
     for (name, differ) in [("ccd", 1), ("occlusion", 1), ("caustics", 6), ("sampling", 6)] {
         assert_eq!(inputs(&*job(name, &[])), differ, "{name}");
+    }
+}
+
+/// Heat maps have the work of conservative passes where their tiles are in the image: what lanes do and tests of tiles, all of it.
+#[test]
+fn passes_in_conservative_mode_are_on_heat_maps() {
+    let events = [Event::PixelInvocations, Event::ShaderOps, Event::TileMadds, Event::TilesVisited];
+    for (name, size, set) in [
+        ("ccd", None, [("resolution", "16"), ("balls", "5")]),
+        ("caustics", Some((90, 50)), [("cells", "8"), ("wave_m", "18")]),
+        ("sampling", Some((60, 60)), [("radius", "0.08"), ("rounds", "2")]),
+    ] {
+        let set = set.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
+        let overrides = Overrides { size, ..Overrides::default() };
+        let request = Request { overrides: &overrides, seed: 1 };
+        let job = find(name, &OptionSource { file: None, set }, &request).unwrap().unwrap();
+        let settings = job.settings();
+        let viewport = Viewport::new(settings.width, settings.height).unwrap();
+        // Tiles of the GPU are not those of the passes.
+        let spec = PipelineSpec { tile_px: 4, ..crate::common::spec() };
+        let mut gpu = Gpu::quiet(&spec).unwrap().with_heat(&events, viewport);
+        job.frame(settings.frames.start, &mut gpu).unwrap();
+        let report = gpu.finish();
+        for map in &report.heat {
+            let pixels: f64 = map.pixels().iter().map(|&value| f64::from(value)).sum();
+            let total = report.counts()[map.event];
+            assert!(total > 0 && map.total() == total, "{name} {:?}", map.event);
+            // Vertices run on the same cores.
+            let placed = if map.event == Event::ShaderOps { map.total() - map.elsewhere } else { total };
+            assert!((pixels - placed as f64).abs() <= 1e-4 * placed as f64, "{name} {:?}", map.event);
+            assert!(placed > 0, "{name} {:?}", map.event);
+        }
     }
 }

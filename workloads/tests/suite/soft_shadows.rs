@@ -10,7 +10,7 @@ use workloads::accumulation::SharedSamples;
 use workloads::job::{Drawn, Job};
 use workloads::soft_shadows::{
     AreaLight, DepthPass, LightSpec, Method, SceneView, ShadowMap, Shadows, SoftShadowOptions, SoftShadows,
-    World, depth_pass,
+    VisibleTriangles, World, depth_pass, look_ups,
 };
 use workloads::visibility::Unshaded;
 
@@ -244,6 +244,50 @@ fn depth_passes_write_depths_only() {
     let counts = gpu.finish().counts();
     assert!(!counts.uses(Unit::Colour) && !counts.uses(Unit::ShadingCache));
     assert_eq!(counts[Event::DramWriteBytes], map.bytes(), "each depth goes to memory once");
+}
+
+/// The shading pass sees what the pass before it left in memory: every sample fetches its number, and where a triangle is seen its
+/// indices, its corners, what it reflects and, in the light's map, a depth. The image is that of the host, bit for bit.
+#[test]
+fn shading_fetches_what_it_reads() {
+    let scene = workloads::soft_shadows::default_scene().unwrap();
+    let frame = scene.frame(1).unwrap();
+    let draws: Vec<_> = frame.draws(&scene).unwrap().into_iter().map(|d| d.culling(Cull::None)).collect();
+    let (light, viewport) = (AreaLight::new(&LightSpec::default()).unwrap(), Viewport::new(48, 26).unwrap());
+    let (camera, set, spec) = (frame.camera.with_lens(None), set(8, 5), spec());
+    let albedos: Vec<Vec3> = (0..draws.len()).map(|draw| Vec3::splat(0.1 + 0.1 * draw as f32)).collect();
+    let samples = (viewport.pixels() * set.samples().len()) as u64;
+    for method in [Method::OnePass, Method::Accumulation] {
+        let mut gpu = Gpu::quiet(&spec).unwrap();
+        let draws = gpu.resident(&draws);
+        let view = SceneView { camera: &camera, draws: &draws };
+        let map = ShadowMap::new(&light, &draws, 64, &set, method, &mut gpu).unwrap();
+        let seen = VisibleTriangles::draw(&view, viewport, &set, method, &mut gpu).unwrap();
+        let world = World::new(&view, viewport, &light, &albedos, Vec3::splat(0.5));
+        let shadows = Shadows::Map { map: &map, bias: 0.06 };
+        let shaded = look_ups(&world, &set, &seen, shadows, &mut gpu);
+        let by_host = depth_pass(&view, viewport, &set, method, &mut Gpu::quiet(&spec).unwrap()).unwrap();
+        let host = by_host.samples.iter().map(|(triangle, _)| *triangle);
+        let numbers = (0..viewport.pixels() as u32 * 8).map(|n| {
+            let (pixel, index) = (n / 8, n as usize % 8);
+            seen.at([pixel % viewport.width(), pixel / viewport.width()], index)
+        });
+        assert!(numbers.eq(host), "{method:?}");
+        let of_host = world.image(&set, &by_host.samples, shadows);
+        let fetches = shaded.counts[Event::TextureFetches];
+        assert_eq!(bits(&shaded.into_image()), bits(&of_host), "{method:?}");
+        let on_surfaces = by_host.samples.iter().filter(|(triangle, _)| *triangle != u32::MAX).count() as u64;
+        let lit = world.lit_and_unlit(&set, &by_host.samples, Shadows::None);
+        let facing = lit.iter().flatten().count() as u64;
+        assert!(0 < facing && facing < on_surfaces && on_surfaces < samples);
+        let but_depths = samples + 5 * on_surfaces;
+        // A point outside of the light's map fetches no depth.
+        assert!((but_depths + facing / 2..=but_depths + facing).contains(&fetches), "{fetches}");
+        let report = gpu.finish();
+        let passes = report.passes.iter().filter(|pass| pass.name == "triangles");
+        let written: u64 = passes.map(|pass| pass.counts()[Event::ColourWrites]).sum();
+        assert!(written >= on_surfaces, "{written} of {on_surfaces}");
+    }
 }
 
 fn warned(options: SoftShadowOptions, samples: u32) -> Vec<&'static str> {

@@ -88,7 +88,7 @@ impl Paper {
 /// Options of a reproduction.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
-    /// Quick form: fewer values and less work, less than a minute.
+    /// Quick form: fewer values and less work, some minutes at most.
     pub quick: bool,
     /// Ids of the rows to compute; empty for all.
     pub rows: Vec<String>,

@@ -22,7 +22,7 @@ use run::RunError;
 pub enum Form {
     /// Everything: minutes.
     Full,
-    /// Fewer values and less work: less than a minute.
+    /// Fewer values and less work: some minutes at most.
     Quick,
 }
 

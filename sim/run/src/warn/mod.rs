@@ -148,7 +148,7 @@ fn heat_outside_image(simulated: &Simulated) -> Vec<Warning> {
     let warning = |worst: &HeatPicture| {
         let message = format!(
             "the heat map of {} shows {:.1} % of it (frame {}): the rest has no place in the image, because its passes are of \
-             another size or in conservative mode; choose another quantity",
+             another size; choose another quantity",
             worst.of.name(),
             1e2 * worst.placed,
             worst.frame
@@ -319,7 +319,7 @@ fn lost(measurement: &Measurement) -> Option<Warning> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{GpuSpec, Quantity, SampledSummary};
+    use crate::{GpuSpec, HeatQuantity, Quantity, SampledSummary};
     use timing::streams::failures;
     use timing::{FrameClock, Level, Recorder};
 
@@ -379,6 +379,22 @@ mod tests {
         assert_eq!(of(MAX_HALF_WIDTH_PERCENT), None);
         let message = of(7.25).map(|warning| warning.to_string()).unwrap_or_default();
         assert!(message.contains("3 of 36 frames") && message.contains("7.2 %"), "{message}");
+    }
+
+    #[test]
+    fn each_heat_map_that_shows_next_to_nothing_has_one_warning() {
+        let [hits, madds, reads] =
+            [Event::SamplesHit, Event::TileMadds, Event::DepthReads].map(HeatQuantity::Event);
+        let picture = |(of, frame, placed)| HeatPicture { of, frame, placed, png: Vec::new() };
+        let heat = [(hits, 3, 0.05), (madds, 3, 0.0), (reads, 3, 0.9), (hits, 4, 0.01), (madds, 4, 0.5)];
+        let heat = heat.map(picture).into();
+        let (distinct, pictures) = Default::default();
+        let simulated = Simulated { distinct, frames: vec![0; 2], pictures, heat, sampled: None };
+        let messages: Vec<String> =
+            heat_outside_image(&simulated).iter().map(|warning| warning.message.clone()).collect();
+        assert_eq!(messages.len(), 2, "{messages:?}");
+        assert!(messages[0].contains("samples_hit shows 1.0 %") && messages[0].contains("(frame 4)"));
+        assert!(messages[1].contains("tile_madds shows 0.0 %") && messages[1].contains("(frame 3)"));
     }
 
     /// Warning codes of the failure streams at a level.

@@ -1,8 +1,9 @@
 //! Rows VI-6 and VI-7: caustic volumes as moving triangles.
 
 use glam::DVec3;
+use pipeline::Gpu;
 use workloads::caustics::generator::{Ocean, turned_beams};
-use workloads::caustics::{Coverage, Eye, Floor, Method, receivers};
+use workloads::caustics::{Beam, Coverage, Eye, Floor, Light, Method, Picture, draw_on, receivers};
 
 use super::super::band::{Cases, one_at_a_time};
 use super::super::figure::line;
@@ -11,12 +12,12 @@ use super::super::{Done, Figure};
 use super::Task;
 use super::caustics_figures::{light, warped};
 use super::settings::{Lost, Size};
-use crate::chart::caustics::view::{DEPTH_M, SIDE_M, WAVE_M};
+use crate::chart::caustics::view::{DEPTH_M, SIDE_M, WAVE_M, aside_of, water};
 use crate::chart::caustics::{OceanCounts, ocean};
 use crate::reproduce::settings::Form;
 use crate::study::Ran;
 use output::plot::{Look, Series};
-use run::RunError;
+use run::{GpuSpec, RunError};
 
 /// Executions of the moving triangles over those of the bounding volume with fewer.
 fn over_fewer(counted: &OceanCounts) -> f64 {
@@ -77,12 +78,46 @@ pub(super) fn executions(task: &Task<'_>) -> Result<Done, RunError> {
     // The ocean of the values given is in both sweeps and was drawn once.
     let others = depths.iter().filter(|(at, _)| *at != depth_m).chain(&slopes).map(|(_, counted)| counted);
     let drawn: Vec<&OceanCounts> = others.collect();
-    let draws = drawn.iter().map(|counted| counted.draws).sum();
-    let fragments = drawn.iter().flat_map(|counted| counted.executions).sum();
-    let mut ran = ran(&Ran { passes: draws, draws, fragments });
-    ran.extend(numbers([("volumes", base.volumes as f64), ("oceans", drawn.len() as f64)]));
+    let draws: u64 = drawn.iter().map(|counted| counted.draws).sum();
+    let fragments: u64 = drawn.iter().flat_map(|counted| counted.executions).sum();
+    let (there, on_hardware) = base_on_hardware(*row.cells.get(form), [slope, depth_m], [size.0, size.1])?;
+    let same = if on_hardware == base.executions { "the same" } else { "others" };
+    let ours = format!("{ours}; the modelled hardware counts {same} by all methods");
+    let mut ran = ran(&there);
+    ran.extend(numbers([
+        ("draws_on_the_host", draws as f64),
+        ("fragments_on_the_host", fragments as f64),
+        ("volumes", base.volumes as f64),
+        ("oceans_on_the_host", drawn.len() as f64),
+    ]));
     let row = Row { numbers: facts, ran, ..with.banded(&row.about, ours, band) };
     Ok(Done { row, figures: figures(&base, &slopes, form)? })
+}
+
+/// Work and executions of the modelled hardware on the ocean of the values given, by method as in [`Method::ALL`].
+fn base_on_hardware(
+    cells: u32,
+    [slope, depth_m]: [f64; 2],
+    size: [u32; 2],
+) -> Result<(Ran, [u64; 4]), RunError> {
+    let water = Ocean { depth_m, ..water(cells, slope) };
+    let eye = aside_of(depth_m, size).map_err(RunError::setting)?;
+    let (beams, mut work) = (water.beams(0.0), Ran::default());
+    let mut executions = [0; 4];
+    for (method, executions) in Method::ALL.into_iter().zip(&mut executions) {
+        let (picture, of_method) = on_hardware(&beams, &eye, method, Light::Volume)?;
+        work += of_method;
+        *executions = picture.total_runs();
+    }
+    Ok((work, executions))
+}
+
+/// What the modelled hardware draws of beams.
+fn on_hardware(beams: &[Beam], eye: &Eye, method: Method, light: Light) -> Result<(Picture, Ran), RunError> {
+    let spec = GpuSpec::load("reference")?.pipeline;
+    let mut gpu = Gpu::quiet(&spec).map_err(RunError::setting)?;
+    let (picture, _) = draw_on(&mut gpu, beams, eye, method, light);
+    Ok((picture, Ran::of(&gpu.finish())))
 }
 
 fn figures(base: &OceanCounts, slopes: &[(f64, OceanCounts)], form: Form) -> Result<Vec<Figure>, RunError> {
@@ -123,20 +158,22 @@ pub(super) fn no_light_is_lost(task: &Task<'_>) -> Result<Done, RunError> {
         "pairs of a pixel and a beam that are missed",
         "slope and pleat jointly, and floors of turned beams",
     );
-    let mut all = Coverage::default();
+    let (mut all, mut there) = (Coverage::default(), Ran::default());
     for &pleat in row.pleat.all(form) {
         let mut at = Vec::new();
         for &slope in row.slope.all(form) {
-            let found = in_ocean(row, form, [slope, pleat])?;
+            let (found, drawn) = in_ocean(row, form, [slope, pleat])?;
             all = all.and(&found);
+            there += drawn;
             at.push((slope, found.missed as f64, found.missed == 0));
         }
         tried.along(&format!("slope (pleat {pleat})"), at);
     }
     let mut at = Vec::new();
     for &height_m in row.turned_floors.get(form) {
-        let found = turned(row, form, height_m)?;
+        let (found, drawn) = turned(row, form, height_m)?;
         all = all.and(&found);
+        there += drawn;
         at.push((height_m, found.missed as f64, found.missed == 0));
     }
     tried.along("floor of turned beams", at);
@@ -158,7 +195,11 @@ pub(super) fn no_light_is_lost(task: &Task<'_>) -> Result<Done, RunError> {
         ("pairs_hit_twice", twice as f64),
         ("pairs_hit_three_times", thrice as f64),
     ];
-    let mut ran = ran(&Ran { passes: all.draws, draws: all.draws, fragments: all.fragments });
+    let mut ran = ran(&there);
+    ran.extend(numbers([
+        ("draws_on_the_host", all.draws as f64),
+        ("fragments_on_the_host", all.fragments as f64),
+    ]));
     ran.extend(numbers(pairs));
     Ok(Done::bare(Row { numbers: facts, ran, ..with.banded(&row.about, ours, band) }))
 }
@@ -169,19 +210,25 @@ fn eye(place: [DVec3; 3], half_height: f64, size: &Size) -> Result<Eye, RunError
 }
 
 /// Water with waves of a slope, its triangles pleated along the light.
-fn in_ocean(row: &Lost, form: Form, [slope, pleat]: [f64; 2]) -> Result<Coverage, RunError> {
+fn in_ocean(row: &Lost, form: Form, [slope, pleat]: [f64; 2]) -> Result<(Coverage, Ran), RunError> {
     let middle = DVec3::new(0.6, -0.5 * DEPTH_M, 0.3);
     let from = middle + 80.0 * DVec3::new(0.3, 0.35, 1.0).normalize();
     let eye = eye([from, middle, DVec3::Y], 6.5, row.size_px.get(form))?;
     let (cells, seed) = (*row.cells.get(form), *row.seed.get(form));
     let water =
         Ocean { overshoot: OVERSHOOT, pleat, ..Ocean::new(cells, SIDE_M, DEPTH_M, [WAVE_M, slope], seed) };
-    Ok(receivers(&water.beams(0.0), &eye, Method::Moving, &Floor { height_m: -DEPTH_M }))
+    covered(&water.beams(0.0), &eye, Floor { height_m: -DEPTH_M })
 }
 
 /// Beams that turn about themselves, cut by a floor and seen from above.
-fn turned(row: &Lost, form: Form, height_m: f64) -> Result<Coverage, RunError> {
+fn turned(row: &Lost, form: Form, height_m: f64) -> Result<(Coverage, Ran), RunError> {
     let eye = eye([10.0 * DVec3::Y, DVec3::ZERO, DVec3::NEG_Z], 1.2, row.turned_px.get(form))?;
     let beams = turned_beams(*row.turned_beams.get(form), *row.seed.get(form));
-    Ok(receivers(&beams, &eye, Method::Moving, &Floor { height_m }))
+    covered(&beams, &eye, Floor { height_m })
+}
+
+/// Which receivers on a floor are covered, which the host finds, and what the modelled hardware draws of the same beams.
+fn covered(beams: &[Beam], eye: &Eye, floor: Floor) -> Result<(Coverage, Ran), RunError> {
+    let (_, drawn) = on_hardware(beams, eye, Method::Moving, Light::Floor(floor))?;
+    Ok((receivers(beams, eye, Method::Moving, &floor), drawn))
 }

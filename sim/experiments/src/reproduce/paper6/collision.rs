@@ -1,6 +1,7 @@
 //! Rows VI-1 to VI-3: continuous collision detection.
 
 use glam::DVec3;
+use pipeline::PipelineSpec;
 use rayon::prelude::*;
 use workloads::collision::families::{Case, cases};
 use workloads::collision::{Method, Object, PlainPasses, PlainResult, Search, candidates, detect};
@@ -16,7 +17,7 @@ use super::public::{Pair, Public};
 use super::settings::{Moving, Shape, TwoObjects};
 use crate::reproduce::settings::Form;
 use output::plot::Series;
-use run::RunError;
+use run::{GpuSpec, RunError};
 
 /// As the file has it.
 const fn name(method: Method) -> &'static str {
@@ -27,14 +28,22 @@ const fn name(method: Method) -> &'static str {
     }
 }
 
-/// Numbers of a result, as the rows print them.
-fn ran(drawn: &PlainResult) -> Vec<Number> {
+/// What the modelled hardware drew, and what the host did, as the rows print them.
+fn ran(hardware: &PlainResult, host: &PlainResult) -> Vec<Number> {
     numbers([
-        ("passes", drawn.passes as f64),
-        ("draws", drawn.draws as f64),
-        ("triangles", drawn.triangles as f64),
-        ("fragments", drawn.fragments as f64),
+        ("passes", hardware.passes as f64),
+        ("draws", hardware.draws as f64),
+        ("fragments", hardware.fragments as f64),
+        ("passes_on_the_host", host.passes as f64),
+        ("draws_on_the_host", host.draws as f64),
+        ("triangles_on_the_host", host.triangles as f64),
+        ("fragments_on_the_host", host.fragments as f64),
     ])
+}
+
+/// The modelled hardware, which draws in f32 what the host draws in f64.
+fn hardware() -> Result<PipelineSpec, RunError> {
+    Ok(GpuSpec::load("reference")?.pipeline)
 }
 
 /// Pairs of one kind, and what a way of drawing them says.
@@ -56,9 +65,24 @@ impl Drawn {
         Self { pairs: pairs.len(), cleared, work }
     }
 
+    /// The same on the modelled hardware.
+    fn on(
+        hardware: &PipelineSpec,
+        pairs: &[Pair],
+        method: Method,
+        resolution: u32,
+    ) -> Result<Self, RunError> {
+        let one = |passes: &mut PlainPasses, [a, b]: &Pair| passes.pair_on(a, b, hardware);
+        let each = pairs.par_iter().map_init(|| PlainPasses::new(method, resolution), one);
+        let each: Vec<PlainResult> = each.collect::<Result<_, _>>().map_err(RunError::setting)?;
+        let cleared = each.iter().filter(|drawn| !drawn.may_collide()).count() as u64;
+        let work = each.iter().fold(PlainResult::default(), |all, one| all.and(one));
+        Ok(Self { pairs: pairs.len(), cleared, work })
+    }
+
     /// Share of the pairs that are kept, in percent.
     fn kept_percent(&self) -> f64 {
-        100.0 * (self.pairs as f64 - self.cleared as f64) / self.pairs as f64
+        100.0 * kept_pairs(self) / self.pairs as f64
     }
 }
 
@@ -95,9 +119,9 @@ impl Looks {
     }
 
     /// All work, and that of each kind of public case that there is.
-    fn ran(&self) -> Vec<Number> {
+    fn ran(&self, hardware: &PlainResult) -> Vec<Number> {
         let [own, collide, apart] = [&self.generated, &self.collide, &self.apart].map(|drawn| work_of(drawn));
-        let mut all = ran(&own.and(&collide).and(&apart));
+        let mut all = ran(hardware, &own.and(&collide).and(&apart));
         let some = |drawn: &[Drawn]| drawn.iter().any(|one| one.pairs > 0);
         if some(&self.collide) {
             all.extend(numbers([
@@ -152,6 +176,10 @@ pub(super) fn missed(task: &Task<'_>) -> Result<Done, RunError> {
     let at =
         |&method: &Method| row.resolution_px.all(form).iter().map(move |&resolution| (method, resolution));
     let looks = Looks::new(row.methods.get(form).iter().flat_map(at).collect(), &generated, &public);
+    let (hardware, px) = (hardware()?, *row.resolution_px.get(form));
+    let on_hardware = row.methods.get(form).iter().map(|&of| Drawn::on(&hardware, &generated, of, px));
+    let on_hardware: Vec<Drawn> = on_hardware.collect::<Result<_, _>>()?;
+    let missed_there: u64 = on_hardware.iter().map(|drawn| drawn.cleared).sum();
     let mut tried = Cases::new("pairs missed", "methods and resolution_px jointly, and `quintile ccd`");
     for &of in row.methods.get(form) {
         let at = looks.missed().filter(|(method, ..)| *method == of);
@@ -164,10 +192,12 @@ pub(super) fn missed(task: &Task<'_>) -> Result<Done, RunError> {
     tried.along("quintile ccd", [("default search", closer as f64, closer == 0)]);
     let missed = looks.missed().map(|(.., missed)| missed).sum::<u64>() + closer as u64;
     let ours = format!(
-        "{missed} missed: {} generated pairs that collide{}, by {} kinds of passes and by `quintile ccd`{}",
+        "{missed} missed: {} generated pairs that collide{}, by {} kinds of passes and by `quintile ccd`, and {missed_there} by {} of these \
+         kinds at {px} px on the modelled hardware, which draws the generated pairs alone{}",
         generated.len(),
         public_text(&public, task.collision_data.is_some()),
         looks.names.len(),
+        on_hardware.len(),
         looks.text_of_others(&public)
     );
     let full = row.methods.get(Form::Full).len() * row.resolution_px.values() + 1;
@@ -177,9 +207,13 @@ pub(super) fn missed(task: &Task<'_>) -> Result<Done, RunError> {
         0 => format!("no public case that collides was tested; {}", made.note),
         _ => made.note.clone(),
     };
-    let counted = [("missed", missed as f64), ("generated_cases", own.len() as f64)];
+    let counted = [
+        ("missed", missed as f64),
+        ("missed_on_the_modelled_hardware", missed_there as f64),
+        ("generated_cases", own.len() as f64),
+    ];
     let facts = numbers(counted).into_iter().chain(facts(&looks, &public)).collect();
-    Ok(Done::bare(Row { numbers: facts, ran: looks.ran(), note, ..made }))
+    Ok(Done::bare(Row { numbers: facts, ran: looks.ran(&work_of(&on_hardware)), note, ..made }))
 }
 
 /// How many cases of each kind there are, and how many of those that do not collide are kept.
@@ -265,6 +299,17 @@ impl Looked<'_> {
         PlainPasses::new(method, resolution).pair(&self.objects[0], &self.objects[1])
     }
 
+    /// The same on the modelled hardware.
+    fn drawn_on(
+        &self,
+        hardware: &PipelineSpec,
+        method: Method,
+        resolution: u32,
+    ) -> Result<PlainResult, RunError> {
+        let [a, b] = &self.objects;
+        PlainPasses::new(method, resolution).pair_on(a, b, hardware).map_err(RunError::setting)
+    }
+
     /// Whether boxes of time and depth and boxes of depth alone say what they have to.
     fn is_distinguished(&self, ours: &PlainResult, depth: &PlainResult) -> bool {
         depth.may_collide() && ours.may_collide() == self.case.collide
@@ -281,6 +326,7 @@ pub(super) fn dodged(task: &Task<'_>) -> Result<Done, RunError> {
         PlainResult::default(),
         Vec::new(),
     );
+    let (hardware, mut there) = (hardware()?, PlainResult::default());
     for case in row.objects.get(form).iter().filter(|case| row.cases.all(form).contains(&case.name)) {
         let objects = [object(&case.first).ok_or_else(refused)?, object(&case.second).ok_or_else(refused)?];
         let looked = Looked { case, objects };
@@ -295,7 +341,13 @@ pub(super) fn dodged(task: &Task<'_>) -> Result<Done, RunError> {
                 let fewest = ours.overlaps.into_iter().min().unwrap_or(0);
                 at.push((resolution, fewest as f64, looked.is_distinguished(&ours, &depth)));
                 if resolution == *row.resolution_px.get(form) && method == row.methods.get(form)[0] {
-                    said.push(case_text(case, &ours, &depth, resolution));
+                    let on = |method| looked.drawn_on(&hardware, method, resolution);
+                    let (ours_there, depth_there) = (on(method)?, on(Method::DepthOnly)?);
+                    there = there.and(&ours_there).and(&depth_there);
+                    let same = looked.is_distinguished(&ours_there, &depth_there);
+                    let text = case_text(case, &ours, &depth, resolution);
+                    let on_hardware = if same { "does the same" } else { "does not tell them apart" };
+                    said.push(format!("{text}; the modelled hardware {on_hardware}"));
                 }
             }
             tried.along(&format!("resolution_px ({}, {})", case.name, name(method)), at);
@@ -310,7 +362,7 @@ pub(super) fn dodged(task: &Task<'_>) -> Result<Done, RunError> {
         overlaps(&case.name, [&first, &second], *row.resolution_px.get(form))
     };
     let figures = shown.map(figure).into_iter().collect();
-    Ok(Done { row: Row { ran: ran(&drawn), ..made }, figures })
+    Ok(Done { row: Row { ran: ran(&there, &drawn), ..made }, figures })
 }
 
 /// Result of the passes for a case, in words.
@@ -349,6 +401,11 @@ pub(super) fn tighter(task: &Task<'_>) -> Result<Done, RunError> {
         resolutions.iter().map(at).collect()
     };
     let (boxes, fragments) = (kept(Method::BoxBox), kept(Method::FragmentBox));
+    let (hardware, apart) = (hardware()?, all.iter().flat_map(apart).collect::<Vec<Pair>>());
+    let px = *row.resolution_px.get(form);
+    let on = |method| Drawn::on(&hardware, &apart, method, px);
+    let on_hardware = [on(Method::BoxBox)?, on(Method::FragmentBox)?];
+    let there = work_of(&on_hardware);
     let mut tried = Cases::new(
         "cases with fewer false positives for fragments, less those with more",
         "resolution_px alone",
@@ -367,17 +424,34 @@ pub(super) fn tighter(task: &Task<'_>) -> Result<Done, RunError> {
         |of: &[Vec<usize>]| of.iter().map(|counts| counts.iter().sum::<usize>()).collect::<Vec<usize>>();
     let (boxes, fragments) = (sums(&boxes), sums(&fragments));
     let ours = format!(
-        "false positives at {resolutions:?} px: {fragments:?} for fragments, {boxes:?} for boxes; fewer in {better} of {} cases, more in {worse}",
-        each().count()
+        "false positives at {resolutions:?} px: {fragments:?} for fragments, {boxes:?} for boxes; fewer in {better} of {} cases, more in {worse}; \
+         on the modelled hardware at {px} px {} and {}",
+        each().count(),
+        kept_pairs(&on_hardware[1]),
+        kept_pairs(&on_hardware[0])
     );
+
     let facts = numbers([
         ("cases", each().count() as f64),
         ("cases_fewer", better as f64),
         ("cases_more", worse as f64),
+        ("boxes_on_the_modelled_hardware", kept_pairs(&on_hardware[0])),
+        ("fragments_on_the_modelled_hardware", kept_pairs(&on_hardware[1])),
     ]);
     let figure = curves(&resolutions, [("fragment against box", &fragments), ("box against box", &boxes)]);
-    let row = Row { numbers: facts, ran: ran(&drawn), ..with.banded(&row.about, ours, band) };
+    let row = Row { numbers: facts, ran: ran(&there, &drawn), ..with.banded(&row.about, ours, band) };
     Ok(Done { row, figures: vec![figure] })
+}
+
+/// Pairs that were kept.
+fn kept_pairs(drawn: &Drawn) -> f64 {
+    drawn.pairs as f64 - drawn.cleared as f64
+}
+
+/// Pairs of a case whose boxes touch and that do not collide.
+fn apart(case: &Case) -> impl Iterator<Item = Pair> {
+    let pairs = candidates(&case.objects).into_iter().filter(|pair| !case.collide.contains(pair));
+    pairs.map(|(a, b)| [case.objects[a].clone(), case.objects[b].clone()])
 }
 
 /// Pairs of a case that do not collide and are kept, and what was drawn for that.
@@ -433,10 +507,10 @@ mod tests {
         let looks = looks(&public);
         assert!(looks.missed().all(|(.., missed)| missed == 0));
         assert_eq!(looks.false_positives(), Some([50.0, 50.0]));
-        let ran = looks.ran();
+        let ran = looks.ran(&PlainResult::default());
         let of = |name: &str| ran.iter().find(|number| number.name == name).unwrap().value;
         assert_eq!(of("draws_of_public_queries_that_do_not"), 2.0 * of("draws_of_public_cases_that_collide"));
-        assert_eq!(of("draws"), 3.0 * of("draws_of_public_cases_that_collide"));
+        assert_eq!(of("draws_on_the_host"), 3.0 * of("draws_of_public_cases_that_collide"));
         let both =
             ["collide", "do_not"].map(|end| ran.iter().filter(|n| n.name.ends_with(end)).collect::<Vec<_>>());
         assert!(both.iter().all(|kind| kind.len() == 2 && kind.iter().all(|number| number.value > 0.0)));
@@ -451,6 +525,6 @@ mod tests {
         let looks = looks(&public);
         assert!(looks.missed().all(|(.., missed)| missed == 1));
         assert_eq!((looks.false_positives(), looks.text_of_others(&public)), (None, String::new()));
-        assert!(looks.ran().iter().all(|number| !number.name.ends_with("do_not")));
+        assert!(looks.ran(&PlainResult::default()).iter().all(|number| !number.name.ends_with("do_not")));
     }
 }

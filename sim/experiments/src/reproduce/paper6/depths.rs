@@ -6,7 +6,10 @@ use pipeline::depth::{Bounder, DepthBound};
 use pipeline::geometry::Projection;
 use pipeline::random::{mix, unit};
 use pipeline::setup::Triangle;
-use pipeline::{Camera, Draw, Features, Geometry, LensShape, MovingVertex, SampleTable, Viewport};
+use pipeline::{
+    Camera, Draw, Features, Geometry, Gpu, LensShape, MovingVertex, RasterPass, SampleTable, Settings,
+    Target, Viewport,
+};
 use rayon::prelude::*;
 use workloads::stress::{Size, StressScene, brute_force, set_up_all};
 use workloads::visibility::Unshaded;
@@ -15,11 +18,12 @@ use super::settings::{Depths, Mode, Planes, Triangles};
 use super::{Task, catalogue};
 use crate::reproduce::band::Cases;
 use crate::reproduce::figure::line;
-use crate::reproduce::row::{Row, numbers};
+use crate::reproduce::row::{Row, numbers, ran};
 use crate::reproduce::settings::Form;
 use crate::reproduce::{Done, Figure};
 use crate::stress::measure::Place;
-use run::RunError;
+use crate::study::Ran;
+use run::{GpuSpec, RunError};
 
 /// Widths of depth intervals in tiles, over those of the vertices.
 #[derive(Clone, Debug, Default)]
@@ -197,11 +201,12 @@ pub(super) fn tighter(task: &Task<'_>) -> Result<Done, RunError> {
         ("least_over_null_steady", against_null.ranges[1][0]),
         ("most_over_null_steady", against_null.ranges[1][1]),
     ]);
-    let ran = numbers([
-        ("triangles", total.triangles as f64),
-        ("tiles", total.tiles[0] as f64),
-        ("depths_checked", total.places as f64),
-    ]);
+    let mut ran = ran(&all.drawn()?);
+    ran.extend(numbers([
+        ("triangles_on_the_host", total.triangles as f64),
+        ("tiles_on_the_host", total.tiles[0] as f64),
+        ("depths_checked_on_the_host", total.places as f64),
+    ]));
     let figures = figure.into_iter().collect();
     let made = with.banded(&row.about, ours, band);
     let note = format!("{}; {}", made.note, against_null.text());
@@ -240,6 +245,21 @@ impl<'a> Scenes<'a> {
         let catalogue = catalogue(size, *row.values_of_each_family.get(form), *row.seed.get(form))?;
         let random = random(*row.random_triangles.get(form), side_px, *row.seed.get(form))?;
         Ok(Self { row, form, catalogue, random })
+    }
+
+    /// What the modelled hardware draws of them, each scene for its depths. The intervals are measured on the host.
+    fn drawn(&self) -> Result<Ran, RunError> {
+        let spec = GpuSpec::load("reference")?.pipeline;
+        let one = |scene: &StressScene| -> Result<Ran, RunError> {
+            let StressScene { camera, viewport, samples, .. } = scene;
+            let draws = [scene.draw(&Unshaded).map_err(RunError::setting)?];
+            let settings = Settings { spec: &spec, viewport: *viewport, samples, background: Vec3::ZERO };
+            let mut gpu = Gpu::quiet(&spec).map_err(RunError::setting)?;
+            let pass = RasterPass::new(camera, &draws, &settings).onto(Target::Depth);
+            gpu.draw(&pass).map_err(RunError::setting)?;
+            Ok(Ran::of(&gpu.finish()))
+        };
+        self.catalogue.par_iter().chain([&self.random]).map(one).sum()
     }
 
     /// Every triangle alone.

@@ -10,6 +10,8 @@ use workloads::Overrides;
 use workloads::job::{OptionSource, Request};
 use workloads::lighting::Light;
 use workloads::material::{Material, SurfaceShader};
+use workloads::points::job::Rasterized;
+use workloads::scene::Mesh;
 use workloads::{catalog, shapes};
 
 use crate::reproduce::Figure;
@@ -130,23 +132,44 @@ const SPACE_PX: u32 = 320;
 /// Distances r along a side of the part of the cube that is drawn.
 const SIDE: f64 = 9.0;
 
-/// Figure 11 in space: balls of half the least distance around points, so that they touch at most.
-pub(super) fn balls(points: &[[f64; 3]], radius: f64) -> Result<Figure, RunError> {
-    let side = (SIDE * radius).min(1.0);
-    let inside = points.iter().filter(|point| point.iter().all(|at| *at < side));
-    let centres: Vec<Vec3> =
-        inside.map(|point| Vec3::from(point.map(|at| (at / side) as f32 - 0.5))).collect();
-    let ball = shapes::sphere(0.5 * radius / side, 12, 0);
-    let (mut corners, mut triangles, mut colors) = (Vec::new(), Vec::new(), Vec::new());
-    for centre in &centres {
-        let first = corners.len() as u32;
-        corners.extend(ball.positions.iter().map(|corner| *corner + *centre));
-        triangles.extend(ball.triangles.iter().map(|three| three.map(|corner| first + corner)));
-        // Colour by place along the axes, so that layers can be distinguished.
-        colors.extend(
-            ball.positions.iter().map(|_| 0.15 + 0.85 * (*centre + 0.5).clamp(Vec3::ZERO, Vec3::ONE)),
-        );
+/// Linear RGB of voids, blue as in the paper, and of points.
+const VOID: Vec3 = Vec3::new(0.05, 0.20, 0.80);
+const POINT: Vec3 = Vec3::new(0.75, 0.72, 0.66);
+
+/// Meshes in one.
+#[derive(Default)]
+struct Shown {
+    corners: Vec<Vec3>,
+    triangles: Vec<[u32; 3]>,
+    colors: Vec<Vec3>,
+}
+
+impl Shown {
+    fn add(&mut self, mesh: &Mesh, centre: Vec3, color: Vec3) {
+        let first = self.corners.len() as u32;
+        self.corners.extend(mesh.positions.iter().map(|corner| *corner + centre));
+        self.triangles.extend(mesh.triangles.iter().map(|three| three.map(|corner| first + corner)));
+        self.colors.extend(mesh.positions.iter().map(|_| color));
     }
+}
+
+/// Figure 11 in space: balls of half the least distance around the points before the last pass, so that they touch at most, and the
+/// voids that it draws.
+pub(super) fn balls_and_voids(darts: &Rasterized<3>, radius: f64) -> Result<Figure, RunError> {
+    let side = (SIDE * radius).min(1.0);
+    let is_inside = |point: &[f64; 3]| point.iter().all(|at| *at < side);
+    let place = |point: [f64; 3]| Vec3::from(point.map(|at| (at / side) as f32 - 0.5));
+    let ball = shapes::sphere(0.5 * radius / side, 12, 0);
+    let points = darts.found.points.iter().filter(|point| is_inside(point) && !darts.is_in_void(point));
+    let points: Vec<_> = points.collect();
+    let voids: Vec<_> = darts.voids.iter().filter(|void| is_inside(&void.low)).collect();
+    let mut shown = Shown::default();
+    points.iter().for_each(|point| shown.add(&ball, place(**point), POINT));
+    for void in &voids {
+        let cube = shapes::cuboid(Vec3::splat((void.side / side) as f32), 0);
+        shown.add(&cube, place(void.low.map(|at| at + 0.5 * void.side)), VOID);
+    }
+    let Shown { corners, triangles, colors } = shown;
     let geometry = Geometry::new(&corners, &corners, &triangles).map_err(RunError::setting)?;
     let geometry = geometry.with_colors(&colors).map_err(RunError::setting)?;
     let light = Light { toward: Some(Vec3::new(0.3, 0.9, 0.4).normalize()), ..Light::default() };
@@ -161,13 +184,18 @@ pub(super) fn balls(points: &[[f64; 3]], radius: f64) -> Result<Figure, RunError
     let pass = RasterPass::new(&camera, &draws, &settings).named("points");
     let image = pass.uncounted().map_err(RunError::setting)?;
     let pixels = image.into_image().iter().map(|color| color.to_array()).collect();
-    let caption =
-        format!("{} points of a corner of the cube, {:.1} r along each side", centres.len(), side / radius);
+    let caption = format!(
+        "{} points and {} voids of a corner of the cube, {:.1} r along each side",
+        points.len(),
+        voids.len(),
+        side / radius
+    );
     let shown = [CaptionedImage { size: [SPACE_PX; 2], pixels, caption }];
     let subject = format!(
-        "balls of radius r/2 around the points do not overlap; red, green and blue along x, y and z; r = {radius}"
+        "before the last of {} passes: balls of radius r/2 around the points, and in blue the voids that it draws; r = {radius}",
+        darts.passes
     );
-    Ok(figure("VI_fig11_3d", ["Maximal points in space (Paper VI, Figure 11)", &subject], 1, &shown))
+    Ok(figure("VI_fig11_3d", ["Points and voids in space (Paper VI, Figure 11)", &subject], 1, &shown))
 }
 
 /// A camera that sees three sides of the unit cube about the origin.

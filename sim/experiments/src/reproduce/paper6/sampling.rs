@@ -5,7 +5,9 @@ use std::ops::RangeInclusive;
 use pipeline::{Gpu, PipelineSpec};
 use workloads::points::job::{Rasterized, rasterized};
 use workloads::points::noise::{NoiseSpec, draw_noise};
-use workloads::points::poisson::{Domain, PoissonDisk, PoissonSpec, Spacing, ball, poisson_disk, saturation};
+use workloads::points::poisson::{
+    Cube, Domain, PoissonDisk, PoissonSpec, Spacing, ball, poisson_disk, saturation,
+};
 use workloads::points::quality::{ChiSquare, chi_square, closer_than, free_share, largest_hole, upper_tail};
 use workloads::points::white::{
     Density, Named, Numbers, WhiteSpec, columns_for, counts, shares, white_noise,
@@ -17,10 +19,11 @@ use super::super::row::{self, Row, numbers};
 use super::super::verdict::Verdict;
 use super::super::{Done, Figure};
 use super::Task;
-use super::image_figures::balls;
+use super::image_figures::balls_and_voids;
 use super::settings::Darts;
 use crate::reproduce::settings::Form;
 use crate::study::Ran;
+use output::plot::{Mark, Series};
 use run::GpuSpec;
 use run::RunError;
 
@@ -131,19 +134,36 @@ pub(super) fn darts(task: &Task<'_>) -> Result<Done, RunError> {
     let made = [flat.darts.candidates + deep.darts.candidates, flat.darts.kept + deep.darts.kept];
     ran.extend(numbers([("candidates", made[0] as f64), ("candidates_in_regions", made[1] as f64)]));
     let radius = *row.radius_2d.get(form);
-    let shown = flat.darts.found.points.iter().filter(|[x, y]| *x < 40.0 * radius && *y < 20.0 * radius);
+    let is_shown = |[x, y]: &[f64; 2]| *x < 40.0 * radius && *y < 20.0 * radius;
+    let shown =
+        flat.darts.found.points.iter().filter(|point| is_shown(point) && !flat.darts.is_in_void(point));
+    let voids = flat.darts.voids.iter().filter(|void| is_shown(&void.low)).map(outline).collect();
     let figure = Figure::plane(
         "VI_fig11",
         [
-            "Maximal points that keep their distance (Paper VI, Figure 11)",
-            &format!("a corner of the unit square, r = {radius}"),
+            "Points that keep their distance, and voids (Paper VI, Figure 11)",
+            &format!(
+                "before the last of {} passes, in a corner of the unit square, r = {radius}",
+                flat.darts.passes
+            ),
         ],
         ["x", "y"],
-        vec![dots("points", shown.map(|[x, y]| (*x, *y)).collect())],
+        vec![
+            Series::new("voids that the last pass draws", Mark::Faint(voids)),
+            dots("points", shown.map(|[x, y]| (*x, *y)).collect()),
+        ],
     );
     let made = with.row(&row.about, (ours, Verdict::of(holds), note));
-    let in_cube = balls(&deep.darts.found.points, *row.radius_3d.get(form))?;
+    let in_cube = balls_and_voids(&deep.darts, *row.radius_3d.get(form))?;
     Ok(Done { row: Row { numbers: facts, ran, ..made }, figures: vec![figure, in_cube] })
+}
+
+/// The outline of a void in the plane.
+fn outline(void: &Cube<2>) -> Vec<(f64, f64)> {
+    let ([x, y], side) = (void.low, void.side);
+    [(0.0, 0.0), (side, 0.0), (side, side), (0.0, side), (0.0, 0.0)]
+        .map(|(right, up)| (x + right, y + up))
+        .to_vec()
 }
 
 /// A p within these is that of white noise.

@@ -9,8 +9,9 @@ use workloads::soft_shadows::{SoftShadowOptions, SoftShadows};
 
 use super::Task;
 use crate::reproduce::Done;
-use crate::reproduce::row::{Row, numbers};
+use crate::reproduce::row::{Row, numbers, ran};
 use crate::reproduce::verdict::Verdict;
+use crate::study::Ran;
 use run::GpuSpec;
 use run::RunError;
 
@@ -52,16 +53,14 @@ pub(super) fn row(task: &Task<'_>) -> Result<Done, RunError> {
         ("samples_tested_one_pass", tested[0]),
         ("samples_tested_accumulation", tested[1]),
     ]);
-    let (draws, hit) = (count(Event::Draws), count(Event::SamplesHit));
-    let passes = [&one_report, &many_report].map(|report| report.passes.len() as f64);
-    let ran = numbers([
-        ("passes_one_pass", passes[0]),
-        ("passes_accumulation", passes[1]),
-        ("draws_one_pass", draws[0]),
-        ("draws_accumulation", draws[1]),
-        ("samples_hit_one_pass", hit[0]),
-        ("samples_hit_accumulation", hit[1]),
-    ]);
+    let [of_one, of_many] = [&one_report, &many_report].map(Ran::of);
+    let mut ran = ran(&[of_one, of_many].into_iter().sum());
+    ran.extend(numbers([
+        ("passes_of_one_pass", of_one.passes as f64),
+        ("passes_of_accumulation", of_many.passes as f64),
+        ("fragments_of_one_pass", of_one.fragments as f64),
+        ("fragments_of_accumulation", of_many.fragments as f64),
+    ]));
     let made = with.row(&row.about, (ours, Verdict::of(same), String::new()));
     Ok(Done::bare(Row { numbers: facts, ran, ..made }))
 }
