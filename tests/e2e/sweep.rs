@@ -32,6 +32,11 @@ fn done(args: &[&str]) -> Ended {
     ended
 }
 
+/// Runs all points of a sweep.
+fn finished(file: &str, out: &str) -> Ended {
+    done(&["run", file, "--out", out])
+}
+
 /// `results.parquet` of the sweep in a folder.
 fn merged(folder: &str) -> Vec<u8> {
     done(&["merge", folder]);

@@ -5,6 +5,8 @@ use std::fs::{self, File};
 use std::io::{self, BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 
+use output::Destination;
+use output::dir::{Claim, OutDir};
 use serde::{Deserialize, Serialize};
 use timing::Level;
 use traces::io::atomic;
@@ -99,6 +101,18 @@ impl Folder {
         atomic::write_file(&self.root.join(PLAN), write)?;
         // Another sweep may have come between.
         self.check(plan)
+    }
+
+    /// Opens it for the results `files` of the command `by`: all or none are replaced, and no file of the user.
+    ///
+    /// # Errors
+    /// If a file of the user has such a name, another process writes results, or the folder cannot be written.
+    pub(crate) fn open<'a>(
+        &self,
+        by: &str,
+        files: impl IntoIterator<Item = &'a str>,
+    ) -> Result<OutDir, SweepError> {
+        Ok(Destination::new(&self.root).open([Claim::new(by).files(files)])?)
     }
 
     /// Whether it has a plan.

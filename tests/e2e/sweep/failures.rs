@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::Command;
 use std::time::{Duration, SystemTime};
 
-use super::{SWEEP, done, merged, point_files, sweep, unfinished_files};
+use super::{SWEEP, done, finished, merged, point_files, sweep, unfinished_files};
 use crate::support::{Inputs, Quintile, quintile};
 
 /// 240 points.
@@ -61,11 +61,7 @@ fn a_full_disk_ends_a_sweep_that_goes_on_when_there_is_room() {
     assert!(status.stdout.contains(&format!("{finished} of 240 runs finished")), "{}", status.stdout);
     let ended = sweep(&["merge", &out, "--partial"]);
     assert_eq!(ended.code, Some(1), "{}", ended.stderr);
-    assert!(
-        ended.stderr.contains("results.parquet") && ended.stderr.contains("No space left"),
-        "{}",
-        ended.stderr
-    );
+    assert!(ended.stderr.contains(&out) && ended.stderr.contains("No space left"), "{}", ended.stderr);
     assert!(!Path::new(&out).join("results.parquet").exists());
     mounted.change("size=64m");
     let again = done(&["run", &file, "--out", &out]);
@@ -100,6 +96,66 @@ fn a_read_only_folder_is_refused_before_anything_runs_and_can_be_read() {
         assert!(has_remedy && !ended.stderr.contains("call it again"), "{}", ended.stderr);
     }
     assert!(done(&["status", &out]).stdout.contains("4 of 4 runs finished"));
+}
+
+/// Each file that a step writes, with what a user could have there.
+#[test]
+fn a_file_of_the_user_is_never_overwritten() {
+    let inputs = Inputs::new();
+    let (file, out) = (inputs.put("tiles.ron", SWEEP), inputs.path("out"));
+    finished(&file, &out);
+    let slurm = ["slurm", &file, "--out", &out, "--tasks", "2"];
+    let steps: [(&[&str], &[&str]); 3] = [
+        (&["merge", &out], &["results.parquet"]),
+        (&["report", &out], &["designs.csv", "shares.csv", "frontier.svg", "report.html"]),
+        (&slurm, &["array.sh", "merge.sh"]),
+    ];
+    for (step, names) in steps {
+        let refused = |why: &str| {
+            for path in names.iter().map(|name| Path::new(&out).join(name)) {
+                fs::write(&path, "mine").unwrap();
+                let ended = sweep(step);
+                assert_eq!(ended.code, Some(2), "{step:?}: {}", ended.stderr);
+                let says = format!("{}: {why}", path.display());
+                assert!(
+                    ended.stderr.contains(&says) && ended.stderr.contains("move or rename it"),
+                    "{}",
+                    ended.stderr
+                );
+                assert_eq!(fs::read(&path).unwrap(), b"mine");
+                fs::remove_file(&path).unwrap();
+            }
+        };
+        refused("Quintile did not write");
+        done(step);
+        done(step);
+        refused("this file was changed after Quintile wrote it");
+    }
+}
+
+#[test]
+fn a_report_that_cannot_be_written_leaves_the_earlier_one_whole() {
+    let inputs = Inputs::new();
+    let (file, out) = (inputs.put("tiles.ron", SWEEP), inputs.path("out"));
+    done(&["run", &file, "--out", &out, "--shard", "2/2"]);
+    done(&["report", &out]);
+    let files = || {
+        ["designs.csv", "winners.csv", "shares.csv"].map(|name| fs::read(Path::new(&out).join(name)).unwrap())
+    };
+    let (earlier, page) = (files(), Path::new(&out).join("report.html"));
+    finished(&file, &out);
+    fs::remove_file(&page).unwrap();
+    fs::create_dir(&page).unwrap();
+    let ended = sweep(&["report", &out]);
+    assert!(
+        ended.code == Some(2) && ended.stderr.contains("report.html: it is a folder"),
+        "{}",
+        ended.stderr
+    );
+    assert!(files() == earlier);
+    fs::remove_dir(&page).unwrap();
+    done(&["report", &out]);
+    assert!(files() != earlier && page.is_file());
 }
 
 #[test]
