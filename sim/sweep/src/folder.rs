@@ -127,19 +127,16 @@ impl Folder {
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
             Err(error) => return Err(SweepError::folder(&path)(error)),
         };
-        let line = BufReader::new(file).lines().next().transpose().map_err(SweepError::folder(&path))?;
-        let Some(line) = line else {
-            return Err(SweepError::Plan { path, message: "it is empty: plan the sweep again".to_owned() });
-        };
-        let header: Header = serde_json::from_str(&line).map_err(|error| damaged(&path, &error))?;
-        if header.schema != SCHEMA {
-            let message = format!(
-                "its schema is {}, this version reads {SCHEMA}: use the version that wrote it",
-                header.schema
-            );
-            return Err(SweepError::Plan { path, message });
+        let mut line = Vec::new();
+        match BufReader::new(file).read_until(b'\n', &mut line) {
+            Ok(_) => {}
+            Err(error) if error.kind() == io::ErrorKind::IsADirectory => {}
+            Err(error) => return Err(SweepError::folder(&path)(error)),
         }
-        Ok(Some(header))
+        match serde_json::from_slice::<Header>(&line) {
+            Ok(header) if header.schema == SCHEMA => Ok(Some(header)),
+            _ => Err(SweepError::Plan { path, message: not_a_plan(&line) }),
+        }
     }
 
     /// Points of the plan, line by line.
@@ -339,8 +336,17 @@ fn entries(folder: &Path) -> Result<Vec<PathBuf>, SweepError> {
     }
 }
 
+/// What is wrong with a file whose first line is `line`, and what to do. It may be a file of the user.
+fn not_a_plan(line: &[u8]) -> String {
+    let header = serde_json::from_slice::<serde_json::Value>(line).unwrap_or_default();
+    match header["schema"].as_u64().filter(|schema| header["sweep"].is_string() && *schema != u64::from(SCHEMA)) {
+        Some(schema) => format!("its schema is {schema}, this version reads {SCHEMA}: use the version that wrote it"),
+        None => "it is not a plan that this program wrote, and stays as it is: move or rename it, or give another --out".to_owned(),
+    }
+}
+
 fn damaged(path: &Path, error: &serde_json::Error) -> SweepError {
-    let message = format!("it is not a plan, or damaged: {error}; plan the sweep again");
+    let message = format!("it is damaged: {error}; plan the sweep again");
     SweepError::Plan { path: path.to_owned(), message }
 }
 
@@ -399,11 +405,37 @@ mod tests {
         assert!(matches!(folder.stored(&plan.points[0]).unwrap(), Stored::OtherBuild));
         let path = root.path().join(PLAN);
         let text = fs::read_to_string(&path).unwrap();
-        for length in [0, 10, text.find('\n').unwrap() + 1, text.len() - 5] {
+        for length in [text.find('\n').unwrap() + 1, text.len() - 5] {
             fs::write(&path, &text[..length]).unwrap();
             let error = folder.plan().unwrap_err();
             assert!(error.to_string().contains("plan the sweep again"), "{error}");
+            folder.write_plan(&plan).unwrap();
+            assert_eq!(fs::read_to_string(&path).unwrap(), text);
         }
+    }
+
+    #[test]
+    fn a_plan_of_others_stays_as_it_is() {
+        let root = tempfile::tempdir().unwrap();
+        let (folder, path) = (Folder::at(root.path()), root.path().join(PLAN));
+        let of_others = [&b""[..], b"{\"schema\":2,\"sw", b"{\"task\": \"buy milk\"}\n", b"\xff\0\n"];
+        let newer = &b"{\"schema\":9,\"sweep\":\"a\",\"more\":1}\n"[..];
+        for (text, says) in of_others
+            .map(|text| (text, "not a plan that this program wrote"))
+            .into_iter()
+            .chain([(newer, "its schema is 9")])
+        {
+            fs::write(&path, text).unwrap();
+            for error in [folder.plan().map(drop), folder.write_plan(&plan("a"))].map(Result::unwrap_err) {
+                assert!(error.is_usage() && error.to_string().contains(says), "{error}");
+                assert!(!error.to_string().contains("plan the sweep again"), "{error}");
+            }
+            assert_eq!(fs::read(&path).unwrap(), text);
+        }
+        fs::remove_file(&path).unwrap();
+        fs::create_dir(&path).unwrap();
+        let error = folder.plan().unwrap_err();
+        assert!(error.is_usage() && error.to_string().contains("move or rename it"), "{error}");
     }
 
     #[test]
