@@ -203,8 +203,11 @@ pub(super) fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), Failure> {
     let listed = lists::runs(&options(args), &args.set, &args.out)?;
     let is_alone = listed.iter().all(|run| run.varied.is_empty());
     if !is_alone {
-        // Wrong values are refused before the first of several runs.
-        listed.iter().try_for_each(|run| Plan::resolve(run.options.clone()).map(drop))?;
+        // Wrong values and folders are refused before the first of several runs.
+        listed.iter().try_for_each(|run| {
+            let plan = Plan::resolve(run.options.clone())?;
+            open(&plan, &Destination { folder: run.out.clone(), force: args.force }).map(drop)
+        })?;
     }
     let (mut done, mut json) = (Vec::new(), Vec::new());
     for run in listed {
