@@ -6,7 +6,8 @@ use std::io::{self, BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 
 use output::Destination;
-use output::dir::{Claim, OutDir};
+use output::dir::{Claim, OutDir, sha256_of_text};
+use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 use timing::Level;
 use traces::io::atomic;
@@ -236,12 +237,11 @@ impl Folder {
     pub(crate) fn stored(&self, point: &Point) -> Result<Stored, SweepError> {
         let path = self.file_of(point);
         let fault = match fs::read(&path) {
-            Ok(bytes) if bytes.is_empty() => "it is empty".to_owned(),
-            Ok(bytes) => match serde_json::from_slice::<PointResult>(&bytes) {
-                Ok(result) if result.id == point.id => return Ok(Stored::Whole(result)),
-                Ok(result) => format!("it holds the point {}", result.id),
-                Err(_) if is_point(&bytes, &point.id) => return Ok(Stored::OtherBuild),
-                Err(error) => format!("it is cut off or damaged: {error}"),
+            Ok(bytes) => match unsealed(&bytes).map(|text| serde_json::from_str::<PointResult>(&text)) {
+                Some(Ok(result)) if result.id == point.id => return Ok(Stored::Whole(result)),
+                Some(Ok(result)) => format!("it holds the point {}", result.id),
+                Some(Err(_)) => return Ok(Stored::OtherBuild),
+                None => fault(&bytes),
             },
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Stored::Missing),
             Err(error) => return Err(SweepError::folder(&path)(error)),
@@ -269,11 +269,11 @@ impl Folder {
         if let Some(folder) = path.parent() {
             fs::create_dir_all(folder).map_err(SweepError::folder(folder))?;
         }
-        atomic::write_file(&path, |out| serde_json::to_writer(out, result)).or_else(|error| {
-            match self.result(point) {
-                Ok(Some(_)) => Ok(()),
-                _ => Err(error.into()),
-            }
+        let write =
+            |out: &mut io::BufWriter<File>| out.write_all(sealed(&serde_json::to_string(result)?).as_bytes());
+        atomic::write_file(&path, write).or_else(|error| match self.result(point) {
+            Ok(Some(_)) => Ok(()),
+            _ => Err(error.into()),
         })
     }
 
@@ -310,6 +310,30 @@ pub(crate) enum Stored {
     OtherBuild,
     /// Nothing.
     Missing,
+}
+
+/// Start of the file of a point; the checksum of the rest follows.
+const SEAL: &str = "{\"sha256\":\"";
+
+/// A JSON object with its checksum as first field.
+fn sealed(object: &str) -> String {
+    format!("{SEAL}{}\",{}", sha256_of_text(object), object.trim_start_matches('{'))
+}
+
+/// The object that was [`sealed`]; `None` if a byte of it has changed.
+fn unsealed(bytes: &[u8]) -> Option<String> {
+    let (sha256, rest) = std::str::from_utf8(bytes).ok()?.strip_prefix(SEAL)?.split_once("\",")?;
+    let object = format!("{{{rest}");
+    (sha256_of_text(&object) == sha256).then_some(object)
+}
+
+/// What is wrong with the file of a point whose checksum is not its own.
+fn fault(bytes: &[u8]) -> String {
+    match serde_json::from_slice::<IgnoredAny>(bytes) {
+        _ if bytes.is_empty() => "it is empty".to_owned(),
+        Ok(_) => "it was changed after it was written".to_owned(),
+        Err(error) => format!("it is cut off or damaged: {error}"),
+    }
 }
 
 /// Whether `bytes` are a whole file of the point `id`, whatever else it holds.
@@ -392,16 +416,22 @@ mod tests {
         assert_eq!(folder.result(&plan.points[1]).unwrap(), None);
         let path = folder.file_of(&plan.points[0]);
         let text = fs::read_to_string(&path).unwrap();
-        let other = text.replace("aa01", "aa02");
-        for (damaged, says) in
-            [(&text[..text.len() / 2], "cut off"), ("", "it is empty"), (&*other, "the point aa02")]
-        {
+        let of = |object: &str| sealed(&object.replace("aa01", "aa02"));
+        let other = of(&unsealed(text.as_bytes()).unwrap());
+        let edited = text.replace("why", "because");
+        for (damaged, says) in [
+            (&text[..text.len() / 2], "cut off"),
+            ("", "it is empty"),
+            (&*other, "the point aa02"),
+            (&*edited, "it was changed after it was written"),
+            (&*text.replace(",", ", "), "it was changed after it was written"),
+        ] {
             fs::write(&path, damaged).unwrap();
             assert_eq!(folder.result(&plan.points[0]).unwrap(), None);
             let Ok(Stored::Damaged(message)) = folder.stored(&plan.points[0]) else { panic!() };
             assert!(message.contains("aa01.json: ") && message.contains(says), "{message}");
         }
-        fs::write(&path, r#"{"id":"aa01","measured":{"cycles":1}}"#).unwrap();
+        fs::write(&path, sealed(r#"{"id":"aa01","measured":{"cycles":1}}"#)).unwrap();
         assert!(matches!(folder.stored(&plan.points[0]).unwrap(), Stored::OtherBuild));
         let path = root.path().join(PLAN);
         let text = fs::read_to_string(&path).unwrap();

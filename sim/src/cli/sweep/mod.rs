@@ -113,9 +113,16 @@ fn run_points(args: &RunStepArgs, terminal: &Terminal, stop: &Stop) -> Result<()
         args.sweep.json,
         &InShard { status, shard, sweep_points: plan.points.len() },
     )?;
-    match status.points - status.finished {
-        0 => Ok(()),
-        left => Err(Failure {
+    match (status.points - status.finished, status.failed) {
+        (0, 0) => Ok(()),
+        (0, failed) => Err(Failure {
+            message: format!(
+                "{} failed: the lines above and the table have the reasons; --retry runs them again",
+                counted(failed, "run")
+            ),
+            code: 1,
+        }),
+        (left, _) => Err(Failure {
             message: format!(
                 "stopped by a signal: {} not finished; call it again to continue",
                 counted(left, "run")
