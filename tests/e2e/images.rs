@@ -77,6 +77,27 @@ fn a_run_of_images_alone_is_repeated_to_the_same_bytes() {
     assert_eq!(ended.code, Some(0), "{}", ended.stderr);
     let frame = std::fs::read(again.path("out/images/frame_0002.png")).expect("an image");
     assert!(frame == first.bytes("images/frame_0002.png"));
+    let dry = ["run", "--again", &summary.display().to_string(), "--dry-run", "--out", &again.path("dry")];
+    let ended = quintile().call(dry);
+    assert!(ended.code == Some(0) && !std::path::Path::new(&again.path("dry")).exists(), "{}", ended.stderr);
+    for part in ["of which 4 differ", "GPU       reference\n", "timing    none: images alone"] {
+        assert!(ended.stdout.contains(part) && !ended.stdout.contains("platform"), "{}", ended.stdout);
+    }
+}
+
+#[test]
+fn runs_of_images_alone_are_compared_by_their_images() {
+    let alone = quintile().run("tiny", &["--timing", "none", "--frames", "0..1"]);
+    let summary = alone.path("summary.json").display().to_string();
+    let ended = quintile().call(["compare", &summary, &summary]);
+    let images = alone.path("images").display().to_string();
+    assert!(
+        ended.code == Some(2) && ended.stderr.contains("no numbers to compare: compare its images, "),
+        "{}",
+        ended.stderr
+    );
+    assert!(ended.stderr.contains(&images), "{}", ended.stderr);
+    assert_eq!(quintile().call(["compare", &images, &images]).code, Some(0));
 }
 
 #[test]
@@ -92,8 +113,22 @@ fn what_needs_counts_or_time_is_refused_with_images_alone() {
     ] {
         refusals.call(&with(more), 2, &["--timing none", named], "leave one of both out");
     }
-    refusals.call(&with(&["--dry-run"]), 2, &["--timing none", "--dry-run"], "leave one of both out");
+    refusals.call(
+        &with(&["--pacing", "vsync", "--set", "samples=2"]),
+        2,
+        &["--timing none", "--pacing"],
+        "leave one of both out",
+    );
+    let changed = with(&["--set", "platform.v_v=0.85", "--set", "table.rows.draws.nominal_pj=700"]);
+    let named = ["--set platform.v_v, --set table.rows.draws.nominal_pj"];
+    refusals.call(&changed, 2, &named, "leave one of both out");
     refusals.call(&with(&["--accuracy", "2%"]), 2, &["--accuracy"], "cannot be used with");
     refusals.call(&["glossy", "--timing", "none"], 2, &["glossy", "workload"], "take another timing level");
+    refusals.call(
+        &["glossy", "--timing", "none", "--dry-run"],
+        2,
+        &["glossy", "workload"],
+        "take another timing level",
+    );
     refusals.done();
 }

@@ -110,6 +110,21 @@ fn options_of_a_scene_and_several_gpus_are_refused_by_flag() {
 }
 
 #[test]
+fn a_file_in_the_way_of_the_second_of_several_runs_is_refused_before_the_first() {
+    let inputs = Inputs::new();
+    let out = inputs.path("out");
+    fs::create_dir_all(inputs.path("out/seed=2")).unwrap();
+    let mine = inputs.put("out/seed=2/summary.json", "mine");
+    let call = || quintile().call(["run", "tiny", "--set", "seed=1,2", "--frames", "0..1", "--out", &out]);
+    let ended = call();
+    assert!(ended.code == Some(2) && ended.stderr.contains(&mine), "{}", ended.stderr);
+    assert!(!std::path::Path::new(&inputs.path("out/seed=1")).exists());
+    assert_eq!(fs::read(&mine).unwrap(), b"mine");
+    fs::remove_file(&mine).unwrap();
+    assert_eq!(call().code, Some(0));
+}
+
+#[test]
 fn several_values_are_several_runs_that_a_table_compares() {
     let inputs = Inputs::new();
     let out = inputs.path("out");

@@ -32,6 +32,19 @@ fn done(args: &[&str]) -> Ended {
     ended
 }
 
+/// Runs points of which some fail.
+fn failing(args: &[&str]) -> Ended {
+    let ended = sweep(args);
+    let failed = ended.stderr.contains("failed: the lines above and the table have the reasons");
+    assert!(ended.code == Some(1) && failed, "{args:?}: {}", ended.stderr);
+    ended
+}
+
+/// Runs all points of [`SWEEP`].
+fn run_all(file: &str, out: &str) -> Ended {
+    failing(&["run", file, "--out", out])
+}
+
 /// `results.parquet` of the sweep in a folder.
 fn merged(folder: &str) -> Vec<u8> {
     done(&["merge", folder]);
@@ -69,7 +82,7 @@ fn shards_merge_to_the_bytes_of_a_local_run() {
     let inputs = Inputs::new();
     let file = inputs.put("tiles.ron", SWEEP);
     let [local, shards] = ["local", "shards"].map(|name| inputs.path(name));
-    let ended = done(&["run", &file, "--out", &local]);
+    let ended = run_all(&file, &local);
     assert!(ended.stdout.contains("4 of 4 runs finished, 1 failed"), "{}", ended.stdout);
     assert!(ended.stderr.contains("4/4 ") && ended.stderr.contains("expected to take"), "{}", ended.stderr);
 
@@ -83,7 +96,7 @@ fn shards_merge_to_the_bytes_of_a_local_run() {
     let refused = sweep(&["merge", &shards]);
     assert_eq!(refused.code, Some(1));
     assert!(refused.stderr.contains("2 of 4 points are not finished"), "{}", refused.stderr);
-    done(&["run", &file, "--out", &shards, "--shard", "1/2"]);
+    failing(&["run", &file, "--out", &shards, "--shard", "1/2"]);
     assert_eq!(merged(&local), merged(&shards));
 }
 
@@ -91,7 +104,7 @@ fn shards_merge_to_the_bytes_of_a_local_run() {
 fn every_point_is_a_row_with_its_settings_and_numbers_or_a_reason() {
     let inputs = Inputs::new();
     let (file, out) = (inputs.put("tiles.ron", SWEEP), inputs.path("out"));
-    done(&["run", &file, "--out", &out]);
+    run_all(&file, &out);
     merged(&out);
     let table = InputTable::read(&Path::new(&out).join("results.parquet")).unwrap();
     assert_eq!(table.numbers("gpu.pipeline.tile_px").unwrap(), [4.0, 4.0, 8.0, 8.0]);
@@ -137,10 +150,10 @@ fn a_killed_sweep_continues_where_it_was() {
     let before: Vec<_> = kept.iter().map(written).collect();
     let status = done(&["status", &killed]);
     assert!(status.stdout.contains(&format!("{} of 80 runs finished", kept.len())), "{}", status.stdout);
-    let ended = done(&["run", &file, "--out", &killed]);
+    let ended = run_all(&file, &killed);
     assert!(ended.stderr.contains(&format!("{} of 80 runs to do", 80 - kept.len())), "{}", ended.stderr);
     assert_eq!(before, kept.iter().map(written).collect::<Vec<_>>());
-    done(&["run", &file, "--out", &whole]);
+    run_all(&file, &whole);
     assert_eq!(merged(&killed), merged(&whole));
 }
 
@@ -169,7 +182,7 @@ fn a_dry_run_writes_nothing_and_quick_makes_runs_small() {
     let expected: serde_json::Value = serde_json::from_str(&ended.stdout).unwrap();
     assert!(expected["pending"] == 4 && expected["host_s"].as_f64() > Some(0.0), "{expected}");
     assert!(!Path::new(&out).exists());
-    done(&["run", &file, "--out", &out, "--quick"]);
+    failing(&["run", &file, "--out", &out, "--quick"]);
     merged(&out);
     let table = InputTable::read(&Path::new(&out).join("results.parquet")).unwrap();
     assert_eq!(table.numbers("samples").unwrap(), [1.0; 4]);
@@ -212,7 +225,7 @@ fn tasks_of_a_scheduler_take_their_shards() {
 fn a_report_has_frontier_and_effects() {
     let inputs = Inputs::new();
     let (file, out) = (inputs.put("tiles.ron", SWEEP), inputs.path("out"));
-    done(&["run", &file, "--out", &out]);
+    run_all(&file, &out);
     let report: serde_json::Value = serde_json::from_str(&done(&["report", &out, "--json"]).stdout).unwrap();
     assert_eq!(report["left_out"], 1);
     let designs = report["workloads"]["tiny"].as_array().unwrap();
@@ -241,7 +254,7 @@ fn a_report_has_frontier_and_effects() {
 fn a_report_of_an_unfinished_sweep_says_so_first_and_by_cause() {
     let inputs = Inputs::new();
     let (file, out) = (inputs.put("tiles.ron", SWEEP), inputs.path("out"));
-    done(&["run", &file, "--out", &out, "--shard", "1/2"]);
+    failing(&["run", &file, "--out", &out, "--shard", "1/2"]);
     let text = done(&["report", &out]).stdout;
     let says = "3 points left out: 2 not finished (`quintile sweep run` runs them), 1 failed\n";
     assert!(text.starts_with(says), "{text}");
@@ -257,7 +270,7 @@ fn a_screened_sweep_is_compared_at_its_last_level() {
     let inputs = Inputs::new();
     let text = SWEEP.replace("axes: [", "screen: [bound, packet], axes: [");
     let (file, out) = (inputs.put("tiles.ron", text), inputs.path("out"));
-    let ended = done(&["run", &file, "--out", &out]);
+    let ended = run_all(&file, &out);
     assert!(ended.stderr.contains("3 of 4 designs ran at packet"), "{}", ended.stderr);
     let report: serde_json::Value = serde_json::from_str(&done(&["report", &out, "--json"]).stdout).unwrap();
     let workloads: Vec<&String> = report["workloads"].as_object().unwrap().keys().collect();
@@ -270,7 +283,7 @@ fn warnings_of_runs_are_in_rows_and_mark_designs() {
     let inputs = Inputs::new();
     let text = SWEEP.replace("\"tiny\"", "\"tiny\", \"platform\": \"hd_4000\"");
     let (file, out) = (inputs.put("tiles.ron", text), inputs.path("out"));
-    done(&["run", &file, "--out", &out]);
+    run_all(&file, &out);
     merged(&out);
     let table = InputTable::read(&Path::new(&out).join("results.parquet")).unwrap();
     let warnings = table.texts("warnings").unwrap();
@@ -308,13 +321,14 @@ fn scripts_for_slurm_run_all_points_and_merge_them() {
     );
     let script = |name: &str, task: &str| {
         let path = Path::new(&out).join(name);
-        let status =
+        let ended =
             std::process::Command::new("sh").arg(path).env("SLURM_ARRAY_TASK_ID", task).output().unwrap();
-        assert!(status.status.success(), "{}", String::from_utf8_lossy(&status.stderr));
+        ended.status.code()
     };
-    ["0", "1", "2"].iter().for_each(|task| script("array.sh", task));
-    script("merge.sh", "");
-    done(&["run", &file, "--out", &local]);
+    // The third point fails, and all are merged.
+    assert_eq!(["0", "1", "2"].map(|task| script("array.sh", task)), [Some(0), Some(0), Some(1)]);
+    assert_eq!(script("merge.sh", ""), Some(0));
+    run_all(&file, &local);
     assert_eq!(fs::read(Path::new(&out).join("results.parquet")).unwrap(), merged(&local));
 }
 
@@ -345,7 +359,7 @@ fn wrong_sweeps_and_folders_are_refused() {
     refused(&SWEEP.replace("\"tiny\"", "\"tinny\""), 2, "did you mean `tiny`?");
     let (file, other) =
         (inputs.put("a.ron", SWEEP), inputs.put("b.ron", SWEEP.replace("\"tiles\"", "\"other\"")));
-    done(&["run", &file, "--out", &out]);
+    run_all(&file, &out);
     let files = point_files(&out);
     let ended = sweep(&["run", &other, "--out", &out]);
     assert!(ended.code == Some(2) && ended.stderr.contains("holds the sweep `tiles`"), "{}", ended.stderr);

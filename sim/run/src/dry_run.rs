@@ -40,6 +40,16 @@ pub struct DryRun {
     pub simulated_frames: usize,
     /// Name of the GPU.
     pub gpu: String,
+    /// How frames are counted and timed; `None` for images alone.
+    #[serde(flatten)]
+    pub timed: Option<DryTimed>,
+    /// Warnings found before the run.
+    pub warnings: Vec<Warning>,
+}
+
+/// How the frames of a run are to be counted and timed.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct DryTimed {
     /// Name of the platform.
     pub platform: String,
     /// Name of the energy table.
@@ -56,8 +66,6 @@ pub struct DryRun {
     pub chosen: Option<String>,
     /// Expected time and memory.
     pub expected: Expected,
-    /// Warnings found before the run.
-    pub warnings: Vec<Warning>,
 }
 
 impl DryRun {
@@ -73,7 +81,7 @@ impl DryRun {
             sampling => sampling.first(prepared.distinct.groups().len()).min(distinct),
         };
         let mut warnings = plan.job.warnings().to_vec();
-        warnings.extend(plan.pairing.clone());
+        warnings.extend(plan.pairing.clone().filter(|_| plan.options.timing.is_some()));
         Ok(Self {
             scene: plan.name.clone(),
             triangles: plan.job.scene().map(Scene::triangle_count),
@@ -87,14 +95,7 @@ impl DryRun {
             distinct_frames: distinct,
             simulated_frames: simulated,
             gpu: plan.gpu.name.clone(),
-            platform: plan.platform.name.clone(),
-            energy_table: plan.table.name().to_owned(),
-            area_mm2: area_mm2(plan),
-            timing: plan.options.level().name(),
-            pacing: plan.options.pacing.name(),
-            trace_rate_hz: plan.options.trace_rate_hz,
-            chosen: prepared.choice.as_ref().map(Choice::line),
-            expected: prepared.expected()?,
+            timed: plan.options.timing.map(|level| DryTimed::new(prepared, level)).transpose()?,
             warnings,
         })
     }
@@ -106,9 +107,6 @@ impl DryRun {
         let [first, end] = self.frames;
         let lens =
             if self.lens_radius > 0.0 { format!("lens {}", self.lens_radius) } else { "pinhole".to_owned() };
-        let rate = self
-            .trace_rate_hz
-            .map_or("50 kHz, more where frames are short".to_owned(), |rate_hz| si(rate_hz, "Hz"));
         let mut rows = vec![
             ("scene", format!("{}{triangles}", self.scene)),
             (
@@ -131,7 +129,37 @@ impl DryRun {
                     self.simulated_frames
                 ),
             ),
-            ("GPU", format!("{}, platform {}, energy table {}", self.gpu, self.platform, self.energy_table)),
+        ];
+        match &self.timed {
+            Some(timed) => rows.extend(timed.rows(&self.gpu)),
+            None => rows.extend([("GPU", self.gpu.clone()), ("timing", "none: images alone".to_owned())]),
+        }
+        rows
+    }
+}
+
+impl DryTimed {
+    fn new(prepared: &Prepared, level: Level) -> Result<Self, RunError> {
+        let plan = &prepared.plan;
+        Ok(Self {
+            platform: plan.platform.name.clone(),
+            energy_table: plan.table.name().to_owned(),
+            area_mm2: area_mm2(plan),
+            timing: level.name(),
+            pacing: plan.options.pacing.name(),
+            trace_rate_hz: plan.options.trace_rate_hz,
+            chosen: prepared.choice.as_ref().map(Choice::line),
+            expected: prepared.expected()?,
+        })
+    }
+
+    /// Its rows, of a run on `gpu`.
+    fn rows(&self, gpu: &str) -> Vec<(&'static str, String)> {
+        let rate = self
+            .trace_rate_hz
+            .map_or("50 kHz, more where frames are short".to_owned(), |rate_hz| si(rate_hz, "Hz"));
+        let mut rows = vec![
+            ("GPU", format!("{gpu}, platform {}, energy table {}", self.platform, self.energy_table)),
             ("area", area_text(&self.area_mm2)),
             ("timing", format!("{}, pacing {}", self.timing, self.pacing)),
             ("recorder", rate),

@@ -74,7 +74,7 @@ impl ImagesSummary {
 }
 
 /// Checks that a job is a rendering of a scene: what others find are counts.
-fn check_job(plan: &Plan) -> Result<(), RunError> {
+pub(super) fn check_job(plan: &Plan) -> Result<(), RunError> {
     if is_rendering(plan) {
         return Ok(());
     }
@@ -100,7 +100,6 @@ impl Prepared {
     /// As [`super::prepare`]. Earlier results in `dir` then stay unchanged.
     pub fn draw(self, mut dir: OutDir, progress: &Progress) -> Result<ImagesSummary, RunError> {
         let Self { plan, provenance, distinct, .. } = self;
-        check_job(&plan)?;
         let numbers = distinct.numbers();
         let bar = progress.bar("frames", numbers.len() as u64);
         let draw = |group: usize| {

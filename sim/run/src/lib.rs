@@ -59,7 +59,7 @@ use workloads::Scene;
 pub use changes::{ChangeError, ChangedFile, InputFile};
 pub use choice::{Choice, Dimensions, ProbeSummary, Verified, cheapest_level};
 pub use distinct::Distinct;
-pub use dry_run::{DryRun, Expected, duration};
+pub use dry_run::{DryRun, DryTimed, Expected, duration};
 pub use error::RunError;
 pub use frame::{CrashedFrame, frames_of, panic_message};
 pub use gpu::{GpuError, GpuSpec, PowerFiles};
@@ -69,9 +69,9 @@ pub use images::{ImageRow, ImagesSummary};
 pub use job_frame::{BIN_PS, JobFrame, PassEnergy};
 pub use machine::{HardwareSummary, area_mm2};
 pub use measure::{Checks, Measurement, Resolution};
-pub use options::{Change, HeatQuantity, PacingChoice, Requested, RunOptions, Sampling, TimingChoice};
+pub use options::{Change, HeatQuantity, PacingChoice, Requested, RunOptions, Sampling};
 pub use passes::{PassSummary, WorkSummary, passes_of};
-pub use plan::{Plan, fits_memory};
+pub use plan::{Plan, fits_memory, refuse_beside_images};
 pub use provenance::{Host, Input, Provenance, again};
 pub use recording::{MACHINES_IN_TURN, RecordedRun, Recording, TimedFrames};
 pub use sampled::{Forecast, FramePreview, Previewer, Previews, Signatures};
@@ -115,6 +115,9 @@ pub fn prepare(
     revision: Option<&str>,
     progress: &Progress,
 ) -> Result<Prepared, RunError> {
+    if plan.options.timing.is_none() {
+        images::check_job(&plan)?;
+    }
     report_camera(&plan, progress);
     let provenance = Provenance::new(&plan, revision)?;
     let distinct = Distinct::new(&*plan.job)?;

@@ -15,7 +15,7 @@ use workloads::job::OptionSource;
 pub(crate) const DEFAULT_RATE_HZ: f64 = 50e3;
 
 /// When the next frame starts.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PacingChoice {
     /// On the next tick of the display
@@ -201,42 +201,6 @@ impl Default for RunOptions {
             exr: false,
             heat: Vec::new(),
             plot_style: Look::default(),
-        }
-    }
-}
-
-/// Value of `--timing`: a timing level for every frame, or sampled simulation.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
-pub enum TimingChoice {
-    /// Every unit from cycle to cycle: the reference, slow
-    Stepped,
-    /// A recurrence over packets
-    #[default]
-    Packet,
-    /// The busiest unit of each batch, fill and drain
-    Bound,
-    /// One frame in fifty at `packet`, the others predicted from a preview, with intervals
-    Sampled,
-    /// Images alone, drawn faster: no counts, cycles and joules
-    None,
-}
-
-impl TimingChoice {
-    /// Timing level of the simulated frames, if they are timed.
-    pub const fn level(self) -> Option<Level> {
-        match self {
-            Self::Stepped => Some(Level::Stepped),
-            Self::Packet | Self::Sampled => Some(Level::Packet),
-            Self::Bound => Some(Level::Bound),
-            Self::None => None,
-        }
-    }
-
-    /// Which frames are simulated.
-    pub const fn sampling(self) -> Sampling {
-        match self {
-            Self::Sampled => Sampling::Some,
-            _ => Sampling::Every,
         }
     }
 }

@@ -12,10 +12,10 @@ use workloads::job::{Reduction, Request};
 use workloads::{Job, Rendering, Settings, catalog};
 
 use crate::RunError;
-use crate::changes::{ChangedFile, Changes};
+use crate::changes::{ChangedFile, Changes, InputFile};
 use crate::gpu::{GpuSpec, check_pairing};
 use crate::hardware;
-use crate::options::{DEFAULT_RATE_HZ, PacingChoice, Requested, RunOptions};
+use crate::options::{Change, DEFAULT_RATE_HZ, PacingChoice, Requested, RunOptions};
 
 /// Plan of a run: options, and all inputs loaded and checked.
 pub struct Plan {
@@ -227,7 +227,19 @@ fn check_images(options: &RunOptions) -> Result<(), RunError> {
         ("--packet-loss", options.packet_loss != 0.0),
         ("the style of plots", options.plot_style != defaults.plot_style),
     ];
-    let asked: Vec<&str> = asked.into_iter().filter(|(_, given)| *given).map(|(name, _)| name).collect();
+    let given = asked.into_iter().filter(|(_, given)| *given).map(|(name, _)| name.to_owned());
+    let is_of_power = |change: &&Change| {
+        matches!(InputFile::of(&change.path), Some(InputFile::Platform | InputFile::Table))
+    };
+    let changes = options.changes.iter().filter(is_of_power).map(|change| format!("--set {}", change.path));
+    refuse_beside_images(&given.chain(changes).collect::<Vec<_>>())
+}
+
+/// Refuses options that need counts or time beside `--timing none`.
+///
+/// # Errors
+/// [`RunError::Setting`] with their names, if there are any.
+pub fn refuse_beside_images(asked: &[String]) -> Result<(), RunError> {
     if asked.is_empty() {
         return Ok(());
     }
@@ -393,8 +405,12 @@ mod tests {
     fn what_needs_counts_or_time_is_named() {
         let images = RunOptions { timing: None, ..RunOptions::default() };
         assert!(check_images(&images).is_ok());
-        let asked = RunOptions { verify: true, packet_loss: 0.5, ..images };
+        let change = |path: &str| Change { path: path.to_owned(), value: "1".to_owned() };
+        let changes =
+            ["gpu.pipeline.tile_px", "platform.v_v", "table.rows.draws.nominal_pj"].map(change).into();
+        let asked = RunOptions { verify: true, packet_loss: 0.5, changes, ..images };
         let message = check_images(&asked).unwrap_err().to_string();
-        assert!(message.contains("--verify, --packet-loss needs"), "{message}");
+        let says = "--verify, --packet-loss, --set platform.v_v, --set table.rows.draws.nominal_pj needs";
+        assert!(message.contains(says), "{message}");
     }
 }

@@ -22,6 +22,7 @@ use serde_json::{Map, Value};
 use super::Failure;
 use super::outputs::{print, print_json};
 use crate::cli::args::{LookArgs, ThreadArgs};
+use crate::cli::parse::named;
 
 /// Arguments of `stress`.
 #[derive(Debug, Args)]
@@ -278,7 +279,7 @@ pub(super) fn stress(args: &StressArgs, terminal: &Terminal) -> Result<(), Failu
     if every row of kind E holds and every row ran something, otherwise with 1; one that is not yet there does not hold.")]
 pub struct ReproduceArgs {
     /// Which paper
-    #[arg(value_enum, value_name = "PAPER", ignore_case = true)]
+    #[arg(value_name = "PAPER", ignore_case = true, value_parser = named(Paper::ALL.map(|paper| (paper, paper.number(), paper.title()))))]
     pub paper: Paper,
     /// Fewer values, frames and repetitions: some minutes. Verdicts then say at how many of the settings they were reached
     #[arg(long)]

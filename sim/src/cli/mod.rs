@@ -158,6 +158,9 @@ fn parse(args: Vec<OsString>) -> Result<Cli, clap::Error> {
     let mut command = Cli::command().color(args::color_of(&args));
     let matches = command.try_get_matches_from_mut(args)?;
     let cli = Cli::from_arg_matches(&matches).map_err(|error| error.format(&mut command))?;
+    if let Some(("run", given)) = matches.subcommand() {
+        run::check_given(given).map_err(|error| command.error(ErrorKind::ArgumentConflict, error))?;
+    }
     // Global options may stand before and after the subcommand; the parser checks conflicts only within each.
     if cli.messages.quiet && cli.messages.verbose {
         let message = "the argument '--quiet' cannot be used with '--verbose'";

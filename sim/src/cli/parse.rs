@@ -3,9 +3,21 @@
 use std::ops::Range;
 use std::str::FromStr;
 
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use experiments::stress::measure::SWITCHES;
 use pipeline::Features;
 use traces::units::{self, Quantity};
+
+/// Parser of one of some values, each with its name and a sentence for the help.
+pub(super) fn named<T: Clone + Send + Sync + 'static, const N: usize>(
+    values: [(T, &'static str, &'static str); N],
+) -> impl TypedValueParser<Value = T> {
+    let names = values.each_ref().map(|(_, name, help)| PossibleValue::new(*name).help(*help));
+    PossibleValuesParser::new(names).try_map(move |given| {
+        let known = values.iter().find(|(_, name, _)| given.eq_ignore_ascii_case(name));
+        known.map(|(value, ..)| value.clone()).ok_or(format!("unknown value `{given}`"))
+    })
+}
 
 /// Range of frames, the end not included; at least one frame.
 pub(super) fn frames(text: &str) -> Result<Range<u32>, String> {

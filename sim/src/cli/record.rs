@@ -17,7 +17,7 @@ use workloads::job::OptionSource;
 use super::Failure;
 use super::lists;
 use super::outputs::{print, print_json};
-use super::run::{bound, one_gpu};
+use super::run::{bound, one_gpu, pacing};
 use crate::cli::args::{SceneArgs, ThreadArgs};
 use crate::cli::parse::setting;
 
@@ -88,7 +88,7 @@ pub struct TimeArgs {
     #[arg(long, value_name = "LEVEL", default_value = "packet", value_parser = level)]
     pub timing: Level,
     /// When the next frame starts
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_name = "PACING", default_value = "vsync", value_parser = pacing())]
     pub pacing: PacingChoice,
     /// Worker threads.
     #[command(flatten)]

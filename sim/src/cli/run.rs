@@ -5,8 +5,9 @@ use std::time::Instant;
 
 use activity::Event;
 use activity::spec::suggestion;
-use clap::Args;
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::builder::TypedValueParser;
+use clap::parser::ValueSource;
+use clap::{ArgMatches, Args, ValueEnum};
 use output::progress::Progress;
 use output::table::{Table, count_or_digits, counted, si, si_mean_sd};
 use output::terminal::{Terminal, Verbosity};
@@ -14,16 +15,17 @@ use output::{Destination, MeanSd};
 use power_model::Bound;
 use run::{
     Choice, DryRun, FinishedRun, HeatQuantity, PacingChoice, Plan, Prepared, Requested, RunError, RunOptions,
-    Summary, TimingChoice, again, open, prepare,
+    Sampling, Summary, again, open, prepare, refuse_beside_images,
 };
 use serde::Serialize;
+use timing::Level;
 use workloads::job::OptionSource;
 
 use super::Failure;
 use super::lists;
 use super::outputs::{json_text, print};
 use crate::cli::args::{LookArgs, SceneArgs, ThreadArgs};
-use crate::cli::parse::{duration, percent, rate, setting, share_below_one};
+use crate::cli::parse::{duration, named, percent, rate, setting, share_below_one};
 
 /// Arguments of `run`.
 #[derive(Debug, Args)]
@@ -90,7 +92,7 @@ pub struct RunArgs {
     #[arg(long)]
     pub verify: bool,
     /// When the next frame starts
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_name = "PACING", default_value = "vsync", value_parser = pacing())]
     pub pacing: PacingChoice,
     /// Samples per second of the recorder, 1 to 10 million: a number in Hz, or with its unit, such as 50kHz or 1MHz [default: 50kHz,
     /// or up to 1MHz where frames are shorter than two samples or, without idle time between them, than fifty]
@@ -124,6 +126,42 @@ pub struct RunArgs {
     /// Style of pictures.
     #[command(flatten)]
     pub look: LookArgs,
+}
+
+/// Value of `--timing`: a timing level for every frame, or sampled simulation.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum TimingChoice {
+    /// Every unit from cycle to cycle: the reference, slow
+    Stepped,
+    /// A recurrence over packets
+    #[default]
+    Packet,
+    /// The busiest unit of each batch, fill and drain
+    Bound,
+    /// One frame in fifty at `packet`, the others predicted from a preview, with intervals
+    Sampled,
+    /// Images alone, drawn about three times as fast: no counts, cycles and joules
+    None,
+}
+
+impl TimingChoice {
+    /// Timing level of the simulated frames, if they are timed.
+    pub const fn level(self) -> Option<Level> {
+        match self {
+            Self::Stepped => Some(Level::Stepped),
+            Self::Packet | Self::Sampled => Some(Level::Packet),
+            Self::Bound => Some(Level::Bound),
+            Self::None => None,
+        }
+    }
+
+    /// Which frames are simulated.
+    pub const fn sampling(self) -> Sampling {
+        match self {
+            Self::Sampled => Sampling::Some,
+            _ => Sampling::Every,
+        }
+    }
 }
 
 /// Arguments that `--again` takes from the summary.
@@ -163,16 +201,30 @@ const SETTINGS: [&str; 31] = [
 
 /// Parser of `--bound`: the name of a column of the energy table.
 pub(super) fn bound() -> impl TypedValueParser<Value = Bound> {
-    let names = [
-        PossibleValue::new("low").help("The lowest that sources support"),
-        PossibleValue::new("nominal").help("The most likely"),
-        PossibleValue::new("high").help("The highest that sources support"),
-    ];
-    PossibleValuesParser::new(names).map(|name| match name.as_str() {
-        "low" => Bound::Low,
-        "high" => Bound::High,
-        _ => Bound::Nominal,
-    })
+    named([
+        (Bound::Low, "low", "The lowest that sources support"),
+        (Bound::Nominal, "nominal", "The most likely"),
+        (Bound::High, "high", "The highest that sources support"),
+    ])
+}
+
+/// Parser of `--pacing`.
+pub(super) fn pacing() -> impl TypedValueParser<Value = PacingChoice> {
+    named([
+        (PacingChoice::Vsync, PacingChoice::Vsync.name(), "On the next tick of the display"),
+        (PacingChoice::Free, PacingChoice::Free.name(), "As soon as the previous frame is done"),
+    ])
+}
+
+/// Refuses options without effect on images alone that are given with their default values; others are refused with the plan.
+pub(super) fn check_given(matches: &ArgMatches) -> Result<(), RunError> {
+    if matches.get_one::<TimingChoice>("timing") != Some(&TimingChoice::None) {
+        return Ok(());
+    }
+    let given = ["bound", "pacing", "packet_samples", "packet_loss"]
+        .into_iter()
+        .filter(|id| matches.value_source(id) == Some(ValueSource::CommandLine));
+    refuse_beside_images(&given.map(|id| format!("--{}", id.replace('_', "-"))).collect::<Vec<_>>())
 }
 
 /// Parser of `--heat`: energy, or a counter that has a position in the image.
@@ -203,8 +255,11 @@ pub(super) fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), Failure> {
     let listed = lists::runs(&options(args), &args.set, &args.out)?;
     let is_alone = listed.iter().all(|run| run.varied.is_empty());
     if !is_alone {
-        // Wrong values are refused before the first of several runs.
-        listed.iter().try_for_each(|run| Plan::resolve(run.options.clone()).map(drop))?;
+        // Wrong values and folders are refused before the first of several runs.
+        listed.iter().try_for_each(|run| {
+            let plan = Plan::resolve(run.options.clone())?;
+            open(&plan, &Destination { folder: run.out.clone(), force: args.force }).map(drop)
+        })?;
     }
     let (mut done, mut json) = (Vec::new(), Vec::new());
     for run in listed {
@@ -247,12 +302,8 @@ fn one(
     let plan = Plan::resolve(options)?;
     let dir = open(&plan, &destination)?;
     let is_timed = plan.options.timing.is_some();
-    if args.dry_run && !is_timed {
-        let message = "--timing none: --dry-run reports the time of what is counted; leave one of both out";
-        return Err(Failure { message: message.to_owned(), code: 2 });
-    }
     let prepared = pool.install(|| prepare(plan, recorded, REVISION, &progress))?;
-    if !is_timed {
+    if !is_timed && !args.dry_run {
         let summary = pool.install(|| prepared.draw(dir, &progress))?;
         if args.json {
             json.push(json_text(&Printed { out: out.display().to_string(), summary: &summary }, true)?);

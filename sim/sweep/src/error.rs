@@ -4,6 +4,7 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use activity::spec::SpecError;
+use output::OutputError;
 use run::RunError;
 use traces::io::WriteError;
 
@@ -65,6 +66,25 @@ pub enum SweepError {
     /// A result cannot be written.
     #[error("{0}{remedy}", remedy = kept(.0))]
     Write(#[from] WriteError),
+    /// A file of the user has the name of a result.
+    #[error("{path}: {why}; move or rename it, then call this again", path = .path.display())]
+    InTheWay {
+        /// The file.
+        path: PathBuf,
+        /// Why it is not an earlier result.
+        why: String,
+    },
+    /// Another process writes results into the folder.
+    #[error("{folder}: another quintile{process} writes results there; wait until it is done", folder = .folder.display())]
+    Busy {
+        /// The folder.
+        folder: PathBuf,
+        /// ` (process 123)`, or empty if the number is unknown.
+        process: String,
+    },
+    /// Results are complete, but cannot be moved into place.
+    #[error(transparent)]
+    Publish(OutputError),
     /// Points are not finished.
     #[error(
         "{folder}: {missing} of {points} points are not finished: call `quintile sweep run` again, or give --partial{damaged}",
@@ -98,9 +118,12 @@ impl SweepError {
             | Self::Setting { .. }
             | Self::Shard(_)
             | Self::OtherSweep { .. }
+            | Self::InTheWay { .. }
+            | Self::Busy { .. }
             | Self::Plan { .. } => true,
             Self::Folder { .. }
             | Self::Write(_)
+            | Self::Publish(_)
             | Self::Unfinished { .. }
             | Self::Slurm(_)
             | Self::Input(_) => false,
@@ -115,6 +138,20 @@ impl SweepError {
     /// Error of the operating system at `path`.
     pub(crate) fn folder(path: &Path) -> impl FnOnce(std::io::Error) -> Self {
         |source| Self::Folder { path: path.to_owned(), source }
+    }
+}
+
+impl From<OutputError> for SweepError {
+    fn from(error: OutputError) -> Self {
+        match error {
+            OutputError::InTheWay { path, why, .. } => Self::InTheWay { path, why },
+            OutputError::Busy { path: folder, process } => Self::Busy { folder, process },
+            OutputError::Folder { path, source } | OutputError::Read { path, source } => {
+                Self::Folder { path, source }
+            }
+            OutputError::Write { path, source } => WriteError::Content { path, source }.into(),
+            error @ (OutputError::Publish { .. } | OutputError::Unclaimed { .. }) => Self::Publish(error),
+        }
     }
 }
 

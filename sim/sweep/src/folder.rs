@@ -5,6 +5,9 @@ use std::fs::{self, File};
 use std::io::{self, BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 
+use output::Destination;
+use output::dir::{Claim, OutDir, sha256_of_text};
+use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 use timing::Level;
 use traces::io::atomic;
@@ -101,6 +104,18 @@ impl Folder {
         self.check(plan)
     }
 
+    /// Opens it for the results `files` of the command `by`: all or none are replaced, and no file of the user.
+    ///
+    /// # Errors
+    /// If a file of the user has such a name, another process writes results, or the folder cannot be written.
+    pub(crate) fn open<'a>(
+        &self,
+        by: &str,
+        files: impl IntoIterator<Item = &'a str>,
+    ) -> Result<OutDir, SweepError> {
+        Ok(Destination::new(&self.root).open([Claim::new(by).files(files)])?)
+    }
+
     /// Whether it has a plan.
     pub(crate) fn holds_plan(&self) -> bool {
         self.root.join(PLAN).exists()
@@ -113,19 +128,16 @@ impl Folder {
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
             Err(error) => return Err(SweepError::folder(&path)(error)),
         };
-        let line = BufReader::new(file).lines().next().transpose().map_err(SweepError::folder(&path))?;
-        let Some(line) = line else {
-            return Err(SweepError::Plan { path, message: "it is empty: plan the sweep again".to_owned() });
-        };
-        let header: Header = serde_json::from_str(&line).map_err(|error| damaged(&path, &error))?;
-        if header.schema != SCHEMA {
-            let message = format!(
-                "its schema is {}, this version reads {SCHEMA}: use the version that wrote it",
-                header.schema
-            );
-            return Err(SweepError::Plan { path, message });
+        let mut line = Vec::new();
+        match BufReader::new(file).read_until(b'\n', &mut line) {
+            Ok(_) => {}
+            Err(error) if error.kind() == io::ErrorKind::IsADirectory => {}
+            Err(error) => return Err(SweepError::folder(&path)(error)),
         }
-        Ok(Some(header))
+        match serde_json::from_slice::<Header>(&line) {
+            Ok(header) if header.schema == SCHEMA => Ok(Some(header)),
+            _ => Err(SweepError::Plan { path, message: not_a_plan(&line) }),
+        }
     }
 
     /// Points of the plan, line by line.
@@ -225,12 +237,11 @@ impl Folder {
     pub(crate) fn stored(&self, point: &Point) -> Result<Stored, SweepError> {
         let path = self.file_of(point);
         let fault = match fs::read(&path) {
-            Ok(bytes) if bytes.is_empty() => "it is empty".to_owned(),
-            Ok(bytes) => match serde_json::from_slice::<PointResult>(&bytes) {
-                Ok(result) if result.id == point.id => return Ok(Stored::Whole(result)),
-                Ok(result) => format!("it holds the point {}", result.id),
-                Err(_) if is_point(&bytes, &point.id) => return Ok(Stored::OtherBuild),
-                Err(error) => format!("it is cut off or damaged: {error}"),
+            Ok(bytes) => match unsealed(&bytes).map(|text| serde_json::from_str::<PointResult>(&text)) {
+                Some(Ok(result)) if result.id == point.id => return Ok(Stored::Whole(result)),
+                Some(Ok(result)) => format!("it holds the point {}", result.id),
+                Some(Err(_)) => return Ok(Stored::OtherBuild),
+                None => fault(&bytes),
             },
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Stored::Missing),
             Err(error) => return Err(SweepError::folder(&path)(error)),
@@ -258,11 +269,11 @@ impl Folder {
         if let Some(folder) = path.parent() {
             fs::create_dir_all(folder).map_err(SweepError::folder(folder))?;
         }
-        atomic::write_file(&path, |out| serde_json::to_writer(out, result)).or_else(|error| {
-            match self.result(point) {
-                Ok(Some(_)) => Ok(()),
-                _ => Err(error.into()),
-            }
+        let write =
+            |out: &mut io::BufWriter<File>| out.write_all(sealed(&serde_json::to_string(result)?).as_bytes());
+        atomic::write_file(&path, write).or_else(|error| match self.result(point) {
+            Ok(Some(_)) => Ok(()),
+            _ => Err(error.into()),
         })
     }
 
@@ -301,6 +312,30 @@ pub(crate) enum Stored {
     Missing,
 }
 
+/// Start of the file of a point; the checksum of the rest follows.
+const SEAL: &str = "{\"sha256\":\"";
+
+/// A JSON object with its checksum as first field.
+fn sealed(object: &str) -> String {
+    format!("{SEAL}{}\",{}", sha256_of_text(object), object.trim_start_matches('{'))
+}
+
+/// The object that was [`sealed`]; `None` if a byte of it has changed.
+fn unsealed(bytes: &[u8]) -> Option<String> {
+    let (sha256, rest) = std::str::from_utf8(bytes).ok()?.strip_prefix(SEAL)?.split_once("\",")?;
+    let object = format!("{{{rest}");
+    (sha256_of_text(&object) == sha256).then_some(object)
+}
+
+/// What is wrong with the file of a point whose checksum is not its own.
+fn fault(bytes: &[u8]) -> String {
+    match serde_json::from_slice::<IgnoredAny>(bytes) {
+        _ if bytes.is_empty() => "it is empty".to_owned(),
+        Ok(_) => "it was changed after it was written".to_owned(),
+        Err(error) => format!("it is cut off or damaged: {error}"),
+    }
+}
+
 /// Whether `bytes` are a whole file of the point `id`, whatever else it holds.
 fn is_point(bytes: &[u8], id: &str) -> bool {
     serde_json::from_slice::<serde_json::Value>(bytes).is_ok_and(|value| value["id"] == id)
@@ -325,8 +360,17 @@ fn entries(folder: &Path) -> Result<Vec<PathBuf>, SweepError> {
     }
 }
 
+/// What is wrong with a file whose first line is `line`, and what to do. It may be a file of the user.
+fn not_a_plan(line: &[u8]) -> String {
+    let header = serde_json::from_slice::<serde_json::Value>(line).unwrap_or_default();
+    match header["schema"].as_u64().filter(|schema| header["sweep"].is_string() && *schema != u64::from(SCHEMA)) {
+        Some(schema) => format!("its schema is {schema}, this version reads {SCHEMA}: use the version that wrote it"),
+        None => "it is not a plan that this program wrote, and stays as it is: move or rename it, or give another --out".to_owned(),
+    }
+}
+
 fn damaged(path: &Path, error: &serde_json::Error) -> SweepError {
-    let message = format!("it is not a plan, or damaged: {error}; plan the sweep again");
+    let message = format!("it is damaged: {error}; plan the sweep again");
     SweepError::Plan { path: path.to_owned(), message }
 }
 
@@ -372,24 +416,56 @@ mod tests {
         assert_eq!(folder.result(&plan.points[1]).unwrap(), None);
         let path = folder.file_of(&plan.points[0]);
         let text = fs::read_to_string(&path).unwrap();
-        let other = text.replace("aa01", "aa02");
-        for (damaged, says) in
-            [(&text[..text.len() / 2], "cut off"), ("", "it is empty"), (&*other, "the point aa02")]
-        {
+        let of = |object: &str| sealed(&object.replace("aa01", "aa02"));
+        let other = of(&unsealed(text.as_bytes()).unwrap());
+        let edited = text.replace("why", "because");
+        for (damaged, says) in [
+            (&text[..text.len() / 2], "cut off"),
+            ("", "it is empty"),
+            (&*other, "the point aa02"),
+            (&*edited, "it was changed after it was written"),
+            (&*text.replace(",", ", "), "it was changed after it was written"),
+        ] {
             fs::write(&path, damaged).unwrap();
             assert_eq!(folder.result(&plan.points[0]).unwrap(), None);
             let Ok(Stored::Damaged(message)) = folder.stored(&plan.points[0]) else { panic!() };
             assert!(message.contains("aa01.json: ") && message.contains(says), "{message}");
         }
-        fs::write(&path, r#"{"id":"aa01","measured":{"cycles":1}}"#).unwrap();
+        fs::write(&path, sealed(r#"{"id":"aa01","measured":{"cycles":1}}"#)).unwrap();
         assert!(matches!(folder.stored(&plan.points[0]).unwrap(), Stored::OtherBuild));
         let path = root.path().join(PLAN);
         let text = fs::read_to_string(&path).unwrap();
-        for length in [0, 10, text.find('\n').unwrap() + 1, text.len() - 5] {
+        for length in [text.find('\n').unwrap() + 1, text.len() - 5] {
             fs::write(&path, &text[..length]).unwrap();
             let error = folder.plan().unwrap_err();
             assert!(error.to_string().contains("plan the sweep again"), "{error}");
+            folder.write_plan(&plan).unwrap();
+            assert_eq!(fs::read_to_string(&path).unwrap(), text);
         }
+    }
+
+    #[test]
+    fn a_plan_of_others_stays_as_it_is() {
+        let root = tempfile::tempdir().unwrap();
+        let (folder, path) = (Folder::at(root.path()), root.path().join(PLAN));
+        let of_others = [&b""[..], b"{\"schema\":2,\"sw", b"{\"task\": \"buy milk\"}\n", b"\xff\0\n"];
+        let newer = &b"{\"schema\":9,\"sweep\":\"a\",\"more\":1}\n"[..];
+        for (text, says) in of_others
+            .map(|text| (text, "not a plan that this program wrote"))
+            .into_iter()
+            .chain([(newer, "its schema is 9")])
+        {
+            fs::write(&path, text).unwrap();
+            for error in [folder.plan().map(drop), folder.write_plan(&plan("a"))].map(Result::unwrap_err) {
+                assert!(error.is_usage() && error.to_string().contains(says), "{error}");
+                assert!(!error.to_string().contains("plan the sweep again"), "{error}");
+            }
+            assert_eq!(fs::read(&path).unwrap(), text);
+        }
+        fs::remove_file(&path).unwrap();
+        fs::create_dir(&path).unwrap();
+        let error = folder.plan().unwrap_err();
+        assert!(error.is_usage() && error.to_string().contains("move or rename it"), "{error}");
     }
 
     #[test]

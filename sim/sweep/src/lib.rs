@@ -45,10 +45,10 @@ pub use merge::{RESULTS, merge};
 pub use plan::{Plan, Point};
 pub use points::combinations;
 pub use report::{
-    ALL_WORKLOADS, Cost, Design, Effect, Failure, Interaction, Measure, NearBest, NoEffect, PageError, Pair,
+    ALL_WORKLOADS, Cost, Design, Effect, Failure, Interaction, Measure, NearBest, NoEffect, Pair,
     RatedDesign, Report, ReportOptions, Share, Winner,
 };
 pub use setting::{Setting, Text, is_option, with};
 pub use shard::Shard;
-pub use slurm::{SlurmArray, SlurmJob, submit, write_scripts};
+pub use slurm::{Scripts, SlurmArray, SlurmJob, submit};
 pub use spec::{Combination, MAX_POINTS, SweepSpec};

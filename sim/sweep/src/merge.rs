@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 
 use activity::Event;
-use traces::io::atomic;
 
 use crate::detail::PassMeans;
 use crate::execute::{Measured, Outcome};
@@ -18,9 +17,11 @@ pub const RESULTS: &str = "results.parquet";
 /// `partial`, points without a result are rows with a reason, too.
 ///
 /// # Errors
-/// [`SweepError::Unfinished`] if points are missing, and if a file cannot be read or written.
+/// [`SweepError::Unfinished`] if points are missing, [`SweepError::InTheWay`] if a file of the user has this name, and if a file
+/// cannot be read or written.
 pub fn merge(folder: &Folder, partial: bool) -> Result<PathBuf, SweepError> {
     let plan = folder.plan()?;
+    let mut dir = folder.open("sweep merge", [RESULTS])?;
     let mut rows = Vec::with_capacity(plan.points.len());
     let mut missing = 0;
     for point in &plan.points {
@@ -33,10 +34,10 @@ pub fn merge(folder: &Folder, partial: bool) -> Result<PathBuf, SweepError> {
         return Err(SweepError::Unfinished { damaged: damaged(folder)?, folder: root, missing, points });
     }
     folder.clean()?;
-    let path = folder.path().join(RESULTS);
     let columns = columns(&plan, &rows);
-    atomic::write_file(&path, |out| parquet::write(&columns, out))?;
-    Ok(path)
+    dir.write_file(RESULTS, |out| Ok(parquet::write(&columns, out)?))?;
+    dir.publish()?;
+    Ok(folder.path().join(RESULTS))
 }
 
 /// End of a message with the first damaged file; empty if there is none.

@@ -3,10 +3,13 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use output::dir::OutDir;
 use output::table::shell_line;
-use traces::io::{WriteError, atomic};
 
-use crate::{Expected, SweepError};
+use crate::{Expected, Folder, SweepError};
+
+/// Names of the scripts: the array, and the job that merges.
+const SCRIPTS: [&str; 2] = ["array.sh", "merge.sh"];
 
 /// Most tasks of an array: the usual limit `MaxArraySize` of Slurm is 1001.
 const MAX_TASKS: usize = 1000;
@@ -93,19 +96,33 @@ impl SlurmJob<'_> {
     }
 }
 
-/// Writes both scripts into `folder`; returns their paths.
-///
-/// # Errors
-/// If they cannot be written.
-pub fn write_scripts(folder: &Path, array: &str, merge: &str) -> Result<[PathBuf; 2], WriteError> {
-    let paths = ["array.sh", "merge.sh"].map(|name| folder.join(name));
-    for (path, text) in paths.iter().zip([array, merge]) {
-        atomic::write_file(path, |out| std::io::Write::write_all(out, text.as_bytes()))?;
+/// Place of both scripts in the folder of a sweep.
+#[derive(Debug)]
+pub struct Scripts(OutDir);
+
+impl Scripts {
+    /// Place in `folder`, which is created if missing.
+    ///
+    /// # Errors
+    /// [`SweepError::InTheWay`] if a file there is not of this program or was edited, and if the folder cannot be written.
+    pub fn open(folder: &Folder) -> Result<Self, SweepError> {
+        Ok(Self(folder.open("sweep slurm", SCRIPTS)?))
     }
-    Ok(paths)
+
+    /// Writes both; returns their paths.
+    ///
+    /// # Errors
+    /// If they cannot be written.
+    pub fn write(mut self, array: &str, merge: &str) -> Result<[PathBuf; 2], SweepError> {
+        for (name, text) in SCRIPTS.into_iter().zip([array, merge]) {
+            self.0.write_file(name, |out| Ok(out.write_all(text.as_bytes())?))?;
+        }
+        self.0.publish()?;
+        Ok(SCRIPTS.map(|name| self.0.path().join(name)))
+    }
 }
 
-/// Submits the scripts of [`write_scripts`] by `sbatch`: the array, and the merge job for when it has ended. Returns the numbers of
+/// Submits [`Scripts`] by `sbatch`: the array, and the merge job for when it has ended. Returns the numbers of
 /// both jobs.
 ///
 /// # Errors

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::time::Duration;
 
-use super::{SWEEP, done, merged, point_files, unfinished_files};
+use super::{SWEEP, merged, point_files, run_all, unfinished_files};
 use crate::support::{Ended, Inputs, quintile};
 
 /// Ends a sweep of 240 points after some of them by `signal`.
@@ -17,7 +17,7 @@ fn a_signal_of_the_scheduler_ends_between_points() {
     let inputs = Inputs::new();
     let file = inputs.put("tiles.ron", SWEEP.replace("axes: [", "repetitions: 60, axes: ["));
     let whole = inputs.path("whole");
-    done(&["run", &file, "--out", &whole]);
+    run_all(&file, &whole);
     for (signal, code) in [("USR1", 138), ("TERM", 143)] {
         let out = inputs.path(signal);
         let ended = ended_by(signal, &file, &out);
@@ -30,7 +30,7 @@ fn a_signal_of_the_scheduler_ends_between_points() {
         let lines = ended.stderr.lines().filter(|line| line.contains("/240 ")).count();
         assert_eq!(lines, finished, "{}", ended.stderr);
         assert!(unfinished_files(&out).is_empty());
-        let again = done(&["run", &file, "--out", &out]);
+        let again = run_all(&file, &out);
         assert!(again.stderr.contains(&format!("{} of 240 runs to do", 240 - finished)), "{}", again.stderr);
         assert!(merged(&out) == merged(&whole));
     }

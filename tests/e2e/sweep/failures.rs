@@ -5,7 +5,9 @@ use std::path::Path;
 use std::process::Command;
 use std::time::{Duration, SystemTime};
 
-use super::{SWEEP, done, merged, point_files, sweep, unfinished_files};
+use output::dir::sha256_of_text;
+
+use super::{SWEEP, done, merged, point_files, run_all, sweep, unfinished_files};
 use crate::support::{Inputs, Quintile, quintile};
 
 /// 240 points.
@@ -61,16 +63,12 @@ fn a_full_disk_ends_a_sweep_that_goes_on_when_there_is_room() {
     assert!(status.stdout.contains(&format!("{finished} of 240 runs finished")), "{}", status.stdout);
     let ended = sweep(&["merge", &out, "--partial"]);
     assert_eq!(ended.code, Some(1), "{}", ended.stderr);
-    assert!(
-        ended.stderr.contains("results.parquet") && ended.stderr.contains("No space left"),
-        "{}",
-        ended.stderr
-    );
+    assert!(ended.stderr.contains(&out) && ended.stderr.contains("No space left"), "{}", ended.stderr);
     assert!(!Path::new(&out).join("results.parquet").exists());
     mounted.change("size=64m");
-    let again = done(&["run", &file, "--out", &out]);
+    let again = run_all(&file, &out);
     assert!(again.stderr.contains(&format!("{} of 240 runs to do", 240 - finished)), "{}", again.stderr);
-    done(&["run", &file, "--out", &whole]);
+    run_all(&file, &whole);
     assert!(merged(&out) == merged(&whole));
 }
 
@@ -81,7 +79,7 @@ fn a_read_only_folder_is_refused_before_anything_runs_and_can_be_read() {
     let (file, disk) = (inputs.put("tiles.ron", SWEEP), inputs.path("disk"));
     let mounted = Mount::new(&disk, "size=64m");
     let out = Path::new(&disk).join("out").display().to_string();
-    done(&["run", &file, "--out", &out]);
+    run_all(&file, &out);
     mounted.change("ro");
     for args in [
         &["run", &file, "--out", &out][..],
@@ -102,6 +100,66 @@ fn a_read_only_folder_is_refused_before_anything_runs_and_can_be_read() {
     assert!(done(&["status", &out]).stdout.contains("4 of 4 runs finished"));
 }
 
+/// Each file that a step writes, with what a user could have there.
+#[test]
+fn a_file_of_the_user_is_never_overwritten() {
+    let inputs = Inputs::new();
+    let (file, out) = (inputs.put("tiles.ron", SWEEP), inputs.path("out"));
+    run_all(&file, &out);
+    let slurm = ["slurm", &file, "--out", &out, "--tasks", "2"];
+    let steps: [(&[&str], &[&str]); 3] = [
+        (&["merge", &out], &["results.parquet"]),
+        (&["report", &out], &["designs.csv", "shares.csv", "frontier.svg", "report.html"]),
+        (&slurm, &["array.sh", "merge.sh"]),
+    ];
+    for (step, names) in steps {
+        let refused = |why: &str| {
+            for path in names.iter().map(|name| Path::new(&out).join(name)) {
+                fs::write(&path, "mine").unwrap();
+                let ended = sweep(step);
+                assert_eq!(ended.code, Some(2), "{step:?}: {}", ended.stderr);
+                let says = format!("{}: {why}", path.display());
+                assert!(
+                    ended.stderr.contains(&says) && ended.stderr.contains("move or rename it"),
+                    "{}",
+                    ended.stderr
+                );
+                assert_eq!(fs::read(&path).unwrap(), b"mine");
+                fs::remove_file(&path).unwrap();
+            }
+        };
+        refused("Quintile did not write");
+        done(step);
+        done(step);
+        refused("this file was changed after Quintile wrote it");
+    }
+}
+
+#[test]
+fn a_report_that_cannot_be_written_leaves_the_earlier_one_whole() {
+    let inputs = Inputs::new();
+    let (file, out) = (inputs.put("tiles.ron", SWEEP), inputs.path("out"));
+    done(&["run", &file, "--out", &out, "--shard", "2/2"]);
+    done(&["report", &out]);
+    let files = || {
+        ["designs.csv", "winners.csv", "shares.csv"].map(|name| fs::read(Path::new(&out).join(name)).unwrap())
+    };
+    let (earlier, page) = (files(), Path::new(&out).join("report.html"));
+    run_all(&file, &out);
+    fs::remove_file(&page).unwrap();
+    fs::create_dir(&page).unwrap();
+    let ended = sweep(&["report", &out]);
+    assert!(
+        ended.code == Some(2) && ended.stderr.contains("report.html: it is a folder"),
+        "{}",
+        ended.stderr
+    );
+    assert!(files() == earlier);
+    fs::remove_dir(&page).unwrap();
+    done(&["report", &out]);
+    assert!(files() != earlier && page.is_file());
+}
+
 #[test]
 fn two_sweeps_at_once_share_no_folder() {
     let inputs = Inputs::new();
@@ -114,7 +172,7 @@ fn two_sweeps_at_once_share_no_folder() {
     assert_eq!(refused.code, Some(2), "{}", refused.stderr);
     assert!(refused.stderr.contains("holds the sweep `tiles`, and this is `other`"), "{}", refused.stderr);
     let ended = running.end();
-    assert!(ended.code == Some(0) && point_files(&out).len() == 240, "{}", ended.stderr);
+    assert!(ended.code == Some(1) && point_files(&out).len() == 240, "{}", ended.stderr);
 }
 
 #[test]
@@ -124,10 +182,10 @@ fn a_shard_that_runs_twice_at_once_does_no_harm() {
         (inputs.put("tiles.ron", many()), ["out", "whole"].map(|name| inputs.path(name)));
     let start = || quintile().spawn(["sweep", "run", &file, "--out", &out]);
     for ended in [start(), start(), start()].map(|running| running.end()) {
-        assert_eq!(ended.code, Some(0), "{}", ended.stderr);
+        assert_eq!(ended.code, Some(1), "{}", ended.stderr);
     }
     assert!(unfinished_files(&out).is_empty());
-    done(&["run", &file, "--out", &whole]);
+    run_all(&file, &whole);
     assert!(merged(&out) == merged(&whole));
 }
 
@@ -136,7 +194,7 @@ fn a_shard_that_runs_twice_at_once_does_no_harm() {
 fn times_of_files_decide_nothing() {
     let inputs = Inputs::new();
     let (file, out) = (inputs.put("tiles.ron", SWEEP), inputs.path("out"));
-    done(&["run", &file, "--out", &out]);
+    run_all(&file, &out);
     let table = merged(&out);
     let plan = Path::new(&out).join("plan.jsonl");
     let century = Duration::from_secs(100 * 365 * 86_400);
@@ -149,7 +207,7 @@ fn times_of_files_decide_nothing() {
         };
         point_files(&out).iter().chain([&plan]).for_each(|path| set(path, time));
         set(Path::new(&file), of_inputs);
-        let ended = done(&["run", &file, "--out", &out]);
+        let ended = run_all(&file, &out);
         assert!(ended.stderr.contains("0 of 4 runs to do"), "{}", ended.stderr);
         assert!(merged(&out) == table);
     }
@@ -180,9 +238,9 @@ fn processes_that_are_killed_while_they_write_leave_nothing_that_counts() {
     let killed = point_files(&out);
     let finished = done(&["status", &out]).stdout;
     assert!(finished.contains(&format!("{} of 240 runs finished", killed.len())), "{finished}");
-    done(&["run", &file, "--out", &out]);
+    run_all(&file, &out);
     assert!(unfinished_files(&out).is_empty(), "{:?}", unfinished_files(&out));
-    done(&["run", &file, "--out", &whole]);
+    run_all(&file, &whole);
     assert!(merged(&out) == merged(&whole));
 }
 
@@ -190,12 +248,14 @@ fn processes_that_are_killed_while_they_write_leave_nothing_that_counts() {
 fn a_damaged_file_of_a_point_is_named_and_its_point_runs_again() {
     let inputs = Inputs::new();
     let (file, out) = (inputs.put("tiles.ron", SWEEP), inputs.path("out"));
-    done(&["run", &file, "--out", &out]);
+    run_all(&file, &out);
     let table = merged(&out);
     let path = point_files(&out).remove(0);
     let name = path.display().to_string();
     let whole = fs::read(&path).unwrap();
+    let edited = String::from_utf8(whole.clone()).unwrap().replace("\"cycles\":", "\"cycles\":1");
     for (bytes, says) in [
+        (edited.as_bytes(), "it was changed after it was written"),
         (&whole[..whole.len() / 2], "cut off or damaged"),
         (b"", "it is empty"),
         (b"\xff\0rubbish", "damaged"),
@@ -205,7 +265,7 @@ fn a_damaged_file_of_a_point_is_named_and_its_point_runs_again() {
         assert_eq!(merge.code, Some(1), "{}", merge.stderr);
         let status = done(&["status", &out]);
         assert!(status.stdout.contains("3 of 4 runs finished"), "{}", status.stdout);
-        let run = done(&["run", &file, "--out", &out]);
+        let run = run_all(&file, &out);
         assert!(run.stderr.contains("1 of 4 runs to do"), "{}", run.stderr);
         for stderr in [merge.stderr, status.stderr, run.stderr] {
             assert!(
@@ -221,7 +281,7 @@ fn a_damaged_file_of_a_point_is_named_and_its_point_runs_again() {
 fn a_changed_program_runs_its_points_again() {
     let inputs = Inputs::new();
     let (file, out, program) = (inputs.put("tiles.ron", SWEEP), inputs.path("out"), inputs.path("quintile"));
-    done(&["run", &file, "--out", &out]);
+    run_all(&file, &out);
     // The same program under another name is the same.
     fs::copy(env!("CARGO_BIN_EXE_quintile"), &program).unwrap();
     let run = || Quintile::new(&program).call(["sweep", "run", &file, "--out", &out]);
@@ -240,7 +300,7 @@ fn a_changed_program_runs_its_points_again() {
         );
     }
     let ended = run();
-    assert!(ended.code == Some(0) && ended.stderr.contains("4 of 4 runs to do"), "{}", ended.stderr);
+    assert!(ended.code == Some(1) && ended.stderr.contains("4 of 4 runs to do"), "{}", ended.stderr);
     // Nothing is lost without a request.
     let status = program.call(["sweep", "status", &out]).stderr;
     assert!(status.contains("4 results of other builds") && !status.contains("another build"), "{status}");
@@ -254,15 +314,17 @@ fn a_changed_program_runs_its_points_again() {
 fn a_result_with_other_numbers_is_of_another_build() {
     let inputs = Inputs::new();
     let (file, out) = (inputs.put("tiles.ron", SWEEP), inputs.path("out"));
-    done(&["run", &file, "--out", &out]);
+    run_all(&file, &out);
     for path in point_files(&out) {
         let text = fs::read_to_string(&path).unwrap().replace("\"cycles\":", "\"ticks\":");
-        fs::write(&path, text).unwrap();
+        let (_, rest) = text.split_once("\",").unwrap();
+        let sha256 = sha256_of_text(&format!("{{{rest}"));
+        fs::write(&path, format!("{{\"sha256\":\"{sha256}\",{rest}")).unwrap();
     }
     let status = done(&["status", &out]);
     assert!(status.stdout.contains("1 of 4 runs finished, 1 failed"), "{}", status.stdout);
     let says = "3 results written by another build of quintile";
     assert!(status.stderr.contains(says) && !status.stderr.contains("damaged"), "{}", status.stderr);
-    let run = done(&["run", &file, "--out", &out]).stderr;
+    let run = run_all(&file, &out).stderr;
     assert!(run.contains(says) && run.contains("3 of 4 runs to do"), "{run}");
 }

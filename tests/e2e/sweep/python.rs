@@ -6,15 +6,15 @@ use std::process::Command;
 
 use serde_json::{Value, json};
 
-use super::{SWEEP, done, merged, point_files};
+use super::{SWEEP, merged, point_files, run_all};
 use crate::support::{Inputs, root};
 
-/// Standard output of `script` of this repository with `args`.
-fn python(script: &str, args: &[&str]) -> String {
+/// Standard output of `script` of this repository with `args`, which ends with `code`.
+fn python(script: &str, args: &[&str], code: i32) -> String {
     let program = std::env::var("QUINTILE_PYTHON").unwrap_or_else(|_| "python3".to_owned());
     let ended = Command::new(program).arg(root().join(script)).args(args).output().unwrap();
     let stderr = String::from_utf8_lossy(&ended.stderr);
-    assert!(ended.status.success(), "{script} {args:?}: {stderr}");
+    assert_eq!(ended.status.code(), Some(code), "{script} {args:?}: {stderr}");
     String::from_utf8(ended.stdout).unwrap()
 }
 
@@ -26,10 +26,10 @@ fn ray_merges_to_the_bytes_of_a_local_run() {
     let [local, out] = ["local", "out"].map(|name| inputs.path(name));
     let driver = "sim/sweep/drivers/ray_sweep.py";
     let program = env!("CARGO_BIN_EXE_quintile");
-    python(driver, &[&file, "--out", &out, "--shards", "3", "--quintile", program]);
+    python(driver, &[&file, "--out", &out, "--shards", "3", "--quintile", program], 1);
     assert_eq!(point_files(&out).len(), 4);
     let table = fs::read(Path::new(&out).join("results.parquet")).unwrap();
-    done(&["run", &file, "--out", &local]);
+    run_all(&file, &local);
     assert!(table == merged(&local));
 }
 
@@ -53,7 +53,7 @@ fn a_search_is_compared_with_random_points_and_with_all() {
     let arguments =
         [&*file, "--out", &out, "--points", "12", "--truth", "--quintile", env!("CARGO_BIN_EXE_quintile")];
     let driver = "sim/sweep/drivers/optuna_sweep.py";
-    let found: Value = serde_json::from_str(&python(driver, &arguments)).unwrap();
+    let found: Value = serde_json::from_str(&python(driver, &arguments, 0)).unwrap();
     assert_eq!(found["all"], json!({"points": 36, "hypervolume": 1.0}));
     for method in ["nsga2", "random"] {
         let share = found[method]["hypervolume"].as_f64().unwrap();
@@ -63,7 +63,7 @@ fn a_search_is_compared_with_random_points_and_with_all() {
     assert_eq!(point_files(&out).len(), 36);
     // The search is a sweep as any other.
     assert!(!merged(&out).is_empty());
-    assert_eq!(found, serde_json::from_str::<Value>(&python(driver, &arguments)).unwrap(), "by its seed");
+    assert_eq!(found, serde_json::from_str::<Value>(&python(driver, &arguments, 0)).unwrap(), "by its seed");
 }
 
 #[test]
@@ -76,7 +76,7 @@ fn pandas_polars_and_duckdb_read_types_nulls_and_the_order_of_rows() {
     let flags = "axes: [Values(path: \"gpu.pipeline.features.z_max\", values: [true, false]), ";
     let file = inputs.put("tiles.ron", SWEEP.replace("axes: [", flags));
     let out = inputs.path("out");
-    done(&["run", &file, "--out", &out]);
+    run_all(&file, &out);
     merged(&out);
     let table = Path::new(&out).join("results.parquet").display().to_string();
     let plan = fs::read_to_string(Path::new(&out).join("plan.jsonl")).unwrap();
@@ -84,7 +84,7 @@ fn pandas_polars_and_duckdb_read_types_nulls_and_the_order_of_rows() {
     let ids: Vec<Value> = points.collect();
     for reader in ["pandas", "polars", "duckdb"] {
         let read: Value =
-            serde_json::from_str(&python("tests/e2e/sweep/readers.py", &[reader, &table])).unwrap();
+            serde_json::from_str(&python("tests/e2e/sweep/readers.py", &[reader, &table], 0)).unwrap();
         let kind = |column: &str| read["kinds"][column].as_str().unwrap_or_else(|| panic!("{column}"));
         let wholes = ["gpu.pipeline.tile_px", "cycles", "dram_bytes", "seed", "count.samples_tested"];
         let numbers = ["busy_ms", "frame_mJ", "energy_per_pixel_nJ"];

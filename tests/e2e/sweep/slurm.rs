@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use tempfile::TempDir;
 
-use super::{SWEEP, done, merged, point_files};
+use super::{SWEEP, merged, point_files, run_all};
 use crate::support::Inputs;
 
 /// Longest wait for anything, in seconds.
@@ -238,6 +238,6 @@ fn a_cluster_merges_to_the_bytes_of_a_local_run_though_a_task_is_killed_and_one_
     cluster.wait_for_jobs();
     assert_eq!(point_files(&out).len(), 24);
     let merged_by_job = fs::read(Path::new(&out).join("results.parquet")).unwrap();
-    done(&["run", &file, "--out", &local]);
+    run_all(&file, &local);
     assert!(merged_by_job == merged(&local));
 }

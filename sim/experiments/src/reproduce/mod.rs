@@ -38,23 +38,23 @@ pub use settings::{About, Listed, Origin};
 pub use verdict::{Kind, Verdict};
 
 /// Papers with reproduced claims.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub enum Paper {
     /// Performance per What?
-    #[value(name = "II")]
     #[serde(rename = "II")]
     Two,
     /// Measuring Per-Frame Energy Consumption of Real-Time Graphics Applications
-    #[value(name = "III")]
     #[serde(rename = "III")]
     Three,
     /// Design and Novel Uses of Higher-Dimensional Rasterization
-    #[value(name = "VI")]
     #[serde(rename = "VI")]
     Six,
 }
 
 impl Paper {
+    /// All papers.
+    pub const ALL: [Self; 3] = [Self::Two, Self::Three, Self::Six];
+
     /// Its number.
     pub const fn number(self) -> &'static str {
         match self {

@@ -94,6 +94,13 @@ fn read(path: &Path) -> Result<Value, CompareError> {
     let text = std::fs::read(path).map_err(CompareError::unreadable(path))?;
     let run: Value = serde_json::from_slice(&text)
         .map_err(|error| CompareError::broken(path, format!("not JSON: {error}; run it again")))?;
+    if run["scene"].is_string() && run["images"].is_array() {
+        let images = path.with_file_name("images").display().to_string();
+        return Err(CompareError::Usage(format!(
+            "{}: it is a run of images alone (`--timing none`), which has no numbers to compare: compare its images, {images}",
+            path.display()
+        )));
+    }
     let whole = run["scene"].is_string() && run["counts"].is_object() && run["frames"].is_array();
     if !whole {
         let message = "it is not the summary of `quintile run`: give the folder of a run or its summary.json";

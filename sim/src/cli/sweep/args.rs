@@ -14,7 +14,7 @@ use crate::cli::parse::percent;
     after_help = "Examples:\n  quintile sweep run tiles.ron --out tiles --dry-run\n  quintile sweep run tiles.ron --out tiles\n  \
     quintile sweep merge tiles\n  quintile sweep report tiles\n  sbatch --array=0-7 --wrap 'quintile sweep run tiles.ron --out tiles'\n\n\
     `sweep run` may be stopped at any moment and called again: finished points are skipped. Points are finished when their \
-    file is in DIR/points; a point that fails is finished, too, with its reason. After USR1 or TERM no further points are begun, those \
+    file is in DIR/points; a point that fails is finished, too, with its reason, and the exit code is 1 if one has. After USR1 or TERM no further points are begun, those \
     in flight are finished (after TERM, if they can within 20 s), and the exit code is 138 or 143 if points are left."
 )]
 pub struct SweepArgs {

@@ -12,8 +12,8 @@ use rayon::ThreadPool;
 use run::Input;
 use serde::Serialize;
 use sweep::{
-    Answer, Expected, Folder, Plan, Question, Search, Shard, SlurmArray, SlurmJob, Status, SweepError, Work,
-    merge, submit, write_scripts,
+    Answer, Expected, Folder, Plan, Question, Scripts, Search, Shard, SlurmArray, SlurmJob, Status,
+    SweepError, Work, merge, submit,
 };
 
 pub use self::args::SweepArgs;
@@ -113,9 +113,16 @@ fn run_points(args: &RunStepArgs, terminal: &Terminal, stop: &Stop) -> Result<()
         args.sweep.json,
         &InShard { status, shard, sweep_points: plan.points.len() },
     )?;
-    match status.points - status.finished {
-        0 => Ok(()),
-        left => Err(Failure {
+    match (status.points - status.finished, status.failed) {
+        (0, 0) => Ok(()),
+        (0, failed) => Err(Failure {
+            message: format!(
+                "{} failed: the lines above and the table have the reasons; --retry runs them again",
+                counted(failed, "run")
+            ),
+            code: 1,
+        }),
+        (left, _) => Err(Failure {
             message: format!(
                 "stopped by a signal: {} not finished; call it again to continue",
                 counted(left, "run")
@@ -127,6 +134,7 @@ fn run_points(args: &RunStepArgs, terminal: &Terminal, stop: &Stop) -> Result<()
 
 fn slurm(args: &SlurmArgs, terminal: &Terminal) -> Result<(), Failure> {
     let opened = Opened::new(&args.sweep, terminal)?;
+    let scripts = Scripts::open(&opened.folder)?;
     opened.folder.write_plan(&opened.plan)?;
     let expected = opened.probe(Shard::default(), false)?;
     let Opened { plan, pool, .. } = opened;
@@ -143,7 +151,7 @@ fn slurm(args: &SlurmArgs, terminal: &Terminal) -> Result<(), Failure> {
     let [run, merge] = commands(&args.sweep);
     let job = SlurmJob { name: &plan.name, folder: &out, directory: &directory, command: &run };
     let merge_sh = SlurmJob { command: &merge, ..job }.merge_script();
-    let paths = write_scripts(&out, &array.script(&job), &merge_sh)?;
+    let paths = scripts.write(&array.script(&job), &merge_sh)?.map(|path| absolute(&path));
     let jobs = match args.submit {
         true => Some(submit(paths.each_ref().map(PathBuf::as_path))?),
         false => None,

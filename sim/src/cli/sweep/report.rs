@@ -1,32 +1,22 @@
 //! `quintile sweep report`.
 
-use std::io::Write;
-
 use output::table::{Table, counted, si};
 use output::terminal::Terminal;
 use sweep::{RatedDesign, Report, ReportOptions};
-use traces::io::atomic::write_file;
 
 use super::args::ReportArgs;
 use super::{Printed, opened};
 use crate::cli::Failure;
 use crate::cli::outputs::{print, print_json};
-use crate::cli::trace::{PlotFormat, write_picture};
 
 pub(super) fn report(args: &ReportArgs, terminal: &Terminal) -> Result<(), Failure> {
     let folder = opened(&args.folder, terminal)?;
     let report = Report::of(&folder, ReportOptions { within: args.within })?;
-    let file = |name: &str| folder.path().join(name);
-    report.tables().into_iter().try_for_each(|(name, table)| write_file(&file(name), |out| table(out)))?;
-    let look = args.look.look();
-    write_picture(&report.picture(&look), &file("frontier.svg"), PlotFormat::Svg)?;
-    let page = report.html(&look).map_err(|error| Failure { message: error.to_string(), code: 1 })?;
-    write_file(&file("report.html"), |out| out.write_all(page.as_bytes()))?;
+    let page = report.write(&folder, &args.look.look())?;
     let name = folder.path().display().to_string();
     if args.folder.json {
         return print_json(&Printed { out: name, done: &report }, true);
     }
-    let html = file("report.html").display().to_string();
     let notes: String = report.notes().iter().map(|note| format!("{note}\n")).collect();
     let effects = match report.no_effects.len() {
         0 => String::new(),
@@ -35,7 +25,12 @@ pub(super) fn report(args: &ReportArgs, terminal: &Terminal) -> Result<(), Failu
             counted(count, "setting")
         ),
     };
-    print(&format!("{notes}{}\n{}\n{effects}report: {html}", frontiers(&report), winners(&report)))
+    print(&format!(
+        "{notes}{}\n{}\n{effects}report: {}",
+        frontiers(&report),
+        winners(&report),
+        page.display()
+    ))
 }
 
 /// Designs on the frontier, the fastest first.

@@ -16,7 +16,9 @@ mod tables;
 mod winners;
 
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 
+use output::plot::Look;
 use output::table::counted;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -25,13 +27,17 @@ pub(crate) use design::label;
 pub use design::{Cost, Design};
 pub use effects::{Effect, Interaction, NoEffect, Share};
 pub use frontier::RatedDesign;
-pub use page::PageError;
 pub use winners::{Measure, NearBest, Pair, Winner};
 
 use self::design::{Row, designs, short_names};
 use crate::execute::Outcome;
 use crate::plan::{Point, idle};
 use crate::{Folder, SweepError};
+
+/// File of the page.
+const PAGE: &str = "report.html";
+/// File of the picture.
+const PICTURE: &str = "frontier.svg";
 
 /// What a report is made for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -143,6 +149,24 @@ impl Report {
             failed,
             ..of_rows
         })
+    }
+
+    /// Writes the report into `folder`: its page, a picture, and tables. All are replaced together, and no file of the user. Returns
+    /// the path of the page.
+    ///
+    /// # Errors
+    /// [`SweepError::InTheWay`] if a file of the user has the name of one of them, and if they cannot be written.
+    pub fn write(&self, folder: &Folder, look: &Look) -> Result<PathBuf, SweepError> {
+        let tables = self.tables();
+        let names = tables.iter().map(|(name, _)| *name).chain([PICTURE, PAGE]);
+        let mut dir = folder.open("sweep report", names)?;
+        for (name, table) in &tables {
+            dir.write_file(name, |out| Ok(table(out)?))?;
+        }
+        dir.write_file(PICTURE, |out| Ok(out.write_all(self.picture(look).svg()?.as_bytes())?))?;
+        dir.write_file(PAGE, |out| Ok(out.write_all(self.html(look)?.as_bytes())?))?;
+        dir.publish()?;
+        Ok(folder.path().join(PAGE))
     }
 
     /// What a reader has to know before the numbers: which points are not in, by cause, which constraints do nothing, and designs whose

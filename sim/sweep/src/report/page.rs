@@ -17,7 +17,7 @@ const MAX_INTERACTIONS: usize = 60;
 
 /// Why the page cannot be made.
 #[derive(Debug, thiserror::Error)]
-pub enum PageError {
+pub(super) enum PageError {
     /// The template cannot be filled.
     #[error("cannot fill the report: {0}")]
     Template(#[from] minijinja::Error),
@@ -43,7 +43,7 @@ impl Report {
     ///
     /// # Errors
     /// [`PageError`] if the template cannot be filled, or the picture cannot be drawn.
-    pub fn html(&self, look: &Look) -> Result<String, PageError> {
+    pub(super) fn html(&self, look: &Look) -> Result<String, PageError> {
         let mut environment = Environment::new();
         environment.set_trim_blocks(true);
         environment.set_lstrip_blocks(true);

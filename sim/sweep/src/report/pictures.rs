@@ -18,7 +18,7 @@ const MAX_NAMES: usize = 12;
 
 impl Report {
     /// Designs over each two of time, energy and area. The frontier is over all three; steps are that of the two that are shown.
-    pub fn picture(&self, look: &Look) -> Picture {
+    pub(super) fn picture(&self, look: &Look) -> Picture {
         let pairs = [(TIME, ENERGY), (AREA, TIME), (AREA, ENERGY)];
         let panels = pairs.into_iter().filter_map(|(x, y)| self.panel(x, y)).collect();
         Chart::new("Designs", &self.sweep, panels).picture(look)

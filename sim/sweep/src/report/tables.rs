@@ -11,7 +11,7 @@ type Table<'a> = Box<dyn Fn(&mut dyn Write) -> io::Result<()> + 'a>;
 
 impl Report {
     /// Tables by the names of their files.
-    pub fn tables(&self) -> Vec<(&'static str, Table<'_>)> {
+    pub(super) fn tables(&self) -> Vec<(&'static str, Table<'_>)> {
         vec![
             ("designs.csv", Box::new(|out| self.write_designs(out))),
             ("winners.csv", Box::new(|out| write_rows(&self.winners, out))),
