@@ -47,7 +47,7 @@ impl TimingChart {
         };
         let frames = self.animations.first().map_or(0, |row| row.frames);
         let subject = format!(
-            "animations of {frames} frames and single frames, each on three GPUs; lower and further left is better. Errors of \
+            "animations of {frames} frames and single frames, each on all built-in GPUs; lower and further left is better. Errors of \
              animations, median (middle half, number of points): {}",
             self.medians()
         );
