@@ -1,6 +1,6 @@
 //! Code that makes packets or changes their counts, from its sources.
 //!
-//! `syn` knows no types, so a change is told by the names of a packet's fields: whatever is written to one of them counts, but for a
+//! `syn` knows no types, so a change is known by the names of a packet's fields: whatever is written to one of them counts, but for a
 //! field of `self` and for sums into a whole `counts` of what is no local copy, as other structures have one, too. Test modules are
 //! skipped, wherever they are in a file.
 
