@@ -834,7 +834,7 @@ fn dropped_contents_are_gone() {
     });
 }
 
-/// Passes are drawn in the order in which they are asked for, and read what earlier ones stored, so no cycle of them can be asked for: one that
+/// Passes are drawn in the order in which they are requested, and read what earlier ones stored, so no cycle of them can be requested: one that
 /// reads what a later pass is to write is refused, or reads what was there before.
 #[test]
 fn a_pass_reads_what_earlier_passes_stored_and_never_what_later_ones_will() {

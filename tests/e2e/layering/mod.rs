@@ -109,6 +109,8 @@ fn packets_made_of_others_and_after_tests_are_found() {
         "fn f(first: &Packet) { let mut copy = *first; copy.counts = of; emit(&copy) }",
         "fn f(first: &Packet) { let mut copy = first.clone(); copy.triangle = 3; emit(&copy) }",
         "fn f(first: &Packet) { let mut copy = *first; change(&mut copy.counts[Event::Draws]) }",
+        "fn f(first: &Packet) { let mut copy = *first; copy.counts += &other.counts; emit(&copy) }",
+        "fn f(first: &Packet) { let mut copy = first.clone(); change(&mut copy.counts); emit(&copy) }",
         "fn f(packet: &mut Packet) { fill(packet) }",
         "fn f() { vec![Packet { batch: 2, ..first }] }",
         "use activity::{Event, Packet as Work};",

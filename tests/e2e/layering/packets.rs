@@ -1,11 +1,11 @@
 //! Code that makes packets or changes their counts, from its sources.
 //!
-//! `syn` knows no types, so a change is told by the names of a packet's fields: whatever is written to one of them counts, but for a
-//! field of `self` and for sums into a whole `counts`, which other structures have, too. Test modules are skipped, wherever they are in
-//! a file.
+//! `syn` knows no types, so a change is known by the names of a packet's fields: whatever is written to one of them counts, but for a
+//! field of `self` and for sums into a whole `counts` of what is no local copy, as other structures have one, too. Test modules are
+//! skipped, wherever they are in a file.
 
 use syn::visit::{self, Visit};
-use syn::{Attribute, Expr, File, Item, Macro, Member, Path, Type, UseTree};
+use syn::{Attribute, Expr, File, Item, Local, Macro, Member, Pat, Path, Type, UnOp, UseTree};
 
 /// Types of which no code above the pipeline has a value of its own.
 const TYPES: [&str; 2] = ["Packet", "PacketCounts"];
@@ -17,18 +17,23 @@ pub fn made(text: &str) -> Vec<String> {
     let parsed: File = syn::parse_file(text).expect("a source file");
     let mut found = Found::default();
     found.visit_file(&parsed);
-    found.0
+    found.what
 }
 
 #[derive(Default)]
-struct Found(Vec<String>);
+struct Found {
+    what: Vec<String>,
+    /// Names of variables that are copies of others.
+    copies: Vec<String>,
+}
 
 impl Found {
     fn add(&mut self, what: impl Into<String>) {
-        self.0.push(what.into());
+        self.what.push(what.into());
     }
 
-    /// A value is written to a place, or may be through a reference. `counts` of other structures are added to as a whole.
+    /// A value is written to a place, or may be through a reference. `counts` of other structures are added
+    /// to as a whole.
     fn written(&mut self, place: &Expr, is_added: bool) {
         let (mut at, mut is_indexed) = (place, false);
         loop {
@@ -44,9 +49,13 @@ impl Found {
         }
         let Expr::Field(field) = at else { return };
         let Member::Named(name) = &field.member else { return };
-        let is_own = matches!(&*field.base, Expr::Path(path) if path.path.is_ident("self"));
+        let owner = match &*field.base {
+            Expr::Path(path) => path.path.get_ident().map(ToString::to_string).unwrap_or_default(),
+            _ => String::new(),
+        };
+        let (is_own, is_copy) = (owner == "self", self.copies.contains(&owner));
         let is_of_packet =
-            FIELDS.iter().any(|of| name == of) || (name == "counts" && (is_indexed || !is_added));
+            FIELDS.iter().any(|of| name == of) || (name == "counts" && (is_indexed || !is_added || is_copy));
         if is_of_packet && !is_own {
             self.add(format!("writes `.{name}`"));
         }
@@ -105,6 +114,15 @@ impl Visit<'_> for Found {
         visit::visit_item(self, item);
     }
 
+    fn visit_local(&mut self, local: &Local) {
+        if let (Pat::Ident(name), Some(from)) = (&local.pat, &local.init)
+            && is_copied(&from.expr)
+        {
+            self.copies.push(name.ident.to_string());
+        }
+        visit::visit_local(self, local);
+    }
+
     fn visit_expr(&mut self, expr: &Expr) {
         match expr {
             Expr::Struct(made) if ends_in_packet(&made.path) => self.add("makes a packet"),
@@ -146,6 +164,15 @@ impl Visit<'_> for Found {
         if TYPES.iter().any(made) {
             self.add("makes a packet in a macro");
         }
+    }
+}
+
+/// `*first` or `first.clone()`.
+fn is_copied(expr: &Expr) -> bool {
+    match expr {
+        Expr::Unary(of) => matches!(of.op, UnOp::Deref(_)),
+        Expr::MethodCall(call) => call.method == "clone" || call.method == "to_owned",
+        _ => false,
     }
 }
 

@@ -165,17 +165,17 @@ pub struct Rasterized<const D: usize> {
     /// Rounds, one pass each.
     pub passes: u32,
     /// The uncovered regions of the last round.
-    pub voids: Vec<Cube<D>>,
+    pub uncovered: Vec<Cube<D>>,
 }
 
 impl<const D: usize> Rasterized<D> {
     /// Whether a point is in a region of the last round, and so was not there before: the regions are smaller than the least
     /// distance, so there is no earlier point in them.
-    pub fn is_in_void(&self, point: &[f64; D]) -> bool {
+    pub fn is_in_uncovered(&self, point: &[f64; D]) -> bool {
         let is_in = |cube: &Cube<D>| {
             (0..D).all(|axis| (cube.low[axis]..cube.low[axis] + cube.side).contains(&point[axis]))
         };
-        self.voids.iter().any(is_in)
+        self.uncovered.iter().any(is_in)
     }
 }
 
@@ -188,9 +188,9 @@ pub fn darts<const D: usize>(
     rounds: u32,
     gpu: &mut Gpu<'_>,
 ) -> Result<Rasterized<D>, JobError> {
-    let (mut passes, mut sums, mut voids) = (0, [0; 3], Vec::new());
+    let (mut passes, mut sums, mut uncovered) = (0, [0; 3], Vec::new());
     let draw = |cubes: &[Cube<D>]| {
-        voids = cubes.to_vec();
+        uncovered = cubes.to_vec();
         let Kept { points, candidates, fragments, .. } = round(cubes, passes, spec.seed, gpu)?;
         sums = [sums[0] + points.len() as u64, sums[1] + candidates, sums[2] + fragments];
         passes += 1;
@@ -198,7 +198,7 @@ pub fn darts<const D: usize>(
     };
     let (found, drawn) = poisson_disk_drawn(spec, rounds, draw)?.map_err(JobError::setting)?;
     let [kept, candidates, fragments] = sums;
-    Ok(Rasterized { found, drawn, kept, candidates, fragments, passes, voids })
+    Ok(Rasterized { found, drawn, kept, candidates, fragments, passes, uncovered })
 }
 
 /// Darts on a GPU of its own, and its work.

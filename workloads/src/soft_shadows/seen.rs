@@ -11,8 +11,8 @@ use super::map::{Method, SceneView};
 use crate::accumulation::{SharedSamples, Snapshot};
 use crate::job::JobError;
 
-/// Triangles that a surface of numbers tells apart: shaders compute them in single precision.
-const MOST_TRIANGLES: usize = 1 << 24;
+/// Triangles that a surface of numbers distinguishes: shaders compute them in single precision.
+const MAX_TRIANGLES: usize = 1 << 24;
 /// Bytes of a number.
 const NUMBER_BYTES: u64 = 4;
 
@@ -44,7 +44,7 @@ impl VisibleTriangles {
     /// Draws `view` at the samples of `set`.
     ///
     /// # Errors
-    /// [`JobError`] if the hardware cannot be built, or for more triangles than single precision tells apart.
+    /// [`JobError`] if the hardware cannot be built, or for more triangles than single precision distinguishes.
     pub fn draw(
         view: &SceneView<'_>,
         viewport: Viewport,
@@ -54,9 +54,9 @@ impl VisibleTriangles {
     ) -> Result<Self, JobError> {
         let SceneView { camera, draws } = *view;
         let triangles: usize = draws.iter().map(|draw| draw.geometry.triangles().len()).sum();
-        if triangles > MOST_TRIANGLES {
+        if triangles > MAX_TRIANGLES {
             let most = format_args!(
-                "soft shadows tell {MOST_TRIANGLES} triangles apart, and the scene has {triangles}"
+                "soft shadows distinguish {MAX_TRIANGLES} triangles, and the scene has {triangles}"
             );
             return Err(JobError::setting(most));
         }

@@ -346,7 +346,7 @@ pub(super) fn dodged(task: &Task<'_>) -> Result<Done, RunError> {
                     there = there.and(&ours_there).and(&depth_there);
                     let same = looked.is_distinguished(&ours_there, &depth_there);
                     let text = case_text(case, &ours, &depth, resolution);
-                    let on_hardware = if same { "does the same" } else { "does not tell them apart" };
+                    let on_hardware = if same { "does the same" } else { "does not" };
                     said.push(format!("{text}; the modelled hardware {on_hardware}"));
                 }
             }

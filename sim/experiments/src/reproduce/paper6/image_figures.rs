@@ -132,8 +132,8 @@ const SPACE_PX: u32 = 320;
 /// Distances r along a side of the part of the cube that is drawn.
 const SIDE: f64 = 9.0;
 
-/// Linear RGB of voids, blue as in the paper, and of points.
-const VOID: Vec3 = Vec3::new(0.05, 0.20, 0.80);
+/// Linear RGB of uncovered regions, blue as in the paper, and of points.
+const REGION: Vec3 = Vec3::new(0.05, 0.20, 0.80);
 const POINT: Vec3 = Vec3::new(0.75, 0.72, 0.66);
 
 /// Meshes in one.
@@ -154,20 +154,20 @@ impl Shown {
 }
 
 /// Figure 11 in space: balls of half the least distance around the points before the last pass, so that they touch at most, and the
-/// voids that it draws.
-pub(super) fn balls_and_voids(darts: &Rasterized<3>, radius: f64) -> Result<Figure, RunError> {
+/// uncovered regions that it draws.
+pub(super) fn balls_and_uncovered(darts: &Rasterized<3>, radius: f64) -> Result<Figure, RunError> {
     let side = (SIDE * radius).min(1.0);
     let is_inside = |point: &[f64; 3]| point.iter().all(|at| *at < side);
     let place = |point: [f64; 3]| Vec3::from(point.map(|at| (at / side) as f32 - 0.5));
     let ball = shapes::sphere(0.5 * radius / side, 12, 0);
-    let points = darts.found.points.iter().filter(|point| is_inside(point) && !darts.is_in_void(point));
+    let points = darts.found.points.iter().filter(|point| is_inside(point) && !darts.is_in_uncovered(point));
     let points: Vec<_> = points.collect();
-    let voids: Vec<_> = darts.voids.iter().filter(|void| is_inside(&void.low)).collect();
+    let uncovered: Vec<_> = darts.uncovered.iter().filter(|region| is_inside(&region.low)).collect();
     let mut shown = Shown::default();
     points.iter().for_each(|point| shown.add(&ball, place(**point), POINT));
-    for void in &voids {
-        let cube = shapes::cuboid(Vec3::splat((void.side / side) as f32), 0);
-        shown.add(&cube, place(void.low.map(|at| at + 0.5 * void.side)), VOID);
+    for region in &uncovered {
+        let cube = shapes::cuboid(Vec3::splat((region.side / side) as f32), 0);
+        shown.add(&cube, place(region.low.map(|at| at + 0.5 * region.side)), REGION);
     }
     let Shown { corners, triangles, colors } = shown;
     let geometry = Geometry::new(&corners, &corners, &triangles).map_err(RunError::setting)?;
@@ -185,17 +185,22 @@ pub(super) fn balls_and_voids(darts: &Rasterized<3>, radius: f64) -> Result<Figu
     let image = pass.uncounted().map_err(RunError::setting)?;
     let pixels = image.into_image().iter().map(|color| color.to_array()).collect();
     let caption = format!(
-        "{} points and {} voids of a corner of the cube, {:.1} r along each side",
+        "{} points and {} uncovered regions of a corner of the cube, {:.1} r along each side",
         points.len(),
-        voids.len(),
+        uncovered.len(),
         side / radius
     );
     let shown = [CaptionedImage { size: [SPACE_PX; 2], pixels, caption }];
     let subject = format!(
-        "before the last of {} passes: balls of radius r/2 around the points, and in blue the voids that it draws; r = {radius}",
+        "before the last of {} passes: balls of radius r/2 around the points, and in blue the uncovered regions that it draws; r = {radius}",
         darts.passes
     );
-    Ok(figure("VI_fig11_3d", ["Points and voids in space (Paper VI, Figure 11)", &subject], 1, &shown))
+    Ok(figure(
+        "VI_fig11_3d",
+        ["Points and uncovered regions in space (Paper VI, Figure 11)", &subject],
+        1,
+        &shown,
+    ))
 }
 
 /// A camera that sees three sides of the unit cube about the origin.

@@ -114,7 +114,7 @@ const DRAWN_SINCE: [[&str; 2]; 7] = [
     ["and what is finer than pixels are done on the CPU.", "and later rounds are done on the CPU."],
     [
         "In 3D all darts are thrown on the CPU: no prism is drawn, and the 3D half of Figure 11 is not either.",
-        "Figure 11 shows the points before the last pass, and the voids that it draws.",
+        "Figure 11 shows the points before the last pass, and the uncovered regions that it draws.",
     ],
     [
         "No triangle is drawn: points are chosen on the CPU from columns that bound the density.",

@@ -19,7 +19,7 @@ use super::super::row::{self, Row, numbers};
 use super::super::verdict::Verdict;
 use super::super::{Done, Figure};
 use super::Task;
-use super::image_figures::balls_and_voids;
+use super::image_figures::balls_and_uncovered;
 use super::settings::Darts;
 use crate::reproduce::settings::Form;
 use crate::study::Ran;
@@ -136,12 +136,12 @@ pub(super) fn darts(task: &Task<'_>) -> Result<Done, RunError> {
     let radius = *row.radius_2d.get(form);
     let is_shown = |[x, y]: &[f64; 2]| *x < 40.0 * radius && *y < 20.0 * radius;
     let shown =
-        flat.darts.found.points.iter().filter(|point| is_shown(point) && !flat.darts.is_in_void(point));
-    let voids = flat.darts.voids.iter().filter(|void| is_shown(&void.low)).map(outline).collect();
+        flat.darts.found.points.iter().filter(|point| is_shown(point) && !flat.darts.is_in_uncovered(point));
+    let uncovered = flat.darts.uncovered.iter().filter(|region| is_shown(&region.low)).map(outline).collect();
     let figure = Figure::plane(
         "VI_fig11",
         [
-            "Points that keep their distance, and voids (Paper VI, Figure 11)",
+            "Points that keep their distance, and uncovered regions (Paper VI, Figure 11)",
             &format!(
                 "before the last of {} passes, in a corner of the unit square, r = {radius}",
                 flat.darts.passes
@@ -149,18 +149,18 @@ pub(super) fn darts(task: &Task<'_>) -> Result<Done, RunError> {
         ],
         ["x", "y"],
         vec![
-            Series::new("voids that the last pass draws", Mark::Faint(voids)),
+            Series::new("uncovered regions that the last pass draws", Mark::Faint(uncovered)),
             dots("points", shown.map(|[x, y]| (*x, *y)).collect()),
         ],
     );
     let made = with.row(&row.about, (ours, Verdict::of(holds), note));
-    let in_cube = balls_and_voids(&deep.darts, *row.radius_3d.get(form))?;
+    let in_cube = balls_and_uncovered(&deep.darts, *row.radius_3d.get(form))?;
     Ok(Done { row: Row { numbers: facts, ran, ..made }, figures: vec![figure, in_cube] })
 }
 
-/// The outline of a void in the plane.
-fn outline(void: &Cube<2>) -> Vec<(f64, f64)> {
-    let ([x, y], side) = (void.low, void.side);
+/// The outline of an uncovered region in the plane.
+fn outline(region: &Cube<2>) -> Vec<(f64, f64)> {
+    let ([x, y], side) = (region.low, region.side);
     [(0.0, 0.0), (side, 0.0), (side, side), (0.0, side), (0.0, 0.0)]
         .map(|(right, up)| (x + right, y + up))
         .to_vec()
