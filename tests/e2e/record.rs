@@ -75,6 +75,6 @@ fn what_cannot_be_timed_is_refused() {
     check(&["time", &file, "--timing", "pakket"], 2, &["`pakket`"], "`packet`");
     check(&["time", &missing], 1, &["no.rec"], "check the path");
     check(&["time", &cut], 1, &["cut.rec"], "record the frames again");
-    check(&["record", "tiny", "--out", &unwritable], 1, &["none"], "No such file");
+    check(&["record", "tiny", "--out", &unwritable], 2, &["none"], "does not exist; create it");
     refusals.done();
 }

@@ -365,7 +365,12 @@ fn wrong_sweeps_and_folders_are_refused() {
     assert!(ended.code == Some(2) && ended.stderr.contains("holds the sweep `tiles`"), "{}", ended.stderr);
     assert_eq!(point_files(&out), files);
     let ended = sweep(&["run", &file, "--out", &format!("{file}/below")]);
-    assert!(ended.code == Some(1) && ended.stderr.contains("check that it is a folder"), "{}", ended.stderr);
+    assert!(ended.code == Some(2) && ended.stderr.contains("check that it is a folder"), "{}", ended.stderr);
+    for (file, says) in [(inputs.path("."), "Is a directory"), (inputs.put("binary.ron", b"\xff\0"), "UTF-8")]
+    {
+        let ended = sweep(&["run", &file, "--out", &out]);
+        assert!(ended.code == Some(2) && ended.stderr.contains(says), "{}", ended.stderr);
+    }
     let ended = sweep(&["plan", &inputs.path("missing.ron"), "--out", &out]);
     assert!(
         ended.code == Some(2) && ended.stderr.contains("missing.ron: cannot read it"),

@@ -151,7 +151,7 @@ impl Report<'_> {
 }
 
 fn mean_sd(mean: Option<f64>, sd: Option<f64>, unit: &str) -> String {
-    mean.map_or("–".to_owned(), |mean| si_mean_sd(MeanSd { mean, sd: sd.unwrap_or(f64::NAN) }, unit))
+    mean.map_or("–".to_owned(), |mean| si_mean_sd(MeanSd { mean, sd }, unit))
 }
 
 fn percent(fraction: f64) -> String {

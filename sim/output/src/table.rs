@@ -81,19 +81,16 @@ pub fn si_digits(value: f64, unit: &str, digits: usize) -> String {
     format!("{text} {}{unit}", prefix.sign).trim_end().to_owned()
 }
 
-/// `12.3 ± 0.4 mJ`: mean and standard deviation with the prefix and the decimals of the mean; the mean alone if there is no deviation
-/// (NaN).
+/// `12.3 ± 0.4 mJ`: mean and standard deviation with the prefix and the decimals of the mean; the mean alone if there is no deviation.
 pub fn si_mean_sd(stats: MeanSd, unit: &str) -> String {
     if !stats.mean.is_finite() {
         return "n/a".to_owned();
     }
-    if !stats.sd.is_finite() {
-        return si_digits(stats.mean, unit, 4);
-    }
+    let Some(sd) = stats.sd.filter(|sd| sd.is_finite()) else { return si_digits(stats.mean, unit, 4) };
     let prefix = if unit.is_empty() { Prefix::NONE } else { Prefix::of(stats.mean) };
     let decimals =
         if unit.is_empty() { plain_decimals(stats.mean, 4) } else { decimals(stats.mean * prefix.factor, 4) };
-    let (mean, sd) = (stats.mean * prefix.factor, stats.sd * prefix.factor);
+    let (mean, sd) = (stats.mean * prefix.factor, sd * prefix.factor);
     format!("{mean:.decimals$} ± {sd:.decimals$} {}{unit}", prefix.sign).trim_end().to_owned()
 }
 
@@ -223,8 +220,8 @@ pub fn shell_line<'a>(words: impl IntoIterator<Item = &'a String>) -> String {
 pub struct MeanSd {
     /// Arithmetic mean.
     pub mean: f64,
-    /// Sample standard deviation (divided by n - 1); 0 for a single value.
-    pub sd: f64,
+    /// Sample standard deviation (divided by n - 1); `None` for a single value.
+    pub sd: Option<f64>,
 }
 
 impl MeanSd {
@@ -236,7 +233,7 @@ impl MeanSd {
         }
         let mean = values.iter().sum::<f64>() / values.len() as f64;
         let squares: f64 = values.iter().map(|value| (value - mean) * (value - mean)).sum();
-        let sd = if values.len() > 1 { (squares / (values.len() - 1) as f64).sqrt() } else { 0.0 };
+        let sd = (values.len() > 1).then(|| (squares / (values.len() - 1) as f64).sqrt());
         Some(Self { mean, sd })
     }
 }
@@ -264,7 +261,7 @@ mod tests {
         );
         assert_eq!([number(12_345_678.4), number(6.94e-5), number(123.4)], ["12,345,678", "6.94e-5", "123"]);
         assert_eq!([si(12_345.0, ""), si_digits(0.529_12, "", 4)], ["12345", "0.5291"]);
-        assert_eq!(si_mean_sd(MeanSd { mean: 0.0529, sd: 0.0001 }, ""), "0.05290 ± 0.00010");
+        assert_eq!(si_mean_sd(MeanSd { mean: 0.0529, sd: Some(0.0001) }, ""), "0.05290 ± 0.00010");
     }
 
     #[test]
@@ -285,9 +282,9 @@ mod tests {
 
     #[test]
     fn mean_and_deviation_share_a_prefix() {
-        assert_eq!(si_mean_sd(MeanSd { mean: 0.012_34, sd: 0.000_4 }, "J"), "12.34 ± 0.40 mJ");
-        assert_eq!(si_mean_sd(MeanSd { mean: f64::NAN, sd: 0.0 }, "J"), "n/a");
-        assert_eq!(si_mean_sd(MeanSd { mean: 0.012_34, sd: f64::NAN }, "J"), "12.34 mJ");
+        assert_eq!(si_mean_sd(MeanSd { mean: 0.012_34, sd: Some(0.000_4) }, "J"), "12.34 ± 0.40 mJ");
+        assert_eq!(si_mean_sd(MeanSd { mean: f64::NAN, sd: None }, "J"), "n/a");
+        assert_eq!(si_mean_sd(MeanSd { mean: 0.012_34, sd: None }, "J"), "12.34 mJ");
     }
 
     #[test]
@@ -320,12 +317,12 @@ mod tests {
     fn a_known_sample() {
         let stats = MeanSd::of([2.0, 4.0, 4.0, 4.0, 5.0, 5.0, 7.0, 9.0, f64::NAN]).unwrap();
         assert_eq!(stats.mean, 5.0);
-        assert!((stats.sd - (32.0_f64 / 7.0).sqrt()).abs() < 1e-15);
+        assert!((stats.sd.unwrap() - (32.0_f64 / 7.0).sqrt()).abs() < 1e-15);
     }
 
     #[test]
     fn one_value_has_no_spread_and_none_has_no_mean() {
-        assert_eq!(MeanSd::of([3.0]), Some(MeanSd { mean: 3.0, sd: 0.0 }));
+        assert_eq!(MeanSd::of([3.0]), Some(MeanSd { mean: 3.0, sd: None }));
         assert_eq!(MeanSd::of([f64::NAN]), None);
     }
 }

@@ -195,7 +195,7 @@ pub struct Detection {
 impl Summary {
     /// Time, energy and power per frame, measured and true: mean and standard deviation in SI units. A single frame has no deviation.
     pub fn headline(&self) -> Vec<Headline> {
-        let sd = |deviation: f64| if self.settings.frames > 1 { deviation } else { f64::NAN };
+        let sd = |deviation: f64| (self.settings.frames > 1).then_some(deviation);
         let row = |label: &str, unit: &str, pick: fn(&Figures) -> Spread| {
             let number = |figures: &Option<Figures>| {
                 figures.as_ref().map(pick).map(|s| MeanSd { mean: s.mean, sd: sd(s.deviation) })

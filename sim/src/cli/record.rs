@@ -16,7 +16,7 @@ use workloads::job::OptionSource;
 
 use super::Failure;
 use super::lists;
-use super::outputs::{print, print_json};
+use super::outputs::{may_hold_results, print, print_json};
 use super::run::{bound, one_gpu, pacing};
 use crate::cli::args::{SceneArgs, ThreadArgs};
 use crate::cli::parse::setting;
@@ -118,7 +118,7 @@ pub(super) fn record(args: &RecordArgs, terminal: &Terminal) -> Result<(), Failu
     args.set.iter().try_for_each(|(path, value)| lists::set(&mut options, &Setting::new(path, value)))?;
     let progress = Progress::on(terminal, args.json);
     let plan = Plan::resolve(options)?;
-    traces::io::atomic::try_place(&args.out).map_err(RunError::from)?;
+    may_hold_results("--out", Some(&args.out), [args.scene.as_path()])?;
     let recorded = args.threads.pool()?.install(|| RecordedRun::draw(&plan, &progress))?;
     recorded.write(&args.out)?;
     let bytes = std::fs::metadata(&args.out).map_or(0, |file| file.len());

@@ -112,7 +112,11 @@ impl SweepError {
     /// Whether this is a usage error (exit code 2) rather than a failure (exit code 1).
     pub fn is_usage(&self) -> bool {
         match self {
-            Self::Spec(SpecError::Read { source, .. }) => source.kind() == ErrorKind::NotFound,
+            Self::Spec(SpecError::Read { source, .. }) => matches!(
+                source.kind(),
+                ErrorKind::NotFound | ErrorKind::IsADirectory | ErrorKind::InvalidData
+            ),
+            Self::Folder { source, .. } => source.kind() == ErrorKind::NotADirectory,
             Self::Spec(SpecError::Parse { .. }) => true,
             Self::Value { .. }
             | Self::Setting { .. }
@@ -121,12 +125,9 @@ impl SweepError {
             | Self::InTheWay { .. }
             | Self::Busy { .. }
             | Self::Plan { .. } => true,
-            Self::Folder { .. }
-            | Self::Write(_)
-            | Self::Publish(_)
-            | Self::Unfinished { .. }
-            | Self::Slurm(_)
-            | Self::Input(_) => false,
+            Self::Write(_) | Self::Publish(_) | Self::Unfinished { .. } | Self::Slurm(_) | Self::Input(_) => {
+                false
+            }
         }
     }
 

@@ -341,9 +341,9 @@ fn is_point(bytes: &[u8], id: &str) -> bool {
     serde_json::from_slice::<serde_json::Value>(bytes).is_ok_and(|value| value["id"] == id)
 }
 
-/// Name of the file that the file called `name` was to become, such as `ID.json` of `.ID.json.PID.part`.
+/// Name of the file that the file called `name` was to become, such as `ID.json` of `.ID.json.XXXXXX.part`.
 fn finished_name(name: &str) -> Option<&str> {
-    let (whole, _process) = name.strip_prefix('.')?.strip_suffix(".part")?.rsplit_once('.')?;
+    let (whole, _random) = name.strip_prefix('.')?.strip_suffix(".part")?.rsplit_once('.')?;
     Some(whole)
 }
 
@@ -509,6 +509,6 @@ mod tests {
     fn a_folder_that_cannot_be_written_is_named() {
         let file = tempfile::NamedTempFile::new().unwrap();
         let error = Folder::at(file.path().join("below")).write_plan(&plan("a")).unwrap_err();
-        assert!(!error.is_usage() && error.to_string().contains("check that it is a folder"), "{error}");
+        assert!(error.is_usage() && error.to_string().contains("check that it is a folder"), "{error}");
     }
 }

@@ -45,7 +45,7 @@ fn counter(text: &str, number: f64) -> CounterRow {
 /// Every text in it is `text`, every number `number`.
 fn report(text: &str, number: f64) -> Report<'static> {
     let owned = || text.to_owned();
-    let stats = Some(MeanSd { mean: number, sd: number });
+    let stats = Some(MeanSd { mean: number, sd: Some(number) });
     let fact = FactRow { name: owned(), value: owned(), note: owned() };
     let image = ReportImage { caption: owned(), png: b"\x89PNG?".to_vec(), link: Some(owned()) };
     let work = WorkRow {

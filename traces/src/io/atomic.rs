@@ -3,12 +3,14 @@
 
 use std::collections::BTreeMap;
 use std::error::Error;
-use std::ffi::OsString;
+use std::ffi::{OsStr, OsString};
 use std::fmt;
 use std::fs::{self, File};
-use std::io::{self, BufWriter, Write};
+use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use tempfile::Builder;
 
 use super::WriteError;
 
@@ -28,13 +30,13 @@ where
 {
     let path = &destination(path)?;
     let io = |source| WriteError::Io { path: path.to_owned(), source };
-    let (unfinished, file) = temporary(&temporary_name(path)?).map_err(io)?;
+    let (unfinished, file, name) = temporary(path)?;
     let mut writer = BufWriter::new(file);
     fill(&mut writer).map_err(|error| WriteError::Content { path: path.to_owned(), source: error.into() })?;
     writer.flush().map_err(io)?;
     writer.get_ref().sync_all().map_err(io)?;
     drop(writer);
-    fs::rename(temporary_name(path)?, path).map_err(io)?;
+    fs::rename(name, path).map_err(io)?;
     unfinished.finish();
     Ok(())
 }
@@ -45,20 +47,26 @@ where
 /// # Errors
 /// As [`write_file`].
 pub fn try_place(path: &Path) -> Result<(), WriteError> {
-    let path = &destination(path)?;
-    let made = temporary(&temporary_name(path)?);
-    made.map(drop).map_err(|source| WriteError::Io { path: path.to_owned(), source })
+    temporary(&destination(path)?).map(drop)
 }
 
-/// A new file that is removed unless it is finished.
-fn temporary(path: &Path) -> io::Result<(Unfinished, File)> {
-    let unfinished = Unfinished::new({
-        let path = path.to_owned();
-        // The first error is the one to report; a leftover that cannot be removed changes nothing about it.
-        move || drop(fs::remove_file(path))
+/// A new file beside `path` that is removed unless it is finished, and its path: `.name.XXXXXX.part`. Six random letters keep
+/// threads, processes and hosts apart.
+fn temporary(path: &Path) -> Result<(Unfinished, File, PathBuf), WriteError> {
+    let io = |source| WriteError::Io { path: path.to_owned(), source };
+    let name = path.file_name().ok_or_else(|| WriteError::NoName { path: path.to_owned() })?;
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let prefix: OsString = [OsStr::new("."), name, OsStr::new(".")].into_iter().collect();
+    // An interrupt waits until the file is in the list.
+    let mut list = list();
+    let made = Builder::new().prefix(&prefix).suffix(".part").make_in(folder, |path| File::create_new(path));
+    let (file, name) = made.map_err(io)?.keep().map_err(|error| io(error.error))?;
+    // The first error is the one to report; a leftover that cannot be removed changes nothing about it.
+    let unfinished = list.add({
+        let name = name.clone();
+        move || drop(fs::remove_file(name))
     });
-    let file = uninterrupted(|| File::create(path))?;
-    Ok((unfinished, file))
+    Ok((unfinished, file, name))
 }
 
 /// As [`write_file`], for samples: errors of their source name that file alone.
@@ -88,15 +96,6 @@ fn destination(path: &Path) -> Result<PathBuf, WriteError> {
     }
 }
 
-/// `.name.PID.part` beside the file: the process id keeps two runs apart.
-fn temporary_name(path: &Path) -> Result<PathBuf, WriteError> {
-    let name = path.file_name().ok_or_else(|| WriteError::NoName { path: path.to_owned() })?;
-    let mut temporary = OsString::from(".");
-    temporary.push(name);
-    temporary.push(format!(".{}.part", std::process::id()));
-    Ok(path.with_file_name(temporary))
-}
-
 type Remove = Box<dyn FnOnce() + Send>;
 
 /// How to remove each, by its number.
@@ -104,6 +103,14 @@ type Remove = Box<dyn FnOnce() + Send>;
 pub struct List {
     last: u64,
     removers: BTreeMap<u64, Remove>,
+}
+
+impl List {
+    fn add(&mut self, remove: impl FnOnce() + Send + 'static) -> Unfinished {
+        self.last += 1;
+        self.removers.insert(self.last, Box::new(remove));
+        Unfinished { number: self.last }
+    }
 }
 
 static LIST: Mutex<List> = Mutex::new(List { last: 0, removers: BTreeMap::new() });
@@ -117,11 +124,7 @@ pub struct Unfinished {
 impl Unfinished {
     /// Something that `remove` removes. `remove` must not make or drop another [`Unfinished`].
     pub fn new(remove: impl FnOnce() + Send + 'static) -> Self {
-        let mut list = list();
-        list.last += 1;
-        let number = list.last;
-        list.removers.insert(number, Box::new(remove));
-        Self { number }
+        list().add(remove)
     }
 
     /// It is finished and stays.
@@ -167,6 +170,7 @@ pub fn remove_all() -> MutexGuard<'static, List> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::io;
 
     fn names(folder: &Path) -> Vec<String> {
         fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect()
@@ -185,6 +189,33 @@ mod tests {
         assert!(error.to_string().contains("a.txt: no more ink"), "{error}");
         assert_eq!(fs::read(&path).unwrap(), b"old");
         assert_eq!(names(folder.path()), ["a.txt"]);
+    }
+
+    #[test]
+    fn threads_that_write_one_file_do_not_disturb_each_other() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.txt");
+        let write = |letter: u8| {
+            for _ in 0..20 {
+                write_file(&path, |w| w.write_all(&[letter; 50_000])).unwrap();
+                let found = fs::read(&path).unwrap();
+                assert!(found.len() == 50_000 && found.iter().all(|byte| *byte == found[0]));
+            }
+        };
+        std::thread::scope(|scope| (b'a'..b'e').for_each(|letter| drop(scope.spawn(move || write(letter)))));
+        assert_eq!(names(folder.path()), ["a.txt"]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn others_may_read_what_is_written() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().unwrap();
+        let [ours, plain] = ["a.txt", "b.txt"].map(|name| folder.path().join(name));
+        write_file(&ours, |w| w.write_all(b"a")).unwrap();
+        File::create(&plain).unwrap();
+        let mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode();
+        assert_eq!(mode(&ours), mode(&plain));
     }
 
     #[cfg(unix)]

@@ -97,8 +97,14 @@ pub(crate) const FLAGS: Flags = Flags { uses: &[Flag::Size], instead: &[] };
 pub fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<dyn Job>, LoadError> {
     let options: CausticsOptions = options.read()?;
     options.check()?;
-    let settings =
-        Settings { width: 512, height: 288, samples: 1, frame_rate_hz: 30.0, ..Settings::default() };
+    let settings = Settings {
+        width: 512,
+        height: 288,
+        samples: 1,
+        table: "none".to_owned(),
+        frame_rate_hz: 30.0,
+        ..Settings::default()
+    };
     let settings = settings.with(request.overrides)?;
     let CausticsOptions { cells, side_m, depth_m, wave_m, slope, .. } = options;
     let mut ocean = Ocean::new(cells, side_m, depth_m, [wave_m, slope], request.seed);

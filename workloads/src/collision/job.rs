@@ -101,7 +101,13 @@ pub fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<dyn Job>
     let options: CollisionOptions = options.read()?;
     options.check()?;
     let CollisionOptions { resolution, bins, method, narrow, .. } = options;
-    let settings = Settings { width: 3 * resolution, height: resolution, samples: 1, ..Settings::default() };
+    let settings = Settings {
+        width: 3 * resolution,
+        height: resolution,
+        samples: 1,
+        table: "none".to_owned(),
+        ..Settings::default()
+    };
     let search = Search { resolution, bins, method, zoom: false };
     let settings = settings.with(request.overrides)?;
     let refused = || LoadError::Setting { setting: "resolution", message: "1 to 1024 pixels".to_owned() };

@@ -161,13 +161,12 @@ fn files_that_are_something_else_are_refused() {
         expect(&text, &[name]);
     }
     let text = broken(|file| {
-        file.json["extensionsRequired"] = json!(["KHR_draco_mesh_compression"]);
-        file.json["extensionsUsed"] = json!(["KHR_draco_mesh_compression"]);
+        let asked = json!(["KHR_draco_mesh_compression", "KHR_materials_unlit", "EXT_mesh_gpu_instancing"]);
+        file.json["extensionsRequired"] = asked.clone();
+        file.json["extensionsUsed"] = asked;
     });
-    expect(
-        &text,
-        &["extensionsRequired", "KHR_draco_mesh_compression", "not supported", "export it without"],
-    );
+    let named = "extensionsRequired: `KHR_draco_mesh_compression`, `EXT_mesh_gpu_instancing` not supported";
+    expect(&text, &[named, "export it without"]);
 }
 
 #[test]

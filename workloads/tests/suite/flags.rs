@@ -114,3 +114,12 @@ fn views_of_a_scene_without_a_lens_are_focused() {
     assert!(made(Some(2.5)).is_ok());
     expect(&made(None).err().unwrap().to_string(), &["focus", "no lens"]);
 }
+
+#[test]
+fn what_draws_no_samples_of_a_table_names_none() {
+    let table = |job: &str| {
+        let request = Request { overrides: &Overrides::default(), seed: 1 };
+        find(job, &options(job), &request).unwrap().unwrap().settings().table.clone()
+    };
+    assert_eq!(["caustics", "ccd", "occlusion"].map(table), ["none", "none", "owen"]);
+}

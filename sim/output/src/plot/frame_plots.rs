@@ -267,7 +267,10 @@ impl FrameEnergyPlot<'_> {
     fn panel(&self, picture: &Picture) -> Option<Panel> {
         let all = || self.values(true).chain(self.values(false));
         let (first, last) = (all().map(|p| p.0).reduce(f64::min)?, all().map(|p| p.0).reduce(f64::max)?);
-        let bounds = self.measured_j.iter().flat_map(|stats| [stats.mean - stats.sd, stats.mean + stats.sd]);
+        let bounds = self.measured_j.iter().flat_map(|stats| {
+            let sd = stats.sd.unwrap_or(0.0);
+            [stats.mean - sd, stats.mean + sd]
+        });
         let energies =
             || all().map(|point| point.1).chain(bounds.clone()).filter(|energy| energy.is_finite());
         let (low, high) = (energies().reduce(f64::min)?, energies().reduce(f64::max)?);
@@ -284,8 +287,9 @@ impl FrameEnergyPlot<'_> {
     }
 
     fn band(&self, panel: &Panel, picture: &mut Picture) {
-        let Some(stats) = self.measured_j.filter(|s| s.mean.is_finite() && s.sd.is_finite()) else { return };
-        let (top, bottom) = (panel.y_px(stats.mean + stats.sd), panel.y_px(stats.mean - stats.sd));
+        let Some(stats) = self.measured_j.filter(|s| s.mean.is_finite()) else { return };
+        let sd = stats.sd.filter(|sd| sd.is_finite()).unwrap_or(0.0);
+        let (top, bottom) = (panel.y_px(stats.mean + sd), panel.y_px(stats.mean - sd));
         picture.rect((panel.left, top), (panel.right, bottom), MEASURED.alpha(0.13));
         let y = panel.y_px(stats.mean);
         picture.line((panel.left, y), (panel.right, y), MEASURED.alpha(0.6), 1.0);

@@ -151,14 +151,14 @@ fn mean(runs: &[&Row<'_>]) -> Option<Design> {
         runs: runs.len(),
         time_s: Cost {
             value: time.mean,
-            deviation: time.sd,
+            deviation: time.sd.unwrap_or(0.0),
             error: error(|row| row.time_error),
             low: time.mean,
             high: time.mean,
         },
         energy_j: Cost {
             value: energy.mean,
-            deviation: energy.sd,
+            deviation: energy.sd.unwrap_or(0.0),
             error: error(|row| row.energy_error),
             low,
             high,

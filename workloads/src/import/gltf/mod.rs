@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
+use gltf::json::extensions::ENABLED_EXTENSIONS;
 use gltf::json::mesh::Semantic;
 use gltf::json::validation::{Checked, Error, Validate};
 use gltf::json::{Path as JsonPath, Root};
@@ -209,15 +210,16 @@ fn validate(source: Source, root: &Root) -> Result<(), LoadError> {
         Error::IndexOutOfBounds => "index out of range: export it again".to_owned(),
         Error::Missing => "this is required and missing: export it again".to_owned(),
         Error::Unsupported => {
-            format!("a required extension is not supported; supported are {}: export it without", supported())
+            let unknown = |name: &&String| !ENABLED_EXTENSIONS.contains(&name.as_str());
+            let unknown: Vec<String> =
+                root.extensions_required.iter().filter(unknown).map(|name| format!("`{name}`")).collect();
+            let (unknown, supported) = (unknown.join(", "), ENABLED_EXTENSIONS.join(", "));
+            let message = format!("{unknown} not supported; supported are {supported}: export it without");
+            return Err(source.broken("extensionsRequired".to_owned(), message));
         }
         Error::Invalid | Error::Oversize => format!("{error}: export it again"),
     };
     Err(source.broken(place, message))
-}
-
-fn supported() -> String {
-    gltf::json::extensions::ENABLED_EXTENSIONS.join(", ")
 }
 
 /// Bounds of positions are not used. A texture without a known image is reported as a missing image.

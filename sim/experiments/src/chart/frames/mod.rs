@@ -3,6 +3,7 @@
 //! Scenes are those of [`traces::synth`], whose frames are known. Each is recorded, frames are marked as by hand (0.1 ms off at most),
 //! and the outcome is compared with the ground truth: F1 of starts within 0.5 ms, and the energy error of frames whose two ends were found.
 
+mod alarms;
 mod witnesses;
 
 use std::time::Instant;
@@ -17,6 +18,7 @@ use traces::frames::{FinderMethod, Marks, Options, default_window, find_with};
 use traces::score::{TOLERANCE_S, score, true_frames};
 use traces::synth::{Recording, SCENARIOS, Scenario, Scene};
 
+pub use self::alarms::AlarmCount;
 use self::witnesses::{WitnessRow, WitnessSummary};
 use crate::study::table::{Sheet, Table, fixed, optional, plain, share};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
@@ -235,10 +237,10 @@ impl Study for FramesChart {
             .data("f1", |row| row.outcome.f1)
             .data("fails", |row| row.fails)
             .data("energy_error", |row| row.outcome.energy_error)
-            .data("wrong", |row| row.outcome.wrong)
-            .data("wrong_flagged", |row| row.outcome.wrong_flagged)
-            .data("right", |row| row.outcome.right)
-            .data("right_flagged", |row| row.outcome.right_flagged)
+            .data("wrong", |row| row.outcome.flags.wrong)
+            .data("wrong_flagged", |row| row.outcome.flags.wrong_with)
+            .data("right", |row| row.outcome.flags.right)
+            .data("right_flagged", |row| row.outcome.flags.right_with)
             .data("host_s_per_1e6", |row| row.outcome.host_s_per_1e6)
             .csv("frame_finding.csv");
         let witnesses = Table::of(&self.witnesses)
@@ -363,26 +365,20 @@ impl FramesChart {
             table = table.shown(way.name(), |(axis, value)| self.cell(*axis, *value, way), plain);
         }
         let energy = |axis, value| self.mean(axis, value, Way::Auto, |o| o.energy_error);
-        let flagged = |axis, value, flagged: fn(&FinderScore) -> usize, all: fn(&FinderScore) -> usize| {
-            let sum = |of: fn(&FinderScore) -> usize| -> usize {
-                self.at(axis, value, Way::Auto).map(|row| of(&row.outcome)).sum()
-            };
-            format!("{} of {}", sum(flagged), sum(all))
+        let flags = |(axis, value): &(Axis, f64)| {
+            AlarmCount::sum(self.at(*axis, *value, Way::Auto).map(|row| &row.outcome.flags))
         };
-        let wrong = |(axis, value): &(Axis, f64)| flagged(*axis, *value, |o| o.wrong_flagged, |o| o.wrong);
-        let right = |(axis, value): &(Axis, f64)| flagged(*axis, *value, |o| o.right_flagged, |o| o.right);
         table
             .detail("energy error, auto", |(axis, value)| energy(*axis, *value), optional(share(3)))
-            .detail("wrong frames flagged", wrong, plain)
-            .detail("right ones flagged", right, plain)
+            .detail("wrong frames flagged", move |at| flags(at).of_wrong(), plain)
+            .detail("right ones flagged", move |at| flags(at).of_right(), plain)
             .after(format!("*: mean F1 below {FAILS_BELOW}; in brackets how many scenes are below\n"))
             .sheet()
     }
 
     /// Every method on every kind of device.
     fn by_witness(&self) -> Sheet {
-        let counted = |some: usize, all: usize| format!("{some} of {all}");
-        let below = |of: &WitnessSummary| counted(of.below_simple, of.devices);
+        let below = |of: &WitnessSummary| format!("{} of {}", of.below_simple, of.devices);
         Table::of(witnesses::summaries(&self.witnesses))
             .detail("device", |of| of.witness, plain)
             .detail("method", |of| of.method, plain)
@@ -390,14 +386,10 @@ impl FramesChart {
             .detail("F1, worst of five marks", |of| of.worst, fixed(3))
             .detail("below the better simple method", below, plain)
             .detail("calibration error", |of| of.calibration.error(), optional(fixed(3)))
-            .detail("wrong frames flagged", |of| counted(of.flags.wrong_with, of.flags.wrong), plain)
-            .detail("right ones flagged", |of| counted(of.flags.right_with, of.flags.right), plain)
-            .detail(
-                "failed searches that warn",
-                |of| counted(of.warnings.wrong_with, of.warnings.wrong),
-                plain,
-            )
-            .detail("good ones that warn", |of| counted(of.warnings.right_with, of.warnings.right), plain)
+            .detail("wrong frames flagged", |of| of.flags.of_wrong(), plain)
+            .detail("right ones flagged", |of| of.flags.of_right(), plain)
+            .detail("failed searches that warn", |of| of.warnings.of_wrong(), plain)
+            .detail("good ones that warn", |of| of.warnings.of_right(), plain)
             .sheet()
     }
 
@@ -439,14 +431,8 @@ pub struct FinderScore {
     pub f1: f64,
     /// Median energy error of frames whose two ends were found, as a share; `None` where there is none.
     pub energy_error: Option<f64>,
-    /// Frames with an end that is not a true one, or a start missed within.
-    pub wrong: usize,
-    /// Number of them with a flag.
-    pub wrong_flagged: usize,
-    /// The other frames.
-    pub right: usize,
-    /// Number of them with a flag all the same.
-    pub right_flagged: usize,
+    /// Flags of the frames.
+    pub flags: AlarmCount,
     /// Host time, s for a million samples.
     pub host_s_per_1e6: f64,
 }
@@ -502,39 +488,30 @@ fn analyse(trace: &Trace, scene: &Scene, way: Way) -> Result<FinderScore, StudyE
         f1: score.f1(),
         energy_error: score.median_energy_error(),
         host_s_per_1e6: host_s * 1e6 / trace.samples() as f64,
-        ..flagged(&frames, scene)
+        flags: flags(&frames, scene),
     })
 }
 
 /// How many frames are wrong and right, and how many of each carry a flag. The last one ends at the end mark and is left out.
-fn flagged(frames: &[FrameEnergy], scene: &Scene) -> FinderScore {
+fn flags(frames: &[FrameEnergy], scene: &Scene) -> AlarmCount {
     let found_s: Vec<f64> = frames.iter().map(|frame| frame.start_s).collect();
     let truth_s: Vec<f64> = scene.truth.iter().map(|frame| frame.start_s).collect();
-    let mut outcome = FinderScore::default();
+    let mut flags = AlarmCount::default();
     for (right, frame) in true_frames(&found_s, &truth_s, TOLERANCE_S).into_iter().zip(frames) {
-        let flagged = usize::from(frame.flags.has_low_confidence());
-        if right {
-            (outcome.right, outcome.right_flagged) = (outcome.right + 1, outcome.right_flagged + flagged);
-        } else {
-            (outcome.wrong, outcome.wrong_flagged) = (outcome.wrong + 1, outcome.wrong_flagged + flagged);
-        }
+        flags.add(right, frame.flags.has_low_confidence());
     }
-    outcome
+    flags
 }
 
 /// Several as one: means of rates and errors, sums of counts.
 fn joined(outcomes: &[FinderScore]) -> FinderScore {
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
     let all = |of: fn(&FinderScore) -> f64| mean(&outcomes.iter().map(of).collect::<Vec<_>>());
-    let sum = |of: fn(&FinderScore) -> usize| outcomes.iter().map(of).sum();
     let errors: Vec<f64> = outcomes.iter().filter_map(|outcome| outcome.energy_error).collect();
     FinderScore {
         f1: all(|o| o.f1),
         energy_error: (!errors.is_empty()).then(|| mean(&errors)),
-        wrong: sum(|o| o.wrong),
-        wrong_flagged: sum(|o| o.wrong_flagged),
-        right: sum(|o| o.right),
-        right_flagged: sum(|o| o.right_flagged),
+        flags: AlarmCount::sum(outcomes.iter().map(|outcome| &outcome.flags)),
         host_s_per_1e6: all(|o| o.host_s_per_1e6),
     }
 }
@@ -566,7 +543,8 @@ mod tests {
         assert!(f1(20e3) > 0.95 && f1(1e3) < f1(20e3), "{} {}", f1(1e3), f1(20e3));
         for row in &chart.rows {
             assert_eq!(row.fails, row.outcome.f1 < FAILS_BELOW);
-            assert!(row.outcome.wrong_flagged <= row.outcome.wrong && row.outcome.f1 <= 1.0);
+            let AlarmCount { wrong, wrong_with, .. } = row.outcome.flags;
+            assert!(wrong_with <= wrong && row.outcome.f1 <= 1.0);
         }
         let text = std::fs::read_to_string(dir.path().join("frame_finding.csv")).unwrap();
         assert_eq!(text.lines().count(), 1 + chart.rows.len());
@@ -585,19 +563,12 @@ mod tests {
 
     #[test]
     fn outcomes_are_joined_by_means_and_sums() {
-        let a = FinderScore { f1: 0.5, energy_error: None, wrong: 2, right: 3, ..FinderScore::default() };
-        let b = FinderScore {
-            f1: 1.0,
-            energy_error: Some(0.1),
-            wrong: 1,
-            right_flagged: 4,
-            ..FinderScore::default()
-        };
+        let flags = |wrong, right| AlarmCount { wrong, right, ..AlarmCount::default() };
+        let a = FinderScore { f1: 0.5, flags: flags(2, 3), ..FinderScore::default() };
+        let b =
+            FinderScore { f1: 1.0, energy_error: Some(0.1), flags: flags(1, 4), ..FinderScore::default() };
         let both = joined(&[a, b]);
-        assert_eq!(
-            (both.f1, both.energy_error, both.wrong, both.right, both.right_flagged),
-            (0.75, Some(0.1), 3, 3, 4)
-        );
+        assert_eq!((both.f1, both.energy_error, both.flags), (0.75, Some(0.1), flags(3, 7)));
         assert_eq!(joined(&[a]).energy_error, None);
     }
 }

@@ -7,7 +7,7 @@ use traces::frames::{FinderMethod, Marks, Options, default_window, find_with};
 use traces::score::{TOLERANCE_S, score, true_frames};
 use traces::synth::{Scene, WITNESSES, Witness};
 
-use super::{FAILS_BELOW, HAND_S, MARKED};
+use super::{AlarmCount, FAILS_BELOW, HAND_S, MARKED};
 use crate::study::StudyError;
 
 /// Bins of confidence, of equal width.
@@ -33,40 +33,6 @@ pub struct WitnessRow {
     pub flags: AlarmCount,
     /// Warnings of the searches with each mark.
     pub warnings: AlarmCount,
-}
-
-/// How many frames or searches are wrong and right, and how many of each carry a flag or a warning.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct AlarmCount {
-    /// Wrong ones: frames with an end that is not a true one, or a start missed within; searches that fail ([`FAILS_BELOW`]).
-    pub wrong: usize,
-    /// Number of them with an alarm.
-    pub wrong_with: usize,
-    /// The others.
-    pub right: usize,
-    /// Number of them with an alarm all the same.
-    pub right_with: usize,
-}
-
-impl AlarmCount {
-    fn add(&mut self, right: bool, alarm: bool) {
-        let (all, some) = if right {
-            (&mut self.right, &mut self.right_with)
-        } else {
-            (&mut self.wrong, &mut self.wrong_with)
-        };
-        *all += 1;
-        *some += usize::from(alarm);
-    }
-
-    fn join(self, other: &Self) -> Self {
-        Self {
-            wrong: self.wrong + other.wrong,
-            wrong_with: self.wrong_with + other.wrong_with,
-            right: self.right + other.right,
-            right_with: self.right_with + other.right_with,
-        }
-    }
 }
 
 /// How often frames of a confidence are right.
@@ -195,8 +161,8 @@ pub(super) fn summaries(rows: &[WitnessRow]) -> Vec<WitnessSummary> {
                 below_simple: of.iter().filter(|row| first(row) < better(row) - MAX_BELOW).count(),
                 devices: of.len(),
                 calibration: of.iter().fold(Calibration::default(), |sum, row| sum.join(&row.calibration)),
-                flags: of.iter().fold(AlarmCount::default(), |sum, row| sum.join(&row.flags)),
-                warnings: of.iter().fold(AlarmCount::default(), |sum, row| sum.join(&row.warnings)),
+                flags: AlarmCount::sum(of.iter().map(|row| &row.flags)),
+                warnings: AlarmCount::sum(of.iter().map(|row| &row.warnings)),
             });
         }
     }
