@@ -4,7 +4,7 @@ use activity::Counts;
 use glam::Vec3;
 use pipeline::memory::MemoryRange;
 use pipeline::sampling::Sample;
-use pipeline::{Camera, Draw, Gpu, Lane, RasterPass, Rendered, Settings, Target, Viewport};
+use pipeline::{Camera, Draw, Gpu, Lane, RasterPass, Settings, Target, Viewport};
 
 use super::light::AreaLight;
 use crate::accumulation::{SharedSamples, Snapshot};
@@ -140,32 +140,43 @@ pub fn depth_pass(
     method: Method,
     gpu: &mut Gpu<'_>,
 ) -> Result<DepthPass, JobError> {
-    let SceneView { camera, draws } = *view;
-    let spec = gpu.spec();
-    if method == Method::OnePass {
-        let settings = Settings { spec, viewport, samples: set, background: Vec3::ZERO };
-        let Rendered { visible, counts, region, .. } = gpu.draw(&depths(camera, draws, &settings))?;
-        return Ok(DepthPass { samples: visible, counts, surfaces: vec![region] });
-    }
+    let passes = in_passes(view, (viewport, set, method), gpu, |view, samples, gpu| {
+        let settings = Settings { spec: gpu.spec(), viewport, samples, background: Vec3::ZERO };
+        Ok(gpu.draw(&depths(view.camera, view.draws, &settings))?)
+    })?;
     let per_pixel = set.samples().len();
     let mut seen = DepthPass {
         samples: vec![(0, 0); viewport.pixels() * per_pixel],
         counts: Counts::default(),
         surfaces: Vec::new(),
     };
-    let draws = gpu.resident(draws);
-    for (index, at) in set.samples().iter().enumerate() {
-        let snapshot = Snapshot::new(camera, &draws, viewport, at).map_err(JobError::setting)?;
-        let still = snapshot.draws().map_err(JobError::setting)?;
-        let samples = set.still(index);
-        let settings = Settings { spec, viewport, samples: &samples, background: Vec3::ZERO };
-        let one = gpu.draw(&depths(&snapshot.camera, &still, &settings))?;
+    let count = passes.len();
+    for (index, one) in passes.into_iter().enumerate() {
         seen.counts += &one.counts;
         seen.surfaces.push(one.region);
-        let of_sample = seen.samples.iter_mut().skip(index).step_by(per_pixel);
-        of_sample.zip(one.visible).for_each(|(into, from)| *into = from);
+        let of_pass = seen.samples.iter_mut().skip(index).step_by(count);
+        of_pass.zip(one.visible).for_each(|(into, from)| *into = from);
     }
     Ok(seen)
+}
+
+/// Draws `view` at the samples of the set by `draw`: all at once, or each in a pass of its own with still geometry.
+pub(super) fn in_passes<T>(
+    &SceneView { camera, draws }: &SceneView<'_>,
+    (viewport, set, method): (Viewport, &SharedSamples, Method),
+    gpu: &mut Gpu<'_>,
+    mut draw: impl FnMut(&SceneView<'_>, &SharedSamples, &mut Gpu<'_>) -> Result<T, JobError>,
+) -> Result<Vec<T>, JobError> {
+    let draws = gpu.resident(draws);
+    if method == Method::OnePass {
+        return Ok(vec![draw(&SceneView { camera, draws: &draws }, set, gpu)?]);
+    }
+    let one = |(index, at): (usize, &Sample)| {
+        let snapshot = Snapshot::new(camera, &draws, viewport, at).map_err(JobError::setting)?;
+        let still = snapshot.draws().map_err(JobError::setting)?;
+        draw(&SceneView { camera: &snapshot.camera, draws: &still }, &set.still(index), gpu)
+    };
+    set.samples().iter().enumerate().map(one).collect()
 }
 
 /// A pass that draws depths.

@@ -7,8 +7,8 @@ use pipeline::{
     ShadingPoint, SurfaceId, SurfaceSpec, SurfaceView, Target, Viewport,
 };
 
-use super::map::{Method, SceneView};
-use crate::accumulation::{SharedSamples, Snapshot};
+use super::map::{Method, SceneView, in_passes};
+use crate::accumulation::SharedSamples;
 use crate::job::JobError;
 
 /// Triangles that a surface of numbers distinguishes: shaders compute them in single precision.
@@ -52,26 +52,16 @@ impl VisibleTriangles {
         method: Method,
         gpu: &mut Gpu<'_>,
     ) -> Result<Self, JobError> {
-        let SceneView { camera, draws } = *view;
-        let triangles: usize = draws.iter().map(|draw| draw.geometry.triangles().len()).sum();
+        let triangles: usize = view.draws.iter().map(|draw| draw.geometry.triangles().len()).sum();
         if triangles > MAX_TRIANGLES {
             let most = format_args!(
                 "soft shadows distinguish {MAX_TRIANGLES} triangles, and the scene has {triangles}"
             );
             return Err(JobError::setting(most));
         }
-        let draws = gpu.resident(draws);
-        let mut surfaces = Vec::new();
-        if method == Method::OnePass {
-            surfaces.push(numbers(&SceneView { camera, draws: &draws }, viewport, set, gpu)?);
-        } else {
-            for (index, at) in set.samples().iter().enumerate() {
-                let snapshot = Snapshot::new(camera, &draws, viewport, at).map_err(JobError::setting)?;
-                let still = snapshot.draws().map_err(JobError::setting)?;
-                let view = SceneView { camera: &snapshot.camera, draws: &still };
-                surfaces.push(numbers(&view, viewport, &set.still(index), gpu)?);
-            }
-        }
+        let surfaces = in_passes(view, (viewport, set, method), gpu, |view, samples, gpu| {
+            numbers(view, viewport, samples, gpu)
+        })?;
         Ok(Self { surfaces, width: viewport.width() })
     }
 
