@@ -274,7 +274,7 @@ fn the_work_of_passes_adds_up_to_that_of_the_run() {
         ("compute", &["depth pre-pass", "light culling", "image", "display", "write back"]),
         ("deferred", &["g-buffer", "lighting", "resolve", "write back"]),
         ("glossy", &["map", "image", "write back"]),
-        ("soft-shadows", &["depths", "look-ups", "write back"]),
+        ("soft-shadows", &["depths", "triangles", "look-ups", "write back"]),
     ] {
         let summary = run(work, &small).summary();
         let rows = summary["passes"].as_array().expect("passes");
