@@ -216,9 +216,9 @@ mod tests {
             assert!(ours.warnings.is_empty() && ours.moving, "{:?}", ours.warnings);
             assert!(ours.image.iter().filter(|pixel| pixel.y > 0.0).count() > 500, "{look}");
             let [executions, tiles, tested] = of_picture(&ours);
-            // The tone pass runs for every pixel and reads its light.
-            let toned = counts[Event::TextureFetches];
-            assert_eq!(toned, 96 * 54);
+            // The tone pass runs for every pixel and reads its light; a tile of a beam reads its flux.
+            let toned = 96 * 54;
+            assert_eq!(counts[Event::TextureFetches], toned + tiles);
             // A program for every tile, and one for every pixel that is lit.
             assert_eq!(counts[Event::PixelInvocations] - toned, executions + tiles);
             assert_eq!([counts[Event::SamplesTested], counts[Event::SamplesHit]], [tested, executions]);

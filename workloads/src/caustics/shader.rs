@@ -16,6 +16,10 @@ use super::{Beam, Eye, Light, Method};
 
 /// Bytes of a vertex at one end of a beam.
 const VERTEX_BYTES: u32 = 12;
+/// Bytes of the flux of a beam. The light of a moving triangle takes all else from its vertices.
+const FLUX_BYTES: u64 = 4;
+/// Bytes of a beam that a body bounds: the vertices at both ends, and the flux.
+const BEAM_BYTES: u64 = 6 * VERTEX_BYTES as u64 + FLUX_BYTES;
 /// Bytes per pixel of the buffer that accumulates light.
 const LIGHT_BYTES: u64 = 4;
 /// Bytes that mark the pixels of a tile: the number of the body that covered pixels of it last, and two words of bits.
@@ -81,6 +85,8 @@ pub fn draw_on(
     // Both ends of a moving triangle; a face of a body is still.
     let vertex_bytes = if method == Method::Moving { 2 * VERTEX_BYTES } else { VERTEX_BYTES };
     let vertices = gpu.allocate(3 * primitives.len() as u64 * u64::from(vertex_bytes));
+    let beam_bytes = if method == Method::Moving { FLUX_BYTES } else { BEAM_BYTES };
+    let beams = gpu.allocate(seen.len() as u64 * beam_bytes);
     let marks = gpu.allocate(u64::from(columns * rows) * MARK_STRIDE);
     let mut picture = Picture {
         light: vec![0.0; viewport.pixels()],
@@ -98,7 +104,7 @@ pub fn draw_on(
         vertex_bytes,
         projection: Some(eye.projection()),
     };
-    let shader = LightShader { eye, seen: &seen, faces: &faces, light, buffer, marks };
+    let shader = LightShader { eye, seen: &seen, faces: &faces, light, buffer, beams, beam_bytes, marks };
     // The last tiles may reach beyond the image.
     let last = [(columns, viewport.width()), (rows, viewport.height())]
         .map(|(tiles, px)| f64::from(tiles * TILE_PX) / f64::from(px));
@@ -159,6 +165,10 @@ struct LightShader<'a> {
     faces: &'a [Face],
     light: Light,
     buffer: LightBuffer,
+    /// What the light of each beam needs beside the vertices of its primitives.
+    beams: MemoryRange,
+    /// Bytes of that for a beam.
+    beam_bytes: u64,
     /// Marks of the tiles, row by row.
     marks: MemoryRange,
 }
@@ -263,6 +273,7 @@ impl TileShader for LightShader<'_> {
         let Face { beam, corners } = &self.faces[tile.primitive];
         let seen = self.seen[*beam].as_ref()?;
         let mut shaded = Shaded { tests: 0, lit: Vec::new() };
+        lanes.fetch(self.beams.address() + *beam as u64 * self.beam_bytes, self.beam_bytes);
         match corners {
             None => self.moving(lanes, seen, tile, &mut shaded),
             Some(corners) => self.face(marks, (lanes, seen), (corners, tile.tile), &mut shaded),

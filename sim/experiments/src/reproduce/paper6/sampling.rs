@@ -23,7 +23,7 @@ use super::image_figures::balls_and_uncovered;
 use super::settings::Darts;
 use crate::reproduce::settings::Form;
 use crate::study::Ran;
-use output::plot::{Mark, Series};
+use output::plot::{Mark, Paint, Series};
 use run::GpuSpec;
 use run::RunError;
 
@@ -149,7 +149,8 @@ pub(super) fn darts(task: &Task<'_>) -> Result<Done, RunError> {
         ],
         ["x", "y"],
         vec![
-            Series::new("uncovered regions that the last pass draws", Mark::Faint(uncovered)),
+            Series::new("uncovered regions that the last pass draws", Mark::Faint(uncovered))
+                .painted(Paint::Grey),
             dots("points", shown.map(|[x, y]| (*x, *y)).collect()),
         ],
     );
