@@ -82,6 +82,11 @@ impl<T> Buffer<T> {
         self.number
     }
 
+    /// Where it lies in memory.
+    pub fn region(&self) -> MemoryRange {
+        self.region
+    }
+
     /// Number of values.
     pub fn len(&self) -> u32 {
         self.words

@@ -103,41 +103,48 @@ impl Beam {
     /// Roots of the Jacobian at the corners, sorted: the light of a corner crosses that of its neighbours.
     /// Between two roots, the Jacobian has either one sign over all of the triangle, or different signs all
     /// the time.
-    pub fn folds(&self) -> Vec<f64> {
-        let lane = Lane::default();
-        let areas = self.areas(&lane);
-        let at_corner = |k: usize| quadratic_roots(&lane, areas.map(|area| area.dot(self.path(k))));
-        let mut folds: Vec<f64> = (0..3).flat_map(at_corner).filter(|t| *t > 0.0 && *t < 1.0).collect();
-        folds.sort_by(f64::total_cmp);
+    pub fn folds(&self, lane: &Lane) -> Vec<f64> {
+        let areas = self.areas(lane);
+        let at_corner = |k: usize| {
+            let path = lane.sub(self.close[k], self.open[k]);
+            quadratic_roots(lane, areas.map(|area| lane.dot(area, path)))
+        };
+        let mut folds = Vec::new();
+        for t in (0..3).flat_map(at_corner).filter(|t| lane.branch(*t > 0.0 && *t < 1.0)) {
+            let place = folds.iter().position(|other| lane.branch(t < *other)).unwrap_or(folds.len());
+            folds.insert(place, t);
+        }
         folds
     }
 
     /// Sign of the Jacobian at `t`; `None` if it differs over the triangle, where sides cross.
-    pub fn sign(&self, t: f64) -> Option<f64> {
-        let [a, b, c] = self.corners(t);
-        let area = (b - a).cross(c - a);
-        let signs = [0, 1, 2].map(|k| area.dot(self.path(k)));
-        let all = |sign: f64| signs.iter().all(|s| s * sign >= 0.0).then_some(sign);
+    pub fn sign(&self, lane: &Lane, t: f64) -> Option<f64> {
+        let [a, b, c] = self.corners_on(lane, t);
+        let area = lane.cross(lane.sub(b, a), lane.sub(c, a));
+        let signs = [0, 1, 2].map(|k| lane.dot(area, lane.sub(self.close[k], self.open[k])));
+        let all = |sign: f64| signs.iter().all(|s| lane.branch(s * sign >= 0.0)).then_some(sign);
         all(1.0).or_else(|| all(-1.0))
     }
 
     /// Share of its length over which sides cross, 0 to 1. A beam that is pinched at a point or a line has 0;
     /// a beam that its corners do not represent has much.
     pub fn crossing(&self) -> f64 {
-        let cuts = self.cuts();
-        let crossed = |ends: &&[f64]| self.sign(0.5 * (ends[0] + ends[1])).is_none();
+        let lane = Lane::default();
+        let cuts = self.cuts(&lane);
+        let crossed = |ends: &&[f64]| self.sign(&lane, 0.5 * (ends[0] + ends[1])).is_none();
         cuts.windows(2).filter(crossed).map(|ends| ends[1] - ends[0]).fold(0.0, |sum, part| sum + part)
     }
 
     /// 0, the [folds](Self::folds), and 1.
-    pub fn cuts(&self) -> Vec<f64> {
-        [0.0].into_iter().chain(self.folds()).chain([1.0]).collect()
+    pub fn cuts(&self, lane: &Lane) -> Vec<f64> {
+        [0.0].into_iter().chain(self.folds(lane)).chain([1.0]).collect()
     }
 
     /// The part of the beam from `from` to `to`.
     #[must_use]
-    pub fn part(&self, from: f64, to: f64) -> Self {
-        Self { open: self.corners(from), close: self.corners(to), flux_w: self.flux_w }
+    pub fn part(&self, lane: &Lane, from: f64, to: f64) -> Self {
+        let [open, close] = [from, to].map(|t| self.corners_on(lane, t));
+        Self { open, close, flux_w: self.flux_w }
     }
 }
 
@@ -339,7 +346,7 @@ mod tests {
             let by_difference = d1.cross(d2).dot(dt);
             let difference = (by_difference - beam.jacobian(&Lane::default(), &hit)).abs();
             assert!(difference < 1e-3 * (1.0 + by_difference.abs()), "{by_difference}: {difference}");
-            if let Some(sign) = beam.sign(hit.t) {
+            if let Some(sign) = beam.sign(&Lane::default(), hit.t) {
                 assert!(sign * beam.jacobian(&Lane::default(), &hit) >= -1e-12);
             } else {
                 crossed += 1;

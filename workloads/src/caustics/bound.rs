@@ -4,6 +4,7 @@
 //! (see the book).
 
 use glam::DVec3;
+use pipeline::Lane;
 
 use super::Beam;
 
@@ -47,14 +48,14 @@ impl Method {
     }
 
     /// Faces of the bounding volumes of a beam; none for the moving triangle.
-    pub(super) fn bounding_volumes(self, beam: &Beam, into: &mut BoundingVolume) {
+    pub(super) fn bounding_volumes(self, lane: &Lane, beam: &Beam, into: &mut BoundingVolume) {
         into.clear();
         match self {
             Self::Moving => {}
-            Self::Refined => refined_faces(beam, into),
-            Self::Uncut => uncut_faces(beam, into),
-            Self::Hull => hull_faces(beam, into),
-            Self::Prism => prism_faces(beam, into),
+            Self::Refined => refined_faces(lane, beam, into),
+            Self::Uncut => uncut_faces(lane, beam, into),
+            Self::Hull => hull_faces(lane, beam, into),
+            Self::Prism => prism_faces(lane, beam, into),
         }
     }
 }
@@ -65,22 +66,38 @@ fn corners(beam: &Beam) -> [DVec3; 6] {
     [a, b, c, d, e, f]
 }
 
+fn length(lane: &Lane, vector: DVec3) -> f64 {
+    lane.root(lane.dot(vector, vector))
+}
+
+/// The vector of length 1; `None` for zero.
+fn unit(lane: &Lane, vector: DVec3) -> Option<DVec3> {
+    let inverse = lane.div(1.0, length(lane, vector));
+    let has_direction = lane.branch(inverse.is_finite() && inverse > 0.0);
+    has_direction.then(|| lane.mul(vector, DVec3::splat(inverse)))
+}
+
+/// Normal of a triangle, as long as twice its area.
+fn normal(lane: &Lane, [a, b, c]: [DVec3; 3]) -> DVec3 {
+    lane.cross(lane.sub(b, a), lane.sub(c, a))
+}
+
 /// Rounding error of a corner's distance from a plane, relative to the size of the beam.
 const COPLANAR: f64 = 1e-12;
 
 /// Adds the faces of the hull. More than three corners in one plane are one face, whose triangles do not overlap.
-fn hull_faces(beam: &Beam, into: &mut BoundingVolume) {
+fn hull_faces(lane: &Lane, beam: &Beam, into: &mut BoundingVolume) {
     let points = corners(beam);
-    let size = points.iter().map(|p| (*p - points[0]).length()).fold(0.0, f64::max);
+    let size = points.iter().fold(0.0, |most: f64, p| lane.max(most, length(lane, lane.sub(*p, points[0]))));
     let mut found: Vec<[usize; 3]> = Vec::new();
     for i in 0..6 {
         for j in i + 1..6 {
             for k in j + 1..6 {
-                let Some((face, in_plane)) = supporting(&points, size, [i, j, k]) else { continue };
+                let Some((face, in_plane)) = supporting(lane, &points, size, [i, j, k]) else { continue };
                 let triangle = face.map(|n| points[n]);
                 // All triangles of the plane that overlap no other fill its polygon.
                 let is_free = |other: &[usize; 3]| {
-                    let overlaps = !are_apart(&triangle, &other.map(|n| points[n]), size);
+                    let overlaps = !are_apart(lane, &triangle, &other.map(|n| points[n]), size);
                     !(overlaps && other.iter().all(|n| in_plane[*n]))
                 };
                 if found.iter().all(is_free) {
@@ -94,27 +111,37 @@ fn hull_faces(beam: &Beam, into: &mut BoundingVolume) {
 
 /// Three corners in the order that faces outward, and which corners lie in their plane; `None` if corners are on both sides of it, or
 /// the three are on a line.
-fn supporting(points: &[DVec3; 6], size: f64, of: [usize; 3]) -> Option<([usize; 3], [bool; 6])> {
+fn supporting(
+    lane: &Lane,
+    points: &[DVec3; 6],
+    size: f64,
+    of: [usize; 3],
+) -> Option<([usize; 3], [bool; 6])> {
     let [i, j, k] = of;
-    let normal = (points[j] - points[i]).cross(points[k] - points[i]);
-    let slack = COPLANAR * size * normal.length();
-    let sides: [f64; 6] =
-        std::array::from_fn(|n| if of.contains(&n) { 0.0 } else { normal.dot(points[n] - points[i]) });
-    let is_outward = sides.iter().all(|side| *side <= slack);
-    let is_inward = sides.iter().all(|side| *side >= -slack);
+    let normal = normal(lane, of.map(|n| points[n]));
+    let slack = lane.mul(lane.mul(COPLANAR, size), length(lane, normal));
+    let sides: [f64; 6] = std::array::from_fn(|n| {
+        if of.contains(&n) { 0.0 } else { lane.dot(normal, lane.sub(points[n], points[i])) }
+    });
+    let is_outward = sides.iter().all(|side| lane.branch(*side <= slack));
+    let is_inward = sides.iter().all(|side| lane.branch(*side >= -slack));
     let face = if is_outward { of } else { [i, k, j] };
-    let is_face = normal != DVec3::ZERO && (is_outward || is_inward);
-    is_face.then_some((face, sides.map(|side| side.abs() <= slack)))
+    let is_face = lane.branch(normal != DVec3::ZERO && (is_outward || is_inward));
+    is_face.then(|| (face, sides.map(|side| lane.branch(side.abs() <= slack))))
 }
 
 /// Whether two triangles that face the same way in one plane do not overlap: an edge of one has the other beyond it.
-fn are_apart(a: &[DVec3; 3], b: &[DVec3; 3], size: f64) -> bool {
+fn are_apart(lane: &Lane, a: &[DVec3; 3], b: &[DVec3; 3], size: f64) -> bool {
     let beyond = |x: &[DVec3; 3], y: &[DVec3; 3]| {
-        let normal = (x[1] - x[0]).cross(x[2] - x[0]);
+        let normal = normal(lane, *x);
+        let width = length(lane, normal);
         [(0, 1), (1, 2), (2, 0)].iter().any(|&(i, j)| {
-            let along = x[j] - x[i];
-            let slack = COPLANAR * size * along.length() * normal.length();
-            y.iter().all(|p| normal.dot(along.cross(*p - x[i])) <= slack)
+            let along = lane.sub(x[j], x[i]);
+            let slack = lane.mul(lane.mul(lane.mul(COPLANAR, size), length(lane, along)), width);
+            y.iter().all(|p| {
+                let side = lane.dot(normal, lane.cross(along, lane.sub(*p, x[i])));
+                lane.branch(side <= slack)
+            })
         })
     };
     beyond(a, b) || beyond(b, a)
@@ -126,9 +153,10 @@ const MIN_SINE: f64 = 1e-6;
 const TOUCH_TOLERANCE: f64 = 1e-9;
 
 /// Adds the faces of the prism.
-fn prism_faces(beam: &Beam, into: &mut BoundingVolume) {
-    let Some([base, top]) = ends(beam) else { return hull_faces(beam, into) };
-    let outward = (base[1] - base[0]).cross(base[2] - base[0]).dot(top[0] - base[0]) > 0.0;
+fn prism_faces(lane: &Lane, beam: &Beam, into: &mut BoundingVolume) {
+    let Some([base, top]) = ends(lane, beam) else { return hull_faces(lane, beam, into) };
+    let up = lane.dot(normal(lane, base), lane.sub(top[0], base[0]));
+    let outward = lane.branch(up > 0.0);
     let mut face = |a, b, c| into.push(if outward { [a, b, c] } else { [a, c, b] });
     face(base[0], base[2], base[1]);
     face(top[0], top[1], top[2]);
@@ -139,59 +167,68 @@ fn prism_faces(beam: &Beam, into: &mut BoundingVolume) {
 }
 
 /// Corners of both caps.
-fn ends(beam: &Beam) -> Option<[[DVec3; 3]; 2]> {
+fn ends(lane: &Lane, beam: &Beam) -> Option<[[DVec3; 3]; 2]> {
     let v = &beam.open;
-    let normal = (v[1] - v[0]).cross(v[2] - v[0]).try_normalize()?;
-    let sum: f64 = (0..3).map(|k| normal.dot(beam.path(k))).sum();
-    let normal = if sum < 0.0 { -normal } else { normal };
-    let heights = beam.close.map(|p| normal.dot(p - v[0]));
-    let far = heights.into_iter().fold(0.0, f64::max);
-    let near = heights.into_iter().fold(0.0, f64::min);
-    let sides = [side(beam, 1, 2)?, side(beam, 2, 0)?, side(beam, 0, 1)?];
+    let up = unit(lane, normal(lane, *v))?;
+    let heights_of = |from: [DVec3; 3]| -> [f64; 3] {
+        std::array::from_fn(|k| lane.dot(up, lane.sub(beam.close[k], from[k])))
+    };
+    let sum = heights_of(*v).into_iter().fold(0.0, |sum, height| lane.add(sum, height));
+    let up = if lane.branch(sum < 0.0) { -up } else { up };
+    let heights = beam.close.map(|p| lane.dot(up, lane.sub(p, v[0])));
+    let far = heights.into_iter().fold(0.0, |far: f64, height| lane.max(far, height));
+    let near = heights.into_iter().fold(0.0, |near: f64, height| lane.min(near, height));
+    let sides = [side(lane, beam, 1, 2)?, side(lane, beam, 2, 0)?, side(lane, beam, 0, 1)?];
     // The sides of the two edges at corner k meet there.
     let corner = |k: usize, height: f64| {
-        let along = sides[(k + 1) % 3].cross(sides[(k + 2) % 3]);
-        let rise = along.dot(normal);
-        (along.length() > MIN_SINE && rise.abs() > MIN_SINE * along.length())
-            .then(|| v[k] + along * (height / rise))
+        let along = lane.cross(sides[(k + 1) % 3], sides[(k + 2) % 3]);
+        let (rise, sine) = (lane.dot(along, up), length(lane, along));
+        let meets = lane.branch(sine > MIN_SINE) && lane.branch(rise.abs() > lane.mul(MIN_SINE, sine));
+        meets.then(|| lane.madd(along, DVec3::splat(lane.div(height, rise)), v[k]))
     };
     let cap = |height: f64| Some([corner(0, height)?, corner(1, height)?, corner(2, height)?]);
     let (base, top) = (cap(near)?, cap(far)?);
-    let area = |x: &[DVec3; 3]| (x[1] - x[0]).cross(x[2] - x[0]).dot(normal);
+    let area = |x: &[DVec3; 3]| lane.dot(normal(lane, *x), up);
     // If the sides meet between the caps, a cap is inside out.
-    (area(&base) * area(v) > 0.0 && area(&top) * area(v) > 0.0 && far > near).then_some([base, top])
+    let own = area(v);
+    let is_as_generator = |cap: &[DVec3; 3]| lane.branch(lane.mul(area(cap), own) > 0.0);
+    (is_as_generator(&base) && is_as_generator(&top) && lane.branch(far > near)).then_some([base, top])
 }
 
 /// Outward unit normal of the plane through corners `i` and `j` of the generator and a corner of the end
 /// triangle, with all corners on its inner side.
-fn side(beam: &Beam, i: usize, j: usize) -> Option<DVec3> {
+fn side(lane: &Lane, beam: &Beam, i: usize, j: usize) -> Option<DVec3> {
     let (v, opposite) = (&beam.open, 3 - i - j);
     let touching = |through: DVec3| {
-        let normal = (v[j] - v[i]).cross(through - v[i]).try_normalize()?;
-        let inner = normal.dot(v[opposite] - v[i]);
-        let normal = if inner > 0.0 { -normal } else { normal };
-        let inside = |p: &DVec3| normal.dot(*p - v[i]) <= TOUCH_TOLERANCE * (*p - v[i]).length();
-        (inner != 0.0 && corners(beam).iter().all(inside)).then_some(normal)
+        let normal = unit(lane, normal(lane, [v[i], v[j], through]))?;
+        let inner = lane.dot(normal, lane.sub(v[opposite], v[i]));
+        let normal = if lane.branch(inner > 0.0) { -normal } else { normal };
+        let inside = |p: &DVec3| {
+            let to = lane.sub(*p, v[i]);
+            lane.branch(lane.dot(normal, to) <= lane.mul(TOUCH_TOLERANCE, length(lane, to)))
+        };
+        (lane.branch(inner != 0.0) && corners(beam).iter().all(inside)).then_some(normal)
     };
     [i, j, opposite].into_iter().find_map(|k| touching(beam.close[k]))
 }
 
 /// Adds the faces of all parts.
-fn refined_faces(beam: &Beam, into: &mut BoundingVolume) {
-    for ends in beam.cuts().windows(2) {
-        let part = beam.part(ends[0], ends[1]);
-        match beam.sign(0.5 * (ends[0] + ends[1])) {
-            Some(sign) => outer(&part, sign, into),
-            None => hull_faces(&part, into),
+fn refined_faces(lane: &Lane, beam: &Beam, into: &mut BoundingVolume) {
+    for ends in beam.cuts(lane).windows(2) {
+        let part = beam.part(lane, ends[0], ends[1]);
+        match beam.sign(lane, lane.mul(0.5, lane.add(ends[0], ends[1]))) {
+            Some(sign) => outer(lane, &part, sign, into),
+            None => hull_faces(lane, &part, into),
         }
     }
-    drop_repeated(into);
+    drop_repeated(lane, into);
 }
 
 /// Drops triangles that are there twice: where a beam folds back, two parts lie on the same side of the triangle that they share.
-fn drop_repeated(volume: &mut BoundingVolume) {
-    let is_same =
-        |a: &[DVec3; 3], b: &[DVec3; 3]| (0..3).any(|n| *a == [b[n], b[(n + 1) % 3], b[(n + 2) % 3]]);
+fn drop_repeated(lane: &Lane, volume: &mut BoundingVolume) {
+    let is_same = |a: &[DVec3; 3], b: &[DVec3; 3]| {
+        (0..3).any(|n| lane.branch(*a == [b[n], b[(n + 1) % 3], b[(n + 2) % 3]]))
+    };
     let mut kept = 0;
     for place in 0..volume.len() {
         let face = volume[place];
@@ -204,21 +241,21 @@ fn drop_repeated(volume: &mut BoundingVolume) {
 }
 
 /// Adds the ends and outer faces of the whole beam, without cuts at folds.
-fn uncut_faces(beam: &Beam, into: &mut BoundingVolume) {
-    let folds = beam.cuts();
-    let first = beam.sign(0.5 * (folds[0] + folds[1]));
-    outer(beam, first.unwrap_or(1.0), into);
+fn uncut_faces(lane: &Lane, beam: &Beam, into: &mut BoundingVolume) {
+    let folds = beam.cuts(lane);
+    let first = beam.sign(lane, lane.mul(0.5, lane.add(folds[0], folds[1])));
+    outer(lane, beam, first.unwrap_or(1.0), into);
 }
 
 /// Adds the ends and outer faces of a part without folds; `sign` is that of its Jacobian.
-fn outer(part: &Beam, sign: f64, into: &mut BoundingVolume) {
+fn outer(lane: &Lane, part: &Beam, sign: f64, into: &mut BoundingVolume) {
     let (v, p) = (&part.open, &part.close);
     let mut face = |a, b, c| into.push(if sign > 0.0 { [a, b, c] } else { [a, c, b] });
     face(v[0], v[2], v[1]);
     face(p[0], p[1], p[2]);
     for (i, j) in [(0, 1), (1, 2), (2, 0)] {
-        let outward = (v[j] - v[i]).cross(p[i] - v[i]);
-        if sign * outward.dot(p[j] - v[i]) > 0.0 {
+        let outward = normal(lane, [v[i], v[j], p[i]]);
+        if lane.branch(sign * lane.dot(outward, lane.sub(p[j], v[i])) > 0.0) {
             face(v[i], v[j], p[j]);
             face(v[i], p[j], p[i]);
         } else {
@@ -257,7 +294,7 @@ mod tests {
                     0 => turned(&mut random),
                     kind => warped(&mut random, [0.0, 0.15, 0.4, 0.8, 1.5][kind - 1]),
                 };
-                method.bounding_volumes(&beam, &mut volume);
+                method.bounding_volumes(&Lane::default(), &beam, &mut volume);
                 for _ in 0..20 {
                     let hit = random.hit();
                     let along = DVec3::from_array([0; 3].map(|_| random.within(-1.0, 1.0)));
@@ -274,7 +311,7 @@ mod tests {
             let beam = warped(&mut random, 0.0);
             for method in [Method::Refined, Method::Hull, Method::Prism] {
                 let mut volume = BoundingVolume::new();
-                method.bounding_volumes(&beam, &mut volume);
+                method.bounding_volumes(&Lane::default(), &beam, &mut volume);
                 let volume: f64 = volume.iter().map(|[a, b, c]| a.cross(*b).dot(*c) / 6.0).sum();
                 let [a, b, c] = beam.open;
                 let own = 0.5 * (b - a).cross(c - a).dot(beam.path(0)).abs();
@@ -302,18 +339,18 @@ mod tests {
             let flat = Beam { close: [beam.close[0], beam.close[1], flat], ..beam };
             for beam in [beam, flat] {
                 let mut volume = BoundingVolume::new();
-                hull_faces(&beam, &mut volume);
+                hull_faces(&Lane::default(), &beam, &mut volume);
                 for _ in 0..40 {
                     let point = beam.point(&random.hit());
                     let count = volume.iter().filter(|face| crosses(face, [point.x, point.y])).count();
                     assert!(count <= 1, "{round}: {count} of {volume:?}");
                     covered += count;
                 }
-                Method::Refined.bounding_volumes(&beam, &mut volume);
+                Method::Refined.bounding_volumes(&Lane::default(), &beam, &mut volume);
                 let once = volume.len();
                 let mut twice = volume.clone();
                 twice.extend(&volume);
-                drop_repeated(&mut twice);
+                drop_repeated(&Lane::default(), &mut twice);
                 assert_eq!(twice.len(), once);
                 repeated += usize::from(once > 20);
             }

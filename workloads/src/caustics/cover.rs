@@ -65,7 +65,7 @@ impl<'a> Cover<'a> {
             Method::Moving => self.moving(seen),
             method => {
                 let mut volume = std::mem::take(&mut self.volume);
-                method.bounding_volumes(&seen.image, &mut volume);
+                method.bounding_volumes(&Lane::default(), &seen.image, &mut volume);
                 volume.iter().for_each(|face| self.face(face));
                 self.volume = volume;
             }

@@ -131,7 +131,7 @@ impl Draws for Caustics {
         let beams = self.ocean.beams(*time_s);
         let eye = self.eye().ok_or_else(|| JobError::setting("the view has no extent"))?;
         let method = self.options.method;
-        let (picture, buffer) = draw_on(gpu, &beams, &eye, method, self.light());
+        let (picture, buffer) = draw_on(gpu, &beams, &eye, method, self.light())?;
         Ok(Drawn {
             image: tone_on(gpu, &eye, &picture.light, buffer, white(&picture.light)),
             moving: method == Method::Moving,
@@ -252,12 +252,16 @@ mod tests {
         let hardware = hardware();
         for method in Method::ALL {
             let mut gpu = Gpu::quiet(&hardware).unwrap();
-            let (picture, _) = draw_on(&mut gpu, &beams, &eye, method, Light::Volume);
+            let (picture, _) = draw_on(&mut gpu, &beams, &eye, method, Light::Volume).unwrap();
             assert_eq!(picture, draw(&beams, &eye, method, Some(Light::Volume)), "{method:?}");
             // Still bodies are moved to the image once, moving triangles at both ends.
             let counts = gpu.finish().counts();
             let bytes = if method == Method::Moving { 24 } else { 12 };
             assert_eq!(counts[Event::VertexBytes], bytes * counts[Event::VerticesFetched]);
+            // Bounding volumes are made by a lane for each beam.
+            let groups = if method == Method::Moving { 0 } else { beams.len().div_ceil(64) as u64 };
+            assert_eq!(counts[Event::Groups], groups);
+            assert_eq!(counts[Event::BufferLines] > 0, groups > 0);
         }
     }
 

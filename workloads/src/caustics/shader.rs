@@ -5,7 +5,10 @@ use glam::{DVec3, Vec3};
 use pipeline::conservative::{Grid, MovingTriangle, Rasterizer, View};
 use pipeline::memory::MemoryRange;
 use pipeline::traversal::TimeIntervals;
-use pipeline::{ConservativeDraw, Gpu, Lanes, Placement, Primitive, TileIntervals, TileShader};
+use pipeline::{
+    Atomic, Buffer, ComputePass, ConservativeDraw, Gpu, Group, GroupLane, GroupShader, Lane, Lanes,
+    PassError, Placement, Primitive, TileIntervals, TileShader,
+};
 
 use super::bound::BoundingVolume;
 use super::cover::{MAX_HALVINGS, TILE_PX, in_image, pixel_of, reach, set_bits, slack, within_reach};
@@ -18,8 +21,12 @@ use super::{Beam, Eye, Light, Method};
 const VERTEX_BYTES: u32 = 12;
 /// Bytes of the flux of a beam. The light of a moving triangle takes all else from its vertices.
 const FLUX_BYTES: u64 = 4;
-/// Bytes of a beam that a body bounds: the vertices at both ends, and the flux.
-const BEAM_BYTES: u64 = 6 * VERTEX_BYTES as u64 + FLUX_BYTES;
+/// Words of a beam that a body bounds: the vertices at both ends, and the flux.
+const BEAM_WORDS: u32 = 19;
+/// Words of a face of a body.
+const FACE_WORDS: u32 = 9;
+/// Lanes of a group that makes bounding volumes.
+const GROUP_LANES: u32 = 64;
 /// Bytes per pixel of the buffer that accumulates light.
 const LIGHT_BYTES: u64 = 4;
 /// Bytes that mark the pixels of a tile: the number of the body that covered pixels of it last, and two words of bits.
@@ -65,14 +72,18 @@ pub(super) fn tone_on(
     drawn.images.swap_remove(0)
 }
 
-/// Draws beams in a pass of `gpu`. The picture is that of [`super::draw()`], and the light is in the buffer.
+/// Draws beams in a pass of `gpu`, after one that makes their bounding volumes, if there are any. The picture is that of
+/// [`super::draw()`], and the light is in the buffer.
+///
+/// # Errors
+/// [`PassError`] if the GPU does not take the pass that makes bounding volumes.
 pub fn draw_on(
     gpu: &mut Gpu<'_>,
     beams: &[Beam],
     eye: &Eye,
     method: Method,
     light: Light,
-) -> (Picture, LightBuffer) {
+) -> Result<(Picture, LightBuffer), PassError> {
     let seen: Vec<Option<Seen>> = beams.iter().map(|beam| eye.see(beam)).collect();
     let viewport = eye.viewport();
     let [half_width, half_height] = viewport.half_px().map(f64::from);
@@ -82,11 +93,11 @@ pub fn draw_on(
     let region = gpu.allocate(u64::from(columns * rows) * TILE_PIXELS * LIGHT_BYTES);
     let buffer = LightBuffer { region, columns };
     let (primitives, faces) = primitives(&seen, method, &grid);
-    // Both ends of a moving triangle; a face of a body is still.
-    let vertex_bytes = if method == Method::Moving { 2 * VERTEX_BYTES } else { VERTEX_BYTES };
-    let vertices = gpu.allocate(3 * primitives.len() as u64 * u64::from(vertex_bytes));
-    let beam_bytes = if method == Method::Moving { FLUX_BYTES } else { BEAM_BYTES };
-    let beams = gpu.allocate(seen.len() as u64 * beam_bytes);
+    let input = if method == Method::Moving {
+        Input::moving(gpu, primitives.len() as u64, seen.len() as u64)
+    } else {
+        Input::bodies(gpu, method, &seen, &faces)?
+    };
     let marks = gpu.allocate(u64::from(columns * rows) * MARK_STRIDE);
     let mut picture = Picture {
         light: vec![0.0; viewport.pixels()],
@@ -100,11 +111,11 @@ pub fn draw_on(
         primitives: &primitives,
         grid: &grid,
         block: 1,
-        vertices,
-        vertex_bytes,
+        vertices: input.vertices,
+        vertex_bytes: input.vertex_bytes,
         projection: Some(eye.projection()),
     };
-    let shader = LightShader { eye, seen: &seen, faces: &faces, light, buffer, beams, beam_bytes, marks };
+    let shader = LightShader { eye, seen: &seen, faces: &faces, light, buffer, input, marks };
     // The last tiles may reach beyond the image.
     let last = [(columns, viewport.width()), (rows, viewport.height())]
         .map(|(tiles, px)| f64::from(tiles * TILE_PX) / f64::from(px));
@@ -118,7 +129,98 @@ pub fn draw_on(
             picture.useful += u64::from(light > 0.0);
         }
     });
-    (picture, buffer)
+    Ok((picture, buffer))
+}
+
+/// What a draw of beams reads from memory.
+struct Input {
+    /// Vertices of the primitives, at both ends of a moving triangle.
+    vertices: MemoryRange,
+    /// Bytes of a vertex.
+    vertex_bytes: u32,
+    /// What the light of each beam needs beside the vertices of its primitives.
+    beams: MemoryRange,
+    /// Bytes of that for a beam.
+    beam_bytes: u64,
+}
+
+impl Input {
+    /// The vertices of moving triangles, and the flux of each.
+    fn moving(gpu: &mut Gpu<'_>, triangles: u64, beams: u64) -> Self {
+        let vertex_bytes = 2 * VERTEX_BYTES;
+        let vertices = gpu.allocate(3 * triangles * u64::from(vertex_bytes));
+        Self { vertices, vertex_bytes, beams: gpu.allocate(beams * FLUX_BYTES), beam_bytes: FLUX_BYTES }
+    }
+
+    /// The faces of bodies, which a pass makes from the beams.
+    fn bodies(
+        gpu: &mut Gpu<'_>,
+        method: Method,
+        seen: &[Option<Seen>],
+        faces: &[Face],
+    ) -> Result<Self, PassError> {
+        let beams = gpu.buffer("beams", &vec![0.0; seen.len() * BEAM_WORDS as usize]);
+        let made = gpu.buffer("faces", &vec![0.0; faces.len() * FACE_WORDS as usize]);
+        let count = gpu.buffer("count of faces", &[0]);
+        let shader =
+            VolumeShader { method, seen, beams, faces: made, first: firsts(seen.len(), faces), count };
+        if !faces.is_empty() {
+            gpu.dispatch(&ComputePass {
+                name: "bounding volumes",
+                groups: [(seen.len() as u32).div_ceil(GROUP_LANES), 1, 1],
+                group_size: GROUP_LANES,
+                shared_bytes: 0,
+                bindings: &[beams.reads(), made.writes(), count.writes()],
+                shader: &shader,
+            })?;
+            gpu.wait();
+        }
+        let (vertices, beams) = (made.region(), beams.region());
+        Ok(Self { vertices, vertex_bytes: VERTEX_BYTES, beams, beam_bytes: 4 * u64::from(BEAM_WORDS) })
+    }
+}
+
+/// Number of the first face of each beam.
+fn firsts(beams: usize, faces: &[Face]) -> Vec<u32> {
+    (0..beams).map(|beam| faces.partition_point(|face| face.beam < beam) as u32).collect()
+}
+
+/// Makes bounding volumes, a lane each.
+struct VolumeShader<'a> {
+    method: Method,
+    seen: &'a [Option<Seen>],
+    beams: Buffer<f32>,
+    faces: Buffer<f32>,
+    /// Place of the first face of each beam, which an atomic on `count` returns on hardware.
+    first: Vec<u32>,
+    count: Buffer<u32>,
+}
+
+impl GroupShader for VolumeShader<'_> {
+    fn run(&self, group: &mut Group<'_>) {
+        let first = group.id()[0] * group.size();
+        group.lanes(|lane| self.volume(lane, first + lane.index()));
+    }
+}
+
+impl VolumeShader<'_> {
+    /// Reads a beam and writes the faces around it. Image coordinates stand for those in memory.
+    fn volume(&self, lane: &GroupLane<'_, '_>, beam: u32) {
+        if lane.branch(beam as usize >= self.seen.len()) {
+            return;
+        }
+        for word in 0..BEAM_WORDS {
+            lane.load(self.beams, beam * BEAM_WORDS + word);
+        }
+        let Some(seen) = &self.seen[beam as usize] else { return };
+        let mut volume = BoundingVolume::new();
+        self.method.bounding_volumes(lane, &seen.image, &mut volume);
+        lane.atomic(self.count, 0, Atomic::Add, volume.len() as u32);
+        let coordinates = volume.iter().flatten().flat_map(|corner| corner.to_array());
+        for (word, value) in (self.first[beam as usize] * FACE_WORDS..).zip(coordinates) {
+            lane.store(self.faces, word, value as f32);
+        }
+    }
 }
 
 /// A face of a bounding volume, or none for a moving triangle, of a beam.
@@ -152,7 +254,7 @@ fn primitives(seen: &[Option<Seen>], method: Method, grid: &Grid) -> (Vec<Primit
             add(beam, [seen.image.open, seen.image.close], None);
             continue;
         }
-        method.bounding_volumes(&seen.image, &mut volume);
+        method.bounding_volumes(&Lane::default(), &seen.image, &mut volume);
         volume.iter().for_each(|face| add(beam, [*face; 2], Some(*face)));
     }
     (primitives, faces)
@@ -165,10 +267,7 @@ struct LightShader<'a> {
     faces: &'a [Face],
     light: Light,
     buffer: LightBuffer,
-    /// What the light of each beam needs beside the vertices of its primitives.
-    beams: MemoryRange,
-    /// Bytes of that for a beam.
-    beam_bytes: u64,
+    input: Input,
     /// Marks of the tiles, row by row.
     marks: MemoryRange,
 }
@@ -273,7 +372,8 @@ impl TileShader for LightShader<'_> {
         let Face { beam, corners } = &self.faces[tile.primitive];
         let seen = self.seen[*beam].as_ref()?;
         let mut shaded = Shaded { tests: 0, lit: Vec::new() };
-        lanes.fetch(self.beams.address() + *beam as u64 * self.beam_bytes, self.beam_bytes);
+        let Input { beams, beam_bytes, .. } = self.input;
+        lanes.fetch(beams.address() + *beam as u64 * beam_bytes, beam_bytes);
         match corners {
             None => self.moving(lanes, seen, tile, &mut shaded),
             Some(corners) => self.face(marks, (lanes, seen), (corners, tile.tile), &mut shaded),

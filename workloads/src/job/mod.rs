@@ -308,11 +308,13 @@ pub struct Request<'a> {
 #[cfg(test)]
 pub(crate) mod testing {
     use pipeline::depth::DepthSpec;
-    use pipeline::{CacheSpec, Features, MemorySpec, PipelineSpec, Shading};
+    use pipeline::{CacheSpec, ComputeSpec, Features, MemorySpec, PipelineSpec, Shading};
 
     /// Small caches, with all features on.
     pub(crate) fn hardware() -> PipelineSpec {
         let lines = CacheSpec::lru(256, 4);
+        let groups =
+            ComputeSpec { warp_lanes: 32, group_lanes: 256, shared_bytes: 8192, banks: 32, atomic_units: 1 };
         let compression = Default::default();
         PipelineSpec {
             tile_px: 8,
@@ -333,7 +335,7 @@ pub(crate) mod testing {
             },
             features: Features::ALL,
             depth: DepthSpec::default(),
-            compute: None,
+            compute: Some(groups),
             warp_lanes: 32,
         }
     }

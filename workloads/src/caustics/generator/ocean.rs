@@ -157,6 +157,8 @@ impl Corner {
 
 #[cfg(test)]
 mod tests {
+    use pipeline::Lane;
+
     use super::*;
 
     /// Flux of the light on the triangles, before reflection.
@@ -232,13 +234,16 @@ mod tests {
         (ocean.waves, ocean.sun) = (vec![wave], DVec3::NEG_Y);
         let beams = ocean.beams(0.0);
         let focuses = |beam: &Beam| {
-            let t = beam.folds().first().copied()?;
+            let t = beam.folds(&Lane::default()).first().copied()?;
             Some(t * (2.0 * depth + amplitude_m))
         };
         let first = beams.iter().filter_map(focuses).fold(f64::INFINITY, f64::min);
         assert!((first / depth - 1.0).abs() < 0.002, "{first} {depth}");
         // Light diverges under the troughs.
         let trough = beams.iter().filter(|beam| beam.open.iter().all(|p| (p.x.abs() - 0.5).abs() < 0.1));
-        assert!(trough.clone().count() > 100 && trough.into_iter().all(|beam| beam.folds().is_empty()));
+        assert!(
+            trough.clone().count() > 100
+                && trough.into_iter().all(|beam| beam.folds(&Lane::default()).is_empty())
+        );
     }
 }

@@ -116,7 +116,7 @@ fn base_on_hardware(
 fn on_hardware(beams: &[Beam], eye: &Eye, method: Method, light: Light) -> Result<(Picture, Ran), RunError> {
     let spec = GpuSpec::load("reference")?.pipeline;
     let mut gpu = Gpu::quiet(&spec).map_err(RunError::setting)?;
-    let (picture, _) = draw_on(&mut gpu, beams, eye, method, light);
+    let (picture, _) = draw_on(&mut gpu, beams, eye, method, light).map_err(RunError::setting)?;
     Ok((picture, Ran::of(&gpu.finish())))
 }
 
