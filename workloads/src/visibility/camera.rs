@@ -3,7 +3,7 @@
 use glam::{Affine3A, DVec2, DVec3};
 use pipeline::{Camera, CameraError, Lens, LensShape, Viewport};
 
-use super::mesh::MovingMesh;
+use super::MovingMesh;
 use crate::scene::camera::CameraFrame;
 use crate::scene::fit::{Extent, Fit};
 use crate::scene::inside::Inside;
