@@ -10,9 +10,7 @@
 //! work. *An interval query never reports a visible object as hidden.*
 //!
 //! - [`depths()`]: depths of a scene, of which a [`pipeline::depth::Pyramid`] is made.
-//! - [`WallScene`]: walls, solid or slatted, with boxes behind them.
-//!
-//! The job `quintile run occlusion`, and its wall scene: walls, solid or slatted, with boxes behind them.
+//! - [`WallScene`]: walls, solid or slatted, with boxes behind them; [`job()`]: `quintile run occlusion`.
 
 use std::sync::Arc;
 

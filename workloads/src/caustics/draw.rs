@@ -1,6 +1,4 @@
-//! Drawing of beams into an image.
-//!
-//! The pixels whose centre a method covers.
+//! Drawing of beams into an image, and the pixels whose centre a method covers.
 
 use std::ops::Range;
 

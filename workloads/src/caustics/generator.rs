@@ -3,10 +3,7 @@
 //! - [`Ocean`]: light refracted into water by waves; a single wave is a sinusoidal surface with a known
 //!   solution.
 //! - [`turned_beams`]: beams that twist around their axis.
-//!
-//! Light refracted into water by a surface with waves.
-//!
-//! Reflection and refraction at a smooth surface.
+//! - [`reflect`], [`refract`], [`transmission`]: light at a smooth surface.
 
 use std::f64::consts::TAU;
 

@@ -1,6 +1,4 @@
-//! Light of a beam at a pixel: the pixel shader.
-//!
-//! Orthographic views of the light.
+//! Light of a beam at a pixel: the pixel shader, and orthographic views of the light.
 
 use glam::{Affine3A, DAffine3, DMat3, DVec3};
 use pipeline::geometry::Projection;

@@ -1,6 +1,6 @@
-//! Histogram of the luminance of an image, by atomics in the shared memory of each group or in a buffer.
-//! Mean luminance of an image, by a tree in the shared memory of each group and a last group for their sums.
-//! Programs that write the image: a tone map, an equalised image, and a heat map of lights.
+//! Luminance of an image: its histogram by atomics in the shared memory of each group or in a buffer, and its mean by a tree in the
+//! shared memory of each group and a last group for their sums. Programs write the image: a tone map, an equalised image, and a heat
+//! map of lights.
 
 use glam::{Vec3, Vec4};
 use pipeline::surface::Format;

@@ -5,11 +5,8 @@
 //! Positions are not stored: they follow from depth and the ray of a sample. The camera is a still pinhole; objects may move, as every
 //! sample has a surface of its own.
 //!
-//! The G-buffer: its surfaces, and what a lighting pass reads of it.
-//!
-//! Point lights at fixed positions.
-//!
-//! Shaders that light surfaces: forward, and from a G-buffer by a quad over the screen or by a light volume.
+//! Shaders light surfaces forward, or from the G-buffer by a quad over the screen or by a light volume. Point lights have fixed
+//! positions.
 
 mod job;
 

@@ -10,10 +10,6 @@
 //! - [`Map`]: the map in [one pass](Map::one_pass), by [accumulation](Map::accumulated), and by
 //!   [rays](Map::by_rays), the brute-force reference.
 //! - [`job()`]: the workload; [`default_scene()`]: its scene.
-//!
-//! The map of a receiver: the light that each texel gathers through the lens.
-//!
-//! A rectangle that reflects or refracts, its camera position, and its shading.
 
 mod job;
 

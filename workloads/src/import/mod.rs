@@ -1,5 +1,5 @@
 //! Importers: one folder or file for each format. Each returns [`Parts`].
-//! Warnings about content that is not drawn, the same for all formats.
+//! Warnings about content that is not drawn are the same for all formats.
 
 mod gltf;
 mod obj;

@@ -3,7 +3,7 @@
 //! A [`Job`] draws the passes of each frame on a [`Gpu`], which counts and times them. [`crate::catalog`] makes jobs by name
 //! from their options ([`OptionSource`]), and from scenes.
 //!
-//! Fingerprints: equal when two frames have the same content.
+//! A [`Fingerprint`] is equal when two frames have the same content.
 
 mod options;
 

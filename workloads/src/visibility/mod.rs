@@ -4,7 +4,7 @@
 //! results are little endian and packed; `docs/formats.md` describes them. They are shared with a ray caster,
 //! so that results can be compared sample by sample. `.mts` is read by [`load_mts`] for other workloads, too.
 //!
-//! Meshes with linear vertex motion, and their construction from two surface files.
+//! A [`MovingMesh`] has linear vertex motion, and may come from two surface files.
 
 mod camera;
 mod m5d;

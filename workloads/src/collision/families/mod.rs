@@ -2,8 +2,6 @@
 //!
 //! A case has two objects or many. In each family about half of the pairs that come near each other collide.
 //! Gaps go down to 1e-7 of the objects' size.
-//!
-//! Families of two objects and of many.
 
 mod reference;
 

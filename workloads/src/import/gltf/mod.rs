@@ -3,7 +3,7 @@
 //! The crate `gltf` parses and checks the JSON; whether accessors fit their buffers it does not check, and some
 //! of its readers panic where they do not, so buffers and accessors are read here.
 //!
-//! Materials, their base-colour textures, and warnings about content that is not drawn.
+//! Of materials base-colour textures are read; warnings say what is not drawn.
 
 mod nodes;
 mod primitive;
