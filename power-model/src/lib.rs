@@ -35,7 +35,6 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod bound;
 mod error;
 mod model;
 mod pacing;
@@ -46,7 +45,6 @@ mod structure;
 mod system;
 mod table;
 
-pub use bound::Bound;
 pub use error::{ModelError, PacingError, PlatformError, TableError, TimelineError};
 pub use model::{FramePower, PowerModel};
 pub use pacing::{PacedFrame, Pacing, Run, pace};
@@ -56,8 +54,8 @@ pub use platform::{
     UnitPower,
 };
 pub use quantity::{
-    Basis, Celsius, Exponent, Hertz, Interval, OutOfRange, Picojoules, Quantity, Ratio, Seconds, Share,
-    Source, Sourced, Volts, Watts,
+    Basis, Bound, Celsius, Exponent, Hertz, Interval, OutOfRange, Picojoules, Quantity, Ratio, Seconds,
+    Share, Source, Sourced, Volts, Watts,
 };
 pub use structure::{
     Charge, Cost, Estimate, INTERPOLATION, LANE_MADDS, Memory, REGISTER_BYTES, Scaling, Sram, SramRun,

@@ -2,11 +2,10 @@
 
 use activity::{Bin, Counts, Event, Timeline, Unit};
 
-use crate::bound::Bound;
 use crate::error::{ModelError, TimelineError};
 use crate::parts::{Energy, PARTS, Part};
 use crate::platform::Platform;
-use crate::quantity::Watts;
+use crate::quantity::{Bound, Watts};
 use crate::structure::Scaling;
 use crate::table::{EnergyRow, EnergyTable, Supply};
 

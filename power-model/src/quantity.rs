@@ -1,6 +1,6 @@
-//! Quantities with a unit and a range in their type, and values with a mandatory source.
+//! Quantities with a unit and a range in their type, values with a mandatory source, and which end of intervals is taken.
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 /// A value outside the range of its quantity.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -187,6 +187,19 @@ impl<T: Quantity> Sourced<T> {
     pub const fn unit(&self) -> &'static str {
         T::UNIT
     }
+}
+
+/// End of the interval of each number.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Bound {
+    /// Smallest numbers that the sources allow.
+    Low,
+    /// Nominal numbers.
+    #[default]
+    Nominal,
+    /// Largest numbers that the sources allow.
+    High,
 }
 
 #[cfg(test)]

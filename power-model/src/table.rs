@@ -6,8 +6,7 @@ use activity::{Event, spec};
 use serde::Deserialize;
 
 use crate::TableError;
-use crate::bound::Bound;
-use crate::quantity::{Basis, Nanometres, Picojoules, Source, Volts};
+use crate::quantity::{Basis, Bound, Nanometres, Picojoules, Source, Volts};
 use crate::structure::Scaling;
 
 /// Built-in tables by name.

@@ -222,7 +222,7 @@ fn a_crash_reports_its_place_and_a_command_to_repeat_it() {
         let ended = crate::support::Quintile::new("sh").call(["-c", shell, program, backtrace, &out]);
         assert_eq!(ended.code, Some(1), "{}", ended.stderr);
         for says in [
-            "error: sim/run/src/simulate.rs:",
+            "error: sim/run/src/lib.rs:",
             "internal error in frame 2: requested by a test",
             env!("CARGO_PKG_VERSION"),
             "quintile run tiny --seed 3 --frames 2..3 --out frame_2",

@@ -42,7 +42,6 @@ pub mod collision;
 pub mod compute;
 pub mod deferred;
 mod error;
-mod fingerprint;
 pub mod glossy;
 mod import;
 pub mod job;
@@ -63,8 +62,8 @@ pub mod visibility;
 
 pub use builtin::builtin_names;
 pub use error::LoadError;
-pub use fingerprint::{Fingerprint, FingerprintError};
 pub use job::Job;
+pub use job::{Fingerprint, FingerprintError};
 pub use lighting::Light;
 pub use load::{load, load_text};
 pub use material::{Alpha, Material};

@@ -23,7 +23,6 @@
 //!
 //! The crate contains no geometry, clock rate or energy, and depends on no other crate of the workspace.
 
-mod bounded;
 mod counts;
 mod events;
 pub mod inputs;
@@ -31,8 +30,8 @@ mod packet;
 pub mod spec;
 mod stream;
 
-pub use bounded::{Bounded, OutOfBounds};
 pub use counts::{Bin, Counts, Timeline};
 pub use events::{Event, Unit};
 pub use packet::{LEVELS, LevelRequests, LineAccess, LineKind, Packet, PacketCounts, PacketKind, Waits};
+pub use spec::{Bounded, OutOfBounds};
 pub use stream::{PacketStream, StreamError, StreamWriter};

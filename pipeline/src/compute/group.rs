@@ -5,8 +5,7 @@ use std::ops::Deref;
 
 use activity::{Event, PacketCounts};
 
-use super::shared::{SharedAccess, SharedMemory};
-use super::warp::{AccessKind, LaneAccess, LineTouch, account};
+use super::warp::{AccessKind, LaneAccess, LineTouch, SharedAccess, SharedMemory, account};
 use super::{ComputePass, ComputeSpec};
 use crate::buffer::{Access, Atomic, Buffer, Buffers, Stored, Word};
 use crate::shader::Lane;

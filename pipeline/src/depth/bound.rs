@@ -3,8 +3,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::number::{Real, both, cross, hull, range};
 use super::plane::{Beam, MovingPlane, Points, normal, sides, tightest};
+use super::{Real, both, cross, hull, range};
 use crate::geometry::Shear;
 use crate::setup::Triangle;
 use crate::traversal::{Box5, Coordinate, TileRect};
@@ -345,7 +345,7 @@ fn seen_area<R: Real>(ends: &[Points<R>], slopes: &[[R; 2]; 2]) -> R {
 
 #[cfg(test)]
 mod tests {
-    use super::super::number::counting::{Counted, madds};
+    use super::super::counting::{Counted, madds};
     use super::*;
     use crate::geometry::{Cull, MovingVertex};
     use crate::random::{mix, unit};

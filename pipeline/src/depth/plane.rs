@@ -16,7 +16,7 @@
 //! orthographic view `G = (-u a_x, -v a_y, 1)` and `B = (X + u s_x, Y + v s_y, 0)`. The bound is a ratio of
 //! functions linear in each variable, so its extremes are at corners.
 
-use super::number::{Real, both, cross, dot, hull, range};
+use super::{Real, both, cross, dot, hull, range};
 
 /// Three points.
 pub type Points<R> = [[R; 3]; 3];

@@ -5,8 +5,7 @@
 
 use activity::{Event, LEVELS, LevelRequests, LineAccess, LineKind, PacketCounts, Unit};
 
-use super::address::LINE_BYTES;
-use super::{Access, Cache, CacheError, CacheSpec};
+use super::{Access, Cache, CacheError, CacheSpec, LINE_BYTES};
 
 /// Levels below the L2, those that there are.
 pub(super) type LevelSpecs = [Option<CacheSpec>; LEVELS.len()];

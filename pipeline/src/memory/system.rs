@@ -4,9 +4,8 @@
 use activity::{Event, LEVELS, LineAccess, PacketCounts, Unit};
 use serde::{Deserialize, Serialize};
 
-use super::address::{LINE_BYTES, MemoryRange};
 use super::shared::SharedCaches;
-use super::{Access, Cache, CacheError, CacheSpec};
+use super::{Access, Cache, CacheError, CacheSpec, LINE_BYTES, MemoryRange};
 
 /// Caches of memory, with lines of 64 bytes as entries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

@@ -11,14 +11,11 @@
 mod cost;
 mod edges;
 mod facing;
-mod lens_lines;
-mod lens_spans;
+mod lens;
 mod number;
 mod region;
 mod screen;
 mod side_planes;
-#[cfg(test)]
-mod testing;
 pub mod thresholds;
 mod time_interval;
 
@@ -28,8 +25,7 @@ pub use cost::{
 };
 pub use edges::{EdgeBounds, Edges};
 pub use facing::Facing;
-pub use lens_lines::LensLines;
-pub use lens_spans::{LensSpan, LensSpans};
+pub use lens::{LensLines, LensSpan, LensSpans};
 #[cfg(test)]
 pub(crate) use number::counted;
 pub use number::{Coordinate, Number, Pieces, Quadratic, Scalar};
@@ -37,3 +33,6 @@ pub use region::{Box5, Faces, Piece, TileRect, TimePieces, View};
 pub use screen::{SCREEN_GAIN_MADDS, Screen, screen_madds};
 pub use side_planes::{narrow, narrow_by_sides, narrow_counted, narrow_near};
 pub use time_interval::{TimeIntervals, time_interval, time_interval_counted};
+
+#[cfg(test)]
+mod testing;

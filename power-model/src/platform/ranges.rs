@@ -3,8 +3,7 @@
 use serde::Deserialize;
 
 use super::Platform;
-use crate::bound::Bound;
-use crate::quantity::{Ratio, Source, Watts};
+use crate::quantity::{Bound, Ratio, Source, Watts};
 
 /// Range of numbers that are uncertain for one reason and so are off together, as multiples of those in the file.
 #[derive(Clone, Debug, PartialEq, Deserialize)]

@@ -1,18 +1,14 @@
-//! Structure of a GPU: its memories and logic, and what more or less of them costs than on the GPU that a platform was made for.
+//! Structure of a GPU: its memories and logic, and its energies and watts over those of the GPU that a platform was made for.
 
-mod logic;
-mod scaling;
-mod sram;
 mod weights;
 
 use activity::{Event, Unit};
 use serde::Serialize;
+use weights::Case;
 
-use crate::bound::Bound;
+use crate::quantity::Bound;
 
-pub use self::logic::{LANE_MADDS, REGISTER_BYTES, madds};
-pub use self::scaling::Scaling;
-pub use self::sram::{Cost, INTERPOLATION, Sram, SramRun};
+pub use self::weights::{Cost, INTERPOLATION, LANE_MADDS, REGISTER_BYTES, Sram, SramRun, madds};
 
 /// Memories and logic of a GPU. Equal structures have equal costs.
 #[derive(Clone, Debug, PartialEq)]
@@ -126,4 +122,151 @@ impl Estimate {
             high: self.high + other.high,
         }
     }
+}
+
+/// Ratios of what a GPU costs to what another costs. All are 1 for equal structures, to the last bit.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scaling {
+    /// Energy of each event, indexed by event.
+    events: Vec<Estimate>,
+    /// Leakage of the core.
+    pub leakage: Estimate,
+    /// What the clock tree of each unit drives, at one clock; indexed by unit.
+    clock_trees: Vec<Estimate>,
+    /// Leakage or refresh of the last-level cache and of the eDRAM, indexed by unit.
+    retention: Vec<Estimate>,
+    /// Clock of each unit, indexed by unit.
+    clocks: [f64; Unit::COUNT],
+    /// Channels of the off-chip memory.
+    pub channels: f64,
+}
+
+impl Default for Scaling {
+    /// That of a GPU over itself.
+    fn default() -> Self {
+        Self {
+            events: vec![Estimate::ONE; Event::COUNT],
+            leakage: Estimate::ONE,
+            clock_trees: vec![Estimate::ONE; Unit::COUNT],
+            retention: vec![Estimate::ONE; Unit::COUNT],
+            clocks: [1.0; Unit::COUNT],
+            channels: 1.0,
+        }
+    }
+}
+
+impl Scaling {
+    /// What `own` costs over `home`, on the node `node_nm`. Where `home` lacks a memory or a unit, the platform's numbers are for those of
+    /// `stated`.
+    pub fn new(own: &Structure, home: &Structure, stated: &Structure, node_nm: u32) -> Self {
+        if own == home {
+            return Self::default();
+        }
+        let ratio = Ratio { own, home, stated, cases: Case::all(), node_nm };
+        Self {
+            events: ratio.events(),
+            leakage: ratio.of(|case, structure| case.leakage_mw(structure)),
+            clock_trees: Unit::ALL.map(|unit| ratio.clock_tree(unit)).to_vec(),
+            retention: Unit::ALL.map(|unit| ratio.retention(unit)).to_vec(),
+            clocks: Unit::ALL.map(|unit| own.clocks_hz[unit as usize] / home.clocks_hz[unit as usize]),
+            channels: own.channels / home.channels,
+        }
+    }
+
+    /// Energy of `event`.
+    pub fn event(&self, event: Event) -> Estimate {
+        self.events[event as usize]
+    }
+
+    /// Watts of the clock tree of `unit`, which follow its clock.
+    pub fn clock_tree(&self, unit: Unit) -> Estimate {
+        self.clock_trees[unit as usize].map(|ratio| ratio * self.clocks[unit as usize])
+    }
+
+    /// Leakage or refresh of `unit`, if it is a level below the L2.
+    pub fn retention(&self, unit: Unit) -> Estimate {
+        self.retention[unit as usize]
+    }
+
+    /// The nominal ratio that is farthest from 1 of leakage, clock trees and energies, and what it is of.
+    pub fn farthest(&self) -> (f64, String) {
+        let far = |ratio: f64| libm::fabs(libm::log(ratio));
+        let units = Unit::ALL
+            .into_iter()
+            .map(|unit| (self.clock_tree(unit).nominal, format!("the clock tree of `{}`", unit.name())));
+        let events = Event::ALL
+            .into_iter()
+            .map(|event| (self.event(event).nominal, format!("the energy of `{}`", event.name())));
+        let leakage = std::iter::once((self.leakage.nominal, "leakage".to_owned()));
+        let all = leakage.chain(units).chain(events).filter(|(ratio, _)| *ratio > 0.0);
+        all.fold(
+            (1.0, "nothing".to_owned()),
+            |most, next| if far(next.0) > far(most.0) { next } else { most },
+        )
+    }
+}
+
+/// Two structures, compared under every assumption.
+struct Ratio<'a> {
+    own: &'a Structure,
+    home: &'a Structure,
+    stated: &'a Structure,
+    cases: Vec<Case>,
+    node_nm: u32,
+}
+
+impl<'a> Ratio<'a> {
+    /// Ratio of what `weigh` gives for both: nominal, and over all assumptions.
+    fn of(&self, weigh: impl Fn(&Case, &Structure) -> f64) -> Estimate {
+        self.over(|case| weigh(case, self.own) / weigh(case, self.home))
+    }
+
+    fn over(&self, ratio: impl Fn(&Case) -> f64) -> Estimate {
+        let nominal = self.cases.iter().find(|case| case.is_nominal(self.node_nm)).map_or(1.0, &ratio);
+        Estimate::over(nominal, self.cases.iter().map(ratio))
+    }
+
+    /// Pairs of a memory and the one that the platform's numbers are for.
+    fn pairs(&self) -> impl Iterator<Item = (&'a Memory, &'a Memory)> {
+        let own = self.own.memories.iter().filter(|memory| memory.bytes > 0.0);
+        own.filter_map(|memory| Some((memory, self.home.like(memory).or_else(|| self.stated.like(memory))?)))
+    }
+
+    fn events(&self) -> Vec<Estimate> {
+        let mut events = vec![Estimate::ONE; Event::COUNT];
+        for (own, home) in self.pairs() {
+            for &charge in &own.charges {
+                events[charge.event as usize] = self.over(|case| charged(case, charge, own, home));
+            }
+        }
+        events
+    }
+
+    fn clock_tree(&self, unit: Unit) -> Estimate {
+        let is_there = |structure: &Structure| self.cases[0].clock_load(structure, unit) > 0.0;
+        match (is_there(self.own), is_there(self.home), is_there(self.stated)) {
+            (true, true, _) => self.of(|case, structure| case.clock_load(structure, unit)),
+            (true, false, true) => {
+                self.over(|case| case.clock_load(self.own, unit) / case.clock_load(self.stated, unit))
+            }
+            _ => Estimate::ONE,
+        }
+    }
+
+    fn retention(&self, unit: Unit) -> Estimate {
+        match self.pairs().find(|(own, _)| own.unit == unit) {
+            Some((own, home)) if unit == Unit::Llc => {
+                self.over(|case| case.memory_leakage_mw(own) / case.memory_leakage_mw(home))
+            }
+            Some((own, home)) if unit == Unit::Edram => Estimate::ONE.map(|_| own.bytes / home.bytes),
+            _ => Estimate::ONE,
+        }
+    }
+}
+
+/// Energy of an event that accesses `own` over that of one that accesses `home`.
+fn charged(case: &Case, charge: Charge, own: &Memory, home: &Memory) -> f64 {
+    let array = case.pj_per_byte(own) / case.pj_per_byte(home);
+    let way = libm::sqrt(case.bytes(own) / case.bytes(home));
+    1.0 + charge.array * (array - 1.0) + charge.way * (way - 1.0)
 }

@@ -1,9 +1,8 @@
 //! What a structure weighs in area, leakage and clocks, under each assumption about transistors and ports.
+//! The cost of an SRAM lies between sizes that CACTI was run for; logic beside memories is counted in FP32 multiply-adds.
 
-use activity::Unit;
+use activity::{Event, Unit};
 
-use super::logic::{MADD_LEAKAGE_MW, MADD_LEAKAGE_NM, MADD_SQUARES, madd_pj};
-use super::sram::{Cost, Sram};
 use super::{Estimate, Memory, Structure};
 
 /// Powers of the accesses a cycle by which the bytes of a memory grow to have room for them: 0 where banks serve them, which only needs
@@ -121,4 +120,224 @@ pub(super) fn area_mm2(structure: &Structure, node_nm: u32) -> Estimate {
         nominal: edram_middle,
         high: edram_high,
     })
+}
+
+// Horowitz (ISSCC 2014, 45 nm): energies over those of an FP32 multiply and add. Logic that does more has more gates that switch.
+const MADD_PJ: f64 = 0.9 + 3.7;
+const FADD: f64 = 0.9 / MADD_PJ;
+const HADD: f64 = 0.4 / MADD_PJ;
+const HMUL: f64 = 1.1 / MADD_PJ;
+const IADD: f64 = 0.1 / MADD_PJ;
+const IMUL: f64 = 3.1 / MADD_PJ;
+
+/// Multiply-adds that a shader lane has gates for. Built up from parts, an operation takes 1.66 times the energy of its multiply-add
+/// beside registers (instruction and scheduling), with a pipeline's overhead 10.7 times (GPUWattch); their geometric mean, as in the
+/// energy table's row `shader_ops`.
+pub const LANE_MADDS: f64 = 4.2;
+
+/// Bytes of registers of a thread: 256 KB for 40 warps of 64 threads, as a core of a Tahiti has them.
+pub const REGISTER_BYTES: f64 = 102.4;
+
+/// Area of an FP32 multiply-add in squares of the node's length. Low: the multiplier of Aladdin's 40 nm library alone, 8970 um2, as a fused
+/// unit shares the adder; nominal: with its adder, 4360 um2; high: 0.045 mm2 at 32 nm, laid out and with variable precision (Kaul et al.,
+/// ISSCC 2012).
+pub(super) const MADD_SQUARES: [f64; 3] = [8970e6 / 1600.0, 13_330e6 / 1600.0, 45_000e6 / 1024.0];
+
+/// Leakage of an FP32 adder and multiplier of Aladdin's 40 nm library, in milliwatts.
+pub(super) const MADD_LEAKAGE_MW: f64 = 0.053 + 0.120;
+/// Node of that library, in nanometres.
+pub(super) const MADD_LEAKAGE_NM: u32 = 40;
+
+/// Energy of an FP32 multiply-add in picojoules by node: Horowitz at 45 nm, and Stillmaker and Baas (2017) at equal voltage.
+pub(super) fn madd_pj(node_nm: u32) -> f64 {
+    let ratio = match node_nm {
+        ..=24 => 0.315,
+        25..=29 => 0.51,
+        30..=35 => 0.63,
+        36..=42 => 0.86,
+        _ => 1.0,
+    };
+    MADD_PJ * ratio
+}
+
+/// Multiply-adds' worth of logic for one `event` a cycle: the operations that its row of the energy table counts. 0 for events that
+/// only access a memory.
+pub fn madds(event: Event) -> f64 {
+    match event {
+        Event::Draws => 1000.0 * IADD,
+        Event::Indices | Event::SharedCycles => 32.0 * IADD,
+        Event::VerticesFetched => IMUL + 4.0 * IADD + 8.0 * FADD,
+        // A dozen for the quarter of a triangle a clock of the reference GPU, as its platform counts them.
+        Event::TrianglesIn => 48.0,
+        Event::SetupMadds
+        | Event::TileMadds
+        | Event::DepthIntervalMadds
+        | Event::ScreenMadds
+        | Event::SampleMadds => 1.0,
+        Event::ZCullTests => 2.0 * IADD,
+        Event::DepthReads => IADD,
+        Event::ShadingLookups => IMUL + 8.0 * IADD,
+        Event::TextureFetches => 12.0 * (HMUL + 2.0 * HADD) + 4.0,
+        Event::ColourWrites | Event::SamplesResolved => 4.0 * HADD,
+        Event::SamplesBlended => 4.0 * HADD + 4.0 * (2.0 * HMUL + HADD),
+        Event::PixelsResolved => 4.0 * HMUL,
+        Event::AtomicSteps | Event::BufferLines => 16.0 * IADD,
+        _ => 0.0,
+    }
+}
+
+/// Runs of CACTI 7. The file says how they were made.
+const RUNS: &str = include_str!("../../tables/cacti.csv");
+
+/// Ratio within which a cost between two runs lies on either side of the interpolated one: the worst error where a run is left out
+/// and found from its neighbours. CACTI changes the organisation of a memory from size to size, so that costs are no smooth curve.
+pub const INTERPOLATION: f64 = 1.5;
+
+/// A cost of a memory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Cost {
+    /// Energy of a read for each byte of the port, in picojoules.
+    ReadPj,
+    /// Leakage in milliwatts.
+    LeakageMw,
+    /// Area in square millimetres.
+    AreaMm2,
+}
+
+impl Cost {
+    /// All costs.
+    pub const ALL: [Self; 3] = [Self::ReadPj, Self::LeakageMw, Self::AreaMm2];
+}
+
+/// One run: a memory with one port for reads and writes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SramRun {
+    /// Whether cells and periphery are of fast transistors, as opposed to transistors of low leakage.
+    pub fast: bool,
+    /// Process node in nanometres.
+    pub node_nm: u32,
+    /// Size in bytes.
+    pub bytes: f64,
+    /// Costs, in the order of [`Cost::ALL`].
+    pub costs: [f64; 3],
+}
+
+impl SramRun {
+    /// All runs, by kind of transistor, node and size.
+    pub fn all() -> Vec<Self> {
+        RUNS.lines().filter_map(Self::parse).collect()
+    }
+
+    /// A line of the table; `None` for its comments and head.
+    fn parse(line: &str) -> Option<Self> {
+        let (cells, numbers) = line.split_once(',')?;
+        let numbers: Vec<f64> = numbers.split(',').map(|text| text.parse().ok()).collect::<Option<_>>()?;
+        let &[node_nm, size_kb, port_bytes, read_pj, leakage_mw, area_mm2] = numbers.as_slice() else {
+            return None;
+        };
+        let costs = [read_pj / port_bytes, leakage_mw, area_mm2];
+        Some(Self { fast: cells == "fast", node_nm: node_nm as u32, bytes: 1024.0 * size_kb, costs })
+    }
+}
+
+/// Costs over the size of memories of one kind of transistor on one node. They never fall with size.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sram {
+    /// Whether transistors are fast.
+    pub fast: bool,
+    /// Process node in nanometres.
+    pub node_nm: u32,
+    /// Logarithm of the size of each run, rising.
+    ln_bytes: Vec<f64>,
+    /// Logarithms of the costs of each run, in the order of [`Cost::ALL`].
+    ln_costs: [Vec<f64>; 3],
+}
+
+impl Sram {
+    /// All kinds and nodes.
+    pub fn all() -> Vec<Self> {
+        Self::of(&SramRun::all())
+    }
+
+    /// The kinds and nodes of `runs`, which are in the order of [`SramRun::all`] with two or more of each.
+    pub fn of(runs: &[SramRun]) -> Vec<Self> {
+        runs.chunk_by(|a, b| (a.fast, a.node_nm) == (b.fast, b.node_nm)).map(Self::of_kind).collect()
+    }
+
+    fn of_kind(runs: &[SramRun]) -> Self {
+        let ln_costs =
+            Cost::ALL.map(|cost| never_falling(runs.iter().map(|run| libm::log(run.costs[cost as usize]))));
+        let ln_bytes = runs.iter().map(|run| libm::log(run.bytes)).collect();
+        Self { fast: runs[0].fast, node_nm: runs[0].node_nm, ln_bytes, ln_costs }
+    }
+
+    /// Cost of a memory of `bytes` with one port: a straight line between runs in logarithms, the nearest of these lines beyond the
+    /// runs. Nothing costs nothing.
+    pub fn cost(&self, cost: Cost, bytes: f64) -> f64 {
+        if bytes <= 0.0 {
+            return 0.0;
+        }
+        let (at, sizes, costs) = (libm::log(bytes), &self.ln_bytes, &self.ln_costs[cost as usize]);
+        let above = sizes.partition_point(|&size| size < at).clamp(1, sizes.len() - 1);
+        let share = (at - sizes[above - 1]) / (sizes[above] - sizes[above - 1]);
+        libm::exp(costs[above - 1] + share * (costs[above] - costs[above - 1]))
+    }
+}
+
+/// The values with those that fall replaced by means of neighbours, the closest such series (pool adjacent violators; Ayer et al., Ann.
+/// Math. Statist. 26, 1955).
+fn never_falling(values: impl Iterator<Item = f64>) -> Vec<f64> {
+    let mut pools: Vec<(f64, usize)> = Vec::new();
+    for value in values {
+        let mut pool = (value, 1);
+        while let Some(&(before, count)) = pools.last().filter(|before| before.0 > pool.0) {
+            let all = count + pool.1;
+            pool = ((before * count as f64 + pool.0 * pool.1 as f64) / all as f64, all);
+            pools.pop();
+        }
+        pools.push(pool);
+    }
+    pools.into_iter().flat_map(|(value, count)| std::iter::repeat_n(value, count)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_run_is_read() {
+        let all = Sram::all();
+        assert_eq!((SramRun::all().len(), all.len()), (110, 10));
+        assert!(all.iter().all(|sram| sram.ln_bytes.len() == 11 && sram.ln_bytes.is_sorted()));
+    }
+
+    #[test]
+    fn a_size_that_was_run_has_its_cost_and_nothing_costs_nothing() {
+        let runs = SramRun::all();
+        let run = runs.iter().find(|run| run.fast && run.node_nm == 28 && run.bytes == 8192.0).unwrap();
+        let sram = Sram::all().into_iter().find(|sram| sram.fast && sram.node_nm == 28).unwrap();
+        for cost in Cost::ALL {
+            assert!((sram.cost(cost, 8192.0) / run.costs[cost as usize] - 1.0).abs() < 1e-12, "{cost:?}");
+            assert_eq!(sram.cost(cost, 0.0), 0.0);
+        }
+    }
+
+    #[test]
+    fn no_cost_falls_with_size() {
+        for sram in Sram::all() {
+            for cost in Cost::ALL {
+                let costs: Vec<f64> =
+                    (0..400).map(|at| sram.cost(cost, libm::exp(0.06 * f64::from(at)))).collect();
+                assert!(costs.is_sorted() && costs[0] > 0.0, "{cost:?} of {sram:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn falling_values_are_pooled() {
+        let pooled = |values: &[f64]| never_falling(values.iter().copied());
+        assert_eq!(pooled(&[1.0, 2.0, 2.0, 5.0]), [1.0, 2.0, 2.0, 5.0]);
+        assert_eq!(pooled(&[1.0, 4.0, 2.0, 5.0]), [1.0, 3.0, 3.0, 5.0]);
+        assert_eq!(pooled(&[3.0, 2.0, 1.0]), [2.0, 2.0, 2.0]);
+    }
 }

@@ -24,7 +24,6 @@
 mod changes;
 mod choice;
 pub mod compare;
-mod distinct;
 mod dry_run;
 mod error;
 mod frame;
@@ -43,7 +42,6 @@ mod provenance;
 mod recording;
 mod report;
 mod sampled;
-mod simulate;
 mod simulated;
 mod stalls;
 mod stated;
@@ -54,11 +52,15 @@ mod write;
 
 use output::progress::Progress;
 use output::{Destination, OutDir};
-use workloads::Scene;
+use power_model::{EnergyTable, Platform};
+use rayon::prelude::*;
+use timing::Level;
+use workloads::{Overrides, Scene};
+
+use crate::frame::{FrameSimulator, SimulatedFrame, max_bins_per_frame};
 
 pub use changes::{ChangeError, ChangedFile, InputFile};
 pub use choice::{Choice, Dimensions, ProbeSummary, Verified, cheapest_level};
-pub use distinct::Distinct;
 pub use dry_run::{DryRun, DryTimed, Expected, duration};
 pub use error::RunError;
 pub use frame::{CrashedFrame, frames_of, panic_message};
@@ -66,7 +68,7 @@ pub use gpu::{GpuError, GpuSpec, PowerFiles};
 pub use hardware::{scaling, structure};
 pub use heat::HeatPicture;
 pub use images::{ImageRow, ImagesSummary};
-pub use job_frame::{BIN_PS, JobFrame, PassEnergy};
+pub use job_frame::{BIN_PS, Distinct, JobFrame, PassEnergy};
 pub use machine::{HardwareSummary, area_mm2};
 pub use measure::{Checks, Measurement, Resolution};
 pub use options::{Change, HeatQuantity, PacingChoice, Requested, RunOptions, Sampling};
@@ -75,7 +77,6 @@ pub use plan::{Plan, fits_memory, refuse_beside_images};
 pub use provenance::{Host, Input, Provenance, again};
 pub use recording::{MACHINES_IN_TURN, RecordedRun, Recording, TimedFrames};
 pub use sampled::{Forecast, FramePreview, Previewer, Previews, Signatures};
-pub use simulate::MachineTexts;
 pub use simulated::{FrameCost, Modelled, Observed, Origin, Quantity, RunFrame, SampledSummary, Simulated};
 pub use stalls::StallShares;
 pub use stated::{CONFIDENCE, StatedError};
@@ -147,7 +148,7 @@ impl Prepared {
     /// As [`prepare`]. Earlier results in `dir` then stay unchanged.
     pub fn run(self, mut dir: OutDir, progress: &Progress) -> Result<FinishedRun, RunError> {
         let Self { plan, provenance, distinct, mut choice } = self;
-        let simulated = simulate::simulate(&plan, &distinct, &dir, progress)?;
+        let simulated = simulate(&plan, &distinct, &dir, progress)?;
         if let Some(choice) = &mut choice {
             choice.add_prediction_error(&simulated);
         }
@@ -197,3 +198,94 @@ pub const FIGURES: [(&str, &str); 5] = [
     ("frame_energy", "energy of each frame, measured and true"),
     ("stalls", "what each unit waited for in one frame (only with --timing stepped)"),
 ];
+
+/// Simulates the frames that the plan requires and writes each image when its frame is done.
+fn simulate(
+    plan: &Plan,
+    distinct: &Distinct,
+    dir: &OutDir,
+    progress: &Progress,
+) -> Result<Simulated, RunError> {
+    let max_bins = max_bins_per_frame(distinct.numbers().len());
+    let simulator = FrameSimulator { plan, distinct, dir: Some(dir), max_bins };
+    if plan.options.sampling == Sampling::Every || has_few_distinct(distinct, plan.options.sampling) {
+        return every(&simulator, progress);
+    }
+    sampled::simulate(&simulator, progress)
+}
+
+/// Whether there are so few distinct frames that prediction would save nothing.
+fn has_few_distinct(distinct: &Distinct, sampling: Sampling) -> bool {
+    let (differ, all) = (distinct.numbers().len(), distinct.groups().len());
+    differ == 1 || differ < all && differ <= sampling.first(all)
+}
+
+/// Simulates all distinct frames without writing files.
+fn without_files(plan: &Plan, progress: &Progress) -> Result<Simulated, RunError> {
+    let distinct = &Distinct::new(&*plan.job)?;
+    let max_bins = max_bins_per_frame(distinct.numbers().len());
+    every(&FrameSimulator { plan, distinct, dir: None, max_bins }, progress)
+}
+
+/// Simulates all distinct frames. Keeps the images of the first, the middle and the last.
+fn every(simulator: &FrameSimulator<'_>, progress: &Progress) -> Result<Simulated, RunError> {
+    let numbers = simulator.distinct.numbers();
+    let middle = numbers[numbers.len() / 2];
+    let shown = [middle, numbers[0], numbers[numbers.len() - 1]];
+    let bar = progress.bar("frames", numbers.len() as u64);
+    let simulate = |group: usize| {
+        let done = simulator.simulate(group, shown.contains(&numbers[group]))?;
+        bar.inc();
+        Ok(done)
+    };
+    let done: Vec<SimulatedFrame> =
+        (0..numbers.len()).into_par_iter().map(simulate).collect::<Result<_, RunError>>()?;
+    let (mut distinct, mut pictures, mut heat) = (Vec::new(), Vec::new(), Vec::new());
+    for done in done {
+        if done.frame.index == middle {
+            heat = done.heat;
+        }
+        pictures.extend(done.picture.map(|picture| (done.frame.index, picture)));
+        distinct.push(done.frame);
+    }
+    let frames = simulator.distinct.groups().to_vec();
+    Ok(Simulated { distinct, frames, pictures, heat, sampled: None })
+}
+
+/// Files of a machine as RON text; `None` for those of the reference.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct MachineTexts<'a> {
+    /// The GPU file.
+    pub gpu: Option<&'a str>,
+    /// The platform file.
+    pub platform: Option<&'a str>,
+    /// The energy table.
+    pub table: Option<&'a str>,
+}
+
+impl MachineTexts<'_> {
+    /// Simulates one frame of the scene `tiny` at 16x12 pixels at `level`, records it and finds it in the
+    /// trace. Returns its energy in the trace in joules and writes no files. Messages name the files
+    /// `gpu.ron`, `platform.ron` and `table.ron`.
+    ///
+    /// # Errors
+    /// If a file is invalid, or the files do not match.
+    pub fn one_frame(&self, level: Level) -> Result<f64, RunError> {
+        let gpu =
+            self.gpu.map_or_else(|| GpuSpec::load("reference"), |text| GpuSpec::parse(text, "gpu.ron"))?;
+        let platform = self
+            .platform
+            .map_or_else(|| Platform::builtin("reference"), |text| Platform::parse(text, "platform.ron"))?;
+        let table = self
+            .table
+            .map_or_else(|| EnergyTable::builtin("28nm"), |text| EnergyTable::parse(text, "table.ron"))?;
+        let overrides =
+            Overrides { size: Some((16, 12)), samples: Some(1), frames: Some(0..1), ..Overrides::default() };
+        let options =
+            RunOptions { scene: "tiny".into(), overrides, timing: Some(level), ..RunOptions::default() };
+        let plan = Plan::resolve(options)?.on(gpu, platform, table)?;
+        let simulated = without_files(&plan, &Progress::new(true))?;
+        let measurement = measure::measure(&plan, &simulated)?;
+        Ok(measurement.frames.iter().map(|frame| frame.energy_j).sum())
+    }
+}

@@ -1,8 +1,10 @@
-//! Unusual ends: the report of a crash (its place, and the command that repeats the frame), and interrupts (Ctrl-C).
+//! Unusual ends: the report of a crash (its place, and the command that repeats the frame), interrupts (Ctrl-C), and the request of a
+//! scheduler to end, which work in steps follows between two steps.
 
 use std::any::Any;
 use std::backtrace::{Backtrace, BacktraceStatus};
 use std::io::{IsTerminal, Write, stderr};
+use std::sync::atomic::{AtomicI32, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 #[cfg(unix)]
 use std::time::Duration;
@@ -11,8 +13,6 @@ use output::table::shell_line;
 use output::terminal::Terminal;
 use run::{CrashedFrame, panic_message};
 use traces::io::atomic;
-
-use super::stop::Stop;
 
 /// Panics in all threads of this process.
 #[derive(Clone, Default)]
@@ -156,6 +156,31 @@ fn end(terminal: &Terminal, code: i32) {
     std::process::exit(code);
 }
 
+/// A request to end. It comes by a signal and stays.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Stop {
+    /// Number of the signal; 0 before it.
+    signal: Arc<AtomicI32>,
+}
+
+impl Stop {
+    /// Whether it is time to end.
+    pub fn is_asked(&self) -> bool {
+        self.signal.load(Ordering::Relaxed) != 0
+    }
+
+    /// Exit code of a command that ended for it: 128 plus the number of the signal, as in shells.
+    pub fn code(&self) -> u8 {
+        u8::try_from(128 + self.signal.load(Ordering::Relaxed)).unwrap_or(u8::MAX)
+    }
+
+    /// Asks to end because of a signal. The exit code is that of the last one.
+    #[cfg(unix)]
+    pub fn ask(&self, signal: i32) {
+        self.signal.store(signal, Ordering::Relaxed);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -193,5 +218,14 @@ mod tests {
         let plain = crashes.report(&"other".to_owned(), &words("list --json"));
         assert!(plain.starts_with("a.rs:1: internal error: other\n"), "{plain}");
         assert!(plain.ends_with("quintile list --json"), "{plain}");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_request_stays_and_gives_the_exit_code() {
+        let stop = Stop::default();
+        assert!(!stop.is_asked());
+        stop.clone().ask(10);
+        assert!(stop.is_asked() && stop.code() == 138);
     }
 }

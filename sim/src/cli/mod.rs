@@ -13,7 +13,6 @@ mod parse;
 mod record;
 mod run;
 mod sample;
-mod stop;
 mod sweep;
 mod trace;
 mod visibility;
@@ -24,22 +23,20 @@ use std::panic::AssertUnwindSafe;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use clap::error::ErrorKind;
-use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
-use clap_mangen::Man;
-use output::terminal::Terminal;
-use traces::io::atomic;
-
 use ::run::RunError;
 use args::MessageArgs;
 use chart::{ChartArgs, StressArgs};
+use clap::error::ErrorKind;
+use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
+use clap_mangen::Man;
 use compare::CompareArgs;
-use crash::Crashes;
+use crash::{Crashes, Stop};
 use info::InfoArgs;
+use output::terminal::Terminal;
 use outputs::print;
 use run::RunArgs;
-use stop::Stop;
 use trace::TraceArgs;
+use traces::io::atomic;
 use visibility::{SamplesArgs, VisibilityArgs};
 
 /// A cycle-approximate simulator of a tile-based 5D rasterization pipeline, with an energy trace for every frame.

@@ -27,9 +27,8 @@ use crate::data_unit::DataUnit;
 use crate::demand::{CLIENTS, DemandBuilder, ServiceDemand, Station, port};
 use crate::draws::{ByDraw, PassParts};
 use crate::passes::Passes;
-use crate::service::time_of;
+use crate::service::{UnitSpeeds, UnitWork, time_of};
 use crate::spec::MachineSpec;
-use crate::work::{UnitSpeeds, UnitWork};
 use crate::{Clock, Recorder, Timed};
 
 /// Time of a frame from its totals.

@@ -6,8 +6,7 @@ use std::ops::Range;
 use activity::{Event, LineAccess, Packet, PacketCounts, PacketKind, Unit, Waits};
 
 use crate::data_unit::{DATA_EVENTS, DataUnit};
-use crate::service::{CYCLE, Work, work_of};
-use crate::work::UnitWork;
+use crate::service::{CYCLE, UnitWork, Work, work_of};
 use crate::{LINE_BYTES, MachineSpec};
 
 /// A station on the path of a packet. The shader cores are two stations, one for vertices and one for pixels.

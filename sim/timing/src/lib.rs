@@ -46,7 +46,6 @@ mod spec;
 mod stalls;
 pub mod stepped;
 pub mod streams;
-mod work;
 
 pub use bound::{BoundClock, Totals, bound};
 pub use clock::{Clocks, Time};

@@ -4,8 +4,8 @@ use activity::Unit;
 
 use crate::clock::{Clocks, Time};
 use crate::draws::PassParts;
+use crate::service::{UnitSpeeds, UnitWork};
 use crate::spec::MachineSpec;
-use crate::work::{UnitSpeeds, UnitWork};
 
 /// Time of a pass. Passes may overlap.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -6,8 +6,8 @@ use rayon::prelude::*;
 use warnings::{Code, Warning};
 
 use super::draw::draw_with_work;
-use super::eye::Seen;
 use super::generator::Ocean;
+use super::light::Seen;
 use super::{Beam, Eye, Floor, Method};
 
 /// Coverage of a method.

@@ -6,7 +6,7 @@
 //! give the light that it gathers, so no bounding volume is needed. The bounding volumes of earlier methods
 //! are included for comparison.
 //!
-//! - [`optics`]: refraction, reflection and Fresnel's transmission.
+
 //! - [`Beam`]: the light volume of a generator triangle; [`Beam::inside`]: when a point lies in it.
 //! - [`generator`]: beams of an ocean, of a water surface with one wave, of a mirror ring, of a ball lens.
 //! - [`Method`]: the moving triangle, and bounding volumes: the prism of Ernst et al. (2005), the refined
@@ -20,13 +20,10 @@
 mod beam;
 mod bound;
 mod check;
-mod cover;
 mod draw;
-mod eye;
 pub mod generator;
 mod job;
 mod light;
-pub mod optics;
 mod photons;
 mod shader;
 
@@ -34,9 +31,9 @@ pub use beam::{Beam, Hit};
 pub use bound::Method;
 pub use check::{Coverage, MAX_CROSSED_SHARE, MIN_SQUARES_PER_WAVE, accuracy_warnings, crossing, receivers};
 pub use draw::{Picture, draw};
-pub use eye::Eye;
+
 pub(crate) use job::FLAGS;
 pub use job::{CausticsOptions, LightView, job};
-pub use light::{Floor, Light};
+pub use light::{Eye, Floor, Light};
 pub use photons::{Squares, error};
 pub use shader::draw_on;

@@ -11,10 +11,8 @@ use pipeline::{
 };
 
 use super::bound::BoundingVolume;
-use super::cover::{MAX_HALVINGS, TILE_PX, in_image, pixel_of, reach, set_bits, slack, within_reach};
-use super::draw::Picture;
-use super::eye::Seen;
-use super::light::PixelInBeam;
+use super::draw::{MAX_HALVINGS, Picture, TILE_PX, in_image, pixel_of, reach, set_bits, slack, within_reach};
+use super::light::{PixelInBeam, Seen};
 use super::{Beam, Eye, Light, Method};
 
 /// Bytes of a vertex at one end of a beam.

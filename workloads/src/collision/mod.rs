@@ -30,7 +30,6 @@ mod on_gpu;
 mod pair;
 mod pass;
 mod plain;
-mod sweeps;
 
 pub use bounds::Bounds;
 pub use detect::{Answer, candidates, detect, detect_each};
@@ -38,5 +37,4 @@ pub(crate) use job::FLAGS;
 pub use job::{CollisionOptions, job};
 pub use object::{CaseFiles, CollisionCase, Object, components, load_cases};
 pub use pair::{Method, Search, Verdict};
-pub use plain::{PlainPasses, PlainResult};
-pub use sweeps::{CollidingSet, Sweeps};
+pub use plain::{CollidingSet, PlainPasses, PlainResult, Sweeps};

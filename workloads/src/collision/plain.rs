@@ -1,15 +1,23 @@
 //! The passes of the paper alone (thesis, Paper VI, section 3). Both objects are drawn whole along each of
 //! the three axes, over all of the space that either sweeps, with one box of time and depth per pixel. The
 //! CPU narrows nothing, the passes are independent, and all of them are drawn.
+//!
+//! Many objects: the potentially colliding set in two linear sweeps (Govindaraju, Redon, Lin and Manocha 2003,
+//! "CULLIDE", section 3, generalized to time by the thesis, Paper VI, section 3).
+//!
+//! Along each axis every object is drawn twice in each sweep: its fragments are compared with the boxes of all objects
+//! before it, then they enlarge the boxes. The second sweep goes the other way. An object that meets the boxes of others
+//! in neither sweep touches none of them and leaves the set; the next axis is drawn with those that stay. The CPU narrows
+//! nothing.
 
 use activity::Event;
 use pipeline::{Gpu, PipelineSpec, Viewport};
 
-use super::bounds::Bounds;
-use super::detect::{MAX_SCALED_COORDINATE, upscale_factor};
+use super::bounds::{Bounds, TzBox, TzBuffer};
+use super::detect::{MAX_SCALED_COORDINATE, candidates, upscale_factor};
 use super::object::Object;
 use super::on_gpu::PassesOnGpu;
-use super::pair::Method;
+use super::pair::{Method, time_bins};
 use super::pass::{
     Comparison, Fit, Fragment, FragmentBudget, Part, Pass, PassBackend, Resources, Scratch, Tiling,
 };
@@ -153,8 +161,189 @@ impl PlainPasses {
     }
 }
 
+/// Parameters of the sweeps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Sweeps {
+    /// What is compared.
+    pub method: Method,
+    /// Pixels across, 1 to 1024.
+    pub resolution: u32,
+    /// Time bins per pixel, 1 to 256.
+    pub bins: u32,
+}
+
+/// Potentially colliding set.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct CollidingSet {
+    /// Objects that may collide with others, in order.
+    pub objects: Vec<usize>,
+    /// Work of the sweeps. A pass is a sweep along an axis.
+    pub work: PlainResult,
+}
+
+impl CollidingSet {
+    /// Pairs of the set whose swept boxes touch.
+    pub fn pairs(&self, objects: &[Object]) -> Vec<(usize, usize)> {
+        let is_kept = |object: &usize| self.objects.binary_search(object).is_ok();
+        candidates(objects).into_iter().filter(|(a, b)| is_kept(a) && is_kept(b)).collect()
+    }
+}
+
+impl Sweeps {
+    /// The potentially colliding set of `objects`.
+    pub fn detect(&self, objects: &[Object]) -> CollidingSet {
+        let mut work = PlainResult::default();
+        let objects = self.detect_on(objects, &mut work);
+        CollidingSet { objects, work }
+    }
+
+    /// The same, drawn by `backend`.
+    pub(super) fn detect_on(&self, objects: &[Object], backend: &mut impl PassBackend) -> Vec<usize> {
+        let largest = objects.iter().map(Object::largest).fold(0.0, f64::max);
+        if largest > 0.0 && largest < MAX_SCALED_COORDINATE {
+            let factor = upscale_factor(largest);
+            let scaled: Vec<Object> = objects.iter().map(|object| object.scaled(factor)).collect();
+            return self.all_axes(&scaled, backend);
+        }
+        self.all_axes(objects, backend)
+    }
+
+    fn all_axes(&self, objects: &[Object], backend: &mut impl PassBackend) -> Vec<usize> {
+        let mut set: Vec<usize> = (0..objects.len()).filter(|&object| !objects[object].is_empty()).collect();
+        for axis in 0..3 {
+            if set.len() < 2 {
+                return Vec::new();
+            }
+            set = self.along(axis, objects, &set, backend);
+        }
+        set
+    }
+
+    /// The objects of `set` that meet others along `axis`.
+    fn along(
+        &self,
+        axis: usize,
+        objects: &[Object],
+        set: &[usize],
+        backend: &mut impl PassBackend,
+    ) -> Vec<usize> {
+        let hull = set.iter().fold(Bounds::NOTHING, |hull, &object| hull.hull(objects[object].bounds()));
+        let uncertainty = set.iter().map(|&object| objects[object].uncertainty);
+        let tiling =
+            Tiling { resolution: self.resolution, min_width: uncertainty.fold(hull.rounding(), f64::max) };
+        let pass = Pass::new(axis, &hull, tiling, Fit::Edges);
+        let bins = time_bins(&hull, self.bins);
+        let mut sweep = Sweep {
+            pass: &pass,
+            bins: &bins,
+            method: self.method,
+            known: TzBuffer::default(),
+            own: TzBuffer::default(),
+        };
+        let mut meets = vec![[false; 2]; objects.len()];
+        let backward: Vec<usize> = set.iter().rev().copied().collect();
+        for (order, name, follows) in [(set, NAMES[axis][0], axis > 0), (&backward, NAMES[axis][1], false)] {
+            backend.begin(name, &pass, follows);
+            sweep.known.clear(pass.tiles() * bins.len());
+            for &object in order {
+                let found = sweep.object(&objects[object], backend);
+                (0..2).for_each(|direction| meets[object][direction] |= found[direction]);
+            }
+        }
+        set.iter().copied().filter(|&object| meets[object] == [true; 2]).collect()
+    }
+}
+
+/// Names of the sweeps along each axis.
+const NAMES: [[&str; 2]; 3] =
+    [["x, forward", "x, backward"], ["y, forward", "y, backward"], ["z, forward", "z, backward"]];
+
+/// A sweep along an axis.
+struct Sweep<'a> {
+    pass: &'a Pass,
+    bins: &'a [Option<Bounds>],
+    method: Method,
+    /// Boxes of all objects so far.
+    known: TzBuffer,
+    /// Boxes of one object.
+    own: TzBuffer,
+}
+
+impl Sweep<'_> {
+    /// Whether an object meets those before it, seen from either direction of the axis; then it is added to them. Boxes of
+    /// time and depth need no second direction.
+    fn object(&mut self, object: &Object, backend: &mut impl PassBackend) -> [bool; 2] {
+        let list: Vec<u32> = (0..object.len() as u32).collect();
+        let part = Part { object, list: &list };
+        let found = match self.method {
+            Method::FragmentBox => self.fragments(part, backend),
+            _ => self.boxes(part, backend),
+        };
+        match self.method {
+            Method::FragmentBox => {
+                let (pass, known) = (self.pass, &mut self.known);
+                let budget = &mut FragmentBudget::unlimited();
+                backend.draw(pass, (0, part), self.bins, budget, None, &mut |fragment| {
+                    known.add(pass.place(fragment.tile, fragment.bin), &fragment.inside);
+                });
+            }
+            _ => self.own.used().for_each(|(place, inside)| self.known.add(place, inside)),
+        }
+        found
+    }
+
+    /// Compares each fragment with the boxes so far.
+    fn fragments(&self, part: Part<'_>, backend: &mut impl PassBackend) -> [bool; 2] {
+        let (pass, mut overlaps) = (self.pass, Vec::new());
+        let budget = &mut FragmentBudget::unlimited();
+        backend.draw(pass, (1, part), self.bins, budget, Some(&self.known), &mut |fragment| {
+            let known = self.known.at(pass.place(fragment.tile, fragment.bin));
+            if known.meet(fragment.inside.t, fragment.inside.z).is_some() {
+                overlaps.push(fragment.tile);
+            }
+        });
+        overlaps.iter().for_each(|tile| backend.overlap(pass, *tile));
+        [!overlaps.is_empty(); 2]
+    }
+
+    /// Draws the object into boxes of its own, and compares these with the boxes so far.
+    fn boxes(&mut self, part: Part<'_>, backend: &mut impl PassBackend) -> [bool; 2] {
+        let (pass, own) = (self.pass, &mut self.own);
+        own.clear(pass.tiles() * self.bins.len());
+        let budget = &mut FragmentBudget::unlimited();
+        backend.draw(pass, (1, part), self.bins, budget, None, &mut |fragment| {
+            own.add(pass.place(fragment.tile, fragment.bin), &fragment.inside);
+        });
+        backend.compare(pass, self.bins.len(), [&self.known, &self.own], true);
+        let mut found = [false; 2];
+        for (place, own) in self.own.used() {
+            let directions = overlaps(self.method, self.known.at(place), own);
+            (0..2).for_each(|direction| found[direction] |= directions[direction]);
+            if directions == [true; 2] {
+                backend.overlap(pass, pass.at(place).0);
+            }
+        }
+        found
+    }
+}
+
+/// By direction, whether two boxes meet; by depth alone, whether the second is in front of the farthest depth of the first, and whether
+/// it is behind the nearest.
+fn overlaps(method: Method, known: &TzBox, own: &TzBox) -> [bool; 2] {
+    if known.z[0] > known.z[1] {
+        return [false; 2];
+    }
+    match method {
+        Method::DepthOnly => [own.z[0] <= known.z[1], own.z[1] >= known.z[0]],
+        _ => [known.meet(own.t, own.z).is_some(); 2],
+    }
+}
+
 #[cfg(test)]
 mod tests {
+    use pipeline::random::{mix, unit};
+
+    use super::super::contact_probe::cross;
     use super::super::families::cases;
     use super::super::{Search, detect};
     use super::*;
@@ -210,5 +399,69 @@ mod tests {
         let none = Object::from_ends(Vec::new(), 0.0).unwrap();
         let result = PlainPasses::new(Method::BoxBox, 8).pair(&none, &none);
         assert!(!result.may_collide() && result.draws == 0);
+    }
+
+    const METHODS: [Method; 3] = [Method::FragmentBox, Method::BoxBox, Method::DepthOnly];
+
+    #[test]
+    fn no_object_that_collides_leaves_the_set() {
+        let mut left = 0;
+        for case in cases(9, 2) {
+            for (method, bins) in METHODS.into_iter().flat_map(|method| [(method, 1), (method, 3)]) {
+                let set = Sweeps { method, resolution: 12, bins }.detect(&case.objects);
+                let pairs = set.pairs(&case.objects);
+                assert!(case.collide.iter().all(|pair| pairs.contains(pair)), "{} {method:?}", case.family);
+                assert!(case.collide.is_empty() || set.work.fragments > 0);
+                left += case.objects.len() - set.objects.len();
+            }
+        }
+        assert!(left > 0);
+    }
+
+    /// Random moving triangles, tested at many times pair by pair.
+    #[test]
+    fn brute_force_finds_no_collision_outside_the_set() {
+        let mut found = [0, 0];
+        for seed in 0..12 {
+            let uniform = |n: u64| unit(mix(mix(seed) ^ n));
+            let object = |n: u64| {
+                let at = |k: u64| 6.0 * uniform(100 * n + k);
+                let corner = |k: u64, from: u64| {
+                    [0, 1, 2].map(|axis| at(from + axis) + uniform(100 * n + 9 * k + axis + 10))
+                };
+                let ends = [0, 3].map(|from| [0, 1, 2].map(|k| corner(k, from)));
+                Object::from_ends(vec![ends], 0.0).unwrap()
+            };
+            let objects: Vec<Object> = (0..16).map(object).collect();
+            let collides = |a: usize, b: usize| {
+                let [one, other] = [a, b].map(|n| &objects[n].triangles[0]);
+                (0..=64).any(|step| cross(one, other, f64::from(step) / 64.0))
+            };
+            for method in METHODS {
+                let set = Sweeps { method, resolution: 32, bins: 2 }.detect(&objects);
+                let pairs = set.pairs(&objects);
+                for (a, b) in (0..16).flat_map(|a| (a + 1..16).map(move |b| (a, b))) {
+                    if collides(a, b) {
+                        assert!(pairs.contains(&(a, b)), "{seed} {a} {b} {method:?}");
+                        found[0] += 1;
+                    }
+                }
+                found[1] += objects.len() - set.objects.len();
+            }
+        }
+        assert!(found[0] > 20 && found[1] > 20, "{found:?}");
+    }
+
+    #[test]
+    fn two_objects_are_separated_as_by_plain_passes() {
+        for case in cases(5, 3).iter().filter(|case| case.objects.len() == 2) {
+            for method in METHODS {
+                let alone = PlainPasses::new(method, 16).pair(&case.objects[0], &case.objects[1]);
+                let set = Sweeps { method, resolution: 16, bins: 1 }.detect(&case.objects);
+                if !alone.may_collide() {
+                    assert!(set.objects.is_empty(), "{} {method:?}", case.family);
+                }
+            }
+        }
     }
 }

@@ -1,17 +1,15 @@
 //! Passes of groups: a reduction, a histogram, lists of lights, and the image made of them.
 
 use activity::{Counts, Event};
+use glam::Vec3;
 use pipeline::{
     Buffer, BufferBinding, Camera, ComputeError, ComputePass, Gpu, PassError, SurfaceView, Viewport,
 };
 
 use super::block::{Blocks, Slots};
-use super::display::{Display, Show, decoded};
-use super::histogram::{Count, Scan};
 use super::light_culling::{Cull, ImagePlane, LightBuffer, LightSphere, Lists};
+use super::luminance::{BlockSums, Count, Display, Mean, Scan, Show, decoded};
 use super::options::ComputeOptions;
-use super::reduction::{BlockSums, Mean};
-use glam::Vec3;
 
 /// The passes of groups of a frame.
 pub struct Kernels<'a, 'e> {

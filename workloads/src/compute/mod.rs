@@ -7,23 +7,21 @@
 //! - [`job()`]: the workload.
 
 mod block;
-mod display;
-mod histogram;
 mod job;
 mod kernels;
 mod light_culling;
+mod luminance;
 mod options;
-mod reduction;
 
 use pipeline::texture::LUMINANCE;
 use pipeline::{GroupLane, SurfaceView};
 
 pub use block::{Blocks, Order};
-pub use histogram::{Atomics, bin};
 pub(crate) use job::FLAGS;
 pub use job::{ATOMICS_PER_WORD, CHAIN, CYCLES_PER_ACCESS, Chain, Compute, job};
 pub use kernels::{Kernels, TileLights};
 pub use light_culling::LightSphere;
+pub use luminance::{Atomics, bin};
 pub use options::{ComputeOptions, Kernel};
 
 /// Luminance of a sample of an image in linear RGB: loads and a dot product.

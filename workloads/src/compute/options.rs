@@ -4,7 +4,7 @@ use pipeline::ComputeSpec;
 use serde::{Deserialize, Serialize};
 
 use super::block::Order;
-use super::histogram::{Atomics, Scan};
+use super::luminance::{Atomics, Scan};
 use crate::error::LoadError;
 use crate::job::{JobError, JobOptions, Need, must_hold};
 

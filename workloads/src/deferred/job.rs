@@ -10,9 +10,7 @@ use pipeline::{
 use serde::{Deserialize, Serialize};
 use warnings::{Code, Warning};
 
-use super::buffer::{GBuffer, NormalFormat, Writer};
-use super::lights::{bounds, point_lights};
-use super::shaders::{CameraRays, Forward, Screen, Volume};
+use super::{CameraRays, Forward, GBuffer, NormalFormat, Screen, Volume, Writer, bounds, point_lights};
 use crate::error::LoadError;
 use crate::job::{
     Drawn, DrawsScene, Fact, Flag, Flags, IMAGE_SIZE, Job, JobError, JobOptions, Need, OptionSource, Request,

@@ -8,8 +8,7 @@ use pipeline::{Camera, Cull, Draw, Geometry, Gpu, RasterPass, Rendered, SampleSp
 use serde::{Deserialize, Serialize};
 use warnings::{Code, Warning};
 
-use super::map::Map;
-use super::receiver::{Effect, Receiver, ReceiverShader};
+use super::{Effect, Map, Receiver, ReceiverShader};
 use crate::error::LoadError;
 use crate::job::{Drawn, DrawsScene, Fact, Flag, Flags, Job, JobError, JobOptions, OptionSource, Request};
 use crate::material::Material;

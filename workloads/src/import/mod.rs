@@ -1,7 +1,7 @@
 //! Importers: one folder or file for each format. Each returns [`Parts`].
+//! Warnings about content that is not drawn are the same for all formats.
 
 mod gltf;
-mod ignored;
 mod obj;
 mod off;
 mod ply;
@@ -10,15 +10,16 @@ pub(crate) mod ron;
 mod soup;
 mod stl;
 
-pub(crate) use obj::{Face, statements};
-
 use std::path::Path;
 
 use glam::DVec3;
+use soup::{Soup, TriangleMaterials};
+use warnings::{Code, Warning};
 
 use crate::error::LoadError;
 use crate::scene::{Local, Node, Parts, Trs};
-use soup::{Soup, TriangleMaterials};
+
+pub(crate) use obj::{Face, statements};
 
 /// Name extensions of scene files, for messages.
 pub(crate) const ENDINGS: &str = ".ron, .gltf, .glb, .obj, .ply, .off or .stl";
@@ -90,7 +91,7 @@ fn bare(path: &Path, format: Format) -> Result<Soup, LoadError> {
     let mut soup = if format == Format::Obj { obj::surface(path)? } else { soup(path, format)? };
     soup.colors.clear();
     soup.looks = TriangleMaterials::default();
-    soup.warnings.retain(|warning| warning.code == warnings::Code::CoordinatesFarFromOrigin);
+    soup.warnings.retain(|warning| warning.code == Code::CoordinatesFarFromOrigin);
     Ok(soup)
 }
 
@@ -155,6 +156,74 @@ pub(crate) fn foreign(path: &Path) -> Option<String> {
     let (_, name) = FORMATS.iter().find(|(endings, _)| endings.contains(&ending.as_str()))?;
     let convert = "convert it to glTF, for example with Blender: File > Export > glTF 2.0";
     Some(format!("it is {name} file, which is not read; {convert}"))
+}
+
+/// A material with a normal or bump map.
+fn normal_map(material: &str) -> Warning {
+    about_material(
+        Code::NormalMapIgnored,
+        "normal map",
+        "ignored: surfaces keep the normals of their vertices",
+        material,
+    )
+}
+
+/// An emissive material.
+fn emissive(material: &str) -> Warning {
+    about_material(Code::EmissiveIgnored, "emissive material", "drawn without emitting light", material)
+}
+
+/// A material with a map of its opacity alone.
+fn opacity_map(material: &str) -> Warning {
+    let what = "ignored: the opacity of the material is the same everywhere";
+    about_material(Code::AlphaIgnored, "opacity map", what, material)
+}
+
+/// A material that filters the light behind it.
+fn filter(material: &str) -> Warning {
+    let what = "drawn without filtering the light of what is behind";
+    about_material(Code::AlphaIgnored, "transmissive material", what, material)
+}
+
+/// A material whose opacity is that of its vertices.
+fn vertex_alpha(material: &str) -> Warning {
+    let what = "with opacities of vertices, which are ignored";
+    about_material(Code::AlphaIgnored, "material", what, material)
+}
+
+/// A texture that cannot be read, for the reason `why`.
+fn texture(material: &str, why: &str) -> Warning {
+    let detail = format!("material `{material}`: {why}");
+    Warning::about(Code::MissingImage, "texture", "not read: the material's colour is used alone", detail)
+}
+
+/// A material that is metallic.
+fn metallic(material: &str) -> Warning {
+    let what = "drawn as diffuse ones with a faint highlight";
+    about_material(Code::MetallicIgnored, "metallic material", what, material)
+}
+
+/// A material with its own highlight, roughness or reflections.
+fn reflection(material: &str) -> Warning {
+    let what = "with a highlight or reflections of its own: every surface has the same faint highlight";
+    about_material(Code::ReflectionIgnored, "material", what, material)
+}
+
+/// A material with a displacement map.
+fn displacement(material: &str) -> Warning {
+    let what = "ignored: surfaces stay where they are";
+    about_material(Code::DisplacementIgnored, "displacement map", what, material)
+}
+
+/// A file with face colours.
+fn face_colors(path: &Path) -> Warning {
+    let what = "with colours for faces, which are drawn without them";
+    Warning::about(Code::FaceColorsIgnored, "file", what, path.display().to_string())
+}
+
+/// A warning about a material.
+fn about_material(code: Code, thing: &'static str, what: &'static str, material: &str) -> Warning {
+    Warning::about(code, thing, what, format!("material `{material}`"))
 }
 
 #[cfg(test)]

@@ -7,8 +7,9 @@ use std::path::Path;
 
 use glam::{DVec3, Vec2};
 
-use super::ignored;
-use super::reader::{self, MAX_ELEMENTS};
+use super::super::import;
+use super::reader;
+use super::reader::MAX_ELEMENTS;
 use super::soup::{Soup, linear};
 use crate::error::{LoadError, Source};
 
@@ -29,7 +30,7 @@ pub(super) fn read(path: &Path) -> Result<Soup, LoadError> {
         let face = words.take("a face")?;
         colored |= face_of(&face, vertices, &mut soup).map_err(|what| words.broken(&what))?;
     }
-    soup.warnings.extend(colored.then(|| ignored::face_colors(path)));
+    soup.warnings.extend(colored.then(|| import::face_colors(path)));
     Ok(soup)
 }
 
@@ -176,8 +177,9 @@ impl Words<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use glam::Vec3;
+
+    use super::*;
 
     fn parse(text: &str) -> Result<Soup, String> {
         let file = tempfile::NamedTempFile::new().unwrap();

@@ -10,8 +10,9 @@ use ply_rs_bw::ply::{
 };
 use warnings::{Code, Warning};
 
-use super::ignored;
-use super::reader::{self, MAX_ELEMENTS};
+use super::super::import;
+use super::reader;
+use super::reader::MAX_ELEMENTS;
 use super::soup::{Soup, linear};
 use crate::error::{LoadError, Source};
 
@@ -206,7 +207,7 @@ fn stored_single(vertex: &ElementDef) -> bool {
 fn left_out(header: &Header, path: &Path) -> Vec<Warning> {
     let mut warnings = Vec::new();
     if header.elements.get("face").is_some_and(|face| face.properties.contains_key("red")) {
-        warnings.push(ignored::face_colors(path));
+        warnings.push(import::face_colors(path));
     }
     for texture in header.comments.iter().filter_map(|comment| comment.strip_prefix("TextureFile ")) {
         let (what, detail) =

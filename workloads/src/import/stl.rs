@@ -5,8 +5,9 @@ use std::path::Path;
 
 use glam::DVec3;
 
+use super::super::import;
+use super::reader;
 use super::soup::Soup;
-use super::{ignored, reader};
 use crate::error::{LoadError, Source};
 
 /// Bytes before the triangles of a binary file: a comment and the number of triangles.
@@ -31,7 +32,7 @@ pub(super) fn read(path: &Path) -> Result<Soup, LoadError> {
         soup.warn_if_rounded(path);
         // Materialise Magics writes the colour of the part, and those of triangles, behind this word.
         let colored = bytes[..HEADER - 4].windows(6).any(|word| word == b"COLOR=");
-        soup.warnings.extend(colored.then(|| ignored::face_colors(path)));
+        soup.warnings.extend(colored.then(|| import::face_colors(path)));
     }
     Ok(soup)
 }

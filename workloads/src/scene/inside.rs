@@ -12,8 +12,7 @@ use std::f64::consts::TAU;
 
 use glam::DVec3;
 
-use super::camera::{CameraFrame, Frustum, tan_half};
-use super::fit::Fit;
+use super::camera::{CameraFrame, Fit, Frustum, tan_half};
 use super::rays::{Hit, Rays, normal};
 
 /// Points of the surface whose rays decide.

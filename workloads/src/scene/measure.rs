@@ -7,8 +7,7 @@ use glam::DVec3;
 use warnings::{Code, Warning};
 
 use super::Scene;
-use super::camera::{Frustum, Rig, Side};
-use super::fit::{Extent, Fit};
+use super::camera::{Extent, Fit, Frustum, Rig, Side};
 use super::frame::FrameError;
 use super::inside::Inside;
 use super::settings::LAST_FRAME;

@@ -5,7 +5,6 @@ mod camera_spec;
 mod camera_used;
 mod deform;
 pub(crate) mod far;
-pub(crate) mod fit;
 mod frame;
 mod graph;
 mod info;

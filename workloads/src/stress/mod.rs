@@ -2,23 +2,25 @@
 //!
 //! A [`Family`] makes a [`StressScene`] from a value of its parameter, a [`Size`] and a seed,
 //! deterministically. `quintile stress` measures the methods on it.
+//!
+//! Scenes are built from image positions in pixels, depths in scene units, and random numbers from a hash. [`Soup`] has random
+//! triangles of a known blur in pixels, for measuring how the cost grows.
 
-mod builder;
 mod motion;
 mod shape;
 
-pub use builder::Soup;
+use std::ops::Range;
 
+use glam::{Affine3A, DVec2, DVec3};
 use pipeline::geometry::Projection;
+use pipeline::random::{mix, unit};
 use pipeline::sample_test::{Hits, Target, test_run};
 use pipeline::sampling::{SampleSource, TableError, TileSamples};
 use pipeline::setup::{SetupResult, Triangle, set_up};
 use pipeline::traversal::{Box5, TileRect};
 use pipeline::{
-    Camera, CameraError, Cull, Draw, DrawError, Geometry, LensShape, SampleTable, Shader, Viewport,
+    Camera, CameraError, Cull, Draw, DrawError, Geometry, Lens, LensShape, SampleTable, Shader, Viewport,
 };
-
-use builder::SceneBuilder;
 
 /// A family of triangles with one kind of difficulty, and its parameter.
 #[derive(Clone, Copy, Debug)]
@@ -208,8 +210,201 @@ pub fn within_bounds(
     seen
 }
 
+/// Uniform random numbers from a hash of the seed and a counter.
+#[derive(Clone, Copy, Debug)]
+struct Rng {
+    seed: u64,
+    drawn: u64,
+}
+
+/// A scene under construction. The camera looks along z, with a field of view of 90 degrees, from one unit
+/// before everything.
+struct SceneBuilder {
+    pub size: Size,
+    rng: Rng,
+    scene: StressScene,
+}
+
+/// Near depth of the camera.
+const NEAR: f64 = 0.25;
+
+impl SceneBuilder {
+    pub fn new(size: Size, viewport: Viewport, samples: SampleTable, seed: u64) -> Result<Self, CameraError> {
+        let camera = Camera::new(Affine3A::IDENTITY, 1.0, NEAR as f32)?;
+        let (open, close, triangles) = (Vec::new(), Vec::new(), Vec::new());
+        let scene = StressScene { camera, viewport, samples, open, close, triangles };
+        Ok(Self { size, rng: Rng { seed: mix(seed), drawn: 0 }, scene })
+    }
+
+    pub fn finish(self) -> StressScene {
+        self.scene
+    }
+
+    /// Adds a lens whose circle of confusion has a radius of `blur_px` at infinity, focused at `focus`.
+    pub fn lens(&mut self, blur_px: f64, focus: f64) -> Result<(), CameraError> {
+        self.lens_of(blur_px / self.scale() * focus, focus)
+    }
+
+    /// Adds a lens of `radius` in scene units; none if it is zero.
+    pub fn lens_of(&mut self, radius: f64, focus: f64) -> Result<(), CameraError> {
+        let lens = if radius > 0.0 { Some(Lens::new(radius as f32, focus as f32)?) } else { None };
+        self.scene.camera = self.scene.camera.with_lens(lens);
+        Ok(())
+    }
+
+    /// Scales the geometry so far, the lens and the near depth by `factor`.
+    pub fn enlarge(&mut self, factor: f64) -> Result<(), CameraError> {
+        for vertex in self.scene.open.iter_mut().chain(&mut self.scene.close) {
+            *vertex = (vertex.as_dvec3() * factor).as_vec3();
+        }
+        let lens = self.scene.camera.lens();
+        self.scene.camera = Camera::new(Affine3A::IDENTITY, 1.0, (NEAR * factor) as f32)?;
+        lens.map_or(Ok(()), |l| self.lens_of(f64::from(l.radius()) * factor, f64::from(l.focus()) * factor))
+    }
+
+    /// Replaces the samples.
+    pub fn sample_with(&mut self, samples: SampleTable) {
+        self.scene.samples = samples;
+    }
+
+    pub fn samples(&self) -> &SampleTable {
+        &self.scene.samples
+    }
+
+    pub fn side(&self) -> f64 {
+        f64::from(self.size.side_px)
+    }
+
+    /// Pixels per unit at depth one.
+    pub fn scale(&self) -> f64 {
+        0.5 * self.side()
+    }
+
+    /// World point at image position `px` (from the image centre, y upwards) and depth `w`.
+    pub fn at(&self, px: DVec2, w: f64) -> DVec3 {
+        (px / self.scale() * w).extend(w)
+    }
+
+    /// Random number between `low` and `high`.
+    pub fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.rng.next()
+    }
+
+    /// Random number between `low` and `high`, uniform in its logarithm.
+    pub fn octaves(&mut self, low: f64, high: f64) -> f64 {
+        low * libm::exp2(self.between(0.0, libm::log2(high / low)))
+    }
+
+    /// Random image position.
+    pub fn position(&mut self) -> DVec2 {
+        let half = 0.5 * self.side();
+        DVec2::new(self.between(-half, half), self.between(-half, half))
+    }
+
+    /// Random direction in the image.
+    pub fn direction(&mut self) -> DVec2 {
+        let turn = self.between(0.0, std::f64::consts::TAU);
+        DVec2::new(libm::cos(turn), libm::sin(turn))
+    }
+
+    /// Corners of a randomly rotated equilateral triangle around the origin, with sides of `size_px`.
+    pub fn corners(&mut self, size_px: f64) -> [DVec2; 3] {
+        let first = self.direction() * (size_px / libm::sqrt(3.0));
+        let (sin, cos) = (libm::sqrt(0.75), -0.5);
+        [0, 1, 2].map(|k| {
+            let turn = [DVec2::X, DVec2::new(cos, sin), DVec2::new(cos, -sin)][k];
+            turn.rotate(first)
+        })
+    }
+
+    /// Adds a triangle with its own vertices, given at both ends of the shutter.
+    pub fn triangle(&mut self, open: [DVec3; 3], close: [DVec3; 3]) {
+        let corners = [0, 1, 2].map(|k| self.vertex(open[k], close[k]));
+        self.face(corners);
+    }
+
+    /// Adds a vertex and returns its index.
+    pub fn vertex(&mut self, open: DVec3, close: DVec3) -> u32 {
+        self.scene.open.push(open.as_vec3());
+        self.scene.close.push(close.as_vec3());
+        self.scene.open.len() as u32 - 1
+    }
+
+    /// Adds a triangle of existing vertices.
+    pub fn face(&mut self, corners: [u32; 3]) {
+        self.scene.triangles.push(corners);
+    }
+}
+
+impl Rng {
+    fn next(&mut self) -> f64 {
+        self.drawn += 1;
+        let word = mix(self.seed.wrapping_add(self.drawn.wrapping_mul(0x9E37_79B9_7F4A_7C15)));
+        unit(word)
+    }
+}
+
+/// Random triangles of one size that together cover the image a given number of times, whatever their count.
+/// Each is translated linearly.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Soup {
+    /// Image size and number of triangles.
+    pub size: Size,
+    /// Total area of the triangles, relative to the image.
+    pub layers: f64,
+    /// Motion across the image during the shutter, in pixels.
+    pub motion_px: f64,
+    /// Diameter in pixels of the circle of confusion at the middle of a triangle, within a few per cent.
+    pub defocus_px: f64,
+}
+
+/// Depths of triangles, far behind the focus so that all have a similar blur.
+const DEPTHS: Range<f64> = 9.0..11.0;
+/// Focus depth.
+const FOCUS: f64 = 1.0;
+
+impl Soup {
+    /// Makes the scene; `seed` determines positions and directions.
+    ///
+    /// # Errors
+    /// [`StressError`] for an invalid image size or lens.
+    pub fn scene(&self, seed: u64) -> Result<StressScene, StressError> {
+        let side = self.size.side_px;
+        let viewport = Viewport::new(side, side).ok_or(StressError::Side(side))?;
+        let samples = SampleTable::low_discrepancy(PER_PIXEL, seed, LensShape::Disk)?;
+        let mut builder = SceneBuilder::new(self.size, viewport, samples, seed)?;
+        // The blur at depth z relative to that at infinity is 1 - focus / z.
+        let blur_share = 1.0 - FOCUS / (0.5 * (DEPTHS.start + DEPTHS.end));
+        builder.lens(0.5 * self.defocus_px / blur_share, FOCUS)?;
+        (0..self.size.triangles).for_each(|_| self.add_triangle(&mut builder));
+        let scene = builder.finish();
+        Geometry::new(&scene.open, &scene.close, &scene.triangles)?;
+        Ok(scene)
+    }
+
+    /// Side of a triangle in pixels; the area of an equilateral one is sqrt(3)/4 side^2.
+    fn side_px(&self) -> f64 {
+        let image = f64::from(self.size.side_px);
+        image * libm::sqrt(4.0 * self.layers / (libm::sqrt(3.0) * f64::from(self.size.triangles)))
+    }
+
+    fn add_triangle(&self, builder: &mut SceneBuilder) {
+        let (position, half_way) = (builder.position(), 0.5 * self.motion_px * builder.direction());
+        let depth = builder.between(DEPTHS.start, DEPTHS.end);
+        // The mean tilt of a randomly rotated triangle, limited to stay in front of the camera.
+        let tilt = 0.5 * (self.side_px() / builder.scale()).min(1.0);
+        let corners = builder.corners(self.side_px());
+        let depths = [0, 1, 2].map(|_| depth * (1.0 + tilt * builder.between(-1.0, 1.0)));
+        let at = |k: usize, shift: DVec2| builder.at(position + corners[k] + shift, depths[k]);
+        let (open, close) = ([0, 1, 2].map(|k| at(k, -half_way)), [0, 1, 2].map(|k| at(k, half_way)));
+        builder.triangle(open, close);
+    }
+}
+
 #[cfg(test)]
 mod tests {
+    use glam::Vec2;
+
     use super::*;
 
     #[test]
@@ -245,5 +440,50 @@ mod tests {
         let family = family("slivers").unwrap();
         let error = family.scene(1.0, Size { side_px: 100, triangles: 3 }, 1).unwrap_err();
         assert!(error.to_string().contains("100"), "{error}");
+    }
+
+    const SOUP: Soup =
+        Soup { size: Size { side_px: 128, triangles: 200 }, layers: 4.0, motion_px: 24.0, defocus_px: 12.0 };
+
+    /// Image position of a vertex through a lens position, in pixels from the centre.
+    fn seen(scene: &StressScene, vertex: glam::Vec3, lens: Vec2) -> Vec2 {
+        let optics = scene.camera.lens().unwrap();
+        let shift = lens * optics.radius() * (1.0 / vertex.z - 1.0 / optics.focus());
+        64.0 * (vertex.truncate() / vertex.z - shift)
+    }
+
+    #[test]
+    fn triangles_move_and_blur_as_requested() {
+        let scene = SOUP.scene(7).unwrap();
+        for (open, close) in scene.open.iter().zip(&scene.close) {
+            let moved = seen(&scene, *close, Vec2::ZERO) - seen(&scene, *open, Vec2::ZERO);
+            assert!((moved.length() - 24.0).abs() < 1e-2, "{moved}");
+        }
+        for corners in &scene.triangles {
+            let corners = corners.map(|corner| scene.open[corner as usize]);
+            let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
+            let blur = seen(&scene, middle, Vec2::X) - seen(&scene, middle, Vec2::NEG_X);
+            assert!((blur.length() / 12.0 - 1.0).abs() < 0.05, "{blur}");
+        }
+    }
+
+    #[test]
+    fn more_triangles_cover_as_much() {
+        for triangles in [50, 800] {
+            let soup = Soup { size: Size { triangles, ..SOUP.size }, ..SOUP };
+            let scene = soup.scene(7).unwrap();
+            let area = |corners: &[u32; 3]| {
+                let [a, b, c] = corners.map(|corner| seen(&scene, scene.open[corner as usize], Vec2::ZERO));
+                f64::from(0.5 * (b - a).perp_dot(c - a).abs())
+            };
+            let layers = scene.triangles.iter().map(area).sum::<f64>() / (128.0 * 128.0);
+            assert!((layers - 4.0).abs() < 1e-3, "{layers}");
+        }
+    }
+
+    #[test]
+    fn without_blur_there_is_neither_lens_nor_motion() {
+        let scene = Soup { motion_px: 0.0, defocus_px: 0.0, ..SOUP }.scene(7).unwrap();
+        assert!(scene.camera.lens().is_none() && scene.open == scene.close);
     }
 }

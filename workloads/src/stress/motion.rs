@@ -3,8 +3,7 @@
 
 use glam::{DMat3, DVec2, DVec3};
 
-use super::builder::SceneBuilder;
-use super::{Family, StressError};
+use super::{Family, SceneBuilder, StressError};
 
 pub(super) const MOTION_FAMILIES: &[Family] = &[
     Family {

@@ -5,8 +5,7 @@ use glam::{DVec2, DVec3};
 use pipeline::SampleTable;
 use pipeline::sampling::Sample;
 
-use super::builder::{NEAR, SceneBuilder};
-use super::{Family, PER_PIXEL, StressError};
+use super::{Family, NEAR, PER_PIXEL, SceneBuilder, StressError};
 
 pub(super) const SHAPE_FAMILIES: &[Family] = &[
     Family {

@@ -3,9 +3,8 @@
 use glam::{Affine3A, DVec2, DVec3};
 use pipeline::{Camera, CameraError, Lens, LensShape, Viewport};
 
-use super::mesh::MovingMesh;
-use crate::scene::camera::CameraFrame;
-use crate::scene::fit::{Extent, Fit};
+use super::MovingMesh;
+use crate::scene::camera::{CameraFrame, Extent, Fit};
 use crate::scene::inside::Inside;
 use crate::scene::{CameraSpec, Side, Wrong, tan_half};
 

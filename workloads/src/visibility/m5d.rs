@@ -6,8 +6,7 @@ use std::path::Path;
 use glam::{Affine3A, DVec3, Vec3};
 use pipeline::{Camera, Lens, LensShape, Viewport};
 
-use super::VisibilityScene;
-use super::mesh::MovingMesh;
+use super::{MovingMesh, VisibilityScene};
 use crate::error::LoadError;
 use crate::import::reader::{self, Bytes};
 

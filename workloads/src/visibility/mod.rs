@@ -3,30 +3,29 @@
 //! [`load()`] reads any file format with a moving mesh into a [`VisibilityScene`]. `.m5d`, sample tables and
 //! results are little endian and packed; `docs/formats.md` describes them. They are shared with a ray caster,
 //! so that results can be compared sample by sample. `.mts` is read by [`load_mts`] for other workloads, too.
+//!
+//! A [`MovingMesh`] has linear vertex motion, and may come from two surface files.
 
 mod camera;
 mod m5d;
-mod mesh;
 mod mts;
 
 use std::ops::Range;
 use std::path::Path;
 
-use glam::{Vec3, Vec4};
+use camera::{PosedCamera, fit};
+use glam::{DVec3, Vec3, Vec4};
 use pipeline::sampling::HashedSamples;
 use pipeline::{Camera, Lane, LensShape, Shader, ShadingPoint, Viewport};
 use warnings::Warning;
 
 use crate::error::{LoadError, Source};
-use crate::import::{Format, reader};
+use crate::import::{Face, Format, Surface, reader, statements, surface};
 use crate::scene::Wrong;
 use crate::scene::measure::lens_leaves_view;
-use camera::{PosedCamera, fit};
 
 pub use crate::scene::CameraSpec;
 pub use m5d::parse as parse_m5d;
-pub use mesh::MovingMesh;
-pub(crate) use mesh::moving;
 pub use mts::{load_mts, parse_mts};
 
 /// Accepted files, for messages.
@@ -92,7 +91,7 @@ pub fn load(files: &[impl AsRef<Path>], camera: Option<&str>) -> Result<Visibili
             Some(_) => (*file, vec![m5d::world(&m5d::load(file)?)]),
         },
         ([file], [InputKind::Mts]) => (*file, load_mts(file)?),
-        ([file], [InputKind::Surface(format)]) => (*file, vec![mesh::still((file, *format))?]),
+        ([file], [InputKind::Surface(format)]) => (*file, vec![still((file, *format))?]),
         ([start, end], [InputKind::Surface(one), InputKind::Surface(other)]) => {
             (*start, vec![moving((start, *one), (end, *other))?])
         }
@@ -114,7 +113,7 @@ fn parsed_camera(text: &str) -> Result<CameraSpec, LoadError> {
 /// As [`load`].
 pub fn load_surface(path: &Path) -> Result<MovingMesh, LoadError> {
     match InputKind::of(path)? {
-        InputKind::Surface(format) => mesh::still((path, format)),
+        InputKind::Surface(format) => still((path, format)),
         _ => Err(LoadError::Kind {
             file: path.display().to_string(),
             known: ".ply, .obj, .off and .stl (also gzipped)",
@@ -238,7 +237,7 @@ fn joined(objects: Vec<MovingMesh>) -> Result<(MovingMesh, Vec<Range<u32>>), Str
 /// Vertices in camera space at both ends, rounded once. A still vertex and a still camera stay exactly still.
 fn in_camera_space(view: &PosedCamera, mesh: &MovingMesh) -> Result<[Vec<Vec3>; 2], String> {
     let [open, close] = &view.stands;
-    let see = |(stand, points): (&crate::scene::camera::CameraFrame, &[glam::DVec3])| {
+    let see = |(stand, points): (&crate::scene::camera::CameraFrame, &[DVec3])| {
         let seen = points.iter().enumerate().map(|(vertex, point)| {
             let seen = stand.view(*point).as_vec3();
             let far =
@@ -257,5 +256,152 @@ pub struct Unshaded;
 impl Shader for Unshaded {
     fn shade(&self, _lane: &Lane, _at: &ShadingPoint, _texel: Vec4) -> Vec4 {
         Vec4::ZERO
+    }
+}
+
+/// A mesh at both ends of the shutter (or of a simulation step), in the precision of its file.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct MovingMesh {
+    /// Vertices at time 0, shutter open.
+    pub open: Vec<DVec3>,
+    /// Vertices at time 1, shutter close.
+    pub close: Vec<DVec3>,
+    /// Vertex indices of each triangle, all in range.
+    pub triangles: Vec<[u32; 3]>,
+}
+
+impl MovingMesh {
+    /// Positions of every triangle corner at both ends.
+    fn corners(&self) -> impl Iterator<Item = [DVec3; 2]> {
+        self.triangles
+            .as_flattened()
+            .iter()
+            .map(|&vertex| [&self.open, &self.close].map(|end| end[vertex as usize]))
+    }
+}
+
+/// Remedy for incompatible files.
+const REMEDY: &str = "both ends of the shutter need equal topology: export both from the same mesh";
+
+/// A file and its format.
+type File<'a> = (&'a Path, Format);
+
+/// The still mesh of one file.
+fn still((path, format): File<'_>) -> Result<MovingMesh, LoadError> {
+    let Surface { positions, triangles } = surface(path, format)?;
+    Ok(MovingMesh { close: positions.clone(), open: positions, triangles })
+}
+
+/// The mesh of one file, which must have triangles.
+fn with_triangles((path, format): File<'_>) -> Result<Surface, LoadError> {
+    let mesh = surface(path, format)?;
+    if mesh.triangles.is_empty() {
+        let message = "it has none, so there is nothing that could move; export it with its faces";
+        return Err(Source { path }.broken("triangles", message));
+    }
+    Ok(mesh)
+}
+
+/// The mesh of one file at shutter open and of the other at shutter close.
+pub(crate) fn moving(start: File<'_>, end: File<'_>) -> Result<MovingMesh, LoadError> {
+    let [open, close] = [with_triangles(start)?, with_triangles(end)?];
+    let pair = Pair { paths: [start.0, end.0], open: &open, close: &close };
+    let close = match (start.1, end.1) {
+        (Format::Ply, Format::Ply) | (Format::Off, Format::Off) => pair.by_index()?,
+        both => {
+            let close = pair.by_corner()?;
+            if both == (Format::Obj, Format::Obj) {
+                pair.same_faces()?;
+            }
+            close
+        }
+    };
+    Ok(MovingMesh { open: open.positions, close, triangles: open.triangles })
+}
+
+/// Two meshes to be matched.
+struct Pair<'a> {
+    paths: [&'a Path; 2],
+    open: &'a Surface,
+    close: &'a Surface,
+}
+
+impl Pair<'_> {
+    /// End positions of the first mesh's vertices, if both files use the same indices.
+    fn by_index(&self) -> Result<Vec<DVec3>, LoadError> {
+        self.same_count("triangles", self.open.triangles.len(), self.close.triangles.len())?;
+        self.same_count("vertices", self.open.positions.len(), self.close.positions.len())?;
+        let both = self.open.triangles.iter().zip(self.close.triangles.iter());
+        match both.enumerate().find(|(_, (from, to))| from != to) {
+            None => Ok(self.close.positions.clone()),
+            Some((triangle, (from, to))) => {
+                let start = self.paths[0].display();
+                let message = format!("its corners are {to:?}, those in {start} are {from:?}; {REMEDY}");
+                Err(self.wrong(format!("triangle {triangle}"), message))
+            }
+        }
+    }
+
+    /// Checks that two OBJ files have the same number of positions and the same faces; triangles may match by
+    /// chance.
+    fn same_faces(&self) -> Result<(), LoadError> {
+        let [open, close] = [statements(self.paths[0])?, statements(self.paths[1])?];
+        self.same_count("vertices", open.positions.len(), close.positions.len())?;
+        // One-based, as in the file.
+        let numbers = |face: &Face| face.corners.map(|corner| corner.position + 1);
+        match open.faces.iter().zip(&close.faces).find(|(from, to)| numbers(from) != numbers(to)) {
+            None => Ok(()),
+            Some((from, to)) => {
+                let message = format!(
+                    "it joins vertices {:?}, but line {} of {} joins {:?}; {REMEDY}",
+                    numbers(to),
+                    from.line,
+                    self.paths[0].display(),
+                    numbers(from)
+                );
+                Err(self.wrong(format!("line {}", to.line), message))
+            }
+        }
+    }
+
+    /// End positions of the first mesh's vertices, matched by triangle corners. Vertex indices of OBJ files
+    /// do not match: importers split vertices with different normals, and the normals change with the motion.
+    fn by_corner(&self) -> Result<Vec<DVec3>, LoadError> {
+        self.same_count("triangles", self.open.triangles.len(), self.close.triangles.len())?;
+        self.matched([self.close, self.open], 1)?;
+        self.matched([self.open, self.close], 0)
+    }
+
+    /// Position in `to` of each vertex of `from`, which must be unique; `which` of the paths is that of
+    /// `from`.
+    fn matched(&self, [from, to]: [&Surface; 2], which: usize) -> Result<Vec<DVec3>, LoadError> {
+        let mut places: Vec<Option<DVec3>> = vec![None; from.positions.len()];
+        let corners = from.triangles.as_flattened().iter().zip(to.triangles.as_flattened());
+        for (corner, (vertex, goal)) in corners.enumerate() {
+            let place = to.positions[*goal as usize];
+            let known = places[*vertex as usize].get_or_insert(place);
+            if *known != place {
+                let message = format!(
+                    "one vertex of {} is at {known} and at {place} of {}; {REMEDY}",
+                    self.paths[which].display(),
+                    self.paths[1 - which].display()
+                );
+                return Err(self.wrong(format!("triangle {}", corner / 3), message));
+            }
+        }
+        // Unused vertices stay in place.
+        Ok(places.iter().zip(&from.positions).map(|(place, own)| place.unwrap_or(*own)).collect())
+    }
+
+    fn same_count(&self, what: &str, open: usize, close: usize) -> Result<(), LoadError> {
+        if open == close {
+            return Ok(());
+        }
+        let message = format!("it has {close} {what}, but {} has {open}; {REMEDY}", self.paths[0].display());
+        Err(self.wrong(what, message))
+    }
+
+    fn wrong(&self, place: impl Into<String>, message: String) -> LoadError {
+        Source { path: self.paths[1] }.broken(place, message)
     }
 }

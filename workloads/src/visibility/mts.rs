@@ -7,7 +7,7 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::mesh::MovingMesh;
+use super::MovingMesh;
 use crate::error::LoadError;
 use crate::import::reader::{self, Bytes};
 

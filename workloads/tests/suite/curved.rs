@@ -3,9 +3,8 @@
 use std::f64::consts::TAU;
 
 use glam::DVec3;
-
 use workloads::caustics::Beam;
-use workloads::caustics::optics::{reflect, refract, transmission};
+use workloads::caustics::generator::{reflect, refract, transmission};
 
 /// A glass ball at the origin, in parallel light along +x with one watt per square metre.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,9 +1,7 @@
-//! Sensitivity of a condition to the settings that a paper leaves open.
+//! Kind and verdict of a claim, and the sensitivity of its condition to the settings that a paper leaves open.
 
-use serde::Serialize;
-
-use super::verdict::Verdict;
 use run::RunError;
+use serde::{Deserialize, Serialize, Serializer};
 
 /// Result of one combination of settings.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -158,6 +156,71 @@ pub(super) fn short(number: f64) -> String {
     let digits =
         if size > 0.0 && size < 1e6 { (3.0 - libm::floor(libm::log10(size))).clamp(0.0, 6.0) } else { 0.0 };
     if size >= 1e6 { format!("{number:.3e}") } else { format!("{number:.*}", digits as usize) }
+}
+
+/// Kind of agreement that a row needs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+pub enum Kind {
+    /// An equality that holds exactly.
+    Equality,
+    /// A number with a tolerance.
+    Number,
+    /// An order or a sign.
+    Order,
+}
+
+impl Kind {
+    /// The letter of the list of claims.
+    pub const fn letter(self) -> &'static str {
+        match self {
+            Self::Equality => "E",
+            Self::Number => "N",
+            Self::Order => "O",
+        }
+    }
+}
+
+impl Serialize for Kind {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.letter())
+    }
+}
+
+/// Verdict of a claim.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub enum Verdict {
+    /// The condition is met at every value of the open settings.
+    #[serde(rename = "holds")]
+    Holds,
+    /// The condition is met at no value.
+    #[serde(rename = "differs")]
+    Differs,
+    /// The condition is met at some values of the open settings and not at others.
+    #[serde(rename = "depends")]
+    Depends,
+    /// A part that the row needs is missing.
+    #[serde(rename = "not yet")]
+    NotYet,
+}
+
+impl Verdict {
+    /// Every verdict.
+    pub const ALL: [Self; 4] = [Self::Holds, Self::Differs, Self::Depends, Self::NotYet];
+
+    /// Holds or differs.
+    pub const fn of(holds: bool) -> Self {
+        if holds { Self::Holds } else { Self::Differs }
+    }
+
+    /// As printed.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Holds => "holds",
+            Self::Differs => "differs",
+            Self::Depends => "depends",
+            Self::NotYet => "not yet",
+        }
+    }
 }
 
 #[cfg(test)]

@@ -9,7 +9,6 @@
 //! verdict of a row is over all values of open settings (`Band`).
 
 mod band;
-mod figure;
 mod paper2;
 mod paper3;
 mod paper6;
@@ -18,24 +17,19 @@ mod row;
 mod scenes;
 mod settings;
 mod stage;
-mod verdict;
 
 use std::path::PathBuf;
-
-use serde::Serialize;
 
 use output::Destination;
 use output::progress::Progress;
 use run::RunError;
-
+use serde::Serialize;
 use settings::Form;
 
-pub use band::{Band, Case, Turn};
-pub use figure::Figure;
-pub use report::Report;
+pub use band::{Band, Case, Kind, Turn, Verdict};
+pub use report::{Figure, Report};
 pub use row::{Number, Row};
 pub use settings::{About, Listed, Origin};
-pub use verdict::{Kind, Verdict};
 
 /// Papers with reproduced claims.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]

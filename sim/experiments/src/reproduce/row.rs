@@ -2,9 +2,8 @@
 
 use serde::Serialize;
 
-use super::band::Band;
+use super::band::{Band, Kind, Verdict};
 use super::settings::{About, Form, Listed, listed, reduced};
-use super::verdict::{Kind, Verdict};
 use crate::study::Ran;
 
 /// A row of the list of claims.

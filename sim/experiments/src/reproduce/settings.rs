@@ -12,7 +12,7 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use super::Paper;
-use super::verdict::Kind;
+use super::band::Kind;
 use output::dir::sha256_of_text;
 use run::RunError;
 

@@ -3,17 +3,19 @@
 //! - [`Study`]: what a study is; [`Entry`]: one of them in a list.
 //! - [`table`]: tables whose columns are declared once.
 //! - [`tradeoff`]: speed against accuracy, the same few numbers for every method; one page of all studies.
+//! - [`Ran`]: work that a measurement ran, added up from the reports of its frames.
 
-mod ran;
 pub mod table;
 pub mod tradeoff;
 
+use std::ops::AddAssign;
 use std::time::Instant;
 
+use activity::{Counts, Event};
 use output::plot::{Chart, ChartPanel, Look, Picture};
 use output::progress::Progress;
 use output::{Claim, OutDir, OutputError};
-pub use ran::Ran;
+use pipeline::FrameReport;
 use run::{GpuError, RunError};
 use serde::Serialize;
 use table::Sheet;
@@ -289,5 +291,45 @@ impl StudyError {
     /// The pipeline refused what it was given.
     pub(crate) fn pipeline(why: impl std::fmt::Display) -> Self {
         Self::Pipeline(why.to_string())
+    }
+}
+
+/// Counts of what ran.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Ran {
+    /// Passes.
+    pub passes: u64,
+    /// Draws.
+    pub draws: u64,
+    /// Samples inside a triangle.
+    pub fragments: u64,
+}
+
+impl Ran {
+    /// Work of a frame.
+    pub fn of(report: &FrameReport) -> Self {
+        Self::counted(report.passes.len() as u64, &report.counts())
+    }
+
+    /// Work of so many passes with these counts.
+    pub fn counted(passes: u64, counts: &Counts) -> Self {
+        Self { passes, draws: counts[Event::Draws], fragments: counts[Event::SamplesHit] }
+    }
+}
+
+impl AddAssign for Ran {
+    fn add_assign(&mut self, other: Self) {
+        self.passes += other.passes;
+        self.draws += other.draws;
+        self.fragments += other.fragments;
+    }
+}
+
+impl std::iter::Sum for Ran {
+    fn sum<I: Iterator<Item = Self>>(all: I) -> Self {
+        all.fold(Self::default(), |mut sum, one| {
+            sum += one;
+            sum
+        })
     }
 }

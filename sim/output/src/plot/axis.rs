@@ -1,6 +1,6 @@
 //! Axes: quantity, range and ticks. Only ticks with room for their labels are labelled.
 
-use super::text::text_width;
+use super::picture::text_width;
 use crate::table::{Prefix, power_of_ten};
 
 /// Scale of an axis.

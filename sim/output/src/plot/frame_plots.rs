@@ -3,12 +3,11 @@
 use power_model::Part;
 
 use super::axis::{Along, Axis, is_drawable};
-use super::columns::means;
 use super::legend::{Key, LEGEND_LINE, legend_column, legend_lines};
 use super::palette::{BACKGROUND, INK, MEASURED, MUTED, TRUTH, part_colour};
 use super::panel::{BELOW, Panel, aside};
-use super::picture::Look;
-use super::picture::{Picture, Text, text};
+use super::picture::{Look, Picture, Text, text};
+use super::series::means;
 use crate::MeanSd;
 use crate::table::{si, si_mean_sd};
 

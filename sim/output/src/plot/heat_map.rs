@@ -4,8 +4,7 @@ use super::axis::{Along, Axis, is_drawable};
 use super::legend::{Key, legend_lines};
 use super::palette::{AXIS, BACKGROUND, CLASSES, Colour, INK, MUTED, heat};
 use super::panel::tick_label;
-use super::picture::{Across, Look, Picture, Point, Text, text};
-use super::text::{shortened, text_width};
+use super::picture::{Across, Look, Picture, Point, Text, shortened, text, text_width};
 use crate::table::digits;
 
 /// A rectangle of the image with a value.

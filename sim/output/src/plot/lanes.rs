@@ -1,13 +1,11 @@
 //! Units of one frame over time, a lane for each: how busy they were, and what they waited for.
 
 use super::axis::{Along, Axis, is_drawable};
-use super::columns::means;
 use super::legend::{Key, legend_lines};
 use super::palette::{INK, MUTED, STATES, heat, named_unit_colour};
 use super::panel::{BELOW, Panel};
-use super::picture::Look;
-use super::picture::{Across, Picture, Text, text};
-use super::text::{shortened, text_width};
+use super::picture::{Across, Look, Picture, Text, shortened, text, text_width};
+use super::series::means;
 use crate::table::si;
 
 /// A unit's busy fraction over time.

@@ -1,8 +1,7 @@
 //! Legends, and the styles that distinguish series: colour, marker and strokes.
 
 use super::palette::{BACKGROUND, Colour, INK, MUTED, SERIES};
-use super::picture::{Across, Picture, Point, Text, text};
-use super::text::{shortened, text_width};
+use super::picture::{Across, Picture, Point, Text, shortened, text, text_width};
 
 /// Symbol of a legend entry.
 #[derive(Clone, Copy, Debug)]

@@ -21,7 +21,6 @@
 mod axis;
 mod chart;
 mod chart_panel;
-mod columns;
 mod frame_plots;
 mod heat_map;
 mod images;
@@ -33,7 +32,6 @@ mod picture;
 mod power_run;
 mod render;
 mod series;
-mod text;
 
 pub use axis::{AxisSpec, Scale};
 pub use chart::Chart;
@@ -43,11 +41,10 @@ pub use heat_map::{HeatMapPlot, HeatTile, Matrix, MatrixPanel, Shading};
 pub use images::{CaptionedImage, Images};
 pub use lanes::{StallLane, UnitLane, UnitPlot};
 pub use palette::{Colour, part_colour};
-pub use picture::{COLUMN_MM, Look, Picture};
+pub use picture::{COLUMN_MM, Look, Picture, undrawable};
 pub use power_run::PowerRun;
 pub use render::PlotError;
 pub use series::{Mark, Paint, Series, Spread};
-pub use text::undrawable;
 
 #[cfg(test)]
 mod tests;

@@ -2,8 +2,7 @@
 
 use super::axis::{Axis, RAISED, TICK_PX, Tick, label_width};
 use super::palette::{AXIS, Colour, GRID, MUTED};
-use super::picture::{Across, Picture, Point, Text, text};
-use super::text::text_width;
+use super::picture::{Across, Picture, Point, Text, text, text_width};
 
 /// Rectangle of the picture, and its two axes.
 #[derive(Clone, Debug)]
@@ -237,8 +236,7 @@ fn nearest(label: &Label<'_>, panel: &Panel, taken: &[Box4]) -> Option<(Box4, f6
 mod tests {
     use super::super::axis::{Along, Axis};
     use super::super::palette::INK;
-    use super::super::picture::Look;
-    use super::super::picture::Shape;
+    use super::super::picture::{Look, Shape};
     use super::*;
 
     fn panel() -> Panel {

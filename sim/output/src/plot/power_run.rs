@@ -1,12 +1,11 @@
 //! Power over the whole run.
 
 use super::axis::{Along, Axis, is_drawable};
-use super::columns::{Extremes, extremes, moving_mean};
 use super::legend::{Key, legend_lines};
 use super::palette::{INK, MARK, MEASURED, MUTED, TRUTH};
 use super::panel::{BELOW, Panel, aside};
-use super::picture::Look;
-use super::picture::{Across, Picture, Text, text};
+use super::picture::{Across, Look, Picture, Text, text};
+use super::series::{Extremes, extremes, moving_mean};
 use crate::table::si;
 
 /// Sampled power of a run, with frame starts.

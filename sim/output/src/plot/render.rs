@@ -15,8 +15,9 @@ use plotters_backend::{
 };
 
 use super::palette::{BACKGROUND, Colour};
-use super::picture::{Across, Picture, Point, Shape, Text};
-use super::text::{SCALE, drawable, plotters_font, register, text_width};
+use super::picture::{
+    Across, Picture, Point, SCALE, Shape, Text, drawable, plotters_font, register, text_width,
+};
 use crate::dir::{OutDir, OutputError};
 use crate::image;
 
@@ -293,7 +294,7 @@ impl DrawingBackend for Raster {
         };
         // The font draws its base line at half its size; half way up the capitals is 0.36 em above that.
         let down =
-            (style.size() / super::text::SIZE_OVER_EM * 0.36) as i32 - (style.size() as f32 / 2.0) as i32;
+            (style.size() / super::picture::SIZE_OVER_EM * 0.36) as i32 - (style.size() as f32 / 2.0) as i32;
         let turn = style.transform();
         style
             .draw(text, (0, 0), |x, y, colour| {

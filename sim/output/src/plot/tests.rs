@@ -3,8 +3,7 @@
 use activity::Unit;
 use power_model::Part;
 
-use super::picture::{Across, Picture, Shape, Text};
-use super::text::text_width;
+use super::picture::{Across, Picture, Shape, Text, text_width};
 use super::*;
 
 /// Every look that a picture has to fit: its own, that of a column, of a page, and large letters.

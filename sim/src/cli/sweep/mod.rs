@@ -16,14 +16,15 @@ use sweep::{
     SweepError, Work, merge, submit,
 };
 
-pub use self::args::SweepArgs;
 use self::args::{
     AskArgs, CleanArgs, FileArgs, FolderArgs, MergeArgs, PlanArgs, RunStepArgs, SlurmArgs, StatusArgs, Step,
 };
 use super::Failure;
+use super::crash::Stop;
 use super::outputs::{print, print_json};
 use super::run::REVISION;
-use super::stop::Stop;
+
+pub use self::args::SweepArgs;
 
 impl From<SweepError> for Failure {
     fn from(error: SweepError) -> Self {

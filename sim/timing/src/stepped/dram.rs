@@ -6,8 +6,7 @@
 
 use activity::{Event, LineAccess, Unit};
 
-use super::meter::Meter;
-use super::queue::Waits;
+use super::queue::{Meter, Waits};
 use crate::address::AddressMap;
 use crate::chips::ChipTimes;
 use crate::clock::{Clocks, Time};

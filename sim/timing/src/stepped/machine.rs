@@ -3,10 +3,8 @@
 use activity::{LEVELS, LineAccess, Unit};
 
 use super::dram::Dram;
-use super::levels::Levels;
-use super::memory::L2;
-use super::meter::Meter;
-use super::queue::{Queue, Waits};
+use super::levels::{L2, Levels};
+use super::queue::{Meter, Queue, Waits};
 use super::shader::{CoreEnv, Shader};
 use super::sources::Sources;
 use super::stage::{Stage, StageEnv};

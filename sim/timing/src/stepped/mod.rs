@@ -7,8 +7,6 @@
 mod dram;
 mod levels;
 mod machine;
-mod memory;
-mod meter;
 mod queue;
 mod shader;
 mod sources;

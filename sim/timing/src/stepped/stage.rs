@@ -5,9 +5,8 @@ use std::ops::Range;
 
 use activity::{LineAccess, Unit};
 
-use super::memory::{NO_WAIT, Request};
-use super::queue::Queue;
-use super::queue::Waits;
+use super::levels::{NO_WAIT, Request};
+use super::queue::{Queue, Waits};
 use crate::clock::Time;
 use crate::service::{CYCLE, Server, Work};
 use crate::stalls::Reason;

@@ -10,8 +10,9 @@ use warnings::{Code, Warning};
 
 use super::{Statements, broken, lines};
 use crate::error::{LoadError, Source};
+use crate::import;
+use crate::import::reader;
 use crate::import::soup::{Paint, Soup, TriangleMaterials, grey, linear};
-use crate::import::{ignored, reader};
 use crate::material::{Alpha, Material};
 
 /// Gives each triangle of `soup` the material that the file at `path` names for it.
@@ -78,7 +79,7 @@ impl Library {
         let names = found.materials.iter().zip(used).filter(|(_, used)| *used && self.whole);
         let names = names.map(|(name, _)| name).filter(|name| !self.described.contains_key(*name));
         let what = "missing from the material files: drawn grey";
-        names.map(|name| ignored::about_material(Code::MissingMaterial, "material", what, name)).collect()
+        names.map(|name| import::about_material(Code::MissingMaterial, "material", what, name)).collect()
     }
 }
 
@@ -103,20 +104,20 @@ impl Textures {
     fn paint(&mut self, described: &Described, folder: &Path, warnings: &mut Vec<Warning>) -> Paint {
         let name = &described.name;
         let left_out = [
-            described.opacity_map.then(|| ignored::opacity_map(name)),
-            described.shine.filters.then(|| ignored::filter(name)),
-            described.bumpy.then(|| ignored::normal_map(name)),
-            described.displaced.then(|| ignored::displacement(name)),
-            (described.metallic > 0.0).then(|| ignored::metallic(name)),
-            described.shines().then(|| ignored::reflection(name)),
-            described.emissive.then(|| ignored::emissive(name)),
+            described.opacity_map.then(|| import::opacity_map(name)),
+            described.shine.filters.then(|| import::filter(name)),
+            described.bumpy.then(|| import::normal_map(name)),
+            described.displaced.then(|| import::displacement(name)),
+            (described.metallic > 0.0).then(|| import::metallic(name)),
+            described.shines().then(|| import::reflection(name)),
+            described.emissive.then(|| import::emissive(name)),
         ];
         warnings.extend(left_out.into_iter().flatten());
         let map = described.texture.as_ref();
         let texture = map.map(|map| self.texture(map, folder)).and_then(|read| match read {
             Ok(texture) => Some(texture),
             Err(why) => {
-                warnings.push(ignored::texture(name, &why));
+                warnings.push(import::texture(name, &why));
                 None
             }
         });
@@ -163,7 +164,7 @@ fn untextured(found: &Statements, looks: &TriangleMaterials) -> Vec<Warning> {
     let what = "on faces without texture coordinates: these show one texel, or the base colour where no face has any";
     materials
         .map(|(material, _)| {
-            ignored::about_material(Code::MissingTexcoord, "textured material", what, &material.name)
+            import::about_material(Code::MissingTexcoord, "textured material", what, &material.name)
         })
         .collect()
 }

@@ -7,21 +7,21 @@ use std::sync::Arc;
 
 use glam::{DQuat, DVec3, Vec3};
 use pipeline::{Wrap, linear_to_srgb8};
+use spec::{
+    LightSpec, MaterialSpec, ObjectSpec, SceneSpec, SettingsSpec, ShapeSpec, TextureSpec, VisibleSpec,
+};
 use warnings::{Code, Warning};
 
 use crate::builtin::checker;
 use crate::error::{LoadError, Source};
-use crate::import::{self, Format, bare, gltf, ignored, reader, soup};
+use crate::import::{Format, bare, gltf, reader, soup};
 use crate::lighting::Light;
 use crate::material::{Alpha, Material};
 use crate::scene::{
     CameraSpec, Interpolation, Local, Mesh, Node, Parts, Rig, SceneCamera, Settings, Spin, Target, Track,
     Trs, rotation,
 };
-use crate::shapes;
-use spec::{
-    LightSpec, MaterialSpec, ObjectSpec, SceneSpec, SettingsSpec, ShapeSpec, TextureSpec, VisibleSpec,
-};
+use crate::{import, shapes};
 
 /// Reads the scene at `path`.
 pub(super) fn import(path: &Path) -> Result<Parts, LoadError> {
@@ -403,7 +403,7 @@ fn make_material(
             match reader::load_texture(&context.beside(file), [Wrap::Repeat; 2]) {
                 Ok(texture) => Some(Arc::new(texture)),
                 Err(why) => {
-                    warnings.push(ignored::texture(place, &format!("`{file}`: {why}")));
+                    warnings.push(import::texture(place, &format!("`{file}`: {why}")));
                     None
                 }
             }

@@ -3,7 +3,7 @@
 use pipeline::{Blend, Format};
 use run::{GpuError, GpuSpec};
 
-use super::passes::Work;
+use super::Work;
 
 /// A rate as it was published.
 #[derive(Clone, Copy, Debug)]

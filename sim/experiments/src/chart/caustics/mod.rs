@@ -1,8 +1,7 @@
 //! `quintile chart caustics`: shader executions and images of caustics by bounding volume, and failure modes: too few triangles,
 //! and crossed sides.
 
-mod measure;
-pub(crate) mod view;
+pub(crate) mod measure;
 
 use output::OutputError;
 use output::plot::{ChartPanel, HeatMapPlot, HeatTile, Look, Picture, Scale, Series, Shading};

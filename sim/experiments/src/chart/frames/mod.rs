@@ -3,7 +3,6 @@
 //! Scenes are those of [`traces::synth`], whose frames are known. Each is recorded, frames are marked as by hand (0.1 ms off at most),
 //! and the outcome is compared with the ground truth: F1 of starts within 0.5 ms, and the energy error of frames whose two ends were found.
 
-mod alarms;
 mod witnesses;
 
 use std::time::Instant;
@@ -18,11 +17,12 @@ use traces::frames::{FinderMethod, Marks, Options, default_window, find_with};
 use traces::score::{TOLERANCE_S, score, true_frames};
 use traces::synth::{Recording, SCENARIOS, Scenario, Scene};
 
-pub use self::alarms::AlarmCount;
 use self::witnesses::{WitnessRow, WitnessSummary};
 use crate::study::table::{Sheet, Table, fixed, optional, plain, share};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
 use crate::study::{Gallery, Study, StudyError};
+
+pub use self::witnesses::AlarmCount;
 
 /// A method fails where its F1 is below this.
 pub const FAILS_BELOW: f64 = 0.9;

@@ -3,20 +3,24 @@
 //!
 //! Scenes and workloads are in two halves, and so are the GPUs. An error is stated from one half of both and judged on the other, so
 //! neither frame nor GPU is known to it.
+//!
+//! GPUs are drawn at random around the reference one. The picture shows errors over how far a GPU is from it, over its memory channels,
+//! and over how dense packets are.
 
 mod figures;
-mod picture;
-mod random_gpu;
 
+use activity::Bounded;
 use output::OutputError;
+use output::plot::{AxisSpec, ChartPanel, Mark, Paint, Scale, Series};
 use output::progress::Progress;
 use rayon::prelude::*;
-use run::{GpuSpec, RunError};
+use run::{GpuSpec, RunError, StatedError};
 use serde::Serialize;
-use timing::{AccuracyWarning, Level, Timed};
+use timing::{AccuracyWarning, Level, Rates, Timed};
+use traces::random::Random;
 
-use self::random_gpu::RandomGpu;
-use super::timing::animations::{self, Packets, Subject};
+use super::timing::animations;
+use super::timing::animations::{Packets, Subject};
 use super::timing::measure::{Written, power_model, timed};
 use crate::study::table::Sheet;
 use crate::study::{Gallery, Study, StudyError};
@@ -200,6 +204,141 @@ fn errors(
     LEVELS.into_iter().map(row).collect()
 }
 
+/// What errors are shown over: name, scale, and its value.
+type Quantity = (&'static str, Scale, fn(&ErrorRow) -> f64);
+
+const ACROSS: [Quantity; 3] = [
+    ("distance from the reference GPU (RMS of log2)", Scale::Even, |row| row.distance),
+    ("memory channels", Scale::Even, |row| f64::from(row.channels)),
+    ("packets per cycle", Scale::Decades, |row| row.packets_per_cycle),
+];
+
+impl StatedErrorsChart {
+    /// A row of panels for each level.
+    fn panels(&self) -> Vec<ChartPanel> {
+        LEVELS.into_iter().flat_map(|level| ACROSS.map(|across| self.panel(level, across))).collect()
+    }
+
+    fn panel(&self, level: Level, (name, scale, of): Quantity) -> ChartPanel {
+        let rows = || self.rows.iter().filter(|row| row.level == level);
+        let points = |warned: bool| {
+            let rows = rows().filter(|row| row.is_warned() == warned);
+            rows.map(|row| (of(row), 100.0 * row.cycles_log.abs(), String::new())).collect()
+        };
+        let ends = rows().map(of).fold([f64::INFINITY, 0.0], |[low, high], x| [low.min(x), high.max(x)]);
+        let stated = 100.0 * libm::log1p(StatedError::at(level, false).cycles);
+        let line = ends.map(|x| (x, stated)).to_vec();
+        let series = vec![
+            Series::new("without a warning", Mark::Dots(points(false))).painted(Paint::Like(0)),
+            Series::new("with a warning", Mark::Rings(points(true))).painted(Paint::Like(1)),
+            Series::new("stated", Mark::Curve(line)).painted(Paint::Ink),
+        ];
+        let across = AxisSpec { name: name.to_owned(), scale, ..AxisSpec::default() };
+        let up = AxisSpec {
+            name: "error of cycles (%)".to_owned(),
+            scale: Scale::Decades,
+            zero: "exact".to_owned(),
+            ..AxisSpec::default()
+        };
+        ChartPanel::over(level.name(), [across, up], series)
+    }
+}
+
+/// Factors of rates, and clocks in hertz. Numbers between are drawn evenly by their logarithm.
+const RATE_FACTORS: [f64; 2] = [0.25, 16.0];
+const CLOCKS_HZ: [f64; 2] = [200e6, 1375e6];
+/// Sizes to choose from.
+const CORES: [u32; 5] = [1, 2, 4, 8, 16];
+const LINES: [u32; 3] = [1, 2, 4];
+const QUEUES: [u32; 5] = [2, 4, 8, 16, 32];
+const CHANNELS: [u32; 6] = [1, 2, 3, 4, 6, 8];
+const BANKS: [u32; 3] = [4, 8, 16];
+const ROWS_BYTES: [u32; 3] = [1024, 2048, 4096];
+
+/// A GPU, and how far it is from the reference one.
+#[derive(Clone, Debug)]
+struct RandomGpu {
+    pub spec: GpuSpec,
+    /// Root mean square of the binary logarithms of its numbers over those of the reference GPU.
+    pub distance: f64,
+}
+
+impl RandomGpu {
+    /// The GPU `number` of a seed: another one than `home` in clocks, rates, queues, cores and memory.
+    pub fn new(home: &GpuSpec, seed: u64, number: u64) -> Self {
+        let mut draw = Draw { random: Random::new(seed, number), squares: 0.0, count: 0 };
+        let mut gpu = home.clone();
+        gpu.name = format!("random {seed}.{number}");
+        gpu.core_hz = draw.between(gpu.core_hz, CLOCKS_HZ);
+        gpu.memory_hz = draw.between(gpu.memory_hz, CLOCKS_HZ);
+        let units = &mut gpu.units;
+        for unit in [
+            &mut units.setup,
+            &mut units.traversal,
+            &mut units.z_cull,
+            &mut units.sample_test,
+            &mut units.shading_cache,
+        ] {
+            unit.rates = draw.rates(&unit.rates);
+            unit.queue = draw.one_of(unit.queue, &QUEUES);
+        }
+        let clients = [&mut units.command, &mut units.depth, &mut units.texture, &mut units.colour];
+        for client in clients.into_iter().chain(&mut units.compute) {
+            client.rates = draw.rates(&client.rates);
+            client.queue = draw.one_of(client.queue, &QUEUES);
+            client.lines_per_cycle = draw.one_of(client.lines_per_cycle, &LINES);
+        }
+        units.shader.cores = draw.one_of(units.shader.cores, &CORES);
+        units.shader.queue = draw.one_of(units.shader.queue, &QUEUES);
+        units.l2.queue = draw.one_of(units.l2.queue, &QUEUES);
+        units.l2.lines_per_cycle = draw.one_of(units.l2.lines_per_cycle, &LINES);
+        let dram = &mut units.dram;
+        dram.queue = draw.one_of(dram.queue, &QUEUES);
+        dram.channels = draw.one_of(dram.channels, &CHANNELS);
+        dram.banks = draw.one_of(dram.banks, &BANKS);
+        dram.row_bytes = draw.one_of(dram.row_bytes, &ROWS_BYTES);
+        Self { spec: gpu, distance: (draw.squares / draw.count as f64).sqrt() }
+    }
+}
+
+/// Numbers drawn one after another, and how far they are from those they replace.
+struct Draw {
+    random: Random,
+    squares: f64,
+    /// Numbers drawn so far.
+    count: u64,
+}
+
+impl Draw {
+    /// The next number that `of` makes of an even one in (0, 1), in place of `home`.
+    fn next(&mut self, home: f64, of: impl FnOnce(f64) -> f64) -> f64 {
+        let drawn = of(self.random.uniform(self.count));
+        self.squares += libm::log2(drawn / home).powi(2);
+        self.count += 1;
+        drawn
+    }
+
+    fn between(&mut self, home: f64, [low, high]: [f64; 2]) -> f64 {
+        self.next(home, |even| low * libm::pow(high / low, even))
+    }
+
+    /// All rates of a unit times the same number.
+    fn rates(&mut self, home: &Rates) -> Rates {
+        home.scaled(self.between(1.0, RATE_FACTORS))
+    }
+
+    fn one_of<const MIN: u32, const MAX: u32>(
+        &mut self,
+        home: Bounded<MIN, MAX>,
+        values: &[u32],
+    ) -> Bounded<MIN, MAX> {
+        let of = |even: f64| values[(even * values.len() as f64) as usize].into();
+        let drawn = self.next(home.get().into(), of) as u32;
+        // All values are within the limits of the fields that they are drawn for.
+        Bounded::new(drawn).unwrap_or(home)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -222,5 +361,22 @@ mod tests {
         let text = std::fs::read_to_string(folder.path().join("stated_errors.csv")).unwrap();
         assert!(text.starts_with("level,warns,runs,cycles,energy"), "{text}");
         assert!(done.text.contains("packet") && done.fault.is_none());
+    }
+
+    #[test]
+    fn gpus_are_valid_different_and_the_same_again() {
+        let home = GpuSpec::load("reference").unwrap();
+        let of = |seed, number| RandomGpu::new(&home, seed, number);
+        for number in 0..200 {
+            let RandomGpu { spec, distance } = of(7, number);
+            spec.units.validate().unwrap();
+            spec.machine().unwrap();
+            assert!((0.5..4.0).contains(&distance), "{distance}");
+            assert!(spec == of(7, number).spec && spec.units != of(7, number + 1).spec.units);
+            assert!(spec.units != of(8, number).spec.units);
+            assert!(
+                QUEUES.contains(&spec.units.dram.queue.get()) && BANKS.contains(&spec.units.dram.banks.get())
+            );
+        }
     }
 }

@@ -1,18 +1,16 @@
 //! Rows III-4 and III-5: what a blocking finish at the end of each frame does to a measurement.
 
+use output::plot::Series;
 use power_model::{Circumstances, FramePower};
+use run::RunError;
 use traces::energy::{Pooled, pooled};
 
 use super::super::band::{Cases, one_at_a_time};
-use super::super::figure::{ENERGY, POWER, TIME, level, line};
+use super::super::report::{ENERGY, POWER, TIME, level, line};
 use super::super::row::{Row, numbers};
-use super::super::stage::Stage;
-use super::super::stage::{MARKED, looped};
+use super::super::stage::{MARKED, Stage, looped};
 use super::super::{Done, Figure, scenes};
-use super::BlockingPhone;
-use super::{Bench, FRAME, settled};
-use output::plot::Series;
-use run::RunError;
+use super::{Bench, BlockingPhone, FRAME, settled};
 
 fn blocked(seed: u64) -> Circumstances {
     Circumstances { blocking_finish: true, ..settled(seed) }

@@ -1,23 +1,23 @@
 //! Rows VI-6 and VI-7: caustic volumes as moving triangles.
 
 use glam::DVec3;
+use output::plot::{Look, Series};
 use pipeline::Gpu;
+use run::{GpuSpec, RunError};
 use workloads::caustics::generator::{Ocean, turned_beams};
 use workloads::caustics::{Beam, Coverage, Eye, Floor, Light, Method, Picture, draw_on, receivers};
 
 use super::super::band::{Cases, one_at_a_time};
-use super::super::figure::line;
+use super::super::report::line;
 use super::super::row::{Row, numbers, ran};
 use super::super::{Done, Figure};
 use super::Task;
-use super::caustics_figures::{light, warped};
+use super::figures::{light, warped};
 use super::settings::{Lost, Size};
-use crate::chart::caustics::view::{DEPTH_M, SIDE_M, WAVE_M, aside_of, water};
+use crate::chart::caustics::measure::{DEPTH_M, SIDE_M, WAVE_M, aside_of, water};
 use crate::chart::caustics::{OceanCounts, ocean};
 use crate::reproduce::settings::Form;
 use crate::study::Ran;
-use output::plot::{Look, Series};
-use run::{GpuSpec, RunError};
 
 /// Executions of the moving triangles over those of the bounding volume with fewer.
 fn over_fewer(counted: &OceanCounts) -> f64 {

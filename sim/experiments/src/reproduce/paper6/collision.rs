@@ -1,23 +1,23 @@
 //! Rows VI-1 to VI-3: continuous collision detection.
 
 use glam::DVec3;
+use output::plot::Series;
 use pipeline::PipelineSpec;
 use rayon::prelude::*;
+use run::{GpuSpec, RunError};
 use workloads::collision::families::{Case, cases};
 use workloads::collision::{Method, Object, PlainPasses, PlainResult, Search, candidates, detect};
 use workloads::shapes;
 
 use super::super::band::Cases;
-use super::super::figure::over_doublings;
+use super::super::report::over_doublings;
 use super::super::row::{Number, Row, numbers};
 use super::super::{Done, Figure};
 use super::Task;
-use super::collision_figure::{Ends, overlaps};
+use super::figures::{Ends, overlaps};
 use super::public::{Pair, Public};
 use super::settings::{Moving, Shape, TwoObjects};
 use crate::reproduce::settings::Form;
-use output::plot::Series;
-use run::{GpuSpec, RunError};
 
 /// As the file has it.
 const fn name(method: Method) -> &'static str {

@@ -5,17 +5,16 @@ use glam::Vec3;
 use pipeline::depth::{DepthBound, DepthSpec};
 use pipeline::{Cull, Features, PipelineSpec, RasterPass, Rendered, Settings, Target};
 use rayon::prelude::*;
+use run::{GpuSpec, RunError};
 use workloads::stress::{Size, StressScene, brute_force};
 use workloads::visibility::Unshaded;
 
 use super::settings::{Bound, Hardware};
 use super::{Task, catalogue};
 use crate::reproduce::Done;
+use crate::reproduce::band::Verdict;
 use crate::reproduce::row::{Row, numbers, ran};
-use crate::reproduce::verdict::Verdict;
 use crate::study::Ran;
-use run::GpuSpec;
-use run::RunError;
 
 impl Hardware {
     fn spec(&self, reference: &PipelineSpec) -> PipelineSpec {

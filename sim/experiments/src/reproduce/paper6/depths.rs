@@ -11,19 +11,19 @@ use pipeline::{
     Target, Viewport,
 };
 use rayon::prelude::*;
+use run::{GpuSpec, RunError};
 use workloads::stress::{Size, StressScene, brute_force, set_up_all};
 use workloads::visibility::Unshaded;
 
 use super::settings::{Depths, Mode, Planes, Triangles};
 use super::{Task, catalogue};
 use crate::reproduce::band::Cases;
-use crate::reproduce::figure::line;
+use crate::reproduce::report::line;
 use crate::reproduce::row::{Row, numbers, ran};
 use crate::reproduce::settings::Form;
 use crate::reproduce::{Done, Figure};
 use crate::stress::measure::Place;
 use crate::study::Ran;
-use run::{GpuSpec, RunError};
 
 /// Widths of depth intervals in tiles, over those of the vertices.
 #[derive(Clone, Debug, Default)]

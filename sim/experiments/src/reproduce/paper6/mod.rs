@@ -1,31 +1,28 @@
 //! Paper VI, "Design and Novel Uses of Higher-Dimensional Rasterization": a module for each use.
 
 mod caustics;
-mod caustics_figures;
 mod collision;
-mod collision_figure;
 mod culling;
 mod depths;
-mod glossy;
-mod image_figures;
+mod figures;
+mod glossy_and_shadows;
 mod occlusion;
 mod public;
 mod sampling;
 mod settings;
-mod shadows;
 mod torus;
 mod views;
 
 use std::path::Path;
 
+use output::progress::Progress;
+use run::RunError;
+use settings::Settings;
 use workloads::stress::{Size, StressScene, families};
 
 use super::row::With;
 use super::settings::{Form, Origin, load};
 use super::{Done, Options};
-use output::progress::Progress;
-use run::RunError;
-use settings::Settings;
 
 /// Input of every row.
 struct Task<'a> {
@@ -62,8 +59,8 @@ const ROWS: [(&str, Compute); 16] = [
     ("VI-8", torus::row),
     ("VI-9", sampling::darts),
     ("VI-10", sampling::densities),
-    ("VI-11", glossy::row),
-    ("VI-12", shadows::row),
+    ("VI-11", glossy_and_shadows::glossy_row),
+    ("VI-12", glossy_and_shadows::shadow_row),
     ("VI-13", views::stereo),
     ("VI-14", views::seven),
     ("VI-15", depths::tighter),

@@ -1,18 +1,18 @@
 //! Rows VI-4 and VI-5: occlusion queries by intervals.
 
+use output::plot::Series;
 use pipeline::{IntervalAnswer, SampledAnswer};
+use run::RunError;
 use workloads::occlusion::WallSceneSpec;
 
 use super::super::Done;
 use super::super::band::{Cases, one_at_a_time, short};
-use super::super::figure::{Figure, over_doublings};
+use super::super::report::{Figure, over_doublings};
 use super::super::row::{Number, Row, numbers, ran};
 use super::Task;
 use super::settings::QueriedObjects;
 use crate::chart::occlusion::{Drawn, Kind, QueryAnswers};
 use crate::study::Ran;
-use output::plot::Series;
-use run::RunError;
 
 /// Draws the scenes of a kind, with `asked` queried boxes in each.
 fn drawn(

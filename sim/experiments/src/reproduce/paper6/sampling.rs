@@ -2,7 +2,9 @@
 
 use std::ops::RangeInclusive;
 
+use output::plot::{Mark, Paint, Series};
 use pipeline::{Gpu, PipelineSpec};
+use run::{GpuSpec, RunError};
 use workloads::points::job::{Rasterized, rasterized};
 use workloads::points::noise::{NoiseSpec, draw_noise};
 use workloads::points::poisson::{
@@ -13,19 +15,15 @@ use workloads::points::white::{
     Density, Named, Numbers, WhiteSpec, columns_for, counts, shares, white_noise,
 };
 
-use super::super::band::Cases;
-use super::super::figure::{dots, line};
-use super::super::row::{self, Row, numbers};
-use super::super::verdict::Verdict;
-use super::super::{Done, Figure};
+use super::super::band::{Cases, Verdict};
+use super::super::report::{dots, line};
+use super::super::row::{Row, numbers};
+use super::super::{Done, Figure, row};
 use super::Task;
-use super::image_figures::balls_and_uncovered;
+use super::figures::balls_and_uncovered;
 use super::settings::Darts;
 use crate::reproduce::settings::Form;
 use crate::study::Ran;
-use output::plot::{Mark, Paint, Series};
-use run::GpuSpec;
-use run::RunError;
 
 fn failed(error: impl std::fmt::Display) -> RunError {
     RunError::Setting(format!("sampling: {error}"))

@@ -2,18 +2,17 @@
 
 use pipeline::Lane;
 use pipeline::sampling::{HashedSamples, LensShape};
+use run::{GpuSpec, RunError};
 use workloads::points::quality::upper_tail;
 use workloads::points::volume::{Blurred, Covered, Point, Torus, every_sample, standard_mode};
 
 use super::super::band::Cases;
-use super::super::figure::dots;
-use super::super::row::{self, Number, Row, numbers};
-use super::super::{Done, Figure};
+use super::super::report::dots;
+use super::super::row::{Number, Row, numbers};
+use super::super::{Done, Figure, row};
 use super::Task;
 use crate::reproduce::settings::About;
 use crate::study::Ran;
-use run::GpuSpec;
-use run::RunError;
 
 fn failed(error: impl std::fmt::Display) -> RunError {
     RunError::Setting(format!("torus: {error}"))

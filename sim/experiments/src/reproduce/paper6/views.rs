@@ -1,20 +1,20 @@
 //! VI-13 and VI-14: shader runs of stereo and of seven views, over what the paper leaves open.
 
+use output::plot::Series;
 use pipeline::{CacheSpec, Replacement};
+use run::RunError;
 use workloads::multiview::Layout;
 
-use super::Task;
-use super::image_figures::{self, Line};
+use super::figures::Line;
 use super::settings::{Policy, Size, Views};
+use super::{Task, figures};
 use crate::chart::multiview::{Bench, Lanes};
 use crate::reproduce::band::{Cases, one_at_a_time};
-use crate::reproduce::figure::{level, line, over_doublings};
+use crate::reproduce::report::{level, line, over_doublings};
 use crate::reproduce::row::{Row, With, numbers, ran};
 use crate::reproduce::settings::Form;
 use crate::reproduce::{Done, Figure};
 use crate::study::{Ran, StudyError};
-use output::plot::Series;
-use run::RunError;
 
 /// VI-13.
 pub(super) fn stereo(task: &Task<'_>) -> Result<Done, RunError> {
@@ -94,10 +94,7 @@ impl Point {
         let Layout { views, spacing, aperture, overlap } = self.layout(shape);
         let (scene, frame) = (self.scene.0.as_str(), self.scene.1);
         let (samples, shutter) = (self.samples, self.shutter);
-        image_figures::views(
-            name,
-            &Line { scene, frame, views, spacing, aperture, overlap, samples, shutter },
-        )
+        figures::views(name, &Line { scene, frame, views, spacing, aperture, overlap, samples, shutter })
     }
 
     /// Lanes of all views and of one.

@@ -1,12 +1,41 @@
-//! Light refracted into water by a surface with waves.
+//! Generators of beams.
+//!
+//! - [`Ocean`]: light refracted into water by waves; a single wave is a sinusoidal surface with a known
+//!   solution.
+//! - [`turned_beams`]: beams that twist around their axis.
+//! - [`reflect`], [`refract`], [`transmission`]: light at a smooth surface.
 
 use std::f64::consts::TAU;
 
 use glam::{DVec2, DVec3};
 use pipeline::random::{mix, unit};
 
-use super::super::Beam;
-use super::super::optics::{refract, transmission};
+use super::Beam;
+
+/// Range of the twist, in radians.
+const TURN: [f64; 2] = [2.5, 3.8];
+/// Largest rise or fall of an end corner, in metres.
+const REACH_M: f64 = 0.3;
+
+/// Makes `count` beams that start at height 0, within a metre of the y axis, and twist by about 180 degrees
+/// while rising or falling by up to 0.3 m. Their sides cross, and they may contain a point three times.
+pub fn turned_beams(count: u32, seed: u64) -> Vec<Beam> {
+    let turned = |number: u32| {
+        let uniform = |n: u64, [low, high]: [f64; 2]| {
+            low + (high - low) * unit(mix(mix(seed ^ u64::from(number) << 8) ^ n))
+        };
+        let (sin, cos) = libm::sincos(uniform(0, TURN));
+        let open =
+            [0, 1, 2].map(|k| DVec3::new(uniform(1 + k, [-1.0, 1.0]), 0.0, uniform(4 + k, [-1.0, 1.0])));
+        let height = [0, 1, 2].map(|k| uniform(7 + k, [-REACH_M, REACH_M]));
+        let close = [0, 1, 2].map(|k| {
+            let p = open[k];
+            DVec3::new(cos * p.x - sin * p.z, height[k], sin * p.x + cos * p.z)
+        });
+        Beam { open, close, flux_w: 1.0 }
+    };
+    (0..count).map(turned).collect()
+}
 
 /// A wave of the surface: `amplitude cos(number . (x, z) - rate t + phase)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -155,11 +184,86 @@ impl Corner {
     }
 }
 
+/// Direction of a reflected ray. `incoming` and `normal` have unit length.
+pub fn reflect(incoming: DVec3, normal: DVec3) -> DVec3 {
+    incoming - 2.0 * incoming.dot(normal) * normal
+}
+
+/// Direction of a refracted ray (Snell); `None` for total reflection. `normal` points against `incoming`,
+/// both of unit length. `ratio` is the refractive index on this side over that on the other.
+pub fn refract(incoming: DVec3, normal: DVec3, ratio: f64) -> Option<DVec3> {
+    let cos_in = -incoming.dot(normal);
+    let cos_out_squared = 1.0 - ratio * ratio * (1.0 - cos_in * cos_in);
+    (cos_out_squared >= 0.0)
+        .then(|| ratio * incoming + (ratio * cos_in - libm::sqrt(cos_out_squared)) * normal)
+}
+
+/// Share of unpolarized light that is transmitted (Fresnel), for the cosines of both angles and the ratio of
+/// [`refract`].
+pub fn transmission(cos_in: f64, cos_out: f64, ratio: f64) -> f64 {
+    let across = (ratio * cos_in - cos_out) / (ratio * cos_in + cos_out);
+    let along = (ratio * cos_out - cos_in) / (ratio * cos_out + cos_in);
+    1.0 - 0.5 * (across * across + along * along)
+}
+
 #[cfg(test)]
-mod tests {
+pub(in crate::caustics) mod tests {
     use pipeline::Lane;
 
     use super::*;
+    use crate::caustics::Hit;
+
+    /// Counter-based uniform numbers.
+    pub struct Uniform(u64);
+
+    impl Uniform {
+        pub fn new(seed: u64) -> Self {
+            Self(mix(seed ^ 0xCA05_71C5))
+        }
+
+        pub fn within(&mut self, low: f64, high: f64) -> f64 {
+            self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+            low + (high - low) * unit(mix(self.0))
+        }
+
+        /// A random position in a beam.
+        pub fn hit(&mut self) -> Hit {
+            let (mut b, mut c) = (self.within(0.0, 1.0), self.within(0.0, 1.0));
+            if b + c > 1.0 {
+                (b, c) = (1.0 - b, 1.0 - c);
+            }
+            Hit { weights: [1.0 - b - c, b, c], t: self.within(0.0, 1.0) }
+        }
+    }
+
+    /// A beam along z whose directions vary by up to `warp`.
+    pub fn warped(random: &mut Uniform, warp: f64) -> Beam {
+        let open = [0; 3].map(|_| DVec3::new(random.within(-1.0, 1.0), random.within(-1.0, 1.0), 0.0));
+        let (lean, length) = ([random.within(-0.3, 0.3), random.within(-0.3, 0.3)], random.within(1.5, 3.0));
+        let close = open.map(|p| {
+            let across = lean.map(|lean| lean + random.within(-warp, warp));
+            let short = 1.0 - 0.2 * warp.min(1.0) * random.within(0.0, 1.0);
+            p + length * short * DVec3::new(across[0], across[1], 1.0)
+        });
+        Beam { open, close, flux_w: 1.0 }
+    }
+
+    /// A short beam that twists by about 180 degrees, so that its sides cross.
+    pub fn turned(random: &mut Uniform) -> Beam {
+        let open = [0; 3].map(|_| DVec3::new(random.within(-1.0, 1.0), random.within(-1.0, 1.0), 0.0));
+        let (sin, cos) = random.within(2.5, 3.8).sin_cos();
+        let close =
+            open.map(|p| DVec3::new(cos * p.x - sin * p.y, sin * p.x + cos * p.y, random.within(-0.3, 0.3)));
+        Beam { open, close, flux_w: 1.0 }
+    }
+
+    #[test]
+    fn beams_are_the_same_for_the_same_seed_and_their_sides_cross() {
+        let beams = turned_beams(50, 3);
+        assert_eq!(beams, turned_beams(50, 3));
+        assert_ne!(beams[0], turned_beams(1, 4)[0]);
+        assert!(beams.iter().filter(|beam| beam.crossing() > 0.1).count() > 25);
+    }
 
     /// Flux of the light on the triangles, before reflection.
     fn incoming_w(ocean: &Ocean, time_s: f64) -> f64 {
@@ -244,6 +348,37 @@ mod tests {
         assert!(
             trough.clone().count() > 100
                 && trough.into_iter().all(|beam| beam.folds(&Lane::default()).is_empty())
+        );
+    }
+
+    #[test]
+    fn refraction_follows_snell_and_stays_in_the_plane() {
+        let normal = DVec3::Y;
+        for degrees in [0.0_f64, 20.0, 45.0, 80.0] {
+            let angle = degrees.to_radians();
+            let incoming = DVec3::new(angle.sin(), -angle.cos(), 0.0);
+            let out = refract(incoming, normal, 1.0 / 1.33).unwrap();
+            assert!((out.length() - 1.0).abs() < 1e-12 && out.z == 0.0);
+            assert!((1.33 * out.x - incoming.x).abs() < 1e-12, "{degrees}");
+            assert!((reflect(incoming, normal) - DVec3::new(incoming.x, -incoming.y, 0.0)).length() < 1e-15);
+        }
+        let grazing = DVec3::new(0.9, -(1.0_f64 - 0.81).sqrt(), 0.0);
+        assert!(refract(grazing, normal, 1.33).is_none(), "beyond the critical angle all is reflected");
+    }
+
+    #[test]
+    fn transmission_follows_fresnel() {
+        // Normal incidence: 4 n1 n2 / (n1 + n2)^2. At Brewster's angle the light polarized along the plane is
+        // transmitted completely.
+        assert!((transmission(1.0, 1.0, 1.0 / 1.5) - 0.96).abs() < 1e-12);
+        let brewster = 1.5_f64.atan();
+        let (cos_in, cos_out) = (brewster.cos(), brewster.sin());
+        let across = ((1.0 / 1.5 * cos_in - cos_out) / (1.0 / 1.5 * cos_in + cos_out)).powi(2);
+        assert!((transmission(cos_in, cos_out, 1.0 / 1.5) - (1.0 - 0.5 * across)).abs() < 1e-12);
+        // Transmission is the same in both directions.
+        assert!(
+            (transmission(0.8, 0.9, 1.0 / 1.2) - transmission(0.9, 0.8, 1.2)).abs() < 1e-12,
+            "the same for both directions"
         );
     }
 }

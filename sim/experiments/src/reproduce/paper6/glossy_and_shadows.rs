@@ -1,18 +1,23 @@
-//! VI-11: glossy reflection and refraction.
+//! Rows VI-11 and VI-12: glossy reflection and refraction, and motion-blurred soft shadows.
 
+use activity::Event;
+use glam::Vec3;
+use pipeline::{FrameReport, Gpu};
+use run::{GpuSpec, RunError};
+use workloads::Overrides;
 use workloads::glossy::Effect;
+use workloads::job::{Drawn, Job};
+use workloads::soft_shadows::{SoftShadowOptions, SoftShadows};
 
-use super::Task;
-use super::image_figures;
 use super::settings::Glossy;
+use super::{Task, figures};
 use crate::chart::glossy::{Bench, Blur, GlossyEffort as Size, GlossyRow as Measured};
-use crate::reproduce::band::{Cases, one_at_a_time};
-use crate::reproduce::figure::line;
+use crate::reproduce::band::{Cases, Verdict, one_at_a_time};
+use crate::reproduce::report::line;
 use crate::reproduce::row::{Row, numbers, ran};
 use crate::reproduce::settings::Form;
 use crate::reproduce::{Done, Figure};
-use crate::study::StudyError;
-use run::RunError;
+use crate::study::{Ran, StudyError};
 
 /// Errors of the map by few and by many samples, of reflection and of refraction, and blurs by height.
 struct Found {
@@ -55,7 +60,7 @@ impl Found {
     }
 }
 
-pub(super) fn row(task: &Task<'_>) -> Result<Done, RunError> {
+pub(super) fn glossy_row(task: &Task<'_>) -> Result<Done, RunError> {
     let with = task.with(|settings| &settings.vi_11);
     let (row, form) = (with.settings, with.form);
     let found = |settings| Found::new(row, form, settings).map_err(RunError::setting);
@@ -117,7 +122,7 @@ pub(super) fn row(task: &Task<'_>) -> Result<Done, RunError> {
         ("vertices", measured().map(|row| row.vertices as f64).sum()),
         ("samples_tested", measured().map(|row| row.samples_tested as f64).sum()),
     ]));
-    let pictures = image_figures::glossy(*row.texels.get(form), radius, index, *row.samples.get(form))?;
+    let pictures = figures::glossy(*row.texels.get(form), radius, index, *row.samples.get(form))?;
     Ok(Done {
         row: Row { numbers: facts, ran, ..with.banded(&row.about, ours, band) },
         figures: vec![contact(&base.blurs), pictures],
@@ -136,4 +141,54 @@ fn contact(blurs: &[Blur]) -> Figure {
             line("geometry", points(|blur| blur.expected)),
         ],
     )
+}
+
+pub(super) fn shadow_row(task: &Task<'_>) -> Result<Done, RunError> {
+    let with = task.with(|settings| &settings.vi_12);
+    let (row, form) = (with.settings, with.form);
+    let draw = |accumulate| -> Result<(Drawn, FrameReport), RunError> {
+        let (size, samples) = (Some(*row.size_px.get(form)), Some(*row.places.get(form)));
+        let overrides = Overrides { size, samples, ..Overrides::default() };
+        let job = SoftShadows::new(
+            SoftShadowOptions { accumulate, ..SoftShadowOptions::default() },
+            &overrides,
+            1,
+        )?;
+        let hardware = GpuSpec::load("reference")?.pipeline;
+        let mut gpu = Gpu::quiet(&hardware).map_err(RunError::setting)?;
+        Ok((job.frame(*row.frame.get(form), &mut gpu)?, gpu.finish()))
+    };
+    let [(one, one_report), (many, many_report)] = [draw(false)?, draw(true)?];
+    let counts = [&one_report, &many_report].map(FrameReport::counts);
+    let bits = |pixel: &Vec3| pixel.to_array().map(f32::to_bits);
+    let differ = one.image.iter().zip(&many.image).filter(|(a, b)| bits(a) != bits(b)).count();
+    let count = |event: Event| counts.each_ref().map(|counts| counts[event] as f64);
+    let (vertices, tested) = (count(Event::VertexInvocations), count(Event::SamplesTested));
+    let same = differ == 0 && one.image.len() == many.image.len();
+    let ours = format!(
+        "{differ} of {} pixels differ in any bit; vertex shader runs {:.0} against {:.0}, samples tested {:.3e} against {:.3e}",
+        one.image.len(),
+        vertices[0],
+        vertices[1],
+        tested[0],
+        tested[1]
+    );
+    let facts = numbers([
+        ("pixels", one.image.len() as f64),
+        ("pixels_that_differ", differ as f64),
+        ("vertices_one_pass", vertices[0]),
+        ("vertices_accumulation", vertices[1]),
+        ("samples_tested_one_pass", tested[0]),
+        ("samples_tested_accumulation", tested[1]),
+    ]);
+    let [of_one, of_many] = [&one_report, &many_report].map(Ran::of);
+    let mut ran = ran(&[of_one, of_many].into_iter().sum());
+    ran.extend(numbers([
+        ("passes_of_one_pass", of_one.passes as f64),
+        ("passes_of_accumulation", of_many.passes as f64),
+        ("fragments_of_one_pass", of_one.fragments as f64),
+        ("fragments_of_accumulation", of_many.fragments as f64),
+    ]));
+    let made = with.row(&row.about, (ours, Verdict::of(same), String::new()));
+    Ok(Done::bare(Row { numbers: facts, ran, ..made }))
 }
