@@ -1,5 +1,4 @@
-//! Bad input: one message with file, place and remedy. Exit code 2 for usage errors, 1 for failures; no
-//! panic.
+//! Bad input: one message with file, place and remedy. Exit code 2; no panic.
 
 use std::fs;
 
@@ -154,19 +153,19 @@ fn unknown_names() {
 fn missing_files() {
     let mut refusals = Refusals::default();
     for scene in ["gone.glb", "gone.gltf", "gone.ron", "gone.ply", "gone.ply.gz", "gone.obj"] {
-        refusals.call(&[scene], 1, &[scene, "No such file"], "check the path");
+        refusals.call(&[scene], 2, &[scene, "No such file"], "check the path");
     }
     for flag in ["--gpu", "--platform", "--energy"] {
-        refusals.call(&["tiny", flag, "gone.ron"], 1, &["gone.ron", "No such file"], "check the path");
+        refusals.call(&["tiny", flag, "gone.ron"], 2, &["gone.ron", "No such file"], "check the path");
     }
     let inputs = Inputs::new();
     let folder = inputs.path("folder.glb");
     fs::create_dir(&folder).expect("a folder can be made");
-    refusals.call(&[&folder], 1, &[&folder, "directory"], "give the path of a .ron, .gltf");
+    refusals.call(&[&folder], 2, &[&folder, "directory"], "give the path of a .ron, .gltf");
     let scene = inputs.put("s.ron", "(objects: [(file: \"gone.obj\")])");
     refusals.call(
         &[&scene],
-        1,
+        2,
         &["s.ron:1:19: ", "gone.obj: cannot read it: No such file"],
         "check the path",
     );
@@ -183,7 +182,7 @@ fn names_that_are_not_unicode() {
     use std::os::unix::ffi::OsStrExt;
     let name = OsStr::from_bytes(b"sc\xffene.glb");
     let ended = quintile().call([OsStr::new("run"), name]);
-    refusals.check(&ended, 1, &["ene.glb: cannot read it"], "check the path");
+    refusals.check(&ended, 2, &["ene.glb: cannot read it"], "check the path");
     refusals.done();
 }
 
@@ -192,9 +191,9 @@ fn truncated_glb_files() {
     let mut refusals = Refusals::default();
     let whole = Glb::square().bytes();
     for length in [4, 11, 12, 19, 40, whole.len() / 2, whole.len() - 60, whole.len() - 1] {
-        refusals.file("cut.glb", &whole[..length], 1, &["truncated"], "get the file again");
+        refusals.file("cut.glb", &whole[..length], 2, &["truncated"], "get the file again");
     }
-    refusals.file("empty.glb", b"", 1, &["not a glTF 2.0 file"], "export it again");
+    refusals.file("empty.glb", b"", 2, &["not a glTF 2.0 file"], "export it again");
     refusals.done();
 }
 
@@ -203,7 +202,7 @@ fn truncated_glb_files() {
 fn a_truncated_real_glb_file() {
     let bytes = fs::read(real_scene("Fox.glb")).expect("the fox is there");
     let mut refusals = Refusals::default();
-    refusals.file("fox.glb", &bytes[..bytes.len() / 3], 1, &["truncated"], "get the file again");
+    refusals.file("fox.glb", &bytes[..bytes.len() / 3], 2, &["truncated"], "get the file again");
     refusals.done();
 }
 
@@ -213,33 +212,33 @@ fn indices_out_of_range() {
     let mut glb = Glb::square();
     let indices = glb.binary.len() - 2;
     glb.binary[indices] = 77;
-    refusals.file("index.glb", glb.bytes(), 1, &["meshes[0].primitives[0]", "77"], "export it again");
+    refusals.file("index.glb", glb.bytes(), 2, &["meshes[0].primitives[0]", "77"], "export it again");
     let mut glb = Glb::square();
     glb.primitive()["indices"] = json!(9);
     refusals.file(
         "accessor.glb",
         glb.bytes(),
-        1,
+        2,
         &["meshes[0].primitives[0].indices", "out of range"],
         "export it again",
     );
     let mut glb = Glb::square();
     glb.json["accessors"][0]["count"] = json!(4_000_000_000u32);
-    refusals.file("count.glb", glb.bytes(), 1, &["accessor 0", "4000000000"], "export it again");
+    refusals.file("count.glb", glb.bytes(), 2, &["accessor 0", "4000000000"], "export it again");
     let mut glb = Glb::square();
     glb.json["bufferViews"][0]["byteLength"] = json!(u64::from(u32::MAX));
-    refusals.file("view.glb", glb.bytes(), 1, &["buffer view 0"], "export it again");
+    refusals.file("view.glb", glb.bytes(), 2, &["buffer view 0"], "export it again");
     refusals.file(
         "a.obj",
         "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n",
-        1,
+        2,
         &["line 4: a face uses vertex 9"],
         "fix the file",
     );
     refusals.file(
         "a.ply",
         ply("3", "0 0 0\n1 0 0\n0 1 0\n3 0 1 9\n"),
-        1,
+        2,
         &["triangle 0", "vertex 9"],
         "fix the file",
     );
@@ -263,7 +262,7 @@ fn vertices_that_are_not_finite() {
         refusals.file(
             "nan.glb",
             glb.bytes(),
-            1,
+            2,
             &["meshes[0].primitives[0]", "vertex 2", word],
             "export it again",
         );
@@ -271,14 +270,14 @@ fn vertices_that_are_not_finite() {
     refusals.file(
         "nan.obj",
         "v 0 0 0\nv 1 nan 0\nv 0 1 0\nf 1 2 3\n",
-        1,
+        2,
         &["line 2: a coordinate that is NaN"],
         "fix the file",
     );
     refusals.file(
         "nan.ply",
         ply("3", "0 0 0\n1 x 0\n0 1 0\n3 0 1 2\n"),
-        1,
+        2,
         &["element vertex", "Line 11"],
         "get it again",
     );
@@ -287,7 +286,7 @@ fn vertices_that_are_not_finite() {
         refusals.file(
             "nan.ply",
             ply("3", &body),
-            1,
+            2,
             &["line 11: the coordinate `y`", bad, "not finite"],
             "fix the file",
         );
@@ -303,14 +302,14 @@ fn geometry_files_of_another_format() {
     let obj = ("it has no triangles", "name another file, or export it with its surfaces as triangles");
     let names = ["a.glb", "a.gltf", "a.ply", "a.obj", "a.ply.gz", "a.obj.gz"];
     for (name, (says, remedy)) in names.into_iter().zip([gltf, gltf, ply_file, obj, ply_file, obj]) {
-        refusals.file(name, b"\x89PNG\r\n\x1a\n\0\0\xff\xfe no geometry", 1, &[says], remedy);
-        refusals.file(name, b"", 1, &[says], remedy);
+        refusals.file(name, b"\x89PNG\r\n\x1a\n\0\0\xff\xfe no geometry", 2, &[says], remedy);
+        refusals.file(name, b"", 2, &[says], remedy);
     }
-    refusals.file("a.ply", ply("4000000000", ""), 1, &["header", "4000000000"], "up to 100000000 are taken");
-    refusals.file("a.ply", ply("3", "0 0 0\n1 0 0\n"), 1, &["element vertex", "truncated"], "get it again");
+    refusals.file("a.ply", ply("4000000000", ""), 2, &["header", "4000000000"], "up to 100000000 are taken");
+    refusals.file("a.ply", ply("3", "0 0 0\n1 0 0\n"), 2, &["element vertex", "truncated"], "get it again");
     let mut glb = Glb::square();
     glb.json["extensionsRequired"] = json!(["KHR_draco_mesh_compression"]);
-    refusals.file("draco.glb", glb.bytes(), 1, &["KHR_draco_mesh_compression"], "export it without");
+    refusals.file("draco.glb", glb.bytes(), 2, &["KHR_draco_mesh_compression"], "export it without");
     refusals.done();
 }
 
@@ -318,10 +317,10 @@ fn geometry_files_of_another_format() {
 fn empty_scenes() {
     let mut refusals = Refusals::default();
     refusals.file("a.ron", "(objects: [])", 2, &["objects"], "add a `file` or a `shape`");
-    refusals.file("a.obj", "v 0 0 0\n", 1, &["it has no triangles"], "name another file");
+    refusals.file("a.obj", "v 0 0 0\n", 2, &["it has no triangles"], "name another file");
     let mut glb = Glb::square();
     glb.json["nodes"] = json!([{}]);
-    refusals.file("a.glb", glb.bytes(), 1, &["it has no triangles"], "name another file");
+    refusals.file("a.glb", glb.bytes(), 2, &["it has no triangles"], "name another file");
     refusals.done();
 }
 
@@ -352,7 +351,7 @@ fn invalid_scene_files() {
     refusals.file(
         "scene.ron",
         b"(\xff\xfe)",
-        1,
+        2,
         &["did not contain valid UTF-8"],
         "check the path, and that it is a text file in UTF-8",
     );

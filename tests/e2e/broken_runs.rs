@@ -15,7 +15,7 @@ fn results_that_cannot_be_written() {
         let ended = quintile().call(["run", "tiny", "--out", &out]);
         refusals.check(
             &ended,
-            1,
+            2,
             &[&out, "cannot use it as the folder for results"],
             "name another with --out",
         );

@@ -226,7 +226,7 @@ fn errors_in_a_camera_name_their_place() {
     }
     refusals.call(
         &["tiny", "--camera", "/nowhere/c.ron"],
-        1,
+        2,
         &["/nowhere/c.ron: cannot read it"],
         "check the path",
     );

@@ -154,19 +154,19 @@ fn results_of_different_kinds_are_refused() {
         (vec![&a, &wide], 2, vec!["a.png has 40x30 pixels", "wide.png 41x30"], "give images of one size"),
         (
             vec![&a, &broken],
-            1,
+            2,
             vec!["broken.png", "cannot be decoded"],
             "give a PNG or an EXR file that is whole",
         ),
         (vec![&a, &number], 2, vec!["is an image and", "a run"], "give two of a kind"),
         (
             vec![&number, &number],
-            1,
+            2,
             vec!["number.json", "not the summary of `quintile run`"],
             "give the folder of a run",
         ),
         (vec![&text, &text], 2, vec!["text.txt", "it is neither a run"], "give one of these"),
-        (vec![&a, &gone], 1, vec!["gone.png: cannot read it"], "check the path"),
+        (vec![&a, &gone], 2, vec!["gone.png: cannot read it"], "check the path"),
     ] {
         let args: Vec<&str> = args.into_iter().map(String::as_str).collect();
         refusals.check(&compare(&args), code, &says, remedy);

@@ -73,8 +73,8 @@ fn what_cannot_be_timed_is_refused() {
     check(&scene, 2, &["scene.settings"], "record them anew");
     check(&["time", &file, "--set", "bins=4"], 2, &["bins=4"], "only gpu., platform. and table.");
     check(&["time", &file, "--timing", "pakket"], 2, &["`pakket`"], "`packet`");
-    check(&["time", &missing], 1, &["no.rec"], "check the path");
-    check(&["time", &cut], 1, &["cut.rec"], "record the frames again");
+    check(&["time", &missing], 2, &["no.rec"], "check the path");
+    check(&["time", &cut], 2, &["cut.rec"], "record the frames again");
     check(&["record", "tiny", "--out", &unwritable], 2, &["none"], "does not exist; create it");
     refusals.done();
 }

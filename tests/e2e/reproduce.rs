@@ -478,7 +478,7 @@ fn settings_that_cannot_be_are_refused_with_their_place() {
         &["settings.ron: `paper` is \"III\"; settings of Paper VI have \"VI\""],
     );
     let missing = quintile().call(["reproduce", "VI", "--settings", &inputs.path("none.ron"), "--out", &out]);
-    assert_eq!(missing.code, Some(1));
+    assert_eq!(missing.code, Some(2));
     let row = quintile().call(["reproduce", "VI", "--row", "VI-99", "--out", &out]);
     assert_eq!(row.code, Some(2));
     assert!(row.stderr.contains("no row `VI-99` in Paper VI; its rows: VI-1, VI-2"), "{}", row.stderr);
@@ -560,7 +560,7 @@ fn invalid_arguments_are_refused_before_the_work() {
     let file = temporary.path().join("file");
     fs::write(&file, "not a folder").expect("a file");
     let blocked = quintile().call(["reproduce", "II", "--quick", "--out", &file.display().to_string()]);
-    assert_eq!(blocked.code, Some(1));
+    assert_eq!(blocked.code, Some(2));
     assert!(blocked.stderr.contains("cannot use it as the folder for results"), "{}", blocked.stderr);
     let help = quintile().call(["help", "reproduce"]);
     assert!(help.stdout.contains("quintile reproduce III --quick --out claims"), "{}", help.stdout);

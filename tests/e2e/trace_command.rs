@@ -102,7 +102,7 @@ fn repairs_are_made_only_on_request_and_reported() {
     let rows = "time_s,voltage_V,current_A\n0,5,1\n0.001,5,nan\n0.003,5,3\n0.002,5,2\n0.006,5,6\n0.007,5,7\n";
     fs::write(folder.path().join("bad.csv"), rows).unwrap();
     let refused = quintile(folder.path(), &["convert", "bad.csv", "good.csv"]);
-    assert_eq!(refused.status.code(), Some(1));
+    assert_eq!(refused.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&refused.stderr).contains("row 2"));
     let report = json(folder.path(), &["convert", "bad.csv", "good.csv", "--repair"]);
     let codes: Vec<&str> =
@@ -123,7 +123,7 @@ fn samples_that_a_device_loses_are_missing_in_jls_and_filled_as_in_parquet() {
         let report = json(folder.path(), &[&["sample", "t.csv"], &lossy[..]].concat());
         assert!(report["lost_samples"].as_u64().unwrap() > 0);
         let refused = quintile(folder.path(), &["convert", out, "b.csv"]);
-        assert_eq!(refused.status.code(), Some(1));
+        assert_eq!(refused.status.code(), Some(2));
     }
     let filled = |from: &str, to: &str| {
         json(folder.path(), &["convert", from, to, "--repair"]);
@@ -461,7 +461,7 @@ fn a_plot_reports_gaps_and_fills_them_on_request() {
     fs::write(folder.path().join("gap.csv"), kept).unwrap();
     let output = quintile(folder.path(), &["plot", "gap.csv", "--out", "a.svg"]);
     let message = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(output.status.code() == Some(1) && message.contains("row 1001"), "{message}");
+    assert!(output.status.code() == Some(2) && message.contains("row 1001"), "{message}");
     let output = quintile(folder.path(), &["plot", "gap.csv", "--repair", "--out", "a.svg"]);
     let (message, shown) = (String::from_utf8_lossy(&output.stderr), String::from_utf8_lossy(&output.stdout));
     assert!(message.contains("100 samples missing") && shown.contains("0 s to 0.52 s"), "{message}{shown}");
@@ -479,7 +479,7 @@ fn invalid_settings_are_refused_and_deviations_are_drawn() {
     table("good.csv", "1,10,1\n2,5,1\n3,20,1\n");
     let none = quintile(folder.path(), &["pareto", "none.csv"]);
     let message = String::from_utf8_lossy(&none.stderr).into_owned();
-    assert!(none.status.code() == Some(1) && message.contains("has no row"), "{message}");
+    assert!(none.status.code() == Some(2) && message.contains("has no row"), "{message}");
     refused(folder.path(), &["pareto", "zero.csv"], "row 2: time_ms is not above 0");
     refused(folder.path(), &["pareto", "negative.csv", "--energy-sd", "sd"], "row 2: a standard deviation");
     let svg = |args: &[&str]| {

@@ -45,7 +45,7 @@ fn bad_values_are_refused_with_the_option_they_are_of() {
 }
 
 #[test]
-fn a_file_that_cannot_be_read_ends_every_command_with_1() {
+fn a_file_that_cannot_be_read_ends_every_command_with_2() {
     let inputs = Inputs::new();
     let trace = recording(&inputs);
     let (gone, bad) = (inputs.path("gone.csv"), inputs.put("bad.txt", "0.02s\n0.04s\n"));
@@ -66,7 +66,7 @@ fn a_file_that_cannot_be_read_ends_every_command_with_1() {
         (vec!["run", "--again", &cut], ["summary.json: it is cut off or damaged", "get the file again"]),
     ] {
         let ended = quintile().call(&args);
-        assert_eq!(ended.code, Some(1), "{args:?}: {}", ended.stderr);
+        assert_eq!(ended.code, Some(2), "{args:?}: {}", ended.stderr);
         assert!(says.iter().all(|part| ended.stderr.contains(part)), "{args:?}: {}", ended.stderr);
     }
 }
@@ -130,7 +130,7 @@ fn files_without_a_trace_fail_with_1_in_every_format_and_command() {
             vec!["pareto", if *file == headed { &table } else { file }],
         ] {
             let ended = quintile().call(["trace"].iter().chain(&args));
-            assert_eq!(ended.code, Some(1), "{args:?}: {}", ended.stderr);
+            assert_eq!(ended.code, Some(2), "{args:?}: {}", ended.stderr);
             assert!(!ended.stderr.contains("os error"), "{args:?}: {}", ended.stderr);
         }
     }
@@ -184,7 +184,7 @@ fn a_lost_end_is_in_the_file_and_filled_on_request() {
         let loss = ["--packet-loss", "0.8", "--seed", "3", "--out", &lost];
         let ended = quintile().call(sample.iter().chain(&loss));
         assert_eq!(ended.code, Some(0), "{}", ended.stderr);
-        assert!(quintile().call(["trace", "convert", &lost, &back]).code == Some(1), "{name}");
+        assert!(quintile().call(["trace", "convert", &lost, &back]).code == Some(2), "{name}");
         let ended = quintile().call(["trace", "convert", &lost, &back, "--repair"]);
         assert!(ended.stdout.contains(": 100 samples at 1000 Hz"), "{name}: {ended:?}");
     }

@@ -96,6 +96,6 @@ fn a_truncated_file_is_refused() {
     let file = folder.path().join("cut.m5d");
     std::fs::write(&file, &scene()[..100]).unwrap();
     let ended = quintile().call([OsStr::new("visibility"), file.as_os_str()]);
-    assert_eq!(ended.code, Some(1));
+    assert_eq!(ended.code, Some(2));
     assert!(ended.stderr.contains("cut.m5d") && ended.stderr.contains("bytes follow"), "{}", ended.stderr);
 }

@@ -7,8 +7,7 @@ use activity::spec::SpecError;
 
 /// Reason why a scene could not be loaded or changed.
 ///
-/// [`LoadError::is_usage`] distinguishes mistakes of the caller (exit code 2) from broken or unreadable files
-/// (exit code 1).
+/// [`LoadError::is_usage`] distinguishes mistakes of the caller from broken or unreadable files.
 #[derive(Debug, thiserror::Error)]
 pub enum LoadError {
     /// Neither a built-in scene nor a file of a known format.
@@ -97,11 +96,8 @@ fn remedy(error: &io::Error) -> &'static str {
 }
 
 impl LoadError {
-    /// Whether the caller made a mistake (unknown scene or format, invalid setting or RON scene): exit code
-    /// 2. Missing, unreadable, truncated, corrupt or unsupported files have exit code 1, as has an unreadable
-    /// RON file.
-    /// 2. The others (files that are missing, unreadable, truncated, corrupt or not supported) are exit
-    /// code 1. A RON file that cannot be read counts as unreadable.
+    /// Whether the caller made a mistake: an unknown scene or format, an invalid setting or RON scene. Others are files that are
+    /// missing, unreadable, truncated, corrupt or not supported.
     pub fn is_usage(&self) -> bool {
         match self {
             Self::Unknown { .. }

@@ -84,42 +84,23 @@ impl RunError {
         }
     }
 
-    /// Whether this is a usage error (exit code 2) rather than a failure (exit code 1).
+    /// Whether the request is at fault (exit code 2): a wrong value, or an input that is missing or damaged. Other failures come
+    /// while it runs (exit code 1).
     pub fn is_usage(&self) -> bool {
         match self {
-            Self::Scene(error) => error.is_usage(),
-            Self::Gpu(GpuError::Spec(activity::spec::SpecError::Read { .. })) => false,
             Self::Output(error) => error.is_usage(),
-            Self::Change(error) => !is_unreadable(error),
-            Self::Platform(error) => !is_unreadable(error),
-            Self::Table(error) => !is_unreadable(error),
-            Self::Spec(activity::spec::SpecError::Read { .. }) => false,
-            Self::Pacing(power_model::PacingError::Rate(_)) | Self::Timing(TimingError::TooLong) => true,
-            Self::Spec(_)
-            | Self::Gpu(_)
-            | Self::Marks(_)
-            | Self::Sample(_)
-            | Self::Samples(_)
-            | Self::Device(_)
-            | Self::Model(_)
-            | Self::Job(JobError::Setting(_) | JobError::Pass(_))
-            | Self::Groups { .. }
-            | Self::Setting(_) => true,
-            _ => false,
+            Self::Pacing(error) => matches!(error, power_model::PacingError::Rate(_)),
+            Self::Timing(error) => matches!(error, TimingError::TooLong),
+            Self::Job(error) => matches!(error, JobError::Setting(_) | JobError::Pass(_)),
+            Self::Frame(_)
+            | Self::Timeline { .. }
+            | Self::Plot(_)
+            | Self::Image(_)
+            | Self::Frames(_)
+            | Self::Write(_) => false,
+            _ => true,
         }
     }
-}
-
-/// Whether the chain of causes contains an input or output error: the file could not be read.
-fn is_unreadable(error: &(dyn std::error::Error + 'static)) -> bool {
-    let mut cause = Some(error);
-    while let Some(error) = cause {
-        if error.downcast_ref::<std::io::Error>().is_some() {
-            return true;
-        }
-        cause = error.source();
-    }
-    false
 }
 
 #[cfg(test)]

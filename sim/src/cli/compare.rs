@@ -17,8 +17,8 @@ use super::outputs::{print, print_json};
 #[command(
     after_help = "Examples:\n  quintile compare out/before out/after\n  quintile compare before.png after.png --out difference.png\n  \
     quintile compare before/images after/images --json\n\n\
-    Differences are B minus A, ratios B over A. The exit code is 0 with or without differences; 1 if a file is broken, 2 if \
-    the two cannot be compared: images of different sizes, or a run with an image."
+    Differences are B minus A, ratios B over A. The exit code is 0 with or without differences; 2 if \
+    the two cannot be compared: images of different sizes, a run with an image, or a file that is missing or broken."
 )]
 pub struct CompareArgs {
     /// The folder or summary.json of a run, a frames.csv, a .png or .exr image, or a folder of images

@@ -60,7 +60,7 @@ pub(super) fn runs(
     let listed = |varied: Vec<Setting>| {
         let mut options = options.clone();
         for (path, values) in &single {
-            set(&mut options, &Setting::new(path, values.concat()))?;
+            set(&mut options, &Setting::new(path.as_str(), values.concat()))?;
         }
         varied.iter().try_for_each(|setting| set(&mut options, setting))?;
         let out = if varied.is_empty() { out.to_owned() } else { out.join(unique(&varied, &mut names)) };
@@ -77,11 +77,11 @@ pub(super) fn set(options: &mut RunOptions, setting: &Setting) -> Result<(), Fai
     let Setting { path, value } = setting;
     let is_workload = catalog::names().any(|(name, _)| Path::new(name) == options.scene);
     if let Some(name) = path.strip_prefix("workload.") {
-        options.options.set.push((name.to_owned(), value.clone()));
+        options.options.set.push((name.to_owned(), value.to_string()));
     } else if path.contains('.') {
-        options.changes.push(Change { path: path.clone(), value: value.clone() });
+        options.changes.push(Change { path: path.to_string(), value: value.to_string() });
     } else if is_workload || !sweep::is_option(path) {
-        options.options.set.push((path.clone(), value.clone()));
+        options.options.set.push((path.to_string(), value.to_string()));
     } else {
         *options = sweep::with(options, setting)?;
     }
@@ -123,7 +123,7 @@ fn unique(settings: &[Setting], names: &mut BTreeSet<String>) -> String {
 /// Compares runs: what differs, and means of a frame, also over those of the first run.
 pub(super) fn table(runs: &[(Listed, Summary)]) -> Table {
     let varied = runs.first().map_or(&[][..], |(run, _)| &run.varied);
-    let names = varied.iter().map(|setting| setting.path.as_str());
+    let names = varied.iter().map(|setting| &*setting.path);
     let numbers = ["cycles", "busy time", "ratio", "energy", "ratio"];
     let mut table = Table::new(names.chain(numbers).collect::<Vec<_>>());
     let Some((_, first)) = runs.first() else { return table };
@@ -137,7 +137,7 @@ pub(super) fn table(runs: &[(Listed, Summary)]) -> Table {
             [si(value, unit), format!("{:.4}", value / mean(first, of))]
         };
         let numbers = cell(|frame| frame.busy_s, "s").into_iter().chain(cell(|frame| frame.energy_j, "J"));
-        let settings = run.varied.iter().map(|setting| setting.value.clone());
+        let settings = run.varied.iter().map(|setting| setting.value.to_string());
         table.row(settings.chain([count_or_digits(cycles)]).chain(numbers).collect::<Vec<_>>());
     }
     table

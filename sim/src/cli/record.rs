@@ -16,7 +16,7 @@ use workloads::job::OptionSource;
 
 use super::Failure;
 use super::lists;
-use super::outputs::{may_hold_results, print, print_json};
+use super::outputs::{may_hold_trace, print, print_json};
 use super::run::{bound, one_gpu, pacing};
 use crate::cli::args::{SceneArgs, ThreadArgs};
 use crate::cli::parse::setting;
@@ -105,6 +105,19 @@ fn level(text: &str) -> Result<Level, String> {
     found.ok_or_else(|| format!("`{text}` is no timing level; {}", activity::spec::suggestion(text, &known)))
 }
 
+/// Checks that `out` can be written, and that a file there is an older recording.
+fn may_hold_recording(out: &Path, scene: &Path) -> Result<(), Failure> {
+    may_hold_trace("--out", Some(out), [scene])?;
+    if !out.exists() || RecordedRun::is_at(out) {
+        return Ok(());
+    }
+    let message = format!(
+        "--out: {} is not from `quintile record`, and stays as it is: move or rename it, or name another file",
+        out.display()
+    );
+    Err(Failure { message, code: 2 })
+}
+
 pub(super) fn record(args: &RecordArgs, terminal: &Terminal) -> Result<(), Failure> {
     one_gpu(&args.gpu)?;
     let mut options = RunOptions {
@@ -115,10 +128,13 @@ pub(super) fn record(args: &RecordArgs, terminal: &Terminal) -> Result<(), Failu
         seed: args.seed,
         ..RunOptions::default()
     };
-    args.set.iter().try_for_each(|(path, value)| lists::set(&mut options, &Setting::new(path, value)))?;
+    let mut set = |(path, value): &(String, String)| {
+        lists::set(&mut options, &Setting::new(path.as_str(), value.as_str()))
+    };
+    args.set.iter().try_for_each(&mut set)?;
     let progress = Progress::on(terminal, args.json);
     let plan = Plan::resolve(options)?;
-    may_hold_results("--out", Some(&args.out), [args.scene.as_path()])?;
+    may_hold_recording(&args.out, &args.scene)?;
     let recorded = args.threads.pool()?.install(|| RecordedRun::draw(&plan, &progress))?;
     recorded.write(&args.out)?;
     let bytes = std::fs::metadata(&args.out).map_or(0, |file| file.len());

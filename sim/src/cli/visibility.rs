@@ -178,7 +178,7 @@ fn write(
 fn samples(args: &VisibilityArgs, scene: &VisibilityScene) -> Result<Box<dyn SampleSource>, Failure> {
     let range = || Failure {
         message: format!("{}: {} samples per pixel; it has to be 1 to 256", named(args), scene.per_pixel),
-        code: 1,
+        code: 2,
     };
     match args.samples.as_str() {
         "hash" => Ok(Box::new(scene.hashed_samples().ok_or_else(range)?)),

@@ -190,10 +190,7 @@ mod tests {
         assert_eq!(counts, [Some(2), Some(4)]);
         let mut ask = |at: &[f64]| search.answer(&Question { at: at.to_vec() }).unwrap();
         let first = ask(&[0.25, 0.375]);
-        assert_eq!(
-            first.settings.iter().map(|set| set.value.as_str()).collect::<Vec<_>>(),
-            ["4", "400000000"]
-        );
+        assert_eq!(first.settings.iter().map(|set| &*set.value).collect::<Vec<_>>(), ["4", "400000000"]);
         assert!(first.busy_ms.unwrap() > 0.0 && first.error.is_none());
         assert_eq!(first, ask(&[0.3, 0.4]), "another place in the same part of each axis");
         assert_ne!(first.busy_ms, ask(&[0.25, 0.6]).busy_ms);

@@ -1,6 +1,7 @@
 //! Axes: the values of one setting, or of several that change together.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 use serde::Deserialize;
 
@@ -13,14 +14,14 @@ pub enum Axis {
     /// Listed values of a setting.
     Values {
         /// The setting.
-        path: String,
+        path: Arc<str>,
         /// Its values.
         values: Vec<Text>,
     },
     /// Numbers from one to another.
     Range {
         /// The setting.
-        path: String,
+        path: Arc<str>,
         /// First number.
         from: f64,
         /// Last number.
@@ -41,7 +42,7 @@ pub enum Axis {
     /// Settings that change together: their first values, then their second ones, and so on.
     Linked {
         /// Lists of equal length.
-        settings: BTreeMap<String, Vec<Text>>,
+        settings: BTreeMap<Arc<str>, Vec<Text>>,
     },
 }
 
@@ -49,8 +50,8 @@ impl Axis {
     /// Settings that it varies.
     pub(crate) fn paths(&self) -> Box<dyn Iterator<Item = &str> + '_> {
         match self {
-            Self::Values { path, .. } | Self::Range { path, .. } => Box::new(std::iter::once(path.as_str())),
-            Self::Linked { settings } => Box::new(settings.keys().map(String::as_str)),
+            Self::Values { path, .. } | Self::Range { path, .. } => Box::new(std::iter::once(&**path)),
+            Self::Linked { settings } => Box::new(settings.keys().map(|path| &**path)),
         }
     }
 
@@ -71,7 +72,7 @@ impl Axis {
             }
             Self::Values { path, values } => {
                 let mut seen = BTreeSet::new();
-                let repeated = values.iter().find(|value| !seen.insert(value.0.as_str()));
+                let repeated = values.iter().find(|value| !seen.insert(&*value.0));
                 repeated.map_or(Ok(()), |value| Err(format!("`{path}` has {} twice", value.0)))
             }
             Self::Linked { settings } => {
@@ -129,14 +130,15 @@ impl Axis {
     /// Settings of value `index`, below [`Self::len`].
     pub(crate) fn value(&self, index: usize) -> Vec<Setting> {
         match self {
-            Self::Values { path, values } => vec![Setting::new(path, &*values[index].0)],
+            Self::Values { path, values } => vec![Setting::new(path.clone(), values[index].0.clone())],
             Self::Linked { settings } => {
-                settings.iter().map(|(path, values)| Setting::new(path, &*values[index].0)).collect()
+                let linked = settings.iter();
+                linked.map(|(path, values)| Setting::new(path.clone(), values[index].0.clone())).collect()
             }
             Self::Range { path, from, step: Some(step), log, .. } => {
                 let steps = index as f64;
                 let value = if *log { from * libm::pow(*step, steps) } else { from + step * steps };
-                vec![Setting::new(path, number(value))]
+                vec![Setting::new(path.clone(), number(value))]
             }
             Self::Range { count, .. } => self.between(index as f64 / (count.unwrap_or(2) - 1) as f64),
         }
@@ -163,7 +165,7 @@ impl Axis {
             _ => low + (high - low) * share,
         };
         let value = if *whole { value.floor().min(high - 1.0) } else { value };
-        vec![Setting::new(path, number(value))]
+        vec![Setting::new(path.clone(), number(value))]
     }
 
     /// The path of a range of any numbers that holds a whole one, and that number.
@@ -194,10 +196,10 @@ mod tests {
     use super::*;
 
     fn range(count: Option<u32>, step: Option<f64>, log: bool, [from, to]: [f64; 2]) -> Vec<String> {
-        let path = "gpu.core_hz".to_owned();
+        let path = "gpu.core_hz".into();
         let axis = Axis::Range { path, from, to, count, step, log, whole: false };
         axis.check(true).unwrap();
-        (0..axis.len()).map(|index| axis.value(index)[0].value.clone()).collect()
+        (0..axis.len()).map(|index| axis.value(index)[0].value.to_string()).collect()
     }
 
     #[test]
@@ -211,13 +213,11 @@ mod tests {
 
     #[test]
     fn a_share_picks_a_value_or_a_number() {
-        let listed =
-            Axis::Values { path: "seed".to_owned(), values: ["1", "2"].map(|n| Text(n.to_owned())).into() };
-        let at = |share| listed.at(share)[0].value.clone();
+        let listed = Axis::Values { path: "seed".into(), values: ["1", "2"].map(|n| Text(n.into())).into() };
+        let at = |share| listed.at(share)[0].value.to_string();
         assert_eq!([at(0.0), at(0.49), at(0.5), at(0.999)], ["1", "1", "2", "2"]);
-        let path = "gpu.core_hz".to_owned();
         let any = |log, [from, to]: [f64; 2], whole| Axis::Range {
-            path: path.clone(),
+            path: "gpu.core_hz".into(),
             from,
             to,
             count: None,
@@ -226,9 +226,9 @@ mod tests {
             whole,
         };
         let log = any(true, [1.0, 100.0], false);
-        assert!(log.check(false).is_ok() && log.at(0.5)[0].value == "10");
+        assert!(log.check(false).is_ok() && &*log.at(0.5)[0].value == "10");
         // Whole numbers have equal parts of a range, or equal ratios.
-        let at = |axis: &Axis, share| axis.at(share)[0].value.clone();
+        let at = |axis: &Axis, share| axis.at(share)[0].value.to_string();
         let whole = any(false, [3.5, 7.2], true);
         assert_eq!(
             [0.0, 0.24, 0.26, 0.74, 0.76, 1.0].map(|at_| at(&whole, at_)),
@@ -243,11 +243,11 @@ mod tests {
 
     #[test]
     fn names_alone_are_no_axis() {
-        let values = |path: &str| Axis::Values { path: path.to_owned(), values: vec![Text("a".to_owned())] };
+        let values = |path: &str| Axis::Values { path: path.into(), values: vec![Text("a".into())] };
         let error = values("gpu.name").check(true).unwrap_err();
         assert!(error.contains("changes no number of a run") && error.contains("Linked"), "{error}");
         let linked = |paths: &[&str]| Axis::Linked {
-            settings: paths.iter().map(|path| ((*path).to_owned(), vec![Text("1".to_owned())])).collect(),
+            settings: paths.iter().map(|path| ((*path).into(), vec![Text("1".into())])).collect(),
         };
         assert!(linked(&["gpu.name", "gpu.core_hz"]).check(true).is_ok());
         assert!(linked(&["gpu.name", "gpu.doc"]).check(true).is_err());

@@ -102,7 +102,7 @@ impl Expression {
         match self {
             Self::Value(value) => Ok(value.clone()),
             Self::Setting(path) => {
-                let found = settings.iter().copied().flatten().find(|setting| setting.path == *path);
+                let found = settings.iter().copied().flatten().find(|setting| *setting.path == **path);
                 found.map(|setting| Value::of(&setting.value)).ok_or_else(|| format!("`{path}` has no value"))
             }
             Self::Not(inner) => match inner.value(settings)? {

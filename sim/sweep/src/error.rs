@@ -79,7 +79,7 @@ pub enum SweepError {
     Busy {
         /// The folder.
         folder: PathBuf,
-        /// ` (process 123)`, or empty if the number is unknown.
+        /// ` (process 123 on node7)`, or empty if it is unknown.
         process: String,
     },
     /// Results are complete, but cannot be moved into place.
@@ -109,25 +109,20 @@ pub enum SweepError {
 }
 
 impl SweepError {
-    /// Whether this is a usage error (exit code 2) rather than a failure (exit code 1).
+    /// Whether the request is at fault, or an input that it names (exit code 2), rather than what came while it ran (exit code 1).
     pub fn is_usage(&self) -> bool {
         match self {
-            Self::Spec(SpecError::Read { source, .. }) => matches!(
-                source.kind(),
-                ErrorKind::NotFound | ErrorKind::IsADirectory | ErrorKind::InvalidData
-            ),
             Self::Folder { source, .. } => source.kind() == ErrorKind::NotADirectory,
-            Self::Spec(SpecError::Parse { .. }) => true,
-            Self::Value { .. }
+            Self::Spec(_)
+            | Self::Input(_)
+            | Self::Value { .. }
             | Self::Setting { .. }
             | Self::Shard(_)
             | Self::OtherSweep { .. }
             | Self::InTheWay { .. }
             | Self::Busy { .. }
             | Self::Plan { .. } => true,
-            Self::Write(_) | Self::Publish(_) | Self::Unfinished { .. } | Self::Slurm(_) | Self::Input(_) => {
-                false
-            }
+            Self::Write(_) | Self::Publish(_) | Self::Unfinished { .. } | Self::Slurm(_) => false,
         }
     }
 

@@ -15,7 +15,7 @@ use traces::io::atomic;
 use crate::SweepError;
 use crate::execute::PointResult;
 use crate::plan::{Plan, Point, SCHEMA, version};
-use crate::setting::Setting;
+use crate::setting::{Setting, Texts};
 
 /// File of the plan: a header, then one line per point.
 const PLAN: &str = "plan.jsonl";
@@ -140,13 +140,16 @@ impl Folder {
         }
     }
 
-    /// Points of the plan, line by line.
+    /// Points of the plan, line by line. They share the texts of their settings.
     fn points(&self) -> Result<impl Iterator<Item = Result<Point, SweepError>>, SweepError> {
         let path = self.root.join(PLAN);
         let lines = BufReader::new(File::open(&path).map_err(SweepError::folder(&path))?).lines().skip(1);
+        let mut texts = Texts::default();
         Ok(lines.map(move |line| {
             let line = line.map_err(SweepError::folder(&path))?;
-            serde_json::from_str(&line).map_err(|error| damaged(&path, &error))
+            let Point { id, settings }: Point =
+                serde_json::from_str(&line).map_err(|error| damaged(&path, &error))?;
+            Ok(Point { id, settings: settings.iter().map(|setting| texts.shared(setting)).collect() })
         }))
     }
 

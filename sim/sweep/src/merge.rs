@@ -75,16 +75,17 @@ fn settings(plan: &Plan) -> Vec<Column> {
     let common = plan
         .settings
         .iter()
-        .map(|setting| column(&setting.path, vec![Some(setting.value.clone()); plan.points.len()]));
+        .map(|setting| column(&setting.path, vec![Some(setting.value.to_string()); plan.points.len()]));
     let mut paths: Vec<&str> = Vec::new();
     for setting in plan.points.iter().flat_map(|point| &point.settings) {
-        if !paths.contains(&setting.path.as_str()) {
+        if !paths.contains(&&*setting.path) {
             paths.push(&setting.path);
         }
     }
     let varied = paths.into_iter().map(|path| {
         let value = |point: &Point| {
-            point.settings.iter().find(|setting| setting.path == path).map(|setting| setting.value.clone())
+            let found = point.settings.iter().find(|setting| &*setting.path == path);
+            found.map(|setting| setting.value.to_string())
         };
         column(path, plan.points.iter().map(value).collect())
     });

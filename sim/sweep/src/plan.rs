@@ -123,24 +123,22 @@ fn refused(refusal: Refusal, spec: &SweepSpec, (file, text): (&str, &str), point
     let message = message.strip_prefix("--set ").or(message.strip_prefix("--")).unwrap_or(&message);
     let settings = points.settings(at);
     let of = |setting: &&Setting| {
-        let rest =
-            [setting.path.as_str(), setting.option()].into_iter().find_map(|name| message.strip_prefix(name));
+        let rest = [&*setting.path, setting.option()].into_iter().find_map(|name| message.strip_prefix(name));
         let rest = rest.filter(|rest| rest.starts_with(['=', ':']))?;
-        Some((setting.path.clone(), format!("{}{rest}", setting.path)))
+        Some((setting.path.to_string(), format!("{}{rest}", setting.path)))
     };
     let is_quoted = |setting: &&Setting| {
         let Setting { value, .. } = setting;
         message.contains(&format!("`{value}`")) || message.starts_with(&format!("{value}: "))
     };
-    let quoted = || settings.iter().find(is_quoted).map(|setting| setting.path.clone());
+    let quoted = || settings.iter().find(is_quoted).map(|setting| setting.path.to_string());
     let named = settings.iter().find_map(|setting| of(&setting));
     let named =
         named.or_else(|| path.or_else(quoted).map(|path| (path.clone(), format!("`{path}`: {message}"))));
     let Some((path, message)) = named else {
         return SweepError::Setting { file: file.to_owned(), message: message.to_owned() };
     };
-    let value =
-        |path: &str| settings.iter().find(|setting| setting.path == path).map(|set| set.value.as_str());
+    let value = |path: &str| settings.iter().find(|setting| &*setting.path == path).map(|set| &*set.value);
     let line = text.find(&format!("{path:?}")).map(|at| 1 + text[..at].matches('\n').count());
     let file = line.map_or_else(|| file.to_owned(), |line| format!("{file}:{line}"));
     let with = match value("scene").filter(|_| path.starts_with("workload.") && spec.varies("scene")) {
@@ -263,7 +261,7 @@ mod tests {
             Range(path: \"gpu.units.depth.queue\", from: 2.5, to: 64, log: true)";
         let plan = sweep(axes).unwrap();
         let of = |path: &str| -> Vec<f64> {
-            let all = plan.points.iter().flat_map(|point| &point.settings).filter(|set| set.path == path);
+            let all = plan.points.iter().flat_map(|point| &point.settings).filter(|set| &*set.path == path);
             all.map(|setting| setting.value.parse().unwrap()).collect()
         };
         let samples = of("samples");

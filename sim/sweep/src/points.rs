@@ -33,16 +33,16 @@ impl Points {
             return self;
         }
         let Self { mut common, varied, idle } = self;
-        let seed = common.iter().find(|setting| setting.path == "seed");
+        let seed = common.iter().find(|setting| &*setting.path == "seed");
         let first: u64 = seed.and_then(|seed| seed.value.parse().ok()).unwrap_or(1);
-        common.retain(|setting| setting.path != "seed");
+        common.retain(|setting| &*setting.path != "seed");
         let seeds = (0..u64::from(repetitions)).map(|repetition| first.wrapping_add(repetition));
-        let repeated = |varied: Vec<Setting>| {
-            let with =
-                move |seed: u64| [varied.clone(), vec![Setting::new("seed", seed.to_string())]].concat();
-            seeds.clone().map(with)
+        let seeds: Vec<Setting> = seeds.map(|seed| Setting::new("seed", seed.to_string())).collect();
+        let repeated = |point: &Vec<Setting>| {
+            let with = |seed| [point.as_slice(), std::slice::from_ref(seed)].concat();
+            seeds.iter().map(with).collect::<Vec<_>>()
         };
-        Self { varied: varied.into_iter().flat_map(repeated).collect(), common, idle }
+        Self { varied: varied.iter().flat_map(repeated).collect(), common, idle }
     }
 
     /// All points at the first level, then all of them at the next.
@@ -116,17 +116,19 @@ fn varied(spec: &SweepSpec) -> Box<dyn Iterator<Item = Vec<Setting>> + '_> {
     }
 }
 
-/// Each value of each axis with all others; the last axis varies fastest.
-fn grid(axes: &[Axis]) -> impl Iterator<Item = Vec<Setting>> + '_ {
-    let lengths: Vec<usize> = axes.iter().map(|axis| axis.len()).collect();
-    (0..lengths.iter().product()).map(move |point: usize| {
+/// Each value of each axis with all others; the last axis varies fastest. Points share the text of a value.
+fn grid(axes: &[Axis]) -> impl Iterator<Item = Vec<Setting>> {
+    let values = |axis: &Axis| (0..axis.len()).map(|index| axis.value(index)).collect();
+    let axes: Vec<Vec<Vec<Setting>>> = axes.iter().map(values).collect();
+    (0..axes.iter().map(Vec::len).product()).map(move |point: usize| {
         let mut rest = point;
-        let mut settings: Vec<Vec<Setting>> = Vec::with_capacity(lengths.len());
-        for (axis, &length) in axes.iter().zip(&lengths).rev() {
-            settings.push(axis.value(rest % length));
-            rest /= length;
+        let mut settings: Vec<&[Setting]> = Vec::with_capacity(axes.len());
+        for values in axes.iter().rev() {
+            settings.push(&values[rest % values.len()]);
+            rest /= values.len();
         }
-        settings.into_iter().rev().flatten().collect()
+        settings.reverse();
+        settings.concat()
     })
 }
 
@@ -136,8 +138,8 @@ fn grid(axes: &[Axis]) -> impl Iterator<Item = Vec<Setting>> + '_ {
 /// In words, if a path is unknown or a value is listed twice.
 pub fn combinations(lists: Vec<(String, Vec<String>)>) -> Result<Vec<Vec<Setting>>, String> {
     let axis = |(path, values): (String, Vec<String>)| Axis::Values {
-        path,
-        values: values.into_iter().map(Text).collect(),
+        path: path.into(),
+        values: values.into_iter().map(|value| Text(value.into())).collect(),
     };
     let axes: Vec<Axis> = lists.into_iter().map(axis).collect();
     axes.iter().try_for_each(|axis| axis.check(true))?;
@@ -165,7 +167,8 @@ mod tests {
 
     fn made(text: &str) -> Vec<Vec<String>> {
         let spec = SweepSpec::parse(&format!("(name: \"a\", {text})"), "a.ron").unwrap();
-        let values = |settings: Vec<Setting>| settings.into_iter().map(|setting| setting.value).collect();
+        let values =
+            |settings: Vec<Setting>| settings.into_iter().map(|setting| setting.value.to_string()).collect();
         let points = Points::new(&spec, false).unwrap();
         (0..points.varied.len()).map(|at| values(points.settings(at))).collect()
     }

@@ -61,7 +61,7 @@ fn may_be_optimal(design: &Design<'_>, designs: &[Design<'_>], range: Cost) -> b
 
 /// Order in which designs are drawn: as random as a hash, and the same for every build of the program, as ids are not.
 fn draw_order(point: &Point) -> String {
-    let settings = point.settings.iter().filter(|setting| setting.path != "timing");
+    let settings = point.settings.iter().filter(|setting| &*setting.path != "timing");
     let mut lines: Vec<String> = settings.map(|set| format!("{:?}={:?}", set.path, set.value)).collect();
     lines.sort();
     sha256_of_text(&lines.join("\n"))
@@ -131,7 +131,7 @@ pub(crate) fn screened<'a>(plan: &'a Plan, folder: &Folder, fine: usize) -> Resu
 
 /// What designs are compared under: all settings that are neither of the hardware nor the level.
 fn workload(point: &Point) -> String {
-    let settings = point.settings.iter().filter(|set| !set.is_of_design() && set.path != "timing");
+    let settings = point.settings.iter().filter(|set| !set.is_of_design() && &*set.path != "timing");
     settings.map(|set| format!("{}={}", set.path, set.value)).collect::<Vec<_>>().join(", ")
 }
 
@@ -257,7 +257,7 @@ mod tests {
         let host_s = started.elapsed().as_secs_f64();
         let last = plan.of_level(plan.screen.len().max(1) - 1);
         let of = |point: &Point| {
-            let settings = point.settings.iter().filter(|set| set.path != "timing");
+            let settings = point.settings.iter().filter(|set| &*set.path != "timing");
             let name =
                 settings.map(|set| format!("{}={}", set.path, set.value)).collect::<Vec<_>>().join(" ");
             Some((name, cost(into.result(point).unwrap()?.outcome.measured()?)))

@@ -1,37 +1,42 @@
 //! Settings of a point by path, and the options of a run made from them.
 
+use std::collections::HashSet;
+use std::sync::Arc;
+
 use activity::spec::suggestion;
 use run::{Change, InputFile, Plan, RunError, RunOptions};
 use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::{Map, Value, json};
 
-/// A setting and its value as text.
+/// A setting and its value as text, which the points of a sweep share.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Setting {
     /// An option of a run (`timing`), a view option (`samples`), a value in an input file (`gpu.core_hz`), or an option of a
     /// workload (`workload.bins`).
-    pub path: String,
+    pub path: Arc<str>,
     /// The value.
-    pub value: String,
+    pub value: Arc<str>,
 }
 
 /// Text of a value: a number, `true`, text, or a list.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Text(pub String);
+pub struct Text(pub Arc<str>);
 
 impl<'de> Deserialize<'de> for Text {
     fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
         let value = ron::Value::deserialize(from)?;
         match value {
-            ron::Value::String(text) => Ok(Self(text)),
+            ron::Value::String(text) => Ok(Self(text.into())),
             ron::Value::Seq(items) => {
                 let items = items.iter().map(ron::to_string).collect::<Result<Vec<_>, _>>();
-                items.map(|items| Self(format!("({})", items.join(", ")))).map_err(serde::de::Error::custom)
+                items
+                    .map(|items| Self(format!("({})", items.join(", ")).into()))
+                    .map_err(serde::de::Error::custom)
             }
-            other => {
-                ron::to_string(&other).map(|text| Self(without_zeros(text))).map_err(serde::de::Error::custom)
-            }
+            other => ron::to_string(&other)
+                .map(|text| Self(without_zeros(text).into()))
+                .map_err(serde::de::Error::custom),
         }
     }
 }
@@ -86,7 +91,7 @@ pub(crate) enum Stage {
 
 impl Setting {
     /// A setting.
-    pub fn new(path: impl Into<String>, value: impl Into<String>) -> Self {
+    pub fn new(path: impl Into<Arc<str>>, value: impl Into<Arc<str>>) -> Self {
         Self { path: path.into(), value: value.into() }
     }
 
@@ -117,7 +122,7 @@ impl Setting {
 
     /// The first stage of a run that depends on it. A GPU as a whole, and all that is not known to be later, is of the drawing.
     pub(crate) fn stage(&self) -> Stage {
-        match self.path.as_str() {
+        match &*self.path {
             "platform" | "energy" | "bound" | "pacing" => Stage::Power,
             "timing" | "gpu.core_hz" | "gpu.memory_hz" => Stage::Timing,
             // What a warp does is counted as it is drawn.
@@ -132,6 +137,29 @@ impl Setting {
 
     fn refused(&self, message: impl std::fmt::Display) -> RunError {
         RunError::Setting(format!("{}: `{}`: {message}", self.path, self.value))
+    }
+}
+
+/// Texts of settings that are kept once, however many points have them.
+#[derive(Default)]
+pub(crate) struct Texts {
+    known: HashSet<Arc<str>>,
+}
+
+impl Texts {
+    /// `setting` with the texts that are known, which its own join.
+    pub fn shared(&mut self, setting: &Setting) -> Setting {
+        Setting { path: self.text(&setting.path), value: self.text(&setting.value) }
+    }
+
+    fn text(&mut self, text: &Arc<str>) -> Arc<str> {
+        match self.known.get(text) {
+            Some(known) => known.clone(),
+            None => {
+                self.known.insert(text.clone());
+                text.clone()
+            }
+        }
     }
 }
 
@@ -193,9 +221,9 @@ fn options(settings: &[Setting]) -> Result<RunOptions, RunError> {
     for setting in settings {
         let Setting { path, value } = setting;
         if InputFile::of(path).is_some() {
-            options.changes.push(Change { path: path.clone(), value: value.clone() });
+            options.changes.push(Change { path: path.to_string(), value: value.to_string() });
         } else if let Some(name) = path.strip_prefix("workload.") {
-            options.options.set.push((name.to_owned(), value.clone()));
+            options.options.set.push((name.to_owned(), value.to_string()));
         } else {
             options = with(&options, setting)?;
         }
@@ -219,13 +247,14 @@ pub fn with(options: &RunOptions, setting: &Setting) -> Result<RunOptions, RunEr
             Some(view) => view,
             None => &mut fields,
         };
-        within.insert(setting.path.clone(), value);
+        within.insert(setting.path.to_string(), value);
         serde_json::from_value(Value::Object(fields))
     };
     // A value that looks like a number may be a name.
     let typed = changed(json_of(setting));
     typed.or_else(|error| {
-        changed(Value::String(setting.value.clone())).map_err(|_| setting.refused(in_words(setting, &error)))
+        changed(Value::String(setting.value.to_string()))
+            .map_err(|_| setting.refused(in_words(setting, &error)))
     })
 }
 
@@ -233,12 +262,12 @@ pub fn with(options: &RunOptions, setting: &Setting) -> Result<RunOptions, RunEr
 fn json_of(setting: &Setting) -> Value {
     let text = setting.value.trim();
     // Runs that are compared have a timing level; `null` would leave it out.
-    if setting.path == "timing" {
+    if &*setting.path == "timing" {
         return Value::String(text.to_owned());
     }
     let list = text.replace('(', "[").replace(')', "]");
     let value = serde_json::from_str(&list).unwrap_or_else(|_| Value::String(text.to_owned()));
-    if setting.path != "frames" {
+    if &*setting.path != "frames" {
         return value;
     }
     let numbers =
@@ -277,7 +306,7 @@ fn check_scene(settings: &[Setting]) -> Result<(), RunError> {
     let Some(inside) = settings.iter().find(|setting| setting.path.starts_with("scene.")) else {
         return Ok(());
     };
-    let scene = settings.iter().find(|setting| setting.path == "scene");
+    let scene = settings.iter().find(|setting| &*setting.path == "scene");
     let scene = scene.map_or("default", |scene| &scene.value);
     if scene.ends_with(".ron") {
         return Ok(());

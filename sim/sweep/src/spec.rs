@@ -247,7 +247,7 @@ impl SweepSpec {
 
     /// Whether a range varies `path`.
     pub(crate) fn is_range(&self, path: &str) -> bool {
-        self.axes.iter().any(|axis| matches!(axis, Axis::Range { path: known, .. } if known == path))
+        self.axes.iter().any(|axis| matches!(axis, Axis::Range { path: known, .. } if **known == *path))
     }
 
     /// Paths of all axes.
@@ -255,19 +255,19 @@ impl SweepSpec {
         self.axes.iter().flat_map(Axis::paths)
     }
 
-    /// Number of points before constraints, repetitions included; `None` if it overflows.
+    /// Number of points before constraints, at all levels and with repetitions; `None` if it overflows.
     pub(crate) fn size(&self) -> Option<usize> {
         let points = match self.points.count() {
             Some(count) => count as usize,
             None => self.axes.iter().try_fold(1_usize, |size, axis| size.checked_mul(axis.len()))?,
         };
-        points.checked_mul(self.repetitions as usize)
+        points.checked_mul(self.repetitions as usize)?.checked_mul(self.screen.len().max(1))
     }
 
     /// Entries of `forbidden` that leave out a point with these values, by number.
     pub(crate) fn forbids<'a>(&'a self, settings: &'a [Setting]) -> impl Iterator<Item = usize> + 'a {
         let has = |(path, value): (&String, &Text)| {
-            settings.iter().any(|setting| setting.path == *path && same(&setting.value, &value.0))
+            settings.iter().any(|setting| *setting.path == **path && same(&setting.value, &value.0))
         };
         let entries = self.forbidden.iter().enumerate();
         entries.filter(move |(_, entry)| entry.iter().all(has)).map(|(index, _)| index)
@@ -307,8 +307,11 @@ mod tests {
         let text = r#"(name: "a", settings: {"samples": 4, "size": (64, 48), "gpu.core_hz": 2e8, "scene": "tiny",
             "gpu.pipeline.features.edges": true}, axes: [])"#;
         let spec = SweepSpec::parse(text, "a.ron").unwrap();
-        let values: Vec<String> = spec.base(false).into_iter().map(|setting| setting.value).collect();
-        assert_eq!(values, ["200000000", "true", "4", "tiny", "(64, 48)"]);
+        let values: Vec<_> = spec.base(false).into_iter().map(|setting| setting.value).collect();
+        assert_eq!(
+            values.iter().map(|value| &**value).collect::<Vec<_>>(),
+            ["200000000", "true", "4", "tiny", "(64, 48)"]
+        );
     }
 
     #[test]

@@ -186,7 +186,7 @@ fn owners(points: &[Vec<Setting>], by_value: bool) -> Vec<(Option<&str>, Vec<usi
     for (at, setting) in
         points.iter().enumerate().flat_map(|(at, point)| point.iter().map(move |set| (at, set)))
     {
-        let key = (setting.path.as_str(), if by_value { setting.value.as_str() } else { "" });
+        let key = (&*setting.path, if by_value { &*setting.value } else { "" });
         let group = groups.get(&key).copied().or_else(|| {
             let count = values.entry(key.0).or_default();
             *count += 1;

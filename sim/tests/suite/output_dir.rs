@@ -205,6 +205,11 @@ fn two_at_once_are_refused_and_one_after_the_other_are_not() {
     let says = error.to_string();
     assert!(matches!(error, OutputError::Busy { .. }) && error.is_usage(), "{says}");
     assert!(says.contains(&format!("process {}", std::process::id())) && says.contains("--out"), "{says}");
+    #[cfg(target_os = "linux")]
+    {
+        let host = fs::read_to_string("/proc/sys/kernel/hostname").unwrap();
+        assert!(says.contains(&format!(" on {})", host.trim())), "{says}");
+    }
     first.write_file("a.csv", |_| Ok(())).unwrap();
     drop(first);
     drop(open(temp.path()).unwrap());

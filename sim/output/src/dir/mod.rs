@@ -215,7 +215,7 @@ pub enum OutputError {
     Busy {
         /// Folder as given.
         path: PathBuf,
-        /// ` (process 123)`, or empty if the number is unknown.
+        /// ` (process 123 on node7)`, or empty if it is unknown.
         process: String,
     },
     /// A file that Quintile did not write has the name of a result.
@@ -272,8 +272,13 @@ pub enum OutputError {
 }
 
 impl OutputError {
-    /// Whether this is a usage error (exit code 2) rather than a failure (exit code 1).
+    /// Whether this is a usage error (exit code 2), such as a file in place of the folder, rather than a failure (exit code 1).
     pub fn is_usage(&self) -> bool {
-        matches!(self, Self::Busy { .. } | Self::InTheWay { .. })
+        match self {
+            Self::Folder { source, .. } => {
+                matches!(source.kind(), io::ErrorKind::NotADirectory | io::ErrorKind::AlreadyExists)
+            }
+            _ => matches!(self, Self::Busy { .. } | Self::InTheWay { .. }),
+        }
     }
 }

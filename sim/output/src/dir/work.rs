@@ -129,19 +129,30 @@ fn open(path: &Path) -> io::Result<File> {
 }
 
 fn busy(root: &Path, lock: &mut File) -> OutputError {
-    let mut number = String::new();
-    let known = lock.read_to_string(&mut number).is_ok() && number.parse::<u32>().is_ok();
-    let process = if known { format!(" (process {number})") } else { String::new() };
+    let mut owner = String::new();
+    let known = lock.read_to_string(&mut owner).is_ok()
+        && owner.split(' ').next().is_some_and(|number| number.parse::<u32>().is_ok());
+    let process = if known { format!(" (process {owner})") } else { String::new() };
     OutputError::Busy { path: root.to_owned(), process }
 }
 
-/// Writes the number of this process into the lock and reads it back by name. The former owner may have
-/// removed the file between opening and locking; then another process may lock another file.
+/// This process, such as `123 on node7`: on a cluster other hosts have processes of the same number. Where the system does not
+/// name its host, the number alone.
+fn owner() -> String {
+    let number = std::process::id();
+    match fs::read_to_string("/proc/sys/kernel/hostname") {
+        Ok(host) => format!("{number} on {}", host.trim()),
+        Err(_) => number.to_string(),
+    }
+}
+
+/// Writes this process into the lock and reads it back by name. The former owner may have removed the file between opening
+/// and locking; then another process may lock another file.
 fn is_still_there(lock: &mut File, path: &Path) -> io::Result<bool> {
-    let number = std::process::id().to_string();
+    let owner = owner();
     lock.set_len(0)?;
-    lock.write_all(number.as_bytes())?;
-    Ok(fs::read_to_string(path).is_ok_and(|found| found == number))
+    lock.write_all(owner.as_bytes())?;
+    Ok(fs::read_to_string(path).is_ok_and(|found| found == owner))
 }
 
 /// Removes all but complete results, and the lock last: another process may then use the folder.

@@ -45,9 +45,9 @@ pub enum CompareError {
 }
 
 impl CompareError {
-    /// Whether this is a usage error (exit code 2) rather than a broken file (exit code 1).
+    /// Whether the request is at fault, or a file that it names (exit code 2), rather than the writing of the result (exit code 1).
     pub fn is_usage(&self) -> bool {
-        matches!(self, Self::Usage(_))
+        !matches!(self, Self::Write { .. })
     }
 
     fn broken(path: &Path, message: impl Into<String>) -> Self {

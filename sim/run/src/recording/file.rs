@@ -73,6 +73,9 @@ struct FrameHead {
 /// Version of the format.
 const FORMAT: u32 = 1;
 
+/// What a recording of any version begins with.
+const START: &[u8; 13] = b"{\"recording\":";
+
 /// Longest description of a run in bytes: of 100,000 frames with all their draws.
 const MAX_ABOUT_BYTES: u64 = 4 << 30;
 
@@ -132,6 +135,14 @@ impl RecordedRun {
             zip.finish().map(drop)
         };
         Ok(atomic::write_file(path, fill)?)
+    }
+
+    /// Whether the file at `path` is a recording, of any version of the program.
+    pub fn is_at(path: &Path) -> bool {
+        let mut start = [0; START.len()];
+        let read =
+            File::open(path).and_then(|file| GzDecoder::new(BufReader::new(file)).read_exact(&mut start));
+        read.is_ok() && start == *START
     }
 
     /// Reads the file at `path`.
@@ -341,13 +352,14 @@ mod tests {
         let path = folder.path().join("tiny.rec");
         run.write(&path).unwrap();
         let whole = std::fs::read(&path).unwrap();
+        assert!(RecordedRun::is_at(&path) && !RecordedRun::is_at(folder.path()));
         for length in [0, 1, 10, whole.len() / 2, whole.len() - 1] {
             std::fs::write(&path, &whole[..length]).unwrap();
             let text = RecordedRun::read(&path).map(drop).unwrap_err().to_string();
             assert!(text.contains("tiny.rec: ") && text.contains("record the frames again"), "{text}");
         }
         std::fs::write(&path, "(name: \"tiny\")").unwrap();
-        assert!(RecordedRun::read(&path).is_err());
+        assert!(RecordedRun::read(&path).is_err() && !RecordedRun::is_at(&path));
         assert!(matches!(RecordedRun::read(&folder.path().join("no.rec")), Err(RunError::Input { .. })));
     }
 }

@@ -77,7 +77,7 @@ pub(super) fn volume(args: &VolumeArgs) -> Result<(), Failure> {
         Some(path) => {
             let mesh = load_surface(path)?;
             let solid = Solid::new(&mesh.open, &mesh.triangles, args.tiles)
-                .map_err(|error| Failure { message: format!("{}: {error}", path.display()), code: 1 })?;
+                .map_err(|error| usage(format!("{}: {error}", path.display())))?;
             sample_volume(args, &solid, solid.bounds(), solid.volume().abs())
         }
         None => {
@@ -180,7 +180,7 @@ pub(super) fn white(args: &WhiteArgs) -> Result<(), Failure> {
         if args.dim != 2 {
             return Err(usage("--image: a picture is a density of two dimensions; leave --dim out or say 2"));
         }
-        let image = ImageDensity::load(path).map_err(|e| Failure { message: e.to_string(), code: 1 })?;
+        let image = ImageDensity::load(path).map_err(usage)?;
         return sample_white::<2>(args, &image);
     }
     match args.dim {

@@ -280,10 +280,8 @@ impl SampleArgs {
         };
         let hint =
             "--device takes a JSON file with the fields of a device, such as those that `--json` prints";
-        let text = std::fs::read_to_string(path).map_err(|error| Failure {
-            message: format!("{}: cannot read it: {error}; check the path", path.display()),
-            code: 1,
-        })?;
+        let text = std::fs::read_to_string(path)
+            .map_err(|error| wrong(format!("{}: cannot read it: {error}; check the path", path.display())))?;
         serde_json::from_str(&text).map_err(|error| wrong(format!("{}: {error}; {hint}", path.display())))
     }
 

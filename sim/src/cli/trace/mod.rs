@@ -93,24 +93,19 @@ fn run_on_files(args: &TraceArgs, terminal: &Terminal) -> Result<(), Failure> {
 
 impl From<ReadError> for Failure {
     fn from(error: ReadError) -> Self {
-        let wrong = matches!(
-            error,
-            ReadError::MissingColumn { .. } | ReadError::Format { .. } | ReadError::Conflict { .. }
-        );
-        Self { message: error.to_string(), code: if wrong { 2 } else { 1 } }
+        wrong(error.to_string())
     }
 }
 
 impl From<MarkError> for Failure {
     fn from(error: MarkError) -> Self {
-        Self { message: error.to_string(), code: 2 }
+        wrong(error.to_string())
     }
 }
 
 impl From<TimesError> for Failure {
     fn from(error: TimesError) -> Self {
-        let wrong = matches!(error, TimesError::Column { .. } | TimesError::Unit { .. });
-        Self { message: error.to_string(), code: if wrong { 2 } else { 1 } }
+        wrong(error.to_string())
     }
 }
 

@@ -13,7 +13,7 @@ use traces::pareto::{ParetoError, Point, RatedPoint, SettingColumns, frontiers, 
 use traces::table::{InputTable, TableReadError};
 
 use super::input::shown;
-use super::{PlotFormat, report, write_picture};
+use super::{PlotFormat, report, write_picture, wrong};
 use crate::cli::Failure;
 use crate::cli::args::LookArgs;
 use crate::cli::outputs::{may_hold_results, print_json};
@@ -81,18 +81,13 @@ pub enum ParetoShow {
 
 impl From<TableReadError> for Failure {
     fn from(error: TableReadError) -> Self {
-        let code = if matches!(error, TableReadError::File { .. }) { 1 } else { 2 };
-        Self { message: error.to_string(), code }
+        wrong(error.to_string())
     }
 }
 
 impl From<ParetoError> for Failure {
     fn from(error: ParetoError) -> Self {
-        match error {
-            ParetoError::Table(error) => error.into(),
-            ParetoError::Empty { .. } => Self { message: error.to_string(), code: 1 },
-            ParetoError::Unit(_) | ParetoError::Row { .. } => Self { message: error.to_string(), code: 2 },
-        }
+        wrong(error.to_string())
     }
 }
 

@@ -81,11 +81,11 @@ pub(crate) fn label<'a>(
 impl<'a> Row<'a> {
     /// A point with its numbers, and short names of settings; those in `same` distinguish neither designs nor workloads.
     pub fn new(point: &'a Point, measured: &Measured, names: &BTreeMap<&str, &str>, same: &[&str]) -> Self {
-        let others = point.settings.iter().filter(|setting| !same.contains(&setting.path.as_str()));
+        let others = point.settings.iter().filter(|setting| !same.contains(&&*setting.path));
         let (settings, conditions): (Vec<&Setting>, Vec<&Setting>) =
             others.partition(|setting| setting.is_of_design());
         let scene = measured.used.get("scene").cloned();
-        let others = conditions.iter().filter(|set| set.path != "scene");
+        let others = conditions.iter().filter(|set| &*set.path != "scene");
         let workload = scene.into_iter().chain(others.map(|set| label([*set], names)));
         Self {
             workload: workload.collect::<Vec<_>>().join(", "),
@@ -109,7 +109,7 @@ fn last_name(path: &str) -> &str {
 /// The last name of each path that varies, or the whole path where two end in the same one.
 pub(crate) fn short_names(plan: &Plan) -> BTreeMap<&str, &str> {
     let settings = plan.points.iter().flat_map(|point| &point.settings);
-    let paths: BTreeSet<&str> = settings.map(|setting| setting.path.as_str()).collect();
+    let paths: BTreeSet<&str> = settings.map(|setting| &*setting.path).collect();
     let name = |path: &&'_ str| {
         let last = last_name(path);
         paths.iter().filter(|other| last_name(other) == last).count() == 1
@@ -139,7 +139,7 @@ fn mean(runs: &[&Row<'_>]) -> Option<Design> {
     let energy = of(&|row| row.energy_j[0])?;
     let [low, high] = [1, 2].map(|end| of(&|row| row.energy_j[end]).map_or(energy.mean, |ends| ends.mean));
     let texts = |settings: &[&Setting]| {
-        settings.iter().map(|set| (set.path.clone(), set.value.clone())).collect::<BTreeMap<_, _>>()
+        settings.iter().map(|set| (set.path.to_string(), set.value.to_string())).collect::<BTreeMap<_, _>>()
     };
     let first = runs.first()?;
     let codes = runs.iter().flat_map(|run| run.warnings.split(',')).filter(|code| !code.is_empty());
