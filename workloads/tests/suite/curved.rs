@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use glam::DVec3;
+use pipeline::Lane;
 use workloads::caustics::Beam;
 use workloads::caustics::generator::{reflect, refract, transmission};
 
@@ -172,7 +173,7 @@ fn the_caustic_of_a_ball_is_that_of_the_closed_form() {
         let beams = BALL.beams();
         // Both beams of the first segment of a ring have two corners on one half-plane.
         let beam = &beams[720 + (ring as usize - 1) * 1440];
-        let found = beam.folds().into_iter().map(|t| {
+        let found = beam.folds(&Lane::default()).into_iter().map(|t| {
             let at = beam.corners(t);
             let middle = 0.5 * (at[0] + at[1]);
             [middle.x, (middle.y * middle.y + middle.z * middle.z).sqrt()]
@@ -195,7 +196,7 @@ fn transmitted_light_is_incident_less_reflected() {
 fn caustic(ring: &MirrorRing) -> Vec<(f64, DVec3)> {
     let beams = ring.beams();
     let focus = |(n, beam): (usize, &Beam)| {
-        let t = *beam.folds().first()?;
+        let t = *beam.folds(&Lane::default()).first()?;
         let at = beam.corners(t);
         let share = (n / 2) as f64 + 0.5;
         let angle = ring.angles[0] + (ring.angles[1] - ring.angles[0]) * share / f64::from(ring.segments);
