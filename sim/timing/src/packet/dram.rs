@@ -450,7 +450,8 @@ impl Bank {
     /// before it in the queue have left by then, and so have as many that joined them.
     fn joins(&self, row: u32, seen: Time, lines: u64, queue: u64) -> Option<usize> {
         let latest = self.place(seen);
-        let is_pending = |open: &OpenRow| open.row == row && seen < open.closes && lines - open.last < 2 * queue;
+        let is_pending =
+            |open: &OpenRow| open.row == row && seen < open.closes && lines - open.last < 2 * queue;
         let latest = Some(latest).filter(|&at| self.rows[at].row == row);
         latest.or_else(|| self.rows.iter().position(is_pending))
     }
