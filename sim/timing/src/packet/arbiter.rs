@@ -1,5 +1,7 @@
 //! The L2 as its ports see it, at the level `packet`: they take turns where they come at the same time.
 
+use std::collections::VecDeque;
+
 use super::calendar::{Calendar, Turn};
 use crate::clock::Time;
 use crate::demand::CLIENTS;
@@ -25,17 +27,46 @@ impl SlotPorts {
         capacity / (1 + others.count() as u64)
     }
 
-    /// Takes up to `wanted` from the other ports that have most, and leaves each at least `part`. Returns how much.
-    fn take(&mut self, port: usize, wanted: u64, part: u64) -> u64 {
-        let mut taken = 0;
-        while taken < wanted {
+    /// Takes up to `wanted` from the other ports that have most, and leaves each at least `part`. Returns how much of each.
+    fn take(&mut self, port: usize, wanted: u64, part: u64) -> [u64; CLIENTS.len()] {
+        let mut taken = [0; CLIENTS.len()];
+        let mut missing = wanted;
+        while missing > 0 {
             let others = self.work.iter_mut().enumerate().filter(|(other, _)| *other != port);
-            let Some(most) = others.map(|(_, work)| work).max().filter(|work| **work > part) else { break };
-            let gives = (*most - part).min(wanted - taken);
+            let Some((other, most)) = others.max_by_key(|(_, work)| **work).filter(|(_, work)| **work > part)
+            else {
+                break;
+            };
+            let gives = (*most - part).min(missing);
             *most -= gives;
-            taken += gives;
+            taken[other] += gives;
+            missing -= gives;
         }
         taken
+    }
+}
+
+/// Work of a port that made room for others and waits in the queue of the port, which stays in order: all that comes behind waits as long.
+#[derive(Clone, Debug, Default)]
+struct Lag {
+    /// When each part of it is done, and its work.
+    moved: VecDeque<(Time, u64)>,
+    work: u64,
+    /// Work for which the client could not go on, as the queue was full, and which it does not know yet.
+    stalled: u64,
+}
+
+impl Lag {
+    /// `work` at `at` is done at `end` only. The queue holds `room`.
+    fn add(&mut self, at: Time, end: Time, work: u64, room: u64) {
+        while let Some(&(_, work)) = self.moved.front().filter(|(done, _)| *done <= at) {
+            self.work -= work;
+            self.moved.pop_front();
+        }
+        let held = work.min(room.saturating_sub(self.work));
+        self.stalled += work - held;
+        self.work += held;
+        self.moved.push_back((end, held));
     }
 }
 
@@ -43,16 +74,26 @@ impl SlotPorts {
 ///
 /// Requests come in stream order. So those of a unit early in the pipeline come after those of a late unit at the same time, which
 /// are of packets before theirs, and a calendar alone would serve the late unit first. Here each port gets its part of a slot, and what
-/// was there before moves on to later slots. Work that is moved is small beside a packet, so its port does not wait for it.
+/// was there before moves on to later slots. It waits in the queue of its port; what does not fit there stalls the client.
 #[derive(Clone, Debug)]
 pub(super) struct Arbiter {
     calendar: Calendar,
     slots: Box<[SlotPorts]>,
+    lags: [Lag; CLIENTS.len()],
+    /// Work that the queue of a port holds.
+    room: u64,
 }
 
 impl Arbiter {
-    pub fn new(calendar: Calendar) -> Self {
-        Self { calendar, slots: vec![SlotPorts::none(0); REMEMBERED_SLOTS].into() }
+    /// Ports of a calendar, each with a queue for so much work.
+    pub fn new(calendar: Calendar, room: u64) -> Self {
+        let slots = vec![SlotPorts::none(0); REMEMBERED_SLOTS].into();
+        Self { calendar, slots, lags: Default::default(), room }
+    }
+
+    /// How long the client of a port could not go on since it was asked last.
+    pub fn stalled(&mut self, port: usize) -> Time {
+        self.calendar.time_of(std::mem::take(&mut self.lags[port].stalled))
     }
 
     /// The calendar of all ports.
@@ -99,13 +140,17 @@ impl Arbiter {
         let ports = self.ports(slot);
         let part = ports.part(port, capacity);
         let more = part.saturating_sub(ports.work[port]).min(wanted).saturating_sub(free);
-        let moved = ports.take(port, more, part);
+        let taken = ports.take(port, more, part);
+        let moved = taken.iter().sum();
         ports.work[port] += free + moved;
         if free > 0 {
             self.calendar.reserve(self.calendar.start_of(slot), free);
         }
         if moved > 0 {
-            self.calendar.reserve(self.calendar.start_of(slot + 1), moved);
+            let end = self.calendar.reserve(self.calendar.start_of(slot + 1), moved).1;
+            for (lag, work) in self.lags.iter_mut().zip(taken).filter(|(_, work)| *work > 0) {
+                lag.add(self.calendar.start_of(slot), end, work, self.room);
+            }
         }
         (free + moved, moved)
     }
@@ -124,7 +169,7 @@ mod tests {
     use super::*;
 
     fn arbiter() -> Arbiter {
-        Arbiter::new(Calendar::new(8, 1))
+        Arbiter::new(Calendar::new(8, 1), 4)
     }
 
     fn used(arbiter: &Arbiter) -> Vec<(Time, u64)> {
@@ -156,5 +201,21 @@ mod tests {
         // A third port has its part, which those with more give.
         assert_eq!(ports.reserve_as(Turn::InOrder, 2, 0, 3), (0, 16));
         assert_eq!(used(&ports).iter().map(|(_, work)| work).sum::<u64>(), 16 + 4 + 2 + 3);
+    }
+
+    #[test]
+    fn a_client_stalls_for_what_the_queue_of_its_port_cannot_hold() {
+        let mut ports = arbiter();
+        ports.reserve_as(Turn::InOrder, 3, 0, 24);
+        // Four lines wait in the queue until 28; so four more stall the client.
+        let mut stalled_by = |at| {
+            ports.reserve_as(Turn::InOrder, 1, at, 4);
+            [3, 3].map(|port| ports.stalled(port))
+        };
+        assert_eq!([0, 8].map(&mut stalled_by), [[0, 0], [4, 0]]);
+        // The queue is empty again.
+        ports.reserve_as(Turn::InOrder, 3, 48, 8);
+        ports.reserve_as(Turn::InOrder, 1, 48, 4);
+        assert_eq!(ports.stalled(3), 0);
     }
 }

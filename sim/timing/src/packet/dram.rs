@@ -446,10 +446,12 @@ impl Bank {
     /// if it has to open its row.
     ///
     /// First ready first come (Rixner et al. 2000): a line joins pending lines of its row, ahead of older requests to other
-    /// rows, until the next row opens. The exception is a queue full of other lines since the last of its row.
+    /// rows, until the next row opens. The exception is two queues full of other lines since the last of its row: those that were
+    /// before it in the queue have left by then, and so have as many that joined them.
     fn joins(&self, row: u32, seen: Time, lines: u64, queue: u64) -> Option<usize> {
         let latest = self.place(seen);
-        let is_pending = |open: &OpenRow| open.row == row && seen < open.closes && lines - open.last < queue;
+        let is_pending =
+            |open: &OpenRow| open.row == row && seen < open.closes && lines - open.last < 2 * queue;
         let latest = Some(latest).filter(|&at| self.rows[at].row == row);
         latest.or_else(|| self.rows.iter().position(is_pending))
     }
@@ -525,9 +527,9 @@ mod tests {
         bank.note(used(7, [9, 4, 30], 3), Some(1));
         let rows = |bank: &Bank| [0, 1, 2].map(|at: usize| (bank.rows[at].row, bank.rows[at].until));
         assert_eq!(rows(&bank)[..2], [(8, 20), (7, 30)]);
-        // Four lines of other rows came in between.
+        // Eight lines of other rows came in between: four from the queue, and four that joined them.
         bank.note(used(8, [18, 16, 60], 6), Some(0));
-        assert_eq!([6, 7].map(|lines| joins(&bank, 7, 9, lines)), [Some(4), None]);
+        assert_eq!([10, 11].map(|lines| joins(&bank, 7, 9, lines)), [Some(4), None]);
         // A row that comes earlier in time, and later in the stream.
         bank.note(used(9, [3, 12, 13], 7), None);
         assert_eq!((rows(&bank), bank.rows[1].closes), ([(8, 60), (9, 13), (7, 30)], 16));

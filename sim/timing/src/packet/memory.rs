@@ -109,7 +109,10 @@ impl Memory {
         Self {
             dram: Dram::new(machine, clocks),
             levels: Levels::new(machine, clocks),
-            l2: Arbiter::new(Calendar::new(Time::from(SLOT_CYCLES) * period, spec.lines_per_cycle.get())),
+            l2: Arbiter::new(
+                Calendar::new(Time::from(SLOT_CYCLES) * period, spec.lines_per_cycle.get()),
+                u64::from(spec.queue.get()) * period,
+            ),
             ports: std::array::from_fn(|_| QueueTimes::new(spec.queue.get())),
             pacers: CLIENTS.map(|unit| RequestPacer::new(machine, clocks, unit)),
             order: [0; CLIENTS.len()],
@@ -124,6 +127,7 @@ impl Memory {
     pub fn request(&mut self, port: usize, lines: &[LineAccess], turn: Turn, start: Time) -> Fetched {
         let mut fetched = Fetched { last_request: start, first: Time::MAX, last: 0, arrived: 0, moved: 0 };
         let mut pacer = self.pacers[port];
+        pacer.at += self.l2.stalled(port);
         pacer.delay_until(start);
         let mut remaining = lines;
         while let Some(head) = remaining.first() {
