@@ -143,8 +143,7 @@ fn resolve_bin(pass: &Pass<'_>, bin: &Bin, scratch: &mut Scratch) -> Vec<TilePix
 #[derive(Default)]
 pub(super) struct Scratch {
     samples: TileSamples,
-    /// Slots of a tile, grouped by triangle.
-    slots: Vec<u16>,
+    slots: SlotsByTriangle,
     /// Cells of one triangle.
     cells: ShadedCells,
 }
@@ -186,8 +185,8 @@ impl Default for KnownColours {
 }
 
 impl KnownColours {
-    /// Places, enough for a row of bins of an image: as its logarithm.
-    const BITS: u32 = 16;
+    /// Places, as a logarithm: several times the quads of a bin, yet few enough for the L2 cache of the host.
+    const BITS: u32 = 13;
 
     fn place(triangle: u32, quad: [i32; 2]) -> usize {
         let [x, y] = quad.map(|part| u64::from(part as u16));
@@ -248,20 +247,91 @@ pub(super) fn shade_tile(
     scratch: &mut Scratch,
 ) -> Vec<Vec3> {
     let mut sums = Sums::new(pass, samples);
-    scratch.slots.clear();
-    scratch.slots.extend(0..samples.len as u16);
-    // The stable sort fixes the order of sums.
-    scratch.slots.sort_by_key(|&slot| triangles[slot as usize]);
-    for group in scratch.slots.chunk_by(|&a, &b| triangles[a as usize] == triangles[b as usize]) {
-        let triangle = triangles[group[0] as usize];
+    let Scratch { slots, cells, .. } = scratch;
+    slots.sort(triangles);
+    // Their order fixes that of sums.
+    for (triangle, group) in slots.groups() {
         if triangle == DepthTile::NO_TRIANGLE {
             group.iter().for_each(|&slot| sums.add_background(slot as usize));
             continue;
         }
         let add = &mut |slot, colour| sums.add(slot, colour);
-        shade_group(pass, (triangle, group), (samples, origin), &mut scratch.cells, add);
+        shade_group(pass, (triangle, group), (samples, origin), cells, add);
     }
     sums.means()
+}
+
+/// Slots of a tile, sorted by the triangles they see.
+#[derive(Default)]
+struct SlotsByTriangle {
+    /// Triangles, in the order of first sight until they are sorted, each with the number of its slots and then their end.
+    triangles: Vec<(u32, u32, u16)>,
+    /// Place in that order of the triangle of each slot.
+    of_slot: Vec<u16>,
+    /// Where the slots of each triangle go, by place in that order.
+    next: Vec<u32>,
+    slots: Vec<u16>,
+    /// Open hash table by low bits of the triangle: its place in the order of first sight.
+    known: Vec<u16>,
+}
+
+impl SlotsByTriangle {
+    /// Stands for no place.
+    const FREE: u16 = u16::MAX;
+
+    /// Sorts the slots of samples that see these triangles: by triangle, then by slot.
+    fn sort(&mut self, triangles: &[u32]) {
+        self.triangles.clear();
+        self.of_slot.clear();
+        self.known.clear();
+        self.known.resize((2 * triangles.len()).next_power_of_two(), Self::FREE);
+        for &triangle in triangles {
+            let place = self.place(triangle);
+            self.triangles[place].1 += 1;
+            self.of_slot.push(place as u16);
+        }
+        self.triangles.sort_unstable();
+        self.next.resize(self.triangles.len(), 0);
+        let mut end = 0;
+        for (_, count, place) in &mut self.triangles {
+            self.next[usize::from(*place)] = end;
+            end += *count;
+            *count = end;
+        }
+        self.slots.resize(triangles.len(), 0);
+        for (slot, &place) in (0..).zip(&self.of_slot) {
+            let next = &mut self.next[usize::from(place)];
+            self.slots[*next as usize] = slot;
+            *next += 1;
+        }
+    }
+
+    /// Place of a triangle in the order of first sight.
+    #[inline(always)]
+    fn place(&mut self, triangle: u32) -> usize {
+        let last = self.known.len() - 1;
+        let mut at = triangle as usize & last;
+        loop {
+            let place = self.known[at];
+            match self.triangles.get(usize::from(place)) {
+                Some((known, ..)) if *known == triangle => return usize::from(place),
+                Some(_) => at = (at + 1) & last,
+                None => break,
+            }
+        }
+        let place = self.triangles.len();
+        self.known[at] = place as u16;
+        self.triangles.push((triangle, 0, place as u16));
+        place
+    }
+
+    /// Each triangle with its slots, the lowest first.
+    fn groups(&self) -> impl Iterator<Item = (u32, &[u16])> {
+        let first = std::iter::once(0).chain(self.triangles.iter().map(|&(_, end, _)| end));
+        first
+            .zip(&self.triangles)
+            .map(|(first, &(triangle, end, _))| (triangle, &self.slots[first as usize..end as usize]))
+    }
 }
 
 /// Sums of the colours of a tile, by view and pixel.
@@ -283,6 +353,7 @@ impl<'a> Sums<'a> {
         Self { pass, samples, missed: vec![0; sums.len()], sums, is_whole }
     }
 
+    #[inline(always)]
     fn add(&mut self, slot: usize, colour: Vec3) {
         self.add_to(slot, colour, 0);
     }
@@ -527,6 +598,25 @@ mod tests {
                     "{pixel_bytes} {first_byte} {pixels:x}"
                 );
             }
+        }
+    }
+
+    #[test]
+    fn slots_are_sorted_by_triangle_and_then_by_number() {
+        let mut sorted = SlotsByTriangle::default();
+        for triangles in [1, 2, 3, 40, 300_u32] {
+            // Some have equal low bits.
+            let triangle = |slot: u64| ((mix(slot) % u64::from(triangles)) as u32).wrapping_mul(128) ^ 5;
+            let of: Vec<u32> = (0..512).map(triangle).chain([DepthTile::NO_TRIANGLE; 3]).collect();
+            let mut expected: Vec<u16> = (0..of.len() as u16).collect();
+            expected.sort_by_key(|&slot| of[usize::from(slot)]);
+            sorted.sort(&of);
+            let groups: Vec<(u32, &[u16])> = sorted.groups().collect();
+            assert!(groups.is_sorted_by(|a, b| a.0 < b.0));
+            assert!(
+                groups.iter().all(|(known, group)| group.iter().all(|&slot| of[usize::from(slot)] == *known))
+            );
+            assert_eq!(groups.iter().flat_map(|(_, group)| *group).copied().collect::<Vec<_>>(), expected);
         }
     }
 

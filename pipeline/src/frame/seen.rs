@@ -103,14 +103,19 @@ impl BinShader {
                 continue;
             }
             let Self { scratch, samples, triangles, offsets } = self;
-            samples.fill(source, viewport, &pass.projection.shear, origin, side);
             let of_tile = &seen.triangles[((y * seen.side_px + x) * per_pixel) as usize..];
-            let places = samples.places().iter();
-            triangles.clear();
-            triangles.extend(places.map(|&place| of_tile[offsets[usize::from(place)] as usize]));
-            if triangles.iter().any(|&triangle| triangle != DepthTile::NO_TRIANGLE) {
-                shaded.push((origin, shade_tile(pass, triangles, (samples, origin), scratch)));
+            let rows = of_tile.chunks((seen.side_px * per_pixel) as usize).take(side as usize);
+            let is_seen = |row: &[u32]| {
+                row[..(side * per_pixel) as usize].iter().any(|&triangle| triangle != DepthTile::NO_TRIANGLE)
+            };
+            if !rows.into_iter().any(is_seen) {
+                continue;
             }
+            samples.fill(source, viewport, &pass.projection.shear, origin, side);
+            triangles.clear();
+            let places = samples.places().iter();
+            triangles.extend(places.map(|&place| of_tile[offsets[usize::from(place)] as usize]));
+            shaded.push((origin, shade_tile(pass, triangles, (samples, origin), scratch)));
         }
         shaded
     }

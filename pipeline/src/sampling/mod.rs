@@ -37,20 +37,53 @@ impl Sample {
 
 /// A sample of a block of pixels.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Timed {
-    /// The sample.
-    pub sample: Sample,
+struct Timed {
+    sample: Sample,
     /// The pixel in the block, row by row, times the samples per pixel, plus the index in the pixel.
-    pub index: u16,
+    index: u16,
     /// The pixel in the block, row by row.
-    pub pixel: u8,
+    pixel: u8,
 }
 
-impl Timed {
-    /// Sorts samples by time; the index breaks ties.
-    fn sort(samples: &mut [Self]) {
+/// Samples of a block of pixels as arrays, sorted by time; the index breaks ties.
+#[derive(Clone, Debug, Default)]
+pub struct TimedBlock {
+    /// Position in the pixel, by axis.
+    within: [Vec<f32>; 2],
+    /// Column and row of the pixel.
+    at: [Vec<f32>; 2],
+    /// Lens position, by axis.
+    lens: [Vec<f32>; 2],
+    t: Vec<f32>,
+    /// The pixel, row by row.
+    pixel: Vec<u8>,
+    /// The pixel times the samples per pixel, plus the index in the pixel.
+    index: Vec<u16>,
+}
+
+impl TimedBlock {
+    /// The `samples` of a block of `side_px` pixels squared, in the memory of another block.
+    fn fill(&mut self, samples: &mut [Timed], side_px: u32) {
+        fn refill<T>(into: &mut Vec<T>, values: impl Iterator<Item = T>) {
+            into.clear();
+            into.extend(values);
+        }
         // Times are not negative, so their bits sort as they do.
         samples.sort_unstable_by_key(|timed| (timed.sample.t.to_bits(), timed.index));
+        let all = || samples.iter().map(|timed| timed.sample);
+        let pixels = || samples.iter().map(|timed| u32::from(timed.pixel));
+        let [x, y] = &mut self.within;
+        refill(x, all().map(|s| s.x));
+        refill(y, all().map(|s| s.y));
+        let [column, row] = &mut self.at;
+        refill(column, pixels().map(|pixel| (pixel % side_px) as f32));
+        refill(row, pixels().map(|pixel| (pixel / side_px) as f32));
+        let [u, v] = &mut self.lens;
+        refill(u, all().map(|s| s.u));
+        refill(v, all().map(|s| s.v));
+        refill(&mut self.t, all().map(|s| s.t));
+        refill(&mut self.pixel, samples.iter().map(|timed| timed.pixel));
+        refill(&mut self.index, samples.iter().map(|timed| timed.index));
     }
 }
 
@@ -64,7 +97,7 @@ pub trait SampleSource: Send + Sync + std::fmt::Debug {
     fn pixel_into(&self, px: u32, py: u32, into: &mut [Sample]);
 
     /// Samples of the block of 8x8 pixels that starts at (`px`, `py`), sorted by time, if the source has them.
-    fn block_by_time(&self, _px: u32, _py: u32) -> Option<&[Timed]> {
+    fn block_by_time(&self, _px: u32, _py: u32) -> Option<&TimedBlock> {
         None
     }
 

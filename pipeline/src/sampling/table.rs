@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{LensRegion, LensRegions, LensShape, Pattern, Sample, SampleSource, Timed};
+use super::{LensRegion, LensRegions, LensShape, Pattern, Sample, SampleSource, Timed, TimedBlock};
 use crate::random::word;
 
 /// Samples of a square block of pixels. The block repeats over the image. Each copy is shifted cyclically by
@@ -13,8 +13,8 @@ pub struct SampleTable {
     seed: u64,
     samples: Vec<Sample>,
     regions: Vec<LensRegion>,
-    /// For each block of [`Self::SHIFT_PX`] pixels squared, its samples sorted by time.
-    by_time: Vec<Timed>,
+    /// The blocks of [`Self::SHIFT_PX`] pixels squared.
+    by_time: Vec<TimedBlock>,
 }
 
 /// Why a sample table is invalid.
@@ -145,21 +145,22 @@ impl SampleTable {
         Ok(table)
     }
 
-    fn sorted_blocks(&self) -> Vec<Timed> {
+    fn sorted_blocks(&self) -> Vec<TimedBlock> {
         let (blocks, side) = (Self::SIDE_PX / Self::SHIFT_PX, Self::SHIFT_PX);
-        let mut sorted = Vec::with_capacity(self.samples.len());
-        for block in 0..blocks * blocks {
+        let block = |block: u32| {
             let (x0, y0) = (block % blocks * side, block / blocks * side);
-            let first = sorted.len();
-            sorted.extend((0..side * side * self.per_pixel).map(|index| {
+            let timed = |index: u32| {
                 let (pixel, sample) = (index / self.per_pixel, index % self.per_pixel);
                 let at = (y0 + pixel / side) * Self::SIDE_PX + x0 + pixel % side;
                 let sample = self.samples[(at * self.per_pixel + sample) as usize];
                 Timed { sample, index: index as u16, pixel: pixel as u8 }
-            }));
-            Timed::sort(&mut sorted[first..]);
-        }
-        sorted
+            };
+            let mut samples: Vec<Timed> = (0..side * side * self.per_pixel).map(timed).collect();
+            let mut block = TimedBlock::default();
+            block.fill(&mut samples, side);
+            block
+        };
+        (0..blocks * blocks).map(block).collect()
     }
 
     /// Samples per pixel.
@@ -198,11 +199,10 @@ impl SampleSource for SampleTable {
         into.copy_from_slice(self.pixel(px, py));
     }
 
-    fn block_by_time(&self, px: u32, py: u32) -> Option<&[Timed]> {
+    fn block_by_time(&self, px: u32, py: u32) -> Option<&TimedBlock> {
         let (x, y) = self.block_pixel(px, py);
-        let block = y / Self::SHIFT_PX * (Self::SIDE_PX / Self::SHIFT_PX) + x / Self::SHIFT_PX;
-        let per_block = (Self::SHIFT_PX * Self::SHIFT_PX * self.per_pixel) as usize;
-        self.by_time.chunks_exact(per_block).nth(block as usize)
+        self.by_time
+            .get((y / Self::SHIFT_PX * (Self::SIDE_PX / Self::SHIFT_PX) + x / Self::SHIFT_PX) as usize)
     }
 
     fn lens_regions(&self) -> &[LensRegion] {

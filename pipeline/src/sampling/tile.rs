@@ -1,6 +1,6 @@
 //! Samples of one tile, in the layout of the sample test.
 
-use super::{Sample, SampleSource, SampleTable, Timed};
+use super::{Sample, SampleSource, SampleTable, Timed, TimedBlock};
 use crate::geometry::{Shear, Viewport};
 
 /// Samples of one tile as arrays, sorted by time so that a time interval is a contiguous range. Arrays are
@@ -34,6 +34,7 @@ pub struct TileSamples {
     order: Vec<u16>,
     /// Samples of a tile whose source has not sorted them.
     gathered: Vec<Timed>,
+    sorted: TimedBlock,
     of_pixel: Vec<Sample>,
 }
 
@@ -56,24 +57,20 @@ impl TileSamples {
         let inside = [side_px.min(viewport.width() - px), side_px.min(viewport.height() - py)];
         let is_block = [SampleTable::SHIFT_PX; 2] == inside && side_px == SampleTable::SHIFT_PX;
         if let Some(sorted) = source.block_by_time(px, py).filter(|_| is_block) {
-            return self.fill_sorted(sorted, viewport, shear, ([px, py], inside, side_px));
+            return self.fill_sorted(sorted, viewport, shear, ([px, py], inside));
         }
-        let mut gathered = std::mem::take(&mut self.gathered);
-        self.gather(source, ([px, py], inside, side_px), &mut gathered);
-        self.fill_sorted(&gathered, viewport, shear, ([px, py], inside, side_px));
-        self.gathered = gathered;
+        self.gather(source, ([px, py], inside, side_px));
+        let mut sorted = std::mem::take(&mut self.sorted);
+        sorted.fill(&mut self.gathered, side_px);
+        self.fill_sorted(&sorted, viewport, shear, ([px, py], inside));
+        self.sorted = sorted;
     }
 
-    /// Gathers the samples of a tile's pixels `inside` the image, sorted by time.
-    fn gather(
-        &mut self,
-        source: &dyn SampleSource,
-        ([px, py], inside, side_px): ([u32; 2], [u32; 2], u32),
-        gathered: &mut Vec<Timed>,
-    ) {
+    /// Gathers the samples of a tile's pixels `inside` the image.
+    fn gather(&mut self, source: &dyn SampleSource, ([px, py], inside, side_px): ([u32; 2], [u32; 2], u32)) {
         let per_pixel = source.per_pixel();
         self.of_pixel.resize(per_pixel as usize, Sample::default());
-        gathered.clear();
+        self.gathered.clear();
         for pixel in 0..side_px * side_px {
             let [column, row] = [pixel % side_px, pixel / side_px];
             if column < inside[0] && row < inside[1] {
@@ -82,50 +79,43 @@ impl TileSamples {
                     let index = (pixel * per_pixel + index) as u16;
                     Timed { sample: *sample, index, pixel: pixel as u8 }
                 };
-                gathered.extend((0..).zip(&self.of_pixel).map(timed));
+                self.gathered.extend((0..).zip(&self.of_pixel).map(timed));
             }
         }
-        Timed::sort(gathered);
     }
 
-    /// Fills the arrays with samples that are sorted by time. The first pixel of the tile, its pixels inside the image and its side
-    /// are given.
+    /// Fills the arrays with samples that are sorted by time. The first pixel of the tile and its pixels inside the image are
+    /// given.
     fn fill_sorted(
         &mut self,
-        sorted: &[Timed],
+        sorted: &TimedBlock,
         viewport: Viewport,
         shear: &Shear,
-        ([px, py], inside, side_px): ([u32; 2], [u32; 2], u32),
+        ([px, py], inside): ([u32; 2], [u32; 2]),
     ) {
-        (self.len, self.parallel) = (sorted.len(), shear.parallel);
+        (self.len, self.parallel) = (sorted.t.len(), shear.parallel);
         self.resize(self.len.next_multiple_of(Self::LANES));
-        let sides = [viewport.width(), viewport.height()];
-        let middle = [(px, inside[0], sides[0]), (py, inside[1], sides[1])].map(|(first, count, side)| {
+        let sides = [(px, inside[0], viewport.width()), (py, inside[1], viewport.height())];
+        let middle = sides.map(|(first, count, side)| {
             0.5 * (Viewport::edge(first, side) + Viewport::edge(first + count, side))
         });
-        let mut edges = [[0.0; 2]; 64];
-        for (row, edges) in (0..side_px).zip(edges.chunks_exact_mut(side_px as usize)) {
-            for (column, edge) in (0..side_px).zip(edges) {
-                *edge = [Viewport::edge(px + column, sides[0]), Viewport::edge(py + row, sides[1])];
-            }
-        }
-        self.place(sorted, &edges);
+        self.place(sorted, sides.map(|(first, _, side)| Viewport::edge(first, side)));
         self.follow(shear, middle);
     }
 
-    /// Fills the arrays that hold samples as they are, and the image positions, with the first corners of the pixels.
-    fn place(&mut self, sorted: &[Timed], edges: &[[f32; 2]; 64]) {
-        let Self { x, y, u, v, t, pixel, order, .. } = self;
-        let across = x.iter_mut().zip(y).zip(u).zip(v).zip(t).zip(pixel);
-        for (arrays, timed) in across.zip(sorted) {
-            let (((((x, y), u), v), t), pixel) = arrays;
-            let s = &timed.sample;
-            let [left, top] = edges[usize::from(timed.pixel % 64)];
-            (*x, *y) = (left + s.x, top + s.y);
-            (*u, *v, *t, *pixel) = (s.u, s.v, s.t, timed.pixel);
+    /// Fills the arrays that hold samples as they are, and the image positions, with the corner of the tile.
+    fn place(&mut self, sorted: &TimedBlock, corner: [f32; 2]) {
+        let Self { x, y, u, v, t, pixel, order, len, .. } = self;
+        for (axis, into) in [x, y].into_iter().enumerate() {
+            let places = sorted.at[axis].iter().zip(&sorted.within[axis]);
+            // The corner of a pixel is exact.
+            into.iter_mut().zip(places).for_each(|(into, (at, within))| *into = (corner[axis] + at) + within);
         }
-        order.clear();
-        order.extend(sorted.iter().map(|timed| timed.index));
+        for (into, from) in [(u, &sorted.lens[0]), (v, &sorted.lens[1]), (t, &sorted.t)] {
+            into[..*len].copy_from_slice(from);
+        }
+        pixel[..*len].copy_from_slice(&sorted.pixel);
+        order.clone_from(&sorted.index);
     }
 
     /// Fills the arrays that follow from these.

@@ -84,13 +84,13 @@ impl BinSamples {
         refill(&mut self.packets, blocks * cells * LANES, Packet::NOWHERE);
     }
 
-    /// Widens the boxes around packet number `turn` of a cell in a block by the ranges of its samples: in x and y, and in u, v and t.
+    /// Widens the boxes around packet number `turn` of a cell in a block by the ranges of its samples in x and y.
     pub fn include(
         &mut self,
         (block, cell): (usize, usize),
         turn: usize,
         cells: usize,
-        (box_of, ranges): ([[f32; 2]; 2], [[f32; 2]; 3]),
+        box_of: [[f32; 2]; 2],
     ) {
         for end in 0..2 {
             let [x, y] = box_of.map(|range| range[end]);
@@ -99,14 +99,17 @@ impl BinSamples {
             for (range, at) in self.rect.iter_mut().zip([x, y]) {
                 *range = [range[0].min(at), range[1].max(at)];
             }
-            let CellBoxes { u, v, t } = &mut self.cells;
-            [u, v, t].into_iter().zip(ranges).for_each(|(range, at)| range.include(cell, at[end]));
         }
     }
 
     /// Computes what follows from the samples.
     pub fn finish(&mut self) {
         self.cells.finish();
+        self.finish_partial();
+    }
+
+    /// The same without the boxes of the cells.
+    pub fn finish_partial(&mut self) {
         let packets = (0..).zip(&self.sample_indices);
         let partial = packets.filter(|(_, samples)| samples.contains(&Self::NO_SAMPLE));
         self.partial.clear();

@@ -85,6 +85,9 @@ impl<'a> LinearImage<'a> {
     /// # Errors
     /// [`ImageError::Encode`] when the encoder fails.
     pub fn thumbnail_png(&self, max_width: u32) -> Result<Vec<u8>, ImageError> {
+        if self.width <= max_width {
+            return self.png();
+        }
         let width = self.width.min(max_width.max(1));
         let height = (u64::from(self.height) * u64::from(width) / u64::from(self.width)).max(1) as u32;
         let small: Vec<[f32; 3]> = (0..height)
