@@ -309,43 +309,6 @@ pub struct Request<'a> {
     pub seed: u64,
 }
 
-/// Hardware for tests of jobs.
-#[cfg(test)]
-pub(crate) mod testing {
-    use pipeline::depth::DepthSpec;
-    use pipeline::{CacheSpec, ComputeSpec, Features, MemorySpec, PipelineSpec, Shading};
-
-    /// Small caches, with all features on.
-    pub(crate) fn hardware() -> PipelineSpec {
-        let lines = CacheSpec::lru(256, 4);
-        let groups =
-            ComputeSpec { warp_lanes: 32, group_lanes: 256, shared_bytes: 8192, banks: 32, atomic_units: 1 };
-        let compression = Default::default();
-        PipelineSpec {
-            tile_px: 8,
-            coarse_tile_px: 16,
-            batch_triangles: 1000,
-            vertex_reuse: 16,
-            shading: Shading::default(),
-            shading_cache: CacheSpec::lru(1024, 4),
-            memory: MemorySpec {
-                depth: lines,
-                colour: lines,
-                texture: lines,
-                bins: None,
-                l2: lines,
-                llc: None,
-                edram: None,
-                compression,
-            },
-            features: Features::ALL,
-            depth: DepthSpec::default(),
-            compute: Some(groups),
-            warp_lanes: 32,
-        }
-    }
-}
-
 /// A 128-bit hash (XXH3) of everything that a value serializes, floats by their bits.
 ///
 /// Values of one type with the same content have the same fingerprint. Values that differ in one bit have
@@ -386,6 +349,43 @@ impl Write for HashWriter {
 
     fn flush(&mut self) -> io::Result<()> {
         Ok(())
+    }
+}
+
+/// Hardware for tests of jobs.
+#[cfg(test)]
+pub(crate) mod testing {
+    use pipeline::depth::DepthSpec;
+    use pipeline::{CacheSpec, ComputeSpec, Features, MemorySpec, PipelineSpec, Shading};
+
+    /// Small caches, with all features on.
+    pub(crate) fn hardware() -> PipelineSpec {
+        let lines = CacheSpec::lru(256, 4);
+        let groups =
+            ComputeSpec { warp_lanes: 32, group_lanes: 256, shared_bytes: 8192, banks: 32, atomic_units: 1 };
+        let compression = Default::default();
+        PipelineSpec {
+            tile_px: 8,
+            coarse_tile_px: 16,
+            batch_triangles: 1000,
+            vertex_reuse: 16,
+            shading: Shading::default(),
+            shading_cache: CacheSpec::lru(1024, 4),
+            memory: MemorySpec {
+                depth: lines,
+                colour: lines,
+                texture: lines,
+                bins: None,
+                l2: lines,
+                llc: None,
+                edram: None,
+                compression,
+            },
+            features: Features::ALL,
+            depth: DepthSpec::default(),
+            compute: Some(groups),
+            warp_lanes: 32,
+        }
     }
 }
 
