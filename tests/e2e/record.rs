@@ -78,3 +78,17 @@ fn what_cannot_be_timed_is_refused() {
     check(&["record", "tiny", "--out", &unwritable], 2, &["none"], "does not exist; create it");
     refusals.done();
 }
+
+#[test]
+fn a_recording_replaces_recordings_alone() {
+    let inputs = Inputs::new();
+    assert_eq!(recorded(&inputs), recorded(&inputs));
+    let mut refusals = Refusals::default();
+    for (name, text) in [("notes.txt", "mine"), ("empty.rec", "")] {
+        let file = inputs.put(name, text);
+        let ended = quintile().call(["record", "tiny", "--frames", "0..1", "--samples", "1", "--out", &file]);
+        refusals.check(&ended, 2, &[name, "is not from `quintile record`"], "move or rename it");
+        assert_eq!(std::fs::read_to_string(&file).unwrap(), text);
+    }
+    refusals.done();
+}

@@ -123,7 +123,7 @@ impl<'a> Search<'a> {
                 area_mm2: Some(measured.area_mm2[0]),
                 ..answer
             },
-            Outcome::Error(reason) | Outcome::ScreenedOut(reason) => Answer { error: Some(reason), ..answer },
+            other => Answer { error: other.reason(), ..answer },
         })
     }
 

@@ -34,19 +34,29 @@ pub(crate) enum Outcome {
     Error(String),
     /// It did not run, as a coarser timing level gave a reason.
     ScreenedOut(String),
+    /// It did not run, as a coarser timing level cannot tell it apart from a design that did.
+    Undecided(String),
 }
 
 impl Outcome {
     /// Whether the point ran, be it to a failure.
     pub(crate) const fn ran(&self) -> bool {
-        !matches!(self, Self::ScreenedOut(_))
+        !matches!(self, Self::ScreenedOut(_) | Self::Undecided(_))
+    }
+
+    /// Why there are no numbers.
+    pub fn reason(self) -> Option<String> {
+        match self {
+            Self::Measured(_) => None,
+            Self::Error(reason) | Self::ScreenedOut(reason) | Self::Undecided(reason) => Some(reason),
+        }
     }
 
     /// The numbers of a run that did not fail.
     pub fn measured(&self) -> Option<&Measured> {
         match self {
             Self::Measured(measured) => Some(measured),
-            Self::Error(_) | Self::ScreenedOut(_) => None,
+            Self::Error(_) | Self::ScreenedOut(_) | Self::Undecided(_) => None,
         }
     }
 }
@@ -234,7 +244,7 @@ mod tests {
     fn numbers(settings: &[(&str, &str)]) -> Measured {
         match outcome(settings) {
             Outcome::Measured(measured) => *measured,
-            Outcome::Error(reason) | Outcome::ScreenedOut(reason) => panic!("{reason}"),
+            other => panic!("{:?}", other.reason()),
         }
     }
 

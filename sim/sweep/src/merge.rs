@@ -60,6 +60,7 @@ fn columns(plan: &Plan, rows: &[Outcome]) -> Vec<Column> {
     let reasons = rows.iter().map(|row| match row {
         Outcome::Error(reason) => Some(reason.clone()),
         Outcome::ScreenedOut(reason) => Some(format!("screened out: {reason}")),
+        Outcome::Undecided(reason) => Some(format!("undecided: {reason}")),
         Outcome::Measured(_) => None,
     });
     columns.push(Column { name: "error".to_owned(), values: Values::Text(reasons.collect()) });

@@ -53,7 +53,7 @@ pub struct Status {
     pub finished: usize,
     /// Points that failed.
     pub failed: usize,
-    /// Points that a coarser timing level left out.
+    /// Points that a coarser timing level left out, undecided ones included.
     pub screened_out: usize,
 }
 
@@ -245,6 +245,7 @@ fn line(point: &Point, result: &PointResult, (done, count): (usize, usize), left
         }
         Outcome::Error(reason) => format!("failed: {reason}"),
         Outcome::ScreenedOut(reason) => format!("screened out: {reason}"),
+        Outcome::Undecided(reason) => format!("undecided: {reason}"),
     };
     let left = if done < count { format!(" ({} left)", duration(left_s)) } else { String::new() };
     format!("{done}/{count} {}: {outcome}{left}", label(&point.settings, &BTreeMap::new()))

@@ -5,6 +5,9 @@
 //! turn. Designs that are kept add to the range, and where it grows more of them are kept. For designs like those that ran at
 //! both levels, a further one is outside of a range of `n` with a probability of 2 / (n + 1) (conformal prediction, Vovk, Gammerman
 //! and Shafer 2005).
+//!
+//! Designs that the coarse level `packet` cannot tell apart by its stated error do not all run: those on its own frontier do, and others are
+//! undecided against them. Where one that ran is outside of the stated error, the range decides as above.
 
 use std::collections::{BTreeMap, HashSet};
 
@@ -26,6 +29,11 @@ fn cost(measured: &Measured) -> Cost {
     [measured.busy_ms, measured.busy_mj].map(libm::log)
 }
 
+/// Stated errors of time and energy, as logarithms.
+fn stated(measured: &Measured) -> Cost {
+    [measured.cycles_error, measured.energy_error].map(libm::log1p)
+}
+
 /// A design at two levels.
 #[derive(Clone, Copy, Debug)]
 struct Design<'a> {
@@ -35,6 +43,22 @@ struct Design<'a> {
     coarse: Option<Cost>,
     /// Its cost at the fine level; `None` if it did not run there, or failed.
     fine: Option<Cost>,
+    /// Stated error at the coarse level.
+    stated: Cost,
+}
+
+impl Design<'_> {
+    /// Whether its costs at both levels differ by at most the stated error, as far as known.
+    fn is_within_stated(&self) -> bool {
+        let (Some(coarse), Some(fine)) = (self.coarse, self.fine) else { return true };
+        (0..2).all(|of| (fine[of] - coarse[of]).abs() <= self.stated[of])
+    }
+
+    /// Whether `other` is better in both by more than both stated errors.
+    fn is_far_behind(&self, other: &Self) -> bool {
+        let (Some(cost), Some(better)) = (self.coarse, other.coarse) else { return false };
+        (0..2).all(|of| better[of] + other.stated[of] + self.stated[of] < cost[of])
+    }
 }
 
 /// Range of the factors between two levels, as a difference of logarithms; `None` with fewer than two designs at both.
@@ -57,6 +81,45 @@ fn may_be_optimal(design: &Design<'_>, designs: &[Design<'_>], range: Cost) -> b
     let Some(cost) = design.coarse else { return false };
     let is_far_better = |other: &Cost| (0..2).all(|of| other[of] + range[of] < cost[of]);
     !designs.iter().filter_map(|other| other.coarse).any(|other| is_far_better(&other))
+}
+
+/// Designs on the frontier of the coarse level, one of those with equal costs: none is better there than one of them.
+fn optimal<'a>(designs: &[Design<'a>]) -> Vec<&'a Point> {
+    let known = || designs.iter().enumerate().filter_map(|(at, design)| Some((at, design.coarse?)));
+    let is_better = |(other, by): (usize, Cost), (at, cost): (usize, Cost)| {
+        (0..2).all(|of| by[of] <= cost[of]) && (by != cost || other < at)
+    };
+    let is_optimal = |&design: &(usize, Cost)| !known().any(|other| is_better(other, design));
+    known().filter(is_optimal).map(|(at, _)| designs[at].point).collect()
+}
+
+/// Designs of one workload that run at the fine level, by what the level `coarse` can tell apart.
+fn chosen<'a>(coarse: Level, designs: &[Design<'a>]) -> Vec<&'a Point> {
+    match coarse {
+        Level::Packet if designs.iter().all(Design::is_within_stated) => optimal(designs),
+        _ => kept(designs, CALIBRATED),
+    }
+}
+
+/// Why a design does not run at the fine level.
+fn reason(coarse: Level, design: &Design<'_>, designs: &[Design<'_>]) -> Outcome {
+    let name = coarse.name();
+    let by_stated = coarse == Level::Packet && designs.iter().all(Design::is_within_stated);
+    let text = match design.coarse {
+        None => format!("it did not run at `{name}`"),
+        Some(_) if !by_stated => {
+            format!("at `{name}` another design is better in time and energy by more than levels differ")
+        }
+        Some(_) if designs.iter().any(|other| design.is_far_behind(other)) => {
+            format!("at `{name}` another design is better in time and energy by more than the stated errors")
+        }
+        Some(_) => {
+            let text =
+                format!("at `{name}` no better than a design that ran, by less than the stated errors");
+            return Outcome::Undecided(text);
+        }
+    };
+    Outcome::ScreenedOut(text)
 }
 
 /// Order in which designs are drawn: as random as a hash, and the same for every build of the program, as ids are not.
@@ -101,30 +164,29 @@ pub(crate) fn screened<'a>(plan: &'a Plan, folder: &Folder, fine: usize) -> Resu
     let (mut workloads, mut ran) = (BTreeMap::<String, Vec<Design<'a>>>::new(), HashSet::new());
     for (coarse, point) in plan.of_level(fine - 1).iter().zip(plan.of_level(fine)) {
         let outcome = |point: &Point| folder.result(point).map(|result| result.map(|result| result.outcome));
-        let of = |outcome: Option<&Outcome>| outcome.and_then(Outcome::measured).map(cost);
         let (coarse, fine) = (outcome(coarse)?, outcome(point)?);
         if fine.as_ref().is_some_and(Outcome::ran) {
             ran.insert(point.id.as_str());
         }
-        let design = Design { point, coarse: of(coarse.as_ref()), fine: of(fine.as_ref()) };
+        let [coarse, fine] = [&coarse, &fine].map(|outcome| outcome.as_ref().and_then(Outcome::measured));
+        let stated = coarse.map_or([0.0; 2], stated);
+        let design = Design { point, coarse: coarse.map(cost), fine: fine.map(cost), stated };
         workloads.entry(workload(point)).or_default().push(design);
     }
-    let name = plan.screen[fine - 1].name();
+    let level = plan.screen[fine - 1];
     let mut all = Screened { kept: 0, pending: Vec::new(), dropped: Vec::new(), ranges: BTreeMap::new() };
     for (workload, designs) in workloads {
-        let kept = kept(&designs, CALIBRATED);
-        let ids: HashSet<&str> = kept.iter().map(|point| point.id.as_str()).collect();
-        let dropped = designs.iter().filter(|design| !ids.contains(design.point.id.as_str()));
-        let reason = |design: &Design<'_>| match design.coarse {
-            Some(_) => {
-                format!("at `{name}` another design is better in time and energy by more than levels differ")
-            }
-            None => format!("it did not run at `{name}`"),
+        let chosen = chosen(level, &designs);
+        let ids: HashSet<&str> = chosen.iter().map(|point| point.id.as_str()).collect();
+        let runs = |design: &&Design<'_>| {
+            let id = design.point.id.as_str();
+            ids.contains(id) || ran.contains(id)
         };
-        all.dropped.extend(dropped.map(|design| (design.point, Outcome::ScreenedOut(reason(design)))));
+        let (runs, dropped): (Vec<&Design<'_>>, Vec<&Design<'_>>) = designs.iter().partition(runs);
+        all.dropped.extend(dropped.into_iter().map(|design| (design.point, reason(level, design, &designs))));
         all.ranges.extend(range(&designs).map(|range| (workload, range)));
-        all.kept += kept.len();
-        all.pending.extend(kept.into_iter().filter(|point| !ran.contains(point.id.as_str())));
+        all.kept += runs.len();
+        all.pending.extend(chosen.into_iter().filter(|point| !ran.contains(point.id.as_str())));
     }
     Ok(all)
 }
@@ -140,6 +202,11 @@ pub(crate) fn note(coarse: Level, fine: Level, screened: &Screened<'_>) -> Strin
     let most = |of: usize| screened.ranges.values().map(|range| range[of]).fold(0.0, f64::max);
     let [time, energy] = [0, 1].map(|of| 100.0 * (libm::exp(most(of)) - 1.0));
     let (kept, all) = (screened.kept, screened.kept + screened.dropped.len());
+    let is_undecided = |(_, outcome): &&(&Point, Outcome)| matches!(outcome, Outcome::Undecided(_));
+    let undecided = match screened.dropped.iter().filter(is_undecided).count() {
+        0 => String::new(),
+        count => format!("; {count} that it cannot tell apart from them are undecided"),
+    };
     let nothing = match screened.dropped.is_empty() {
         true => format!(
             ". Screening saved nothing: {CALIBRATED} designs of a workload always run, and no other is far enough from the frontier; leave \
@@ -149,7 +216,7 @@ pub(crate) fn note(coarse: Level, fine: Level, screened: &Screened<'_>) -> Strin
     };
     format!(
         "{kept} of {all} designs ran at {}: it differs from {} by a factor that varies by {time:.2} % in time and {energy:.2} % in \
-         energy{nothing}",
+         energy{undecided}{nothing}",
         fine.name(),
         coarse.name()
     )
@@ -197,6 +264,7 @@ mod tests {
                 point,
                 coarse: Some(costs[at].0),
                 fine: ran[at].then_some(costs[at].1),
+                stated: [0.0; 2],
             };
             let designs: Vec<Design<'a>> = points.iter().enumerate().map(design).collect();
             let kept: Vec<&str> = kept(&designs, calibrated).iter().map(|point| point.id.as_str()).collect();
@@ -265,34 +333,47 @@ mod tests {
         (last.iter().filter_map(of).collect(), status, host_s)
     }
 
-    /// Share of the true frontier that screening has found, and by how much a frontier design at worst lost.
-    fn recall(screened: &HashMap<String, Cost>, truth: &HashMap<String, Cost>) -> (f64, f64) {
+    /// Share of the true frontier that screening has found within the stated error, and by how much a frontier design at worst lost: how far the
+    /// nearest design found is behind it, in the worse of time and energy.
+    fn recall(found: &[Cost], truth: &[Cost], stated: Cost) -> (f64, f64) {
         let is_better = |a: &Cost, b: &Cost| (0..2).all(|of| a[of] <= b[of]) && a != b;
-        let optimal: Vec<(&String, &Cost)> =
-            truth.iter().filter(|(_, cost)| !truth.values().any(|other| is_better(other, cost))).collect();
-        let found = optimal.iter().filter(|(name, _)| screened.contains_key(*name)).count();
-        // How far the nearest design found is behind one of the frontier, in the worse of time and energy.
-        let behind = |cost: &Cost| {
-            let lost = |other: &Cost| (0..2).map(|of| other[of] - cost[of]).fold(f64::MIN, f64::max);
-            screened.values().map(lost).fold(f64::INFINITY, f64::min).max(0.0)
+        let optimal = || truth.iter().filter(|cost| !truth.iter().any(|other| is_better(other, cost)));
+        let behind = |cost: &Cost, other: &Cost| [0, 1].map(|of| other[of] - cost[of]);
+        let is_found = |cost: &&Cost| {
+            let is_near = |other: &Cost| (0..2).all(|of| behind(cost, other)[of] <= stated[of]);
+            found.iter().any(is_near)
         };
-        let regret = optimal.iter().map(|(_, cost)| behind(cost)).fold(0.0, f64::max);
-        (found as f64 / optimal.len() as f64, libm::exp(regret) - 1.0)
+        let regret = |cost: &Cost| {
+            let lost = found.iter().map(|other| behind(cost, other).into_iter().fold(0.0, f64::max));
+            lost.fold(f64::INFINITY, f64::min)
+        };
+        let share = optimal().filter(is_found).count() as f64 / optimal().count() as f64;
+        (share, libm::exp(optimal().map(regret).fold(0.0, f64::max)) - 1.0)
+    }
+
+    /// Stated errors of `packet`, as logarithms, of a run of `tiny`.
+    fn stated_at_packet() -> Cost {
+        let settings = [("scene", "tiny"), ("frames", "0..1"), ("samples", "1")];
+        let settings = settings.map(|(path, value)| crate::Setting::new(path, value));
+        let outcome = crate::execute::execute("a", &settings).outcome;
+        outcome.measured().map(stated).unwrap()
     }
 
     #[test]
     fn screening_finds_the_frontier_of_all_designs_with_fewer_runs() {
         let (truth, ..) = costs("tiny", "(32, 24)", "stepped");
         let (screened, status, _) = costs("tiny", "(32, 24)", "screen: [bound, packet, stepped],");
-        let (recall, regret) = recall(&screened, &truth);
+        let [found, all] = [&screened, &truth].map(|costs| costs.values().copied().collect::<Vec<_>>());
+        let stated = stated_at_packet();
+        let (recall, regret) = recall(&found, &all, stated);
         println!(
             "recall {recall:.3}, regret {regret:.4}, {} of {} at the last level",
-            screened.len(),
-            truth.len()
+            found.len(),
+            all.len()
         );
-        assert_eq!((status.finished, status.failed), (3 * truth.len(), 0));
-        assert!(status.screened_out > 0 && screened.len() < truth.len() / 2);
-        assert!(recall == 1.0 && regret == 0.0);
+        assert_eq!((status.finished, status.failed), (3 * all.len(), 0));
+        assert!(status.screened_out > 0 && found.len() * 20 < all.len());
+        assert!(recall == 1.0 && regret <= libm::expm1(stated[0].max(stated[1])));
     }
 
     #[test]
@@ -301,11 +382,12 @@ mod tests {
         for (scene, size) in [("default", "(320, 180)"), ("tiny", "(64, 48)")] {
             let (truth, _, all_s) = costs(scene, size, "stepped");
             let (screened, _, screened_s) = costs(scene, size, "screen: [bound, packet, stepped],");
-            let (recall, regret) = recall(&screened, &truth);
+            let [found, all] = [&screened, &truth].map(|costs| costs.values().copied().collect::<Vec<_>>());
+            let (recall, regret) = recall(&found, &all, stated_at_packet());
             println!(
                 "{scene}: {} designs, recall {recall:.3}, regret {regret:.4}, {} at stepped, {:.1} % of the time",
-                truth.len(),
-                screened.len(),
+                all.len(),
+                found.len(),
                 100.0 * screened_s / all_s
             );
         }
@@ -332,28 +414,40 @@ mod tests {
         let frames = [("default", "(320, 180)"), ("tiny", "(64, 48)"), ("tiny", "(32, 24)")];
         for (scene, size) in frames {
             let (points, costs) = at_all_levels(scene, size);
-            let pairs =
-                |from: usize| costs.iter().map(|cost| (cost[from], cost[from + 1])).collect::<Vec<_>>();
-            let truth = frontier(&points, &pairs(1));
+            let pairs: Vec<(Cost, Cost)> = costs.iter().map(|cost| (cost[0], cost[1])).collect();
+            let truth: Vec<Cost> = costs.iter().map(|cost| cost[2]).collect();
+            let stated = stated_at_packet();
             for designs in [8, 19, 39] {
-                let (mut whole, mut last) = (0, 0);
+                let (mut whole, mut worst, mut runs) = (0, 0.0_f64, [0; 2]);
                 for seed in 0..200 {
                     // Another setting is another draw.
                     let mut points = points.clone();
                     let set = crate::Setting::new("seed", seed.to_string());
                     points.iter_mut().for_each(|point| point.settings.push(set.clone()));
-                    let survivors = run_by(&points, &pairs(0), designs);
-                    let chosen = |at: &usize| survivors.contains(&points[*at].id.as_str());
-                    let places: Vec<usize> = (0..points.len()).filter(chosen).collect();
-                    let left: Vec<Point> = places.iter().map(|&at| points[at].clone()).collect();
-                    let of_left: Vec<(Cost, Cost)> = places.iter().map(|&at| pairs(1)[at]).collect();
-                    let found = run_by(&left, &of_left, designs);
-                    whole += u32::from(truth.iter().all(|id| found.contains(id)));
-                    last += found.len();
+                    let survivors = run_by(&points, &pairs, designs);
+                    let design = |at: usize| {
+                        let ran = survivors.contains(&points[at].id.as_str());
+                        let [_, coarse, fine] = costs[at];
+                        Design { point: &points[at], coarse: ran.then_some(coarse), fine: Some(fine), stated }
+                    };
+                    let all: Vec<Design<'_>> = (0..points.len()).map(design).collect();
+                    let found = optimal(&all);
+                    let is_found =
+                        |design: &&Design<'_>| found.iter().any(|point| point.id == design.point.id);
+                    let found: Vec<&Design<'_>> = all.iter().filter(is_found).collect();
+                    assert!(found.iter().all(|design| design.is_within_stated()), "{scene} {size}");
+                    let fine: Vec<Cost> = found.iter().filter_map(|design| design.fine).collect();
+                    let (recall, regret) = recall(&fine, &truth, stated);
+                    whole += u32::from(recall == 1.0);
+                    worst = worst.max(regret);
+                    runs = [runs[0] + survivors.len(), runs[1] + found.len()];
                 }
                 println!(
-                    "{scene} {size}, {designs} designs: whole frontier in {whole} of 200, {} at stepped",
-                    last / 200
+                    "{scene} {size}, {designs} designs: all of the frontier within the stated error in {whole} of 200, regret up to \
+                     {:.2} %, {} at packet, {} at stepped",
+                    100.0 * worst,
+                    runs[0] / 200,
+                    runs[1] / 200
                 );
             }
         }
@@ -368,6 +462,29 @@ mod tests {
             assert!(frontier.iter().all(|id| kept.contains(id)), "{range}: {frontier:?}, {kept:?}");
             assert!(kept.len() < 120, "{range}: {} kept", kept.len());
         }
+    }
+
+    #[test]
+    fn designs_that_packet_cannot_tell_apart_are_undecided() {
+        let points = points(5);
+        let costs = [[0.0, 0.1], [0.1, 0.0], [0.1, 0.0], [0.11, 0.01], [0.9, 0.9]];
+        let of = |stated, fine: [Option<Cost>; 5]| {
+            let design = |((point, coarse), fine)| Design { point, coarse: Some(coarse), fine, stated };
+            points.iter().zip(costs).zip(fine).map(design).collect::<Vec<_>>()
+        };
+        let ids =
+            |chosen: Vec<&Point>| chosen.iter().map(|point| point.id.as_str()).collect::<Vec<_>>().concat();
+        // One of two with equal costs runs.
+        let designs = of([0.05; 2], [Some([0.02, 0.1]), None, None, None, None]);
+        assert_eq!(ids(chosen(Level::Packet, &designs)), "000001");
+        assert!(matches!(reason(Level::Packet, &designs[2], &designs), Outcome::Undecided(_)));
+        assert!(matches!(reason(Level::Packet, &designs[3], &designs), Outcome::Undecided(_)));
+        assert!(matches!(reason(Level::Packet, &designs[4], &designs), Outcome::ScreenedOut(_)));
+        // One that ran is outside of the stated error: the range decides, from designs that run at both levels.
+        let designs = of([0.05; 2], [Some([0.06, 0.1]), None, None, None, None]);
+        assert_eq!(chosen(Level::Packet, &designs).len(), 5);
+        // A coarser level tells too little.
+        assert_eq!(chosen(Level::Bound, &of([0.5; 2], [None; 5])).len(), 5);
     }
 
     #[test]
@@ -397,7 +514,7 @@ mod tests {
     #[test]
     fn designs_that_failed_before_are_not_kept() {
         let points = points(3);
-        let design = |point| Design { point, coarse: None, fine: None };
+        let design = |point| Design { point, coarse: None, fine: None, stated: [0.0; 2] };
         assert!(kept(&points.iter().map(design).collect::<Vec<_>>(), CALIBRATED).is_empty());
     }
 }

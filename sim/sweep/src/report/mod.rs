@@ -75,21 +75,23 @@ pub struct Report {
     pub shares: Vec<Share>,
     /// Settings that vary and have no effects, or effects of groups of their values alone.
     pub no_effects: Vec<NoEffect>,
-    /// Points that failed or were screened out.
+    /// Points that failed, were screened out or are undecided.
     pub failed: Vec<Failure>,
-    /// Points that are left out; the sum of the next three.
+    /// Points that are left out; the sum of the next four.
     pub left_out: usize,
     /// Of these, points that failed.
     pub left_out_failed: usize,
     /// Points that a coarser timing level left out.
     pub left_out_screened: usize,
+    /// Points that a coarser timing level cannot tell apart from those that ran.
+    pub left_out_undecided: usize,
     /// Points that are not finished.
     pub left_out_unfinished: usize,
     /// Constraints and forbidden entries of the sweep file that leave out no point.
     pub idle: Vec<String>,
 }
 
-/// A point that failed or was screened out.
+/// A point that failed, was screened out or is undecided.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Failure {
     /// Its settings.
@@ -98,6 +100,8 @@ pub struct Failure {
     pub reason: String,
     /// Whether it did not run, as a coarser timing level left it out.
     pub screened_out: bool,
+    /// Whether it did not run, as a coarser timing level cannot tell it apart from a point that did.
+    pub undecided: bool,
 }
 
 /// Name of the effects over all workloads.
@@ -114,17 +118,17 @@ impl Report {
         // With screening, designs are compared at the last level.
         let same = if plan.screen.is_empty() { &["seed"][..] } else { &["seed", "timing"] };
         let points = plan.last_level();
-        let failure = |point: &Point, reason, screened_out| Failure {
+        let failure = |point: &Point, outcome: Outcome| Failure {
             settings: label(&point.settings, &names),
-            reason,
-            screened_out,
+            screened_out: matches!(outcome, Outcome::ScreenedOut(_)),
+            undecided: matches!(outcome, Outcome::Undecided(_)),
+            reason: outcome.reason().unwrap_or_default(),
         };
         let read = |point| {
             let outcome = folder.result(point)?.map(|result| result.outcome);
             Ok(match outcome {
                 Some(Outcome::Measured(measured)) => Some(Ok(Row::new(point, &measured, &names, same))),
-                Some(Outcome::Error(reason)) => Some(Err(failure(point, reason, false))),
-                Some(Outcome::ScreenedOut(reason)) => Some(Err(failure(point, reason, true))),
+                Some(outcome) => Some(Err(failure(point, outcome))),
                 None => None,
             })
         };
@@ -137,13 +141,16 @@ impl Report {
             }
         }
         let left_out = points.len() - rows.len();
-        let left_out_screened = failed.iter().filter(|failure| failure.screened_out).count();
+        let count = |is: fn(&Failure) -> bool| failed.iter().filter(|failure| is(failure)).count();
+        let left_out_screened = count(|failure| failure.screened_out);
+        let left_out_undecided = count(|failure| failure.undecided);
         let of_rows = Self::of_rows(rows, options);
         Ok(Self {
             sweep: plan.name,
             left_out,
-            left_out_failed: failed.len() - left_out_screened,
+            left_out_failed: failed.len() - left_out_screened - left_out_undecided,
             left_out_screened,
+            left_out_undecided,
             left_out_unfinished: left_out - failed.len(),
             idle: plan.idle,
             failed,
@@ -176,6 +183,7 @@ impl Report {
             (self.left_out_unfinished, "not finished (`quintile sweep run` runs them)"),
             (self.left_out_failed, "failed"),
             (self.left_out_screened, "screened out at a coarser timing level"),
+            (self.left_out_undecided, "undecided at a coarser timing level against those that ran"),
         ];
         let causes: Vec<String> = causes
             .iter()
