@@ -12,6 +12,7 @@ mod idle_gap;
 mod marks;
 mod matched;
 mod periodicity;
+mod segments;
 pub mod profile;
 mod register;
 mod spans;
@@ -218,12 +219,14 @@ pub enum FinderMethod {
     /// The same, but the sum of squares also where searches from the frames found agree more by it than by tracking. How far
     /// these searches agree is the confidence.
     Consensus,
+    /// Segments.
+    Segments,
 }
 
 impl FinderMethod {
     /// All of them, in order.
-    pub const ALL: [Self; 5] =
-        [Self::SumOfSquares, Self::Normalized, Self::Tracking, Self::Auto, Self::Consensus];
+    pub const ALL: [Self; 6] =
+        [Self::SumOfSquares, Self::Normalized, Self::Tracking, Self::Auto, Self::Consensus, Self::Segments];
 
     /// The name on the command line.
     pub fn name(self) -> &'static str {
@@ -233,6 +236,7 @@ impl FinderMethod {
             Self::Tracking => "tracking",
             Self::Auto => "auto",
             Self::Consensus => "consensus",
+            Self::Segments => "segments",
         }
     }
 }
