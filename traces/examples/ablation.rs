@@ -56,9 +56,7 @@ fn recorded(name: &str, seed: u64) -> Result<(Scene, Trace), Box<dyn Error>> {
     let scenario = SCENARIOS.iter().find(|scenario| scenario.name == name);
     let (scene, recording) = match (kind, scenario) {
         (Some(kind), _) => (kind.scene(FRAMES, seed)?, kind.recording(seed)),
-        (None, Some(scenario)) => {
-            (scenario.scene(FRAMES, seed)?, Recording { seed, ..Recording::default() })
-        }
+        (None, Some(scenario)) => (scenario.scene(FRAMES, seed)?, Recording { seed, ..Recording::default() }),
         (None, None) => return Err(format!("no scene {name}").into()),
     };
     let trace = scene.record(&recording)?;

@@ -203,8 +203,12 @@ fn concluded(
     }
     let last = power.len().saturating_sub(placement.samples);
     let offset = |start: &f64| (libm::round(start - anchor).max(0.0) as usize).min(last);
-    let offsets: Vec<usize> =
-        found.starts.iter().zip(&marked).map(|(start, mark)| mark.map_or(offset(start), |mark| mark.first)).collect();
+    let offsets: Vec<usize> = found
+        .starts
+        .iter()
+        .zip(&marked)
+        .map(|(start, mark)| mark.map_or(offset(start), |mark| mark.first))
+        .collect();
     let fixed: Vec<bool> = marked.iter().map(Option::is_some).collect();
     let positions = register(power, &offsets, &fixed, libm::round(anchor) as usize, placement.samples);
     let starts = positions.iter().zip(&marked).map(|(position, mark)| FrameStart {

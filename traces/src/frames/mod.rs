@@ -12,9 +12,9 @@ mod idle_gap;
 mod marks;
 mod matched;
 mod periodicity;
-mod segments;
 pub mod profile;
 mod register;
+mod segments;
 mod spans;
 mod split_frames;
 mod start_refinement;
@@ -219,7 +219,8 @@ pub enum FinderMethod {
     /// The same, but the sum of squares also where searches from the frames found agree more by it than by tracking. How far
     /// these searches agree is the confidence.
     Consensus,
-    /// Segments.
+    /// Segmentation of the whole trace by one probabilistic model, or the result of another method where a criterion without truth
+    /// prefers that.
     Segments,
 }
 
@@ -280,7 +281,8 @@ mod tests {
         }
         assert_eq!(
             "dtw".parse::<FinderMethod>(),
-            Err("no method dtw: choose one of squares, normalized, tracking, auto, consensus".to_owned())
+            Err("no method dtw: choose one of squares, normalized, tracking, auto, consensus, segments"
+                .to_owned())
         );
     }
 }

@@ -78,7 +78,8 @@ impl Grid {
 
     /// A part of the window of the first mark; shares of it before and after the mark.
     pub fn marked(&self, shares: [f64; 2]) -> Appearance {
-        let [before, after] = [0, 1].map(|side| libm::round(shares[side] * self.window[side] as f64) as usize);
+        let [before, after] =
+            [0, 1].map(|side| libm::round(shares[side] * self.window[side] as f64) as usize);
         let mark = self.marks[0];
         let before = before.min(mark);
         let mean_w = self.power_w[mark - before..self.power_w.len().min(mark + after)].to_vec();
@@ -118,9 +119,10 @@ impl Grid {
         let own: f64 = linear.iter().zip(mean_w).map(|(linear, mean)| linear * mean).sum();
         let squares = Correlator::new(weight).correlate(&self.squares);
         let products = Correlator::new(&linear).correlate(&self.power_w);
-        let near = squares.iter().zip(&products).map(|(square, product)| {
-            -libm::log1p((square - 2.0 * product + own).max(0.0) / usual)
-        });
+        let near = squares
+            .iter()
+            .zip(&products)
+            .map(|(square, product)| -libm::log1p((square - 2.0 * product + own).max(0.0) / usual));
         let near: Vec<f64> = near.collect();
         let least = near.iter().copied().fold(0.0, f64::min);
         let mut all = vec![least; self.power_w.len()];
