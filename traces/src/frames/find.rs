@@ -156,7 +156,7 @@ pub(super) fn find_auto(trace: &Trace, marks: &Marks, options: &Options) -> Resu
 /// Traces of more samples are not segmented.
 const MAX_SEGMENTED_SAMPLES: usize = 1 << 20;
 
-/// [`FinderMethod::Segments`]: segmentation with the results of the other methods as proposals.
+/// [`FinderMethod::Segments`]: segmentation up to the end mark, with the results of the other methods as proposals.
 fn find_segments(trace: &Trace, marks: &Marks, options: &Options) -> Result<Found, MarkError> {
     let auto = find_auto(trace, marks, &Options { method: FinderMethod::Auto, ..*options })?;
     let placement = marks.place(trace)?;
@@ -169,7 +169,8 @@ fn find_segments(trace: &Trace, marks: &Marks, options: &Options) -> Result<Foun
     };
     let power: Vec<f64> = trace.powers_w().collect();
     let places = |found: &Found| found.starts.iter().map(|start| trace.position(start.time_s)).collect();
-    let found = segment(&power, &placement, &[places(&auto), places(&other)]);
+    let end = (trace.position(marks.end_s).max(0.0) as usize).min(power.len());
+    let found = segment(&power[..end], &placement, &[places(&auto), places(&other)]);
     let confidence = |found: Found, segments: Segmentation| {
         let last = segments.start_confidence.last().copied();
         let frames = segments.frame_confidence.into_iter().chain(last).collect();

@@ -327,13 +327,15 @@ mod tests {
         let scene = witness.scene(80, 3).unwrap();
         let trace = scene.record(&witness.recording(3)).unwrap();
         let truth_s: Vec<f64> = scene.truth.iter().map(|frame| frame.start_s).collect();
-        let marks = Marks::one(truth_s[32], default_window(0.0, trace.rate_hz()), trace.end_s());
+        // Frames from the end mark on are not searched for.
+        let (end_s, truth_s) = (truth_s[70], &truth_s[..70]);
+        let marks = Marks::one(truth_s[32], default_window(0.0, trace.rate_hz()), end_s);
         let options = Options { method: FinderMethod::Segments, without: None };
         let found = find_with(&trace, &marks, &options).unwrap();
         let found_s: Vec<f64> = found.starts.iter().map(|start| start.time_s).collect();
-        let paired = pairs(&found_s, &truth_s, TOLERANCE_S).len();
+        let paired = pairs(&found_s, truth_s, TOLERANCE_S).len();
         assert!(2 * paired >= 19 * (found_s.len() + truth_s.len()) / 20, "{paired} of {}", found_s.len());
         assert_eq!(found.starts.iter().filter(|start| start.marked).count(), 1);
-        assert!(found.frames.iter().filter(|frame| frame.confidence > 0.5).count() > 60);
+        assert!(found.frames.iter().filter(|frame| frame.confidence > 0.5).count() > 50);
     }
 }
