@@ -60,7 +60,7 @@ const VIEWS: [[f64; 2]; 5] = [[1.0, 1.0], [1.0, 0.25], [0.5, 0.125], [0.2, 0.25]
 /// Shares of the candidates that are no starts, of the first sets.
 const OTHERS: [f64; 12] = [0.5, 0.6, 0.7, 0.75, 0.8, 0.84, 0.87, 0.9, 0.92, 0.94, 0.96, 0.98];
 /// Rounds of learning from what was found.
-const ROUNDS: usize = 2;
+const ROUNDS: usize = 3;
 /// Chains between two of them.
 const CHAINS: usize = 2;
 /// Greatest evidence of a candidate's likeness, and that of a mark, nats.
