@@ -5,6 +5,7 @@ use super::consensus::more_agreed;
 use super::marks::{MarkError, Marks, Placed, Placement, default_window, flat_mark_of};
 use super::matched::{find_matched, noise_variance};
 use super::register::register;
+use super::segments::{Segmentation, segment};
 use super::split_frames::SplitFrames;
 use super::start_refinement::refine_starts;
 use super::threshold::{Rule, Threshold};
@@ -77,6 +78,7 @@ pub fn find_with(trace: &Trace, marks: &Marks, options: &Options) -> Result<Foun
         FinderMethod::SumOfSquares | FinderMethod::Normalized => find_matched(trace, marks, options.method),
         FinderMethod::Tracking => find_tracked(trace, marks, options.without),
         FinderMethod::Auto | FinderMethod::Consensus => find_auto(trace, marks, options),
+        FinderMethod::Segments => find_segments(trace, marks, options),
     }
 }
 
@@ -149,6 +151,77 @@ pub(super) fn find_auto(trace: &Trace, marks: &Marks, options: &Options) -> Resu
     let search =
         |part: &Trace, marks: &Marks, method| find_with(part, marks, &Options { method, without }).ok();
     Ok(more_agreed(trace, marks, [tracked, squares], search))
+}
+
+/// Traces of more samples are not segmented.
+const MAX_SEGMENTED_SAMPLES: usize = 1 << 20;
+
+/// [`FinderMethod::Segments`]: segmentation up to the end mark, with the results of the other methods as proposals.
+fn find_segments(trace: &Trace, marks: &Marks, options: &Options) -> Result<Found, MarkError> {
+    let auto = find_auto(trace, marks, &Options { method: FinderMethod::Auto, ..*options })?;
+    let placement = marks.place(trace)?;
+    if placement.samples < COARSE_WINDOW_SAMPLES || trace.samples() > MAX_SEGMENTED_SAMPLES {
+        return Ok(auto);
+    }
+    let other = match auto.method {
+        FinderMethod::Tracking => find_matched(trace, marks, FinderMethod::SumOfSquares)?,
+        _ => find_tracked(trace, marks, options.without)?,
+    };
+    let power: Vec<f64> = trace.powers_w().collect();
+    let places = |found: &Found| found.starts.iter().map(|start| trace.position(start.time_s)).collect();
+    let end = (trace.position(marks.end_s).max(0.0) as usize).min(power.len());
+    let found = segment(&power[..end], &placement, &[places(&auto), places(&other)]);
+    let confidence = |found: Found, segments: Segmentation| {
+        let last = segments.start_confidence.last().copied();
+        let frames = segments.frame_confidence.into_iter().chain(last).collect();
+        found.with_confidence(segments.start_confidence, frames)
+    };
+    Ok(match found.proposal {
+        Some(0) => confidence(auto, found),
+        Some(_) => confidence(other, found),
+        None => confidence(concluded(trace, &power, marks, &placement, &found), found),
+    })
+}
+
+/// Frames from the starts of a segmentation, each aligned with its neighbours.
+fn concluded(
+    trace: &Trace,
+    power: &[f64],
+    marks: &Marks,
+    placement: &Placement,
+    found: &Segmentation,
+) -> Found {
+    let anchor = placement.marks.first().map_or(0.0, |mark| mark.anchor);
+    let nearest = |mark: &Placed| {
+        let off = |index: &usize| (found.starts[*index] - mark.first as f64 - mark.anchor).abs();
+        (0..found.starts.len()).min_by(|a, b| off(a).total_cmp(&off(b)))
+    };
+    let mut marked: Vec<Option<&Placed>> = vec![None; found.starts.len()];
+    for mark in &placement.marks {
+        if let Some(index) = nearest(mark) {
+            marked[index] = Some(mark);
+        }
+    }
+    let last = power.len().saturating_sub(placement.samples);
+    let offset = |start: &f64| (libm::round(start - anchor).max(0.0) as usize).min(last);
+    let offsets: Vec<usize> = found
+        .starts
+        .iter()
+        .zip(&marked)
+        .map(|(start, mark)| mark.map_or(offset(start), |mark| mark.first))
+        .collect();
+    let fixed: Vec<bool> = marked.iter().map(Option::is_some).collect();
+    let positions = register(power, &offsets, &fixed, libm::round(anchor) as usize, placement.samples);
+    let starts = positions.iter().zip(&marked).map(|(position, mark)| FrameStart {
+        time_s: mark.map_or(trace.start_s() + (position + anchor) * trace.period_s(), |mark| mark.mark_s),
+        distance_w2: 0.0,
+        confidence: 1.0,
+        marked: mark.is_some(),
+    });
+    let nothing = Threshold { rule: Rule::Sequence, ..Threshold::none() };
+    let mut found = assess::conclude(trace, marks, placement, starts.collect(), nothing);
+    found.method = FinderMethod::Segments;
+    found
 }
 
 /// Whether tracking found enough starts for a test: many, or fewer than the sum of squares where that gives a

@@ -14,6 +14,7 @@ mod matched;
 mod periodicity;
 pub mod profile;
 mod register;
+mod segments;
 mod spans;
 mod split_frames;
 mod start_refinement;
@@ -218,12 +219,15 @@ pub enum FinderMethod {
     /// The same, but the sum of squares also where searches from the frames found agree more by it than by tracking. How far
     /// these searches agree is the confidence.
     Consensus,
+    /// Segmentation of the whole trace by one probabilistic model, or the result of another method where a criterion without truth
+    /// prefers that.
+    Segments,
 }
 
 impl FinderMethod {
     /// All of them, in order.
-    pub const ALL: [Self; 5] =
-        [Self::SumOfSquares, Self::Normalized, Self::Tracking, Self::Auto, Self::Consensus];
+    pub const ALL: [Self; 6] =
+        [Self::SumOfSquares, Self::Normalized, Self::Tracking, Self::Auto, Self::Consensus, Self::Segments];
 
     /// The name on the command line.
     pub fn name(self) -> &'static str {
@@ -233,6 +237,7 @@ impl FinderMethod {
             Self::Tracking => "tracking",
             Self::Auto => "auto",
             Self::Consensus => "consensus",
+            Self::Segments => "segments",
         }
     }
 }
@@ -276,7 +281,8 @@ mod tests {
         }
         assert_eq!(
             "dtw".parse::<FinderMethod>(),
-            Err("no method dtw: choose one of squares, normalized, tracking, auto, consensus".to_owned())
+            Err("no method dtw: choose one of squares, normalized, tracking, auto, consensus, segments"
+                .to_owned())
         );
     }
 }
