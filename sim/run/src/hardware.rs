@@ -281,6 +281,8 @@ pub(crate) mod tests {
 
     use super::*;
 
+    const CORES: &str = "units.shader.cores";
+
     /// Numbers of a GPU file that add hardware where they grow: path from `gpu`, and where drawing starts.
     pub(crate) const GROW: [(&str, f64); 40] = [
         ("pipeline.vertex_reuse", 32.0),
@@ -298,7 +300,7 @@ pub(crate) mod tests {
         ("units.command.rates.vertices_fetched", 1.0),
         ("units.shader.queue", 32.0),
         ("units.shader.in_flight", 32.0),
-        ("units.shader.cores", 2.0),
+        (CORES, 2.0),
         ("units.shader.lanes", 32.0),
         ("units.shader.warps", 16.0),
         ("units.shader.shared_bytes", 16384.0),
@@ -361,7 +363,8 @@ pub(crate) mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(96))]
 
-        /// From a machine drawn at random, none of its numbers that adds hardware lowers area, leakage or idle power.
+        /// From a machine drawn at random, none of its numbers that adds hardware lowers area, leakage, idle power, or the power of a busy
+        /// unit: but for the shared memories of more cores, which have the same accesses together.
         #[test]
         fn no_number_that_adds_hardware_makes_anything_cheaper(
             start in prop::collection::vec(0..3_u32, GROW.len()),
@@ -376,9 +379,31 @@ pub(crate) mod tests {
             let platform = Platform::builtin("reference").unwrap();
             let [few, more] = [few, more].map(|changes| costs(&changed("reference", &changes), &platform, bound));
             for ((what, few), (_, more)) in few.iter().zip(&more) {
+                if GROW[which].0 == CORES && what == "compute busy" {
+                    continue;
+                }
                 prop_assert!(more >= &(few * (1.0 - 1e-12)), "{} by {}: {} from {} to {}", GROW[which].0, by, what, few, more);
             }
         }
+    }
+
+    /// `shared_cycles` counts accesses to the shared memories of all cores. With more cores each memory has fewer in a cycle, so it needs
+    /// fewer ports, and an access costs less energy. Cores that keep their accesses cost more.
+    #[test]
+    fn cores_that_keep_their_accesses_to_shared_memory_cost_more() {
+        let platform = Platform::builtin("reference").unwrap();
+        let busy = |cores: f64, shared_cycles: f64| {
+            let gpu =
+                changed("reference", &[(CORES, cores), ("units.compute.rates.shared_cycles", shared_cycles)]);
+            let costs = costs(&gpu, &platform, Bound::Nominal);
+            costs.into_iter().find(|(what, _)| what == "compute busy").unwrap().1
+        };
+        for (cores, shared_cycles) in [(2.0, 2.0), (2.0, 8.0), (8.0, 2.0), (4.0, 16.0)] {
+            let [few, more] = [1.0, 2.0].map(|by| busy(by * cores, by * shared_cycles));
+            assert!(more > 1.5 * few, "{cores} cores, {shared_cycles} accesses: {few} W, {more} W");
+        }
+        let [few, more] = [2.0, 4.0].map(|cores| busy(cores, 8.0));
+        assert!(0.8 * few < more && more < few, "{few} W, {more} W");
     }
 
     #[test]
