@@ -103,9 +103,10 @@ fn parts(placed: &[(usize, usize)], blocks: usize) -> Vec<Parts> {
     let mut own = vec![vec![0.0; BINS]; blocks];
     let reach = (4.0 * KERNEL / bin_width()) as usize;
     for &(block, bin) in placed {
-        for near in bin.saturating_sub(reach)..(bin + reach + 1).min(BINS) {
+        let first = bin.saturating_sub(reach);
+        for (near, evidence) in (first..bin + reach + 1).zip(&mut own[block][first..]) {
             let off = near.abs_diff(bin) as f64 * bin_width() / KERNEL;
-            own[block][near] += libm::exp(-0.5 * off * off) * bin_width() / (KERNEL * libm::sqrt(TAU));
+            *evidence += libm::exp(-0.5 * off * off) * bin_width() / (KERNEL * libm::sqrt(TAU));
         }
     }
     let mut total = vec![0.5 * FLAT; BINS];

@@ -103,14 +103,14 @@ struct Run {
 /// The segmentation that the criterion prefers: one of the model's own, or one of the proposals (starts of other methods, in samples).
 pub(super) fn segment(power: &[f64], placement: &Placement, proposals: &[Vec<f64>]) -> Segmentation {
     let model = Model::new(Grid::new(power, placement));
-    let mut runs: Vec<Run> = (0..VIEWS.len()).into_par_iter().map(|view| model.from_view(view)).collect();
+    let mut runs: Vec<Run> = (0..VIEWS.len()).into_par_iter().map(|view| model.of_view(view)).collect();
     let grid = |starts: &Vec<f64>| -> Vec<usize> {
         let place = |start: &f64| libm::round(start / model.grid.step as f64) as usize;
         starts.iter().map(place).map(|at| at.min(model.grid.power_w.len() - 1)).collect()
     };
     let proposed: Vec<[Run; 2]> = (0..proposals.len())
         .into_par_iter()
-        .map(|index| model.from_proposal(index, grid(&proposals[index])))
+        .map(|index| model.of_proposal(index, grid(&proposals[index])))
         .collect();
     runs.extend(proposed.into_iter().flatten());
     let Some(best) = runs.iter().reduce(|a, b| if b.judged > a.judged { b } else { a }).cloned() else {
@@ -138,7 +138,7 @@ impl Model {
     }
 
     /// From the starts most like a part of the mark's window: as many as the criterion prefers.
-    fn from_view(&self, view: usize) -> Run {
+    fn of_view(&self, view: usize) -> Run {
         let likeness = &self.views[view];
         let unmarked = |index: &usize| !self.grid.marks.contains(&likeness.candidates[*index]);
         let mut sorted: Vec<usize> = (0..likeness.at.len()).filter(unmarked).collect();
@@ -157,7 +157,7 @@ impl Model {
     }
 
     /// A proposal as it is, and what is learnt from it.
-    fn from_proposal(&self, index: usize, starts: Vec<usize>) -> [Run; 2] {
+    fn of_proposal(&self, index: usize, starts: Vec<usize>) -> [Run; 2] {
         let likeness = self.grid.likeness(&self.grid.learn(starts.iter().map(|start| (*start, 1.0))));
         let set: Vec<usize> = starts.iter().map(|start| likeness.nearest(*start)).collect();
         let (chosen, path) = self.chain(&likeness, set.clone());
