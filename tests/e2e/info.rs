@@ -115,9 +115,9 @@ fn unreadable_files_are_refused() {
     let inputs = Inputs::new();
     for (scene, code, says, remedy) in [
         ("nothing".to_owned(), 2, "no scene called `nothing`", "built in: default, tiny"),
-        (inputs.path("gone.obj"), 1, "gone.obj: cannot read it", "check the path"),
-        (inputs.put("broken.glb", "glTF"), 1, "broken.glb: GLB header", "get the file again"),
-        (inputs.put("broken.mts", "MTS1"), 1, "broken.mts: byte 4", "get the file again"),
+        (inputs.path("gone.obj"), 2, "gone.obj: cannot read it", "check the path"),
+        (inputs.put("broken.glb", "glTF"), 2, "broken.glb: GLB header", "get the file again"),
+        (inputs.put("broken.mts", "MTS1"), 2, "broken.mts: byte 4", "get the file again"),
     ] {
         refusals.check(&quintile().call(["info", &scene]), code, &[says], remedy);
     }

@@ -34,7 +34,7 @@ fn errors_of_parser_and_program_have_one_style() {
     let calls: [(&[&str], i32); 3] = [
         (&["run", "no_such_scene"], 2),
         (&["run", "tiny", "--no-such-option"], 2),
-        (&["trace", "convert", "no_such.csv", "no_such.parquet"], 1),
+        (&["trace", "convert", "no_such.csv", "no_such.parquet"], 2),
     ];
     for (call, code) in calls {
         let plain = quintile().call(call);
