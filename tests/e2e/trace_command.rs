@@ -154,9 +154,9 @@ fn a_refusal_names_the_place_and_leaves_no_file() {
     write("back.csv", &|i| row(if i == 4500 { 4400 } else { i }, "1"));
     let before = fs::read_dir(folder.path()).unwrap().count();
     let cases: [(&[&str], &str, i32, &str); 5] = [
-        (&["convert", "nan.csv"], "out", 1, "nan.csv: row 4998: current_A"),
-        (&["convert", "gap.csv"], "out", 1, "gap.csv: row 4001: time 4.03 s is 30.00 sample periods off"),
-        (&["convert", "back.csv"], "out", 1, "back.csv: row 4501: time 4.4 s is not after"),
+        (&["convert", "nan.csv"], "out", 2, "nan.csv: row 4998: current_A"),
+        (&["convert", "gap.csv"], "out", 2, "gap.csv: row 4001: time 4.03 s is 30.00 sample periods off"),
+        (&["convert", "back.csv"], "out", 2, "back.csv: row 4501: time 4.4 s is not after"),
         (&["convert", "good.csv"], "no/such/folder/out", 2, "the folder no/such/folder does not exist"),
         (&["convert", "good.csv"], "/proc/self/out", 1, "cannot be written"),
     ];
@@ -206,10 +206,10 @@ fn wrong_input_is_one_line_and_the_right_code() {
     let cases: [(&[&str], i32, &str); 11] = [
         (&["frames", "t.csv"], 2, "--mark"),
         (&["frames", "t.csv", "--mark", "99"], 2, "mark at 99 s"),
-        (&["frames", "no.csv", "--mark", "1"], 1, "no.csv"),
+        (&["frames", "no.csv", "--mark", "1"], 2, "no.csv"),
         (&["frames", "t.csv", "--rail", "gpu", "--mark", "1"], 2, "rail gpu"),
-        (&["frames", "cut.parquet", "--mark", "1"], 1, "cut.parquet"),
-        (&["sample", "t.csv", "--device", "joulescope", "--out", "a.csv"], 1, "joulescope"),
+        (&["frames", "cut.parquet", "--mark", "1"], 2, "cut.parquet"),
+        (&["sample", "t.csv", "--device", "joulescope", "--out", "a.csv"], 2, "joulescope"),
         (&["convert", "t.csv", "t.xyz"], 2, "ending"),
         (&["plot", "t.csv", "--from", "5", "--out", "a.svg"], 2, "--from and --to: 5 s"),
         (&["pareto", "t.csv"], 2, "time_ms"),

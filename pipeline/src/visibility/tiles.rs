@@ -100,7 +100,7 @@ impl SortedTiles {
     }
 }
 
-/// Address of a block of samples, which tells it from others.
+/// Address of a block of samples, which distinguishes it from others.
 fn address<T>(block: &T) -> usize {
     std::ptr::from_ref(block).addr()
 }

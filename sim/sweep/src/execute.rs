@@ -34,7 +34,7 @@ pub(crate) enum Outcome {
     Error(String),
     /// It did not run, as a coarser timing level gave a reason.
     ScreenedOut(String),
-    /// It did not run, as a coarser timing level cannot tell it apart from a design that did.
+    /// It did not run, as a coarser timing level cannot distinguish it from a design that did.
     Undecided(String),
 }
 

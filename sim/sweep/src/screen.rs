@@ -6,7 +6,7 @@
 //! both levels, a further one is outside of a range of `n` with a probability of 2 / (n + 1) (conformal prediction, Vovk, Gammerman
 //! and Shafer 2005).
 //!
-//! Designs that the coarse level `packet` cannot tell apart by its stated error do not all run: those on its own frontier do, and others are
+//! Designs that the coarse level `packet` cannot distinguish by its stated error do not all run: those on its own frontier do, and others are
 //! undecided against them. Where one that ran is outside of the stated error, the range decides as above.
 
 use std::collections::{BTreeMap, HashSet};
@@ -93,7 +93,7 @@ fn optimal<'a>(designs: &[Design<'a>]) -> Vec<&'a Point> {
     known().filter(is_optimal).map(|(at, _)| designs[at].point).collect()
 }
 
-/// Designs of one workload that run at the fine level, by what the level `coarse` can tell apart.
+/// Designs of one workload that run at the fine level, by what the level `coarse` can distinguish.
 fn chosen<'a>(coarse: Level, designs: &[Design<'a>]) -> Vec<&'a Point> {
     match coarse {
         Level::Packet if designs.iter().all(Design::is_within_stated) => optimal(designs),
@@ -205,7 +205,7 @@ pub(crate) fn note(coarse: Level, fine: Level, screened: &Screened<'_>) -> Strin
     let is_undecided = |(_, outcome): &&(&Point, Outcome)| matches!(outcome, Outcome::Undecided(_));
     let undecided = match screened.dropped.iter().filter(is_undecided).count() {
         0 => String::new(),
-        count => format!("; {count} that it cannot tell apart from them are undecided"),
+        count => format!("; {count} that it cannot distinguish from them are undecided"),
     };
     let nothing = match screened.dropped.is_empty() {
         true => format!(
@@ -465,7 +465,7 @@ mod tests {
     }
 
     #[test]
-    fn designs_that_packet_cannot_tell_apart_are_undecided() {
+    fn designs_that_packet_cannot_distinguish_are_undecided() {
         let points = points(5);
         let costs = [[0.0, 0.1], [0.1, 0.0], [0.1, 0.0], [0.11, 0.01], [0.9, 0.9]];
         let of = |stated, fine: [Option<Cost>; 5]| {
@@ -483,7 +483,7 @@ mod tests {
         // One that ran is outside of the stated error: the range decides, from designs that run at both levels.
         let designs = of([0.05; 2], [Some([0.06, 0.1]), None, None, None, None]);
         assert_eq!(chosen(Level::Packet, &designs).len(), 5);
-        // A coarser level tells too little.
+        // A coarser level says too little.
         assert_eq!(chosen(Level::Bound, &of([0.5; 2], [None; 5])).len(), 5);
     }
 

@@ -83,7 +83,7 @@ fn a_folder_that_cannot_be_made_is_named_with_what_to_do() {
     for path in [file.clone(), file.join("below")] {
         let error = open(&path).unwrap_err();
         let text = error.to_string();
-        assert!(matches!(error, OutputError::Folder { .. }) && !error.is_usage(), "{text}");
+        assert!(matches!(error, OutputError::Folder { .. }) && error.is_usage(), "{text}");
         assert!(text.contains(&path.display().to_string()) && text.contains("--out"), "{text}");
     }
     assert_eq!(names(temp.path()), ["file"]);

@@ -289,7 +289,7 @@ mod tests {
             [("a,b\n1,2\n", "no column `energy_J`"), ("energy_J\nnan\n", "line 2: energy_J is `nan`")]
         {
             let error = compare_tables(&a, &put("c.csv", text)).unwrap_err();
-            assert!(!error.is_usage() && error.to_string().contains(says), "{error}");
+            assert!(error.is_usage() && error.to_string().contains(says), "{error}");
         }
     }
 }

@@ -83,7 +83,7 @@ pub struct Report {
     pub left_out_failed: usize,
     /// Points that a coarser timing level left out.
     pub left_out_screened: usize,
-    /// Points that a coarser timing level cannot tell apart from those that ran.
+    /// Points that a coarser timing level cannot distinguish from those that ran.
     pub left_out_undecided: usize,
     /// Points that are not finished.
     pub left_out_unfinished: usize,
@@ -100,7 +100,7 @@ pub struct Failure {
     pub reason: String,
     /// Whether it did not run, as a coarser timing level left it out.
     pub screened_out: bool,
-    /// Whether it did not run, as a coarser timing level cannot tell it apart from a point that did.
+    /// Whether it did not run, as a coarser timing level cannot distinguish it from a point that did.
     pub undecided: bool,
 }
 

@@ -9,12 +9,11 @@ use activity::LineAccess;
 
 use super::Span;
 use super::calendar::{Calendar, Pauses, Turn};
-use crate::LINE_BYTES;
 use crate::address::AddressMap;
 use crate::chips::{ChipTimes, TurnPolicy};
 use crate::clock::{Clocks, Time};
 use crate::demand::CLIENTS;
-use crate::spec::{DramSpec, MachineSpec};
+use crate::spec::MachineSpec;
 
 /// Lines per slot of a bus calendar. The bus idles while a row opens; longer slots would give that idle time
 /// to lines that come later.
@@ -196,11 +195,6 @@ fn pauses(times: &ChipTimes, rank: u32, ranks: u32) -> Option<Pauses> {
     Some(Pauses { first, interval: refresh.interval, length: refresh.busy })
 }
 
-/// Lines side by side that one channel has.
-fn lines_per_chunk(spec: &DramSpec) -> u64 {
-    u64::from(spec.interleave_bytes.get().min(spec.row_bytes.get()) / LINE_BYTES)
-}
-
 /// All channels.
 #[derive(Clone, Debug)]
 pub(super) struct Dram {
@@ -212,9 +206,6 @@ pub(super) struct Dram {
     spacing: Time,
     has_ranks: bool,
     queue: u64,
-    /// Most lines that come while a line waits: those before it in the queue leave, and so do lines that come in and join them. Lines of
-    /// its own chunk do not.
-    passing: u64,
     /// Time of a full queue of lines of one bank, each of another row, and of all lines that can wait in front of a channel.
     longest_wait: Time,
     longest_way: Time,
@@ -264,7 +255,6 @@ impl Dram {
             has_ranks: spec.ranks.get() > 1,
             times,
             queue,
-            passing: queue + queue.saturating_sub(lines_per_chunk(spec)),
             longest_wait: longest_line * queue,
             longest_way: longest_line * (queue + in_ports),
             end: 0,
@@ -320,7 +310,7 @@ impl Dram {
         let turns_rows =
             is_alone && self.turns.pair > 0 && bank.turns_rows(kind, address.row, channel.lines, self.queue);
         let work = burst * Time::from(count);
-        let open = bank.joins(address.row, seen.from, channel.lines, self.passing);
+        let open = bank.joins(address.row, seen.from, channel.lines, self.queue);
         let opened = match open {
             Some(at) => {
                 let open = bank.rows[at];
@@ -456,10 +446,10 @@ impl Bank {
     /// if it has to open its row.
     ///
     /// First ready first come (Rixner et al. 2000): a line joins pending lines of its row, ahead of older requests to other
-    /// rows, until the next row opens. The exception is `most` other lines since the last of its row.
-    fn joins(&self, row: u32, seen: Time, lines: u64, most: u64) -> Option<usize> {
+    /// rows, until the next row opens. The exception is a queue full of other lines since the last of its row.
+    fn joins(&self, row: u32, seen: Time, lines: u64, queue: u64) -> Option<usize> {
         let latest = self.place(seen);
-        let is_pending = |open: &OpenRow| open.row == row && seen < open.closes && lines - open.last < most;
+        let is_pending = |open: &OpenRow| open.row == row && seen < open.closes && lines - open.last < queue;
         let latest = Some(latest).filter(|&at| self.rows[at].row == row);
         latest.or_else(|| self.rows.iter().position(is_pending))
     }
