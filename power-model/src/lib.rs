@@ -38,7 +38,6 @@
 mod error;
 mod model;
 mod pacing;
-mod parts;
 mod platform;
 mod quantity;
 mod structure;
@@ -46,9 +45,8 @@ mod system;
 mod table;
 
 pub use error::{ModelError, PacingError, PlatformError, TableError, TimelineError};
-pub use model::{FramePower, PowerModel};
+pub use model::{Energy, FramePower, PARTS, Part, PowerModel};
 pub use pacing::{PacedFrame, Pacing, Run, pace};
-pub use parts::{Energy, PARTS, Part};
 pub use platform::{
     Disturbance, Finish, Launch, Leakage, Platform, Provenance, Rail, Range, Ranges, ScaledFrom, System,
     UnitPower,

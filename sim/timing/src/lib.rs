@@ -43,7 +43,6 @@ mod recorder;
 pub mod sampled;
 mod service;
 mod spec;
-mod stalls;
 pub mod stepped;
 pub mod streams;
 
@@ -51,17 +50,15 @@ pub use bound::{BoundClock, Totals, bound};
 pub use clock::{Clocks, Time};
 pub use demand::{CLIENTS, DemandBuilder, ServiceDemand, Station};
 pub use draws::DrawSpan;
-pub use frame_clock::AccuracyWarning;
-pub use frame_clock::{FrameClock, Level, Machine, TimingError};
+pub use frame_clock::{AccuracyWarning, FrameClock, Level, Machine, TimingError};
 pub use packet::{MAX_CYCLES, PacketClock};
 pub use passes::PassTime;
-pub use recorder::Recorder;
+pub use recorder::{Reason, Recorder, Stalls, UnitTime};
 pub use service::{CYCLE, Work};
 pub use spec::{
     BinsSpec, Chips, ClientSpec, Clock, Common, Cycles, DramSpec, Entries, MachineSpec, Rates, RefreshSpec,
     RowBytes, ShaderSpec, SharedCacheSpec, UnitSpec, WaitCycles, Width,
 };
-pub use stalls::{Reason, Stalls, UnitTime};
 
 /// Bytes of a memory line.
 pub const LINE_BYTES: u32 = 64;

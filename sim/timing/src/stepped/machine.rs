@@ -2,22 +2,21 @@
 
 use activity::{LEVELS, LineAccess, Unit};
 
-use super::dram::Dram;
-use super::levels::{L2, Levels};
-use super::queue::{Meter, Queue, Waits};
-use super::shader::{CoreEnv, Shader};
-use super::sources::Sources;
-use super::stage::{Stage, StageEnv};
-use super::{Stalled, StepOptions, Stream};
 use crate::clock::{Clocks, Time};
 use crate::data_unit::DataUnit;
 use crate::demand::{DemandBuilder, Station, port};
 use crate::draws::DrawTimes;
 use crate::passes::Passes;
+use crate::recorder::Reason;
 use crate::service::{CYCLE, Work};
 use crate::spec::{Common, MachineSpec};
-use crate::stalls::Reason;
 use crate::{Recorder, Timed};
+use super::dram::Dram;
+use super::levels::{L2, Levels};
+use super::queue::{Meter, Queue, Sources, Waits};
+use super::shader::{CoreEnv, Shader};
+use super::stage::{Stage, StageEnv};
+use super::{Stalled, StepOptions, Stream};
 
 /// All units of a machine.
 pub(super) struct Machine<'a> {

@@ -9,7 +9,6 @@ mod levels;
 mod machine;
 mod queue;
 mod shader;
-mod sources;
 mod stage;
 
 use activity::{LineAccess, PacketCounts, Unit};
