@@ -30,21 +30,15 @@ mod frame;
 mod gpu;
 mod hardware;
 mod heat;
-mod images;
-mod job_frame;
-mod machine;
 mod measure;
 mod options;
 mod passes;
-mod pictures;
 mod plan;
 mod provenance;
 mod recording;
 mod report;
 mod sampled;
 mod simulated;
-mod stalls;
-mod stated;
 mod summary;
 pub mod visibility;
 mod warn;
@@ -63,23 +57,19 @@ pub use changes::{ChangeError, ChangedFile, InputFile};
 pub use choice::{Choice, Dimensions, ProbeSummary, Verified, cheapest_level};
 pub use dry_run::{DryRun, DryTimed, Expected, duration};
 pub use error::RunError;
-pub use frame::{CrashedFrame, frames_of, panic_message};
+pub use frame::{BIN_PS, CrashedFrame, Distinct, JobFrame, PassEnergy, frames_of, panic_message};
 pub use gpu::{GpuError, GpuSpec, PowerFiles};
 pub use hardware::{scaling, structure};
 pub use heat::HeatPicture;
-pub use images::{ImageRow, ImagesSummary};
-pub use job_frame::{BIN_PS, Distinct, JobFrame, PassEnergy};
-pub use machine::{HardwareSummary, area_mm2};
+pub use visibility::{ImageRow, ImagesSummary};
+pub use provenance::{HardwareSummary, Host, Input, Provenance, again, area_mm2};
 pub use measure::{Checks, Measurement, Resolution};
 pub use options::{Change, HeatQuantity, PacingChoice, Requested, RunOptions, Sampling};
-pub use passes::{PassSummary, WorkSummary, passes_of};
+pub use passes::{PassSummary, StallShares, WorkSummary, passes_of};
 pub use plan::{Plan, fits_memory, refuse_beside_images};
-pub use provenance::{Host, Input, Provenance, again};
 pub use recording::{MACHINES_IN_TURN, RecordedRun, Recording, TimedFrames};
 pub use sampled::{Forecast, FramePreview, Previewer, Previews, Signatures};
-pub use simulated::{FrameCost, Modelled, Observed, Origin, Quantity, RunFrame, SampledSummary, Simulated};
-pub use stalls::StallShares;
-pub use stated::{CONFIDENCE, StatedError};
+pub use simulated::{CONFIDENCE, FrameCost, Modelled, Observed, Origin, Quantity, RunFrame, SampledSummary, Simulated, StatedError};
 pub use summary::{Detection, Figures, FrameRow, Summary};
 pub use warn::warnings_of;
 
@@ -117,7 +107,7 @@ pub fn prepare(
     progress: &Progress,
 ) -> Result<Prepared, RunError> {
     if plan.options.timing.is_none() {
-        images::check_job(&plan)?;
+        visibility::check_job(&plan)?;
     }
     report_camera(&plan, progress);
     let provenance = Provenance::new(&plan, revision)?;

@@ -14,13 +14,9 @@ use workloads::scene::CameraUsed;
 
 use crate::frame::image_name;
 use crate::measure::{Checks, mean_parts_w};
-use crate::passes::{self, PassSummary};
+use crate::passes::{PassSummary, StallShares, self, stall_shares};
 use crate::provenance::SCHEMA;
-use crate::stalls::{self, StallShares};
-use crate::{
-    Choice, HardwareSummary, Host, Input, Measurement, Modelled, Plan, Provenance, Resolution, RunOptions,
-    SampledSummary, Simulated, StatedError, Verified, warn,
-};
+use crate::{Choice, HardwareSummary, Host, Input, Measurement, Modelled, Plan, Provenance, Resolution, RunOptions, SampledSummary, Simulated, StatedError, Verified, warn};
 
 /// Contents of `summary.json`.
 #[derive(Clone, Debug, Serialize)]
@@ -270,7 +266,7 @@ impl Summary {
                 .map(|(part, _)| (part.name(), by_part[part.index()]))
                 .collect(),
             unit_busy: unit_busy(simulated),
-            stalls: stalls::shares(simulated),
+            stalls: stall_shares(simulated),
             facts: facts(simulated),
             sample_test_efficiency: counts.sample_test_efficiency(),
             counts,
