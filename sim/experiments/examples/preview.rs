@@ -8,7 +8,7 @@ use experiments::catalog;
 use experiments::study::Request;
 use output::OutDir;
 use output::plot::Look;
-use output::progress::Progress;
+use output::terminal::Progress;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let words: Vec<String> = std::env::args().skip(1).collect();

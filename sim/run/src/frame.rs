@@ -8,7 +8,7 @@ use activity::{Counts, Event, LineAccess, Packet, Timeline, Unit};
 use glam::Vec3;
 use output::OutDir;
 use output::image::LinearImage;
-use output::progress::Progress;
+use output::terminal::Progress;
 use pipeline::frame::HeatMap;
 use pipeline::{FrameReport, Gpu, Viewport};
 use power_model::{FramePower, PowerModel};
@@ -20,7 +20,7 @@ use workloads::{Fingerprint, Job, Regime};
 
 use crate::heat::{HeatPicture, self};
 use crate::passes::{self, timed_j};
-use crate::{Distinct, GpuSpec, Observed, Origin, Plan, RunError, RunFrame};
+use crate::{GpuSpec, Observed, Origin, Plan, RunError, RunFrame};
 
 /// Largest number of bins of all frames, at about 200 bytes each. Longer runs use longer bins.
 const MAX_TOTAL_BINS: usize = 8_000_000;

@@ -13,7 +13,7 @@
 //!
 //! ```
 //! use run::{Plan, RunOptions, frames_of};
-//! use output::progress::Progress;
+//! use output::terminal::Progress;
 //!
 //! let plan = Plan::resolve(RunOptions { scene: "tiny".into(), ..RunOptions::default() })?;
 //! let frames = frames_of(&plan, &[0], &Progress::new(true))?;
@@ -44,7 +44,7 @@ pub mod visibility;
 mod warn;
 mod write;
 
-use output::progress::Progress;
+use output::terminal::Progress;
 use output::{Destination, OutDir};
 use power_model::{EnergyTable, Platform};
 use rayon::prelude::*;

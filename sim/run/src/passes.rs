@@ -10,7 +10,7 @@ use serde::Serialize;
 use timing::{DrawSpan, PassTime, Stalls, Timed, UnitTime};
 use traces::io::perfetto::CounterTrack;
 
-use crate::{Observed, Plan, RunFrame, Simulated, StallShares};
+use crate::{Observed, Plan, RunFrame, Simulated};
 
 /// Passes of one name.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -281,7 +281,7 @@ mod tests {
             ..crate::RunOptions::default()
         };
         let plan = Plan::resolve(options).unwrap();
-        let frames = crate::frames_of(&plan, &[0], &output::progress::Progress::new(true)).unwrap();
+        let frames = crate::frames_of(&plan, &[0], &output::terminal::Progress::new(true)).unwrap();
         frames[0].cost().energy_j
     }
 

@@ -20,7 +20,7 @@ use workloads::Regime;
 use workloads::job::Fact;
 
 use crate::heat::HeatPicture;
-use crate::{Observed, Plan, RunFrame};
+use crate::Plan;
 
 /// Frame of a run with its power over time, simulated or predicted.
 pub struct RunFrame {

@@ -7,7 +7,7 @@ use cpu_time::ProcessTime;
 use glam::Vec3;
 use output::OutDir;
 use output::dir::SUMMARY;
-use output::progress::Progress;
+use output::terminal::Progress;
 use output::report::{FactRow, FileLink, Report};
 use output::table::{counted, grouped};
 use pipeline::sampling::SampleSource;

@@ -2,7 +2,7 @@
 
 use activity::{Packet, Unit};
 use output::dir::{Claim, OutDir, SUMMARY};
-use output::progress::Progress;
+use output::terminal::Progress;
 use pipeline::PassReport;
 use power_model::Part;
 use timing::{DrawSpan, PassTime};

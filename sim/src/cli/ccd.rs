@@ -4,17 +4,16 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use output::progress::Progress;
 use output::table::{Table, grouped};
-use output::terminal::Terminal;
+use output::terminal::{Progress, Terminal};
 use rayon::prelude::*;
 use serde::Serialize;
 use workloads::collision::{Answer, CaseFiles, Method, Object, Search, Verdict, candidates, detect_each};
 
-use super::Failure;
-use super::outputs::{print, print_json};
 use crate::cli::args::ThreadArgs;
 use crate::cli::outputs;
+use super::Failure;
+use super::outputs::{print, print_json};
 
 /// Arguments of `ccd`.
 #[derive(Debug, Args)]

@@ -9,7 +9,7 @@ use activity::Event;
 use glam::{DVec3, Vec3};
 use output::OutputError;
 use output::plot::{ChartPanel, Scale, Series};
-use output::progress::Progress;
+use output::terminal::Progress;
 use pipeline::sampling::SampleSource;
 use pipeline::{Cull, Draw, Geometry, Gpu, LensShape, SampleSpec, SampleTable};
 use run::GpuSpec;

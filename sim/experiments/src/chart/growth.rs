@@ -6,7 +6,7 @@
 use cpu_time::ThreadTime;
 use output::OutputError;
 use output::plot::{ChartPanel, Scale, Series};
-use output::progress::Progress;
+use output::terminal::Progress;
 use pipeline::sampling::HashedSamples;
 use pipeline::visibility::{SampleLayout, Tally, Visibility, resolve};
 use pipeline::{Cull, Geometry, LensShape};

@@ -10,7 +10,7 @@ use activity::{Counts, Event};
 use glam::Vec3;
 use output::OutputError;
 use output::plot::{ChartPanel, Scale, Series};
-use output::progress::Progress;
+use output::terminal::Progress;
 use pipeline::sampling::SampleSource;
 use pipeline::{
     Cull, Draw, Gpu, PipelineSpec, RasterPass, SampleSpec, SampleTable, Settings, Target, Viewport,

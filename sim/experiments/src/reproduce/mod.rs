@@ -21,7 +21,7 @@ mod stage;
 use std::path::PathBuf;
 
 use output::Destination;
-use output::progress::Progress;
+use output::terminal::Progress;
 use run::RunError;
 use serde::Serialize;
 use settings::Form;

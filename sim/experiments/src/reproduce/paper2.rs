@@ -2,7 +2,7 @@
 //! Row II-1: energies of the passes of a deferred renderer add up to that of the frame.
 
 use output::plot::Series;
-use output::progress::Progress;
+use output::terminal::Progress;
 use power_model::{Circumstances, FramePower};
 use rayon::prelude::*;
 use run::{JobFrame, RunError};

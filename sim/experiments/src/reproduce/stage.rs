@@ -1,23 +1,19 @@
 //! A machine that draws frames, its recorder, and the analysis of the recorded trace.
 
-use output::progress::Progress;
+use output::terminal::Progress;
 use pipeline::{Draw, RasterPass, Settings, Shader, Viewport};
-use power_model::{
-    Cause, Circumstances, EnergyTable, Finish, FramePower, Launch, Pacing, Platform, PowerModel, Seconds,
-    Source, Sourced, Surrounded, Watts, pace,
-};
+use power_model::{Cause, Circumstances, EnergyTable, Finish, FramePower, Launch, Pacing, Platform, PowerModel, Seconds, Source, Sourced, Surrounded, Watts, pace};
 use rayon::prelude::*;
-use run::{BIN_PS, GpuSpec, RunError};
+use run::{BIN_PS, GpuSpec, JobFrame, RunError};
 use timing::{FrameClock, Level, Recorder};
 use traces::Trace;
 use traces::device::{Device, DeviceSpec};
 use traces::energy::{FrameEnergy, PowerIntegral, TrueFrame};
 use traces::frames::{FinderMethod, Flag, Marks, Options, Window, default_window, find_with};
-use traces::score::{self, Score, TOLERANCE_S};
+use traces::score::{Score, TOLERANCE_S, self};
 use workloads::{Job, SampleChoice, Scene};
 
 use super::scenes;
-use run::JobFrame;
 
 /// GPU, platform and energies.
 #[derive(Clone)]

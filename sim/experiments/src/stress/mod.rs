@@ -19,7 +19,7 @@ use crate::study::{Gallery, Study, StudyError, files};
 use choice::{Choice, Choices, Trial};
 use measure::{METHODS, StressRow};
 use output::dir::SUMMARY;
-use output::progress::Progress;
+use output::terminal::Progress;
 
 use output::{Claim, OutputError};
 use run::{GpuSpec, RunError};
@@ -285,14 +285,13 @@ fn choice_sheet<'a>(choices: impl Iterator<Item = &'a Choice>) -> Sheet {
 
 #[cfg(test)]
 mod tests {
-    use super::measure::Pairs;
-    use super::measure::{METHODS, combinations};
-    use super::measure::{Subject, differing};
-    use super::*;
     use pipeline::Features;
     use pipeline::traversal::Box5;
     use workloads::stress::StressScene;
     use workloads::visibility::Unshaded;
+
+    use super::*;
+    use super::measure::{METHODS, Pairs, Subject, combinations, differing};
 
     const SIZE: Size = Size { side_px: 32, triangles: 30 };
 

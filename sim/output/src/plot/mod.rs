@@ -23,27 +23,22 @@ mod chart;
 mod chart_panel;
 mod frame_plots;
 mod heat_map;
-mod images;
-mod lanes;
-mod legend;
 mod palette;
 mod panel;
 mod picture;
-mod power_run;
+mod run_plots;
 mod render;
 mod series;
 
 pub use axis::{AxisSpec, Scale};
 pub use chart::Chart;
 pub use chart_panel::ChartPanel;
-pub use frame_plots::{FrameEnergyPlot, FrameEnergyPoint, FramePowerPlot, PowerPart};
-pub use heat_map::{HeatMapPlot, HeatTile, Matrix, MatrixPanel, Shading};
-pub use images::{CaptionedImage, Images};
-pub use lanes::{StallLane, UnitLane, UnitPlot};
+pub use frame_plots::{FramePowerPlot, PowerPart, StallLane, UnitLane, UnitPlot};
+pub use heat_map::{CaptionedImage, HeatMapPlot, HeatTile, Images, Matrix, MatrixPanel, Shading};
 pub use palette::{Colour, part_colour};
 pub use picture::{COLUMN_MM, Look, Picture, undrawable};
-pub use power_run::PowerRun;
 pub use render::PlotError;
+pub use run_plots::{FrameEnergyPlot, FrameEnergyPoint, PowerRun};
 pub use series::{Mark, Paint, Series, Spread};
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ mod file;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use activity::{LineAccess, Packet, PacketStream, StreamError, StreamWriter};
-use output::progress::Progress;
+use output::terminal::Progress;
 use power_model::PowerModel;
 use rayon::prelude::*;
 use timing::{FrameClock, Level, Recorder, Timed};

@@ -1,17 +1,13 @@
 //! `quintile sample poisson`.
 
 use clap::{ArgGroup, Args};
+use output::terminal::{Progress, Terminal};
 use serde::Serialize;
 use warnings::Warning;
-use workloads::points::poisson::{
-    Domain, PoissonDisk, PoissonSpec, Spacing, ball, poisson_disk_with_progress, radius_for, saturation, span,
-};
+use workloads::points::poisson::{Domain, PoissonDisk, PoissonSpec, Spacing, ball, poisson_disk_with_progress, radius_for, saturation, span};
 use workloads::points::thin_regions_warning;
 
-use super::Points;
-use super::{Common, Failure, usage};
-use output::progress::Progress;
-use output::terminal::Terminal;
+use super::{Common, Failure, Points, usage};
 
 /// Arguments of `sample poisson`.
 #[derive(Debug, Args)]

@@ -5,20 +5,14 @@ mod report;
 
 use std::path::{Path, PathBuf};
 
-use output::progress::Progress;
 use output::table::{counted, shell_line};
-use output::terminal::Terminal;
+use output::terminal::{Progress, Terminal};
 use rayon::ThreadPool;
 use run::Input;
 use serde::Serialize;
-use sweep::{
-    Answer, Expected, Folder, Plan, Question, Scripts, Search, Shard, SlurmArray, SlurmJob, Status,
-    SweepError, Work, merge, submit,
-};
+use sweep::{Answer, Expected, Folder, Plan, Question, Scripts, Search, Shard, SlurmArray, SlurmJob, Status, SweepError, Work, merge, submit};
 
-use self::args::{
-    AskArgs, CleanArgs, FileArgs, FolderArgs, MergeArgs, PlanArgs, RunStepArgs, SlurmArgs, StatusArgs, Step,
-};
+use self::args::{AskArgs, CleanArgs, FileArgs, FolderArgs, MergeArgs, PlanArgs, RunStepArgs, SlurmArgs, StatusArgs, Step};
 use super::Failure;
 use super::crash::Stop;
 use super::outputs::{print, print_json};

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use activity::{LineAccess, Packet, Unit};
 use glam::{Affine3A, Vec2, Vec3, Vec4};
 use output::OutputError;
-use output::progress::Progress;
+use output::terminal::Progress;
 use pipeline::sampling::Pattern;
 use pipeline::{
     Attachment, Attachments, Binding, Blend, Camera, Clear, Cull, DepthState, Draw, DrawState, Format,

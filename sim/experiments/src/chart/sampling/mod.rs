@@ -15,7 +15,7 @@ use crate::study::tradeoff::{Metric, TradeoffPoint};
 use crate::study::{Gallery, Study, StudyError};
 use output::OutputError;
 use output::plot::{ChartPanel, Scale, Series};
-use output::progress::Progress;
+use output::terminal::Progress;
 
 pub use measure::Point;
 pub use measure::{Failures, Shared};

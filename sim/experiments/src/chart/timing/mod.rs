@@ -7,18 +7,17 @@ mod picture;
 
 use std::collections::BTreeMap;
 
+use output::OutputError;
+use output::plot::{Matrix, MatrixPanel};
+use output::terminal::Progress;
+use run::{GpuSpec, RunError};
 use serde::Serialize;
+use timing::Level;
 
-use super::statistics::quantiles;
 use crate::study::table::{Sheet, Table, fixed, percent, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
 use crate::study::{Gallery, Study, StudyError};
-use output::OutputError;
-use output::plot::{Matrix, MatrixPanel};
-use output::progress::Progress;
-use run::GpuSpec;
-use run::RunError;
-use timing::Level;
+use super::statistics::quantiles;
 
 pub use animations::{AnimationRow, SubjectKind};
 pub use failures::{Chosen, FailedLevel, FailureRow, RateRow};

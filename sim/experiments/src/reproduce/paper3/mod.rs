@@ -4,7 +4,7 @@
 mod blocking;
 mod system;
 
-use output::progress::Progress;
+use output::terminal::Progress;
 use power_model::{Circumstances, FramePower, Pacing};
 use run::RunError;
 use traces::energy::PowerIntegral;

@@ -15,7 +15,7 @@ mod views;
 
 use std::path::Path;
 
-use output::progress::Progress;
+use output::terminal::Progress;
 use run::RunError;
 use settings::Settings;
 use workloads::stress::{Size, StressScene, families};
