@@ -2,8 +2,8 @@
 
 use serde::Deserialize;
 
-use crate::quantity::{Bound, Hertz, Interval, Ratio, Seconds, Share, Source, Sourced, Watts};
 use super::{Platform, Provenance, provenance};
+use crate::quantity::{Bound, Hertz, Interval, Ratio, Seconds, Share, Source, Sourced, Watts};
 
 /// Power of the system apart from drawing. All parts are optional.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]

@@ -18,7 +18,7 @@ use warnings::Warning;
 use workloads::job::{Drawn, Fact, ReadyFrame};
 use workloads::{Fingerprint, Job, Regime};
 
-use crate::heat::{HeatPicture, self};
+use crate::heat::{self, HeatPicture};
 use crate::passes::{self, timed_j};
 use crate::{GpuSpec, Observed, Origin, Plan, RunError, RunFrame};
 

@@ -61,16 +61,19 @@ pub use frame::{BIN_PS, CrashedFrame, Distinct, JobFrame, PassEnergy, frames_of,
 pub use gpu::{GpuError, GpuSpec, PowerFiles};
 pub use hardware::{scaling, structure};
 pub use heat::HeatPicture;
-pub use visibility::{ImageRow, ImagesSummary};
-pub use provenance::{HardwareSummary, Host, Input, Provenance, again, area_mm2};
 pub use measure::{Checks, Measurement, Resolution};
 pub use options::{Change, HeatQuantity, PacingChoice, Requested, RunOptions, Sampling};
 pub use passes::{PassSummary, StallShares, WorkSummary, passes_of};
 pub use plan::{Plan, fits_memory, refuse_beside_images};
+pub use provenance::{HardwareSummary, Host, Input, Provenance, again, area_mm2};
 pub use recording::{MACHINES_IN_TURN, RecordedRun, Recording, TimedFrames};
 pub use sampled::{Forecast, FramePreview, Previewer, Previews, Signatures};
-pub use simulated::{CONFIDENCE, FrameCost, Modelled, Observed, Origin, Quantity, RunFrame, SampledSummary, Simulated, StatedError};
+pub use simulated::{
+    CONFIDENCE, FrameCost, Modelled, Observed, Origin, Quantity, RunFrame, SampledSummary, Simulated,
+    StatedError,
+};
 pub use summary::{Detection, Figures, FrameRow, Summary};
+pub use visibility::{ImageRow, ImagesSummary};
 pub use warn::warnings_of;
 
 /// Results of a run.

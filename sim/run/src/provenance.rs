@@ -259,8 +259,8 @@ impl HardwareSummary {
 
 #[cfg(test)]
 mod tests {
-    use crate::hardware::tests::{GROW, set};
     use super::*;
+    use crate::hardware::tests::{GROW, set};
 
     #[test]
     fn a_missing_file_has_neither_size_nor_hash() {

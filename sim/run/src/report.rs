@@ -4,8 +4,14 @@ use activity::{Event, Unit};
 use glam::Vec3;
 use output::MeanSd;
 use output::image::LinearImage;
-use output::plot::{FrameEnergyPlot, FrameEnergyPoint, FramePowerPlot, Picture, PowerPart, PowerRun, UnitLane, UnitPlot, part_colour};
-use output::report::{CounterRow, FactRow, FileLink, FrameNumbers, FrameRow, PartRow, PassRow, Report, ReportImage, ReportPlot, UnitRow, WarningRow, WorkRow};
+use output::plot::{
+    FrameEnergyPlot, FrameEnergyPoint, FramePowerPlot, Picture, PowerPart, PowerRun, UnitLane, UnitPlot,
+    part_colour,
+};
+use output::report::{
+    CounterRow, FactRow, FileLink, FrameNumbers, FrameRow, PartRow, PassRow, Report, ReportImage, ReportPlot,
+    UnitRow, WarningRow, WorkRow,
+};
 use output::table::{count_or_digits, grouped, shell_line, si};
 use power_model::{Bound, Part};
 use warnings::Warning;
@@ -16,7 +22,9 @@ use crate::frame::image_name;
 use crate::heat::heat_name;
 use crate::passes::stall_picture;
 use crate::summary::SettingsSummary;
-use crate::{FinishedRun, HeatQuantity, Host, Input, PassSummary, Plan, RunError, RunFrame, WorkSummary, waited_for};
+use crate::{
+    FinishedRun, HeatQuantity, Host, Input, PassSummary, Plan, RunError, RunFrame, WorkSummary, waited_for,
+};
 
 /// Largest number of draws of a pass in the report; all are in the summary.
 const MAX_DRAWS: usize = 48;

@@ -19,8 +19,8 @@ use warnings::Warning;
 use workloads::Regime;
 use workloads::job::Fact;
 
-use crate::heat::HeatPicture;
 use crate::Plan;
+use crate::heat::HeatPicture;
 
 /// Frame of a run with its power over time, simulated or predicted.
 pub struct RunFrame {

@@ -14,9 +14,12 @@ use workloads::scene::CameraUsed;
 
 use crate::frame::image_name;
 use crate::measure::{Checks, mean_parts_w};
-use crate::passes::{PassSummary, StallShares, self, stall_shares};
+use crate::passes::{self, PassSummary, StallShares, stall_shares};
 use crate::provenance::SCHEMA;
-use crate::{Choice, HardwareSummary, Host, Input, Measurement, Modelled, Plan, Provenance, Resolution, RunOptions, SampledSummary, Simulated, StatedError, Verified, warn};
+use crate::{
+    Choice, HardwareSummary, Host, Input, Measurement, Modelled, Plan, Provenance, Resolution, RunOptions,
+    SampledSummary, Simulated, StatedError, Verified, warn,
+};
 
 /// Contents of `summary.json`.
 #[derive(Clone, Debug, Serialize)]

@@ -7,7 +7,9 @@ use pipeline::PassReport;
 use power_model::Part;
 use timing::{DrawSpan, PassTime};
 use traces::energy::{ExtraColumn, FrameEnergy, FrameTable};
-use traces::io::perfetto::{CounterTrack, FrameSpan, MAX_SLICES, PassSpan, PerfettoTimeline, UnitTrack, self, slices_of_bins};
+use traces::io::perfetto::{
+    self, CounterTrack, FrameSpan, MAX_SLICES, PassSpan, PerfettoTimeline, UnitTrack, slices_of_bins,
+};
 use traces::score::{TOLERANCE_S, truth_beside};
 
 use crate::frame::image_name;

@@ -10,10 +10,10 @@ use rayon::prelude::*;
 use serde::Serialize;
 use workloads::collision::{Answer, CaseFiles, Method, Object, Search, Verdict, candidates, detect_each};
 
-use crate::cli::args::ThreadArgs;
-use crate::cli::outputs;
 use super::Failure;
 use super::outputs::{print, print_json};
+use crate::cli::args::ThreadArgs;
+use crate::cli::outputs;
 
 /// Arguments of `ccd`.
 #[derive(Debug, Args)]

@@ -7,21 +7,21 @@ use std::time::Instant;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::error::{ContextKind, ContextValue};
 use clap::{Arg, Args, Command};
-use experiments::catalog::{ALL, CHARTS, all};
-use experiments::reproduce::{Options, Paper, self};
+use experiments::reproduce::{self, Options, Paper};
 use experiments::stress::{Report, StressEffort, family_named};
-use experiments::study::tradeoff::{Index, Section, self};
+use experiments::study::tradeoff::{self, Index, Section};
 use experiments::study::{Done, Entry, Request, Study, StudyError};
+use experiments::{ALL, CHARTS, all};
 use output::plot::Look;
 use output::terminal::{Progress, Terminal};
 use output::{Destination, OutDir, OutputError};
 use run::RunError;
 use serde_json::{Map, Value};
 
-use crate::cli::args::{LookArgs, ThreadArgs};
-use crate::cli::parse::named;
 use super::Failure;
 use super::outputs::{print, print_json};
+use crate::cli::args::{LookArgs, ThreadArgs};
+use crate::cli::parse::named;
 
 /// Arguments of `stress`.
 #[derive(Debug, Args)]

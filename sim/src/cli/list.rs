@@ -3,7 +3,7 @@
 //! Defaults are those of the workloads themselves. Ranges are checked against what the workloads accept by the tests below.
 
 use activity::spec::suggestion;
-use experiments::catalog::{ALL, CHARTS};
+use experiments::{ALL, CHARTS};
 use output::table::Table;
 use run::GpuSpec;
 use serde::Serialize;

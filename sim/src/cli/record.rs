@@ -13,11 +13,11 @@ use sweep::{Measured, Setting, measured};
 use timing::Level;
 use workloads::job::OptionSource;
 
-use crate::cli::args::{SceneArgs, ThreadArgs};
-use crate::cli::parse::setting;
 use super::outputs::{may_hold_trace, print, print_json};
 use super::run::{bound, one_gpu, pacing};
 use super::{Failure, lists};
+use crate::cli::args::{SceneArgs, ThreadArgs};
+use crate::cli::parse::setting;
 
 /// Arguments of `record`.
 #[derive(Debug, Args)]

@@ -12,15 +12,18 @@ use output::table::{Table, count_or_digits, counted, si, si_mean_sd};
 use output::terminal::{Progress, Terminal, Verbosity};
 use output::{Destination, MeanSd};
 use power_model::Bound;
-use run::{Choice, DryRun, FinishedRun, HeatQuantity, PacingChoice, Plan, Prepared, Requested, RunError, RunOptions, Sampling, Summary, again, open, prepare, refuse_beside_images};
+use run::{
+    Choice, DryRun, FinishedRun, HeatQuantity, PacingChoice, Plan, Prepared, Requested, RunError, RunOptions,
+    Sampling, Summary, again, open, prepare, refuse_beside_images,
+};
 use serde::Serialize;
 use timing::Level;
 use workloads::job::OptionSource;
 
-use crate::cli::args::{LookArgs, SceneArgs, ThreadArgs};
-use crate::cli::parse::{duration, named, percent, rate, setting, share_below_one};
 use super::outputs::{json_text, print};
 use super::{Failure, lists};
+use crate::cli::args::{LookArgs, SceneArgs, ThreadArgs};
+use crate::cli::parse::{duration, named, percent, rate, setting, share_below_one};
 
 /// Arguments of `run`.
 #[derive(Debug, Args)]

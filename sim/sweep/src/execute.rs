@@ -6,10 +6,13 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use activity::{Bin, Event};
 use output::terminal::Progress;
 use power_model::{Bound, FramePower, ModelError, pace};
-use run::{Distinct, Plan, RunError, RunFrame, Simulated, StatedError, area_mm2, frames_of, panic_message, passes_of, warnings_of};
+use run::{
+    Distinct, Plan, RunError, RunFrame, Simulated, StatedError, area_mm2, frames_of, panic_message,
+    passes_of, warnings_of,
+};
 use serde::{Deserialize, Serialize};
 
-use crate::setting::{Setting, self};
+use crate::setting::{self, Setting};
 
 /// Result of a point.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

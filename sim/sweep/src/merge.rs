@@ -276,9 +276,9 @@ mod tests {
     use output::terminal::Progress;
     use traces::table::InputTable;
 
+    use super::*;
     use crate::setting::Setting;
     use crate::{Shard, Work};
-    use super::*;
 
     fn plan() -> Plan {
         let point = |samples: &str, tile: &str| Point {

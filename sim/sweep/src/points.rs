@@ -12,7 +12,7 @@ use timing::Level;
 
 use crate::SweepError;
 use crate::axis::Axis;
-use crate::setting::{Setting, Text, self};
+use crate::setting::{self, Setting, Text};
 use crate::spec::{Combination, SweepSpec};
 
 /// Points of a sweep.

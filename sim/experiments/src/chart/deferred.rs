@@ -16,7 +16,7 @@ use workloads::deferred::{Deferred, DeferredOptions, LightPass, Method, NormalFo
 use workloads::scene::{Local, Node, Parts, Rig, Scene, SceneCamera, Trs};
 use workloads::{Alpha, Material, Overrides, shapes};
 
-use crate::chart::statistics::{errors, mean_square};
+use crate::chart::{errors, mean_square};
 use crate::study::table::{Sheet, Table, count, fixed, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
 use crate::study::{Gallery, Study, StudyError};

@@ -14,7 +14,7 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde::Serialize;
 use workloads::stress::{Size, Soup, StressError, StressScene};
 
-use super::statistics::{exponent, upper_half};
+use super::{exponent, upper_half};
 use crate::study::table::{Sheet, Table, fixed, millis, optional, plain};
 use crate::study::{Gallery, Study, StudyError};
 

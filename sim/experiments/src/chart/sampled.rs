@@ -15,7 +15,7 @@ use run::{
 use serde::Serialize;
 use workloads::Overrides;
 
-use super::statistics::quantiles;
+use super::quantiles;
 use crate::study::table::{Sheet, Table, fixed, percent, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
 use crate::study::{Gallery, Study, StudyError};

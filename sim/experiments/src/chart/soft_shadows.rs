@@ -24,7 +24,7 @@ use workloads::soft_shadows::{
 use workloads::{Frame, Overrides, Scene};
 
 use crate::chart::glossy::Traced;
-use crate::chart::statistics::{errors, mean_square, neighbours};
+use crate::chart::{errors, mean_square, neighbours};
 use crate::study::table::{Sheet, Table, count, fixed, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
 use crate::study::{Gallery, Study, StudyError};

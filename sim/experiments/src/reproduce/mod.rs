@@ -8,13 +8,11 @@
 //! Inputs come from the papers only. A committed file of settings for each paper has what it states and what it leaves open. The
 //! verdict of a row is over all values of open settings (`Band`).
 
-mod band;
 mod paper2;
 mod paper3;
 mod paper6;
 mod report;
 mod row;
-mod scenes;
 mod settings;
 mod stage;
 
@@ -26,10 +24,9 @@ use run::RunError;
 use serde::Serialize;
 use settings::Form;
 
-pub use band::{Band, Case, Kind, Turn, Verdict};
 pub use report::{Figure, Report};
-pub use row::{Number, Row};
-pub use settings::{About, Listed, Origin};
+pub use row::{Band, Case, Number, Row, Turn, Verdict};
+pub use settings::{About, Kind, Listed, Origin};
 
 /// Papers with reproduced claims.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]

@@ -290,8 +290,8 @@ mod tests {
     use workloads::stress::StressScene;
     use workloads::visibility::Unshaded;
 
-    use super::*;
     use super::measure::{METHODS, Pairs, Subject, combinations, differing};
+    use super::*;
 
     const SIZE: Size = Size { side_px: 32, triangles: 30 };
 

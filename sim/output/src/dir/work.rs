@@ -1,8 +1,8 @@
 //! Locked folder of unfinished results, the manifest of the results that Quintile may replace, and the replacement of older results.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs::{File, OpenOptions, TryLockError, self};
-use std::io::{Read, Write, self};
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::io::{self, Read, Write};
 use std::path::{Component, Path, PathBuf};
 
 use serde::{Deserialize, Serialize};

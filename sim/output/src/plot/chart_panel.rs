@@ -6,7 +6,7 @@ use std::ops::Range;
 
 use super::axis::{Along, Axis, AxisSpec, Extent, Scale};
 use super::palette::{INK, MARK, MUTED};
-use super::panel::{BELOW, Key, LEGEND_LINE, LEGEND_PX, Label, Panel, aside, legend_column, plate, self};
+use super::panel::{self, BELOW, Key, LEGEND_LINE, LEGEND_PX, Label, Panel, aside, legend_column, plate};
 use super::picture::{Across, Picture, Text, shortened, text, text_width, wrapped};
 use super::series::{Mark, Series};
 

@@ -3,11 +3,11 @@
 
 use pipeline::texture::linear_to_srgb8;
 
-use crate::table::digits;
 use super::axis::{Along, Axis, is_drawable};
 use super::palette::{AXIS, BACKGROUND, CLASSES, Colour, INK, MUTED, heat};
 use super::panel::{Key, legend_lines, tick_label};
 use super::picture::{Across, Look, Picture, Point, Text, shortened, text, text_width};
+use crate::table::digits;
 
 /// A rectangle of the image with a value.
 #[derive(Clone, Copy, Debug)]
@@ -377,8 +377,8 @@ fn draw(picture: &mut Picture, image: &CaptionedImage, (left, top): (f64, f64), 
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use super::super::picture::Shape;
+    use super::*;
 
     fn plot<'a>(tiles: &'a [HeatTile], shading: Shading<'a>, brightness: &'a [f32]) -> HeatMapPlot<'a> {
         HeatMapPlot { title: "t", subject: "s", label: "l", size: [200, 1], tiles, shading, brightness }

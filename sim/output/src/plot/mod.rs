@@ -26,8 +26,8 @@ mod heat_map;
 mod palette;
 mod panel;
 mod picture;
-mod run_plots;
 mod render;
+mod run_plots;
 mod series;
 
 pub use axis::{AxisSpec, Scale};

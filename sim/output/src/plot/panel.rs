@@ -402,10 +402,10 @@ impl Style {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use super::super::axis::{Along, Axis};
     use super::super::palette::INK;
     use super::super::picture::{Look, Shape};
+    use super::*;
 
     fn panel() -> Panel {
         let x = Axis::new("x", "", (0.0, 1.0), Along::across(400.0));

@@ -1,12 +1,12 @@
 //! The whole run: power over time, and energy of each frame, measured and true.
 
-use crate::MeanSd;
-use crate::table::{si, si_mean_sd};
 use super::axis::{Along, Axis, is_drawable};
 use super::palette::{INK, MARK, MEASURED, MUTED, TRUTH};
 use super::panel::{BELOW, Key, Panel, aside, legend_lines};
 use super::picture::{Across, Look, Picture, Text, text};
 use super::series::{Extremes, extremes, moving_mean};
+use crate::MeanSd;
+use crate::table::{si, si_mean_sd};
 
 /// Sampled power of a run, with frame starts.
 #[derive(Clone, Copy, Debug)]
@@ -359,8 +359,8 @@ impl FrameEnergyPlot<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use super::super::picture::Shape;
+    use super::*;
 
     fn run(power_w: &[f64]) -> PowerRun<'_> {
         PowerRun {

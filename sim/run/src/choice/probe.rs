@@ -10,10 +10,10 @@ use timing::{FrameClock, Level, Recorder};
 use workloads::Job;
 use workloads::job::Reduction;
 
-use crate::frame::{draw_on, self};
+use super::{Findings, ProbeSummary, with_blur_thresholds};
+use crate::frame::{self, draw_on};
 use crate::recording::PacketBuffer;
 use crate::{Distinct, FrameCost, GpuSpec, Plan, RunError};
-use super::{Findings, ProbeSummary, with_blur_thresholds};
 
 /// Largest number of probed frames: the middles of as many equal parts of the run.
 const MAX_FRAMES: usize = 3;

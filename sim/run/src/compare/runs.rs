@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use traces::energy::Spread;
 use serde::Serialize;
 use serde_json::Value;
+use traces::energy::Spread;
 
 use super::CompareError;
 

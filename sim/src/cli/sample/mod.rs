@@ -1,7 +1,6 @@
 //! `quintile sample`, and files of points.
 
-mod independent;
-mod poisson;
+mod kinds;
 
 use std::convert::Infallible;
 use std::fmt::Write as _;
@@ -36,11 +35,11 @@ pub struct SampleArgs {
 #[derive(Debug, Subcommand)]
 pub enum Kind {
     /// Poisson disk points of the unit square, cube, ...: a minimum distance, and no room for another point
-    Poisson(poisson::PoissonArgs),
+    Poisson(kinds::PoissonArgs),
     /// Independent points of the unit square, cube, ... that follow a density
-    White(independent::WhiteArgs),
+    White(kinds::WhiteArgs),
     /// Uniform points in a torus or in a closed surface
-    Volume(independent::VolumeArgs),
+    Volume(kinds::VolumeArgs),
 }
 
 /// Arguments of all distributions.
@@ -110,9 +109,9 @@ fn usage(message: impl std::fmt::Display) -> Failure {
 
 pub(super) fn run(args: &SampleArgs, terminal: &Terminal) -> Result<(), Failure> {
     match &args.kind {
-        Kind::Poisson(args) => poisson::run(args, terminal),
-        Kind::White(args) => independent::white(args),
-        Kind::Volume(args) => independent::volume(args),
+        Kind::Poisson(args) => kinds::poisson(args, terminal),
+        Kind::White(args) => kinds::white(args),
+        Kind::Volume(args) => kinds::volume(args),
     }
 }
 

@@ -1,6 +1,5 @@
 //! `quintile trace`: analysis of any power trace, recorded or synthetic.
 
-mod align;
 mod convert;
 mod energy;
 mod frames;
@@ -10,11 +9,10 @@ mod plot;
 
 use std::path::Path;
 
-use align::AlignArgs;
 use clap::{Args, Subcommand, ValueEnum};
 use convert::{ConvertArgs, SampleArgs};
 use energy::EnergyArgs;
-use frames::FramesArgs;
+use frames::{AlignArgs, FramesArgs};
 use input::Pipes;
 use output::plot::Picture;
 use output::terminal::Terminal;
@@ -83,7 +81,7 @@ fn run_on_files(args: &TraceArgs, terminal: &Terminal) -> Result<(), Failure> {
     match &args.command {
         TraceCommand::Frames(args) => frames::run(args, terminal),
         TraceCommand::Energy(args) => energy::run(args, terminal),
-        TraceCommand::Align(args) => align::run(args, terminal),
+        TraceCommand::Align(args) => frames::align(args, terminal),
         TraceCommand::Convert(args) => convert::run(args, terminal),
         TraceCommand::Sample(args) => convert::sample(args, terminal),
         TraceCommand::Plot(args) => plot::run(args, terminal),

@@ -275,8 +275,8 @@ fn normal_below(x: f64) -> f64 {
 mod tests {
     use proptest::prelude::*;
 
-    use crate::report::exact;
     use super::*;
+    use crate::report::exact;
 
     #[test]
     fn two_blurred_designs_share_the_frontier() {

@@ -1,6 +1,6 @@
 //! The report as one page that opens from disk and needs no network, with its pictures; and its tables as CSV.
 
-use std::io::{Write, self};
+use std::io::{self, Write};
 
 use minijinja::{Environment, context};
 use output::plot::{AxisSpec, Chart, ChartPanel, Look, Mark, Paint, Picture, PlotError, Series};
@@ -235,8 +235,8 @@ fn write_rows<T: Serialize + Default>(rows: &[T], mut out: impl Write) -> io::Re
 
 #[cfg(test)]
 mod tests {
-    use crate::report::{ReportOptions, exact};
     use super::*;
+    use crate::report::{ReportOptions, exact};
 
     #[test]
     fn a_page_begins_with_what_is_missing_and_marks_designs_on_other_platforms() {

@@ -6,13 +6,13 @@
 
 use activity::{Event, LineAccess, Unit};
 
+use super::queue::{Meter, Waits};
 use crate::address::AddressMap;
 use crate::chips::ChipTimes;
 use crate::clock::{Clocks, Time};
 use crate::recorder::Reason;
 use crate::spec::MachineSpec;
 use crate::{LINE_BYTES, Recorder};
-use super::queue::{Meter, Waits};
 
 /// A pending line.
 #[derive(Clone, Copy, Debug)]

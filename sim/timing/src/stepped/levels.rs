@@ -3,13 +3,13 @@
 
 use activity::{Event, LEVELS, LineAccess, LineKind, Unit};
 
+use super::dram::{Dram, Reader};
+use super::queue::{Meter, Queue, Waits};
 use crate::Recorder;
 use crate::clock::{Clocks, Time};
 use crate::demand::CLIENTS;
 use crate::recorder::Reason;
 use crate::spec::{MachineSpec, SharedCacheSpec};
-use super::dram::{Dram, Reader};
-use super::queue::{Meter, Queue, Waits};
 
 /// A request of the L2 on its way down.
 #[derive(Clone, Copy, Debug)]

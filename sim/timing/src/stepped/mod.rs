@@ -13,6 +13,11 @@ mod stage;
 use activity::{LEVELS, LineAccess, PacketCounts, Unit};
 use machine::Machine;
 
+use self::dram::Dram;
+use self::levels::{L2, Levels};
+use self::queue::{Meter, Queue, Sources, Waits};
+use self::shader::{CoreEnv, Shader};
+use self::stage::{Stage, StageEnv};
 use crate::clock::{Clocks, Time};
 use crate::data_unit::DataUnit;
 use crate::demand::{DemandBuilder, ServiceDemand, Station, port};
@@ -22,11 +27,6 @@ use crate::recorder::Reason;
 use crate::service::{CYCLE, Work};
 use crate::spec::{Common, MachineSpec};
 use crate::{Recorder, Timed};
-use self::dram::Dram;
-use self::levels::{L2, Levels};
-use self::queue::{Meter, Queue, Sources, Waits};
-use self::shader::{CoreEnv, Shader};
-use self::stage::{Stage, StageEnv};
 
 /// Deadlock: packets remain but no unit can act. This is an error of the model, never of the input.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

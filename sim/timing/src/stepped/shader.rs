@@ -4,12 +4,12 @@ use std::collections::VecDeque;
 
 use activity::Unit;
 
+use super::queue::Queue;
 use crate::clock::{Clocks, Time};
 use crate::data_unit::{DATA_EVENTS, DataUnit};
 use crate::demand::{ServiceDemand, share};
 use crate::recorder::Reason;
 use crate::spec::MachineSpec;
-use super::queue::Queue;
 
 /// A packet whose warps are on the cores.
 #[derive(Clone, Copy, Debug)]

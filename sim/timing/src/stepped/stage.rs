@@ -5,11 +5,11 @@ use std::ops::Range;
 
 use activity::{LineAccess, Unit};
 
+use super::levels::{NO_WAIT, Request};
+use super::queue::{Queue, Waits};
 use crate::clock::Time;
 use crate::recorder::Reason;
 use crate::service::{CYCLE, Server, Work};
-use super::levels::{NO_WAIT, Request};
-use super::queue::{Queue, Waits};
 
 /// Interface of a stage to its surroundings.
 pub(super) trait StageEnv {

@@ -24,7 +24,7 @@ use timing::{FrameClock, Level, Recorder};
 use workloads::material::SurfaceShader;
 use workloads::{Light, Material};
 
-use super::statistics::quantiles;
+use super::quantiles;
 use crate::study::table::{Sheet, Table, plain};
 use crate::study::{Gallery, Study, StudyError};
 

@@ -15,7 +15,7 @@ use serde::Serialize;
 use workloads::{Frame, Overrides, Scene};
 
 use super::{SamplingEffort, SamplingRow, fitted};
-use crate::chart::statistics::{White, errors, mean_square, neighbours};
+use crate::chart::{White, errors, mean_square, neighbours};
 use crate::study::StudyError;
 
 /// One measurement.

@@ -11,9 +11,8 @@ use traces::energy::PowerIntegral;
 use traces::frames::FinderMethod;
 use traces::score::Score;
 
-use super::band::Verdict;
 use super::report::{POWER, TIME, dots, line};
-use super::row::{Row, With, numbers};
+use super::row::{Row, Verdict, With, numbers};
 use super::settings::{
     About, Form, Origin, Setting, load, paper_settings, reduced, row_settings, settings_group,
 };

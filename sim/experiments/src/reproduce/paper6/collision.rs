@@ -9,9 +9,8 @@ use workloads::collision::families::{Case, cases};
 use workloads::collision::{Method, Object, PlainPasses, PlainResult, Search, candidates, detect};
 use workloads::shapes;
 
-use super::super::band::Cases;
 use super::super::report::over_doublings;
-use super::super::row::{Number, Row, numbers};
+use super::super::row::{Cases, Number, Row, numbers};
 use super::super::{Done, Figure};
 use super::Task;
 use super::figures::{Ends, overlaps};

@@ -1,12 +1,10 @@
 //! Paper VI, "Design and Novel Uses of Higher-Dimensional Rasterization": a module for each use.
 
-mod caustics;
 mod collision;
 mod culling;
 mod depths;
 mod figures;
-mod glossy_and_shadows;
-mod occlusion;
+mod light;
 mod public;
 mod sampling;
 mod settings;
@@ -52,15 +50,15 @@ const ROWS: [(&str, Compute); 16] = [
     ("VI-1", collision::missed),
     ("VI-2", collision::dodged),
     ("VI-3", collision::tighter),
-    ("VI-4", occlusion::rate),
-    ("VI-5", occlusion::cost),
-    ("VI-6", caustics::executions),
-    ("VI-7", caustics::no_light_is_lost),
+    ("VI-4", culling::rate),
+    ("VI-5", culling::cost),
+    ("VI-6", light::executions),
+    ("VI-7", light::no_light_is_lost),
     ("VI-8", torus::row),
     ("VI-9", sampling::darts),
     ("VI-10", sampling::densities),
-    ("VI-11", glossy_and_shadows::glossy_row),
-    ("VI-12", glossy_and_shadows::shadow_row),
+    ("VI-11", light::glossy_row),
+    ("VI-12", light::shadow_row),
     ("VI-13", views::stereo),
     ("VI-14", views::seven),
     ("VI-15", depths::tighter),
