@@ -10,10 +10,9 @@ use rayon::prelude::*;
 use serde::Serialize;
 use workloads::collision::{Answer, CaseFiles, Method, Object, Search, Verdict, candidates, detect_each};
 
-use super::Failure;
-use super::outputs::{print, print_json};
+use super::{Failure, print, print_json};
+use crate::cli::may_hold_results;
 use crate::cli::args::ThreadArgs;
-use crate::cli::outputs;
 
 /// Arguments of `ccd`.
 #[derive(Debug, Args)]
@@ -256,7 +255,7 @@ impl<'a> Rows<'a> {
         let Some(path) = args.csv.as_deref() else { return Ok(Self::Unasked) };
         if !PRINTED.iter().any(|printed| path == Path::new(printed)) {
             let inputs = args.files.iter().map(PathBuf::as_path);
-            return outputs::may_hold_results("--csv", Some(path), inputs).map(|()| Self::File(path));
+            return may_hold_results("--csv", Some(path), inputs).map(|()| Self::File(path));
         }
         if args.json {
             let message = format!(

@@ -18,8 +18,7 @@ use output::{Destination, OutDir, OutputError};
 use run::RunError;
 use serde_json::{Map, Value};
 
-use super::Failure;
-use super::outputs::{print, print_json};
+use super::{Failure, print, print_json};
 use crate::cli::args::{LookArgs, ThreadArgs};
 use crate::cli::parse::named;
 

@@ -13,9 +13,8 @@ use sweep::{Measured, Setting, measured};
 use timing::Level;
 use workloads::job::OptionSource;
 
-use super::outputs::{may_hold_trace, print, print_json};
 use super::run::{bound, one_gpu, pacing};
-use super::{Failure, lists};
+use super::{Failure, lists, may_hold_trace, print, print_json};
 use crate::cli::args::{SceneArgs, ThreadArgs};
 use crate::cli::parse::setting;
 

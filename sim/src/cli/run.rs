@@ -20,8 +20,7 @@ use serde::Serialize;
 use timing::Level;
 use workloads::job::OptionSource;
 
-use super::outputs::{json_text, print};
-use super::{Failure, lists};
+use super::{Failure, json_text, lists, print};
 use crate::cli::args::{LookArgs, SceneArgs, ThreadArgs};
 use crate::cli::parse::{duration, named, percent, rate, setting, share_below_one};
 

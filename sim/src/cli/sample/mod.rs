@@ -13,8 +13,7 @@ use output::terminal::Terminal;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::Failure;
-use super::outputs::{print, print_json};
+use super::{Failure, print, print_json};
 use crate::cli::args::ThreadArgs;
 
 /// Arguments of `sample`.
@@ -99,7 +98,7 @@ impl Common {
     fn check(&self, input: Option<&Path>) -> Result<(), Failure> {
         let out = self.out.as_deref();
         out.map(Format::of).transpose()?;
-        super::outputs::may_hold_results("--out", out, input)
+        super::may_hold_results("--out", out, input)
     }
 }
 

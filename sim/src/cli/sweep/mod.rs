@@ -18,10 +18,9 @@ use self::args::{
     AskArgs, CleanArgs, FileArgs, FolderArgs, MergeArgs, PlanArgs, ReportArgs, RunStepArgs, SlurmArgs,
     StatusArgs, Step,
 };
-use super::Failure;
 use super::crash::Stop;
-use super::outputs::{print, print_json};
 use super::run::REVISION;
+use super::{Failure, print, print_json};
 
 pub use self::args::SweepArgs;
 

@@ -11,13 +11,12 @@ use traces::io::{self, TraceFormat, TraceHeader, TraceReader, csv, endings};
 use warnings::{Code, Warning};
 
 use super::{report, warn_with, wrong};
-use crate::cli::Failure;
-use crate::cli::outputs::{may_hold_trace, print_json};
 use crate::cli::parse::{
     current, gain, length_of_time, positive_current, positive_voltage, rate, resistance, share_below_one,
     size_of_current, size_of_voltage, voltage,
 };
 use crate::cli::trace::input::{InputArgs, trace_format};
+use crate::cli::{Failure, may_hold_trace, print_json};
 
 /// Arguments of `trace convert`.
 #[derive(Clone, Debug, Args)]

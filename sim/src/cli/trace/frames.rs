@@ -20,10 +20,9 @@ use warnings::{Code, Warning};
 
 use super::input::{Frames, warn_of_frames};
 use super::{report, warn_with, wrong};
-use crate::cli::Failure;
 use crate::cli::args::ThreadArgs;
-use crate::cli::outputs::{may_hold_results, print_json};
 use crate::cli::trace::input::{FindArgs, InputArgs, anchor, warn_of_frames};
+use crate::cli::{Failure, may_hold_results, print_json};
 
 /// Arguments of `trace frames`.
 #[derive(Clone, Debug, Args)]

@@ -4,7 +4,6 @@ mod convert;
 mod energy;
 mod frames;
 mod input;
-pub(super) mod pareto;
 mod plot;
 
 use std::path::Path;
@@ -16,16 +15,14 @@ use frames::{AlignArgs, FramesArgs};
 use input::Pipes;
 use output::plot::Picture;
 use output::terminal::Terminal;
-use pareto::ParetoArgs;
-use plot::PlotArgs;
+use plot::{ParetoArgs, PlotArgs};
 use traces::frames::MarkError;
 use traces::io::{ReadError, WriteError};
 use traces::search::SearchError;
 use traces::times::TimesError;
 use warnings::Warning;
 
-use super::Failure;
-use super::outputs::print;
+use super::{Failure, print};
 
 /// Arguments of `trace`.
 #[derive(Clone, Debug, Args)]
@@ -85,7 +82,7 @@ fn run_on_files(args: &TraceArgs, terminal: &Terminal) -> Result<(), Failure> {
         TraceCommand::Convert(args) => convert::run(args, terminal),
         TraceCommand::Sample(args) => convert::sample(args, terminal),
         TraceCommand::Plot(args) => plot::run(args, terminal),
-        TraceCommand::Pareto(args) => pareto::run(args, terminal),
+        TraceCommand::Pareto(args) => plot::pareto(args, terminal),
     }
 }
 
