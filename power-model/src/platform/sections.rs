@@ -207,7 +207,7 @@ impl Platform {
     #[must_use]
     pub fn at(&self, bound: Bound) -> Self {
         let Some(ranges) = &self.ranges else { return self.clone() };
-        let moved = |watts: &crate::Sourced<Watts>, range: &Range| {
+        let moved = |watts: &Sourced<Watts>, range: &Range| {
             watts.computed(watts.value() * range.at(bound), "at one end of its range")
         };
         let mut platform = self.clone();

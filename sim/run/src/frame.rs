@@ -130,7 +130,7 @@ pub(crate) struct DrawnFrame {
 }
 
 /// Pictures of a frame.
-struct Pictures {
+pub(crate) struct Pictures {
     /// Linear radiance of each pixel.
     pub image: Vec<Vec3>,
     pub heat: Vec<HeatMap>,

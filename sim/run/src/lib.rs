@@ -54,9 +54,7 @@ use timing::{Level, TimingError};
 use workloads::job::JobError;
 use workloads::{Overrides, Scene};
 
-use self::changes::ChangeError;
 use self::frame::{FrameSimulator, SimulatedFrame, max_bins_per_frame};
-use self::gpu::{GpuError, GpuSpec};
 
 pub use changes::{ChangeError, ChangedFile, InputFile};
 pub use choice::{Choice, Dimensions, ProbeSummary, Verified, cheapest_level};

@@ -270,7 +270,7 @@ mod tests {
 
     /// Energy of the first frame of `scene` in joules on the reference GPU with changes, until it ends.
     fn frame_j(scene: &str, size: (u32, u32), changes: &[(&str, f64)]) -> f64 {
-        let options = crate::RunOptions {
+        let options = RunOptions {
             scene: scene.into(),
             overrides: workloads::Overrides {
                 size: Some(size),
@@ -278,7 +278,7 @@ mod tests {
                 ..workloads::Overrides::default()
             },
             changes: set(changes),
-            ..crate::RunOptions::default()
+            ..RunOptions::default()
         };
         let plan = Plan::resolve(options).unwrap();
         let frames = crate::frames_of(&plan, &[0], &output::terminal::Progress::new(true)).unwrap();

@@ -20,11 +20,9 @@ use workloads::scene::CameraUsed;
 use crate::dry_run::area_text;
 use crate::frame::image_name;
 use crate::heat::heat_name;
-use crate::passes::stall_picture;
+use crate::passes::{stall_picture, waited_for};
 use crate::summary::SettingsSummary;
-use crate::{
-    FinishedRun, HeatQuantity, Host, Input, PassSummary, Plan, RunError, RunFrame, WorkSummary, waited_for,
-};
+use crate::{FinishedRun, HeatQuantity, Host, Input, PassSummary, Plan, RunError, RunFrame, WorkSummary};
 
 /// Largest number of draws of a pass in the report; all are in the summary.
 const MAX_DRAWS: usize = 48;

@@ -137,7 +137,7 @@ fn modelled(
 ) -> Result<Found, String> {
     let gpu = GpuSpec::load("reference").map_err(|error| error.to_string())?;
     let spec = PipelineSpec { features, ..gpu.pipeline };
-    let background = glam::Vec3::ZERO;
+    let background = Vec3::ZERO;
     let settings = Settings { spec: &spec, viewport: scene.viewport, samples: source, background };
     let draws = [Draw::new(geometry, &Unshaded, Cull::None)];
     let (mut seen, mut all) = (Vec::new(), Vec::new());

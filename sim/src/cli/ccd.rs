@@ -11,8 +11,8 @@ use serde::Serialize;
 use workloads::collision::{Answer, CaseFiles, Method, Object, Search, Verdict, candidates, detect_each};
 
 use super::{Failure, print, print_json};
-use crate::cli::may_hold_results;
 use crate::cli::args::ThreadArgs;
+use crate::cli::may_hold_results;
 
 /// Arguments of `ccd`.
 #[derive(Debug, Args)]

@@ -18,7 +18,7 @@ mod trace;
 mod visibility;
 
 use std::ffi::OsString;
-use std::io::{self, ErrorKind, Write};
+use std::io::{self, Write};
 use std::panic::AssertUnwindSafe;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -230,7 +230,7 @@ fn write_pages(command: &clap::Command, folder: &Path) -> Result<usize, Failure>
     let name = command.get_display_name().unwrap_or_else(|| command.get_name());
     let path = folder.join(format!("{name}.1"));
     let bytes = page(command).map_err(|error| failed(&path.display().to_string(), &error))?;
-    atomic::write_file(&path, |file| io::Write::write_all(file, &bytes))?;
+    atomic::write_file(&path, |file| file.write_all(&bytes))?;
     let below = command.get_subcommands().filter(|below| below.get_name() != "help" && !below.is_hide_set());
     below.map(|below| write_pages(below, folder)).try_fold(1, |pages, more| Ok(pages + more?))
 }
@@ -286,7 +286,7 @@ fn may_hold_trace<'a>(
         );
         return Err(Failure { message, code: 2 });
     }
-    traces::io::atomic::try_place(out).map_err(|error| Failure { message: error.to_string(), code: 1 })
+    atomic::try_place(out).map_err(|error| Failure { message: error.to_string(), code: 1 })
 }
 
 fn not_an_input<'a>(
@@ -308,7 +308,7 @@ fn not_an_input<'a>(
 fn print(text: &str) -> Result<(), Failure> {
     let mut out = io::stdout().lock();
     match writeln!(out, "{}", text.trim_end_matches('\n')).and_then(|()| out.flush()) {
-        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
             Err(Failure { message: format!("standard output: cannot write to it: {error}"), code: 1 })
         }
         _ => Ok(()),

@@ -111,7 +111,7 @@ mod tests {
 
     #[test]
     fn costs_of_other_work_over_another_reference_are_not_in_one_panel() {
-        assert_ne!(super::timing::HOST_TIME, super::sampled::HOST_TIME);
+        assert_ne!(timing::HOST_TIME, sampled::HOST_TIME);
     }
 
     #[test]

@@ -19,7 +19,9 @@ use traces::device::{Device, DeviceSpec};
 use traces::energy::{FrameEnergy, PowerIntegral, TrueFrame};
 use traces::frames::{FinderMethod, Flag, Marks, Options, Window, default_window, find_with};
 use traces::score::{self, Score, TOLERANCE_S};
-use workloads::scene::{Frustum, Graph, Local, Node, Parts, Rig, SceneCamera, Settings, Trs};
+use workloads::scene::{
+    Frustum, Graph, Local, Node, Parts, Rig, SceneCamera, Settings as SceneSettings, Trs,
+};
 use workloads::{Job, LoadError, Material, Overrides, SampleChoice, Scene, shapes};
 
 /// GPU, platform and energies.
@@ -33,7 +35,7 @@ pub(super) struct Stage {
 
 /// Current sensors of the papers.
 #[derive(Clone, Copy, Debug)]
-struct Sensor {
+pub(super) struct Sensor {
     /// Largest current, A.
     pub range_a: f64,
     /// Noise of a sample, A rms.
@@ -400,13 +402,13 @@ pub(super) fn phone(frame: u32, edge: f64) -> Result<Scene, LoadError> {
         view: Some(Frustum::Orthographic { half_height: 1.0 }),
         near: None,
     };
-    parts.settings = Settings {
+    parts.settings = SceneSettings {
         width: 960,
         height: 640,
         samples: 1,
         frame_rate_hz: 30.0,
         shutter: 0.0,
-        ..Settings::default()
+        ..SceneSettings::default()
     };
     Scene::new(parts)
 }

@@ -142,7 +142,7 @@ pub fn sha256_of_text(text: &str) -> String {
 
 struct Hashing<'a>(&'a mut Sha256);
 
-impl io::Write for Hashing<'_> {
+impl Write for Hashing<'_> {
     fn write(&mut self, buffer: &[u8]) -> io::Result<usize> {
         self.0.update(buffer);
         Ok(buffer.len())

@@ -3,7 +3,7 @@
 use power_model::Part;
 
 use super::axis::{Along, Axis, is_drawable};
-use super::palette::{BACKGROUND, INK, MEASURED, MUTED, STATES, TRUTH, heat, named_unit_colour, part_colour};
+use super::palette::{BACKGROUND, INK, MUTED, STATES, heat, named_unit_colour, part_colour};
 use super::panel::{BELOW, Key, LEGEND_LINE, Panel, aside, legend_column, legend_lines};
 use super::picture::{Across, Look, Picture, Text, shortened, text, text_width};
 use super::series::means;
@@ -166,7 +166,7 @@ impl FramePowerPlot<'_> {
         let mut y = top + 30.0 + pitch * rows as f64;
         for (name, value) in sums {
             picture.text(Text { size: 12.5, ..text(name, (left, y)) });
-            let across = super::picture::Across::Right;
+            let across = Across::Right;
             picture.text(Text { size: 12.5, colour: MUTED, across, ..text(&value, (right, y)) });
             y += LEGEND_LINE;
         }

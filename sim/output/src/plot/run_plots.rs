@@ -1,7 +1,7 @@
 //! The whole run: power over time, and energy of each frame, measured and true.
 
 use super::axis::{Along, Axis, is_drawable};
-use super::palette::{INK, MARK, MEASURED, MUTED, TRUTH};
+use super::palette::{Colour, INK, MARK, MEASURED, MUTED, TRUTH};
 use super::panel::{BELOW, Key, Panel, aside, legend_lines};
 use super::picture::{Across, Look, Picture, Text, text};
 use super::series::{Extremes, extremes, moving_mean};
@@ -329,7 +329,7 @@ impl FrameEnergyPlot<'_> {
         picture.line((panel.left, y), (panel.right, y), MEASURED.alpha(0.6), 1.0);
     }
 
-    fn series(&self, truth: bool, colour: super::palette::Colour, panel: &Panel, picture: &mut Picture) {
+    fn series(&self, truth: bool, colour: Colour, panel: &Panel, picture: &mut Picture) {
         let points: Vec<_> = self.values(truth).map(|(frame, energy)| panel.at(frame, energy)).collect();
         let radius = if truth { 4.5 } else { 3.0 };
         let dots = points.len() <= 300;

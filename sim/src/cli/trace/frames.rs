@@ -18,10 +18,9 @@ use traces::times::read_times;
 use traces::trace::is_within;
 use warnings::{Code, Warning};
 
-use super::input::{Frames, warn_of_frames};
+use super::input::{FindArgs, Frames, InputArgs, anchor, warn_of_frames};
 use super::{report, warn_with, wrong};
 use crate::cli::args::ThreadArgs;
-use crate::cli::trace::input::{FindArgs, InputArgs, anchor, warn_of_frames};
 use crate::cli::{Failure, may_hold_results, print_json};
 
 /// Arguments of `trace frames`.
@@ -64,7 +63,7 @@ pub(super) fn run(args: &FramesArgs, terminal: &Terminal) -> Result<(), Failure>
         let mut frames = args.find.frames(&args.input, &args.input.trace, terminal)?;
         let pixels = args.find.pixels.or(frames.set.metadata.pixels);
         let table = FrameTable::new(std::mem::take(&mut frames.set.energies), pixels);
-        let write = |out| traces::io::atomic::write_file(out, |file| table.write_csv(file));
+        let write = |out| write_file(out, |file| table.write_csv(file));
         let (written, summary) = rayon::join(
             || args.out.as_deref().map_or(Ok(()), write),
             || FrameSummary::of(whole(table.frames(), frames.set.ends_with_trace)),

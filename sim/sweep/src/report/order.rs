@@ -293,7 +293,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn oracle_by_comparing_all_pairs(
+        fn frontier_by_comparing_all_pairs(
             points in prop::collection::vec((0_u8..8, 0_u8..8, 0_u8..8), 0..60)
         ) {
             let points: Vec<[f64; 3]> = points.into_iter().map(|(a, b, c)| [a, b, c].map(f64::from)).collect();
@@ -322,7 +322,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn oracle_by_comparing_all_pairs(costs in prop::collection::vec((1_u8..20, 0_u8..30), 0..30)) {
+        fn ranks_by_comparing_all_pairs(costs in prop::collection::vec((1_u8..20, 0_u8..30), 0..30)) {
             let costs: Vec<(f64, f64)> =
                 costs.into_iter().map(|(a, b)| (f64::from(a), f64::from(b) / 100.0)).collect();
             let ends = |(value, error): (f64, f64)| [value / (1.0 + error), value * (1.0 + error)];

@@ -20,7 +20,7 @@ const MAX_INTERACTIONS: usize = 60;
 
 /// Why the page cannot be made.
 #[derive(Debug, thiserror::Error)]
-enum PageError {
+pub(super) enum PageError {
     /// The template cannot be filled.
     #[error("cannot fill the report: {0}")]
     Template(#[from] minijinja::Error),

@@ -11,7 +11,6 @@ mod shader;
 mod stage;
 
 use activity::{LEVELS, LineAccess, PacketCounts, Unit};
-use machine::Machine;
 
 use self::dram::Dram;
 use self::levels::{L2, Levels};

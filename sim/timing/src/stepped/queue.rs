@@ -5,7 +5,7 @@
 
 use std::collections::VecDeque;
 
-use activity::{Unit, Waits};
+use activity::Unit;
 
 use crate::Recorder;
 use crate::clock::{Clocks, Time};
@@ -255,7 +255,8 @@ impl Sources {
                 sources.barriers.push(Gate::default());
                 sources.barrier_ids.push(id);
                 sources.groups.push(Gate::default());
-                barriers_for_front = if waits == Waits::All { before + 1 } else { barriers_for_front };
+                barriers_for_front =
+                    if waits == activity::Waits::All { before + 1 } else { barriers_for_front };
             }
             sources.paths[usize::from(!demand.front)].push(Waiting {
                 id,

@@ -335,17 +335,18 @@ pub struct RateRow {
 /// Every stream on every GPU of `gpus`.
 pub(super) fn failures(gpus: &[GpuSpec]) -> Result<Vec<FailureRow>, RunError> {
     let cases: Vec<_> = gpus.iter().map(|gpu| streams::failures(&gpu.units, BATCH)).collect();
-    let mut rows = Vec::new();
+    let mut failures = Vec::new();
     for stream in 0..cases.iter().map(Vec::len).max().unwrap_or(0) {
         for (gpu, case) in gpus.iter().zip(&cases).filter_map(|(gpu, cases)| Some((gpu, cases.get(stream)?)))
         {
             let mut gpu = GpuSpec { units: case.units.clone(), ..gpu.clone() };
             gpu.pipeline.batch_triangles = BATCH;
             let packets = Packets::of(&case.packets);
-            rows.push(failure(case.name, rows((case.name, None), &gpu, &packets, &mut Speed::default())?));
+            failures
+                .push(failure(case.name, rows((case.name, None), &gpu, &packets, &mut Speed::default())?));
         }
     }
-    Ok(rows)
+    Ok(failures)
 }
 
 fn failure(stream: &'static str, found: Vec<TimingRow>) -> FailureRow {
@@ -382,7 +383,7 @@ pub(super) fn rates() -> Result<Vec<RateRow>, RunError> {
         let written = Written::new(&gpu, &Packets::of(&rate.packets))?;
         let mut giga_per_s = BTreeMap::new();
         for level in Level::ALL {
-            let (timed, _) = measure::timed(level, &gpu, &written)?;
+            let (timed, _) = timed(level, &gpu, &written)?;
             giga_per_s.insert(level.name(), rate.amount / timed.timeline.duration_s() / 1e9);
         }
         Ok(RateRow { rate: rate.name, unit: rate.unit, giga_per_s, card: card(rate.name) })
