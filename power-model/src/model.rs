@@ -5,11 +5,11 @@ use std::ops::{AddAssign, Index, IndexMut};
 use activity::{Bin, Counts, Event, Timeline, Unit};
 use serde::{Serialize, Serializer};
 
-use crate::error::{ModelError, TimelineError};
 use crate::platform::Platform;
 use crate::quantity::{Bound, Watts};
 use crate::structure::Scaling;
 use crate::table::{EnergyRow, EnergyTable, Supply};
+use crate::{ModelError, TimelineError};
 
 /// A part that draws power: the events of a unit, or power that no event causes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

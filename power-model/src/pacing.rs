@@ -3,7 +3,7 @@
 use traces::Curve;
 use warnings::{Code, Warning};
 
-use crate::error::PacingError;
+use crate::PacingError;
 use crate::model::{Energy, FramePower, Part, S_PER_PS};
 use crate::platform::Platform;
 use crate::quantity::Hertz;

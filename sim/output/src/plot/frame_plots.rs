@@ -3,10 +3,10 @@
 use power_model::Part;
 
 use super::axis::{Along, Axis, is_drawable};
-use super::palette::{BACKGROUND, INK, MUTED, STATES, heat, named_unit_colour, part_colour};
 use super::panel::{BELOW, Key, LEGEND_LINE, Panel, aside, legend_column, legend_lines};
 use super::picture::{Across, Look, Picture, Text, shortened, text, text_width};
 use super::series::means;
+use super::{BACKGROUND, INK, MUTED, STATES, heat, named_unit_colour, part_colour};
 use crate::table::si;
 
 /// A part of the power of a frame. Power that does not depend on activity is grey, at the bottom.

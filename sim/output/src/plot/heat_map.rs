@@ -4,9 +4,9 @@
 use pipeline::texture::linear_to_srgb8;
 
 use super::axis::{Along, Axis, is_drawable};
-use super::palette::{AXIS, BACKGROUND, CLASSES, Colour, INK, MUTED, heat};
 use super::panel::{Key, legend_lines, tick_label};
 use super::picture::{Across, Look, Picture, Point, Text, shortened, text, text_width};
+use super::{AXIS, BACKGROUND, CLASSES, Colour, INK, MUTED, heat};
 use crate::table::digits;
 
 /// A rectangle of the image with a value.

@@ -2,8 +2,8 @@
 //! colour, marker and strokes.
 
 use super::axis::{Axis, RAISED, TICK_PX, Tick, label_width};
-use super::palette::{AXIS, BACKGROUND, Colour, GRID, INK, MUTED, SERIES};
 use super::picture::{Across, Picture, Point, Text, shortened, text, text_width};
+use super::{AXIS, BACKGROUND, Colour, GRID, INK, MUTED, SERIES};
 
 /// Rectangle of the picture, and its two axes.
 #[derive(Clone, Debug)]
@@ -402,8 +402,8 @@ impl Style {
 
 #[cfg(test)]
 mod tests {
+    use super::super::INK;
     use super::super::axis::{Along, Axis};
-    use super::super::palette::INK;
     use super::super::picture::{Look, Shape};
     use super::*;
 

@@ -1,10 +1,10 @@
 //! The whole run: power over time, and energy of each frame, measured and true.
 
 use super::axis::{Along, Axis, is_drawable};
-use super::palette::{Colour, INK, MARK, MEASURED, MUTED, TRUTH};
 use super::panel::{BELOW, Key, Panel, aside, legend_lines};
 use super::picture::{Across, Look, Picture, Text, text};
 use super::series::{Extremes, extremes, moving_mean};
+use super::{Colour, INK, MARK, MEASURED, MUTED, TRUTH};
 use crate::MeanSd;
 use crate::table::{si, si_mean_sd};
 
