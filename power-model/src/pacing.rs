@@ -3,9 +3,8 @@
 use traces::Curve;
 use warnings::{Code, Warning};
 
-use crate::error::PacingError;
-use crate::model::{FramePower, S_PER_PS};
-use crate::parts::{Energy, Part};
+use crate::PacingError;
+use crate::model::{Energy, FramePower, Part, S_PER_PS};
 use crate::platform::Platform;
 use crate::quantity::Hertz;
 

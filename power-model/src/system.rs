@@ -6,7 +6,7 @@
 
 use traces::{Curve, CurveError, random};
 
-use crate::error::PacingError;
+use crate::PacingError;
 use crate::pacing::{PacedFrame, Run};
 use crate::platform::{Disturbance, System};
 

@@ -1,8 +1,7 @@
 //! Platforms and their files: all power that is not caused by events, such as voltages, constant power, leakage,
 //! clock trees and idle power. A platform is scaled for another GPU than the one that it was made for.
 
-mod ranges;
-mod system;
+mod sections;
 
 use std::path::Path;
 
@@ -17,8 +16,7 @@ use crate::quantity::{
 use crate::structure::Scaling;
 use crate::table::EnergyRow;
 
-pub use self::ranges::{Range, Ranges};
-pub use self::system::{Disturbance, Finish, Launch, System};
+pub use sections::{Disturbance, Finish, Launch, Range, Ranges, System};
 
 /// Built-in platforms by name.
 const BUILTIN: [(&str, &str); 3] = [

@@ -4,21 +4,21 @@
 use std::error::Error;
 use std::path::Path;
 
-use experiments::catalog;
+use experiments::all;
 use experiments::study::Request;
 use output::OutDir;
 use output::plot::Look;
-use output::progress::Progress;
+use output::terminal::Progress;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let words: Vec<String> = std::env::args().skip(1).collect();
     let [name, folder] = &words[..] else {
-        for study in catalog::all() {
+        for study in all() {
             println!("{:16} {}", study.name, study.about);
         }
         return Ok(());
     };
-    let study = catalog::all().find(|study| study.name == name).ok_or("unknown study")?;
+    let study = all().find(|study| study.name == name).ok_or("unknown study")?;
     let (look, progress) = (Look::default(), Progress::new(true));
     let done = OutDir::with(Path::new(folder), study.claim(), |dir| {
         let look = &look;

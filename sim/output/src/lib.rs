@@ -5,8 +5,7 @@
 //! - [`plot`]: the plots as SVG and PNG, with an embedded font.
 //! - [`report`]: one HTML page that works without network.
 //! - [`table`]: numbers with SI prefixes and aligned tables.
-//! - [`progress`]: progress bars, only on a terminal.
-//! - [`terminal`]: errors, warnings and notes on standard error.
+//! - [`terminal`]: errors, warnings and notes on standard error, and progress bars, only on a terminal.
 //!
 //! Every part has input structs of its own and does not depend on the crate `run`. The bytes written depend
 //! only on these inputs.
@@ -30,7 +29,6 @@
 pub mod dir;
 pub mod image;
 pub mod plot;
-pub mod progress;
 pub mod report;
 pub mod table;
 pub mod terminal;

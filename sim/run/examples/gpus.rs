@@ -1,7 +1,7 @@
 //! Cycles, energy and area of one frame of a scene on every built-in GPU: `cargo run --release -p run --example gpus -- default`.
 
-use output::progress::Progress;
 use output::table::{digits, si};
+use output::terminal::Progress;
 use run::{GpuSpec, Plan, RunError, RunOptions, area_mm2, frames_of};
 
 fn main() -> Result<(), RunError> {

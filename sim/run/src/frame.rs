@@ -1,26 +1,26 @@
-//! Simulation of one frame: pipeline, timing model and power model.
+//! A frame of a run or of a job: drawn, timed and with its power, and the energy of its passes; and which frames of a run differ.
 
 use std::any::Any;
+use std::collections::HashMap;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
-use activity::{LineAccess, Packet, Timeline, Unit};
+use activity::{Counts, Event, LineAccess, Packet, Timeline, Unit};
 use glam::Vec3;
 use output::OutDir;
 use output::image::LinearImage;
-use output::progress::Progress;
-use pipeline::FrameReport;
+use output::terminal::Progress;
 use pipeline::frame::HeatMap;
-use power_model::PowerModel;
+use pipeline::{FrameReport, Gpu, Viewport};
+use power_model::{FramePower, PowerModel};
 use rayon::prelude::*;
 use timing::{AccuracyWarning, FrameClock, Level, Recorder, Timed};
 use warnings::Warning;
-use workloads::Regime;
-use workloads::job::{Drawn, Fact};
+use workloads::job::{Drawn, Fact, ReadyFrame};
+use workloads::{Fingerprint, Job, Regime};
 
 use crate::heat::{self, HeatPicture};
-use crate::job_frame::{self, BIN_PS};
-use crate::passes;
-use crate::{Distinct, Observed, Origin, Plan, RunError, RunFrame};
+use crate::passes::{self, timed_j};
+use crate::{GpuSpec, Observed, Origin, Plan, RunError, RunFrame};
 
 /// Largest number of bins of all frames, at about 200 bytes each. Longer runs use longer bins.
 const MAX_TOTAL_BINS: usize = 8_000_000;
@@ -143,7 +143,7 @@ pub(crate) fn draw<'a>(
     emit: impl FnMut(&Packet, &[LineAccess]) + 'a,
 ) -> Result<(DrawnFrame, Pictures), RunError> {
     let (ready, events) = (plan.job.prepare(number)?, heat::events(&plan.options.heat));
-    let (drawn, mut report) = job_frame::draw(&plan.gpu, Some((&events, plan.viewport)), &*ready, emit)?;
+    let (drawn, mut report) = draw_on(&plan.gpu, Some((&events, plan.viewport)), &*ready, emit)?;
     let Drawn { image, moving, lens, facts, warnings } = drawn;
     let heat = std::mem::take(&mut report.heat);
     passes::limit_draws(&mut report);
@@ -212,4 +212,206 @@ pub(super) fn write_image(plan: &Plan, dir: &OutDir, number: u32, image: &[Vec3]
         linear.write_exr(dir, &format!("{}.exr", image_name(number)))?;
     }
     Ok(())
+}
+
+/// Length of a timeline bin in picoseconds: one microsecond, a twentieth of a sample at 50 kHz.
+pub const BIN_PS: u64 = 1_000_000;
+
+/// A drawn and timed frame with the energy of its passes.
+pub struct JobFrame {
+    /// Image and facts.
+    pub drawn: Drawn,
+    /// Work by pass.
+    pub report: FrameReport,
+    /// Power over time.
+    pub power: FramePower,
+    /// Its passes, in order.
+    pub passes: Vec<PassEnergy>,
+    /// Energy of writing results to memory when the frame ends, J.
+    pub write_back_j: f64,
+}
+
+/// Energy of a pass.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PassEnergy {
+    /// Its name.
+    pub name: String,
+    /// When its last packet leaves, s from the start of the frame.
+    pub end_s: f64,
+    /// From the end of the pass before, s.
+    pub time_s: f64,
+    /// Energy of its events, as the pipeline counted them, J.
+    pub events_j: f64,
+    /// Energy of clocks, leakage and what is constant in that time, J.
+    pub timed_j: f64,
+}
+
+impl PassEnergy {
+    /// All of it, J.
+    pub fn total_j(&self) -> f64 {
+        self.events_j + self.timed_j
+    }
+}
+
+/// Largest number of bins of a frame.
+const MAX_BINS: usize = 4096;
+
+/// Draws a frame on the pipeline of `gpu`, with heat maps of some events over images of a size, and emits its packets.
+pub(crate) fn draw_on<'a>(
+    gpu: &'a GpuSpec,
+    heat: Option<(&[Event], Viewport)>,
+    ready: &dyn ReadyFrame,
+    emit: impl FnMut(&Packet, &[LineAccess]) + 'a,
+) -> Result<(Drawn, FrameReport), RunError> {
+    let mut on = Gpu::new(&gpu.pipeline, emit).map_err(RunError::setting)?;
+    if let Some((events, viewport)) = heat {
+        on = on.with_heat(events, viewport);
+    }
+    let drawn = ready.draw(&mut on).map_err(RunError::on(gpu))?;
+    Ok((drawn, on.finish()))
+}
+
+impl JobFrame {
+    /// Draws frame `number` of a job.
+    ///
+    /// # Errors
+    /// [`RunError`] if the frame cannot be drawn or timed.
+    pub fn new(job: &dyn Job, number: u32, gpu: &GpuSpec, model: &PowerModel) -> Result<Self, RunError> {
+        let mut clock = FrameClock::new(Level::default(), gpu.machine()?, Recorder::new(BIN_PS, MAX_BINS));
+        let emit = |packet: &_, lines: &_| clock.push(packet, lines);
+        let (drawn, report) = draw_on(gpu, None, &*job.prepare(number)?, emit)?;
+        let timed = clock.finish()?;
+        let power = model.frame(&timed.timeline);
+        let power = power.map_err(|source| RunError::Timeline { frame: number, source })?;
+        let mut before_s = 0.0;
+        let pass = |(pass, time): (&pipeline::PassReport, &timing::PassTime)| {
+            let end_s = time.end_ps as f64 * 1e-12;
+            let from_s = std::mem::replace(&mut before_s, end_s);
+            PassEnergy {
+                name: pass.name.clone(),
+                end_s,
+                time_s: end_s - from_s,
+                events_j: events_j(model, &pass.counts()),
+                timed_j: timed_j(&power, from_s, end_s),
+            }
+        };
+        let passes = report.passes.iter().zip(&timed.passes).map(pass).collect();
+        let write_back_j = events_j(model, &report.write_back);
+        Ok(Self { drawn, report, power, passes, write_back_j })
+    }
+
+    /// Energy of all passes and of the write-back, J: to compare with that of the power over time.
+    pub fn sum_j(&self) -> f64 {
+        self.passes.iter().map(PassEnergy::total_j).sum::<f64>() + self.write_back_j
+    }
+
+    /// Bytes to and from memory.
+    pub fn dram_bytes(&self) -> u64 {
+        let counts = self.report.counts();
+        counts[Event::DramReadBytes] + counts[Event::DramWriteBytes]
+    }
+}
+
+fn events_j(model: &PowerModel, counts: &Counts) -> f64 {
+    model.counts_energy(counts).total_j()
+}
+
+/// Groups of frames with equal input. Each group is simulated once.
+///
+/// Inputs are compared by the [`Fingerprint`] of everything that the renderer receives and that changes from
+/// frame to frame: the camera at both ends of the shutter, every mesh, and all that a workload prepares.
+/// Settings, materials, lights, background, sample table and hardware are constant in a run and are not
+/// compared.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Distinct {
+    /// First frame of each group, in order.
+    numbers: Vec<u32>,
+    /// Index of the group of each frame of the run.
+    groups: Vec<usize>,
+    /// Number of the first frame of the run.
+    start: u32,
+}
+
+impl Distinct {
+    /// Prepares and compares all frames of `job`.
+    ///
+    /// # Errors
+    /// When a frame cannot be made.
+    pub fn new(job: &dyn Job) -> Result<Self, RunError> {
+        let range = job.settings().frames.clone();
+        if range.len() == 1 {
+            return Ok(Self::of(range.start, &[()]));
+        }
+        let start = range.start;
+        let prints = range.into_par_iter().map(|number| job.fingerprint(number));
+        Ok(Self::of(start, &prints.collect::<Result<Vec<Fingerprint>, _>>()?))
+    }
+
+    fn of<K: Eq + std::hash::Hash>(start: u32, inputs: &[K]) -> Self {
+        let (mut numbers, mut known) = (Vec::new(), HashMap::new());
+        let groups = (start..)
+            .zip(inputs)
+            .map(|(number, input)| {
+                *known.entry(input).or_insert_with(|| {
+                    numbers.push(number);
+                    numbers.len() - 1
+                })
+            })
+            .collect();
+        Self { numbers, groups, start }
+    }
+
+    /// Number of the first frame of each group, in order: the frames to simulate.
+    pub fn numbers(&self) -> &[u32] {
+        &self.numbers
+    }
+
+    /// Index of the group of each frame of the run, in [`Self::numbers`].
+    pub fn groups(&self) -> &[usize] {
+        &self.groups
+    }
+
+    /// Numbers of the frames in `group`.
+    pub fn members(&self, group: usize) -> impl Iterator<Item = u32> {
+        (self.start..).zip(&self.groups).filter(move |(_, of)| **of == group).map(|(number, _)| number)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use power_model::{EnergyTable, Platform};
+    use workloads::Overrides;
+    use workloads::deferred::{Deferred, DeferredOptions, LightPass};
+
+    use super::*;
+
+    #[test]
+    fn energies_of_passes_add_up_to_that_of_the_power_over_time() {
+        let gpu = GpuSpec::load("hd_4000").unwrap();
+        let platform = Platform::builtin("hd_4000").unwrap();
+        let model = PowerModel::new(&EnergyTable::builtin("28nm").unwrap(), &platform).unwrap();
+        let overrides = Overrides { size: Some((160, 90)), ..Overrides::default() };
+        for lighting in [LightPass::Screen, LightPass::Volumes] {
+            let options = DeferredOptions { lights: 8, lighting, ..DeferredOptions::default() };
+            let job = Deferred::new(options, &overrides, 1).unwrap();
+            let frame = JobFrame::new(&job, 0, &gpu, &model).unwrap();
+            let names: Vec<&str> = frame.passes.iter().map(|pass| pass.name.as_str()).collect();
+            assert_eq!(names, ["g-buffer", "lighting", "resolve"]);
+            let whole_j: f64 =
+                frame.power.bins().map(|(length_s, watts)| length_s * watts.iter().sum::<f64>()).sum();
+            let error = (frame.sum_j() / whole_j - 1.0).abs();
+            assert!(error < 1e-9, "{error:e}");
+            // Each part is far above what would be missed.
+            let parts = frame.passes.iter().flat_map(|pass| [pass.events_j, pass.timed_j]);
+            assert!(parts.chain([frame.write_back_j]).all(|part_j| part_j > 1e-6 * whole_j));
+        }
+    }
+
+    #[test]
+    fn equal_frames_share_a_group_wherever_they_are() {
+        let found = Distinct::of(7, &["a", "b", "a", "a", "c", "b"]);
+        assert_eq!((found.numbers(), found.groups()), (&[7, 8, 11][..], &[0, 1, 0, 0, 2, 1][..]));
+        assert_eq!(found.members(0).collect::<Vec<_>>(), [7, 9, 10]);
+        assert_eq!(found.members(2).collect::<Vec<_>>(), [11]);
+    }
 }

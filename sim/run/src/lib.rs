@@ -13,7 +13,7 @@
 //!
 //! ```
 //! use run::{Plan, RunOptions, frames_of};
-//! use output::progress::Progress;
+//! use output::terminal::Progress;
 //!
 //! let plan = Plan::resolve(RunOptions { scene: "tiny".into(), ..RunOptions::default() })?;
 //! let frames = frames_of(&plan, &[0], &Progress::new(true))?;
@@ -25,62 +25,57 @@ mod changes;
 mod choice;
 pub mod compare;
 mod dry_run;
-mod error;
 mod frame;
 mod gpu;
 mod hardware;
 mod heat;
-mod images;
-mod job_frame;
-mod machine;
 mod measure;
 mod options;
 mod passes;
-mod pictures;
 mod plan;
 mod provenance;
 mod recording;
 mod report;
 mod sampled;
 mod simulated;
-mod stalls;
-mod stated;
 mod summary;
 pub mod visibility;
 mod warn;
 mod write;
 
-use output::progress::Progress;
-use output::{Destination, OutDir};
+use output::image::ImageError;
+use output::plot::PlotError;
+use output::terminal::Progress;
+use output::{Destination, OutDir, OutputError};
+use pipeline::PassError;
 use power_model::{EnergyTable, Platform};
 use rayon::prelude::*;
-use timing::Level;
+use timing::{Level, TimingError};
+use workloads::job::JobError;
 use workloads::{Overrides, Scene};
 
-use crate::frame::{FrameSimulator, SimulatedFrame, max_bins_per_frame};
+use self::frame::{FrameSimulator, SimulatedFrame, max_bins_per_frame};
 
 pub use changes::{ChangeError, ChangedFile, InputFile};
 pub use choice::{Choice, Dimensions, ProbeSummary, Verified, cheapest_level};
 pub use dry_run::{DryRun, DryTimed, Expected, duration};
-pub use error::RunError;
-pub use frame::{CrashedFrame, frames_of, panic_message};
+pub use frame::{BIN_PS, CrashedFrame, Distinct, JobFrame, PassEnergy, frames_of, panic_message};
 pub use gpu::{GpuError, GpuSpec, PowerFiles};
 pub use hardware::{scaling, structure};
 pub use heat::HeatPicture;
-pub use images::{ImageRow, ImagesSummary};
-pub use job_frame::{BIN_PS, Distinct, JobFrame, PassEnergy};
-pub use machine::{HardwareSummary, area_mm2};
 pub use measure::{Checks, Measurement, Resolution};
 pub use options::{Change, HeatQuantity, PacingChoice, Requested, RunOptions, Sampling};
-pub use passes::{PassSummary, WorkSummary, passes_of};
+pub use passes::{PassSummary, StallShares, WorkSummary, passes_of};
 pub use plan::{Plan, fits_memory, refuse_beside_images};
-pub use provenance::{Host, Input, Provenance, again};
+pub use provenance::{HardwareSummary, Host, Input, Provenance, again, area_mm2};
 pub use recording::{MACHINES_IN_TURN, RecordedRun, Recording, TimedFrames};
 pub use sampled::{Forecast, FramePreview, Previewer, Previews, Signatures};
-pub use simulated::{FrameCost, Modelled, Observed, Origin, Quantity, RunFrame, SampledSummary, Simulated};
-pub use stalls::StallShares;
-pub use stated::{CONFIDENCE, StatedError};
+pub use simulated::{
+    CONFIDENCE, FrameCost, Modelled, Observed, Origin, Quantity, RunFrame, SampledSummary, Simulated,
+    StatedError,
+};
 pub use summary::{Detection, Figures, FrameRow, Summary};
+pub use visibility::{ImageRow, ImagesSummary};
 pub use warn::warnings_of;
 
 /// Results of a run.
@@ -117,7 +112,7 @@ pub fn prepare(
     progress: &Progress,
 ) -> Result<Prepared, RunError> {
     if plan.options.timing.is_none() {
-        images::check_job(&plan)?;
+        visibility::check_job(&plan)?;
     }
     report_camera(&plan, progress);
     let provenance = Provenance::new(&plan, revision)?;
@@ -287,5 +282,120 @@ impl MachineTexts<'_> {
         let simulated = without_files(&plan, &Progress::new(true))?;
         let measurement = measure::measure(&plan, &simulated)?;
         Ok(measurement.frames.iter().map(|frame| frame.energy_j).sum())
+    }
+}
+
+/// Error of a run.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the variants are the sources, documented there")]
+pub enum RunError {
+    #[error(transparent)]
+    Scene(#[from] workloads::LoadError),
+    #[error(transparent)]
+    Frame(#[from] workloads::FrameError),
+    #[error(transparent)]
+    Job(#[from] JobError),
+    /// Groups of lanes do not run on the GPU.
+    #[error("GPU `{gpu}`: {source}")]
+    Groups { gpu: String, source: JobError },
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+    #[error(transparent)]
+    Change(#[from] ChangeError),
+    #[error(transparent)]
+    Platform(#[from] power_model::PlatformError),
+    #[error(transparent)]
+    Table(#[from] power_model::TableError),
+    #[error("energy table and platform: {0}")]
+    Model(#[from] power_model::ModelError),
+    #[error("frame {frame}: internal error of the timing model: {source}. Please report it")]
+    Timeline { frame: u32, source: power_model::TimelineError },
+    #[error("timing: {0}")]
+    Timing(#[from] TimingError),
+    #[error("pacing: {0}")]
+    Pacing(#[from] power_model::PacingError),
+    #[error(transparent)]
+    Samples(#[from] pipeline::sampling::TableError),
+    #[error(transparent)]
+    Device(#[from] traces::device::DeviceError),
+    #[error("sampling the power curve: {0}")]
+    Sample(#[from] traces::device::SampleError),
+    #[error("finding frames: {0}")]
+    Marks(#[from] traces::frames::MarkError),
+    #[error(transparent)]
+    Output(#[from] OutputError),
+    #[error("drawing a plot: {0}")]
+    Plot(#[from] PlotError),
+    #[error("encoding an image: {0}")]
+    Image(#[from] ImageError),
+    #[error("frames.csv: {0}")]
+    Frames(#[from] traces::energy::TableError),
+    #[error("{path}: cannot read it: {source}; check the path")]
+    Input { path: String, source: std::io::Error },
+    #[error(transparent)]
+    Spec(#[from] activity::spec::SpecError),
+    /// A file is cut off or damaged.
+    #[error("{path}: {message}")]
+    Damaged { path: String, message: String },
+    #[error("a recorded frame: {0}")]
+    Stream(#[from] activity::StreamError),
+    #[error(transparent)]
+    Write(#[from] traces::io::WriteError),
+    /// A setting is invalid, or two settings conflict.
+    #[error("{0}")]
+    Setting(String),
+}
+
+impl RunError {
+    /// Invalid setting, with the message of `why`.
+    pub fn setting(why: impl std::fmt::Display) -> Self {
+        Self::Setting(why.to_string())
+    }
+
+    /// Error of a frame on `gpu`, with its name where it is the GPU that cannot run groups.
+    pub(crate) fn on(gpu: &GpuSpec) -> impl FnOnce(JobError) -> Self {
+        |source| match source {
+            JobError::Pass(PassError::Compute { .. }) => Self::Groups { gpu: gpu.name.clone(), source },
+            other => Self::Job(other),
+        }
+    }
+
+    /// Whether the request is at fault (exit code 2): a wrong value, or an input that is missing or damaged. Other failures come
+    /// while it runs (exit code 1).
+    pub fn is_usage(&self) -> bool {
+        match self {
+            Self::Output(error) => error.is_usage(),
+            Self::Pacing(error) => matches!(error, power_model::PacingError::Rate(_)),
+            Self::Timing(error) => matches!(error, TimingError::TooLong),
+            Self::Job(error) => matches!(error, JobError::Setting(_) | JobError::Pass(_)),
+            Self::Frame(_)
+            | Self::Timeline { .. }
+            | Self::Plot(_)
+            | Self::Image(_)
+            | Self::Frames(_)
+            | Self::Write(_) => false,
+            _ => true,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use pipeline::ComputeError;
+
+    use super::*;
+
+    #[test]
+    fn a_missing_compute_unit_names_the_gpu() {
+        let gpu = GpuSpec::load("mobile").unwrap();
+        let pass = || "culling".to_owned();
+        let missing = PassError::Compute { pass: pass(), error: ComputeError::Missing };
+        let error = RunError::on(&gpu)(missing.into());
+        assert!(
+            error.is_usage() && error.to_string().starts_with("GPU `mobile`: pass `culling`:"),
+            "{error}"
+        );
+        let large = PassError::Memory { pass: pass(), bytes: 0 };
+        assert!(RunError::on(&gpu)(large.into()).to_string().starts_with("pass `culling`"));
     }
 }

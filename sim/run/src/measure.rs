@@ -249,7 +249,7 @@ mod tests {
     use super::*;
     use crate::{PacingChoice, RunOptions};
     use output::Destination;
-    use output::progress::Progress;
+    use output::terminal::Progress;
     use workloads::Overrides;
 
     /// Energy error of each frame of a run, as a share, in a trace without noise by a recorder of a rate and a resolution, and the

@@ -10,7 +10,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use activity::{Counts, Event, Unit};
-use output::progress::Progress;
+use output::terminal::Progress;
 use pipeline::Gpu;
 use pipeline::random::mix;
 use power_model::PowerModel;

@@ -14,9 +14,8 @@ use workloads::scene::CameraUsed;
 
 use crate::frame::image_name;
 use crate::measure::{Checks, mean_parts_w};
-use crate::passes::{self, PassSummary};
+use crate::passes::{self, PassSummary, StallShares, stall_shares};
 use crate::provenance::SCHEMA;
-use crate::stalls::{self, StallShares};
 use crate::{
     Choice, HardwareSummary, Host, Input, Measurement, Modelled, Plan, Provenance, Resolution, RunOptions,
     SampledSummary, Simulated, StatedError, Verified, warn,
@@ -270,7 +269,7 @@ impl Summary {
                 .map(|(part, _)| (part.name(), by_part[part.index()]))
                 .collect(),
             unit_busy: unit_busy(simulated),
-            stalls: stalls::shares(simulated),
+            stalls: stall_shares(simulated),
             facts: facts(simulated),
             sample_test_efficiency: counts.sample_test_efficiency(),
             counts,

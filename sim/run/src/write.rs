@@ -2,7 +2,7 @@
 
 use activity::{Packet, Unit};
 use output::dir::{Claim, OutDir, SUMMARY};
-use output::progress::Progress;
+use output::terminal::Progress;
 use pipeline::PassReport;
 use power_model::Part;
 use timing::{DrawSpan, PassTime};
@@ -14,8 +14,8 @@ use traces::score::{TOLERANCE_S, truth_beside};
 
 use crate::frame::image_name;
 use crate::heat::heat_name;
-use crate::passes::take_turns;
-use crate::{FIGURES, FinishedRun, FrameRow, Observed, Plan, RunError, pictures, report, stalls};
+use crate::passes::{stall_tracks, take_turns};
+use crate::{FIGURES, FinishedRun, FrameRow, Observed, Plan, RunError, report};
 
 /// Files that a run may write.
 pub(super) fn claim(plan: &Plan) -> Claim {
@@ -51,7 +51,7 @@ pub(super) fn write(outcome: &FinishedRun, dir: &OutDir, progress: &Progress) ->
     let timeline = timeline(outcome, &process);
     dir.write_file("timeline.perfetto-trace", |out| Ok(perfetto::write(&timeline, out)?))?;
     bar.inc();
-    let plots = pictures::plots(outcome);
+    let plots = report::plots(outcome);
     for plot in &plots {
         plot.picture.write(dir, plot.stem)?;
     }
@@ -111,7 +111,7 @@ fn timeline<'a>(outcome: &'a FinishedRun, process: &'a str) -> PerfettoTimeline<
     let parts = Part::ALL.into_iter().filter(|part| energy[*part] > 0.0);
     let starts: Vec<u64> = outcome.measurement.run.frames.iter().map(|paced| ns(paced.start_s)).collect();
     let power = std::iter::once(total_power(outcome)).chain(parts.map(|part| part_power(outcome, part)));
-    let counters = power.chain(stalls::tracks(&outcome.simulated, &starts)).collect();
+    let counters = power.chain(stall_tracks(&outcome.simulated, &starts)).collect();
     PerfettoTimeline { process, frames: frames(outcome), units, counters }
 }
 

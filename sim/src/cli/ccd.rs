@@ -4,17 +4,15 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use output::progress::Progress;
 use output::table::{Table, grouped};
-use output::terminal::Terminal;
+use output::terminal::{Progress, Terminal};
 use rayon::prelude::*;
 use serde::Serialize;
 use workloads::collision::{Answer, CaseFiles, Method, Object, Search, Verdict, candidates, detect_each};
 
-use super::Failure;
-use super::outputs::{print, print_json};
+use super::{Failure, print, print_json};
 use crate::cli::args::ThreadArgs;
-use crate::cli::outputs;
+use crate::cli::may_hold_results;
 
 /// Arguments of `ccd`.
 #[derive(Debug, Args)]
@@ -257,7 +255,7 @@ impl<'a> Rows<'a> {
         let Some(path) = args.csv.as_deref() else { return Ok(Self::Unasked) };
         if !PRINTED.iter().any(|printed| path == Path::new(printed)) {
             let inputs = args.files.iter().map(PathBuf::as_path);
-            return outputs::may_hold_results("--csv", Some(path), inputs).map(|()| Self::File(path));
+            return may_hold_results("--csv", Some(path), inputs).map(|()| Self::File(path));
         }
         if args.json {
             let message = format!(

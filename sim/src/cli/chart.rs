@@ -7,20 +7,18 @@ use std::time::Instant;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::error::{ContextKind, ContextValue};
 use clap::{Arg, Args, Command};
-use experiments::catalog::{ALL, CHARTS, all};
 use experiments::reproduce::{self, Options, Paper};
 use experiments::stress::{Report, StressEffort, family_named};
 use experiments::study::tradeoff::{self, Index, Section};
 use experiments::study::{Done, Entry, Request, Study, StudyError};
+use experiments::{ALL, CHARTS, all};
 use output::plot::Look;
-use output::progress::Progress;
-use output::terminal::Terminal;
+use output::terminal::{Progress, Terminal};
 use output::{Destination, OutDir, OutputError};
 use run::RunError;
 use serde_json::{Map, Value};
 
-use super::Failure;
-use super::outputs::{print, print_json};
+use super::{Failure, print, print_json};
 use crate::cli::args::{LookArgs, ThreadArgs};
 use crate::cli::parse::named;
 

@@ -8,9 +8,7 @@ use run::compare::{
     Change, CompareError, Comparison, FolderComparison, ImageComparison, RunComparison, compare, shown,
 };
 
-use super::Failure;
-use super::outputs::may_hold_results;
-use super::outputs::{print, print_json};
+use super::{Failure, may_hold_results, print, print_json};
 
 /// Arguments of `compare`.
 #[derive(Debug, Args)]

@@ -6,15 +6,12 @@ use std::path::PathBuf;
 use clap::Args;
 use output::table::{Table, counted, digits, grouped};
 use serde::Serialize;
-use workloads::Alpha;
-use workloads::FixedSamples;
-use workloads::catalog;
 use workloads::job::{OptionSource, Request};
 use workloads::scene::{CameraUsed, SceneInfo, SettingsInfo};
 use workloads::visibility::{self, VisibilityScene};
+use workloads::{Alpha, FixedSamples, catalog};
 
-use super::Failure;
-use super::outputs::{print, print_json};
+use super::{Failure, print, print_json};
 use crate::cli::args::SceneArgs;
 
 /// Arguments of `info`.

@@ -3,7 +3,7 @@
 //! Defaults are those of the workloads themselves. Ranges are checked against what the workloads accept by the tests below.
 
 use activity::spec::suggestion;
-use experiments::catalog::{ALL, CHARTS};
+use experiments::{ALL, CHARTS};
 use output::table::Table;
 use run::GpuSpec;
 use serde::Serialize;
@@ -11,8 +11,7 @@ use serde_json::{Map, Value};
 use workloads::job::{JobOptions, Need};
 use workloads::{caustics, collision, compute, deferred, glossy, multiview, occlusion, points, soft_shadows};
 
-use super::outputs::{print, print_json};
-use super::{Failure, ListArgs};
+use super::{Failure, ListArgs, print, print_json};
 
 /// Names of all built-in things, each with a description.
 #[derive(Serialize)]

@@ -3,9 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use output::progress::Progress;
 use output::table::{Table, counted, si};
-use output::terminal::Terminal;
+use output::terminal::{Progress, Terminal};
 use power_model::Bound;
 use rayon::prelude::*;
 use run::{Change, MACHINES_IN_TURN, PacingChoice, Plan, RecordedRun, RunError, RunOptions, TimedFrames};
@@ -14,10 +13,8 @@ use sweep::{Measured, Setting, measured};
 use timing::Level;
 use workloads::job::OptionSource;
 
-use super::Failure;
-use super::lists;
-use super::outputs::{may_hold_trace, print, print_json};
 use super::run::{bound, one_gpu, pacing};
+use super::{Failure, lists, may_hold_trace, print, print_json};
 use crate::cli::args::{SceneArgs, ThreadArgs};
 use crate::cli::parse::setting;
 

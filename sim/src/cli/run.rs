@@ -8,9 +8,8 @@ use activity::spec::suggestion;
 use clap::builder::TypedValueParser;
 use clap::parser::ValueSource;
 use clap::{ArgMatches, Args, ValueEnum};
-use output::progress::Progress;
 use output::table::{Table, count_or_digits, counted, si, si_mean_sd};
-use output::terminal::{Terminal, Verbosity};
+use output::terminal::{Progress, Terminal, Verbosity};
 use output::{Destination, MeanSd};
 use power_model::Bound;
 use run::{
@@ -21,9 +20,7 @@ use serde::Serialize;
 use timing::Level;
 use workloads::job::OptionSource;
 
-use super::Failure;
-use super::lists;
-use super::outputs::{json_text, print};
+use super::{Failure, json_text, lists, print};
 use crate::cli::args::{LookArgs, SceneArgs, ThreadArgs};
 use crate::cli::parse::{duration, named, percent, rate, setting, share_below_one};
 

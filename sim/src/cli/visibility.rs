@@ -17,8 +17,7 @@ use warnings::{Code, Warning};
 use workloads::visibility::{self, CameraSpec, VisibilityScene};
 use workloads::{FixedSamples, SampleChoice, write_hits, write_samples};
 
-use super::Failure;
-use super::outputs::{print, print_json};
+use super::{Failure, print, print_json};
 use crate::cli::args::ThreadArgs;
 use crate::cli::parse::{per_pixel, size, tests};
 
@@ -80,7 +79,7 @@ struct Found {
 pub(super) fn run(args: &VisibilityArgs, terminal: &Terminal) -> Result<(), Failure> {
     let named = args.camera.iter().chain([&args.samples]).map(Path::new);
     let inputs = args.files.iter().map(PathBuf::as_path).chain(named);
-    super::outputs::may_hold_results("--out", args.out.as_deref(), inputs)?;
+    super::may_hold_results("--out", args.out.as_deref(), inputs)?;
     let scene = visibility::load(&args.files, args.camera.as_deref())?;
     if args.print_camera {
         return print_camera(args, &scene);
@@ -229,7 +228,7 @@ struct Written {
 }
 
 pub(super) fn write_table(args: &SamplesArgs) -> Result<(), Failure> {
-    super::outputs::may_hold_results("--out", Some(&args.out), [Path::new(&args.table)])?;
+    super::may_hold_results("--out", Some(&args.out), [Path::new(&args.table)])?;
     let (width, height) = args.size;
     let wrong = |message: String| Failure { message, code: 2 };
     if args.out.extension().is_none_or(|ending| ending != "smp") {

@@ -8,10 +8,9 @@ use serde::{Deserialize, Serialize};
 use crate::axis::Axis;
 use crate::execute::{Outcome, execute};
 use crate::plan::{Plan, Point, id_of, version};
-use crate::points::Points;
+use crate::points::{Points, round_whole};
 use crate::setting::Setting;
 use crate::spec::SweepSpec;
-use crate::trials::round_whole;
 use crate::{Folder, SweepError};
 
 /// A search in the space of a sweep file. Points that were run before are read from the folder.

@@ -1,18 +1,17 @@
-//! One point: its run, and what is kept of it.
+//! One point: its run, and what is kept of it: sums, passes, and both ends of the energy table.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use activity::Event;
-use output::progress::Progress;
-use power_model::{FramePower, pace};
+use activity::{Bin, Event};
+use output::terminal::Progress;
+use power_model::{Bound, FramePower, ModelError, pace};
 use run::{
     Distinct, Plan, RunError, RunFrame, Simulated, StatedError, area_mm2, frames_of, panic_message,
-    warnings_of,
+    passes_of, warnings_of,
 };
 use serde::{Deserialize, Serialize};
 
-use crate::detail::{self, PassMeans};
 use crate::setting::{self, Setting};
 
 /// Result of a point.
@@ -182,7 +181,7 @@ pub fn measured(plan: &Plan, distinct: Vec<RunFrame>, groups: &[usize]) -> Resul
     let counts = EventCounts::of(frames);
     let area = area_mm2(plan);
     let bytes = |event: Event| counts.get(event).unwrap_or(0);
-    let [low_j, high_j] = detail::energy_ends(plan, frames)?;
+    let [low_j, high_j] = energy_ends(plan, frames)?;
     let accuracy = frames.iter().filter_map(|frame| frame.observed()).flat_map(|observed| &observed.accuracy);
     let stated = StatedError::of_frames(plan.options.level(), frames.iter().copied());
     Ok(Measured {
@@ -201,7 +200,7 @@ pub fn measured(plan: &Plan, distinct: Vec<RunFrame>, groups: &[usize]) -> Resul
         warnings: joined(warnings_of(plan, &simulated, &paced).iter().map(|warning| warning.code.name())),
         cycles_error: stated.cycles,
         energy_error: stated.energy,
-        passes: detail::passes(plan, frames),
+        passes: passes(plan, frames),
         counts,
     })
 }
@@ -229,6 +228,46 @@ fn used(plan: &Plan) -> BTreeMap<String, String> {
 /// Each of some codes once, sorted, comma-separated.
 fn joined(codes: impl Iterator<Item = &'static str>) -> String {
     codes.collect::<BTreeSet<_>>().into_iter().collect::<Vec<_>>().join(",")
+}
+
+/// Time and energy of the passes of one name, mean per frame.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PassMeans {
+    /// Name of the pass.
+    pub name: String,
+    /// Milliseconds.
+    pub ms: f64,
+    /// Millijoules.
+    pub mj: f64,
+}
+
+/// Passes of a run in the order of their first use. Their times add up to the busy time, their energies to the busy energy.
+pub(crate) fn passes(plan: &Plan, frames: &[&RunFrame]) -> Vec<PassMeans> {
+    let count = frames.len().max(1) as f64;
+    let means = |pass: run::PassSummary| PassMeans {
+        name: pass.name,
+        ms: pass.all.time_s / count * 1e3,
+        mj: pass.all.energy_j / count * 1e3,
+    };
+    passes_of(plan, frames.iter().copied()).into_iter().map(means).collect()
+}
+
+/// Busy energy in joules, mean per frame, with all energies and watts at their low and at their high end. Nothing is timed again.
+///
+/// # Errors
+/// If table and platform do not match.
+fn energy_ends(plan: &Plan, frames: &[&RunFrame]) -> Result<[f64; 2], ModelError> {
+    let count = frames.len().max(1) as f64;
+    let at = |bound: Bound| {
+        let model = plan.model_at(bound)?;
+        let energy_j = |frame: &&RunFrame| {
+            let counts = frame.observed().map(|observed| observed.counts).unwrap_or_default();
+            model.energy_of(&Bin { counts, busy_ps: frame.busy_ps }, frame.power.duration_ps()).total_j()
+        };
+        Ok::<f64, ModelError>(frames.iter().map(energy_j).sum::<f64>() / count)
+    };
+    Ok([at(Bound::Low)?, at(Bound::High)?])
 }
 
 #[cfg(test)]

@@ -16,26 +16,21 @@
 mod ask;
 mod axis;
 mod constraint;
-mod detail;
 mod error;
 mod execute;
 mod folder;
 mod merge;
-mod parquet;
-mod place;
 mod plan;
 mod points;
 mod report;
 mod run;
 mod screen;
 mod setting;
-mod shard;
 mod shared;
 mod slurm;
 mod spec;
-mod trials;
 
-pub use self::run::{Expected, Status, Work};
+pub use self::run::{Expected, Shard, Status, Work};
 pub use ask::{Answer, Dimension, Question, Search};
 pub use axis::Axis;
 pub use error::SweepError;
@@ -49,6 +44,5 @@ pub use report::{
     RatedDesign, Report, ReportOptions, Share, Winner,
 };
 pub use setting::{Setting, Text, is_option, with};
-pub use shard::Shard;
 pub use slurm::{Scripts, SlurmArray, SlurmJob, submit};
 pub use spec::{Combination, MAX_POINTS, SweepSpec};

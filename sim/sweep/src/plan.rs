@@ -3,16 +3,15 @@
 use std::path::Path;
 
 use output::dir::sha256_of_text;
-use output::progress::Progress;
+use output::terminal::Progress;
 use serde::{Deserialize, Serialize};
 use timing::Level;
 
 use crate::SweepError;
-use crate::place::placed;
-use crate::points::Points;
+use crate::error::placed;
+use crate::points::{Points, Refusal, Ticker, Trials, round_whole};
 use crate::setting::Setting;
 use crate::spec::{Combination, SweepSpec};
-use crate::trials::{Refusal, Ticker, Trials, round_whole};
 
 /// Version of the files of a sweep.
 pub(crate) const SCHEMA: u32 = 2;

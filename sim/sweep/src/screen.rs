@@ -226,7 +226,7 @@ pub(crate) fn note(coarse: Level, fine: Level, screened: &Screened<'_>) -> Strin
 mod tests {
     use std::collections::HashMap;
 
-    use output::progress::Progress;
+    use output::terminal::Progress;
 
     use super::*;
     use crate::{Shard, Status, Work};

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use std::iter::Sum;
 
 use cpu_time::ProcessTime;
-use output::progress::Progress;
+use output::terminal::Progress;
 use rayon::prelude::*;
 use run::{Distinct, MACHINES_IN_TURN, Recording, RunError, TimedFrames};
 

@@ -36,32 +36,33 @@ mod clock;
 mod data_unit;
 mod demand;
 mod draws;
-mod frame_clock;
 mod packet;
 mod passes;
 mod recorder;
 pub mod sampled;
 mod service;
 mod spec;
-mod stalls;
 pub mod stepped;
 pub mod streams;
+
+use activity::{LineAccess, Packet};
+use serde::{Deserialize, Serialize};
+use warnings::{Code, Warning};
+
+use stepped::{Stalled, StepOptions, Stream};
 
 pub use bound::{BoundClock, Totals, bound};
 pub use clock::{Clocks, Time};
 pub use demand::{CLIENTS, DemandBuilder, ServiceDemand, Station};
 pub use draws::DrawSpan;
-pub use frame_clock::AccuracyWarning;
-pub use frame_clock::{FrameClock, Level, Machine, TimingError};
 pub use packet::{MAX_CYCLES, PacketClock};
 pub use passes::PassTime;
-pub use recorder::Recorder;
+pub use recorder::{Reason, Recorder, Stalls, UnitTime};
 pub use service::{CYCLE, Work};
 pub use spec::{
     BinsSpec, Chips, ClientSpec, Clock, Common, Cycles, DramSpec, Entries, MachineSpec, Rates, RefreshSpec,
     RowBytes, ShaderSpec, SharedCacheSpec, UnitSpec, WaitCycles, Width,
 };
-pub use stalls::{Reason, Stalls, UnitTime};
 
 /// Bytes of a memory line.
 pub const LINE_BYTES: u32 = 64;
@@ -110,4 +111,216 @@ fn short_queues(dram: &DramSpec, timeline: &activity::Timeline) -> Option<f64> {
 fn ratio_to_busiest(length_ps: u64, timeline: &activity::Timeline) -> f64 {
     let busiest = timeline.busy_ps().into_iter().max().unwrap_or(0);
     length_ps as f64 / busiest.max(1) as f64
+}
+
+/// Timing level.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Level {
+    /// Every unit from cycle to cycle: the reference, slow
+    Stepped,
+    /// A recurrence over packets
+    #[default]
+    Packet,
+    /// The busiest unit of each batch, fill and drain
+    Bound,
+}
+
+impl Level {
+    /// All levels, the most exact first.
+    pub const ALL: [Self; 3] = [Self::Stepped, Self::Packet, Self::Bound];
+
+    /// Name on the command line and in files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Stepped => "stepped",
+            Self::Packet => "packet",
+            Self::Bound => "bound",
+        }
+    }
+}
+
+/// Why a frame could not be timed.
+#[derive(Debug, thiserror::Error)]
+pub enum TimingError {
+    /// The level `stepped` reached a deadlock.
+    #[error(transparent)]
+    Stalled(#[from] Stalled),
+    /// The frame is longer than the level `packet` can store.
+    #[error(
+        "a frame takes more than {MAX_CYCLES} cycles of the core clock, more than `--timing packet` holds: check the rates of the \
+         GPU file, ask for fewer pixels or samples, or use `--timing bound`"
+    )]
+    TooLong,
+    /// The clocks have no common grain; validated GPUs always have one.
+    #[error("the clocks of GPU `{0}` have no common cycle")]
+    Clocks(String),
+}
+
+/// The properties of a GPU that its timing depends on.
+#[derive(Clone, Copy, Debug)]
+pub struct Machine<'a> {
+    /// Rates, latencies, queues and clock domains of all units.
+    pub units: &'a MachineSpec,
+    /// Both clocks.
+    pub clocks: Clocks,
+}
+
+/// Clock of one frame, at any level.
+pub struct FrameClock<'a> {
+    machine: Machine<'a>,
+    state: State,
+}
+
+enum State {
+    Stepped(Box<(DemandBuilder, Stream, Recorder)>),
+    Packet(Box<PacketClock>),
+    Bound(Box<BoundClock>),
+}
+
+impl<'a> FrameClock<'a> {
+    /// A clock at time 0.
+    pub fn new(level: Level, machine: Machine<'a>, recorder: Recorder) -> Self {
+        let Machine { units, clocks } = machine;
+        let state = match level {
+            Level::Stepped => {
+                State::Stepped(Box::new((DemandBuilder::new(units), Stream::default(), recorder)))
+            }
+            Level::Packet => State::Packet(Box::new(PacketClock::new(units, clocks, recorder))),
+            Level::Bound => State::Bound(Box::new(BoundClock::new(units, clocks, recorder))),
+        };
+        Self { machine, state }
+    }
+
+    /// Add the next packet of the stream and the lines it requests from the L2.
+    pub fn push(&mut self, packet: &Packet, lines: &[LineAccess]) {
+        match &mut self.state {
+            State::Stepped(state) => state.1.push(&mut state.0, packet, lines),
+            State::Packet(clock) => clock.push(packet, lines),
+            State::Bound(clock) => clock.push(packet, lines),
+        }
+    }
+
+    /// Timing of the frame.
+    ///
+    /// # Errors
+    /// [`TimingError::Stalled`] is an error of the model; [`TimingError::TooLong`] limits the level `packet`.
+    pub fn finish(self) -> Result<Timed, TimingError> {
+        Ok(match self.state {
+            State::Stepped(state) => {
+                let (builder, stream, recorder) = *state;
+                stepped::run(
+                    self.machine.units,
+                    self.machine.clocks,
+                    &builder,
+                    &stream,
+                    recorder,
+                    &StepOptions::default(),
+                )?
+            }
+            State::Packet(clock) if clock.is_too_long() => return Err(TimingError::TooLong),
+            State::Packet(clock) => clock.finish(),
+            State::Bound(clock) => clock.finish(),
+        })
+    }
+}
+
+/// Reason why the time of a frame may be inaccurate at its level.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum AccuracyWarning {
+    /// Share of the frame for which a memory bank opens rows in an order that `packet` and `bound` do not know: those that other
+    /// lines may have open at `packet`, all at `bound`, there over the busy time of the busiest unit.
+    MemoryRows(f64),
+    /// Utilization of memory whose queues are shorter than the opening of a row: which lines are in the queue of a channel, and which
+    /// wait in front of it, decides how well rows and buses are used.
+    MemoryQueue(f64),
+    /// Share of the frame that batches and passes may overlap. `bound` does not know for how much of it they do.
+    BatchOverlap(f64),
+    /// Core cycles per packet. At `bound`, short packets wait for one unit each, so no unit is busy for long.
+    ShortPackets(f64),
+}
+
+/// Smallest disputed share of the frame that gives a warning at `packet`, and smallest row time over busy time at `bound`.
+const MIN_ROWS: f64 = 0.2;
+/// Least utilization of memory with short queues that gives a warning at `packet`, and at `bound`.
+const MIN_QUEUED: [f64; 2] = [0.2, 0.15];
+/// Smallest share of the frame that batches and passes may overlap that gives a warning: half of it is what `bound` takes, and any part
+/// may be right.
+const MIN_OVERLAP: f64 = 0.16;
+/// Packets with fewer cycles than this give a warning.
+const MIN_PACKET_CYCLES: f64 = 2.0;
+
+impl AccuracyWarning {
+    /// All warnings about a frame at `level`.
+    pub fn all(level: Level, timed: &Timed) -> Vec<Self> {
+        let is_bound = level == Level::Bound;
+        let rows = if is_bound { timed.rows } else { timed.disputed };
+        let rows = rows.filter(|&share| share >= MIN_ROWS).map(Self::MemoryRows);
+        let least = MIN_QUEUED[usize::from(is_bound)];
+        let queues = timed.short_queues.filter(|&share| share >= least).map(Self::MemoryQueue);
+        let overlap = timed.overlap.filter(|&share| share >= MIN_OVERLAP).map(Self::BatchOverlap);
+        let cycles = timed.cycles as f64 / timed.packets.max(1) as f64;
+        let short = (is_bound && cycles < MIN_PACKET_CYCLES).then_some(Self::ShortPackets(cycles));
+        [rows, queues, overlap, short].into_iter().flatten().collect()
+    }
+
+    /// Warning code.
+    pub const fn code(self) -> Code {
+        match self {
+            Self::MemoryRows(_) => Code::MemoryRows,
+            Self::MemoryQueue(_) => Code::MemoryQueue,
+            Self::BatchOverlap(_) => Code::BatchOverlap,
+            Self::ShortPackets(_) => Code::ShortPackets,
+        }
+    }
+
+    /// Severity, comparable among warnings of one kind; larger is worse.
+    pub fn extent(self) -> f64 {
+        match self {
+            Self::MemoryRows(share) | Self::MemoryQueue(share) | Self::BatchOverlap(share) => share,
+            Self::ShortPackets(cycles) => -cycles,
+        }
+    }
+
+    /// Warning about a frame.
+    pub fn warning(self, frame: u32, level: Level) -> Warning {
+        let name = level.name();
+        match self {
+            Self::MemoryRows(share) => Warning::new(
+                Code::MemoryRows,
+                format!(
+                    "a bank of memory opens rows for {:.0} % of {} in frame {frame} that lines of the same row may have open: \
+                     times at `{name}` may be far off, as what counts is which lines wait side by side; use --timing \
+                     stepped, or let --accuracy choose",
+                    100.0 * share,
+                    if level == Level::Bound { "the busy time" } else { "the time" },
+                ),
+            ),
+            Self::MemoryQueue(share) => Warning::new(
+                Code::MemoryQueue,
+                format!(
+                    "memory is busy for {:.0} % of frame {frame}, and a queue of a channel is shorter than the time in which a row \
+                     opens: times at `{name}` may be a tenth too short or more, as lines wait in front of full queues in an order \
+                     that it does not know; use a longer `dram.queue` (or `dram.write_queue`), --timing stepped, or let --accuracy choose",
+                    100.0 * share,
+                ),
+            ),
+            Self::BatchOverlap(share) => Warning::new(
+                Code::BatchOverlap,
+                format!(
+                    "the longest packets of the batches and passes of frame {frame} take {:.0} % of it: times at `{name}` may be \
+                     off by half of that, as it does not know how far batches overlap; use --timing packet, or let --accuracy \
+                     choose",
+                    100.0 * share,
+                ),
+            ),
+            Self::ShortPackets(cycles) => Warning::new(
+                Code::ShortPackets,
+                format!(
+                    "a packet comes every {cycles:.1} cycles of frame {frame}: with packets so short `{name}` is up to a \
+                     quarter too short; use --timing packet, or let --accuracy choose"
+                ),
+            ),
+        }
+    }
 }

@@ -3,7 +3,7 @@
 use cpu_time::ThreadTime;
 use output::OutputError;
 use output::plot::{ChartPanel, Scale, Series};
-use output::progress::Progress;
+use output::terminal::Progress;
 use serde::Serialize;
 use workloads::collision::families::{Case, cases, reference_cases, slide, triangles_boxes_touch};
 use workloads::collision::{Method, Search, Sweeps, candidates, detect};

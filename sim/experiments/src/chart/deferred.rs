@@ -7,20 +7,19 @@ use activity::Event;
 use glam::{DVec3, Vec3};
 use output::OutputError;
 use output::plot::{ChartPanel, Scale, Series};
-use output::progress::Progress;
+use output::terminal::Progress;
 use power_model::{EnergyTable, Platform, PowerModel};
 use rayon::prelude::*;
-use run::{GpuSpec, RunError};
+use run::{GpuSpec, JobFrame, RunError};
 use serde::Serialize;
 use workloads::deferred::{Deferred, DeferredOptions, LightPass, Method, NormalFormat, Rate};
 use workloads::scene::{Local, Node, Parts, Rig, Scene, SceneCamera, Trs};
 use workloads::{Alpha, Material, Overrides, shapes};
 
-use crate::chart::statistics::{errors, mean_square};
+use crate::chart::{errors, mean_square};
 use crate::study::table::{Sheet, Table, count, fixed, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
 use crate::study::{Gallery, Study, StudyError};
-use run::JobFrame;
 
 /// How much is drawn.
 #[derive(Clone, Copy, Debug, Serialize)]

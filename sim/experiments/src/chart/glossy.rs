@@ -9,7 +9,7 @@ use activity::Event;
 use glam::{DVec3, Vec3};
 use output::OutputError;
 use output::plot::{ChartPanel, Scale, Series};
-use output::progress::Progress;
+use output::terminal::Progress;
 use pipeline::sampling::SampleSource;
 use pipeline::{Cull, Draw, Geometry, Gpu, LensShape, SampleSpec, SampleTable};
 use run::GpuSpec;
@@ -18,7 +18,7 @@ use workloads::accumulation::{RayWork, Rays, SharedSamples};
 use workloads::glossy::{Effect, Lobe, Map, default_scene, receiver};
 use workloads::{Frame, Scene};
 
-use crate::chart::statistics::{White, errors, mean_square};
+use crate::chart::{White, errors, mean_square};
 use crate::study::table::{Sheet, Table, count, fixed, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
 use crate::study::{Gallery, Ran, Study, StudyError};

@@ -6,7 +6,7 @@
 use cpu_time::ThreadTime;
 use output::OutputError;
 use output::plot::{ChartPanel, Scale, Series};
-use output::progress::Progress;
+use output::terminal::Progress;
 use pipeline::sampling::HashedSamples;
 use pipeline::visibility::{SampleLayout, Tally, Visibility, resolve};
 use pipeline::{Cull, Geometry, LensShape};
@@ -14,7 +14,7 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde::Serialize;
 use workloads::stress::{Size, Soup, StressError, StressScene};
 
-use super::statistics::{exponent, upper_half};
+use super::{exponent, upper_half};
 use crate::study::table::{Sheet, Table, fixed, millis, optional, plain};
 use crate::study::{Gallery, Study, StudyError};
 

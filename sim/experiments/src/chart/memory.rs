@@ -3,7 +3,7 @@
 use activity::{Event, Unit};
 use output::OutputError;
 use output::plot::{AxisSpec, ChartPanel, Mark, Paint, Scale, Series};
-use output::progress::Progress;
+use output::terminal::Progress;
 use pipeline::CacheSpec;
 use power_model::Part;
 use rayon::prelude::*;

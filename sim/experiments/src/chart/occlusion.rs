@@ -5,7 +5,7 @@ use activity::Event;
 use glam::Vec3;
 use output::OutputError;
 use output::plot::{ChartPanel, Scale, Series};
-use output::progress::{Bar, Progress};
+use output::terminal::{Bar, Progress};
 use pipeline::depth::{BoxGrid, Pyramid};
 use pipeline::geometry::Projection;
 use pipeline::{

@@ -7,7 +7,7 @@ use std::path::Path;
 use cpu_time::ProcessTime;
 use output::OutputError;
 use output::plot::{AxisSpec, ChartPanel, Mark, Paint, Series};
-use output::progress::Progress;
+use output::terminal::Progress;
 use run::{
     Distinct, Forecast, Plan, Previews, Quantity, RunError, RunFrame, RunOptions, Sampling, Signatures,
     frames_of,
@@ -15,7 +15,7 @@ use run::{
 use serde::Serialize;
 use workloads::Overrides;
 
-use super::statistics::quantiles;
+use super::quantiles;
 use crate::study::table::{Sheet, Table, fixed, percent, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
 use crate::study::{Gallery, Study, StudyError};

@@ -10,7 +10,7 @@ use activity::{Counts, Event};
 use glam::Vec3;
 use output::OutputError;
 use output::plot::{ChartPanel, Scale, Series};
-use output::progress::Progress;
+use output::terminal::Progress;
 use pipeline::sampling::SampleSource;
 use pipeline::{
     Cull, Draw, Gpu, PipelineSpec, RasterPass, SampleSpec, SampleTable, Settings, Target, Viewport,
@@ -24,7 +24,7 @@ use workloads::soft_shadows::{
 use workloads::{Frame, Overrides, Scene};
 
 use crate::chart::glossy::Traced;
-use crate::chart::statistics::{errors, mean_square, neighbours};
+use crate::chart::{errors, mean_square, neighbours};
 use crate::study::table::{Sheet, Table, count, fixed, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
 use crate::study::{Gallery, Study, StudyError};

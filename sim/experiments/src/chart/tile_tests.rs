@@ -14,7 +14,7 @@ use crate::study::tradeoff::{Metric, TradeoffPoint, front};
 use crate::study::{Gallery, Study, StudyError};
 use output::OutputError;
 use output::plot::{AxisSpec, ChartPanel, Mark, Paint, Scale, Series};
-use output::progress::Progress;
+use output::terminal::Progress;
 use run::{GpuSpec, RunError};
 
 /// Families of the failure catalogue in the chart, each at one value.

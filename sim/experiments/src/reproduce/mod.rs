@@ -8,28 +8,25 @@
 //! Inputs come from the papers only. A committed file of settings for each paper has what it states and what it leaves open. The
 //! verdict of a row is over all values of open settings (`Band`).
 
-mod band;
 mod paper2;
 mod paper3;
 mod paper6;
 mod report;
 mod row;
-mod scenes;
 mod settings;
 mod stage;
 
 use std::path::PathBuf;
 
 use output::Destination;
-use output::progress::Progress;
+use output::terminal::Progress;
 use run::RunError;
 use serde::Serialize;
 use settings::Form;
 
-pub use band::{Band, Case, Kind, Turn, Verdict};
 pub use report::{Figure, Report};
-pub use row::{Number, Row};
-pub use settings::{About, Listed, Origin};
+pub use row::{Band, Case, Number, Row, Turn, Verdict};
+pub use settings::{About, Kind, Listed, Origin};
 
 /// Papers with reproduced claims.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]

@@ -2,7 +2,7 @@
 //! Row II-1: energies of the passes of a deferred renderer add up to that of the frame.
 
 use output::plot::Series;
-use output::progress::Progress;
+use output::terminal::Progress;
 use power_model::{Circumstances, FramePower};
 use rayon::prelude::*;
 use run::{JobFrame, RunError};
@@ -10,9 +10,8 @@ use traces::energy::PowerIntegral;
 use workloads::Overrides;
 use workloads::deferred::{Deferred, DeferredOptions, LightPass, NormalFormat};
 
-use super::band::{Cases, Verdict, one_at_a_time};
 use super::report::{POWER, TIME, line};
-use super::row::{Number, Row, With, numbers};
+use super::row::{Cases, Number, Row, Verdict, With, numbers, one_at_a_time};
 use super::settings::{
     About, Form, Origin, Setting, load, paper_settings, reduced, row_settings, settings_group,
 };

@@ -9,8 +9,7 @@ use output::{Claim, Destination, OutDir, OutputError};
 use run::RunError;
 use serde::{Deserialize, Serialize};
 
-use super::band::Verdict;
-use super::row::Row;
+use super::row::{Row, Verdict};
 use super::settings::{Form, Listed, Origin};
 use super::{Done, Options, Paper};
 
@@ -313,8 +312,8 @@ pub(super) fn by_place(values: &[f64]) -> Vec<(f64, f64)> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::band::Kind;
     use super::super::row::tests::row;
+    use super::super::settings::Kind;
     use super::*;
 
     fn done(id: &'static str, kind: Kind, verdict: Verdict) -> Done {

@@ -9,10 +9,9 @@ use std::path::Path;
 
 use activity::spec::{self, SpecError};
 use serde::de::DeserializeOwned;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, Serializer};
 
 use super::Paper;
-use super::band::Kind;
 use output::dir::sha256_of_text;
 use run::RunError;
 
@@ -52,6 +51,34 @@ pub struct About {
     pub holds_when: String,
     /// Claims that are not tested, and those that hold by construction.
     pub limits: String,
+}
+
+/// Kind of agreement that a row needs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+pub enum Kind {
+    /// An equality that holds exactly.
+    Equality,
+    /// A number with a tolerance.
+    Number,
+    /// An order or a sign.
+    Order,
+}
+
+impl Kind {
+    /// The letter of the list of claims.
+    pub const fn letter(self) -> &'static str {
+        match self {
+            Self::Equality => "E",
+            Self::Number => "N",
+            Self::Order => "O",
+        }
+    }
+}
+
+impl Serialize for Kind {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.letter())
+    }
 }
 
 /// A setting of a row with its source.

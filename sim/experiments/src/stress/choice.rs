@@ -5,6 +5,8 @@ use serde::Serialize;
 use workloads::stress::{Family, Size};
 
 use super::measure::{Work, combinations, on_subject};
+use crate::study::table::{Sheet, Table};
+use output::plot::{Look, Matrix, MatrixPanel, Picture};
 use run::{GpuSpec, RunError};
 
 /// Multiply-adds at one value of a family.
@@ -155,6 +157,49 @@ impl Choices {
             self.values.len(),
         )
     }
+
+    /// `auto` and every test on, over the best fixed choice: of each family as a whole, and at the value that is worst for it.
+    pub(super) fn picture(&self, look: &Look) -> Picture {
+        type Cost = fn(&Choice) -> f64;
+        let costs: [(&str, Cost); 2] = [
+            ("auto", |choice| choice.over_best),
+            ("all", |choice| choice.all_madds.max(1) as f64 / choice.best_madds.max(1) as f64),
+        ];
+        let worst = |family: &Choice, cost: Cost| {
+            let values = self.values.iter().filter(|value| value.family == family.family);
+            values.map(cost).reduce(f64::max)
+        };
+        let whole = costs.map(|(name, cost)| (name, self.families.iter().map(|f| Some(cost(f))).collect()));
+        let values = costs.map(|(name, cost)| (name, self.families.iter().map(|f| worst(f, cost)).collect()));
+        Matrix {
+            title: "What auto takes beside the best fixed choice of tests",
+            subject: "multiply-adds over those of the best of all combinations of tests",
+            scale: ["the best", "32 times as much"],
+            columns: self.families.iter().map(|family| family.family).collect(),
+            panels: vec![
+                MatrixPanel {
+                    name: "each family as a whole, one choice for all its values",
+                    rows: whole.to_vec(),
+                },
+                MatrixPanel { name: "the worst value, with a choice for it alone", rows: values.to_vec() },
+            ],
+        }
+        .picture(look)
+    }
+
+    /// Families and values as a table.
+    pub(super) fn sheet(&self) -> Sheet {
+        Table::of(self.families.iter().chain(&self.values))
+            .data("family", |choice| choice.family)
+            .data("value", |choice| choice.value)
+            .data("auto_madds", |choice| choice.auto_madds)
+            .data("best", |choice| choice.best.as_str())
+            .data("best_madds", |choice| choice.best_madds)
+            .data("all_madds", |choice| choice.all_madds)
+            .data("over_best", |choice| choice.over_best)
+            .csv("auto.csv")
+            .sheet()
+    }
 }
 
 fn over(choices: &[Choice]) -> usize {
@@ -167,6 +212,9 @@ fn worst(choices: &[Choice]) -> Option<&Choice> {
 
 #[cfg(test)]
 mod tests {
+    use rayon::prelude::*;
+    use workloads::stress::family;
+
     use super::*;
 
     fn trial(value: f64, auto: u64, fixed: [u64; 2]) -> Trial {
@@ -195,5 +243,18 @@ mod tests {
         assert_eq!(runs.get(), 8 * 7);
         let screens = combinations().iter().map(|(letters, _)| u64::from(letters.contains('c'))).collect();
         assert_eq!(found, Ok::<Vec<u64>, ()>(screens));
+    }
+
+    /// Families on which no set of tests is best at all values, and some that were hard to choose on; `quintile stress` has all.
+    #[test]
+    fn auto_is_as_good_as_the_best_fixed_choice_on_a_family() {
+        let gpu = GpuSpec::load("reference").unwrap();
+        for (name, seed) in [("shared-edges", 4), ("slivers", 5), ("through-lens", 6), ("speed", 7)] {
+            let family = family(name).unwrap();
+            let values = family.sweep(true).par_iter();
+            let trials = values.map(|&value| super::trial(family, value, Size::QUICK, seed, &gpu).unwrap());
+            let choices = Choices::new(&trials.collect::<Vec<_>>());
+            assert_eq!(choices.families_over(), 0, "{}", choices.text());
+        }
     }
 }

@@ -7,22 +7,21 @@
 
 pub mod choice;
 pub mod measure;
-mod picture;
 pub mod truth;
 
+use choice::{Choices, Trial};
+use measure::{METHODS, StressRow, TestMethod};
+use output::dir::SUMMARY;
+use output::plot::{Chart, ChartPanel, Look, Mark, Matrix, MatrixPanel, Paint, Picture, Scale, Series};
+use output::terminal::Progress;
+use output::{Claim, OutputError};
 use rayon::prelude::*;
+use run::{GpuSpec, RunError};
 use serde::{Serialize, Serializer};
 use workloads::stress::{Family, Size, families, family};
 
 use crate::study::table::{Sheet, Table, count, fixed, optional, plain, share};
 use crate::study::{Gallery, Study, StudyError, files};
-use choice::{Choice, Choices, Trial};
-use measure::{METHODS, StressRow};
-use output::dir::SUMMARY;
-use output::progress::Progress;
-
-use output::{Claim, OutputError};
-use run::{GpuSpec, RunError};
 
 /// The seed of the scenes.
 const SEED: u64 = 1;
@@ -121,16 +120,16 @@ impl Study for Report {
 
     fn draw(&self, to: &Gallery<'_>) -> Result<(), OutputError> {
         if self.families.len() > 1 {
-            to.add(&stem("matrix"), &picture::matrix(self, to.look()))?;
-            to.add(&stem("auto"), &picture::auto(&self.auto, to.look()))?;
+            to.add(&stem("matrix"), &matrix(self, to.look()))?;
+            to.add(&stem("auto"), &self.auto.picture(to.look()))?;
         }
         for family in &self.families {
             let stem = stem(family.name);
-            for measure in &picture::MEASURES {
-                let picture = picture::family(self, family, measure, to.look());
+            for measure in &MEASURES {
+                let picture = curves(self, family, measure, to.look());
                 to.add(&format!("{stem}{}", measure.stem), &picture)?;
             }
-            to.add(&format!("{stem}_intervals"), &picture::intervals(self, family, to.look()))?;
+            to.add(&format!("{stem}_intervals"), &intervals(self, family, to.look()))?;
         }
         Ok(())
     }
@@ -140,7 +139,7 @@ impl Study for Report {
             [family] => self.of_family(family),
             _ => self.overview(),
         };
-        vec![shown, self.row_sheet(), choice_sheet(self.auto.families.iter().chain(&self.auto.values))]
+        vec![shown, self.row_sheet(), self.auto.sheet()]
     }
 
     fn fault(&self) -> Option<String> {
@@ -149,7 +148,7 @@ impl Study for Report {
     }
 
     fn claim() -> Claim {
-        let endings = || picture::MEASURES.iter().map(|measure| measure.stem).chain(["_intervals"]);
+        let endings = || MEASURES.iter().map(|measure| measure.stem).chain(["_intervals"]);
         let families = families()
             .flat_map(|family| endings().map(move |ending| format!("{}{ending}", stem(family.name))));
         let plots = families.chain(["matrix", "auto"].map(stem));
@@ -210,7 +209,7 @@ impl Report {
             .shown("family", |family| family.name, plain)
             .before("Cost over that of the best method, at the worst value of each family.\n\n")
             .after(self.below());
-        let method = |table: Table<_>, method: &measure::TestMethod| {
+        let method = |table: Table<_>, method: &TestMethod| {
             let cost = |family: &&&'static Family| self.over_best(family, method.name, false);
             table.shown(method.name, cost, optional(fixed(2)))
         };
@@ -270,29 +269,147 @@ impl Report {
     }
 }
 
-fn choice_sheet<'a>(choices: impl Iterator<Item = &'a Choice>) -> Sheet {
-    Table::of(choices)
-        .data("family", |choice| choice.family)
-        .data("value", |choice| choice.value)
-        .data("auto_madds", |choice| choice.auto_madds)
-        .data("best", |choice| choice.best.as_str())
-        .data("best_madds", |choice| choice.best_madds)
-        .data("all_madds", |choice| choice.all_madds)
-        .data("over_best", |choice| choice.over_best)
-        .csv("auto.csv")
-        .sheet()
+/// Cost over that of the best method, by method and family: at the first and at the worst value.
+fn matrix(report: &Report, look: &Look) -> Picture {
+    let panel = |name, first| MatrixPanel {
+        name,
+        rows: METHODS
+            .iter()
+            .map(|method| {
+                let over = |family| report.over_best(family, method.name, first);
+                (method.name, report.families.iter().map(|family| over(family)).collect())
+            })
+            .collect(),
+    };
+    let subject = format!(
+        "multiply-adds of tile and sample tests over those of the best method; images of {} pixels a side; {} samples lost",
+        report.size.side_px,
+        report.summary().samples_lost
+    );
+    Matrix {
+        title: "Which test pays where",
+        subject: &subject,
+        scale: ["the best", "32 times as much"],
+        columns: report.families.iter().map(|family| family.name).collect(),
+        panels: vec![
+            panel("at the harmless end of each family", true),
+            panel("at the value of each family that is worst for the method", false),
+        ],
+    }
+    .picture(look)
+}
+
+/// Panels of a row on a page.
+const ACROSS: usize = 7;
+
+/// A measure of a method at each value of a family.
+struct Measure {
+    /// Ending after the family's name in names of files; empty for the cost.
+    pub stem: &'static str,
+    title: &'static str,
+    /// The name of the axis.
+    name: &'static str,
+    scale: Scale,
+    of: fn(&StressRow) -> Option<f64>,
+}
+
+/// Cost and efficiency.
+const MEASURES: [Measure; 2] = [
+    Measure {
+        stem: "",
+        title: "cost",
+        name: "madds per triangle",
+        scale: Scale::Decades,
+        of: |row| Some(row.work.madds().max(1) as f64 / row.triangles.max(1) as f64),
+    },
+    Measure {
+        stem: "_efficiency",
+        title: "sample test efficiency",
+        name: "efficiency (%)",
+        scale: Scale::FromZero,
+        of: |row| row.work.efficiency().map(|share| 100.0 * share),
+    },
+];
+
+/// A measure of one family along its parameter: a small panel for each method, the other methods as grey lines behind it.
+fn curves(report: &Report, family: &Family, measure: &Measure, look: &Look) -> Picture {
+    let rows: Vec<&StressRow> = report.of(family).collect();
+    let line = |name: &str| -> Vec<(f64, f64)> {
+        let values = rows.iter().filter(|row| row.method == name).map(|row| (measure.of)(row)).enumerate();
+        values.filter_map(|(place, value)| Some((place as f64, value?))).collect()
+    };
+    let all: Vec<Vec<(f64, f64)>> = METHODS.iter().map(|method| line(method.name)).collect();
+    let panel = |(method, own): (&TestMethod, &Vec<(f64, f64)>)| {
+        let others = Series::new("", Mark::Faint(all.clone())).painted(Paint::Grey);
+        let own = Series::curve("", own.iter().copied()).painted(Paint::Like(0));
+        ChartPanel::new(method.name, ["", measure.name], vec![others, own])
+            .on(Scale::Even, measure.scale.clone())
+            .along(family.parameter, &values(&rows))
+    };
+    let title = format!("Failure modes: {}, {}", family.name, measure.title);
+    let subject = format!(
+        "{}; grey: all other methods; {} samples lost",
+        family.what,
+        rows.iter().map(|row| row.samples_lost).sum::<u64>()
+    );
+    let panels = METHODS.iter().zip(&all).map(panel).collect();
+    Chart::new(&title, &subject, panels).small(ACROSS).picture(look)
+}
+
+fn values(rows: &[&StressRow]) -> Vec<String> {
+    let mut values: Vec<String> = rows.iter().map(|row| row.value.to_string()).collect();
+    values.dedup();
+    values
+}
+
+/// Width of the boxes that the side planes leave, and of the true ones.
+fn intervals(report: &Report, family: &Family, look: &Look) -> Picture {
+    let rows: Vec<&StressRow> = report.of(family).collect();
+    let curve = |name: &str, of: fn(&StressRow) -> f64| {
+        let sides = rows.iter().filter(|row| row.method == "sides").enumerate();
+        Series::curve(name, sides.map(|(place, row)| (place as f64, 100.0 * of(row))))
+    };
+    let panel = |title: &str, curves| {
+        ChartPanel::new(title, ["", "share of all (%)"], curves)
+            .on(Scale::Even, Scale::FromZero)
+            .along(family.parameter, &values(&rows))
+    };
+    let by = ["side planes", "true"];
+    let panels = vec![
+        panel(
+            "time",
+            vec![curve(by[0], |row| row.intervals.t_width), curve(by[1], |row| row.intervals.t_true)],
+        ),
+        panel(
+            "lens, across",
+            vec![curve(by[0], |row| row.intervals.u_width), curve(by[1], |row| row.intervals.u_true)],
+        ),
+        panel(
+            "tiles",
+            vec![
+                curve(by[0], |row| row.intervals.pairs_kept as f64 / row.intervals.pairs.max(1) as f64),
+                curve(by[1], |row| row.intervals.pairs_touching as f64 / row.intervals.pairs.max(1) as f64),
+            ],
+        ),
+    ];
+    let title = format!("What side planes leave: {}", family.name);
+    let subject = format!(
+        "{}; means over triangles and tiles; true intervals from {}",
+        family.what,
+        rows.last().map_or("nothing", |row| row.truth)
+    );
+    Chart::new(&title, &subject, panels).picture(look)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::measure::Pairs;
-    use super::measure::{METHODS, combinations};
-    use super::measure::{Subject, differing};
-    use super::*;
     use pipeline::Features;
     use pipeline::traversal::Box5;
     use workloads::stress::StressScene;
     use workloads::visibility::Unshaded;
+
+    use super::measure::{METHODS, Pairs, Subject, combinations, differing};
+    use super::*;
 
     const SIZE: Size = Size { side_px: 32, triangles: 30 };
 
@@ -383,19 +500,6 @@ mod tests {
             assert_eq!(least, 1.0);
             assert!(rows[0].over_best > 1.0, "the bounding box alone is not the best on {name}");
             assert!(rows.iter().all(|row| row.work.samples_hit > 0));
-        }
-    }
-
-    /// Families on which no set of tests is best at all values, and some that were hard to choose on; `quintile stress` has all.
-    #[test]
-    fn auto_is_as_good_as_the_best_fixed_choice_on_a_family() {
-        let gpu = GpuSpec::load("reference").unwrap();
-        for (name, seed) in [("shared-edges", 4), ("slivers", 5), ("through-lens", 6), ("speed", 7)] {
-            let family = family(name).unwrap();
-            let values = family.sweep(true).par_iter();
-            let trials = values.map(|&value| choice::trial(family, value, Size::QUICK, seed, &gpu).unwrap());
-            let choices = Choices::new(&trials.collect::<Vec<_>>());
-            assert_eq!(choices.families_over(), 0, "{}", choices.text());
         }
     }
 

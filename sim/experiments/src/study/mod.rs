@@ -13,7 +13,7 @@ use std::time::Instant;
 
 use activity::{Counts, Event};
 use output::plot::{Chart, ChartPanel, Look, Picture};
-use output::progress::Progress;
+use output::terminal::Progress;
 use output::{Claim, OutDir, OutputError};
 use pipeline::FrameReport;
 use run::{GpuError, RunError};

@@ -2,8 +2,7 @@
 
 use super::axis::{Along, Extent, MarkerRoom};
 use super::chart_panel::{Cell, ChartPanel, RIGHT, SMALL_GAP, draw_row};
-use super::legend::{Key, LEGEND_PX, legend_lines};
-use super::panel::aside;
+use super::panel::{Key, LEGEND_PX, aside, legend_lines};
 use super::picture::{Across, Look, Picture, Text, shortened, text, text_width};
 
 /// Panels with a title. Panels whose vertical axes have the same quantity share its range.

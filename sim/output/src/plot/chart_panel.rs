@@ -5,12 +5,10 @@
 use std::ops::Range;
 
 use super::axis::{Along, Axis, AxisSpec, Extent, Scale};
-use super::legend::{Key, LEGEND_LINE, LEGEND_PX, legend_column, plate};
-use super::palette::{INK, MARK, MUTED};
-use super::panel;
-use super::panel::{BELOW, Label, Panel, aside};
+use super::panel::{self, BELOW, Key, LEGEND_LINE, LEGEND_PX, Label, Panel, aside, legend_column, plate};
 use super::picture::{Across, Picture, Text, shortened, text, text_width, wrapped};
 use super::series::{Mark, Series};
+use super::{INK, MARK, MUTED};
 
 /// Font size of the label of a marked range.
 const MARK_PX: f64 = 11.5;

@@ -7,7 +7,7 @@ use std::sync::OnceLock;
 use plotters::style::{FontFamily, FontStyle, IntoFont, register_font};
 use serde::{Deserialize, Serialize};
 
-use super::palette::{Colour, INK, MUTED};
+use super::{Colour, INK, MUTED};
 
 /// A point in pixels of the layout, from the top left.
 pub(super) type Point = (f64, f64);

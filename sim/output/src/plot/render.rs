@@ -14,10 +14,10 @@ use plotters_backend::{
     BackendColor, BackendCoord, BackendStyle, BackendTextStyle, DrawingBackend, DrawingErrorKind, rasterizer,
 };
 
-use super::palette::{BACKGROUND, Colour};
 use super::picture::{
     Across, Picture, Point, SCALE, Shape, Text, drawable, plotters_font, register, text_width,
 };
+use super::{BACKGROUND, Colour};
 use crate::dir::{OutDir, OutputError};
 use crate::image;
 

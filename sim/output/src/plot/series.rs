@@ -1,9 +1,8 @@
 //! Series: the data drawn in a panel, each with its style; many samples are reduced to few columns.
 
-use super::legend::{Key, Style};
-use super::palette::{BACKGROUND, FAINT, INK};
-use super::panel::Panel;
+use super::panel::{Key, Panel, Style};
 use super::picture::{Picture, Point};
+use super::{BACKGROUND, FAINT, INK};
 
 /// Kind and data of a series.
 #[derive(Clone, Debug)]

@@ -10,7 +10,7 @@ mod probe;
 
 use std::collections::BTreeMap;
 
-use output::progress::Progress;
+use output::terminal::Progress;
 use pipeline::Features;
 use serde::{Deserialize, Serialize};
 use timing::Level;

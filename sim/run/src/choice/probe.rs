@@ -4,16 +4,16 @@ use std::time::Instant;
 
 use activity::{Counts, Event};
 use cpu_time::ThreadTime;
-use output::progress::Progress;
+use output::terminal::Progress;
 use pipeline::PipelineSpec;
 use timing::{FrameClock, Level, Recorder};
 use workloads::Job;
 use workloads::job::Reduction;
 
-use super::Findings;
-use super::{ProbeSummary, with_blur_thresholds};
+use super::{Findings, ProbeSummary, with_blur_thresholds};
+use crate::frame::{self, draw_on};
 use crate::recording::PacketBuffer;
-use crate::{Distinct, FrameCost, GpuSpec, Plan, RunError, frame, job_frame};
+use crate::{Distinct, FrameCost, GpuSpec, Plan, RunError};
 
 /// Largest number of probed frames: the middles of as many equal parts of the run.
 const MAX_FRAMES: usize = 3;
@@ -98,7 +98,7 @@ impl ProbedFrame {
         let started = Instant::now();
         let mut packets = PacketBuffer::default();
         let emit = |packet: &_, lines: &_| packets.push(packet, lines);
-        let (_, report) = job_frame::draw(gpu, None, &*job.prepare(number)?, emit)?;
+        let (_, report) = draw_on(gpu, None, &*job.prepare(number)?, emit)?;
         Ok(Self { number, packets, counts: report.counts(), pipeline_s: started.elapsed().as_secs_f64() })
     }
 

@@ -1,16 +1,22 @@
 //! Comparison of two results: runs, tables of frames, images, or folders of images.
+//!
+//! Two PNG files are compared in sRGB values from 0 to 1. EXR files, and an EXR with a PNG, are compared in
+//! linear light, without clamping. Structural similarity always compares the displayed values.
 
-mod images;
 mod runs;
 
-use std::collections::BTreeMap;
+use std::collections::BTreeSet;
+use std::fs::File;
+use std::io::{BufReader, BufWriter, Write};
 use std::path::Path;
 
+use ::image::{DynamicImage, ImageReader, Limits};
+use blazediff_ssim::{Plane, Rgba8, SsimOptions, ssim};
+use output::image::{LinearImage, encode_png};
+use pipeline::texture::{linear_to_srgb8, srgb8_to_linear};
 use serde::Serialize;
-use traces::energy::Spread;
 
-pub use images::{FolderComparison, ImageComparison, Named};
-pub use runs::{RunComparison, Setting, shown};
+pub use runs::{Change, RunComparison, Setting, TableComparison, shown};
 
 /// Error of a comparison.
 #[derive(Debug, thiserror::Error)]
@@ -59,9 +65,6 @@ impl CompareError {
         |source| Self::Read { path, source }
     }
 }
-
-/// Largest relative difference of sums of the same numbers in another order.
-const ROUNDING: f64 = 1e-13;
 
 /// Result of a comparison.
 #[derive(Clone, Debug, Serialize)]
@@ -137,159 +140,268 @@ pub fn compare(a: &Path, b: &Path, out: Option<&Path>) -> Result<Comparison, Com
     }
     match kinds[0] {
         Kind::Run => runs::compare(a, b).map(Comparison::Runs),
-        Kind::Frames => compare_tables(a, b).map(Comparison::Frames),
-        Kind::Image => images::compare(a, b, out).map(Comparison::Images),
-        Kind::Folder => images::compare_folders(a, b).map(Comparison::Folders),
+        Kind::Frames => runs::compare_tables(a, b).map(Comparison::Frames),
+        Kind::Image => compare_images(a, b, out).map(Comparison::Images),
+        Kind::Folder => compare_folders(a, b).map(Comparison::Folders),
     }
 }
 
-/// Value of a quantity in A and in B.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Change {
-    /// Group of the quantity.
-    pub group: String,
-    /// Its name.
-    pub name: String,
-    /// Its unit; empty for counts and shares.
-    pub unit: String,
-    /// Value in A, if present.
-    pub a: Option<f64>,
-    /// Value in B, if present.
-    pub b: Option<f64>,
-    /// B minus A.
-    pub difference: Option<f64>,
-    /// B over A; `None` if A is zero.
-    pub ratio: Option<f64>,
-}
+/// Largest side of an image, in pixels.
+const MAX_SIDE_PX: u32 = 32_768;
 
-impl Change {
-    /// The change from `a` to `b`.
-    pub fn new(group: &str, name: &str, unit: &str, [a, b]: [Option<f64>; 2]) -> Self {
-        let both = a.zip(b);
-        Self {
-            group: group.to_owned(),
-            name: name.to_owned(),
-            unit: unit.to_owned(),
-            a,
-            b,
-            difference: both.map(|(a, b)| b - a),
-            ratio: both.filter(|(a, _)| *a != 0.0).map(|(a, b)| b / a),
-        }
-    }
+/// Largest memory of a decoder, in bytes.
+const MAX_DECODED_BYTES: u64 = 4 << 30;
 
-    /// Whether both values are equal but for the rounding of sums, or both are missing.
-    pub fn is_equal(&self) -> bool {
-        let close = |(a, b): (f64, f64)| (a - b).abs() <= ROUNDING * a.abs().max(b.abs());
-        self.a == self.b || self.a.zip(self.b).is_some_and(close)
-    }
-}
-
-/// Comparison of two tables of frames.
+/// Comparison of two images of equal size.
 #[derive(Clone, Debug, Serialize)]
-pub struct TableComparison {
+pub struct ImageComparison {
     /// The files.
     pub files: [String; 2],
-    /// Number of frames, and mean and standard deviation of each column.
-    pub values: Vec<Change>,
+    /// Pixels across.
+    pub width: u32,
+    /// Pixels down.
+    pub height: u32,
+    /// Whether values are linear light (EXR) rather than sRGB from 0 to 1 (PNG).
+    pub linear: bool,
+    /// Mean squared error over pixels and channels.
+    pub mse: f64,
+    /// Peak signal-to-noise ratio for a peak of 1, in dB; `None` for equal images.
+    pub psnr_db: Option<f64>,
+    /// Structural similarity of luma (Wang et al. 2004), 1 for equal images; `None` for images smaller than
+    /// its window.
+    pub ssim: Option<f64>,
+    /// Mean absolute difference.
+    pub mean_difference: f64,
+    /// Largest absolute difference of a channel.
+    pub largest_difference: f64,
+    /// Pixels that differ.
+    pub pixels_that_differ: u64,
+    /// Pixels skipped because a channel is not finite.
+    pub pixels_not_finite: u64,
+    /// Brightness factor of the difference image, if written as PNG.
+    pub scale: Option<f64>,
 }
 
-/// Columns of `frames.csv` that are compared, with their units.
-const COLUMNS: [(&str, &str); 6] = [
-    ("duration_s", "s"),
-    ("energy_J", "J"),
-    ("power_W", "W"),
-    ("energy_per_pixel_J", "J"),
-    ("confidence", ""),
-    ("true_energy_J", "J"),
-];
-
-/// Compares two tables written by `quintile run` or `quintile trace frames`.
-fn compare_tables(a: &Path, b: &Path) -> Result<TableComparison, CompareError> {
-    let [one, other] = [read(a)?, read(b)?];
-    let frames = [&one, &other].map(|table| table.values().map(Vec::len).max().map(|count| count as f64));
-    let mut values = vec![Change::new("frames", "frames", "", frames)];
-    for (column, unit) in COLUMNS {
-        let numbers = [&one, &other].map(|table| table.get(column).filter(|column| !column.is_empty()));
-        if numbers.iter().all(Option::is_none) {
-            continue;
-        }
-        let spreads = numbers.map(|numbers| numbers.and_then(|numbers| Spread::of(numbers)));
-        let means = spreads.map(|spread| spread.map(|spread| spread.mean));
-        values.push(Change::new("mean over frames", column, unit, means));
-        let deviations = spreads.map(|spread| spread.map(|spread| spread.deviation));
-        values.push(Change::new("standard deviation", column, unit, deviations));
-    }
-    Ok(TableComparison { files: [a, b].map(|path| path.display().to_string()), values })
+/// Comparison of the images of two folders.
+#[derive(Clone, Debug, Serialize)]
+pub struct FolderComparison {
+    /// The folders.
+    pub files: [String; 2],
+    /// Images in both folders, by name.
+    pub images: Vec<Named>,
+    /// Images only in A.
+    pub only_in_a: Vec<String>,
+    /// Images only in B.
+    pub only_in_b: Vec<String>,
+    /// Mean of the images' mean squared errors.
+    pub mse: Option<f64>,
+    /// Number of equal pairs.
+    pub equal: usize,
 }
 
-/// Reads the known columns; empty cells are skipped.
-fn read(path: &Path) -> Result<BTreeMap<&'static str, Vec<f64>>, CompareError> {
-    let broken = |message: String| CompareError::broken(path, message);
-    let file = std::fs::File::open(path).map_err(CompareError::unreadable(path))?;
-    let mut reader = csv::Reader::from_reader(file);
-    let header = reader.headers().map_err(|error| broken(format!("not a CSV file: {error}")))?.clone();
-    let place = |name: &str| header.iter().position(|column| column == name);
-    let places: Vec<(&'static str, usize)> =
-        COLUMNS.iter().filter_map(|(name, _)| Some((*name, place(name)?))).collect();
-    if !places.iter().any(|(name, _)| *name == "energy_J") {
-        return Err(broken(
-            "it has no column `energy_J`: give a frames.csv of `quintile run` or `quintile trace frames`"
-                .to_owned(),
-        ));
-    }
-    let mut table: BTreeMap<&'static str, Vec<f64>> =
-        places.iter().map(|(name, _)| (*name, Vec::new())).collect();
-    for (line, record) in (2..).zip(reader.records()) {
-        let record = record.map_err(|error| broken(format!("line {line}: {error}")))?;
-        for (name, place) in &places {
-            let cell = record.get(*place).unwrap_or_default().trim();
-            if cell.is_empty() {
-                continue;
-            }
-            let number = cell.parse::<f64>().ok().filter(|number| number.is_finite());
-            let number = number.ok_or_else(|| {
-                broken(format!("line {line}: {name} is `{cell}`, which is not a finite number"))
-            })?;
-            table.entry(name).or_default().push(number);
-        }
-    }
-    Ok(table)
+/// Comparison of two images of equal name.
+#[derive(Clone, Debug, Serialize)]
+pub struct Named {
+    /// The name.
+    pub name: String,
+    /// The comparison.
+    #[serde(flatten)]
+    pub comparison: ImageComparison,
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+/// A decoded image.
+struct Picture {
+    width: u32,
+    height: u32,
+    /// Linear light.
+    linear: Vec<[f32; 3]>,
+    /// Displayed sRGB values.
+    shown: Vec<[u8; 3]>,
+    is_linear: bool,
+}
 
-    #[test]
-    fn a_change_has_a_sign_and_a_ratio() {
-        let change = Change::new("g", "n", "J", [Some(2.0), Some(1.5)]);
-        assert_eq!((change.difference, change.ratio), (Some(-0.5), Some(0.75)));
-        assert_eq!(Change::new("g", "n", "J", [Some(0.0), Some(1.0)]).ratio, None);
-        assert!(Change::new("g", "n", "J", [Some(0.1 + 0.2), Some(0.3)]).is_equal());
-        assert!(!Change::new("g", "n", "J", [Some(1.0), Some(1.0 + 1e-9)]).is_equal());
-        let missing = Change::new("g", "n", "J", [None, Some(1.0)]);
-        assert!(!missing.is_equal() && missing.difference.is_none());
-    }
-
-    #[test]
-    fn tables_are_compared_by_their_means() {
-        let folder = tempfile::tempdir().unwrap();
-        let put = |name: &str, text: &str| {
-            std::fs::write(folder.path().join(name), text).unwrap();
-            folder.path().join(name)
+impl Picture {
+    fn read(path: &Path) -> Result<Self, CompareError> {
+        let file = File::open(path).map_err(CompareError::unreadable(path))?;
+        let broken = |error: String| {
+            let message =
+                format!("cannot be decoded as an image: {error}; give a PNG or an EXR file that is whole");
+            CompareError::broken(path, message)
         };
-        let a = put("a.csv", "frame,duration_s,energy_J,true_energy_J\n0,0.1,2,\n1,0.1,4,\n");
-        let b = put("b.csv", "frame,duration_s,energy_J,true_energy_J\n0,0.1,6,\n");
-        let compared = compare_tables(&a, &b).unwrap();
-        let energy = compared.values.iter().find(|change| change.name == "energy_J").unwrap();
-        assert_eq!((energy.a, energy.b, energy.ratio), (Some(3.0), Some(6.0), Some(2.0)));
-        assert_eq!(compared.values[0].difference, Some(-1.0));
-        assert!(compared.values.iter().all(|change| change.name != "true_energy_J"));
-        for (text, says) in
-            [("a,b\n1,2\n", "no column `energy_J`"), ("energy_J\nnan\n", "line 2: energy_J is `nan`")]
-        {
-            let error = compare_tables(&a, &put("c.csv", text)).unwrap_err();
-            assert!(error.is_usage() && error.to_string().contains(says), "{error}");
+        let mut reader = ImageReader::new(BufReader::new(file))
+            .with_guessed_format()
+            .map_err(CompareError::unreadable(path))?;
+        let mut limits = Limits::default();
+        limits.max_image_width = Some(MAX_SIDE_PX);
+        limits.max_image_height = Some(MAX_SIDE_PX);
+        limits.max_alloc = Some(MAX_DECODED_BYTES);
+        reader.limits(limits);
+        let image = reader.decode().map_err(|error| broken(error.to_string()))?;
+        let is_linear = matches!(image, DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_));
+        let (width, height) = (image.width(), image.height());
+        let (linear, shown) = if is_linear {
+            let linear: Vec<[f32; 3]> = image.into_rgb32f().pixels().map(|pixel| pixel.0).collect();
+            let shown = linear.iter().map(|pixel| pixel.map(linear_to_srgb8)).collect();
+            (linear, shown)
+        } else {
+            let shown: Vec<[u8; 3]> = image.into_rgb8().pixels().map(|pixel| pixel.0).collect();
+            let linear = shown.iter().map(|pixel| pixel.map(srgb8_to_linear)).collect();
+            (linear, shown)
+        };
+        Ok(Self { width, height, linear, shown, is_linear })
+    }
+
+    fn luma(&self) -> Option<Plane> {
+        let rgba: Vec<u8> = self.shown.iter().flat_map(|[r, g, b]| [*r, *g, *b, 255]).collect();
+        Plane::from_rgba8(Rgba8::new(&rgba, self.width as usize, self.height as usize)).ok()
+    }
+}
+
+/// Compares two images and writes their difference to `out`.
+fn compare_images(a: &Path, b: &Path, out: Option<&Path>) -> Result<ImageComparison, CompareError> {
+    let pictures = [Picture::read(a)?, Picture::read(b)?];
+    let mut comparison = between([a, b], &pictures)?;
+    if let Some(out) = out {
+        comparison.scale = write_difference(out, &pictures, comparison.linear)?;
+    }
+    Ok(comparison)
+}
+
+fn between(files: [&Path; 2], pictures: &[Picture; 2]) -> Result<ImageComparison, CompareError> {
+    let [a, b] = pictures;
+    if (a.width, a.height) != (b.width, b.height) {
+        return Err(CompareError::Usage(format!(
+            "{} has {}x{} pixels and {} {}x{}: give images of one size",
+            files[0].display(),
+            a.width,
+            a.height,
+            files[1].display(),
+            b.width,
+            b.height
+        )));
+    }
+    let linear = a.is_linear || b.is_linear;
+    let (mut squares, mut sum, mut largest) = (0.0, 0.0, 0.0_f64);
+    let (mut differ, mut not_finite) = (0, 0);
+    for difference in differences(pictures, linear) {
+        let Some(difference) = difference else {
+            not_finite += 1;
+            continue;
+        };
+        differ += u64::from(difference != [0.0; 3]);
+        for part in difference {
+            squares += part * part;
+            sum += part.abs();
+            largest = largest.max(part.abs());
         }
     }
+    let pixels = u64::from(a.width) * u64::from(a.height);
+    let count = 3.0 * (pixels - not_finite).max(1) as f64;
+    let mse = squares / count;
+    Ok(ImageComparison {
+        files: files.map(|path| path.display().to_string()),
+        width: a.width,
+        height: a.height,
+        linear,
+        mse,
+        psnr_db: (mse > 0.0).then(|| -10.0 * libm::log10(mse)),
+        ssim: similarity(pictures),
+        mean_difference: sum / count,
+        largest_difference: largest,
+        pixels_that_differ: differ,
+        pixels_not_finite: not_finite,
+        scale: None,
+    })
+}
+
+/// B minus A of each pixel; `None` if not finite.
+fn differences(pictures: &[Picture; 2], linear: bool) -> impl Iterator<Item = Option<[f64; 3]>> + '_ {
+    let [a, b] = pictures;
+    (0..a.shown.len()).map(move |pixel| {
+        let part = |channel: usize| {
+            if linear {
+                f64::from(b.linear[pixel][channel]) - f64::from(a.linear[pixel][channel])
+            } else {
+                (f64::from(b.shown[pixel][channel]) - f64::from(a.shown[pixel][channel])) / 255.0
+            }
+        };
+        let difference = [part(0), part(1), part(2)];
+        difference.iter().all(|part| part.is_finite()).then_some(difference)
+    })
+}
+
+fn similarity([a, b]: &[Picture; 2]) -> Option<f64> {
+    ssim(&a.luma()?, &b.luma()?, &SsimOptions::default()).ok().map(|outcome| outcome.score)
+}
+
+/// Writes the difference image; returns its brightness factor.
+fn write_difference(out: &Path, pictures: &[Picture; 2], linear: bool) -> Result<Option<f64>, CompareError> {
+    let failed = |message: String| CompareError::Write { path: out.display().to_string(), message };
+    let [width, height] = [pictures[0].width, pictures[0].height];
+    let difference: Vec<[f64; 3]> =
+        differences(pictures, linear).map(|difference| difference.unwrap_or_default()).collect();
+    let (bytes, scale) = match out.extension().and_then(|ending| ending.to_str()) {
+        Some("exr") => {
+            let signed: Vec<[f32; 3]> = differences(pictures, true)
+                .map(|difference| difference.unwrap_or_default().map(|part| part as f32))
+                .collect();
+            let image = LinearImage::new(width, height, &signed).and_then(|image| image.exr());
+            (image.map_err(|error| failed(error.to_string()))?, None)
+        }
+        Some("png") => {
+            let largest = difference.iter().flatten().fold(0.0_f64, |largest, part| largest.max(part.abs()));
+            let scale = if largest > 0.0 { 1.0 / largest } else { 1.0 };
+            let shown: Vec<u8> =
+                difference.iter().flatten().map(|part| (255.0 * scale * part.abs()).round() as u8).collect();
+            (encode_png(width, height, &shown).map_err(|error| failed(error.to_string()))?, Some(scale))
+        }
+        _ => {
+            let message = format!("--out: {}: give a name that ends in .png or .exr", out.display());
+            return Err(CompareError::Usage(message));
+        }
+    };
+    let written = traces::io::atomic::write_file(out, |file: &mut BufWriter<File>| {
+        file.write_all(&bytes)?;
+        file.flush()
+    });
+    written.map_err(|error| failed(error.to_string()))?;
+    Ok(scale)
+}
+
+/// Compares the images of two folders by their names.
+fn compare_folders(a: &Path, b: &Path) -> Result<FolderComparison, CompareError> {
+    let [in_a, in_b] = [names(a)?, names(b)?];
+    for (folder, names) in [(a, &in_a), (b, &in_b)] {
+        if names.is_empty() {
+            let message = "there is neither a summary.json nor a .png or .exr image in it: give the folder of a run, or one of images";
+            return Err(CompareError::broken(folder, message));
+        }
+    }
+    let mut images = Vec::new();
+    for name in in_a.intersection(&in_b) {
+        let comparison = compare_images(&a.join(name), &b.join(name), None)?;
+        images.push(Named { name: name.clone(), comparison });
+    }
+    let mean = images.iter().map(|image| image.comparison.mse).sum::<f64>() / images.len().max(1) as f64;
+    Ok(FolderComparison {
+        files: [a, b].map(|path| path.display().to_string()),
+        mse: (!images.is_empty()).then_some(mean),
+        equal: images.iter().filter(|image| image.comparison.pixels_that_differ == 0).count(),
+        only_in_a: in_a.difference(&in_b).cloned().collect(),
+        only_in_b: in_b.difference(&in_a).cloned().collect(),
+        images,
+    })
+}
+
+fn names(folder: &Path) -> Result<BTreeSet<String>, CompareError> {
+    let entries = std::fs::read_dir(folder).map_err(CompareError::unreadable(folder))?;
+    let mut names = BTreeSet::new();
+    for entry in entries {
+        let entry = entry.map_err(CompareError::unreadable(folder))?;
+        let name = entry.file_name().to_string_lossy().into_owned();
+        if (name.ends_with(".png") || name.ends_with(".exr")) && entry.path().is_file() {
+            names.insert(name);
+        }
+    }
+    Ok(names)
 }

@@ -9,7 +9,7 @@ use activity::{Event, PacketStream};
 use flate2::Compression;
 use flate2::read::GzDecoder;
 use flate2::write::GzEncoder;
-use output::progress::Progress;
+use output::terminal::Progress;
 use pipeline::{FrameReport, Gpu};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;

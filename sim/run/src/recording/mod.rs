@@ -5,15 +5,14 @@ mod file;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use activity::{LineAccess, Packet, PacketStream, StreamError, StreamWriter};
-use output::progress::Progress;
+use output::terminal::Progress;
 use power_model::PowerModel;
 use rayon::prelude::*;
 use timing::{FrameClock, Level, Recorder, Timed};
 
 pub use file::RecordedRun;
 
-use crate::frame::{DrawnFrame, draw, max_bins_per_frame};
-use crate::job_frame::BIN_PS;
+use crate::frame::{BIN_PS, DrawnFrame, draw, max_bins_per_frame};
 use crate::{Plan, RunError, RunFrame};
 
 /// Frames of a job as a pipeline drew them. What the pipeline does depends on neither time nor power, so the frames of any GPU

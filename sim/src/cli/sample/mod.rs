@@ -1,7 +1,6 @@
 //! `quintile sample`, and files of points.
 
-mod independent;
-mod poisson;
+mod kinds;
 
 use std::convert::Infallible;
 use std::fmt::Write as _;
@@ -14,8 +13,7 @@ use output::terminal::Terminal;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::Failure;
-use super::outputs::{print, print_json};
+use super::{Failure, print, print_json};
 use crate::cli::args::ThreadArgs;
 
 /// Arguments of `sample`.
@@ -36,11 +34,11 @@ pub struct SampleArgs {
 #[derive(Debug, Subcommand)]
 pub enum Kind {
     /// Poisson disk points of the unit square, cube, ...: a minimum distance, and no room for another point
-    Poisson(poisson::PoissonArgs),
+    Poisson(kinds::PoissonArgs),
     /// Independent points of the unit square, cube, ... that follow a density
-    White(independent::WhiteArgs),
+    White(kinds::WhiteArgs),
     /// Uniform points in a torus or in a closed surface
-    Volume(independent::VolumeArgs),
+    Volume(kinds::VolumeArgs),
 }
 
 /// Arguments of all distributions.
@@ -100,7 +98,7 @@ impl Common {
     fn check(&self, input: Option<&Path>) -> Result<(), Failure> {
         let out = self.out.as_deref();
         out.map(Format::of).transpose()?;
-        super::outputs::may_hold_results("--out", out, input)
+        super::may_hold_results("--out", out, input)
     }
 }
 
@@ -110,9 +108,9 @@ fn usage(message: impl std::fmt::Display) -> Failure {
 
 pub(super) fn run(args: &SampleArgs, terminal: &Terminal) -> Result<(), Failure> {
     match &args.kind {
-        Kind::Poisson(args) => poisson::run(args, terminal),
-        Kind::White(args) => independent::white(args),
-        Kind::Volume(args) => independent::volume(args),
+        Kind::Poisson(args) => kinds::poisson(args, terminal),
+        Kind::White(args) => kinds::white(args),
+        Kind::Volume(args) => kinds::volume(args),
     }
 }
 

@@ -16,10 +16,9 @@ use warnings::Warning;
 
 use super::input::{Frames, warn_of};
 use super::wrong;
-use crate::cli::Failure;
-use crate::cli::outputs::{print, print_json};
 use crate::cli::parse::{power, size_of_power, time};
 use crate::cli::trace::input::{FindArgs, InputArgs, pass, segment};
+use crate::cli::{Failure, print, print_json};
 
 /// Arguments about frames; they do not apply to a segment.
 const OF_FRAMES: [&str; 11] = [

@@ -10,8 +10,7 @@ use std::collections::HashMap;
 use serde::Serialize;
 use timing::sampled::student_t;
 
-use super::design::Design;
-use super::factor::{Factor, cells, codes, factors};
+use super::design::{Design, Factor, cells, codes, factors};
 
 /// Most values of a setting that have effects of their own: of more, a value is in too few points.
 const MAX_VALUES: usize = 20;

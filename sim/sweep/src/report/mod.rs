@@ -6,13 +6,8 @@
 
 mod design;
 mod effects;
-mod factor;
-mod flips;
-mod frontier;
+mod order;
 mod page;
-mod pictures;
-mod ranks;
-mod tables;
 mod winners;
 
 use std::collections::BTreeMap;
@@ -26,7 +21,7 @@ use serde::Serialize;
 pub(crate) use design::label;
 pub use design::{Cost, Design};
 pub use effects::{Effect, Interaction, NoEffect, Share};
-pub use frontier::RatedDesign;
+pub use order::RatedDesign;
 pub use winners::{Measure, NearBest, Pair, Winner};
 
 use self::design::{Row, designs, short_names};
@@ -225,7 +220,7 @@ impl Report {
             report.winners.extend(winners::winners(&workload, &designs));
             report.near_best.extend(winners::near_best(&workload, &designs, options.within));
             report.pairs.extend(winners::pairs(&workload, &designs));
-            report.workloads.insert(workload, frontier::rated(designs));
+            report.workloads.insert(workload, order::rated(designs));
         }
         report
     }

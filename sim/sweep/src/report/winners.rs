@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::design::Design;
-use super::flips::{Difference, LogCost};
+use super::order::{Difference, LogCost};
 
 /// Designs after the best that are compared with it.
 const MAX_PAIRS: usize = 10;

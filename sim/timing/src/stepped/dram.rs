@@ -10,8 +10,8 @@ use super::queue::{Meter, Waits};
 use crate::address::AddressMap;
 use crate::chips::ChipTimes;
 use crate::clock::{Clocks, Time};
+use crate::recorder::Reason;
 use crate::spec::MachineSpec;
-use crate::stalls::Reason;
 use crate::{LINE_BYTES, Recorder};
 
 /// A pending line.

@@ -8,8 +8,8 @@ use super::queue::{Meter, Queue, Waits};
 use crate::Recorder;
 use crate::clock::{Clocks, Time};
 use crate::demand::CLIENTS;
+use crate::recorder::Reason;
 use crate::spec::{MachineSpec, SharedCacheSpec};
-use crate::stalls::Reason;
 
 /// A request of the L2 on its way down.
 #[derive(Clone, Copy, Debug)]

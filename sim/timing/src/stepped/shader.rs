@@ -8,8 +8,8 @@ use super::queue::Queue;
 use crate::clock::{Clocks, Time};
 use crate::data_unit::{DATA_EVENTS, DataUnit};
 use crate::demand::{ServiceDemand, share};
+use crate::recorder::Reason;
 use crate::spec::MachineSpec;
-use crate::stalls::Reason;
 
 /// A packet whose warps are on the cores.
 #[derive(Clone, Copy, Debug)]

@@ -8,8 +8,8 @@ use activity::{LineAccess, Unit};
 use super::levels::{NO_WAIT, Request};
 use super::queue::{Queue, Waits};
 use crate::clock::Time;
+use crate::recorder::Reason;
 use crate::service::{CYCLE, Server, Work};
-use crate::stalls::Reason;
 
 /// Interface of a stage to its surroundings.
 pub(super) trait StageEnv {

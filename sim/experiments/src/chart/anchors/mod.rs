@@ -9,7 +9,7 @@ use std::sync::Arc;
 use activity::{LineAccess, Packet, Unit};
 use glam::{Affine3A, Vec2, Vec3, Vec4};
 use output::OutputError;
-use output::progress::Progress;
+use output::terminal::Progress;
 use pipeline::sampling::Pattern;
 use pipeline::{
     Attachment, Attachments, Binding, Blend, Camera, Clear, Cull, DepthState, Draw, DrawState, Format,
@@ -24,7 +24,7 @@ use timing::{FrameClock, Level, Recorder};
 use workloads::material::SurfaceShader;
 use workloads::{Light, Material};
 
-use super::statistics::quantiles;
+use super::quantiles;
 use crate::study::table::{Sheet, Table, plain};
 use crate::study::{Gallery, Study, StudyError};
 

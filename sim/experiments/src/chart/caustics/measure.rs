@@ -5,7 +5,7 @@
 use activity::Event;
 use cpu_time::ThreadTime;
 use glam::DVec3;
-use output::progress::{Bar, Progress};
+use output::terminal::{Bar, Progress};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use run::{Plan, RunOptions, frames_of};
 use serde::Serialize;

@@ -5,7 +5,7 @@ pub(crate) mod measure;
 
 use output::OutputError;
 use output::plot::{ChartPanel, HeatMapPlot, HeatTile, Look, Picture, Scale, Series, Shading};
-use output::progress::Progress;
+use output::terminal::Progress;
 use serde::Serialize;
 use workloads::caustics::{MAX_CROSSED_SHARE, Method};
 

@@ -2,7 +2,7 @@
 
 use activity::Event;
 use glam::{DVec3, Vec4};
-use output::progress::Progress;
+use output::terminal::Progress;
 use pipeline::Gpu;
 use pipeline::sampling::{Sample, SampleSource};
 use run::{GpuSpec, Observed, Plan, RunError, RunOptions, frames_of};

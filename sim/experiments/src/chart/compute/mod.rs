@@ -5,7 +5,7 @@ mod measure;
 
 use output::OutputError;
 use output::plot::{AxisSpec, ChartPanel, Mark, Paint, Scale, Series};
-use output::progress::Progress;
+use output::terminal::Progress;
 use rayon::prelude::*;
 use run::RunError;
 use serde::Serialize;

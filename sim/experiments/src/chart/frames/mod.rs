@@ -9,7 +9,7 @@ use std::time::Instant;
 
 use output::OutputError;
 use output::plot::{ChartPanel, Mark, Paint, Scale, Series};
-use output::progress::Progress;
+use output::terminal::Progress;
 use serde::Serialize;
 use traces::Trace;
 use traces::energy::{FrameEnergy, PowerIntegral};

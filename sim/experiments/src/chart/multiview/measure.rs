@@ -7,14 +7,14 @@ use glam::{Vec3, Vec4};
 use pipeline::{
     CacheSpec, Draw, Features, Gpu, Lane, PipelineSpec, Replacement, Shader, ShadingPoint, Texture, Viewport,
 };
+use run::GpuSpec;
 use serde::Serialize;
 use workloads::multiview::{Layout, Rig, Target, Views};
 use workloads::{Frame, Overrides, Scene};
 
 use super::{SAMPLES, line, stereo};
-use crate::chart::statistics::{errors, mean_square};
+use crate::chart::{errors, mean_square};
 use crate::study::{Ran, StudyError};
-use run::GpuSpec;
 
 /// Cost of one way to render all views.
 #[derive(Clone, Copy, Debug, Serialize)]

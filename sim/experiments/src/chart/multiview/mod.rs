@@ -14,7 +14,7 @@ use crate::study::tradeoff::{Metric, TradeoffPoint};
 use crate::study::{Gallery, Study, StudyError};
 use output::OutputError;
 use output::plot::{ChartPanel, Scale, Series};
-use output::progress::{Bar, Progress};
+use output::terminal::{Bar, Progress};
 
 pub use measure::{Angle, Bench, Cached, Lanes, RegionTests, Run, TileTests, ViewsRow};
 

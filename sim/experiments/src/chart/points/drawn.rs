@@ -3,7 +3,7 @@
 
 use activity::Event;
 use cpu_time::ThreadTime;
-use output::progress::Progress;
+use output::terminal::Progress;
 use pipeline::Gpu;
 use pipeline::sampling::{HashedSamples, LensShape};
 use run::{GpuSpec, Plan, RunOptions, frames_of};

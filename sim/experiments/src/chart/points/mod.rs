@@ -5,7 +5,7 @@
 use cpu_time::ThreadTime;
 use output::OutputError;
 use output::plot::{ChartPanel, Scale, Series};
-use output::progress::{Bar, Progress};
+use output::terminal::{Bar, Progress};
 use serde::Serialize;
 use workloads::points::MAX_THIN_PER_POINT;
 use workloads::points::poisson::{Domain, PoissonError, PoissonSpec, Spacing, ball, poisson_disk};

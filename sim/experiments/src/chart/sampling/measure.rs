@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use glam::{Affine3A, DVec3, Vec3};
-use output::progress::Bar;
+use output::terminal::Bar;
 use pipeline::sampling::SampleSource;
 use pipeline::{
     Camera, Cull, Draw, Geometry, Lens, PassError, RasterPass, Rendered, SampleSpec, SampleTable, Settings,
@@ -15,7 +15,7 @@ use serde::Serialize;
 use workloads::{Frame, Overrides, Scene};
 
 use super::{SamplingEffort, SamplingRow, fitted};
-use crate::chart::statistics::{White, errors, mean_square, neighbours};
+use crate::chart::{White, errors, mean_square, neighbours};
 use crate::study::StudyError;
 
 /// One measurement.

@@ -7,18 +7,17 @@
 mod measure;
 
 use glam::Vec3;
+use output::OutputError;
+use output::plot::{ChartPanel, Scale, Series};
+use output::terminal::Progress;
 use serde::Serialize;
 
-use super::statistics::exponent;
+use super::exponent;
 use crate::study::table::{Sheet, Table, fixed, optional, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
 use crate::study::{Gallery, Study, StudyError};
-use output::OutputError;
-use output::plot::{ChartPanel, Scale, Series};
-use output::progress::Progress;
 
-pub use measure::Point;
-pub use measure::{Failures, Shared};
+pub use measure::{Failures, Point, Shared};
 
 /// Effort of the measurement.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -240,7 +239,7 @@ fn fitted(points: &[Point]) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::chart::statistics::neighbours;
+    use crate::chart::neighbours;
     use crate::study::written;
 
     /// Small enough for a test.

@@ -5,7 +5,7 @@ use serde::Serialize;
 use timing::Level;
 
 use super::{ErrorRow, LEVELS, StatedErrorsChart};
-use crate::chart::statistics::quantiles;
+use crate::chart::quantiles;
 use crate::study::table::{Sheet, Table, optional, percent, plain, share};
 
 /// Error of cycles that `packet` promises to warn of, as a share.

@@ -12,7 +12,7 @@ mod figures;
 use activity::Bounded;
 use output::OutputError;
 use output::plot::{AxisSpec, ChartPanel, Mark, Paint, Scale, Series};
-use output::progress::Progress;
+use output::terminal::Progress;
 use rayon::prelude::*;
 use run::{GpuSpec, RunError, StatedError};
 use serde::Serialize;

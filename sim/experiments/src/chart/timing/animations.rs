@@ -5,7 +5,7 @@ use std::path::Path;
 use activity::{LineAccess, Packet};
 use cpu_time::ProcessTime;
 use glam::Vec3;
-use output::progress::Progress;
+use output::terminal::Progress;
 use pipeline::{Gpu, RasterPass, Settings};
 use run::{
     Distinct, Forecast, GpuSpec, Plan, Previews, RunError, RunFrame, RunOptions, Sampling, Signatures,

@@ -1,29 +1,25 @@
 //! `quintile chart timing`: every level of timing against the reference, over scenes and GPUs.
 
 pub(super) mod animations;
-mod failures;
 pub(super) mod measure;
 mod picture;
 
 use std::collections::BTreeMap;
 
+use output::OutputError;
+use output::plot::{Matrix, MatrixPanel};
+use output::terminal::Progress;
+use run::{GpuSpec, RunError};
 use serde::Serialize;
+use timing::Level;
 
-use super::statistics::quantiles;
+use super::quantiles;
 use crate::study::table::{Sheet, Table, fixed, percent, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
 use crate::study::{Gallery, Study, StudyError};
-use output::OutputError;
-use output::plot::{Matrix, MatrixPanel};
-use output::progress::Progress;
-use run::GpuSpec;
-use run::RunError;
-use timing::Level;
 
 pub use animations::{AnimationRow, SubjectKind};
-pub use failures::{Chosen, FailedLevel, FailureRow, RateRow};
-pub use measure::AddedRow;
-pub use measure::TimingRow;
+pub use measure::{AddedRow, Chosen, FailedLevel, FailureRow, RateRow, TimingRow};
 
 /// Name of the cost: timing alone, without drawing, over that at `stepped`.
 pub(super) const HOST_TIME: &str = "host time of timing alone, relative to stepped";
@@ -139,8 +135,8 @@ impl Study for TimingChart {
             animations,
             rows,
             added,
-            failures: failures::failures(&gpus)?,
-            rates: failures::rates()?,
+            failures: measure::failures(&gpus)?,
+            rates: measure::rates()?,
         })
     }
 

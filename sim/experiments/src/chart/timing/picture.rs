@@ -1,11 +1,12 @@
 //! Speed against accuracy of all levels in one picture.
 
-use super::animations::SAMPLED;
-use super::{TimingChart, TimingRow};
-use crate::chart::statistics::quantiles;
-use crate::study::tradeoff::front;
 use output::plot::{AxisSpec, Chart, ChartPanel, Look, Mark, Paint, Picture, Scale, Series, Spread};
 use timing::Level;
+
+use super::animations::SAMPLED;
+use super::{TimingChart, TimingRow};
+use crate::chart::quantiles;
+use crate::study::tradeoff::front;
 
 /// The levels from the most exact to the fastest, in the order of their colours.
 const LEVELS: [&str; 4] = [Level::Stepped.name(), Level::Packet.name(), Level::Bound.name(), SAMPLED];

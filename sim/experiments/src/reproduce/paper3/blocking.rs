@@ -5,11 +5,10 @@ use power_model::{Circumstances, FramePower};
 use run::RunError;
 use traces::energy::{Pooled, pooled};
 
-use super::super::band::{Cases, one_at_a_time};
 use super::super::report::{ENERGY, POWER, TIME, level, line};
-use super::super::row::{Row, numbers};
-use super::super::stage::{MARKED, Stage, looped};
-use super::super::{Done, Figure, scenes};
+use super::super::row::{Cases, Row, numbers, one_at_a_time};
+use super::super::stage::{MARKED, Stage, looped, objects};
+use super::super::{Done, Figure};
 use super::{Bench, BlockingPhone, FRAME, settled};
 
 fn blocked(seed: u64) -> Circumstances {
@@ -146,10 +145,10 @@ fn over_edge(bench: &Bench<'_>, row: &BlockingPhone, stage: &Stage) -> Result<Ju
 
 /// Figure 6.
 fn by_objects(bench: &Bench<'_>, methods: &Methods) -> Figure {
-    let objects = |place: usize| f64::from(scenes::objects(bench.phone_step() * place as u32));
+    let drawn = |place: usize| f64::from(objects(bench.phone_step() * place as u32));
     let points = |list: &[f64]| -> Vec<(f64, f64)> {
         let mut points: Vec<_> =
-            list.iter().enumerate().map(|(place, value)| (objects(place), *value)).collect();
+            list.iter().enumerate().map(|(place, value)| (drawn(place), *value)).collect();
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
         points
     };

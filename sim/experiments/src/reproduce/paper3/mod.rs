@@ -4,16 +4,15 @@
 mod blocking;
 mod system;
 
-use output::progress::Progress;
+use output::terminal::Progress;
 use power_model::{Circumstances, FramePower, Pacing};
 use run::RunError;
 use traces::energy::PowerIntegral;
 use traces::frames::FinderMethod;
 use traces::score::Score;
 
-use super::band::Verdict;
 use super::report::{POWER, TIME, dots, line};
-use super::row::{Row, With, numbers};
+use super::row::{Row, Verdict, With, numbers};
 use super::settings::{
     About, Form, Origin, Setting, load, paper_settings, reduced, row_settings, settings_group,
 };

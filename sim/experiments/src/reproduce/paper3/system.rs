@@ -4,9 +4,8 @@ use power_model::{Cause, Circumstances, Pulse};
 use run::RunError;
 use traces::energy::{Spread, WarmUp, mean_over_discarded, outliers, warm_up as knee};
 
-use super::super::band::Cases;
 use super::super::report::{ENERGY, POWER, TIME, by_place, dots, level, line};
-use super::super::row::{Row, numbers};
+use super::super::row::{Cases, Row, numbers};
 use super::super::stage::{MARKED, Recording, looped};
 use super::super::{Done, Figure};
 use super::{Bench, settled, unflagged};

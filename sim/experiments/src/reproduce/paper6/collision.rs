@@ -9,14 +9,12 @@ use workloads::collision::families::{Case, cases};
 use workloads::collision::{Method, Object, PlainPasses, PlainResult, Search, candidates, detect};
 use workloads::shapes;
 
-use super::super::band::Cases;
 use super::super::report::over_doublings;
-use super::super::row::{Number, Row, numbers};
+use super::super::row::{Cases, Number, Row, numbers};
 use super::super::{Done, Figure};
-use super::Task;
 use super::figures::{Ends, overlaps};
-use super::public::{Pair, Public};
 use super::settings::{Moving, Shape, TwoObjects};
+use super::{Pair, Public, Task, load_public};
 use crate::reproduce::settings::Form;
 
 /// As the file has it.
@@ -170,7 +168,7 @@ pub(super) fn missed(task: &Task<'_>) -> Result<Done, RunError> {
     let generated: Vec<Pair> =
         own.iter().flat_map(|case| case.collide.iter().map(move |&both| pair(case, both))).collect();
     let public = match task.collision_data {
-        Some(folder) => super::public::load(folder, row.public_scenes.get(form))?,
+        Some(folder) => load_public(folder, row.public_scenes.get(form))?,
         None => Public::default(),
     };
     let at =

@@ -17,9 +17,8 @@ use workloads::visibility::Unshaded;
 
 use super::settings::{Depths, Mode, Planes, Triangles};
 use super::{Task, catalogue};
-use crate::reproduce::band::Cases;
 use crate::reproduce::report::line;
-use crate::reproduce::row::{Row, numbers, ran};
+use crate::reproduce::row::{Cases, Row, numbers, ran};
 use crate::reproduce::settings::Form;
 use crate::reproduce::{Done, Figure};
 use crate::stress::measure::Place;

@@ -15,10 +15,9 @@ use workloads::points::white::{
     Density, Named, Numbers, WhiteSpec, columns_for, counts, shares, white_noise,
 };
 
-use super::super::band::{Cases, Verdict};
 use super::super::report::{dots, line};
-use super::super::row::{Row, numbers};
-use super::super::{Done, Figure, row};
+use super::super::row::{self, Cases, Row, Verdict, numbers};
+use super::super::{Done, Figure};
 use super::Task;
 use super::figures::balls_and_uncovered;
 use super::settings::Darts;

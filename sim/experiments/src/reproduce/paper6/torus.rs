@@ -6,10 +6,9 @@ use run::{GpuSpec, RunError};
 use workloads::points::quality::upper_tail;
 use workloads::points::volume::{Blurred, Covered, Point, Torus, every_sample, standard_mode};
 
-use super::super::band::Cases;
 use super::super::report::dots;
-use super::super::row::{Number, Row, numbers};
-use super::super::{Done, Figure, row};
+use super::super::row::{self, Cases, Number, Row, numbers};
+use super::super::{Done, Figure};
 use super::Task;
 use crate::reproduce::settings::About;
 use crate::study::Ran;

@@ -5,13 +5,12 @@ use pipeline::{CacheSpec, Replacement};
 use run::RunError;
 use workloads::multiview::Layout;
 
-use super::figures::Line;
+use super::Task;
+use super::figures::{self, Line};
 use super::settings::{Policy, Size, Views};
-use super::{Task, figures};
 use crate::chart::multiview::{Bench, Lanes};
-use crate::reproduce::band::{Cases, one_at_a_time};
 use crate::reproduce::report::{level, line, over_doublings};
-use crate::reproduce::row::{Row, With, numbers, ran};
+use crate::reproduce::row::{Cases, Row, With, numbers, one_at_a_time, ran};
 use crate::reproduce::settings::Form;
 use crate::reproduce::{Done, Figure};
 use crate::study::{Ran, StudyError};
