@@ -1,7 +1,7 @@
 //! Found frames compared with the ground truth.
 
 use crate::energy::{FrameEnergy, TrueFrame};
-pub use crate::pairing::{TOLERANCE_S, found_beside_true, pairs, true_beside_found, true_frames};
+pub use crate::stats::{TOLERANCE_S, found_beside_true, pairs, true_beside_found, true_frames};
 use serde::Serialize;
 
 /// How well found frames agree with true ones. Counts; the rates are functions of them.

@@ -11,7 +11,6 @@ mod bound;
 mod boxes;
 mod grid;
 pub mod plane;
-mod pyramid;
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -20,8 +19,7 @@ use crate::tally::{Branches, Counting, Path, Tally};
 pub use bound::{Bounder, DepthBound, interval_madds, set_up_madds, vertex_range};
 pub(crate) use bound::{ExactBounder, exact_interval_madds};
 pub use boxes::{DepthBoxes, DepthTile, Visible};
-pub use grid::{BoxGrid, DepthSpec};
-pub use pyramid::Pyramid;
+pub use grid::{BoxGrid, DepthSpec, Pyramid};
 
 /// A real number.
 pub trait Real:

@@ -1,7 +1,6 @@
 //! Checks of the targets and bindings of a pass, before it is drawn.
 
-use super::attachments::{Attachments, SurfaceId, Surfaces};
-use super::error::{PassError, PassPart, SurfaceProblem};
+use super::attachments::{Attachments, PassError, PassPart, SurfaceId, SurfaceProblem, Surfaces};
 use super::pass::{Draw, RasterPass, Target};
 use crate::geometry::Viewport;
 use crate::state::{Blend, Compare};

@@ -9,9 +9,9 @@ use std::sync::Arc;
 use glam::{Vec2, Vec4};
 
 use crate::buffer::BoundBuffer;
+use crate::geometry::Viewport;
 use crate::memory::LINE_BYTES;
 use crate::texture::{Footprint, Sampler, Wrap, taps};
-use crate::viewport::Viewport;
 
 pub use format::Format;
 
@@ -286,7 +286,7 @@ fn bilinear(texels: &Texels, layout: &Layout, uv: Vec2, mut line: impl FnMut(u64
 #[cfg(test)]
 mod tests {
     use super::{Format, SurfaceSpec, *};
-    use crate::viewport::Viewport;
+    use crate::geometry::Viewport;
 
     #[test]
     fn every_sample_has_its_own_bytes() {

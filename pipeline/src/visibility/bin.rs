@@ -2,7 +2,7 @@
 //! boxes.
 
 use crate::geometry::Viewport;
-use crate::sample_test::block::SampleRows;
+use crate::sample_test::SampleRows;
 use crate::simd::{LANES, Row};
 
 /// Samples of one bin. Packets are numbered by block, cell and position in the cell.

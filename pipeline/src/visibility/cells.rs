@@ -5,7 +5,7 @@
 
 use super::bin::{BinSamples, Boxes, CellRange};
 use crate::geometry::Shear;
-use crate::sample_test::block::View;
+use crate::sample_test::View;
 use crate::setup::{Corner, Triangle, cross};
 use crate::simd::{LANES, Lanes, Mask, Row};
 

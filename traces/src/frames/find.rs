@@ -1,16 +1,14 @@
 //! Finding frames: by a given method, by the most suitable one, or from a mark that the program proposes.
 
-use super::assess::uncovered_work;
-use super::consensus::more_agreed;
+use super::assess::{more_agreed, uncovered_work};
 use super::marks::{MarkError, Marks, Placed, Placement, default_window, flat_mark_of};
 use super::matched::{find_matched, noise_variance};
-use super::register::register;
+use super::periodicity::{Snapped, snap_to_ticks};
+use super::register::{refine_starts, register};
 use super::segments::{Segmentation, segment};
 use super::split_frames::SplitFrames;
-use super::start_refinement::refine_starts;
 use super::threshold::{Rule, Threshold};
 use super::track::{Start, track};
-use super::vsync::{Snapped, snap_to_ticks};
 use super::{FinderMethod, Found, FrameStart, SUSPECT_CONFIDENCE, marked_start, spacing};
 use super::{assess, idle_gap, periodicity};
 use crate::stats::upper_median;

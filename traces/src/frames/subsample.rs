@@ -5,8 +5,7 @@
 //! from the start. So the earlier frame is scaled about its start by one ratio after another, and the shift
 //! is taken from the best ratio.
 
-use super::profile::difference;
-use crate::overlap::{Buffers, OverlapSave};
+use super::profile::{Buffers, OverlapSave, difference};
 use core::ops::RangeInclusive;
 
 /// The best alignment near offset `near`, in samples, fractional: the minimum of the summed squared

@@ -10,10 +10,7 @@
 //! [`WITNESSES`] are four more devices of other structure, which share nothing with these scenes or each other.
 
 mod layers;
-mod on_demand;
-mod one_process;
-mod pipelined;
-mod several_processes;
+mod processes;
 mod witness;
 
 pub use witness::{WITNESSES, Witness};

@@ -22,7 +22,7 @@ use warnings::Warning;
 use crate::error::{LoadError, Source};
 use crate::import::{Face, Format, Surface, reader, statements, surface};
 use crate::scene::Wrong;
-use crate::scene::measure::lens_leaves_view;
+use crate::scene::lens_leaves_view;
 
 pub use crate::scene::CameraSpec;
 pub use m5d::parse as parse_m5d;

@@ -1,13 +1,12 @@
 //! The one pass over the samples, and the buffers of its threads.
 
-use super::piece::{Piece, powers};
 use super::screen::{Buffers, Screen, minima};
-use super::template::Template;
-use crate::clock::Clock;
+use super::{Piece, Template, powers};
 use crate::frames::marks::{Marks, Placed, Placement};
 use crate::frames::subsample::vertex;
 use crate::frames::{FinderMethod, spacing};
 use crate::stats::{PairSum, mean};
+use crate::times::Clock;
 use core::ops::Range;
 use multiversion::multiversion;
 use rayon::prelude::*;

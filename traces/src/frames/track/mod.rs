@@ -7,20 +7,16 @@
 //! 2. the weight of a distance is learnt from the starts found so far and from the samples between them ([`evidence`]);
 //! 3. the best sequence is found by dynamic programming over pairs of candidates ([`chain`]): near to a template, similar to
 //!    the one before, and at an even period that may jump now and then;
-//! 4. starts that their neighbours resemble more than any template does become templates ([`templates`]).
+//! 4. starts that their neighbours resemble more than any template does become templates ([`evidence`]).
 
 mod chain;
 mod clocks;
 mod evidence;
-mod guess;
-mod phase_slip;
-mod templates;
 
 use super::marks::Placement;
 use super::profile::spaced_minima;
-use super::track::chain::{Chain, Graph};
-use super::track::evidence::{Evidence, FEATURES, Label};
-use super::track::templates::Templates;
+use chain::{Chain, Graph};
+use evidence::{Evidence, FEATURES, Label, Templates};
 
 /// First-guess periods around a mark that the first round searches.
 const FIRST_PERIODS: usize = 12;
@@ -103,7 +99,7 @@ struct Tracker {
 impl Tracker {
     fn new(power: &[f64], width: usize, anchor: usize, marks: &[usize]) -> Self {
         let templates = Templates::new(power, width, anchor, marks);
-        let (period, starts) = guess::first(&templates, (width / 2).max(1), marks);
+        let (period, starts) = evidence::first(&templates, (width / 2).max(1), marks);
         let longest = chain::longest(marks);
         let period = period.min(longest);
         let mut tracker = Self {
@@ -147,7 +143,7 @@ impl Tracker {
         self.prune();
         self.chain = Graph::new(&self.templates, &self.candidates, self.period).best();
         let starts = self.starts();
-        self.period = guess::median_gap(&starts).unwrap_or(self.period).min(self.longest);
+        self.period = evidence::median_gap(&starts).unwrap_or(self.period).min(self.longest);
         let all: Vec<usize> = self.candidates.iter().map(|candidate| candidate.offset).collect();
         let covered = |offsets: &[usize]| chain::covered(offsets, self.period) as f64;
         self.levels_changed |= covered(&starts) < MIN_COVERAGE * covered(&all);
@@ -218,7 +214,7 @@ impl Tracker {
 
     /// The sequence; of `marks` everything is sure.
     fn conclude(self, marks: &[usize]) -> Tracked {
-        let factors = phase_slip::confidence_factors(&self.starts(), marks, &self.marks);
+        let factors = chain::confidence_factors(&self.starts(), marks, &self.marks);
         let start = |((&node, &support), factor): ((&usize, &f64), f64)| {
             let offset = self.candidates[node].offset;
             let marked = marks.contains(&offset);
