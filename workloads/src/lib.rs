@@ -34,7 +34,6 @@
 
 pub mod accumulation;
 mod bounded;
-pub mod builtin;
 mod bvh;
 pub mod catalog;
 pub mod caustics;
@@ -57,7 +56,6 @@ pub mod soft_shadows;
 pub mod stress;
 pub mod visibility;
 
-pub use builtin::builtin_names;
 pub use error::LoadError;
 pub use import::{load, load_text};
 pub use job::Job;
@@ -66,3 +64,4 @@ pub use material::{Alpha, Light, Material};
 pub use regime::Regime;
 pub use rendering::{FixedSamples, Rendering, SampleChoice, write_hits, write_samples};
 pub use scene::{Frame, FrameError, FrameMesh, Overrides, Scene, Settings};
+pub use shapes::builtin_names;

@@ -192,7 +192,7 @@ impl Default for Light {
 }
 
 /// Largest share of a lamp's light in the highlight.
-pub(crate) const HIGHLIGHT: f32 = 0.12;
+const HIGHLIGHT: f32 = 0.12;
 
 /// What light meets at a point of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -18,7 +18,6 @@
 //! vertices, so no point of its outline moves farther than they do.
 
 mod edges;
-mod facing;
 mod lens;
 mod number;
 mod region;
@@ -28,11 +27,10 @@ mod time_interval;
 
 use crate::geometry::{MovingVertex, Shear};
 pub use edges::{EdgeBounds, Edges};
-pub use facing::Facing;
 pub use lens::{LensLines, LensSpan, LensSpans};
 pub use number::{Coordinate, Number, Pieces, Quadratic, Scalar};
 pub use region::{Box5, Faces, Piece, TileRect, TimePieces, View};
-pub use screen::{SCREEN_GAIN_MADDS, Screen, screen_madds};
+pub use screen::{Facing, SCREEN_GAIN_MADDS, Screen, screen_madds};
 pub use side_planes::{narrow, narrow_by_sides, narrow_counted, narrow_near};
 pub use time_interval::{TimeIntervals, time_interval, time_interval_counted};
 

@@ -15,7 +15,6 @@
 //!
 //! Samples of a table repeat from tile to tile: each of its blocks is sorted once, and bins are put together.
 
-mod bin;
 mod cells;
 mod raster;
 mod sorter;
@@ -29,12 +28,11 @@ use crate::geometry::{Camera, Clip, Cull, Geometry, MovingVertex, Projection, Sh
 use crate::sampling::{Sample, SampleSource, SampleTable};
 use crate::setup::{PixelRect, SetupResult, Triangle, bounds, distribute, set_up};
 use crate::simd::{Kernel, LANES, Lanes, Row, Width, dispatch};
-use bin::{BinSamples, CellBoxes};
 use cells::Facing;
 pub use raster::Tally;
 use raster::{BinSurface, Queue, VisibleBinWorker};
 pub use sorter::SampleLayout;
-use sorter::{Plan, Sorter};
+use sorter::{BinSamples, CellBoxes, Plan, Sorter};
 
 /// Visible triangle of every sample of a layout.
 #[derive(Clone, Debug)]

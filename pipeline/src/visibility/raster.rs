@@ -18,9 +18,8 @@
 //! [`crate::setup::Triangle::slack`]), and so does this.
 
 use super::BinTriangle;
-use super::bin::BinSamples;
 use super::cells::{CellBounds, CellSetup, EdgeRows, Extent, ROUNDING, Scene, all, in_front_of_edges};
-use super::sorter::SampleLayout;
+use super::sorter::{BinSamples, SampleLayout};
 use crate::sample_test::{Crossing, SeenLanes, View, hit, vertices_seen};
 use crate::setup::{Corner, Triangle};
 use crate::simd::{Kernel, LANES, Lanes, Mask, Row, prefetch};

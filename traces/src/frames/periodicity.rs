@@ -217,7 +217,7 @@ fn slope(positions: &[f64], periods: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::random::Random;
+    use crate::stats::Random;
 
     #[test]
     fn power_repeats_after_a_frame_and_noise_never_does() {

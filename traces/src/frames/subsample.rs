@@ -282,7 +282,7 @@ mod tests {
 
     #[test]
     fn oracle_estimates_are_those_of_a_direct_search() {
-        let noise = crate::random::Random::new(5, 0);
+        let noise = crate::stats::Random::new(5, 0);
         let busy = |i: usize| if (900..1000).contains(&(i % 2500)) { 2.0 } else { 0.0 };
         let power: Vec<f64> = (0..6000).map(|i| 5.0 + busy(i) + 0.01 * noise.normals(i as u64).0).collect();
         let mean = power[700..2200].iter().sum::<f64>() / 1500.0;

@@ -5,8 +5,7 @@
 //! scored on it. They share only how spans of power are added up ([`Layers`]) and how numbers are drawn ([`Dice`]).
 //! A seed makes another device of the same kind: most quantities are drawn anew with it.
 
-use super::layers::{Dice, Drawn, Layers};
-use super::processes::{one_process, several_processes};
+use super::layers::{Dice, Drawn, Layers, on_demand, pipelined};
 use super::{Recording, Scene};
 use crate::CurveError;
 use crate::energy::TrueFrame;
@@ -72,268 +71,324 @@ impl Witness {
     }
 }
 
-const ON_DEMAND: &str = "on demand";
-/// Power asleep, dozing and polling, W, and after how long it dozes and sleeps, s.
-const ASLEEP_W: f64 = 0.12;
-const DOZING_W: f64 = 0.31;
-const POLLING_W: f64 = 0.52;
-const DOZES_S: f64 = 9e-3;
-const SLEEPS_S: f64 = 60e-3;
-/// Waking up: how long, s, and its steps, W.
-const WAKES_S: f64 = 1.7e-3;
-const WAKING_W: [f64; 5] = [0.2, 0.35, 0.5, 0.68, 0.6];
-/// The traversal: length, s, and power, W, of its parts.
-const TRAVERSE_S: [f64; 2] = [0.7e-3, 1.5e-3];
-const TRAVERSE_W: [f64; 2] = [0.8, 2.0];
-const TRAVERSE_PARTS: usize = 6;
-/// The hand-over, s, W.
-const HAND_OVER_S: f64 = 0.45e-3;
-const HAND_OVER_W: f64 = 0.95;
-/// Filling: how long, s, and its power, W.
-const FILL_S: [f64; 2] = [0.9e-3, 16e-3];
-const FILL_W: [f64; 2] = [1.5, 3.3];
-/// Areas in a full fill, and how much their powers differ.
-const AREAS: f64 = 22.0;
-const AREA_DIFFERS: f64 = 0.22;
-/// The display, Hz; how often a frame is late, and by how much, s.
-const DISPLAY_HZ: [f64; 3] = [60.0, 90.0, 120.0];
-const LATE: f64 = 0.1;
-const LATE_S: [f64; 2] = [0.3e-3, 5e-3];
-/// Frames of a touch; how often a lone frame comes instead.
-const TOUCH_FRAMES: [f64; 2] = [8.0, 55.0];
-const LONE: f64 = 0.45;
-/// Mean pause, s.
-const PAUSE_S: f64 = 0.25;
-const MIN_PAUSE_S: f64 = 5e-3;
-/// From frame to frame of a touch the filled area changes by so much.
-const SCROLL: f64 = 0.15;
-const IDLE_AROUND_S: f64 = 0.4;
+const ONE_PROCESS: &str = "one process";
+/// Static power, power of full activity at the highest clock, W.
+const STATIC_W: [f64; 2] = [0.7, 1.3];
+const DYNAMIC_W: [f64; 2] = [2.5, 6.0];
+/// Submission at the start of a frame: its length, s, and activity.
+const SUBMIT_S: [f64; 2] = [0.25e-3, 0.9e-3];
+const SUBMIT_ACTIVITY: [f64; 2] = [0.25, 0.75];
+/// Passes of a frame, and how long all of them take at the highest clock, s.
+const PASSES: [f64; 2] = [3.0, 8.0];
+const WORK_S: [f64; 2] = [5.5e-3, 19e-3];
+const PASS_ACTIVITY: [f64; 2] = [0.2, 1.0];
+/// By how much a pass begins above or below its activity, and how many steps it is made of.
+const SETTLING: f64 = 0.3;
+const GRAINS: usize = 14;
+const GRAIN: f64 = 0.06;
+/// The camera: deviation of work and activity in the long run, and its memory from frame to frame.
+const CAMERA: [f64; 2] = [0.14, 0.05];
+const MEMORY: f64 = 0.97;
+/// What differs between frames all the same.
+const UNEVEN: f64 = 0.025;
+/// Time between cuts, s, and how often one goes back to an earlier scene.
+const CUT_S: [f64; 2] = [1.2, 3.5];
+const BACK: f64 = 0.4;
+/// Clocks of the governor, as shares of the highest, how often it looks, s, and how often it errs.
+const CLOCKS: [f64; 5] = [1.0, 0.85, 0.7, 0.55, 0.45];
+const LOOK_S: f64 = 0.11;
+const ERRS: f64 = 0.12;
+/// Busy shares between which it keeps its clock.
+const LOAD: [f64; 2] = [0.6, 0.9];
+/// Between frames if nothing limits them, s; rates of a limiter and of the display, Hz; error of sleeping, s.
+const TURN_S: [f64; 2] = [0.08e-3, 0.5e-3];
+const LIMITS_HZ: [f64; 3] = [40.0, 50.0, 75.0];
+const GAME_DISPLAY_HZ: [f64; 3] = [59.94, 72.0, 90.0];
+const SLEEP_S: f64 = 0.22e-3;
+/// Before the first and after the last frame, s.
+const GAME_AROUND_S: f64 = 0.27;
 
-/// What it looks like, and the time.
-struct Interface {
-    dice: Dice,
-    layers: Layers,
-    traverse_s: f64,
-    traverse_w: Vec<f64>,
-    area_w: Vec<f64>,
-    /// End of the frame before, s.
-    idle_s: f64,
+#[derive(Clone, Copy)]
+enum Pace {
+    Uncapped,
+    Limited(f64),
+    Display(f64),
 }
 
-impl Interface {
-    fn new(seed: u64) -> Self {
-        let mut dice = Dice::new(seed, ON_DEMAND, 0);
-        let traverse_s = dice.between(TRAVERSE_S);
-        let traverse_w = (0..TRAVERSE_PARTS).map(|_| dice.between(TRAVERSE_W)).collect();
-        let area_w = (0..AREAS as usize).map(|_| dice.between(FILL_W)).collect();
-        Self { dice, layers: Layers::default(), traverse_s, traverse_w, area_w, idle_s: 0.0 }
-    }
-
-    /// Idles until a time, and wakes up before it if asleep.
-    fn idle_until(&mut self, to_s: f64) {
-        let from_s = self.idle_s;
-        let [doze_s, sleep_s] = [DOZES_S, SLEEPS_S].map(|after_s| (from_s + after_s).min(to_s));
-        self.layers.add(from_s, doze_s, POLLING_W);
-        self.layers.add(doze_s, sleep_s, DOZING_W);
-        self.layers.add(sleep_s, to_s, ASLEEP_W);
-        if to_s - sleep_s > WAKES_S {
-            self.layers.add_steps(to_s - WAKES_S, to_s, &WAKING_W);
-        }
-    }
-
-    /// Draws a frame of so long a fill.
-    fn draw(&mut self, start_s: f64, fill_s: f64) {
-        self.idle_until(start_s);
-        let dice = &mut self.dice;
-        let traversed_s = start_s + self.traverse_s * dice.between([0.96, 1.04]);
-        self.layers.add_steps(start_s, traversed_s, &self.traverse_w);
-        let areas = libm::ceil(AREAS * fill_s / FILL_S[1]).clamp(1.0, AREAS) as usize;
-        let watts: Vec<f64> = self.area_w[..areas]
-            .iter()
-            .map(|watts| watts * libm::exp(AREA_DIFFERS * dice.normal()))
-            .collect();
-        self.layers.add_steps(traversed_s, traversed_s + fill_s, &watts);
-        self.idle_s = traversed_s + fill_s + HAND_OVER_S;
-        self.layers.add(traversed_s + fill_s, self.idle_s, HAND_OVER_W);
-    }
-}
-
-/// A witness: an interface that draws on demand.
-///
-/// Nothing is drawn while nothing changes. A touch starts a run of frames at the rate of the display, some of which are late; a
-/// cursor or a clock draws a single one. What is drawn is anything from a small area to the whole screen, so the longest
-/// frame takes ten times as long as the shortest. All frames begin with the same traversal of the view tree and end with
-/// the same hand-over; in between areas are filled. The processor polls for a while after the last frame, dozes, and sleeps; from sleep it
-/// wakes up by a ramp.
-fn on_demand(count: usize, seed: u64) -> Drawn {
-    let mut interface = Interface::new(seed);
-    let tick_s = 1.0 / interface.dice.one_of(&DISPLAY_HZ);
-    let (mut starts_s, mut now_s) = (Vec::new(), IDLE_AROUND_S);
-    while starts_s.len() < count {
-        let dice = &mut interface.dice;
-        let touch = if dice.chance(LONE) { 1 } else { dice.between(TOUCH_FRAMES) as usize };
-        let mut fill_s = dice.log_between(FILL_S);
-        for _ in 0..touch.min(count - starts_s.len()) {
-            let dice = &mut interface.dice;
-            let late_s = if dice.chance(LATE) { dice.between(LATE_S) } else { 0.0 };
-            fill_s = (fill_s * libm::exp(SCROLL * dice.normal())).clamp(FILL_S[0], FILL_S[1]);
-            let start_s = now_s + late_s;
-            starts_s.push(start_s);
-            interface.draw(start_s, fill_s);
-            let ticks = libm::ceil((interface.idle_s + 0.05e-3 - now_s) / tick_s);
-            now_s += ticks * tick_s;
-        }
-        now_s += MIN_PAUSE_S + interface.dice.waiting(PAUSE_S);
-    }
-    let end_s = now_s.max(interface.idle_s);
-    let until_s = end_s + IDLE_AROUND_S;
-    interface.idle_until(until_s);
-    Drawn { layers: interface.layers, starts_s, end_s, until_s }
-}
-
-const PIPELINED: &str = "pipelined";
-/// The rest of the chip, W.
-const REST_W: [f64; 2] = [0.4, 1.0];
-/// Preparation by the processor: how long, s, and its power, W.
-const PREPARE_S: [f64; 2] = [3e-3, 11e-3];
-const PREPARE_W: [f64; 2] = [0.4, 1.3];
-/// Binning: a burst that sets up, then draws; s and W.
-const SET_UP_S: [f64; 2] = [0.12e-3, 0.4e-3];
-const SET_UP_W: [f64; 2] = [1.6, 3.0];
-const BIN_S: [f64; 2] = [1.4e-3, 4.5e-3];
-const BIN_W: [f64; 2] = [0.9, 2.2];
-const BIN_DRAWS: usize = 17;
-/// Binning takes so much longer where shading runs at the same time.
-const SHARED: f64 = 1.25;
-/// Shading: render targets, how long all of them take, s, tile rows of each, W.
-const TARGETS: [f64; 2] = [2.0, 6.0];
-const SHADE_S: [f64; 2] = [4e-3, 15e-3];
-const SHADE_W: [f64; 2] = [1.0, 4.2];
-const TILE_ROWS: usize = 9;
-/// A store to memory ends each target: s, W.
-const STORE_S: f64 = 0.18e-3;
-const STORE_W: f64 = 0.75;
-/// Phases of the game: by how much each unit's work swings, and how fast, s.
-const SWING: [f64; 2] = [0.05, 0.3];
-const SWING_S: [f64; 2] = [1.5, 9.0];
-/// What differs from frame to frame.
-const DIFFERS: f64 = 0.035;
-/// Before the first preparation and after the last frame, s.
-const REST_AROUND_S: f64 = 0.22;
-
-/// How a unit's work swings with time.
-struct Swing([f64; 3]);
-
-impl Swing {
-    fn drawn(dice: &mut Dice) -> Self {
-        Self([dice.between(SWING), dice.between(SWING_S), dice.between([0.0, TAU])])
-    }
-
-    fn at(&self, time_s: f64, dice: &mut Dice) -> f64 {
-        let [share, period_s, phase] = self.0;
-        libm::exp(share * libm::sin(TAU * time_s / period_s + phase) + DIFFERS * dice.normal())
-    }
-}
-
-/// The three units.
-struct Chip {
-    prepare: ([f64; 2], Swing),
-    set_up: [f64; 2],
-    bin: (f64, Vec<f64>, Swing),
-    shade: (f64, Vec<Target>, Swing),
-}
-
-/// A render target: its share of the shading, and the power of its tile rows, W.
-struct Target {
+/// A pass of a scene.
+#[derive(Clone)]
+struct Pass {
     share: f64,
-    row_w: [f64; TILE_ROWS],
+    activity: f64,
+    settling: f64,
+    grains: [f64; GRAINS],
+    /// Where the camera has taken work and activity.
+    walk: [f64; 2],
 }
 
-impl Chip {
+impl Pass {
     fn drawn(dice: &mut Dice) -> Self {
-        let prepare = [dice.log_between(PREPARE_S), dice.between(PREPARE_W)];
-        let set_up = [SET_UP_S, SET_UP_W].map(|range| dice.between(range));
-        let draws = (0..BIN_DRAWS).map(|_| dice.between(BIN_W)).collect();
-        let count = dice.between(TARGETS) as usize;
-        let shares: Vec<f64> = (0..count).map(|_| dice.log_between([0.35, 2.8])).collect();
-        let all: f64 = shares.iter().sum();
-        let targets = shares.iter().map(|share| {
-            let level_w = dice.between(SHADE_W);
-            let row_w = core::array::from_fn(|_| level_w * dice.between([0.7, 1.3]));
-            Target { share: share / all, row_w }
-        });
-        let targets = targets.collect();
-        let shade_s = dice.log_between(SHADE_S);
-        let mut swing = || Swing::drawn(dice);
         Self {
-            prepare: (prepare, swing()),
-            set_up,
-            shade: (shade_s, targets, swing()),
-            bin: (0.0, draws, swing()),
+            share: dice.log_between([0.3, 3.0]),
+            activity: dice.between(PASS_ACTIVITY),
+            settling: SETTLING * dice.normal(),
+            grains: core::array::from_fn(|_| GRAIN * dice.normal()),
+            walk: [0.0; 2],
         }
-        .with_binning(dice)
     }
 
-    fn with_binning(mut self, dice: &mut Dice) -> Self {
-        self.bin.0 = dice.log_between(BIN_S);
-        self
-    }
-
-    /// Bins from a time on, shading until another; returns the end, s.
-    fn bin(&self, layers: &mut Layers, from_s: f64, shaded_s: f64, dice: &mut Dice) -> f64 {
-        let set_up_s = from_s + self.set_up[0];
-        layers.add(from_s, set_up_s, self.set_up[1]);
-        let slower = if shaded_s > set_up_s { SHARED } else { 1.0 };
-        let end_s = set_up_s + slower * self.bin.0 * self.bin.2.at(from_s, dice);
-        let watts: Vec<f64> = self.bin.1.iter().map(|watts| watts / slower).collect();
-        layers.add_steps(set_up_s, end_s, &watts);
-        end_s
-    }
-
-    /// Shades from a time on; returns the end, s.
-    fn shade(&self, layers: &mut Layers, from_s: f64, dice: &mut Dice) -> f64 {
-        let mut now_s = from_s;
-        for target in &self.shade.1 {
-            let end_s = now_s + self.shade.0 * target.share * self.shade.2.at(from_s, dice);
-            layers.add_steps(now_s, end_s, &target.row_w);
-            layers.add(end_s, end_s + STORE_S, STORE_W);
-            now_s = end_s + STORE_S;
+    /// Moves the camera on by a frame.
+    fn wander(&mut self, dice: &mut Dice) {
+        let kick = libm::sqrt(1.0 - MEMORY * MEMORY);
+        for (walk, deviation) in self.walk.iter_mut().zip(CAMERA) {
+            *walk = MEMORY * *walk + kick * deviation * dice.normal();
         }
-        now_s
+    }
+
+    /// Activity of each grain.
+    fn activities(&self) -> [f64; GRAINS] {
+        core::array::from_fn(|grain| {
+            let settled = libm::exp(-4.0 * grain as f64 / GRAINS as f64);
+            (self.activity + self.walk[1] + self.settling * settled + self.grains[grain]).clamp(0.03, 1.15)
+        })
     }
 }
 
-/// A witness: a tiled renderer whose frames overlap.
-///
-/// Three units work at once, on different frames: the processor prepares frame n + 2, geometry of n + 1 is binned, tiles of n are
-/// shaded. A frame starts where its binning does; that is the event a marker shows. Binning waits for the processor and, as there
-/// are two sets of bins, for the shading of the frame before the last. Shading is two to five render targets, each a sequence of
-/// tile rows with powers of their own; it waits for the bins. While both run they share memory, and binning is slower. Heavy
-/// and light phases of the game move the bottleneck from one unit to another. The rail sees the sum.
-fn pipelined(count: usize, seed: u64) -> Drawn {
-    let mut dice = Dice::new(seed, PIPELINED, 0);
-    let chip = Chip::drawn(&mut dice);
-    let rest_w = dice.between(REST_W);
-    let (mut layers, mut starts_s) = (Layers::default(), Vec::new());
-    let (mut prepared_s, mut binned_s) = (REST_AROUND_S, 0.0);
-    // When shading ends, of the last frame and of the one before it.
-    let mut shaded_s = [0.0; 2];
-    for _ in 0..count {
-        let ([prepare_s, prepare_w], swing) = &chip.prepare;
-        let from_s = prepared_s;
-        prepared_s += prepare_s * swing.at(from_s, &mut dice);
-        layers.add(from_s, prepared_s, *prepare_w);
-        let start_s = prepared_s.max(binned_s).max(shaded_s[1]);
-        starts_s.push(start_s);
-        binned_s = chip.bin(&mut layers, start_s, shaded_s[0], &mut dice);
-        let end_s = chip.shade(&mut layers, binned_s.max(shaded_s[0]), &mut dice);
-        shaded_s = [end_s, shaded_s[0]];
-        // It prepares no more than two frames ahead.
-        prepared_s = prepared_s.max(shaded_s[1]);
+fn scene(dice: &mut Dice) -> Vec<Pass> {
+    let count = dice.between(PASSES) as usize;
+    let mut passes: Vec<Pass> = (0..count).map(|_| Pass::drawn(dice)).collect();
+    let all: f64 = passes.iter().map(|pass| pass.share).sum();
+    passes.iter_mut().for_each(|pass| pass.share /= all);
+    passes
+}
+
+/// The governor's clock, and the busy time since it last looked.
+struct Governor {
+    dice: Dice,
+    place: usize,
+    look_s: f64,
+    busy_s: f64,
+}
+
+impl Governor {
+    fn clock(&self) -> f64 {
+        CLOCKS[self.place.min(CLOCKS.len() - 1)]
     }
-    let until_s = shaded_s[0] + REST_AROUND_S;
-    layers.add(0.0, until_s, rest_w);
-    Drawn { layers, starts_s, end_s: shaded_s[0], until_s }
+
+    fn after_frame(&mut self, now_s: f64, busy_s: f64) {
+        self.busy_s += busy_s;
+        if now_s < self.look_s {
+            return;
+        }
+        let load = self.busy_s / (now_s - self.look_s + LOOK_S);
+        self.place = match load {
+            _ if self.dice.chance(ERRS) => self.dice.between([0.0, CLOCKS.len() as f64]) as usize,
+            _ if load > LOAD[1] => self.place.saturating_sub(1),
+            _ if load < LOAD[0] => (self.place + 1).min(CLOCKS.len() - 1),
+            _ => self.place,
+        };
+        (self.look_s, self.busy_s) = (now_s + LOOK_S, 0.0);
+    }
+}
+
+/// A witness: one process that renders a game.
+///
+/// A frame begins with a short submission by the driver, the same in all scenes of the game. Three to seven passes follow,
+/// each with an activity that settles from its first value to its last, as caches fill, and a grain of its own. The camera moves:
+/// work and activity of each pass follow a mean-reverting walk. Every few seconds the scene is cut, and later scenes may be
+/// earlier ones. A governor looks at the load every tenth of a second and picks one of its clocks, not always
+/// the right one. Frames are uncapped, limited to a rate by sleeping, or wait for the display, whose ticks heavy frames miss.
+fn one_process(count: usize, seed: u64) -> Drawn {
+    let mut dice = Dice::new(seed, ONE_PROCESS, 0);
+    let [static_w, dynamic_w] = [STATIC_W, DYNAMIC_W].map(|range| dice.between(range));
+    let [submit_s, submit] = [SUBMIT_S, SUBMIT_ACTIVITY].map(|range| dice.between(range));
+    let work_s = dice.log_between(WORK_S);
+    let pace = match dice.between([0.0, 3.0]) as usize {
+        0 => Pace::Uncapped,
+        1 => Pace::Limited(dice.one_of(&LIMITS_HZ)),
+        _ => Pace::Display(dice.one_of(&GAME_DISPLAY_HZ)),
+    };
+    let mut scenes = vec![scene(&mut dice)];
+    let (mut shown, mut cut_s) = (0, GAME_AROUND_S + dice.between(CUT_S));
+    let governor = Dice::new(seed, ONE_PROCESS, 1);
+    let mut governor = Governor { dice: governor, place: 0, look_s: GAME_AROUND_S + LOOK_S, busy_s: 0.0 };
+    let (mut layers, mut starts_s, mut now_s) = (Layers::default(), Vec::new(), GAME_AROUND_S);
+    for _ in 0..count {
+        let start_s = now_s;
+        starts_s.push(start_s);
+        if now_s > cut_s {
+            cut_s = now_s + dice.between(CUT_S);
+            if scenes.len() > 1 && dice.chance(BACK) {
+                shown = dice.between([0.0, scenes.len() as f64]) as usize;
+            } else {
+                scenes.push(scene(&mut dice));
+                shown = scenes.len() - 1;
+            }
+        }
+        let clock = governor.clock();
+        // Voltage follows the clock.
+        let full_w = dynamic_w * clock * (0.55 + 0.45 * clock) * (0.55 + 0.45 * clock);
+        let submitted_s = submit_s * (1.0 + UNEVEN * dice.normal());
+        layers.add(now_s, now_s + submitted_s, submit * full_w);
+        now_s += submitted_s;
+        for pass in &mut scenes[shown] {
+            pass.wander(&mut dice);
+            let length_s = work_s * pass.share * libm::exp(pass.walk[0] + UNEVEN * dice.normal()) / clock;
+            layers.add_steps(now_s, now_s + length_s, &pass.activities().map(|activity| activity * full_w));
+            now_s += length_s;
+        }
+        let busy_s = now_s - start_s;
+        now_s = match pace {
+            Pace::Uncapped => now_s + dice.between(TURN_S),
+            Pace::Limited(hz) => (start_s + 1.0 / hz).max(now_s) + SLEEP_S * dice.between([0.2, 1.0]),
+            Pace::Display(hz) => GAME_AROUND_S + libm::ceil((now_s + 0.1e-3 - GAME_AROUND_S) * hz) / hz,
+        };
+        governor.after_frame(now_s, busy_s);
+    }
+    let until_s = now_s + GAME_AROUND_S;
+    layers.add(0.0, until_s, static_w);
+    Drawn { layers, starts_s, end_s: now_s, until_s }
+}
+
+const SEVERAL_PROCESSES: &str = "several processes";
+/// The board, W.
+const BOARD_W: [f64; 2] = [0.9, 1.8];
+/// The display, Hz, and how many of its ticks a frame is shown for.
+const TICKS_HZ: [f64; 4] = [48.0, 60.0, 60.3, 85.0];
+const TICKS: [f64; 3] = [1.0, 1.0, 2.0];
+/// How often a tick is missed, and how long waking up takes, s.
+const MISSES: f64 = 0.03;
+const WAKE_S: [f64; 2] = [0.05e-3, 0.35e-3];
+/// Layers of the interface; all of them together take this share of the time between frames.
+const LAYERS: [f64; 2] = [6.0, 16.0];
+const BUSY: [f64; 2] = [0.3, 0.8];
+const LAYER_W: [f64; 2] = [0.5, 4.5];
+/// An animated layer: one in four, by this share of its power, with this period, s.
+const ANIMATED: f64 = 0.25;
+const SWING: f64 = 0.35;
+const SWING_S: [f64; 2] = [0.6, 5.0];
+const LAYER_UNEVEN: f64 = 0.04;
+/// The compositor: from the tick on, how long, s, and how much power, W.
+const COMPOSE_AT_S: [f64; 2] = [2.5e-3, 9e-3];
+const COMPOSE_S: [f64; 2] = [0.6e-3, 2.2e-3];
+const COMPOSE_W: [f64; 2] = [0.3, 1.1];
+/// Sound: samples a buffer at 48 kHz, how long decoding takes, s, and how much power, W.
+const BUFFER_S: [f64; 3] = [1024.0 / 48e3, 480.0 / 48e3, 2048.0 / 44.1e3];
+const DECODE_S: [f64; 2] = [0.4e-3, 1.6e-3];
+const DECODE_W: [f64; 2] = [0.2, 0.7];
+/// Radio: how often it listens, for how long, s, with how much power, W; a transfer, and how often there is one.
+const LISTEN_EVERY_S: f64 = 0.1024;
+const LISTEN_S: f64 = 3.1e-3;
+const RADIO_W: [f64; 2] = [0.6, 1.4];
+const TRANSFERS: f64 = 0.08;
+const TRANSFER_S: [f64; 2] = [12e-3, 75e-3];
+/// Backlight: its rate, Hz, the share of the time it is lit, and its power, W.
+const BACKLIGHT_HZ: [f64; 2] = [190.0, 1300.0];
+const LIT: [f64; 2] = [0.3, 0.7];
+const BACKLIGHT_W: [f64; 2] = [0.15, 0.7];
+/// Before the first and after the last frame, s: the other processes are at work then, too.
+const BOARD_AROUND_S: f64 = 0.35;
+
+struct Layer {
+    share: f64,
+    watts: f64,
+    swing: [f64; 3],
+}
+
+impl Layer {
+    fn drawn(dice: &mut Dice) -> Self {
+        let animated = if dice.chance(ANIMATED) { SWING } else { 0.0 };
+        Self {
+            share: dice.log_between([0.4, 2.5]),
+            watts: dice.between(LAYER_W),
+            swing: [animated, dice.between(SWING_S), dice.between([0.0, TAU])],
+        }
+    }
+
+    fn watts_at(&self, time_s: f64) -> f64 {
+        let [share, period_s, phase] = self.swing;
+        self.watts * (1.0 + share * libm::sin(TAU * time_s / period_s + phase))
+    }
+}
+
+/// A witness: several processes on one rail.
+///
+/// An application draws a frame for each tick of the display, or for each second one, and misses some. It waits for the tick plus a
+/// wake-up that differs. Its frames are layers of an interface: a number of rectangles, each a level of power; one layer in four
+/// is an animation, whose level swings. On the same rail the compositor works at every tick, with a phase of its own; sound is
+/// decoded a buffer at a time; a radio listens at its interval and now and then transfers for longer; the backlight
+/// is pulsed at a rate that has nothing to do with any of them.
+fn several_processes(count: usize, seed: u64) -> Drawn {
+    let mut dice = Dice::new(seed, SEVERAL_PROCESSES, 0);
+    let tick_s = 1.0 / dice.one_of(&TICKS_HZ);
+    let every = dice.one_of(&TICKS);
+    let layer_count = dice.between(LAYERS) as usize;
+    let interface: Vec<Layer> = (0..layer_count).map(|_| Layer::drawn(&mut dice)).collect();
+    let shares: f64 = interface.iter().map(|layer| layer.share).sum();
+    let busy_s = every * tick_s * dice.between(BUSY);
+    let (mut layers, mut starts_s, mut tick) = (Layers::default(), Vec::new(), 0.0);
+    for _ in 0..count {
+        let mut now_s = BOARD_AROUND_S + tick * tick_s + dice.between(WAKE_S);
+        starts_s.push(now_s);
+        for layer in &interface {
+            let length_s = busy_s * layer.share / shares * (1.0 + LAYER_UNEVEN * dice.normal()).max(0.5);
+            layers.add(now_s, now_s + length_s, layer.watts_at(now_s));
+            now_s += length_s;
+        }
+        tick += every + f64::from(u8::from(dice.chance(MISSES)));
+    }
+    let end_s = BOARD_AROUND_S + tick * tick_s;
+    let until_s = end_s + BOARD_AROUND_S;
+    layers.add(0.0, until_s, dice.between(BOARD_W));
+    compose(&mut layers, tick_s, until_s, seed);
+    sound(&mut layers, until_s, seed);
+    radio(&mut layers, until_s, seed);
+    backlight(&mut layers, until_s, seed);
+    Drawn { layers, starts_s, end_s, until_s }
+}
+
+fn compose(layers: &mut Layers, tick_s: f64, until_s: f64, seed: u64) {
+    let mut dice = Dice::new(seed, SEVERAL_PROCESSES, 1);
+    let at_s = BOARD_AROUND_S % tick_s + dice.between(COMPOSE_AT_S) % tick_s;
+    let [length_s, watts] = [COMPOSE_S, COMPOSE_W].map(|range| dice.between(range));
+    let mut now_s = at_s;
+    while now_s < until_s {
+        layers.add(now_s, now_s + length_s * dice.between([0.9, 1.1]), watts);
+        now_s += tick_s;
+    }
+}
+
+fn sound(layers: &mut Layers, until_s: f64, seed: u64) {
+    let mut dice = Dice::new(seed, SEVERAL_PROCESSES, 2);
+    let buffer_s = dice.one_of(&BUFFER_S);
+    let watts = dice.between(DECODE_W);
+    let mut now_s = dice.between([0.0, buffer_s]);
+    while now_s < until_s {
+        layers.add(now_s, now_s + dice.between(DECODE_S), watts);
+        now_s += buffer_s;
+    }
+}
+
+fn radio(layers: &mut Layers, until_s: f64, seed: u64) {
+    let mut dice = Dice::new(seed, SEVERAL_PROCESSES, 3);
+    let watts = dice.between(RADIO_W);
+    let mut now_s = dice.between([0.0, LISTEN_EVERY_S]);
+    while now_s < until_s {
+        let length_s = if dice.chance(TRANSFERS) { dice.between(TRANSFER_S) } else { LISTEN_S };
+        layers.add(now_s, now_s + length_s, watts);
+        now_s += LISTEN_EVERY_S;
+    }
+}
+
+fn backlight(layers: &mut Layers, until_s: f64, seed: u64) {
+    let mut dice = Dice::new(seed, SEVERAL_PROCESSES, 4);
+    let period_s = 1.0 / dice.log_between(BACKLIGHT_HZ);
+    let [lit, watts] = [LIT, BACKLIGHT_W].map(|range| dice.between(range));
+    let mut now_s = dice.between([0.0, period_s]);
+    while now_s < until_s {
+        layers.add(now_s, now_s + lit * period_s, watts);
+        now_s += period_s;
+    }
 }
 
 #[cfg(test)]

@@ -15,14 +15,14 @@ use activity::spec::suggestion;
 use glam::DVec3;
 use warnings::{Code, Warning};
 
-use crate::builtin::{builtin, builtin_names};
 use crate::error::LoadError;
 use crate::scene::{Local, Node, Parts, Scene, Trs};
+use crate::shapes::{builtin, builtin_names};
 pub(crate) use obj::{Face, statements};
 use reader::{Soup, TriangleMaterials};
 
 /// Name extensions of scene files, for messages.
-pub(crate) const ENDINGS: &str = ".ron, .gltf, .glb, .obj, .ply, .off or .stl";
+const ENDINGS: &str = ".ron, .gltf, .glb, .obj, .ply, .off or .stl";
 
 /// File formats, by the end of the name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

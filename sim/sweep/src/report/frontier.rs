@@ -1,7 +1,7 @@
 //! Frontier over time, energy and area: the designs that no other dominates.
 
 use serde::Serialize;
-use traces::random::Random;
+use traces::stats::Random;
 
 use super::design::Design;
 use super::flips::LogCost;

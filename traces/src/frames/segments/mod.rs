@@ -490,8 +490,8 @@ impl Likeness {
 
 #[cfg(test)]
 mod tests {
+    use crate::energy::{TOLERANCE_S, pairs};
     use crate::frames::{FinderMethod, Marks, Options, default_window, find_with};
-    use crate::score::{TOLERANCE_S, pairs};
     use crate::synth::WITNESSES;
 
     #[test]

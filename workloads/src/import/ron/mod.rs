@@ -12,7 +12,6 @@ use spec::{
 };
 use warnings::{Code, Warning};
 
-use crate::builtin::checker;
 use crate::error::{LoadError, Source};
 use crate::import::{Format, bare, gltf, reader, soup};
 use crate::material::{Alpha, Light, Material};
@@ -20,6 +19,7 @@ use crate::scene::{
     CameraSpec, Interpolation, Local, Mesh, Node, Parts, Rig, SceneCamera, Settings, Spin, Target, Track,
     Trs, rotation,
 };
+use crate::shapes::checker;
 use crate::{import, shapes};
 
 /// Reads the scene at `path`.
