@@ -1,7 +1,7 @@
 //! Medians, means, spreads, exact running sums, starts paired one to one, and random numbers as a pure function of (seed, stream,
 //! counter): any order, any thread, the same numbers.
 //!
-//! There are two medians: [`median`] is what reports print; [`upper_median`] takes an actual value, as the
+//! There are two medians: `median` is what reports print; `upper_median` takes an actual value, as the
 //! frame finder and the time base need.
 
 use core::f64::consts::TAU;

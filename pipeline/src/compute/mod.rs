@@ -1,7 +1,7 @@
 //! Compute: groups of lanes that share memory and barriers, and work on buffers.
 //!
 //! A [`GroupShader`] is code that computes its results and counts its work as it runs: operations on a
-//! [`Lane`](crate::shader::Lane), accesses to shared memory and to buffers, atomics and barriers. Lanes run one after
+//! [`Lane`], accesses to shared memory and to buffers, atomics and barriers. Lanes run one after
 //! another between barriers, and the accesses of a warp are put side by side: the n-th load of a buffer by each lane is one
 //! access of the warp, and so on for each kind. Where lanes leave a loop at different times this is
 //! what happens; where they take different sides of a branch it is an approximation.
