@@ -68,7 +68,6 @@ pub mod surface;
 pub mod tally;
 pub mod texture;
 pub mod traversal;
-mod viewport;
 pub mod visibility;
 
 pub use buffer::{Atomic, Buffer, BufferBinding, Word};

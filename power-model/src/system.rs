@@ -4,7 +4,7 @@
 //! All of them are extra power over intervals of time on top of the curve from [`crate::pace`]; they do not
 //! delay frames.
 
-use traces::{Curve, CurveError, random};
+use traces::{Curve, CurveError, stats};
 
 use crate::PacingError;
 use crate::pacing::{PacedFrame, Run};
@@ -207,7 +207,7 @@ fn uniform(stream: u64, counter: u64) -> f64 {
 
 /// SplitMix64 with `number` as its state (Steele, Lea and Flood, OOPSLA 2014).
 fn mix(number: u64) -> u64 {
-    random::mix(number.wrapping_add(random::GOLDEN))
+    stats::mix(number.wrapping_add(stats::GOLDEN))
 }
 
 #[cfg(test)]

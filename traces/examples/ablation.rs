@@ -4,9 +4,8 @@
 
 use std::error::Error;
 use traces::Trace;
-use traces::energy::PowerIntegral;
+use traces::energy::{PowerIntegral, TOLERANCE_S, score, true_frames};
 use traces::frames::{Marks, Options, Step, default_window, find_with};
-use traces::score::{TOLERANCE_S, score, true_frames};
 use traces::synth::{Recording, SCENARIOS, Scene, WITNESSES};
 
 const FRAMES: usize = 200;

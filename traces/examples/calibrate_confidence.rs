@@ -8,8 +8,8 @@
 use std::error::Error;
 use std::process::ExitCode;
 use traces::Trace;
+use traces::energy::{TOLERANCE_S, pairs, true_frames};
 use traces::frames::{FinderMethod, Found, MarkError, Marks, Options, Step, default_window, find_with};
-use traces::score::{TOLERANCE_S, pairs, true_frames};
 use traces::synth::{Scene, WITNESSES};
 
 /// Frames of each device.

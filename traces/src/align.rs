@@ -275,7 +275,7 @@ fn settled(line: Alignment, stamps_s: &[f64], starts_s: &[f64], near_s: f64) -> 
 }
 
 /// The median distance of neighbours, s; `None` where that is nothing.
-pub(super) fn usual_gap(times_s: &[f64]) -> Option<f64> {
+fn usual_gap(times_s: &[f64]) -> Option<f64> {
     let mut gaps: Vec<f64> = times_s.windows(2).map(|two| two[1] - two[0]).collect();
     let gap_s = if gaps.is_empty() { 0.0 } else { upper_median(&mut gaps) };
     (gap_s > 0.0).then_some(gap_s)
@@ -345,7 +345,7 @@ mod tests {
 
     /// 138 starts 40 ms apart, each off by at most `most_s` either way, on a grid of that if `whole`.
     fn even(seed: u64, most_s: f64, whole: bool) -> Vec<f64> {
-        let random = crate::random::Random::new(seed, 0);
+        let random = crate::stats::Random::new(seed, 0);
         let off = |index| random.between(index, [-1.0, 1.0]);
         let off = |index| if whole { libm::round(1.5 * off(index)) } else { off(index) };
         (0..138_u32).map(|index| 0.04 * f64::from(index) + most_s * off(index.into())).collect()

@@ -11,7 +11,7 @@
 //! 3. [`energy`] integrates from start to start by one rule, so that the frames add up to the whole, and evaluates runs,
 //!    passes, idle power, warm-up and outliers;
 //! 4. [`pareto`] compares settings by time and energy, [`align`] puts time stamps of another clock onto a trace, and
-//!    [`score`] compares found frames with the ground truth.
+//!    [`energy::score`] compares found frames with the ground truth.
 //!
 //! The other way round, [`device`] turns a noise-free power [`Curve`] into the trace that a recorder would
 //! have written, and [`synth`] makes such curves with frames whose starts and energies are known. [`units`],
@@ -47,20 +47,15 @@
 //! - Input that is not a trace is an error that names file and row; nothing panics, and nothing is repaired silently.
 
 pub mod align;
-mod clock;
 pub mod curve;
 pub mod device;
 pub mod energy;
 pub mod frames;
 pub mod io;
-mod overlap;
-mod pairing;
 pub mod pareto;
 pub mod pyramid;
-pub mod random;
-pub mod score;
 pub mod search;
-mod stats;
+pub mod stats;
 pub mod stream;
 pub mod synth;
 pub mod table;

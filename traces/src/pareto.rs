@@ -90,7 +90,7 @@ pub fn nondominated(pairs: &[(f64, f64)]) -> Vec<bool> {
 
 /// Two independent standard normal numbers for a draw (Box and Muller 1958).
 fn normal(seed: u64, draw: u64) -> (f64, f64) {
-    crate::random::Random::new(seed, 0).normals(draw)
+    crate::stats::Random::new(seed, 0).normals(draw)
 }
 
 impl Point {

@@ -294,7 +294,7 @@ mod tests {
         let set = Search { propose: true, ..search() }.of_trace(&trace(Vec::new())).unwrap();
         assert!(set.proposal.is_some() && set.energies.len() > 10);
         // One frame between noise.
-        let random = crate::random::Random::new(1, 0);
+        let random = crate::stats::Random::new(1, 0);
         let watts = |i: u64| {
             let busy = (10_000..10_400).contains(&i);
             let level = if busy { 3.0 + libm::sin(i as f64 / 17.0) } else { 0.5 };

@@ -1,8 +1,10 @@
-//! Medians, means, spreads, and exact running sums.
+//! Medians, means, spreads, exact running sums, starts paired one to one, and random numbers as a pure function of (seed, stream,
+//! counter): any order, any thread, the same numbers.
 //!
-//! There are two medians: [`median`] is what reports print; [`upper_median`] takes an actual value, as the
+//! There are two medians: `median` is what reports print; `upper_median` takes an actual value, as the
 //! frame finder and the time base need.
 
+use core::f64::consts::TAU;
 use serde::Serialize;
 
 /// The `n`-th smallest value, from 0; the values are left in another order. There must be more than `n`.
@@ -140,6 +142,103 @@ impl PairSum {
     }
 }
 
+/// Largest timing error of a start that counts as found, s.
+pub const TOLERANCE_S: f64 = 0.5e-3;
+
+/// Pairs `(found, truth)` of indices, one to one and in order, whose starts differ by at most `tolerance_s`.
+/// Both must be sorted by start. Greedy, earliest first: for intervals of one width on a line no other
+/// matching has more pairs; of several found starts that could take the same true one the nearest does, if
+/// the next true start does not need it.
+pub fn pairs(found_s: &[f64], truth_s: &[f64], tolerance_s: f64) -> Vec<(usize, usize)> {
+    let (mut f, mut t) = (0, 0);
+    let mut pairs = Vec::new();
+    while let (Some(&found), Some(&truth)) = (found_s.get(f), truth_s.get(t)) {
+        if (found - truth).abs() > tolerance_s {
+            if found < truth {
+                f += 1
+            } else {
+                t += 1
+            }
+            continue;
+        }
+        while let Some(&next) = found_s.get(f + 1) {
+            let needed = truth_s.get(t + 1).is_some_and(|&other| (next - other).abs() <= tolerance_s);
+            if needed || (next - truth).abs() >= (found_s[f] - truth).abs() {
+                break;
+            }
+            f += 1;
+        }
+        pairs.push((f, t));
+        f += 1;
+        t += 1;
+    }
+    pairs
+}
+
+/// For each found start the place of the true one beside it.
+pub fn true_beside_found(found_s: &[f64], truth_s: &[f64], tolerance_s: f64) -> Vec<Option<usize>> {
+    let mut beside = vec![None; found_s.len()];
+    pairs(found_s, truth_s, tolerance_s).into_iter().for_each(|(found, truth)| beside[found] = Some(truth));
+    beside
+}
+
+/// For each true start the place of the found one beside it.
+pub fn found_beside_true(found_s: &[f64], truth_s: &[f64], tolerance_s: f64) -> Vec<Option<usize>> {
+    let mut beside = vec![None; truth_s.len()];
+    pairs(found_s, truth_s, tolerance_s).into_iter().for_each(|(found, truth)| beside[truth] = Some(found));
+    beside
+}
+
+/// For each found frame, from a start to the next, whether both ends are true starts that follow each other.
+pub fn true_frames(found_s: &[f64], truth_s: &[f64], tolerance_s: f64) -> Vec<bool> {
+    let beside = true_beside_found(found_s, truth_s, tolerance_s);
+    beside.windows(2).map(|ends| matches!(ends, [Some(a), Some(b)] if *b == a + 1)).collect()
+}
+
+/// The odd constant nearest to 2^64 over the golden ratio: SplitMix64's increment (Steele, Lea and Flood
+/// 2014, "Fast splittable pseudorandom number generators", fig. 17).
+pub const GOLDEN: u64 = 0x9E37_79B9_7F4A_7C15;
+
+/// SplitMix64's output function (same source; constants by Stafford, variant 13).
+pub fn mix(mut z: u64) -> u64 {
+    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    z ^ (z >> 31)
+}
+
+/// One stream of numbers, by their counters.
+#[derive(Clone, Copy, Debug)]
+pub struct Random {
+    key: u64,
+}
+
+impl Random {
+    /// A stream of a seed: of one rail, or of one thing that varies.
+    pub fn new(seed: u64, stream: u64) -> Self {
+        Self { key: mix(seed.wrapping_add(GOLDEN.wrapping_mul(stream.wrapping_add(1)))) }
+    }
+
+    /// Even over `(0, 1)`.
+    pub fn uniform(self, counter: u64) -> f64 {
+        let bits = mix(self.key.wrapping_add(GOLDEN.wrapping_mul(counter.wrapping_add(1))));
+        // 53 bits, shifted by half a step: never 0, so the logarithm is finite.
+        ((bits >> 11) as f64 + 0.5) * (1.0 / 9_007_199_254_740_992.0)
+    }
+
+    /// Even between two numbers.
+    pub fn between(self, counter: u64, [low, high]: [f64; 2]) -> f64 {
+        low + (high - low) * self.uniform(counter)
+    }
+
+    /// Two independent normal numbers of mean 0 and variance 1 (Box and Muller 1958), from the even ones `2 n` and `2 n + 1`.
+    pub fn normals(self, n: u64) -> (f64, f64) {
+        let counter = n.wrapping_mul(2);
+        let radius = libm::sqrt(-2.0 * libm::log(self.uniform(counter)));
+        let angle = TAU * self.uniform(counter.wrapping_add(1));
+        (radius * libm::cos(angle), radius * libm::sin(angle))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -173,5 +272,35 @@ mod tests {
         let x = 1.0 + f64::EPSILON;
         let sum = PairSum::default().plus_product(x, x);
         assert_eq!(sum.plus(-1.0).plus(-2.0 * f64::EPSILON).value(), f64::EPSILON * f64::EPSILON);
+    }
+
+    #[test]
+    fn mean_variance_kurtosis_and_correlation_are_those_of_a_standard_normal() {
+        let random = Random::new(7, 0);
+        let n = 200_000_u64;
+        let (mut sum, mut square, mut fourth, mut cross, mut lag) = (0.0, 0.0, 0.0, 0.0, 0.0);
+        for sample in 0..n {
+            let (a, b) = random.normals(sample);
+            sum += a;
+            square += a * a;
+            fourth += a * a * a * a;
+            cross += a * b;
+            lag += a * random.normals(sample + 1).0;
+        }
+        let n = n as f64;
+        // Five standard errors each: 1, sqrt 2, sqrt 96, 1, 1 over sqrt n.
+        let sigma = 5.0 / n.sqrt();
+        assert!((sum / n).abs() < sigma);
+        assert!((square / n - 1.0).abs() < sigma * 1.4143);
+        assert!((fourth / n - 3.0).abs() < sigma * 9.8);
+        assert!((cross / n).abs() < sigma);
+        assert!((lag / n).abs() < sigma);
+    }
+
+    #[test]
+    fn seeds_and_streams_differ_and_repeat() {
+        assert_eq!(Random::new(1, 0).normals(5), Random::new(1, 0).normals(5));
+        assert_ne!(Random::new(1, 0).normals(5), Random::new(2, 0).normals(5));
+        assert_ne!(Random::new(1, 0).normals(5), Random::new(1, 1).normals(5));
     }
 }

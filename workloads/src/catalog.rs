@@ -87,7 +87,7 @@ pub fn names() -> impl Iterator<Item = (&'static str, &'static str)> {
 pub fn or_job(error: LoadError) -> LoadError {
     match error {
         LoadError::Unknown { name, .. } => {
-            crate::load::unknown(&name, &names().map(|(name, _)| name).collect::<Vec<_>>())
+            crate::import::unknown(&name, &names().map(|(name, _)| name).collect::<Vec<_>>())
         }
         error => error,
     }
@@ -163,7 +163,7 @@ pub fn remade(
     to: &Reduction,
 ) -> Result<Box<dyn Job>, LoadError> {
     let entry = JOBS.iter().find(|job| job.name == name);
-    let entry = entry.ok_or_else(|| or_job(crate::load::unknown(name, &[])))?;
+    let entry = entry.ok_or_else(|| or_job(crate::import::unknown(name, &[])))?;
     let (mut options, mut overrides) = (options.clone(), request.overrides.clone());
     match entry.flags.instead_of_size() {
         Some(option) => options.set.push((option.to_owned(), to.size[1].to_string())),

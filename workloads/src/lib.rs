@@ -15,7 +15,7 @@
 //! - [`collision`] finds the pairs of moving objects that may collide.
 //! - [`occlusion`] finds objects that are hidden at all times and from all of the lens.
 //! - [`deferred`] draws a G-buffer and lights it, beside forward rendering with the same lights.
-//! - [`Material`] is the look of a surface, [`material::SurfaceShader`] its cost, and [`lighting`] its light.
+//! - [`Material`] is the look of a surface, [`material::SurfaceShader`] its cost; [`material::Lighting`] is its light.
 //!
 //! ```
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -34,7 +34,6 @@
 
 pub mod accumulation;
 mod bounded;
-pub mod builtin;
 mod bvh;
 pub mod catalog;
 pub mod caustics;
@@ -45,29 +44,24 @@ mod error;
 pub mod glossy;
 mod import;
 pub mod job;
-pub mod lighting;
-mod load;
 pub mod material;
 pub mod multiview;
 pub mod occlusion;
 pub mod points;
 mod regime;
 mod rendering;
-mod samples;
 pub mod scene;
 pub mod shapes;
 pub mod soft_shadows;
 pub mod stress;
 pub mod visibility;
 
-pub use builtin::builtin_names;
 pub use error::LoadError;
+pub use import::{load, load_text};
 pub use job::Job;
 pub use job::{Fingerprint, FingerprintError};
-pub use lighting::Light;
-pub use load::{load, load_text};
-pub use material::{Alpha, Material};
+pub use material::{Alpha, Light, Material};
 pub use regime::Regime;
-pub use rendering::Rendering;
-pub use samples::{FixedSamples, SampleChoice, write_hits, write_samples};
+pub use rendering::{FixedSamples, Rendering, SampleChoice, write_hits, write_samples};
 pub use scene::{Frame, FrameError, FrameMesh, Overrides, Scene, Settings};
+pub use shapes::builtin_names;

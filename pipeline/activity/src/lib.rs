@@ -23,15 +23,16 @@
 //!
 //! The crate contains no geometry, clock rate or energy, and depends on no other crate of the workspace.
 
-mod counts;
 mod events;
 pub mod inputs;
 mod packet;
 pub mod spec;
 mod stream;
 
-pub use counts::{Bin, Counts, Timeline};
 pub use events::{Event, Unit};
-pub use packet::{LEVELS, LevelRequests, LineAccess, LineKind, Packet, PacketCounts, PacketKind, Waits};
+pub use packet::{
+    Bin, Counts, LEVELS, LevelRequests, LineAccess, LineKind, Packet, PacketCounts, PacketKind, Timeline,
+    Waits,
+};
 pub use spec::{Bounded, OutOfBounds};
 pub use stream::{PacketStream, StreamError, StreamWriter};

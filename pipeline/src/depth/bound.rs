@@ -3,8 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::plane::{Beam, MovingPlane, Points, normal, sides, tightest};
-use super::{Real, both, cross, hull, range};
+use super::{Beam, MovingPlane, Points, Real, both, cross, hull, normal, range, sides, tightest};
 use crate::geometry::Shear;
 use crate::setup::Triangle;
 use crate::traversal::{Box5, Coordinate, TileRect};

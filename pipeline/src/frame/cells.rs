@@ -1,7 +1,7 @@
 //! Cells of the shading grid that the samples of a tile are shaded in, sixteen at a time.
 
 use super::pass::Pass;
-use crate::sample_test::block::{Crossing, SampleRows, View};
+use crate::sample_test::{Crossing, SampleRows, View};
 use crate::sampling::TileSamples;
 use crate::setup::Corner;
 use crate::shading::{REFERENCE_TIME, cell_at, places};

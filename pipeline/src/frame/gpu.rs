@@ -6,8 +6,7 @@ use activity::{Counts, Event, LineAccess, Packet, PacketCounts, PacketKind, Wait
 use glam::{Vec3, Vec4};
 use serde::{Deserialize, Serialize};
 
-use super::attachments::{Attachments, Store, SurfaceId, Surfaces};
-use super::error::PassError;
+use super::attachments::{Attachments, PassError, Store, SurfaceId, Surfaces};
 use super::heat::{Block, FrameHeat, HeatMap, Placement};
 use super::pass::{AddressMap, Draw, Pass, RasterPass, Resident, Target, resident};
 use super::replay::Replay;

@@ -17,8 +17,7 @@ use crate::shader::{Program, Shader};
 use crate::state::{Clear, DepthState, DrawState};
 use crate::surface::{Bound, Format, MAX_TARGETS, Texels};
 use crate::texture::{Sampler, Texture};
-use crate::traversal::LensSpans;
-use crate::traversal::thresholds::{at_rest, blur_px, motion_px};
+use crate::traversal::{LensSpans, at_rest, blur_px, motion_px};
 
 /// Bytes of a stored depth or colour of one sample, and of a pixel of an image.
 pub(super) const SAMPLE_BYTES: u64 = 4;

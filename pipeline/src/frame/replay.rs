@@ -3,12 +3,11 @@
 use activity::{Event, LineAccess, Packet, PacketCounts, PacketKind};
 
 use super::Shading;
-use super::bin::{Bin, BinLog, Work};
-use super::bin_memory::BinMemory;
+use super::bin::{Bin, BinLog, BinMemory, Work};
+use super::lanes::Warps;
 use super::pass::{INDEX_BYTES, Pass, Plane, Query, SAMPLE_BYTES, VertexBuffer};
 use super::resolve::{SampleLine, TileResolve, tile_lines};
 use super::shaded::{QuadWork, ShadedTriangle};
-use super::warps::Warps;
 use crate::memory::{Access, Cache, CacheError, LINE_BYTES, MemorySystem};
 use crate::random::mix;
 use crate::sampling::Sample;

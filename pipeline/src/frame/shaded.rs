@@ -8,7 +8,7 @@ use super::Shading;
 use super::cells::reference;
 use super::pass::{Draw, Pass};
 use crate::geometry::{Clip, Geometry, Viewport};
-use crate::sample_test::exact;
+use crate::sample_test::covers;
 use crate::sampling::{Sample, TileSamples};
 use crate::setup::Corner;
 use crate::shader::{Lane, Lines, Outputs, Program, Shader, ShadingPoint};
@@ -108,7 +108,7 @@ impl<'a> ShadedTriangle<'a> {
         let (shear, near) = (&self.pass.projection.shear, self.pass.projection.near);
         let covers = |s: &Sample| {
             let rays = [shear.ray(0, first[0] + s.x, s.u), shear.ray(1, first[1] + s.y, s.v)];
-            exact::covers(corners, rays, s.t, near)
+            covers(corners, rays, s.t, near)
         };
         if covers(&Sample { x: 0.5, y: 0.5, t: REFERENCE_TIME, ..Sample::default() }) {
             return None;

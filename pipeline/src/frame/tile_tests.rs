@@ -1,7 +1,7 @@
 //! Enabled tile tests of one triangle over one tile, in order of cost: which part of lens and time remains.
 
+use super::Features;
 use super::bin::TileWork;
-use super::settings::Features;
 use super::test_selection::{TestPlan, TestResult, TestSelector, Workload};
 use crate::geometry::Shear;
 use crate::sample_test;

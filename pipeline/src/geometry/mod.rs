@@ -8,7 +8,7 @@ mod vertex;
 use glam::{Affine3A, Vec2};
 use serde::Serialize;
 
-pub use crate::viewport::Viewport;
+pub use crate::surface::Viewport;
 pub use vertex::{Cull, DrawError, Geometry, MovingVertex, Projection, Shear};
 
 /// A camera looking along `+z` of its own space, with `x` to the right and `y` up.

@@ -4,9 +4,8 @@
 use glam::{DAffine3, DVec3, Vec2, Vec3, Vec4};
 use rayon::prelude::*;
 
-use super::{Camera, Clip};
+use super::{Camera, Clip, Viewport};
 use crate::shader::Lane;
-use crate::viewport::Viewport;
 
 /// A vertex on the image plane at both ends of the shutter, as `[x, y, w]`; `w` is its depth in scene units.
 /// In perspective `x, y` are homogeneous: its image is `(x / w, y / w)` pixels from the centre of the image,

@@ -5,8 +5,7 @@
 
 use std::ops::Range;
 
-use super::block::{Crossing, SampleRows, View, block_of};
-use super::exact;
+use super::{Crossing, SampleRows, View, block_of, hit, vertices_seen};
 use crate::sampling::TileSamples;
 use crate::setup::Triangle;
 use crate::simd::{Kernel, LANES, Lanes, Mask, Width, dispatch};
@@ -293,8 +292,8 @@ impl SampleTest<'_, '_> {
 
     #[cold]
     fn keep_exact(&mut self, base: usize, lane: usize) {
-        let seen = exact::seen(&self.triangle.corners, &SampleRows::of(self.samples, base), lane);
-        if let Some((depth, _)) = exact::hit(&seen, self.triangle.faces) {
+        let seen = vertices_seen(&self.triangle.corners, &SampleRows::of(self.samples, base), lane);
+        if let Some((depth, _)) = hit(&seen, self.triangle.faces) {
             self.keep(base + lane, depth);
         }
     }
@@ -319,8 +318,8 @@ impl SampleTest<'_, '_> {
         let SeenBlock { shown, tie, counter_clockwise, depth } = *block;
         for lane in (0..LANES).filter(|lane| (shown | tie) >> lane & 1 == 1) {
             let found = if tie >> lane & 1 == 1 {
-                let seen = exact::seen(&self.triangle.corners, &SampleRows::of(self.samples, base), lane);
-                exact::hit(&seen, self.triangle.faces)
+                let seen = vertices_seen(&self.triangle.corners, &SampleRows::of(self.samples, base), lane);
+                hit(&seen, self.triangle.faces)
             } else {
                 Some((depth[lane], counter_clockwise >> lane & 1 == 1))
             };
@@ -369,7 +368,7 @@ impl SampleTest<'_, '_> {
 struct SeenBlock {
     /// Lanes inside that show a drawn face.
     shown: Mask,
-    /// Lanes that [`exact`] decides.
+    /// Lanes that [`weights`](super::weights) decides.
     tie: Mask,
     counter_clockwise: Mask,
     depth: [f32; LANES],

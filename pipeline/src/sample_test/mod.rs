@@ -17,13 +17,274 @@
 //!
 //! Every operation rounds once, so `e_ji = -e_ij` holds to the last bit, and neighbours agree on a shared
 //! edge without a common vertex order. Rounding is monotone, so a strict sign of the rounded difference is
-//! the exact sign. If the rounded products tie, [`exact`] decides by the exact products in `f64`. The test is
+//! the exact sign. If the rounded products tie, [`weights`] decides by the exact products in `f64`. The test is
 //! therefore *exact* for the rounded points `(x', y')`. That makes it watertight, and allows proofs that
 //! culling changes nothing: points on one side of a line through the sample cannot surround it.
+//!
+//! `kernel` runs the test sixteen samples at a time.
 
-pub(crate) mod block;
-pub mod exact;
 mod kernel;
 
+use crate::sampling::TileSamples;
+use crate::setup::Corner;
 pub use crate::simd::Width;
+use crate::simd::{LANES, Lanes, Mask};
 pub use kernel::{Covered, Hits, PixelHits, SampleTest, Target, madds, test_run};
+
+/// Data of sixteen samples for the sample test, in memory.
+#[derive(Clone, Copy)]
+pub(crate) struct SampleRows<'a> {
+    /// Factor of a vertex's depth ([`crate::geometry::Shear::ray`]).
+    pub slope: [&'a [f32; LANES]; 2],
+    /// Offset of a vertex independent of its depth; read with a lens or in an orthographic view.
+    pub lens: [&'a [f32; LANES]; 2],
+    /// Time; read for moving triangles.
+    pub t: &'a [f32; LANES],
+}
+
+impl<'a> SampleRows<'a> {
+    /// The sixteen samples of a tile from `base` on, a multiple of sixteen.
+    #[inline(always)]
+    pub fn of(samples: &'a TileSamples, base: usize) -> Self {
+        Self {
+            slope: [block_of(&samples.slope[0], base), block_of(&samples.slope[1], base)],
+            lens: [block_of(&samples.lens[0], base), block_of(&samples.lens[1], base)],
+            t: block_of(&samples.t, base),
+        }
+    }
+}
+
+#[inline(always)]
+fn block_of(array: &[f32], base: usize) -> &[f32; LANES] {
+    // Arrays are padded to whole blocks, so the fallback is never used.
+    array[base..base + LANES].first_chunk().unwrap_or(&[0.0; LANES])
+}
+
+/// Data of sixteen samples in registers, in perspective or in an orthographic view.
+#[derive(Clone, Copy)]
+pub(crate) struct View<V, const MOTION: bool, const LENS: bool, const PARALLEL: bool = false> {
+    pub slope: [V; 2],
+    pub lens: [V; 2],
+    pub t: V,
+}
+
+/// A vertex relative to the samples.
+#[derive(Clone, Copy)]
+pub(crate) struct SeenLanes<V> {
+    pub x: V,
+    pub y: V,
+    pub w: V,
+}
+
+impl<V: Lanes, const MOTION: bool, const LENS: bool, const PARALLEL: bool> View<V, MOTION, LENS, PARALLEL> {
+    const HAS_BASE: bool = LENS || PARALLEL;
+    const HAS_SLOPE: bool = LENS || !PARALLEL;
+
+    #[inline(always)]
+    pub fn load(rows: &SampleRows<'_>) -> Self {
+        let zero = V::splat(0.0);
+        Self {
+            slope: [V::load(rows.slope[0]), V::load(rows.slope[1])],
+            lens: if Self::HAS_BASE { [V::load(rows.lens[0]), V::load(rows.lens[1])] } else { [zero; 2] },
+            t: if MOTION { V::load(rows.t) } else { zero },
+        }
+    }
+
+    #[inline(always)]
+    pub fn see(&self, corner: &Corner) -> SeenLanes<V> {
+        let [mut x, mut y, mut w] =
+            [V::splat(corner.open[0]), V::splat(corner.open[1]), V::splat(corner.open[2])];
+        if MOTION {
+            x = self.t.times_plus(V::splat(corner.delta[0]), x);
+            y = self.t.times_plus(V::splat(corner.delta[1]), y);
+            w = self.t.times_plus(V::splat(corner.delta[2]), w);
+        }
+        if Self::HAS_BASE {
+            x = x - self.lens[0];
+            y = y - self.lens[1];
+        }
+        if Self::HAS_SLOPE {
+            x = self.slope[0].times_from(w, x);
+            y = self.slope[1].times_from(w, y);
+        }
+        SeenLanes { x, y, w }
+    }
+}
+
+/// Edge functions of a triangle at sixteen samples, and their signs.
+pub(crate) struct Crossing<V> {
+    edges: [V; 3],
+    depths: [V; 3],
+    /// Smallest and largest edge function.
+    ends: [V; 2],
+}
+
+impl<V: Lanes> Crossing<V> {
+    #[inline(always)]
+    pub fn new<const MOTION: bool, const LENS: bool, const PARALLEL: bool>(
+        corners: &[Corner; 3],
+        view: &View<V, MOTION, LENS, PARALLEL>,
+    ) -> Self {
+        let (a, b, c) = (view.see(&corners[0]), view.see(&corners[1]), view.see(&corners[2]));
+        let e0 = b.x * c.y - c.x * b.y;
+        let e1 = c.x * a.y - a.x * c.y;
+        let e2 = a.x * b.y - b.x * a.y;
+        let (min, max) = (e0.min(e1).min(e2), e0.max(e1).max(e2));
+        Self { edges: [e0, e1, e2], depths: [a.w, b.w, c.w], ends: [min, max] }
+    }
+
+    /// Whether any lane is inside or on an edge.
+    #[inline(always)]
+    pub fn any(&self) -> bool {
+        let zero = V::splat(0.0);
+        (self.ends[0].ge(zero) | zero.ge(self.ends[1])) != 0
+    }
+
+    /// Lanes on an edge or a vertex and outside of no other edge; [`weights`] decides them.
+    #[inline(always)]
+    pub fn tie(&self) -> Mask {
+        let zero = V::splat(0.0);
+        self.ends[0].equal(zero) | self.ends[1].equal(zero)
+    }
+
+    /// Lanes inside that show a drawn face.
+    #[inline(always)]
+    pub fn shown(&self, faces: [bool; 2]) -> Mask {
+        let zero = V::splat(0.0);
+        // Uniform branches rather than masks, which the compiler would vectorize.
+        let mut shown = 0;
+        if faces[0] {
+            shown |= self.ends[0].gt(zero);
+        }
+        if faces[1] {
+            shown |= zero.gt(self.ends[1]);
+        }
+        shown
+    }
+
+    /// Barycentric weights of the lanes, extrapolated outside.
+    #[inline(always)]
+    pub fn weights(&self) -> [V; 3] {
+        let [e0, e1, e2] = self.edges;
+        let sum = (e0 + e1) + e2;
+        [e0 / sum, e1 / sum, e2 / sum]
+    }
+
+    /// Depth of the lanes inside.
+    #[inline(always)]
+    pub fn depth(&self) -> V {
+        let ([e0, e1, e2], [a, b, c]) = (self.edges, self.depths);
+        let quotient = ((e0 * a + e1 * b) + e2 * c) / ((e0 + e1) + e2);
+        // The quotient may leave the range of the vertices by rounding; depth culling relies on the range.
+        quotient.max(a.min(b).min(c)).min(a.max(b).max(c))
+    }
+}
+
+/// A vertex relative to a sample: `[x', y', w]`.
+pub type Seen = [f32; 3];
+
+/// Vertices of a triangle as seen by one of sixteen samples.
+pub(crate) fn vertices_seen(corners: &[Corner; 3], rows: &SampleRows<'_>, lane: usize) -> [Seen; 3] {
+    let [slope, lens] =
+        [&rows.slope, &rows.lens].map(|axes: &[&[f32; LANES]; 2]| [axes[0][lane], axes[1][lane]]);
+    corners.map(|corner| see(&corner, slope, lens, rows.t[lane]))
+}
+
+/// Whether a sample with these rays ([`crate::geometry::Shear::ray`]) is inside a triangle and beyond the near depth at time `t`.
+pub(crate) fn covers(corners: &[Corner; 3], [across, down]: [[f32; 2]; 2], t: f32, near: f32) -> bool {
+    let seen = corners.map(|corner| see(&corner, [across[0], down[0]], [across[1], down[1]], t));
+    hit(&seen, [true; 2]).is_some_and(|(depth, _)| depth > near)
+}
+
+/// One vertex, with the operations of the kernel in their order.
+fn see(corner: &Corner, slope: [f32; 2], lens: [f32; 2], t: f32) -> Seen {
+    let [x, y, w] = corner.at(t);
+    [(-slope[0]).mul_add(w, x - lens[0]), (-slope[1]).mul_add(w, y - lens[1]), w]
+}
+
+/// Depth at which a sample hits a triangle with the given drawn faces, and whether the triangle is counter-clockwise
+/// there.
+pub(crate) fn hit(seen: &[Seen; 3], faces: [bool; 2]) -> Option<(f32, bool)> {
+    let (weights, counter_clockwise) = weights(seen)?;
+    faces[usize::from(counter_clockwise)].then(|| (depth(seen, &weights), counter_clockwise))
+}
+
+/// Barycentric weights of the origin in the triangle, or `None` if it is outside. They add up to 1 and are
+/// not negative. The flag says whether the triangle is counter-clockwise on the screen (`y` downwards).
+///
+/// Ties are broken by moving the sample by `(eps, eps^2)` for an infinitely small `eps`. The edge becomes `e
+/// + eps B + eps^2 C` with `B = y_i w_j - y_j w_i`, `C = w_i x_j - w_j x_i`, and its first nonzero term
+/// decides (Edelsbrunner and Mücke 1990, simulation of simplicity). Products of two `f32` are exact in `f64`.
+///
+/// In an orthographic view the same terms tilt the ray about its point at depth 0, by `(eps, eps^2)` per unit
+/// of depth. Any tilted ray makes neighbours agree. At positive depth, where alone samples count, edges and
+/// vertices have the same owner as if the sample were moved.
+pub fn weights(seen: &[Seen; 3]) -> Option<([f64; 3], bool)> {
+    let edges = [(1, 2), (2, 0), (0, 1)].map(|(i, j)| terms(&seen[i], &seen[j]));
+    let signs = edges.map(|levels| levels.into_iter().map(sign).find(|&s| s != 0).unwrap_or(0));
+    if signs[0] == 0 || signs[1] != signs[0] || signs[2] != signs[0] {
+        return None;
+    }
+    // The lowest order at which any edge is nonzero has the weights.
+    let level = (0..3).find(|&level| edges.iter().any(|levels| sign(levels[level]) != 0))?;
+    let parts = edges.map(|levels| levels[level].0 - levels[level].1);
+    let parts = [0, 1, 2].map(|k| if sign(edges[k][level]) == signs[0] { parts[k].abs() } else { 0.0 });
+    let sum: f64 = parts.iter().sum();
+    (sum > 0.0).then(|| (parts.map(|part| part / sum), signs[0] < 0))
+}
+
+/// Pairs of exact products whose differences are `e`, `B` and `C` of the edge from `i` to `j`.
+fn terms(i: &Seen, j: &Seen) -> [(f64, f64); 3] {
+    let [xi, yi, wi] = i.map(f64::from);
+    let [xj, yj, wj] = j.map(f64::from);
+    [(xi * yj, xj * yi), (yi * wj, yj * wi), (wi * xj, wj * xi)]
+}
+
+fn sign((plus, minus): (f64, f64)) -> i8 {
+    i8::from(plus > minus) - i8::from(plus < minus)
+}
+
+/// Depth of a hit with the given weights, clamped to the range of the vertices.
+pub fn depth(seen: &[Seen; 3], weights: &[f64; 3]) -> f32 {
+    let w = seen.map(|vertex| vertex[2]);
+    let mean: f64 = weights.iter().zip(w).map(|(weight, w)| weight * f64::from(w)).sum();
+    (mean as f32).clamp(w[0].min(w[1]).min(w[2]), w[0].max(w[1]).max(w[2]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_middle_of_a_triangle_has_equal_weights() {
+        let seen = [[2.0, 0.0, 1.0], [-1.0, 1.0, 1.0], [-1.0, -1.0, 1.0]];
+        let (w, counter_clockwise) = weights(&seen).unwrap();
+        assert!(!counter_clockwise, "x towards y is clockwise when y points down");
+        assert!(w.iter().zip([1.0 / 3.0; 3]).all(|(a, b)| (a - b).abs() < 1e-15), "{w:?}");
+    }
+
+    #[test]
+    fn a_shared_edge_has_one_owner_for_all_samples_on_it() {
+        let (a, b) = ([-3.0_f32, -1.5, 1.0], [6.0_f32, 3.0, 2.0]);
+        let (left, right) = ([-1.0_f32, 4.0, 1.5], [2.0_f32, -5.0, 0.5]);
+        let owners = [[a, b, left], [b, a, right]].iter().filter(|t| weights(t).is_some()).count();
+        assert_eq!(owners, 1);
+    }
+
+    #[test]
+    fn a_shared_vertex_has_one_owner() {
+        // A fan of eight triangles around a vertex at the sample itself.
+        let rim: Vec<Seen> = [(3, 0), (2, 2), (0, 3), (-2, 2), (-3, 0), (-2, -2), (0, -3), (2, -2)]
+            .map(|(x, y)| [x as f32, y as f32, 1.0 + 0.1 * x as f32])
+            .to_vec();
+        let centre = [0.0, 0.0, 1.0];
+        let owners = (0..8).filter(|&k| weights(&[centre, rim[k], rim[(k + 1) % 8]]).is_some()).count();
+        assert_eq!(owners, 1);
+    }
+
+    #[test]
+    fn nothing_surrounds_a_point_outside() {
+        assert!(weights(&[[1.0, 1.0, 1.0], [2.0, 1.0, 1.0], [1.0, 2.0, 1.0]]).is_none());
+        assert!(weights(&[[1.0, 1.0, 1.0], [2.0, 2.0, 1.0], [3.0, 3.0, 1.0]]).is_none());
+    }
+}

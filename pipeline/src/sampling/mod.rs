@@ -3,12 +3,11 @@
 mod lens;
 mod pattern;
 mod table;
-mod tile;
 
+use crate::geometry::{Shear, Viewport};
 pub use lens::{LensRegion, LensRegions, LensShape};
 pub use pattern::{HashedSamples, Pattern};
 pub use table::{SampleSpec, SampleTable, TableError};
-pub use tile::TileSamples;
 
 /// One sample of a pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -104,5 +103,217 @@ pub trait SampleSource: Send + Sync + std::fmt::Debug {
     /// Regions of the lens that contain the lens position of every sample; empty if nothing is known.
     fn lens_regions(&self) -> &[LensRegion] {
         &[]
+    }
+}
+
+/// Samples of one tile as arrays, sorted by time so that a time interval is a contiguous range. Arrays are
+/// padded to whole blocks of [`TileSamples::LANES`]; the time of padding is outside all intervals.
+#[derive(Clone, Debug, Default)]
+pub struct TileSamples {
+    /// Samples without padding.
+    pub len: usize,
+    /// Image position in pixels from the centre of the image.
+    pub x: Vec<f32>,
+    /// Image position in pixels from the centre of the image, downwards.
+    pub y: Vec<f32>,
+    /// Image position from the middle of the part of the tile in the image, as the sample table of the hardware keeps it.
+    pub from_middle: [Vec<f32>; 2],
+    /// Lens position.
+    pub u: Vec<f32>,
+    /// Lens position.
+    pub v: Vec<f32>,
+    /// Time over the shutter.
+    pub t: Vec<f32>,
+    /// Depth-independent offset of a vertex: `u s.x` and `v s.y`, in an orthographic view `x + u s.x` and `y
+    /// + v s.y`.
+    pub lens: [Vec<f32>; 2],
+    /// Factor of a vertex's depth: `x - u a.x` and `y - v a.y`, in an orthographic view `-u a.x` and `-v
+    /// a.y`.
+    pub slope: [Vec<f32>; 2],
+    /// Whether the view is orthographic.
+    pub parallel: bool,
+    /// Pixel in the tile, row by row.
+    pub pixel: Vec<u8>,
+    order: Vec<u16>,
+    /// Samples of a tile whose source has not sorted them.
+    gathered: Vec<Timed>,
+    sorted: TimedBlock,
+    of_pixel: Vec<Sample>,
+}
+
+impl TileSamples {
+    /// Samples tested together.
+    pub const LANES: usize = 16;
+    /// Time of padding.
+    const PADDING_TIME: f32 = f32::INFINITY;
+
+    /// Fill the arrays for the tile of `side_px` pixels (at most 8) whose first pixel is `(px, py)`. Pixels
+    /// outside the viewport have no samples.
+    pub fn fill(
+        &mut self,
+        source: &dyn SampleSource,
+        viewport: Viewport,
+        shear: &Shear,
+        [px, py]: [u32; 2],
+        side_px: u32,
+    ) {
+        let inside = [side_px.min(viewport.width() - px), side_px.min(viewport.height() - py)];
+        let is_block = [SampleTable::SHIFT_PX; 2] == inside && side_px == SampleTable::SHIFT_PX;
+        if let Some(sorted) = source.block_by_time(px, py).filter(|_| is_block) {
+            return self.fill_sorted(sorted, viewport, shear, ([px, py], inside));
+        }
+        self.gather(source, ([px, py], inside, side_px));
+        let mut sorted = std::mem::take(&mut self.sorted);
+        sorted.fill(&mut self.gathered, side_px);
+        self.fill_sorted(&sorted, viewport, shear, ([px, py], inside));
+        self.sorted = sorted;
+    }
+
+    /// Gathers the samples of a tile's pixels `inside` the image.
+    fn gather(&mut self, source: &dyn SampleSource, ([px, py], inside, side_px): ([u32; 2], [u32; 2], u32)) {
+        let per_pixel = source.per_pixel();
+        self.of_pixel.resize(per_pixel as usize, Sample::default());
+        self.gathered.clear();
+        for pixel in 0..side_px * side_px {
+            let [column, row] = [pixel % side_px, pixel / side_px];
+            if column < inside[0] && row < inside[1] {
+                source.pixel_into(px + column, py + row, &mut self.of_pixel);
+                let timed = |(index, sample): (u32, &Sample)| {
+                    let index = (pixel * per_pixel + index) as u16;
+                    Timed { sample: *sample, index, pixel: pixel as u8 }
+                };
+                self.gathered.extend((0..).zip(&self.of_pixel).map(timed));
+            }
+        }
+    }
+
+    /// Fills the arrays with samples that are sorted by time. The first pixel of the tile and its pixels inside the image are
+    /// given.
+    fn fill_sorted(
+        &mut self,
+        sorted: &TimedBlock,
+        viewport: Viewport,
+        shear: &Shear,
+        ([px, py], inside): ([u32; 2], [u32; 2]),
+    ) {
+        (self.len, self.parallel) = (sorted.t.len(), shear.parallel);
+        self.resize(self.len.next_multiple_of(Self::LANES));
+        let sides = [(px, inside[0], viewport.width()), (py, inside[1], viewport.height())];
+        let middle = sides.map(|(first, count, side)| {
+            0.5 * (Viewport::edge(first, side) + Viewport::edge(first + count, side))
+        });
+        self.place(sorted, sides.map(|(first, _, side)| Viewport::edge(first, side)));
+        self.follow(shear, middle);
+    }
+
+    /// Fills the arrays that hold samples as they are, and the image positions, with the corner of the tile.
+    fn place(&mut self, sorted: &TimedBlock, corner: [f32; 2]) {
+        let Self { x, y, u, v, t, pixel, order, len, .. } = self;
+        for (axis, into) in [x, y].into_iter().enumerate() {
+            let places = sorted.at[axis].iter().zip(&sorted.within[axis]);
+            // The corner of a pixel is exact.
+            into.iter_mut().zip(places).for_each(|(into, (at, within))| *into = (corner[axis] + at) + within);
+        }
+        for (into, from) in [(u, &sorted.lens[0]), (v, &sorted.lens[1]), (t, &sorted.t)] {
+            into[..*len].copy_from_slice(from);
+        }
+        pixel[..*len].copy_from_slice(&sorted.pixel);
+        order.clone_from(&sorted.index);
+    }
+
+    /// Fills the arrays that follow from these.
+    fn follow(&mut self, shear: &Shear, middle: [f32; 2]) {
+        let Self { x, y, u, v, from_middle, slope, lens, len, .. } = self;
+        for (axis, (at, places)) in [(x, u), (y, v)].into_iter().enumerate() {
+            let (slope, lens) = (&mut slope[axis][..*len], &mut lens[axis][..*len]);
+            let all = at[..*len].iter().zip(&places[..*len]).zip(slope).zip(lens).zip(&mut from_middle[axis]);
+            for ((((at, place), slope), lens), from_middle) in all {
+                *from_middle = at - middle[axis];
+                [*slope, *lens] = shear.ray(axis, *at, *place);
+            }
+        }
+    }
+
+    /// Index in the whole image of the sample in `slot` of the tile of `side_px` pixels whose first pixel is
+    /// `(px, py)`: `(y width + x) per_pixel + index`.
+    pub fn in_image(
+        &self,
+        slot: usize,
+        [px, py]: [u32; 2],
+        side_px: u32,
+        viewport: Viewport,
+        per_pixel: u32,
+    ) -> usize {
+        let index = u32::from(self.order[slot]);
+        let (pixel, sample) = (index / per_pixel, index % per_pixel);
+        let [x, y] = [px + pixel % side_px, py + pixel / side_px].map(|c| c as usize);
+        (y * viewport.width() as usize + x) * per_pixel as usize + sample as usize
+    }
+
+    /// Index in its pixel of the sample in `slot`, of `per_pixel`.
+    pub fn in_pixel(&self, slot: usize, per_pixel: u32) -> u32 {
+        u32::from(self.order[slot]) % per_pixel
+    }
+
+    /// Places of the samples, by slot: the pixel in the tile, row by row, times the samples per pixel, plus the index in the pixel.
+    pub(crate) fn places(&self) -> &[u16] {
+        &self.order
+    }
+
+    fn resize(&mut self, padded: usize) {
+        let [lens_x, lens_y] = &mut self.lens;
+        let [slope_x, slope_y] = &mut self.slope;
+        let [near_x, near_y] = &mut self.from_middle;
+        let of_image = [&mut self.x, &mut self.y, near_x, near_y, slope_x, slope_y];
+        // What is beyond the samples stays or becomes padding; the samples are overwritten.
+        let pads = |array: &mut Vec<f32>, len: usize, padding: f32| {
+            array.resize(padded, padding);
+            array[len..].fill(padding);
+        };
+        for array in of_image.into_iter().chain([&mut self.u, &mut self.v, lens_x, lens_y]) {
+            pads(array, self.len, 0.0);
+        }
+        pads(&mut self.t, self.len, Self::PADDING_TIME);
+        self.pixel.resize(padded, 0);
+        self.pixel[self.len..].fill(0);
+    }
+
+    /// Range of samples with `lo <= t <= hi`.
+    pub fn between(&self, lo: f32, hi: f32) -> std::ops::Range<usize> {
+        let times = &self.t[..self.len];
+        times.partition_point(|&t| t < lo)..times.partition_point(|&t| t <= hi)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sampling::LensShape;
+
+    #[test]
+    fn a_tile_holds_each_sample_of_its_pixels_once() {
+        let table = SampleTable::low_discrepancy(5, 1, LensShape::Disk).unwrap();
+        let viewport = Viewport::new(20, 11).unwrap();
+        let mut tile = TileSamples::default();
+        tile.fill(&table, viewport, &Shear::default(), [16, 8], 8);
+        assert_eq!(tile.len, 4 * 3 * 5);
+        assert_eq!(tile.t.len() % TileSamples::LANES, 0);
+        assert!(tile.t[..tile.len].is_sorted());
+        for slot in 0..tile.len {
+            let (column, row) = (16 + u32::from(tile.pixel[slot]) % 8, 8 + u32::from(tile.pixel[slot]) / 8);
+            let here = table.pixel(column, row);
+            assert!(here.iter().any(|s| s.t == tile.t[slot] && column as f32 - 10.0 + s.x == tile.x[slot]));
+        }
+    }
+
+    #[test]
+    fn a_time_interval_is_a_run() {
+        let table = SampleTable::low_discrepancy(8, 1, LensShape::Disk).unwrap();
+        let mut tile = TileSamples::default();
+        tile.fill(&table, Viewport::new(64, 64).unwrap(), &Shear::default(), [8, 8], 8);
+        let run = tile.between(0.25, 0.5);
+        let inside = tile.t[..tile.len].iter().filter(|t| (0.25..=0.5).contains(*t)).count();
+        assert_eq!(run.len(), inside);
+        assert!(tile.t[run].iter().all(|t| (0.25..=0.5).contains(t)));
     }
 }

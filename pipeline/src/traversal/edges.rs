@@ -22,7 +22,7 @@
 
 use super::number::{Coordinate, Number, Quadratic};
 use super::region::{Faces, Piece, Point, TimePieces};
-use super::{View, cost};
+use super::{PHASE, ROOT, View};
 
 /// Edges of a triangle over a box; edge `k` is opposite vertex `k`.
 #[derive(Clone, Copy, Debug)]
@@ -219,11 +219,11 @@ impl<N: Number> EdgeBounds<N> {
         let part = if edges.spans(t) {
             [N::zero(), N::from(1.0)]
         } else {
-            madds += 2 * cost::PHASE;
+            madds += 2 * PHASE;
             t.map(|t| edges.view.phase(t))
         };
         let (part, roots) = self.narrow(part, faces);
-        madds += roots * cost::ROOT;
+        madds += roots * ROOT;
         let Some(part) = part else { return (None, madds) };
         let [lo, hi] = if self.moving { edges.view.times(part) } else { t };
         let left = [lo.max(t[0]), hi.min(t[1])];

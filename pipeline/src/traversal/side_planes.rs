@@ -8,7 +8,7 @@
 //! x(t) + u (a w(t) - s) - X0`, for any sign of `w`.
 
 use super::number::{Coordinate, Number};
-use super::{Box5, TileRect, cost};
+use super::{Box5, SIDE_ROOT, TileRect, near_madds, side_madds};
 use crate::geometry::Shear;
 use crate::setup::{Corner, Triangle};
 
@@ -53,7 +53,7 @@ pub(super) fn narrow_sides<N: Number, C: Coordinate>(
     axis: usize,
 ) -> (bool, u32) {
     let mut madds = 0;
-    let price = cost::side_madds(triangle.moving, within.lens, triangle.behind);
+    let price = side_madds(triangle.moving, within.lens, triangle.behind);
     let [low, high] = if axis == 0 { tile.x } else { tile.y };
     for (edge, other, positive) in [(low, high, true), (high, low, false)] {
         let edges = if triangle.behind { [edge, other] } else { [edge, edge] };
@@ -67,7 +67,7 @@ pub(super) fn narrow_sides<N: Number, C: Coordinate>(
             positive,
         };
         let (is_left, roots) = side.narrow(within);
-        madds += price + roots * cost::SIDE_ROOT;
+        madds += price + roots * SIDE_ROOT;
         if !is_left {
             return (false, madds);
         }
@@ -92,7 +92,7 @@ pub fn narrow_near<N: Number, C: Coordinate>(
     });
     let mut roots = 0;
     let times = above(within.t, &depths, &mut roots);
-    let madds = cost::near_madds(triangle.moving) + roots * cost::SIDE_ROOT;
+    let madds = near_madds(triangle.moving) + roots * SIDE_ROOT;
     (times.map(|t| within.t = t).is_some(), madds)
 }
 

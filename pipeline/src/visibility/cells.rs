@@ -3,9 +3,9 @@
 //! For every cell, a box of lens and time: where on the screen the triangle may be, which faces it may show
 //! ([`Facing`]), and a linear function in X and Y above each of its edge functions (`edges`).
 
-use super::bin::{BinSamples, Boxes, CellRange};
+use super::sorter::{BinSamples, Boxes, CellRange};
 use crate::geometry::Shear;
-use crate::sample_test::block::View;
+use crate::sample_test::View;
 use crate::setup::{Corner, Triangle, cross};
 use crate::simd::{LANES, Lanes, Mask, Row};
 

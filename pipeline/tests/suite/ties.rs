@@ -1,7 +1,7 @@
 //! Samples on edges and vertices are decided as if they were moved by an infinitely small step, and near ties
 //! exactly.
 
-use pipeline::sample_test::exact;
+use pipeline::sample_test::{depth, weights};
 use proptest::prelude::*;
 
 /// The sign of each edge when the sample is moved by `(2^-20, 2^-40)`, in integers. Coordinates up to 1000
@@ -30,7 +30,7 @@ proptest! {
         let scale = libm::exp2f(shift as f32);
         let exact_points = points.map(|(x, y, w)| [i128::from(x * scale_xy), i128::from(y * scale_xy), i128::from(w)]);
         let rounded = exact_points.map(|p| p.map(|c| c as f32 * scale));
-        let ours = exact::weights(&rounded);
+        let ours = weights(&rounded);
         prop_assert_eq!(ours.map(|(_, counter_clockwise)| counter_clockwise), moved(&exact_points), "{:?}", points);
         if let Some((weights, _)) = ours {
             prop_assert!(weights.iter().all(|&w| (0.0..=1.0).contains(&w)), "{:?}", weights);
@@ -40,7 +40,7 @@ proptest! {
             for back in [back(0), back(1)] {
                 prop_assert!(back.abs() < 1e-9 * f64::from(scale) * f64::from(scale_xy), "{:?} {:?}", weights, points);
             }
-            let depth = exact::depth(&rounded, &weights);
+            let depth = depth(&rounded, &weights);
             let w = rounded.map(|p| p[2]);
             prop_assert!(depth >= w[0].min(w[1]).min(w[2]) && depth <= w[0].max(w[1]).max(w[2]));
         }
@@ -57,7 +57,7 @@ proptest! {
         let signs = [e(1, 2).signum(), e(2, 0).signum(), e(0, 1).signum()];
         prop_assume!(!signs.contains(&0));
         let inside = signs[0] == signs[1] && signs[1] == signs[2];
-        let ours = exact::weights(&points.map(|p| p.map(|c| c as f32)));
+        let ours = weights(&points.map(|p| p.map(|c| c as f32)));
         prop_assert_eq!(ours.map(|(_, ccw)| ccw), inside.then_some(signs[0] < 0));
     }
 }

@@ -4,9 +4,8 @@ use output::table::si;
 use power_model::{FramePower, PARTS, PacedFrame, Run, pace};
 use serde::Serialize;
 use traces::device::{Device, DeviceSpec, RATES_HZ, Sampled};
-use traces::energy::{FrameEnergy, PowerIntegral, TrueFrame};
+use traces::energy::{self, FrameEnergy, PowerIntegral, Score, TOLERANCE_S, TrueFrame};
 use traces::frames::{Found, Marks, default_window, find, marked_only};
-use traces::score::{self, Score, TOLERANCE_S};
 use traces::{Mark, MarkKind, Metadata, Trace};
 
 use crate::options::DEFAULT_RATE_HZ;
@@ -54,7 +53,7 @@ impl Measurement {
         }
         let starts: Vec<f64> = self.truth.iter().map(|frame| frame.start_s).collect();
         let found: Vec<f64> = self.frames.iter().map(|frame| frame.start_s).collect();
-        let beside = score::found_beside_true(&found, &starts, TOLERANCE_S);
+        let beside = energy::found_beside_true(&found, &starts, TOLERANCE_S);
         beside.into_iter().map(|place| place.map(|place| &self.frames[place])).collect()
     }
 }
@@ -78,7 +77,7 @@ pub(super) fn measure(plan: &Plan, simulated: &Simulated) -> Result<Measurement,
     let frames = integral.frames(&found);
     let truth: Vec<_> =
         run.frames.iter().map(|f| TrueFrame { start_s: f.start_s, energy_j: f.energy.total_j() }).collect();
-    let score = score::score(&frames, &truth, TOLERANCE_S);
+    let score = energy::score(&frames, &truth, TOLERANCE_S);
     let checks = Checks::new(&run, &device, &integral, &found, &frames)?;
     let clipped = clipped_currents + clipped_voltages;
     Ok(Measurement { run, clipped, device, resolution, marks, found, frames, truth, score, checks, trace })

@@ -6,11 +6,10 @@ use output::terminal::Progress;
 use pipeline::PassReport;
 use power_model::Part;
 use timing::{DrawSpan, PassTime};
-use traces::energy::{ExtraColumn, FrameEnergy, FrameTable};
+use traces::energy::{ExtraColumn, FrameEnergy, FrameTable, TOLERANCE_S, truth_beside};
 use traces::io::perfetto::{
     self, CounterTrack, FrameSpan, MAX_SLICES, PassSpan, PerfettoTimeline, UnitTrack, slices_of_bins,
 };
-use traces::score::{TOLERANCE_S, truth_beside};
 
 use crate::frame::image_name;
 use crate::heat::heat_name;

@@ -2,9 +2,8 @@
 
 use crate::case::Case;
 use std::error::Error;
-use traces::energy::{FrameEnergy, PowerIntegral};
+use traces::energy::{FrameEnergy, PowerIntegral, TOLERANCE_S, score, true_frames};
 use traces::frames::{FinderMethod, Flags, Marks, Options, find_with};
-use traces::score::{TOLERANCE_S, score, true_frames};
 
 /// Relative errors of energy.
 #[derive(Clone, Copy, Default)]

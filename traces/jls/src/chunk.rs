@@ -1,8 +1,7 @@
 //! Chunks of a JLS file, written and read: a header and a payload, each with a checksum.
 
-use crate::ReadError;
-use crate::format::{
-    FILE_HEADER_BYTES, HEADER_BYTES, IDENTIFICATION, MAX_PAYLOAD_BYTES, VERSION, field, on_disk,
+use crate::{
+    FILE_HEADER_BYTES, HEADER_BYTES, IDENTIFICATION, MAX_PAYLOAD_BYTES, ReadError, VERSION, field, on_disk,
 };
 use crc32c::crc32c;
 use std::fs::File;

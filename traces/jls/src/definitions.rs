@@ -1,12 +1,11 @@
 //! Definitions at the beginning of a JLS file, written and read: sources, signals, and the places of their
 //! data.
 
-use crate::ReadError;
 use crate::chunk::{ChunkFile, ChunkHeader, ChunkWriter, List};
-use crate::format::{
+use crate::{
     ANNOTATIONS, DATA_SAMPLES, DEFINITION, ENTRIES_PER_ENTRY, ENTRY_SAMPLES, F32, FIXED_RATE, HEAD, JSON,
-    LEVELS, SIGNAL, SIGNAL_MASK, SIGNAL_TEXTS, SOURCE, SOURCE_TEXTS, SUMMARY_ENTRIES, USER_DATA, UTC,
-    VARIABLE_RATE, field,
+    LEVELS, ReadError, SIGNAL, SIGNAL_MASK, SIGNAL_TEXTS, SOURCE, SOURCE_TEXTS, SUMMARY_ENTRIES, USER_DATA,
+    UTC, VARIABLE_RATE, field,
 };
 use std::collections::BTreeMap;
 use std::io::{self, Seek, Write};

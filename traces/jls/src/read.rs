@@ -1,13 +1,12 @@
 //! Reading a recording, signal by signal.
 
-use crate::ReadError;
 use crate::chunk::{ChunkFile, ChunkHeader};
 use crate::definitions::{self, Definitions, Signal, Source};
-use crate::format::{self, FIXED_RATE, FRONT, JSON, SIGNAL_MASK, Sample, USER_DATA, field};
+use crate::{DATA, FIXED_RATE, FRONT, INDEX, JSON, ReadError, SIGNAL_MASK, Sample, USER_DATA, field};
 use std::path::{Path, PathBuf};
 
-const FIXED_RATE_DATA: u8 = FIXED_RATE + format::DATA;
-const FIXED_RATE_INDEX: u8 = FIXED_RATE + format::INDEX;
+const FIXED_RATE_DATA: u8 = FIXED_RATE + DATA;
+const FIXED_RATE_INDEX: u8 = FIXED_RATE + INDEX;
 /// The kind of user data, in the upper bits of the mark of a chunk.
 const USER_DATA_KIND: u16 = 0xf000;
 

@@ -11,7 +11,7 @@ use std::io::{self, ErrorKind, Seek, Write};
 
 use crate::chunk::{ChunkWriter, List};
 use crate::definitions::{self, Heads, SignalName};
-use crate::format::{
+use crate::{
     DATA, DATA_SAMPLES, END, ENTRIES_PER_ENTRY, ENTRY_SAMPLES, FIXED_RATE, INDEX, LEVELS, MAX_PAYLOAD_BYTES,
     SUMMARY, SUMMARY_ENTRIES, Timestamp, UTC, front,
 };

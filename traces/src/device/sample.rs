@@ -7,7 +7,7 @@ use thiserror::Error;
 use super::Device;
 use crate::curve::{Curve, CurveError};
 use crate::io::{TraceChunk, TraceWriter, WriteError};
-use crate::random::Random;
+use crate::stats::Random;
 use crate::trace::{Metadata, Trace, TraceError, on_line};
 
 /// Most samples: 16 bytes each while they are made.

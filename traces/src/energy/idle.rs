@@ -215,7 +215,7 @@ impl SegmentEnergy {
 mod tests {
     use super::*;
     use crate::frames::Flags;
-    use crate::random::Random;
+    use crate::stats::Random;
     use crate::trace::Metadata;
 
     fn trace(power: Vec<f32>) -> Trace {

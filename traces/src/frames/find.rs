@@ -1,16 +1,14 @@
 //! Finding frames: by a given method, by the most suitable one, or from a mark that the program proposes.
 
-use super::assess::uncovered_work;
-use super::consensus::more_agreed;
+use super::assess::{more_agreed, uncovered_work};
 use super::marks::{MarkError, Marks, Placed, Placement, default_window, flat_mark_of};
 use super::matched::{find_matched, noise_variance};
-use super::register::register;
+use super::periodicity::{Snapped, snap_to_ticks};
+use super::register::{refine_starts, register};
 use super::segments::{Segmentation, segment};
 use super::split_frames::SplitFrames;
-use super::start_refinement::refine_starts;
 use super::threshold::{Rule, Threshold};
 use super::track::{Start, track};
-use super::vsync::{Snapped, snap_to_ticks};
 use super::{FinderMethod, Found, FrameStart, SUSPECT_CONFIDENCE, marked_start, spacing};
 use super::{assess, idle_gap, periodicity};
 use crate::stats::upper_median;
@@ -119,7 +117,7 @@ const MAX_TRACKED_SAMPLES: usize = 1 << 24;
 const MIN_COVERAGE_GAIN: f64 = 0.02;
 
 /// [`FinderMethod::Auto`] and [`FinderMethod::Consensus`].
-pub(super) fn find_auto(trace: &Trace, marks: &Marks, options: &Options) -> Result<Found, MarkError> {
+fn find_auto(trace: &Trace, marks: &Marks, options: &Options) -> Result<Found, MarkError> {
     let without = options.without;
     let squares = find_matched(trace, marks, FinderMethod::SumOfSquares)?;
     let samples = marks.place(trace)?.samples;
@@ -331,7 +329,7 @@ fn rises(trace: &Trace) -> Vec<f64> {
 
 /// The median correlation (Pearson 1896) of the windows at neighbouring starts: about 0 in noise, 1 for
 /// frames that repeat. 0 for fewer than two windows inside the trace.
-pub(super) fn neighbour_similarity(trace: &Trace, found: &Found) -> f64 {
+fn neighbour_similarity(trace: &Trace, found: &Found) -> f64 {
     let width = libm::round((found.window.pre_s + found.window.post_s) * trace.rate_hz()) as usize;
     let first = |time_s: f64| libm::round(trace.position(time_s - found.window.pre_s));
     let firsts: Vec<usize> = found
@@ -481,7 +479,7 @@ fn product(a: impl IntoIterator<Item = f64>, b: Vec<f64>) -> Vec<f64> {
 mod tests {
     use super::*;
     use crate::frames::Window;
-    use crate::random::Random;
+    use crate::stats::Random;
     use crate::trace::Metadata;
 
     const RATE_HZ: f64 = 50e3;

@@ -290,7 +290,7 @@ mod tests {
 #[cfg(test)]
 mod no_idle_gap_tests {
     use super::*;
-    use crate::random::Random;
+    use crate::stats::Random;
 
     const WIDTH: usize = 250;
 

@@ -234,7 +234,7 @@ pub(super) fn flat_mark_of(power: &[f64], placement: &Placement, sigma: f64) -> 
 mod tests {
     use super::*;
     use crate::frames::matched::noise_variance;
-    use crate::random::Random;
+    use crate::stats::Random;
     use crate::trace::Metadata;
 
     const WINDOW: Window = Window { pre_s: 0.1, post_s: 0.4 };

@@ -156,7 +156,7 @@ impl Dips<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::random::Random;
+    use crate::stats::Random;
 
     const WIDTH: usize = 250;
     const FRAME: usize = 320;

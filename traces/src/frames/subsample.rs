@@ -5,8 +5,7 @@
 //! from the start. So the earlier frame is scaled about its start by one ratio after another, and the shift
 //! is taken from the best ratio.
 
-use super::profile::difference;
-use crate::overlap::{Buffers, OverlapSave};
+use super::profile::{Buffers, OverlapSave, difference};
 use core::ops::RangeInclusive;
 
 /// The best alignment near offset `near`, in samples, fractional: the minimum of the summed squared
@@ -283,7 +282,7 @@ mod tests {
 
     #[test]
     fn oracle_estimates_are_those_of_a_direct_search() {
-        let noise = crate::random::Random::new(5, 0);
+        let noise = crate::stats::Random::new(5, 0);
         let busy = |i: usize| if (900..1000).contains(&(i % 2500)) { 2.0 } else { 0.0 };
         let power: Vec<f64> = (0..6000).map(|i| 5.0 + busy(i) + 0.01 * noise.normals(i as u64).0).collect();
         let mean = power[700..2200].iter().sum::<f64>() / 1500.0;

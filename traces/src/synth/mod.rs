@@ -10,17 +10,13 @@
 //! [`WITNESSES`] are four more devices of other structure, which share nothing with these scenes or each other.
 
 mod layers;
-mod on_demand;
-mod one_process;
-mod pipelined;
-mod several_processes;
 mod witness;
 
 pub use witness::{WITNESSES, Witness};
 
 use crate::device::{Device, DeviceError, DeviceSpec, SampleError};
 use crate::energy::TrueFrame;
-use crate::random::Random;
+use crate::stats::Random;
 use crate::trace::Trace;
 use crate::{Curve, CurveBuilder, CurveError};
 use core::f64::consts::TAU;

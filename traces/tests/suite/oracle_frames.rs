@@ -2,9 +2,8 @@
 
 use crate::common::{Case, free_running, vsync};
 use traces::device::{Device, DeviceSpec};
-use traces::energy::{PowerIntegral, TrueFrame};
+use traces::energy::{PowerIntegral, Score, TOLERANCE_S, TrueFrame, score};
 use traces::frames::{Found, Marks, default_window, find};
-use traces::score::{Score, TOLERANCE_S, score};
 use traces::{Curve, CurveBuilder, Trace};
 
 /// The battery rail of a phone in a recorder of +-4 A and +-6 V (assumed), with noise for a ratio of power variance to noise

@@ -5,8 +5,8 @@ use std::ops::RangeInclusive;
 
 use glam::DVec3;
 
-use super::bounds::{Bounds, Ends};
 use super::pass::Part;
+use super::{Bounds, Ends};
 
 /// Instants to test, as shares of the window's time. Simulations are often free of crossings at both ends.
 const INSTANTS: [f64; 3] = [0.5, 1.0, 0.25];
@@ -85,7 +85,7 @@ fn touch(a: &[[f64; 2]; 3], b: &[[f64; 2]; 3]) -> bool {
 }
 
 fn hull(a: &[[f64; 2]; 3], b: &[[f64; 2]; 3]) -> [[f64; 2]; 3] {
-    [0, 1, 2].map(|axis| super::bounds::hull(a[axis], b[axis]))
+    [0, 1, 2].map(|axis| super::hull(a[axis], b[axis]))
 }
 
 /// Triangles sorted by the tiles that their boxes touch, seen along the shortest axis.

@@ -2,11 +2,10 @@
 
 use rayon::prelude::*;
 
-use super::bounds::Bounds;
-use super::contact_probe;
 use super::object::Object;
 use super::pair::{Method, Pair, Search, Verdict};
 use super::pass::{FragmentBudget, Part, PassBackend, Resources, Scratch};
+use super::{Bounds, contact_probe};
 
 /// Verdict on objects `a` and `b`, `a < b`.
 #[derive(Clone, Copy, Debug, PartialEq)]

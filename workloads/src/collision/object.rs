@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 
-use super::bounds::{Bounds, Ends, times_inside};
+use super::{Bounds, Ends, times_inside};
 use crate::error::LoadError;
 use crate::import::Format;
 use crate::visibility::{InputKind, MovingMesh, load_mts, moving};

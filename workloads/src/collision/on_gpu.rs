@@ -7,10 +7,9 @@ use pipeline::{
     Viewport,
 };
 
-use super::Method;
-use super::bounds::{Bounds, TzBox, TzBuffer};
 use super::object::Object;
 use super::pass::{BinnedPrimitive, Fragment, FragmentBudget, Part, Pass, PassBackend};
+use super::{Bounds, Method, TzBox, TzBuffer};
 
 /// Bytes of a vertex at both times.
 const VERTEX_BYTES: u32 = 24;

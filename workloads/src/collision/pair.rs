@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::bounds::Bounds;
+use super::Bounds;
 use super::contact_probe::cross;
 use super::object::Object;
 use super::pass::{

@@ -5,8 +5,8 @@ use std::ops::Range;
 use pipeline::Primitive;
 use pipeline::conservative::{Grid, MovingTriangle, Rasterizer, Region, Touch, View};
 
-use super::bounds::{Bounds, Ends, NOTHING, TzBox, TzBuffer, hull, meet};
 use super::object::Object;
+use super::{Bounds, Ends, NOTHING, TzBox, TzBuffer, hull, meet};
 
 /// The triangles of an object that may be in the window.
 #[derive(Clone, Copy)]

@@ -13,7 +13,6 @@
 use activity::Event;
 use pipeline::{Gpu, PipelineSpec, Viewport};
 
-use super::bounds::{Bounds, TzBox, TzBuffer};
 use super::detect::{MAX_SCALED_COORDINATE, candidates, upscale_factor};
 use super::object::Object;
 use super::on_gpu::PassesOnGpu;
@@ -21,6 +20,7 @@ use super::pair::{Method, time_bins};
 use super::pass::{
     Comparison, Fit, Fragment, FragmentBudget, Part, Pass, PassBackend, Resources, Scratch, Tiling,
 };
+use super::{Bounds, TzBox, TzBuffer};
 use crate::job::{IMAGE_SIZE, JobError};
 
 /// Work of the passes, and the overlapping pixels of a pair.

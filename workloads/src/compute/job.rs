@@ -10,10 +10,9 @@ use pipeline::{
 };
 use warnings::{Code, Warning};
 
-use super::kernels::Kernels;
-use super::light_culling::LightSphere;
+use super::kernels::{Kernels, LightSphere};
 use super::luminance::Show;
-use super::options::{ComputeOptions, Kernel};
+use super::{ComputeOptions, Kernel};
 use crate::error::LoadError;
 use crate::job::{Drawn, DrawsScene, Fact, Flag, Flags, IMAGE_SIZE, Job, JobError, OptionSource, Request};
 use crate::scene::{Frame, Overrides, Scene};

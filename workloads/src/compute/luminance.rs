@@ -8,8 +8,7 @@ use pipeline::texture::LUMINANCE;
 use pipeline::{Atomic, Buffer, Group, GroupLane, GroupShader, Lane, SurfaceView};
 use serde::{Deserialize, Serialize};
 
-use super::block::{Blocks, Order, Slots, tree};
-use super::luminance;
+use super::{Blocks, Order, Slots, luminance, tree};
 
 /// Where lanes count.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

@@ -16,9 +16,8 @@ use crate::job::{
     Drawn, DrawsScene, Fact, Flag, Flags, IMAGE_SIZE, Job, JobError, JobOptions, Need, OptionSource, Request,
     must_hold,
 };
-use crate::lighting::PointLight;
-use crate::material::SurfaceShader;
-use crate::samples::{SampleChoice, blur_warning};
+use crate::material::{PointLight, SurfaceShader};
+use crate::rendering::{SampleChoice, blur_warning};
 use crate::scene::{Frame, Overrides, Scene};
 use crate::shapes;
 

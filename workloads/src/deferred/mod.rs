@@ -17,8 +17,7 @@ use pipeline::{
 };
 use serde::{Deserialize, Serialize};
 
-use crate::lighting::{Lighting, LitPoint, PointLight};
-use crate::material::SurfaceShader;
+use crate::material::{Lighting, LitPoint, PointLight, SurfaceShader};
 use crate::scene::Frame;
 
 pub use job::{Deferred, DeferredOptions, LightPass, Method, Rate};

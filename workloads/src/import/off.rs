@@ -9,8 +9,7 @@ use glam::{DVec3, Vec2};
 
 use super::super::import;
 use super::reader;
-use super::reader::MAX_ELEMENTS;
-use super::soup::{Soup, linear};
+use super::reader::{MAX_ELEMENTS, Soup, linear};
 use crate::error::{LoadError, Source};
 
 /// What to do about kinds of OFF files that are not read.

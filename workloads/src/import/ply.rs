@@ -12,8 +12,7 @@ use warnings::{Code, Warning};
 
 use super::super::import;
 use super::reader;
-use super::reader::MAX_ELEMENTS;
-use super::soup::{Soup, linear};
+use super::reader::{MAX_ELEMENTS, Soup, linear};
 use crate::error::{LoadError, Source};
 
 /// What to do about a header that cannot be used.

@@ -7,7 +7,7 @@ use glam::DVec3;
 
 use super::super::import;
 use super::reader;
-use super::soup::Soup;
+use super::reader::Soup;
 use crate::error::{LoadError, Source};
 
 /// Bytes before the triangles of a binary file: a comment and the number of triangles.

@@ -3,7 +3,7 @@
 //! - *Darts* (Fig. 11): in each round the uncovered regions, squares in 2D and cubes in 3D, are drawn in conservative mode as
 //!   triangles and prisms, and the random candidates in them become points if they are free. The host removes conflicts and
 //!   divides the regions. It fills what is left after the last round, [`super::poisson`]; the facts give the share.
-//! - *Noise* (Fig. 12): points that follow a bell, from columns one dimension higher ([`super::noise`]).
+//! - *Noise* (Fig. 12): points that follow a bell, from columns one dimension higher ([`crate::points`]).
 //! - *Volume* (Fig. 9): samples in a torus (3D) or a blurred disk (4D, 5D), found in standard mode ([`super::volume`]).
 
 use glam::Vec3;
@@ -14,13 +14,13 @@ use serde::{Deserialize, Serialize};
 use warnings::{Code, Warning};
 
 use super::drawn::{AXES, Cell, Everywhere, Kept, Lattice, draw};
-use super::noise::{DrawnNoise, NoiseSpec, draw_noise};
 use super::poisson::{
     Cube, DARTS_PER_FIRST_CELL, DARTS_PER_LATER_CELL, Domain, PoissonDisk, PoissonSpec, Spacing,
     poisson_disk_drawn,
 };
 use super::volume::{Blurred, Torus, Volume, fill};
 use super::white::{Named, columns_for};
+use super::{DrawnNoise, NoiseSpec, draw_noise};
 use crate::error::LoadError;
 use crate::job::{Drawn, Draws, Fact, Flag, Flags, Job, JobError, JobOptions, Need, OptionSource, Request};
 use crate::scene::Settings;

@@ -2,9 +2,8 @@
 
 use glam::{DAffine3, DMat3, DVec3};
 
-use super::far::Bounds;
 use super::graph::{Graph, world_poses};
-use super::mesh::{Influences, Instance, Mesh, Normals, unit};
+use super::mesh::{Bounds, Influences, Instance, Mesh, Normals, unit};
 use super::track::Instant;
 
 /// Poses of all nodes and morph weights at one time.

@@ -4,12 +4,10 @@ pub(crate) mod camera;
 mod camera_spec;
 mod camera_used;
 mod deform;
-pub(crate) mod far;
 mod frame;
 mod graph;
 mod info;
 pub(crate) mod inside;
-pub(crate) mod measure;
 mod mesh;
 mod rays;
 mod settings;
@@ -21,9 +19,11 @@ pub use camera_spec::{CameraKey, CameraSpec, InterpolationSpec};
 pub use camera_used::{CameraSource, CameraUsed, OwnCamera};
 pub use frame::{Frame, FrameError, FrameMesh, NearSpace};
 pub use graph::{Channels, Clip, Graph, Local, Motion, Node, Property, Spin, Trs, world_poses};
+pub(crate) use info::lens_leaves_view;
 pub use info::{
     CameraInfo, ClipInfo, LensInfo, LightInfo, MaterialInfo, MeshInfo, SceneInfo, SettingsInfo, TextureInfo,
 };
+pub(crate) use mesh::Bounds;
 pub use mesh::{Influences, Instance, Mesh, Normals, Skin, Target};
 pub use settings::{Overrides, Settings};
 pub use track::{Instant, Interpolation, Track};
@@ -36,13 +36,12 @@ use glam::{DVec3, Vec3};
 use warnings::Warning;
 
 use crate::error::LoadError;
-use crate::lighting::Light;
-use crate::material::{Material, SurfaceShader};
+use crate::material::{Light, Material, SurfaceShader};
 use camera::{Standing, between};
 use deform::Pose;
 use frame::Interval;
+use info::Placed;
 use inside::Inside;
-use measure::Placed;
 
 /// A scene that can be rendered frame by frame.
 #[derive(Clone, Debug)]
@@ -166,14 +165,14 @@ impl Scene {
     fn recentre(&mut self) {
         self.origin = DVec3::ZERO;
         let first = self.interval(self.own_frames.start).open;
-        let mut bounds = far::Bounds::default();
+        let mut bounds = Bounds::default();
         for instance in &self.graph.instances {
             let at_rest = self.graph.meshes[instance.mesh].positions.iter().map(|point| point.as_dvec3());
-            first.transforms(&self.graph, *instance).place(&far::Bounds::of(at_rest), &mut bounds);
+            first.transforms(&self.graph, *instance).place(&Bounds::of(at_rest), &mut bounds);
         }
         self.origin = bounds.origin();
         if self.origin != DVec3::ZERO {
-            self.warnings.push(far::recentred(self.origin));
+            self.warnings.push(mesh::recentred(self.origin));
         }
     }
 
@@ -196,7 +195,7 @@ impl Scene {
             self.playing = Some(index);
             self.room = None;
         }
-        let placed = |code| code == warnings::Code::CoordinatesRecentred || measure::CODES.contains(&code);
+        let placed = |code| code == warnings::Code::CoordinatesRecentred || info::CODES.contains(&code);
         self.warnings.retain(|warning| !placed(warning.code));
         self.prepare()?;
         Ok(self)

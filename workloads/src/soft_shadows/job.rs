@@ -10,10 +10,8 @@ use pipeline::{Cull, Draw, DrawState, Gpu, Viewport};
 use serde::{Deserialize, Serialize};
 use warnings::{Code, Warning};
 
-use super::light::{AreaLight, LightSpec};
-use super::map::{Method, SceneView, ShadowMap};
-use super::seen::VisibleTriangles;
-use super::shade::{Shadows, World, look_ups};
+use super::shade::{Shadows, VisibleTriangles, World, look_ups};
+use super::{AreaLight, LightSpec, Method, SceneView, ShadowMap};
 use crate::accumulation::SharedSamples;
 use crate::error::LoadError;
 use crate::job::{Drawn, DrawsScene, Fact, Flag, Flags, Job, JobError, JobOptions, OptionSource, Request};

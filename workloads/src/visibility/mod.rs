@@ -7,8 +7,7 @@
 //! A [`MovingMesh`] has linear vertex motion, and may come from two surface files.
 
 mod camera;
-mod m5d;
-mod mts;
+mod files;
 
 use std::ops::Range;
 use std::path::Path;
@@ -21,12 +20,10 @@ use warnings::Warning;
 
 use crate::error::{LoadError, Source};
 use crate::import::{Face, Format, Surface, reader, statements, surface};
-use crate::scene::Wrong;
-use crate::scene::measure::lens_leaves_view;
+use crate::scene::{Wrong, lens_leaves_view};
 
 pub use crate::scene::CameraSpec;
-pub use m5d::parse as parse_m5d;
-pub use mts::{load_mts, parse_mts};
+pub use files::{load_mts, parse_m5d, parse_mts};
 
 /// Accepted files, for messages.
 const KNOWN: &str = ".m5d, .mts, and .ply, .obj, .off or .stl, alone or as a pair (each also gzipped)";
@@ -48,10 +45,10 @@ impl InputKind {
             return Err(not_a_regular_file(path));
         }
         let begins = |magic: &[u8]| head.starts_with(magic);
-        if begins(m5d::MAGIC) {
+        if begins(files::M5D_MAGIC) {
             return Ok(Self::M5d);
         }
-        if begins(mts::MAGIC) {
+        if begins(files::MTS_MAGIC) {
             return Ok(Self::Mts);
         }
         if begins(b"ply\n") || begins(b"ply\r") {
@@ -87,8 +84,8 @@ pub fn load(files: &[impl AsRef<Path>], camera: Option<&str>) -> Result<Visibili
     let kinds = files.iter().map(|path| InputKind::of(path)).collect::<Result<Vec<_>, _>>()?;
     let (path, objects) = match (&files[..], &kinds[..]) {
         ([file], [InputKind::M5d]) => match &spec {
-            None => return m5d::load(file),
-            Some(_) => (*file, vec![m5d::world(&m5d::load(file)?)]),
+            None => return files::load(file),
+            Some(_) => (*file, vec![files::world(&files::load(file)?)]),
         },
         ([file], [InputKind::Mts]) => (*file, load_mts(file)?),
         ([file], [InputKind::Surface(format)]) => (*file, vec![still((file, *format))?]),

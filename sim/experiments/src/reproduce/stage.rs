@@ -16,9 +16,8 @@ use run::{BIN_PS, GpuSpec, JobFrame, RunError};
 use timing::{FrameClock, Level, Recorder};
 use traces::Trace;
 use traces::device::{Device, DeviceSpec};
-use traces::energy::{FrameEnergy, PowerIntegral, TrueFrame};
+use traces::energy::{self, FrameEnergy, PowerIntegral, Score, TOLERANCE_S, TrueFrame};
 use traces::frames::{FinderMethod, Flag, Marks, Options, Window, default_window, find_with};
-use traces::score::{self, Score, TOLERANCE_S};
 use workloads::scene::{
     Frustum, Graph, Local, Node, Parts, Rig, SceneCamera, Settings as SceneSettings, Trs,
 };
@@ -267,12 +266,12 @@ impl Recording {
         let truth = self.truth.frames.iter();
         let truth: Vec<_> =
             truth.map(|frame| TrueFrame { start_s: frame.start_s, energy_j: frame.energy_j }).collect();
-        let beside = score::truth_beside(&frames.found, &truth, within_s);
+        let beside = energy::truth_beside(&frames.found, &truth, within_s);
         let missed = truth.iter().filter(|frame| !beside.contains(&Some(**frame)));
         let Window { pre_s, post_s } = self.marks(1).window;
         let disturbed =
             missed.filter(|frame| self.is_disturbed(frame.start_s - pre_s, frame.start_s + post_s));
-        (score::score(&frames.found, &truth, within_s), disturbed.count())
+        (energy::score(&frames.found, &truth, within_s), disturbed.count())
     }
 
     fn is_disturbed(&self, from_s: f64, to_s: f64) -> bool {
@@ -302,7 +301,7 @@ impl Recording {
             let parts = [Flag::Merged, Flag::Split, Flag::Long, Flag::Short];
             (!parts.iter().any(|flag| frame.flags.contains(*flag))).then_some(frame.energy_j)
         };
-        let beside = score::found_beside_true(&found, &truth, TOLERANCE_S);
+        let beside = energy::found_beside_true(&found, &truth, TOLERANCE_S);
         beside.into_iter().map(|place| place.and_then(whole_j)).collect()
     }
 

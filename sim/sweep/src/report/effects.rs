@@ -343,7 +343,7 @@ fn interval(effect: f64, rests: &[f64], members: &[usize], centre: f64) -> Ratio
 mod tests {
     use super::*;
     use crate::report::exact;
-    use traces::random::Random;
+    use traces::stats::Random;
 
     /// Designs over x, y and z, with the logarithm of time by `log`.
     fn grid(count: usize, log: impl Fn(usize, usize, usize) -> f64) -> Vec<Design> {

@@ -9,7 +9,7 @@
 use core::f64::consts::{FRAC_1_SQRT_2, PI};
 
 use serde::Serialize;
-use traces::random::Random;
+use traces::stats::Random;
 
 use super::design::{Cost, Design};
 

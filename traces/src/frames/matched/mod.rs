@@ -5,9 +5,7 @@
 //! free-running recording is searched separately: nothing was drawn before it, so the part of the window before the mark differs.
 
 mod pass;
-mod piece;
 mod screen;
-mod template;
 
 use super::assess::{conclude_at, confidence};
 use super::marks::{MarkError, Marks, Placed, flat_mark};
@@ -16,14 +14,15 @@ use super::profile::summed_squared_difference;
 use super::subsample::align;
 use super::threshold::{Threshold, choose};
 use super::{FinderMethod, Found, FrameStart, marked_start};
-use crate::clock::Clock;
-use crate::stats::{PairSum, upper_median};
+use crate::stats::{PairSum, mean, upper_median};
+use crate::times::Clock;
 use crate::trace::Trace;
 use core::convert::Infallible;
+use core::ops::Range;
+use multiversion::multiversion;
 use pass::Candidate;
 pub(crate) use pass::{Gathered, Plan, Samples};
 use rayon::prelude::*;
-use template::Template;
 
 /// How far, in samples, refinement may move a start from the lowest offset of the profile.
 const MAX_REFINEMENT_SAMPLES: usize = 2;
@@ -220,4 +219,152 @@ pub(super) fn noise_variance(power: &[f64]) -> f64 {
 /// The deviation of white Gaussian noise whose steps from sample to sample have this median: it is `0.6745 sqrt(2) sigma`.
 pub(crate) fn noise_deviation(median_step: f64) -> f64 {
     median_step / (0.674_489_75 * core::f64::consts::SQRT_2)
+}
+
+/// Least norm of a window, as a share of the template's: steady power then resembles nothing.
+const MIN_NORM_SHARE: f64 = 0.05;
+
+/// The powers about a mark, and how others are compared with them.
+struct Template {
+    pub watts: Vec<f64>,
+    pub mean_w: f64,
+    /// By the z-normalized distance (Goldin and Kanellakis 1995; Mueen's MASS), `2 |q|^2 (1 - r)` in W^2, with `r` the correlation
+    /// coefficient and `|q|` the norm about the mean; else by the summed squared difference.
+    pub normalized: bool,
+}
+
+impl Template {
+    pub fn new(watts: Vec<f64>, normalized: bool) -> Self {
+        Self { mean_w: mean(&watts), watts, normalized }
+    }
+
+    /// The distance of at least as many powers, W^2.
+    pub fn distance_w2(&self, power_w: &[f64]) -> f64 {
+        let [sum, squares, inner] = if self.normalized {
+            sums(power_w, &self.watts, self.mean_w)
+        } else {
+            return difference(power_w, &self.watts);
+        };
+        let own = sums(&self.watts, &self.watts, self.mean_w)[2];
+        let norm = libm::sqrt(own);
+        let about = libm::sqrt((squares - sum * sum / self.watts.len() as f64).max(0.0));
+        let r = inner / (about.max(MIN_NORM_SHARE * norm) * norm).max(f64::MIN_POSITIVE);
+        2.0 * own * (1.0 - r).max(0.0)
+    }
+}
+
+/// Summed squared difference of powers and a template, in eight lanes: always the same order, whatever
+/// vectors there are.
+#[multiversion(targets("x86_64+avx2"))]
+fn difference(power_w: &[f64], template: &[f64]) -> f64 {
+    let mut lanes = [0.0; 8];
+    let whole = template.len() / 8 * 8;
+    for (t, power) in template[..whole].chunks_exact(8).zip(power_w.chunks_exact(8)) {
+        for lane in 0..8 {
+            let difference = power[lane] - t[lane];
+            lanes[lane] += difference * difference;
+        }
+    }
+    let rest = template.iter().zip(power_w).skip(whole).map(|(t, power)| (power - t) * (power - t));
+    lanes.iter().sum::<f64>() + rest.sum::<f64>()
+}
+
+/// Of powers less a mean: their sum, their squares, and their product with a template less the same mean.
+fn sums(power_w: &[f64], template: &[f64], mean_w: f64) -> [f64; 3] {
+    template.iter().zip(power_w).fold([0.0; 3], |[sum, squares, inner], (t, power)| {
+        let power = power - mean_w;
+        [sum + power, squares + power * power, inner + power * (t - mean_w)]
+    })
+}
+
+/// Samples per stored sum.
+const BLOCK: usize = 256;
+
+/// A segment of samples with running sums of power, for energies to any place in it.
+#[derive(Default)]
+struct Piece {
+    /// Number of the first sample, a multiple of [`BLOCK`].
+    pub base: u64,
+    pub voltage_v: Vec<f32>,
+    pub current_a: Vec<f32>,
+    /// Sum of powers (W) before each block, and before the end of the last whole one.
+    prefix_w: Vec<PairSum>,
+}
+
+impl Piece {
+    pub fn len(&self) -> usize {
+        self.voltage_v.len()
+    }
+
+    /// Number of the sample after the last.
+    pub fn end(&self) -> u64 {
+        self.base + self.len() as u64
+    }
+
+    /// Power of a sample by its place in the piece, W.
+    pub fn power_w(&self, place: usize) -> f64 {
+        f64::from(self.voltage_v[place]) * f64::from(self.current_a[place])
+    }
+
+    /// Brings the sums up to date with samples that were appended.
+    pub fn add_up(&mut self) {
+        if self.prefix_w.is_empty() {
+            self.prefix_w.push(PairSum::default());
+        }
+        let done = self.prefix_w.len() - 1;
+        let whole = self.len() / BLOCK;
+        for block in done..whole {
+            let sum_w = self.sum_w(block * BLOCK..(block + 1) * BLOCK);
+            self.prefix_w.push(self.prefix_w[block].plus(sum_w));
+        }
+    }
+
+    /// Sum of powers (W) of all samples up to a position in the file, the last by fraction.
+    pub fn sum_to(&self, position: f64) -> PairSum {
+        let place = (position - self.base as f64).clamp(0.0, self.len() as f64);
+        let whole = (place as usize).min(self.len());
+        let block = (whole / BLOCK).min(self.prefix_w.len() - 1);
+        let sum = self.prefix_w[block].plus(self.sum_w(block * BLOCK..whole));
+        if whole < self.len() { sum.plus_product(self.power_w(whole), place - whole as f64) } else { sum }
+    }
+
+    fn sum_w(&self, places: Range<usize>) -> f64 {
+        sum_of_powers(&self.voltage_v[places.clone()], &self.current_a[places])
+    }
+
+    /// Takes over the end of another piece, from a sample on, rounded down to a whole block.
+    pub fn begin_with(&mut self, other: &Self, sample: u64) {
+        let blocks = (sample.saturating_sub(other.base) as usize / BLOCK).min(other.prefix_w.len() - 1);
+        let take_over = |mine: &mut Vec<f32>, theirs: &[f32]| {
+            mine.clear();
+            mine.extend_from_slice(&theirs[blocks * BLOCK..]);
+        };
+        take_over(&mut self.voltage_v, &other.voltage_v);
+        take_over(&mut self.current_a, &other.current_a);
+        self.prefix_w.clear();
+        self.prefix_w.extend_from_slice(&other.prefix_w[blocks..]);
+        self.base = other.base + (blocks * BLOCK) as u64;
+    }
+}
+
+/// Sum of the powers of some samples, in eight lanes: always the same order.
+#[multiversion(targets("x86_64+avx2"))]
+fn sum_of_powers(voltage_v: &[f32], current_a: &[f32]) -> f64 {
+    let mut lanes = [0.0; 8];
+    let (v, i) = (voltage_v.chunks_exact(8), current_a.chunks_exact(8));
+    let rest = v.remainder().iter().zip(i.remainder()).map(|(&v, &i)| f64::from(v) * f64::from(i));
+    let rest: f64 = rest.sum();
+    for (v, i) in v.zip(i) {
+        for lane in 0..8 {
+            lanes[lane] += f64::from(v[lane]) * f64::from(i[lane]);
+        }
+    }
+    lanes.iter().sum::<f64>() + rest
+}
+
+/// Powers of some samples, W.
+#[multiversion(targets("x86_64+avx2"))]
+fn powers(voltage_v: &[f32], current_a: &[f32], into: &mut Vec<f64>) {
+    into.clear();
+    into.extend(voltage_v.iter().zip(current_a).map(|(&v, &i)| f64::from(v) * f64::from(i)));
 }

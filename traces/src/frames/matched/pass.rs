@@ -1,13 +1,12 @@
 //! The one pass over the samples, and the buffers of its threads.
 
-use super::piece::{Piece, powers};
 use super::screen::{Buffers, Screen, minima};
-use super::template::Template;
-use crate::clock::Clock;
+use super::{Piece, Template, powers};
 use crate::frames::marks::{Marks, Placed, Placement};
 use crate::frames::subsample::vertex;
 use crate::frames::{FinderMethod, spacing};
 use crate::stats::{PairSum, mean};
+use crate::times::Clock;
 use core::ops::Range;
 use multiversion::multiversion;
 use rayon::prelude::*;
@@ -22,7 +21,7 @@ const MAX_REFINEMENT_SAMPLES: usize = 2;
 /// Samples kept beside what offsets need: for energies at starts between samples.
 const MARGIN_SAMPLES: usize = 8;
 /// Samples at the beginning that are kept: the first frame is searched in them again.
-pub(super) const HEAD_SAMPLES: usize = 1 << 21;
+const HEAD_SAMPLES: usize = 1 << 21;
 /// About the most values that medians are taken from.
 const MAX_MEDIAN_VALUES: u64 = 65_536;
 

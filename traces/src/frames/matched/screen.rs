@@ -1,9 +1,9 @@
 //! The distance of the nearest template to every window, in f32: exact enough to show where minima are; and
 //! these minima, piece by piece.
 
-use super::template::{MIN_NORM_SHARE, Template};
-use crate::overlap;
-use crate::overlap::OverlapSave;
+use super::{MIN_NORM_SHARE, Template};
+
+use crate::frames::profile::{self, OverlapSave};
 use multiversion::multiversion;
 use rustfft::num_complex::Complex;
 
@@ -22,7 +22,7 @@ pub(super) struct Screen {
 /// The buffers of a thread.
 #[derive(Default)]
 pub(super) struct Buffers {
-    overlap: overlap::Buffers<f32>,
+    overlap: profile::Buffers<f32>,
     squares: Vec<f64>,
     norms: Vec<f64>,
 }

@@ -1,7 +1,6 @@
 //! The native format: Parquet with the columns `time_ns`, `voltage_V` and `current_A`, and one JSON text
 //! under the key `trace` in the file's metadata. It is read column by column, in parallel.
 
-mod arrow_schema;
 mod column;
 mod pages;
 
@@ -138,7 +137,7 @@ impl RowSource for ParquetRows {
 pub(crate) fn field_units(file: &PagedFile) -> BTreeMap<String, String> {
     let pairs = file.metadata().file_metadata().key_value_metadata().map_or(&[][..], Vec::as_slice);
     let schema = pairs.iter().find(|pair| pair.key == "ARROW:schema").and_then(|pair| pair.value.as_deref());
-    schema.map_or_else(BTreeMap::new, arrow_schema::units)
+    schema.map_or_else(BTreeMap::new, column::units)
 }
 
 fn description(path: &Path, file: &PagedFile) -> Result<Description, ReadError> {

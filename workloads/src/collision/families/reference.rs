@@ -8,7 +8,7 @@
 use glam::{DMat3, DVec3};
 
 use super::{Case, Maker, Moving, Rng, cube};
-use crate::collision::bounds::meet;
+use crate::collision::meet;
 
 /// Kinds with two objects.
 pub(super) const PAIRS: [(&str, Maker); 8] = [

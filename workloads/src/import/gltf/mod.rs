@@ -28,7 +28,7 @@ use crate::error::{LoadError, Source};
 use crate::import;
 use crate::import::{about_material, reader};
 use crate::material::{Alpha, Material};
-use crate::scene::far::Bounds;
+use crate::scene::Bounds;
 use crate::scene::{Clip, Instance, Mesh, Parts};
 use nodes::Tree;
 

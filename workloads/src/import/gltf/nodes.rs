@@ -13,7 +13,7 @@ use warnings::{Code, Warning};
 
 use super::Document;
 use crate::error::LoadError;
-use crate::lighting::Light;
+use crate::material::Light;
 use crate::scene::{
     Clip, Frustum, Instant, Interpolation, Local, Node, OwnCamera, Property, Rig, SceneCamera, Skin, Track,
     Trs, unit_quat, world_poses,

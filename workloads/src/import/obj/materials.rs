@@ -12,7 +12,7 @@ use super::{Statements, broken, lines};
 use crate::error::{LoadError, Source};
 use crate::import;
 use crate::import::reader;
-use crate::import::soup::{Paint, Soup, TriangleMaterials, grey, linear};
+use crate::import::reader::{Paint, Soup, TriangleMaterials, grey, linear};
 use crate::material::{Alpha, Material};
 
 /// Gives each triangle of `soup` the material that the file at `path` names for it.

@@ -10,10 +10,8 @@ use std::path::Path;
 use glam::{DVec3, Vec2, Vec3};
 use warnings::{Code, Warning};
 
-use super::soup::Soup;
 use crate::error::{LoadError, Source};
-use crate::import::reader::{self, MAX_ELEMENTS};
-use crate::import::soup;
+use crate::import::reader::{self, MAX_ELEMENTS, Soup};
 
 /// Reads the OBJ file at `path`, gzipped or not, with the materials it names.
 pub(super) fn read(path: &Path) -> Result<Soup, LoadError> {
@@ -314,7 +312,7 @@ impl Statements {
     pub fn linear_colors(&self) -> Vec<Vec3> {
         let bytes = self.colors.iter().flatten().flatten().any(|channel| *channel > 1.0);
         let scale = if bytes { 1.0 / 255.0 } else { 1.0 };
-        let linear = |color: [f32; 3]| soup::linear(color.map(|channel| channel * scale));
+        let linear = |color: [f32; 3]| reader::linear(color.map(|channel| channel * scale));
         self.colors.iter().map(|color| color.map_or(Vec3::ONE, linear)).collect()
     }
 }

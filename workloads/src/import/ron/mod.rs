@@ -12,15 +12,14 @@ use spec::{
 };
 use warnings::{Code, Warning};
 
-use crate::builtin::checker;
 use crate::error::{LoadError, Source};
 use crate::import::{Format, bare, gltf, reader, soup};
-use crate::lighting::Light;
-use crate::material::{Alpha, Material};
+use crate::material::{Alpha, Light, Material};
 use crate::scene::{
     CameraSpec, Interpolation, Local, Mesh, Node, Parts, Rig, SceneCamera, Settings, Spin, Target, Track,
     Trs, rotation,
 };
+use crate::shapes::checker;
 use crate::{import, shapes};
 
 /// Reads the scene at `path`.
@@ -380,7 +379,7 @@ fn material(
 ) -> Result<usize, LoadError> {
     let made = match spec {
         Some(spec) => make_material(context, &mut parts.warnings, place, spec)?,
-        None => soup::grey(),
+        None => reader::grey(),
     };
     Ok(parts.graph.push_material(made))
 }
@@ -391,7 +390,7 @@ fn make_material(
     place: &str,
     spec: &MaterialSpec,
 ) -> Result<Material, LoadError> {
-    let plain = soup::grey();
+    let plain = reader::grey();
     let otherwise = if spec.texture.is_some() { Vec3::ONE } else { plain.base_color };
     let shade = |value| color(context, &format!("{place}.material.color"), value);
     let base_color = spec.color.map_or(Ok(otherwise), shade)?;

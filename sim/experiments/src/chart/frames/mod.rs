@@ -12,9 +12,8 @@ use output::plot::{ChartPanel, Mark, Paint, Scale, Series};
 use output::terminal::Progress;
 use serde::Serialize;
 use traces::Trace;
-use traces::energy::{FrameEnergy, PowerIntegral};
+use traces::energy::{FrameEnergy, PowerIntegral, TOLERANCE_S, score, true_frames};
 use traces::frames::{FinderMethod, Marks, Options, default_window, find_with};
-use traces::score::{TOLERANCE_S, score, true_frames};
 use traces::synth::{Recording, SCENARIOS, Scenario, Scene};
 
 use self::witnesses::{WitnessRow, WitnessSummary};

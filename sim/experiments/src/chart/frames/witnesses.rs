@@ -3,9 +3,8 @@
 
 use serde::Serialize;
 use traces::Trace;
-use traces::energy::PowerIntegral;
+use traces::energy::{PowerIntegral, TOLERANCE_S, score, true_frames};
 use traces::frames::{FinderMethod, Marks, Options, default_window, find_with};
-use traces::score::{TOLERANCE_S, score, true_frames};
 use traces::synth::{Scene, WITNESSES, Witness};
 
 use super::{FAILS_BELOW, HAND_S, MARKED};

@@ -10,11 +10,11 @@ use run::{GpuSpec, Plan, RunOptions, frames_of};
 use serde::Serialize;
 use workloads::job::OptionSource;
 use workloads::points::job::rasterized;
-use workloads::points::noise::{DrawnNoise, NoiseSpec, draw_noise};
 use workloads::points::poisson::{Domain, PoissonSpec, Spacing, poisson_disk};
 use workloads::points::quality::{chi_square, largest_hole};
 use workloads::points::volume::{Blurred, Torus, Volume, every_sample, standard_mode};
 use workloads::points::white::{Named, Numbers, WhiteSpec, columns_for, counts, shares, white_noise};
+use workloads::points::{DrawnNoise, NoiseSpec, draw_noise};
 use workloads::scene::Overrides;
 
 use super::{PointsEffort, one_thread};

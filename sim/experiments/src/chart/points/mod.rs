@@ -12,8 +12,8 @@ use workloads::points::poisson::{Domain, PoissonError, PoissonSpec, Spacing, bal
 use workloads::points::quality::{
     Spectrum, chi_square, closer_than, free_share, largest_hole, least_distance,
 };
-use workloads::points::rivals::{bridson, plain_darts};
 use workloads::points::white::{Density, Named, Numbers, WhiteError, WhiteSpec, counts, shares, white_noise};
+use workloads::points::{bridson, plain_darts};
 
 use crate::study::table::{Sheet, Table, count, fixed, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};

@@ -17,7 +17,7 @@ use rayon::prelude::*;
 use run::{GpuSpec, RunError, StatedError};
 use serde::Serialize;
 use timing::{AccuracyWarning, Level, Rates, Timed};
-use traces::random::Random;
+use traces::stats::Random;
 
 use super::timing::animations;
 use super::timing::animations::{Packets, Subject};

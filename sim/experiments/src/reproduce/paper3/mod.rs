@@ -7,9 +7,8 @@ mod system;
 use output::terminal::Progress;
 use power_model::{Circumstances, FramePower, Pacing};
 use run::RunError;
-use traces::energy::PowerIntegral;
+use traces::energy::{PowerIntegral, Score};
 use traces::frames::FinderMethod;
-use traces::score::Score;
 
 use super::report::{POWER, TIME, dots, line};
 use super::row::{Row, Verdict, With, numbers};

@@ -11,7 +11,7 @@ use run::{GpuSpec, RunError};
 use workloads::caustics::generator::Ocean;
 use workloads::caustics::{Beam, Eye, Floor, Light, Method, Picture, draw};
 use workloads::job::{OptionSource, Request};
-use workloads::lighting::Light as SceneLight;
+use workloads::material::Light as SceneLight;
 use workloads::material::{Material, SurfaceShader};
 use workloads::points::job::Rasterized;
 use workloads::scene::Mesh;

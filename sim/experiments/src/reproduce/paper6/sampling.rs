@@ -6,7 +6,6 @@ use output::plot::{Mark, Paint, Series};
 use pipeline::{Gpu, PipelineSpec};
 use run::{GpuSpec, RunError};
 use workloads::points::job::{Rasterized, rasterized};
-use workloads::points::noise::{NoiseSpec, draw_noise};
 use workloads::points::poisson::{
     Cube, Domain, PoissonDisk, PoissonSpec, Spacing, ball, poisson_disk, saturation,
 };
@@ -14,6 +13,7 @@ use workloads::points::quality::{ChiSquare, chi_square, closer_than, free_share,
 use workloads::points::white::{
     Density, Named, Numbers, WhiteSpec, columns_for, counts, shares, white_noise,
 };
+use workloads::points::{NoiseSpec, draw_noise};
 
 use super::super::report::{dots, line};
 use super::super::row::{self, Cases, Row, Verdict, numbers};
