@@ -42,15 +42,13 @@ struct OpenRow {
     may_close: Time,
     /// When the next row begins to open.
     closes: Time,
-    /// Lines of the channel up to its last line so far.
-    last: u64,
     /// Time on the bus of lines that joined it.
     joined: Time,
 }
 
 impl OpenRow {
     const NONE: Self =
-        Self { row: u32::MAX, since: 0, opened: 0, until: 0, may_close: 0, closes: 0, last: 0, joined: 0 };
+        Self { row: u32::MAX, since: 0, opened: 0, until: 0, may_close: 0, closes: 0, joined: 0 };
 }
 
 /// A bank: calendar of its row activations, and its latest rows, the newest first.
@@ -134,9 +132,28 @@ struct Waiting {
     seen: Time,
     issued: Time,
     count: u64,
+    bank: usize,
+    row: u32,
 }
 
 impl Channel {
+    /// A channel that remembers `groups` groups of lines.
+    fn new(bus: Calendar, ranks: Vec<Rank>, banks: Vec<Bank>, groups: usize) -> Self {
+        Self {
+            bus,
+            turns: BusTurns::default(),
+            banks,
+            ranks,
+            lines: 0,
+            recent: vec![Waiting::default(); groups].into(),
+            oldest: 0,
+            last_bank: 0,
+            of_last_bank: 0,
+            leaving: Vec::new(),
+            last_issued: 0,
+        }
+    }
+
     /// When a queue of `queue` lines has room for `count` more, which come at `seen`: lines leave in any order, one every
     /// `burst`.
     fn room_for(&mut self, count: u64, seen: Time, queue: u64, burst: Time) -> Time {
@@ -164,9 +181,18 @@ impl Channel {
         self.last_bank == bank && self.of_last_bank >= queue
     }
 
-    fn note(&mut self, bank: usize, lines: Waiting) {
-        self.of_last_bank = lines.count + if self.last_bank == bank { self.of_last_bank } else { 0 };
-        self.last_bank = bank;
+    /// Lines of other rows of the bank that go after `closes` do so later, as more lines of `row` go first.
+    fn delay(&mut self, bank: usize, row: u32, closes: Time, by: Time) {
+        let waits = |line: &&mut Waiting| line.bank == bank && line.row != row && line.issued > closes;
+        for line in self.recent.iter_mut().filter(waits) {
+            line.issued += by;
+            self.last_issued = self.last_issued.max(line.issued);
+        }
+    }
+
+    fn note(&mut self, lines: Waiting) {
+        self.of_last_bank = lines.count + if self.last_bank == lines.bank { self.of_last_bank } else { 0 };
+        self.last_bank = lines.bank;
         self.last_issued = self.last_issued.max(lines.issued);
         self.recent[self.oldest] = lines;
         self.oldest = (self.oldest + 1) % self.recent.len();
@@ -183,8 +209,7 @@ struct RowUse {
     issued: Time,
     /// When the chips let the row close.
     may_close: Time,
-    /// Lines of the channel up to them, and their time on the bus.
-    lines: u64,
+    /// Their time on the bus.
     work: Time,
 }
 
@@ -234,19 +259,8 @@ impl Dram {
         let longest_line = times.burst.max(times.row_cycle(0).max(times.row_cycle(1)));
         let in_ports = CLIENTS.len() as Time * Time::from(machine.l2.queue.get());
         let remembered = (RECENT_GROUPS * queue as usize).min(MAX_RECENT_GROUPS);
-        let channel = Channel {
-            bus: bus.with_pauses(reopening),
-            turns: BusTurns::default(),
-            banks: ranks.iter().flat_map(|rank| vec![bank(rank); banks]).collect(),
-            ranks,
-            lines: 0,
-            recent: vec![Waiting::default(); remembered].into(),
-            oldest: 0,
-            last_bank: 0,
-            of_last_bank: 0,
-            leaving: Vec::new(),
-            last_issued: 0,
-        };
+        let banks = ranks.iter().flat_map(|rank| vec![bank(rank); banks]).collect();
+        let channel = Channel::new(bus.with_pauses(reopening), ranks, banks, remembered);
         Self {
             map: AddressMap::new(spec),
             channels: vec![channel; spec.channels.get() as usize],
@@ -310,7 +324,7 @@ impl Dram {
         let turns_rows =
             is_alone && self.turns.pair > 0 && bank.turns_rows(kind, address.row, channel.lines, self.queue);
         let work = burst * Time::from(count);
-        let open = bank.joins(address.row, seen.from, channel.lines, self.queue);
+        let open = bank.joins(address.row, seen.from);
         let opened = match open {
             Some(at) => {
                 let open = bank.rows[at];
@@ -362,14 +376,23 @@ impl Dram {
             opened,
             issued: end - burst,
             may_close: (end - burst + keeps).max((opened + self.times.row).saturating_sub(activate)),
-            lines: channel.lines,
             work,
         };
-        if let Some(at) = open.filter(|&at| used.issued >= bank.rows[at].closes) {
+        let delays = open.map(|at| (at, bank.rows[at].closes)).filter(|&(_, closes)| used.issued >= closes);
+        if let Some((at, _)) = delays {
             bank.delay(at, work);
         }
         bank.note(used, open);
-        channel.note(address.bank, Waiting { seen: seen.from, issued: used.issued, count: count.into() });
+        if let Some((_, closes)) = delays {
+            channel.delay(address.bank, address.row, closes, work);
+        }
+        channel.note(Waiting {
+            seen: seen.from,
+            issued: used.issued,
+            count: count.into(),
+            bank: address.bank,
+            row: address.row,
+        });
         self.end = self.end.max(end);
         end
     }
@@ -442,27 +465,31 @@ impl Bank {
         self.rows.iter().position(|open| open.since <= seen).unwrap_or(self.rows.len() - 1)
     }
 
-    /// Place of the opening of `row` that a line joins which enters the queue at `seen`, after `lines` lines of its channel; `None`
-    /// if it has to open its row.
+    /// Place of the opening of `row` that a line joins which enters the queue at `seen`; `None` if it has to open its row.
     ///
     /// First ready first come (Rixner et al. 2000): a line joins pending lines of its row, ahead of older requests to other
-    /// rows, until the next row opens. The exception is a queue full of other lines since the last of its row.
-    fn joins(&self, row: u32, seen: Time, lines: u64, queue: u64) -> Option<usize> {
+    /// rows, until the row closes.
+    fn joins(&self, row: u32, seen: Time) -> Option<usize> {
         let latest = self.place(seen);
-        let is_pending = |open: &OpenRow| open.row == row && seen < open.closes && lines - open.last < queue;
-        let latest = Some(latest).filter(|&at| self.rows[at].row == row);
-        latest.or_else(|| self.rows.iter().position(is_pending))
+        let is_open = |&at: &usize| self.rows[at].row == row && seen < self.closed_at(at);
+        Some(latest).filter(|&at| self.rows[at].row == row).or_else(|| (0..self.rows.len()).find(is_open))
+    }
+
+    /// When the row at a place closes: once the chips let it and the next is requested, even if that can open only later.
+    fn closed_at(&self, at: usize) -> Time {
+        let open = &self.rows[at];
+        let next = at.checked_sub(1).map_or(Time::MAX, |next| self.rows[next].since);
+        open.closes.min(open.may_close.max(next))
     }
 
     /// Record lines of a row: those that joined the row at `joined`, or opened theirs.
     fn note(&mut self, used: RowUse, joined: Option<usize>) {
-        let RowUse { row, seen, opened, issued, may_close, lines, work } = used;
+        let RowUse { row, seen, opened, issued, may_close, work } = used;
         let at = self.place(seen);
         let begins_anew = |open: &usize| *open == at && seen > self.rows[at].until;
         if let Some(open) = joined.filter(|open| !begins_anew(open)).map(|at| &mut self.rows[at]) {
             open.until = open.until.max(issued);
             open.may_close = open.may_close.max(may_close);
-            open.last = lines;
             open.joined += work;
             return;
         }
@@ -473,8 +500,7 @@ impl Bank {
         }
         let last = self.rows.len() - 1;
         self.rows.copy_within(at..last, at + 1);
-        self.rows[at] =
-            OpenRow { row, since: seen, opened, until: issued, may_close, closes, last: lines, joined: 0 };
+        self.rows[at] = OpenRow { row, since: seen, opened, until: issued, may_close, closes, joined: 0 };
     }
 }
 
@@ -485,15 +511,8 @@ mod tests {
     #[test]
     fn a_row_that_opens_again_is_disputed_if_its_lines_may_have_met() {
         let mut bank = Bank::new(Calendar::new(16, 1), 2);
-        let used = |row, issued| RowUse {
-            row,
-            seen: issued,
-            opened: issued,
-            issued,
-            may_close: issued,
-            lines: 0,
-            work: 1,
-        };
+        let used =
+            |row, issued| RowUse { row, seen: issued, opened: issued, issued, may_close: issued, work: 1 };
         [(7, 10), (8, 20), (9, 30)].into_iter().for_each(|(row, issued)| bank.note(used(row, issued), None));
         // Row 7 is not among the two remembered any more; row 6 never was open.
         for (row, came, disputed) in [(7, 59, 5), (7, 60, 5), (9, 60, 10), (6, 0, 10)] {
@@ -503,54 +522,54 @@ mod tests {
     }
 
     #[test]
-    fn a_line_joins_others_of_its_row_until_the_next_opens() {
-        let used = |row, [seen, opened, issued]: [Time; 3], lines| RowUse {
+    fn a_line_joins_others_of_its_row_until_it_closes() {
+        let used = |row, [seen, opened, issued]: [Time; 3]| RowUse {
             row,
             seen,
             opened,
             issued,
             may_close: issued,
-            lines,
             work: 1,
         };
         let mut bank = Bank::new(Calendar::new(16, 1), 4);
-        let joins =
-            |bank: &Bank, row, seen, lines| bank.joins(row, seen, lines, 4).map(|at| bank.rows[at].opened);
-        assert_eq!(joins(&bank, 7, 0, 0), None);
-        bank.note(used(7, [0, 4, 10], 1), None);
-        assert_eq!((joins(&bank, 7, 50, 9), joins(&bank, 8, 5, 1)), (Some(4), None));
-        bank.rows[0].closes = 12;
-        bank.note(used(8, [5, 16, 20], 2), None);
-        assert_eq!([11, 12].map(|seen| joins(&bank, 7, seen, 2)), [Some(4), None]);
-        bank.note(used(7, [9, 4, 30], 3), Some(1));
+        let joins = |bank: &Bank, row, seen| bank.joins(row, seen).map(|at| bank.rows[at].opened);
+        assert_eq!(joins(&bank, 7, 0), None);
+        bank.note(used(7, [0, 4, 10]), None);
+        assert_eq!((joins(&bank, 7, 50), joins(&bank, 8, 5)), (Some(4), None));
+        // The next row is requested at 5. That of 7 may close at 10, long before the next can open.
+        bank.rows[0].closes = 60;
+        bank.note(used(8, [5, 64, 70]), None);
+        assert_eq!([9, 10].map(|seen| joins(&bank, 7, seen)), [Some(4), None]);
+        bank.note(used(7, [9, 4, 30]), Some(1));
         let rows = |bank: &Bank| [0, 1, 2].map(|at: usize| (bank.rows[at].row, bank.rows[at].until));
-        assert_eq!(rows(&bank)[..2], [(8, 20), (7, 30)]);
-        // Four lines of other rows came in between.
-        bank.note(used(8, [18, 16, 60], 6), Some(0));
-        assert_eq!([6, 7].map(|lines| joins(&bank, 7, 9, lines)), [Some(4), None]);
+        assert_eq!(rows(&bank)[..2], [(8, 70), (7, 30)]);
+        assert_eq!([29, 30].map(|seen| joins(&bank, 7, seen)), [Some(4), None]);
         // A row that comes earlier in time, and later in the stream.
-        bank.note(used(9, [3, 12, 13], 7), None);
-        assert_eq!((rows(&bank), bank.rows[1].closes), ([(8, 60), (9, 13), (7, 30)], 16));
+        bank.note(used(9, [3, 12, 13]), None);
+        assert_eq!((rows(&bank), bank.rows[1].closes), ([(8, 70), (9, 13), (7, 30)], 64));
+    }
+
+    #[test]
+    fn lines_that_join_a_row_keep_those_of_the_next_in_the_queue() {
+        let mut channel = Channel::new(Calendar::new(16, 1), Vec::new(), Vec::new(), 4);
+        let line = |bank, row, issued| Waiting { seen: 0, issued, count: 1, bank, row };
+        let lines = [line(0, 7, 40), line(0, 8, 60), line(1, 8, 60), line(0, 9, 80)];
+        lines.into_iter().for_each(|line| channel.note(line));
+        channel.delay(0, 7, 30, 5);
+        let issued: Vec<_> = channel.recent.iter().map(|line| line.issued).collect();
+        assert_eq!((issued, channel.last_issued), (vec![40, 65, 60, 85], 85));
     }
 
     #[test]
     fn a_row_that_is_used_again_later_keeps_no_line_waiting() {
-        let used = |seen, lines| RowUse {
-            row: 7,
-            seen,
-            opened: 4,
-            issued: seen + 6,
-            may_close: seen + 6,
-            lines,
-            work: 1,
-        };
+        let used = |seen| RowUse { row: 7, seen, opened: 4, issued: seen + 6, may_close: seen + 6, work: 1 };
         let mut bank = Bank::new(Calendar::new(16, 1), 4);
-        bank.note(used(0, 1), None);
+        bank.note(used(0), None);
         // While lines of it wait, and then again.
-        for (seen, lines) in [(5, 2), (11, 3), (500, 4)] {
-            let joined = bank.joins(7, seen, lines, 4);
+        for seen in [5, 11, 500] {
+            let joined = bank.joins(7, seen);
             assert_eq!(joined, Some(0));
-            bank.note(used(seen, lines), joined);
+            bank.note(used(seen), joined);
         }
         let at = |seen| bank.rows[bank.place(seen)];
         assert_eq!(
