@@ -20,15 +20,11 @@
 
 use activity::{Counts, Event, LineAccess, LineKind, Packet, PacketCounts, Unit, Waits};
 
-use crate::address::AddressMap;
-use crate::chips::{ChipTimes, Refresh, TurnPolicy};
+use crate::chips::{AddressMap, ChipTimes, Refresh, TurnPolicy};
 use crate::clock::{Clocks, Time};
-use crate::data_unit::DataUnit;
-use crate::demand::{CLIENTS, DemandBuilder, ServiceDemand, Station, port};
-use crate::draws::{ByDraw, PassParts};
-use crate::passes::Passes;
-use crate::service::{UnitSpeeds, UnitWork, time_of};
-use crate::spec::MachineSpec;
+use crate::demand::{CLIENTS, DemandBuilder, ServiceDemand, Station, UnitSpeeds, UnitWork, port, time_of};
+use crate::draws::{ByDraw, PassParts, Passes};
+use crate::spec::{DataUnit, MachineSpec};
 use crate::{Clock, Recorder, Timed};
 
 /// Time of a frame from its totals.

@@ -1,4 +1,4 @@
-//! Time of the draws of a frame.
+//! Time of the draws and of the passes of a frame: when each pass began and ended, and how long its work takes every unit.
 //!
 //! Packets count in the order of the stream, as instructions do that commit in order (Gottschall, Eeckhout and Jahre 2021,
 //! time-proportional instruction profiling): each takes the time from the latest end before it to its own end. So a draw gets the
@@ -7,10 +7,11 @@
 
 use std::collections::VecDeque;
 
-use activity::Packet;
+use activity::{Packet, Unit};
 
 use crate::clock::{Clocks, Time};
-use crate::demand::ServiceDemand;
+use crate::demand::{ServiceDemand, UnitSpeeds, UnitWork};
+use crate::spec::MachineSpec;
 
 /// Something of each draw of a pass, and of all that is of no single draw.
 #[derive(Clone, Debug, Default)]
@@ -157,5 +158,83 @@ impl DrawTimes {
         };
         let is_whole = self.spans.len() <= self.most_spans;
         (self.passes, if is_whole { self.spans.iter().map(span).collect() } else { Vec::new() })
+    }
+}
+
+/// Time of a pass. Passes may overlap.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PassTime {
+    /// When its first packet starts.
+    pub begin_ps: u64,
+    /// When its last packet leaves, and no earlier than the end of the pass before. That of the last pass is
+    /// the length of the frame, so the times between ends add up to the frame.
+    pub end_ps: u64,
+    /// Time that its work takes each unit at its rates, all servers together. It is the same at all levels.
+    pub busy_ps: [u64; Unit::COUNT],
+    /// Time of each draw, by number: its part of the time from the end of the pass before to the end of this one. What is
+    /// missing is that of the resolve, the barrier and the last lines to memory.
+    pub draws_ps: Vec<u64>,
+}
+
+/// A pass, as far as known.
+#[derive(Clone, Copy, Debug)]
+struct Pass {
+    /// [`Time::MAX`] before its first packet.
+    begin: Time,
+    end: Time,
+    work: UnitWork,
+}
+
+impl Pass {
+    const NONE: Self = Self { begin: Time::MAX, end: 0, work: [0; Unit::COUNT] };
+}
+
+/// The passes of a frame, as far as known, by number.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Passes(Vec<Pass>);
+
+impl Passes {
+    /// Record that packets of `pass` are in the machine between two times.
+    pub fn note(&mut self, pass: u32, begin: Time, end: Time) {
+        let pass = self.reach(pass);
+        pass.begin = pass.begin.min(begin);
+        pass.end = pass.end.max(end);
+    }
+
+    /// Work of `pass` so far.
+    pub fn work(&mut self, pass: u32) -> &mut UnitWork {
+        &mut self.reach(pass).work
+    }
+
+    fn reach(&mut self, pass: u32) -> &mut Pass {
+        let pass = pass as usize;
+        if self.0.len() <= pass {
+            self.0.resize(pass + 1, Pass::NONE);
+        }
+        &mut self.0[pass]
+    }
+
+    /// Times of the passes of a frame that ends at `end_ps`, with their `parts`. A pass without packets takes none.
+    pub fn finish(
+        &self,
+        machine: &MachineSpec,
+        clocks: &Clocks,
+        end_ps: u64,
+        parts: &[PassParts],
+    ) -> Vec<PassTime> {
+        let speeds = UnitSpeeds::new(machine, clocks);
+        let mut ended_ps = 0;
+        let time = |(pass, number): (&Pass, usize)| {
+            let before_ps = ended_ps;
+            let last = number + 1 == self.0.len();
+            ended_ps = if last { end_ps } else { before_ps.max(clocks.ps(pass.end)) };
+            PassTime {
+                begin_ps: if pass.begin == Time::MAX { before_ps } else { clocks.ps(pass.begin) },
+                end_ps: ended_ps,
+                draws_ps: parts.get(number).map_or(Vec::new(), |parts| parts.scaled(ended_ps - before_ps)),
+                busy_ps: speeds.times(&pass.work).map(|time| clocks.ps(time)),
+            }
+        };
+        self.0.iter().zip(0..).map(time).collect()
     }
 }

@@ -29,18 +29,14 @@
 //! assert_eq!(busy, [500, 1000]);
 //! ```
 
-mod address;
 mod bound;
 mod chips;
 mod clock;
-mod data_unit;
 mod demand;
 mod draws;
 mod packet;
-mod passes;
 mod recorder;
 pub mod sampled;
-mod service;
 mod spec;
 pub mod stepped;
 pub mod streams;
@@ -53,12 +49,10 @@ use stepped::{Stalled, StepOptions, Stream};
 
 pub use bound::{BoundClock, Totals, bound};
 pub use clock::{Clocks, Time};
-pub use demand::{CLIENTS, DemandBuilder, ServiceDemand, Station};
-pub use draws::DrawSpan;
+pub use demand::{CLIENTS, CYCLE, DemandBuilder, ServiceDemand, Station, Work};
+pub use draws::{DrawSpan, PassTime};
 pub use packet::{MAX_CYCLES, PacketClock};
-pub use passes::PassTime;
 pub use recorder::{Reason, Recorder, Stalls, UnitTime};
-pub use service::{CYCLE, Work};
 pub use spec::{
     BinsSpec, Chips, ClientSpec, Clock, Common, Cycles, DramSpec, Entries, MachineSpec, Rates, RefreshSpec,
     RowBytes, ShaderSpec, SharedCacheSpec, UnitSpec, WaitCycles, Width,

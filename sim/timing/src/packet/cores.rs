@@ -7,11 +7,9 @@ use super::slots::{Occupancy, Slots, Turns, Wait};
 use super::station::{Service, aligned};
 use super::{Span, Visit};
 use crate::clock::{Clocks, Time};
-use crate::data_unit::DataUnit;
-use crate::demand::{DemandBuilder, ServiceDemand, Station, share};
+use crate::demand::{CYCLE, DemandBuilder, Server, ServiceDemand, Station, Work, share, time_of};
 use crate::draws::Left;
-use crate::service::{CYCLE, Server, Work, time_of};
-use crate::spec::MachineSpec;
+use crate::spec::{DataUnit, MachineSpec};
 
 /// Cycles per slot of the calendars.
 const SLOT_CYCLES: u32 = 64;

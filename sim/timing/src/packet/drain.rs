@@ -9,13 +9,11 @@
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, VecDeque};
 
-use crate::clock::{Clocks, Time};
-use crate::demand::{ServiceDemand, Station};
-use crate::draws::Left;
-use crate::service::time_of;
-use crate::spec::MachineSpec;
-
 use super::Span;
+use crate::clock::{Clocks, Time};
+use crate::demand::{ServiceDemand, Station, time_of};
+use crate::draws::Left;
+use crate::spec::MachineSpec;
 
 /// A packet of pixels or a group on the cores.
 #[derive(Clone, Copy, Debug)]

@@ -9,8 +9,7 @@ use activity::LineAccess;
 
 use super::Span;
 use super::calendar::{Calendar, Pauses, Turn};
-use crate::address::AddressMap;
-use crate::chips::{ChipTimes, TurnPolicy};
+use crate::chips::{AddressMap, ChipTimes, TurnPolicy};
 use crate::clock::{Clocks, Time};
 use crate::demand::CLIENTS;
 use crate::spec::MachineSpec;

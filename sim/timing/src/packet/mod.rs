@@ -47,11 +47,9 @@ use memory::Memory;
 use station::{Service, StationState};
 
 use crate::clock::{Clocks, Time};
-use crate::demand::{DemandBuilder, ServiceDemand, Station};
-use crate::draws::DrawTimes;
-use crate::passes::Passes;
+use crate::demand::{CYCLE, DemandBuilder, ServiceDemand, Station, Work};
+use crate::draws::{DrawTimes, Passes};
 use crate::recorder::part;
-use crate::service::{CYCLE, Work};
 use crate::spec::MachineSpec;
 use crate::stepped::Stream;
 use crate::{Clock, Recorder, Timed};

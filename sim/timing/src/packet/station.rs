@@ -4,8 +4,7 @@ use super::Visit;
 use super::calendar::QueueTimes;
 use super::memory::{Fetched, Memory};
 use crate::clock::{Clocks, Time};
-use crate::demand::{Station, port};
-use crate::service::{Server, Work};
+use crate::demand::{Server, Station, Work, port};
 use crate::spec::MachineSpec;
 
 /// First edge of a clock at or after `at`. Most times are edges already.

@@ -7,8 +7,7 @@
 use activity::{Event, LineAccess, Unit};
 
 use super::queue::{Meter, Waits};
-use crate::address::AddressMap;
-use crate::chips::ChipTimes;
+use crate::chips::{AddressMap, ChipTimes};
 use crate::clock::{Clocks, Time};
 use crate::recorder::Reason;
 use crate::spec::MachineSpec;

@@ -18,13 +18,10 @@ use self::queue::{Meter, Queue, Sources, Waits};
 use self::shader::{CoreEnv, Shader};
 use self::stage::{Stage, StageEnv};
 use crate::clock::{Clocks, Time};
-use crate::data_unit::DataUnit;
-use crate::demand::{DemandBuilder, ServiceDemand, Station, port};
-use crate::draws::DrawTimes;
-use crate::passes::Passes;
+use crate::demand::{CYCLE, DemandBuilder, ServiceDemand, Station, Work, port};
+use crate::draws::{DrawTimes, Passes};
 use crate::recorder::Reason;
-use crate::service::{CYCLE, Work};
-use crate::spec::{Common, MachineSpec};
+use crate::spec::{Common, DataUnit, MachineSpec};
 use crate::{Recorder, Timed};
 
 /// Deadlock: packets remain but no unit can act. This is an error of the model, never of the input.

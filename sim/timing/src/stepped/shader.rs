@@ -6,10 +6,9 @@ use activity::Unit;
 
 use super::queue::Queue;
 use crate::clock::{Clocks, Time};
-use crate::data_unit::{DATA_EVENTS, DataUnit};
 use crate::demand::{ServiceDemand, share};
 use crate::recorder::Reason;
-use crate::spec::MachineSpec;
+use crate::spec::{DATA_EVENTS, DataUnit, MachineSpec};
 
 /// A packet whose warps are on the cores.
 #[derive(Clone, Copy, Debug)]

@@ -8,8 +8,8 @@ use activity::{LineAccess, Unit};
 use super::levels::{NO_WAIT, Request};
 use super::queue::{Queue, Waits};
 use crate::clock::Time;
+use crate::demand::{CYCLE, Server, Work};
 use crate::recorder::Reason;
-use crate::service::{CYCLE, Server, Work};
 
 /// Interface of a stage to its surroundings.
 pub(super) trait StageEnv {
