@@ -1,11 +1,11 @@
-//! The git revision that the program is built from, in release builds within a clone; and what there is to test with: real scenes,
-//! Slurm, packages of Python.
+//! The git revision that the program is built from, in release builds within a clone; and what there is to
+//! test with: real scenes, Slurm, packages of Python.
 
 use std::path::Path;
 use std::process::Command;
 
-/// Sources of the program, from the root of the repository. A change of these builds the program anew anyway, so that asking git
-/// costs nothing more.
+/// Sources of the program, from the root of the repository. A change of these builds the program anew anyway,
+/// so that asking git costs nothing more.
 const SOURCES: [&str; 20] = [
     "Cargo.toml",
     "Cargo.lock",

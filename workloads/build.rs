@@ -1,4 +1,5 @@
-//! Whether there are real scenes, and public collision data beside them: tests on them count as ignored where there are none.
+//! Whether there are real scenes, and public collision data beside them: tests on them count as ignored where
+//! there are none.
 
 fn main() {
     println!("cargo:rerun-if-changed=build.rs");

@@ -23,8 +23,8 @@
 //! - [`conservative`]: the tiles that a triangle may touch, without samples,
 //! - [`frame`]: all stages in order.
 //!
-//! Beside it: [`tally`], numbers that count their operations; [`visibility`], the visible triangle of every sample as fast as
-//! the host can, without the model; [`simd`], its vectors.
+//! Beside it: [`tally`], numbers that count their operations; [`visibility`], the visible triangle of every
+//! sample as fast as the host can, without the model; [`simd`], its vectors.
 //!
 //! ```
 //! use glam::Vec3;

@@ -149,8 +149,9 @@ pub(crate) fn cross<N: Copy + Sub<Output = N> + Mul<Output = N>>(a: [N; 3], b: [
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-/// Whether a still triangle in front of the camera, seen through a pinhole and given by homogeneous points, shows a culled face. The
-/// sign of det[p0, p1, p2] is used only beyond its rounding error in the sample test.
+/// Whether a still triangle in front of the camera, seen through a pinhole and given by homogeneous points,
+/// shows a culled face. The sign of det[p0, p1, p2] is used only beyond its rounding error in the sample
+/// test.
 fn shows_culled_face(images: &[[f32; 3]; 3], faces: [bool; 2], slack: [f32; 2]) -> bool {
     let p = images.map(|image| image.map(f64::from));
     let det = determinant(p);
@@ -202,8 +203,8 @@ impl PixelRect {
         Self { x0: 0, y0: 0, x1: viewport.width(), y1: viewport.height() }
     }
 
-    /// Pixels with samples in a range of image coordinates x and y, in pixels from the centre of the image, and one more on each
-    /// side, as the position of a sample may be rounded up to the next pixel.
+    /// Pixels with samples in a range of image coordinates x and y, in pixels from the centre of the image,
+    /// and one more on each side, as the position of a sample may be rounded up to the next pixel.
     pub fn around(range: [[f32; 2]; 2], viewport: Viewport) -> Self {
         let sides = [viewport.width(), viewport.height()];
         let [x, y] = [0, 1].map(|axis| {

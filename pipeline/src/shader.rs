@@ -59,7 +59,8 @@ pub trait Shader: Sync {
         None
     }
 
-    /// Work on a vertex in world space besides moving it to the image plane, which the pipeline does with every vertex.
+    /// Work on a vertex in world space besides moving it to the image plane, which the pipeline does with
+    /// every vertex.
     fn vertex(&self, _lane: &Lane, _position: Vec3) {}
 
     /// Linear RGB radiance and opacity. `texel` is the filtered texel in linear RGBA, or white without a texture.
@@ -72,8 +73,8 @@ pub trait Shader: Sync {
         outputs
     }
 
-    /// Whether [`Lane::discard_below`] may be called. Then samples are shaded before they are stored; a shader without it
-    /// discards nothing.
+    /// Whether [`Lane::discard_below`] may be called. Then samples are shaded before they are stored; a
+    /// shader without it discards nothing.
     fn may_discard(&self) -> bool {
         false
     }
@@ -139,8 +140,8 @@ pub(crate) struct Lines {
 }
 
 impl Lines {
-    /// The lines as the texture cache sees them: those of fetches, then those of loads. The n-th loads of the lanes are one
-    /// access, which reads a line once.
+    /// The lines as the texture cache sees them: those of fetches, then those of loads. The n-th loads of the
+    /// lanes are one access, which reads a line once.
     pub fn accessed(mut self) -> impl Iterator<Item = u64> {
         self.loaded.sort_unstable();
         self.loaded.dedup();
@@ -148,9 +149,10 @@ impl Lines {
     }
 }
 
-/// A lane of a warp. It computes what a shader asks for and counts the operations: a multiply-add, or anything simpler, of
-/// one component is one operation; so are a comparison, a reciprocal and a square root, as in the shader cores of the GPU
-/// files. Constants and the choice between programs that is the same for a whole draw are free.
+/// A lane of a warp. It computes what a shader asks for and counts the operations: a multiply-add, or
+/// anything simpler, of one component is one operation; so are a comparison, a reciprocal and a square root,
+/// as in the shader cores of the GPU files. Constants and the choice between programs that is the same for a
+/// whole draw are free.
 #[derive(Debug, Default)]
 pub struct Lane<'a> {
     ops: Cell<u32>,
@@ -188,9 +190,9 @@ impl<'a> Lane<'a> {
         }
     }
 
-    /// Filtered texel at `uv` of the texture or surface bound to `slot`, in linear RGBA, at a level of detail (0 for the
-    /// finest; a surface that is bound by one level has no others). An unbound slot reads as zero. The texture unit does the
-    /// work: a fetch is no operation of the lane.
+    /// Filtered texel at `uv` of the texture or surface bound to `slot`, in linear RGBA, at a level of detail
+    /// (0 for the finest; a surface that is bound by one level has no others). An unbound slot reads as zero.
+    /// The texture unit does the work: a fetch is no operation of the lane.
     pub fn fetch(&self, slot: usize, uv: Vec2, lod: f32) -> Vec4 {
         let Some(bound) = self.bound.get(slot) else { return Vec4::ZERO };
         let (texel, fetches) = bound.fetch(uv, lod, |line| self.note(line));
@@ -198,17 +200,18 @@ impl<'a> Lane<'a> {
         texel
     }
 
-    /// Value of a sample of a pixel of what is bound to `slot`, as it is stored: one fetch of the texture unit. An unbound slot reads as
-    /// zero.
+    /// Value of a sample of a pixel of what is bound to `slot`, as it is stored: one fetch of the texture
+    /// unit. An unbound slot reads as zero.
     pub fn load_sample(&self, slot: usize, pixel: [i32; 2], sample: u32) -> Vec4 {
         let Some(bound) = self.bound.get(slot) else { return Vec4::ZERO };
         self.fetches.set(self.fetches.get() + 1);
         bound.load(pixel, sample, |line| self.note(line))
     }
 
-    /// The value at `index` of a buffer that the draw binds. It is an operation, as a load of a group is, and a fetch of the texture
-    /// unit, through whose cache it reads: the n-th loads of the lanes of a quad read each line once. A buffer that is not bound
-    /// reads as zero, and so does an index beyond it, which helper lanes may have; no line is read then.
+    /// The value at `index` of a buffer that the draw binds. It is an operation, as a load of a group is, and
+    /// a fetch of the texture unit, through whose cache it reads: the n-th loads of the lanes of a quad read
+    /// each line once. A buffer that is not bound reads as zero, and so does an index beyond it, which helper
+    /// lanes may have; no line is read then.
     pub fn load<T: Word>(&self, buffer: Buffer<T>, index: u32) -> T {
         self.count(1);
         self.fetches.set(self.fetches.get() + 1);
@@ -437,7 +440,8 @@ impl<'a> Lane<'a> {
         a.unit()
     }
 
-    /// `point` moved by `pose`: nine multiply-adds. Double precision stands for the fixed-point arithmetic of the hardware.
+    /// `point` moved by `pose`: nine multiply-adds. Double precision stands for the fixed-point arithmetic of
+    /// the hardware.
     #[inline(always)]
     pub(crate) fn transform_f64(&self, pose: &DAffine3, point: DVec3) -> DVec3 {
         self.count(9);
@@ -466,8 +470,8 @@ impl<'a> Lane<'a> {
         condition
     }
 
-    /// Discards the samples that this lane shades if `a < b`, and if the shader says that it [may](Shader::may_discard). A
-    /// test without a branch: the lane runs on.
+    /// Discards the samples that this lane shades if `a < b`, and if the shader says that it
+    /// [may](Shader::may_discard). A test without a branch: the lane runs on.
     #[inline(always)]
     pub fn discard_below(&self, a: f32, b: f32) {
         self.count(1);
@@ -485,7 +489,8 @@ pub(crate) struct Program {
 }
 
 impl Program {
-    /// Runs `shader` once, as in a pass with so many colour targets. Without branches its cost is the same for all points.
+    /// Runs `shader` once, as in a pass with so many colour targets. Without branches its cost is the same
+    /// for all points.
     pub fn of(shader: &dyn Shader, targets: usize) -> Self {
         let [pixel, vertex] = [Lane::default(), Lane::default()];
         if targets > 1 {

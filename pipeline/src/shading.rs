@@ -17,9 +17,9 @@ pub const REFERENCE_TIME: f32 = 0.5;
 /// Largest distance of a cell from the image centre, so that its coordinates fit every use.
 const MAX_CELL: f32 = 1e6;
 
-/// Places of the points with the given barycentric `weights`, in pixels from the top left of the image, and the lanes whose point
-/// is in front of the camera. `reference` has the vertices at the reference, `origin` the image coordinate of the first column and
-/// row. The place in other lanes is undefined.
+/// Places of the points with the given barycentric `weights`, in pixels from the top left of the image, and
+/// the lanes whose point is in front of the camera. `reference` has the vertices at the reference, `origin`
+/// the image coordinate of the first column and row. The place in other lanes is undefined.
 #[inline(always)]
 pub(crate) fn places<V: Lanes>(
     reference: &[[f32; 3]; 3],
@@ -32,7 +32,8 @@ pub(crate) fn places<V: Lanes>(
     (place, w.gt(V::splat(0.0)))
 }
 
-/// A coordinate of the points with the given weights. No closure, as that would be compiled for the baseline of the target.
+/// A coordinate of the points with the given weights. No closure, as that would be compiled for the baseline
+/// of the target.
 #[inline(always)]
 fn mixed<V: Lanes>(reference: &[[f32; 3]; 3], weights: &[V; 3], axis: usize) -> V {
     (weights[0] * V::splat(reference[0][axis]) + weights[1] * V::splat(reference[1][axis]))

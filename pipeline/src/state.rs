@@ -1,5 +1,5 @@
-//! State of a draw: which samples of its triangles are stored, and how. The rules are those of Direct3D 11 (Functional
-//! Specification 3.0, sections 17.11 to 17.13) for depth, stencil and blending.
+//! State of a draw: which samples of its triangles are stored, and how. The rules are those of Direct3D 11
+//! (Functional Specification 3.0, sections 17.11 to 17.13) for depth, stencil and blending.
 
 use glam::{BVec4A, Vec4};
 
@@ -283,9 +283,10 @@ pub struct DrawState {
     pub colour_mask: [bool; 4],
     /// State of the second to the last colour target; those without one have that of the first.
     pub others: [Option<ColourState>; MAX_TARGETS - 1],
-    /// Whether a pixel whose middle the triangle does not cover is shaded at the centroid of the samples that it covers, in place
-    /// of the middle, where attributes are beyond those of the vertices. It serves still triangles through a pinhole and without
-    /// clip planes across the shutter; others are shaded as without it.
+    /// Whether a pixel whose middle the triangle does not cover is shaded at the centroid of the samples that
+    /// it covers, in place of the middle, where attributes are beyond those of the vertices. It serves still
+    /// triangles through a pinhole and without clip planes across the shutter; others are shaded as without
+    /// it.
     pub centroid: bool,
 }
 

@@ -8,8 +8,8 @@ use std::cell::Cell;
 use std::cmp::Ordering;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-/// Count of multiply-adds, by the convention of the sample test: a product and the sum it goes into are one; a separate
-/// addition, multiplication, division or root is one. Signs, magnitudes and comparisons are free.
+/// Count of multiply-adds, by the convention of the sample test: a product and the sum it goes into are one;
+/// a separate addition, multiplication, division or root is one. Signs, magnitudes and comparisons are free.
 #[derive(Debug, Default)]
 pub struct Tally(Cell<u32>);
 
@@ -79,8 +79,8 @@ impl Branches for &Path {
     }
 }
 
-/// Kernels whose multiply-adds are counted by path. Their numbers have five bits each, so that no path through one is that
-/// through another.
+/// Kernels whose multiply-adds are counted by path. Their numbers have five bits each, so that no path
+/// through one is that through another.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub(crate) enum Kernel {
@@ -92,8 +92,8 @@ pub(crate) enum Kernel {
     Times,
 }
 
-/// Multiply-adds of the paths that were taken so far, each with its branches. By default none is remembered, and every
-/// run is counted.
+/// Multiply-adds of the paths that were taken so far, each with its branches. By default none is remembered,
+/// and every run is counted.
 #[derive(Debug, Default)]
 pub struct Costs(Box<[Cell<(u64, u32)>]>);
 
@@ -103,7 +103,8 @@ impl Costs {
         Self(vec![Cell::default(); 4096].into())
     }
 
-    /// Runs a kernel: `follow` on plain numbers, and `count` if the path is new. Returns the result with its multiply-adds.
+    /// Runs a kernel: `follow` on plain numbers, and `count` if the path is new. Returns the result with its
+    /// multiply-adds.
     #[inline(always)]
     pub(crate) fn run<T>(
         &self,

@@ -3,8 +3,8 @@
 //! - [`EnergyTable`]: energy per [`activity::Event`], with low, nominal and high value and a source in each
 //!   row.
 //! - [`Platform`]: voltages, constant power, leakage, clock trees and idle power.
-//! - [`Structure`]: memories and logic of a GPU, and what they cost in area, energy and leakage beside those of the GPU that a platform
-//!   was made for ([`Scaling`]).
+//! - [`Structure`]: memories and logic of a GPU, and what they cost in area, energy and leakage beside those
+//!   of the GPU that a platform was made for ([`Scaling`]).
 //! - [`Part`] and [`Energy`]: energy by part. The sum over parts is the exact energy of a frame.
 //! - [`PowerModel`]: converts an [`activity::Timeline`] to a [`FramePower`].
 //! - [`pace`]: puts frames one after another, under V-sync or free-running, into one power curve.
@@ -187,7 +187,8 @@ pub enum ModelError {
     },
     /// The leakage at the platform's voltage and temperature exceeds any power supply.
     #[error(
-        "platform `{platform}` leaks {leakage_w:.3e} W at its voltage and temperature, more than {most_w} W: check          leakage.doubling_c, leakage.voltage_exponent and v0_v"
+        "platform `{platform}` leaks {leakage_w:.3e} W at its voltage and temperature, more than {most_w} W: check leakage.doubling_c, \
+         leakage.voltage_exponent and v0_v"
     )]
     Leakage {
         /// Platform.

@@ -1,4 +1,5 @@
-//! Parts that draw power and energy by part, and the conversion of activity over time to the power of a frame over time.
+//! Parts that draw power and energy by part, and the conversion of activity over time to the power of a frame
+//! over time.
 
 use std::ops::{AddAssign, Index, IndexMut};
 

@@ -1,4 +1,5 @@
-//! Quantities with a unit and a range in their type, values with a mandatory source, and which end of intervals is taken.
+//! Quantities with a unit and a range in their type, values with a mandatory source, and which end of
+//! intervals is taken.
 
 use serde::{Deserialize, Serialize};
 

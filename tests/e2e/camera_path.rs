@@ -1,5 +1,5 @@
-//! A camera that moves past a still scene: every frame is drawn, at every level of timing and in every workload that takes a
-//! scene; and a frame is the same whether it is run alone or among others.
+//! A camera that moves past a still scene: every frame is drawn, at every level of timing and in every
+//! workload that takes a scene; and a frame is the same whether it is run alone or among others.
 
 use std::collections::BTreeSet;
 

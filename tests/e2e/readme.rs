@@ -87,7 +87,8 @@ fn every_trace_format_is_in_the_book() {
     }
 }
 
-/// Files and folders in back quotes of `ARCHITECTURE.md` and `CONTRIBUTING.md` that begin with a folder of the repository.
+/// Files and folders in back quotes of `ARCHITECTURE.md` and `CONTRIBUTING.md` that begin with a folder of
+/// the repository.
 #[test]
 fn quoted_paths_exist() {
     for page in ["ARCHITECTURE.md", "CONTRIBUTING.md"] {

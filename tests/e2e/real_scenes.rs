@@ -131,8 +131,8 @@ fn a_shutter_that_is_open_blurs_the_fox() {
     assert!(blurred < 0.9 * sharp, "contrast of {blurred} with, {sharp} without blur");
 }
 
-/// Frames of enough samples, V-synced, are found, each one, and cost what the simulator says. What is enough is what the
-/// warning says; frames a little above it count as well.
+/// Frames of enough samples, V-synced, are found, each one, and cost what the simulator says. What is enough
+/// is what the warning says; frames a little above it count as well.
 #[test]
 #[cfg_attr(not(real_scenes), ignore = "QUINTILE_SCENES is not set")]
 fn every_frame_of_the_fox_is_found_where_frames_are_long_enough() {

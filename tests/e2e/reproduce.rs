@@ -44,7 +44,8 @@ fn sha256(text: &str) -> String {
     Sha256::digest(text).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// One row of Paper VI or III, computed with the committed settings after `changes`, each of which has to change something.
+/// One row of Paper VI or III, computed with the committed settings after `changes`, each of which has to
+/// change something.
 fn planted(id: &str, changes: &[(&str, &str)]) -> (Ended, Value) {
     let (paper, number) = if id.starts_with("VI") { ("VI", 6) } else { ("III", 3) };
     let text = changes.iter().fold(committed(number), |text, (from, to)| {
@@ -116,7 +117,8 @@ fn rows_are_whole(json: &Value, (ids, number): (&[&str], u32), folder: &Path) {
     }
 }
 
-/// A verdict of the quick form is never a bare one: it says at how many of the settings of the full form it was reached.
+/// A verdict of the quick form is never a bare one: it says at how many of the settings of the full form it
+/// was reached.
 fn quick_verdict_says_so(row: &Value) {
     assert_eq!(row["form"], "quick");
     let [verdict, text] = ["verdict", "verdict_text"].map(|field| row[field].as_str().unwrap_or_default());
@@ -365,7 +367,8 @@ fn planted_hardware_that_culls_nothing_fails() {
     assert!(ended.stderr.contains("ran nothing: VI-16"), "{}", ended.stderr);
 }
 
-/// Waves that no bounding volume could follow, a query that has to be a million times cheaper: settings are what is computed with.
+/// Waves that no bounding volume could follow, a query that has to be a million times cheaper: settings are
+/// what is computed with.
 #[test]
 fn planted_conditions_flip_rows() {
     let (_, cheap) = planted("VI-5", &[("far_fewer: Ours(value: 2.0", "far_fewer: Ours(value: 1e6")]);

@@ -120,7 +120,8 @@ fn workloads() -> impl Iterator<Item = &'static str> {
     workloads::catalog::names().map(|(name, _)| name)
 }
 
-/// The expected error of a workload is within the requested accuracy, or it warns; and so is the actual one of every frame.
+/// The expected error of a workload is within the requested accuracy, or it warns; and so is the actual one
+/// of every frame.
 #[test]
 fn workloads_meet_the_requested_accuracy() {
     for name in workloads() {
@@ -145,7 +146,8 @@ fn packet_is_near_stepped_for_workloads() {
     }
 }
 
-/// Frames of workloads are predicted as those of scenes are. Simulated ones are those of `packet`, and the total is near.
+/// Frames of workloads are predicted as those of scenes are. Simulated ones are those of `packet`, and the
+/// total is near.
 #[test]
 fn frames_of_workloads_are_predicted() {
     for name in workloads() {

@@ -236,7 +236,8 @@ fn a_crash_reports_its_place_and_a_command_to_repeat_it() {
     }
 }
 
-/// Draws and what is of no single draw are the pass: time, energy and counts at every level, busy time where stalls are recorded.
+/// Draws and what is of no single draw are the pass: time, energy and counts at every level, busy time where
+/// stalls are recorded.
 #[test]
 fn the_draws_of_a_pass_add_up_to_it() {
     for level in ["stepped", "packet", "bound"] {

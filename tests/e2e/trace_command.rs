@@ -19,7 +19,8 @@ fn json(folder: &Path, args: &[&str]) -> Value {
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
-/// 40 frames of 10 ms at 5 kHz from 0.1 s on: 4 ms at 20 W falling to 12 W, then 2 W; 12 V. One frame has a disturbance.
+/// 40 frames of 10 ms at 5 kHz from 0.1 s on: 4 ms at 20 W falling to 12 W, then 2 W; 12 V. One frame has a
+/// disturbance.
 fn write_trace(folder: &Path) {
     let mut text = String::from("Time(s),Main Voltage(V),Main(mA)\n");
     for i in 0..2600_u32 {

@@ -77,8 +77,8 @@ const REFUSED: [(&str, &str); 68] = [
     ("yardstick", "reference"),
 ];
 
-/// Files that may hold them: this list, the changelog, which names fields that were renamed, and settings of papers, which do not
-/// change after their first number.
+/// Files that may hold them: this list, the changelog, which names fields that were renamed, and settings of
+/// papers, which do not change after their first number.
 const EXEMPT: [&str; 3] = ["tests/e2e/words.rs", "CHANGELOG.md", "sim/experiments/papers"];
 
 /// Endings of files that are read.
@@ -101,7 +101,8 @@ pub(super) fn files_with(endings: &[&str], folder: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// Whether `line`, in small letters and with spaces in the place of `_`, holds `phrase` between characters that are not part of a word.
+/// Whether `line`, in small letters and with spaces in the place of `_`, holds `phrase` between characters
+/// that are not part of a word.
 fn holds(line: &str, phrase: &str) -> bool {
     let inside = |c: Option<char>| c.is_some_and(char::is_alphanumeric);
     line.match_indices(phrase).any(|(at, _)| {

@@ -1,5 +1,5 @@
-//! Times the analysis from file to table: `cargo bench -p traces --bench frames [-- SAMPLES]`, ten million by default;
-//! `-- FILE MARK_S` times that of a file.
+//! Times the analysis from file to table: `cargo bench -p traces --bench frames [-- SAMPLES]`, ten million by
+//! default; `-- FILE MARK_S` times that of a file.
 
 use std::error::Error;
 use std::path::Path;

@@ -1,5 +1,6 @@
-//! Times writing and reading of JLS: `cargo bench -p traces --bench jls_speed [-- SAMPLES FILE]`, ten million samples in
-//! a temporary file by default; prints million samples/s of both. With `--write` the file is written, and kept.
+//! Times writing and reading of JLS: `cargo bench -p traces --bench jls_speed [-- SAMPLES FILE]`, ten million
+//! samples in a temporary file by default; prints million samples/s of both. With `--write` the file is
+//! written, and kept.
 
 use std::error::Error;
 use std::path::PathBuf;

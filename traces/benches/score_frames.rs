@@ -1,11 +1,12 @@
-//! Scores the frame finder on directories of cases with known frames:
-//! `cargo bench -p traces --bench score_frames -- [--method M] [--cases A,B] [--several] [--json FILE] DIR...`, with absolute
-//! paths, as it runs in the folder of the package.
+//! Scores the frame finder on directories of cases with known frames: `cargo bench -p traces --bench
+//! score_frames -- [--method M] [--cases A,B] [--several] [--json FILE] DIR...`, with absolute paths, as it
+//! runs in the folder of the package.
 //!
-//! A case is `NAME.parquet` (or `.csv`), `NAME.json` (`mark_s`, `other_marks_s`, `window_pre_s`, `window_post_s`) and
-//! `NAME.truth.csv` (`start_s`, `energy_J`), as `traces/tests/peers/cases.py` makes them with an independent generator, which
-//! is not part of the repository. One line a case: F1 within 0.5 ms (median over the marks, worst mark), the mean energy error of frames whose two ends were found
-//! beside that of the true starts (the noise floor), and how many of the wrong frames are flagged.
+//! A case is `NAME.parquet` (or `.csv`), `NAME.json` (`mark_s`, `other_marks_s`, `window_pre_s`,
+//! `window_post_s`) and `NAME.truth.csv` (`start_s`, `energy_J`), as `traces/tests/peers/cases.py` makes them
+//! with an independent generator, which is not part of the repository. One line a case: F1 within 0.5 ms
+//! (median over the marks, worst mark), the mean energy error of frames whose two ends were found beside that
+//! of the true starts (the noise floor), and how many of the wrong frames are flagged.
 
 #[path = "score_frames/case.rs"]
 mod case;

@@ -1,6 +1,8 @@
-//! What each step of the finder is worth: all of it, and with one step left out, on the eight scenes and on the devices of other structure.
+//! What each step of the finder is worth: all of it, and with one step left out, on the eight scenes and on
+//! the devices of other structure.
 //!
-//! `ablation FIRST_SEED LAST_SEED`: mean F1 with the first mark, median energy error, and how many wrong and right frames carry a flag.
+//! `ablation FIRST_SEED LAST_SEED`: mean F1 with the first mark, median energy error, and how many wrong and
+//! right frames carry a flag.
 
 use std::error::Error;
 use traces::Trace;

@@ -1,9 +1,9 @@
-//! The finder on the [`WITNESSES`]: how well it finds, and how far its confidence is a probability. Also whether a map would make it one:
-//! fits a logistic map (Platt 1999) of confidence, of how far methods agree and of how even gaps are, on all kinds of devices but one,
-//! and judges it on that one.
+//! The finder on the [`WITNESSES`]: how well it finds, and how far its confidence is a probability. Also
+//! whether a map would make it one: fits a logistic map (Platt 1999) of confidence, of how far methods agree
+//! and of how even gaps are, on all kinds of devices but one, and judges it on that one.
 //!
-//! `calibrate_confidence FIRST_SEED LAST_SEED [METHOD|STEP]`: METHOD in place of `auto`, or `auto` without STEP, one of
-//! `traces::frames::Step`.
+//! `calibrate_confidence FIRST_SEED LAST_SEED [METHOD|STEP]`: METHOD in place of `auto`, or `auto` without
+//! STEP, one of `traces::frames::Step`.
 
 use std::error::Error;
 use std::process::ExitCode;
@@ -17,7 +17,8 @@ const FRAMES: usize = 200;
 /// Places of the marks, as shares of the frames, and their errors, s.
 const MARKED: [f64; 5] = [0.4, 0.1, 0.25, 0.6, 0.85];
 const HAND_S: [f64; 5] = [0.05e-3, -0.1e-3, 0.1e-3, 0.0, -0.05e-3];
-/// A constant, the confidence and its logit, the share of frames that squares and normalized find as well, and the share of even gaps.
+/// A constant, the confidence and its logit, the share of frames that squares and normalized find as well,
+/// and the share of even gaps.
 const FEATURES: usize = 6;
 /// Bins of confidence.
 const BINS: usize = 10;

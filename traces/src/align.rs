@@ -16,15 +16,15 @@ use warnings::{Code, Warning};
 const MIN_PAIRS: usize = 4;
 /// A fit is ambiguous if the second best leaves at most this many times the residual of the best.
 const MAX_RIVAL_RATIO: f64 = 2.0;
-/// A fit is ambiguous if chance alone leaves as little in more than this many other places: one in a hundred times, a fit by chance
-/// is not known as such.
+/// A fit is ambiguous if chance alone leaves as little in more than this many other places: one in a hundred
+/// times, a fit by chance is not known as such.
 const MAX_CHANCE_FITS: f64 = 0.01;
 
 /// Largest residual of a fit, as a share of the median gap of the starts.
 const MAX_RESIDUAL_SHARE: f64 = 0.1;
 
-/// Largest deviation of the clock of the stamps from that of the trace by anchors, as a share. The crystals of computers deviate
-/// by less than 1e-4; more than this is another unit or another recording.
+/// Largest deviation of the clock of the stamps from that of the trace by anchors, as a share. The crystals
+/// of computers deviate by less than 1e-4; more than this is another unit or another recording.
 const MAX_CLOCK_DEVIATION: f64 = 0.02;
 
 /// Residuals below this are rounding, s.
@@ -101,8 +101,8 @@ impl Alignment {
         Ok(Self { scale, offset_s: a.1 - scale * a.0, residual_s: 0.0, pairs: 2, ambiguous: false })
     }
 
-    /// Warnings about anchors (stamp, time) that are likely wrong: stamps in another unit, or of another recording. The stamps
-    /// are sorted, s.
+    /// Warnings about anchors (stamp, time) that are likely wrong: stamps in another unit, or of another
+    /// recording. The stamps are sorted, s.
     pub fn warnings(&self, anchors: [(f64, f64); 2], stamps_s: &[f64]) -> Vec<Warning> {
         let mut messages = Vec::new();
         if (self.scale - 1.0).abs() > MAX_CLOCK_DEVIATION {
@@ -119,11 +119,12 @@ impl Alignment {
     }
 
     /// The pairing of stamps with starts of the least residual: one after another from some shift on or, if
-    /// that does not fit, with gaps in either. Both sorted, s. Starts are known to `resolution_s` rms: residuals below that say nothing.
+    /// that does not fit, with gaps in either. Both sorted, s. Starts are known to `resolution_s` rms:
+    /// residuals below that say nothing.
     ///
     /// # Errors
-    /// [`AlignError::Few`] for fewer than four of either, [`AlignError::Equal`] for stamps of which too many are the same,
-    /// [`AlignError::Unlike`] where nothing fits.
+    /// [`AlignError::Few`] for fewer than four of either, [`AlignError::Equal`] for stamps of which too many
+    /// are the same, [`AlignError::Unlike`] where nothing fits.
     pub fn by_fit(stamps_s: &[f64], starts_s: &[f64], resolution_s: f64) -> Result<Self, AlignError> {
         let in_step = Self::in_step(stamps_s, starts_s, resolution_s.max(EXACT_S))?;
         let gap_s = usual_gap(starts_s).unwrap_or(0.0);
@@ -164,11 +165,13 @@ impl Alignment {
     }
 }
 
-/// In how many other places chance leaves as little as in the best, at most, where the places are no better than each other: with
-/// few pairs one of many residuals is small. `fits` are in order of their residuals, of which those below `least_s` say nothing.
+/// In how many other places chance leaves as little as in the best, at most, where the places are no better
+/// than each other: with few pairs one of many residuals is small. `fits` are in order of their residuals, of
+/// which those below `least_s` say nothing.
 ///
-/// `n` pairs leave `n - 2` degrees of freedom `k`; chi-square is at most a share `x` of `k` with a probability of at most
-/// `(x e^(1 - x))^(k / 2)` (Chernoff 1952). The median of the residuals stands for the usual one.
+/// `n` pairs leave `n - 2` degrees of freedom `k`; chi-square is at most a share `x` of `k` with a
+/// probability of at most `(x e^(1 - x))^(k / 2)` (Chernoff 1952). The median of the residuals stands for the
+/// usual one.
 fn chance_fits(fits: &[Alignment], least_s: f64) -> f64 {
     let Some((best, others)) = fits.split_first().filter(|(_, others)| !others.is_empty()) else {
         return 0.0;

@@ -4,12 +4,13 @@
 //! No simulator is needed. A recording of voltage and current, one marked frame start and the end of the last
 //! frame are enough:
 //!
-//! 1. [`io`] reads a [`Trace`] from a file and writes it, in any of the [formats](io::FORMATS); the crate [`jls`] can be used
-//!    alone;
-//! 2. [`frames`] finds every frame that begins like the marked one, with the confidence of each start, and warns of results
-//!    that may be wrong; [`stream`] does so for files that do not fit into memory, and [`search`] chooses between the two;
-//! 3. [`energy`] integrates from start to start by one rule, so that the frames add up to the whole, and evaluates runs,
-//!    passes, idle power, warm-up and outliers;
+//! 1. [`io`] reads a [`Trace`] from a file and writes it, in any of the [formats](io::FORMATS); the crate
+//!    [`jls`] can be used alone;
+//! 2. [`frames`] finds every frame that begins like the marked one, with the confidence of each start, and
+//!    warns of results that may be wrong; [`stream`] does so for files that do not fit into memory, and
+//!    [`search`] chooses between the two;
+//! 3. [`energy`] integrates from start to start by one rule, so that the frames add up to the whole, and
+//!    evaluates runs, passes, idle power, warm-up and outliers;
 //! 4. [`pareto`] compares settings by time and energy, [`align`] puts time stamps of another clock onto a trace, and
 //!    [`energy::score`] compares found frames with the ground truth.
 //!

@@ -23,8 +23,8 @@ pub struct Search {
     pub starts_s: Vec<f64>,
     /// Whether to [propose](propose()) a start instead.
     pub propose: bool,
-    /// The window around a mark; by default the usual one, no longer than the time after which power repeats. Files that are read in
-    /// pieces have the usual one.
+    /// The window around a mark; by default the usual one, no longer than the time after which power repeats.
+    /// Files that are read in pieces have the usual one.
     pub window: Option<Window>,
     /// Where the last frame ends, s; by default the end mark of the metadata, or the end of the trace.
     pub end_s: Option<f64>,

@@ -1,5 +1,5 @@
-//! Medians, means, spreads, exact running sums, starts paired one to one, and random numbers as a pure function of (seed, stream,
-//! counter): any order, any thread, the same numbers.
+//! Medians, means, spreads, exact running sums, starts paired one to one, and random numbers as a pure
+//! function of (seed, stream, counter): any order, any thread, the same numbers.
 //!
 //! There are two medians: `median` is what reports print; `upper_median` takes an actual value, as the
 //! frame finder and the time base need.
@@ -230,7 +230,8 @@ impl Random {
         low + (high - low) * self.uniform(counter)
     }
 
-    /// Two independent normal numbers of mean 0 and variance 1 (Box and Muller 1958), from the even ones `2 n` and `2 n + 1`.
+    /// Two independent normal numbers of mean 0 and variance 1 (Box and Muller 1958), from the even ones `2
+    /// n` and `2 n + 1`.
     pub fn normals(self, n: u64) -> (f64, f64) {
         let counter = n.wrapping_mul(2);
         let radius = libm::sqrt(-2.0 * libm::log(self.uniform(counter)));

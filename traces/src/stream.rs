@@ -1,7 +1,7 @@
 //! Frames of a file of any length: one pass, in pieces, on all threads.
 //!
-//! The method is that of [`frames`](crate::frames) by the sum of squares or the normalized distance, to the bit: a trace in memory is
-//! searched in the same way.
+//! The method is that of [`frames`](crate::frames) by the sum of squares or the normalized distance, to the
+//! bit: a trace in memory is searched in the same way.
 
 use crate::energy::FrameEnergy;
 use crate::frames::{
@@ -33,8 +33,8 @@ pub struct Streamed {
     pub metadata: Metadata,
 }
 
-/// Finds frames by the sum of squares, or by [`FinderMethod::Normalized`], and takes their energies. An infinite `marks.end_s` stands
-/// for the end of the file.
+/// Finds frames by the sum of squares, or by [`FinderMethod::Normalized`], and takes their energies. An
+/// infinite `marks.end_s` stands for the end of the file.
 ///
 /// # Errors
 /// [`StreamError`] if the file cannot be read, its samples are not even or finite, or the marks are not in it.

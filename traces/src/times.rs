@@ -1,5 +1,5 @@
-//! Files of times: marks of frames, or stamps of another clock; and the time base of a file of samples, before all of them have been
-//! read.
+//! Files of times: marks of frames, or stamps of another clock; and the time base of a file of samples,
+//! before all of them have been read.
 
 use crate::io::{ReadError, ReadOptions, RowBatch, Rows, Stamps, all_apart, grid, rate_to_last_row_hz};
 use crate::units::{Quantity, TIME_WORDS, UnitError, scale};

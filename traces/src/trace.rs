@@ -172,7 +172,8 @@ impl Trace {
         f64::from(self.voltage_v[index]) * f64::from(self.current_a[index])
     }
 
-    /// Left edge (s) and power (W) of the samples from the one that `from_s` lies in to before the one that `to_s` lies in.
+    /// Left edge (s) and power (W) of the samples from the one that `from_s` lies in to before the one that
+    /// `to_s` lies in.
     pub fn powers_between(&self, from_s: f64, to_s: f64) -> impl ExactSizeIterator<Item = (f64, f64)> + '_ {
         let place = |time_s: f64| self.position(time_s).clamp(0.0, self.samples() as f64) as usize;
         (place(from_s)..place(to_s)).map(|index| (self.time_s(index), self.power_w(index)))

@@ -157,8 +157,8 @@ pub(crate) fn jls_unit(text: &str) -> Option<f64> {
     units(JLS).find(|unit| unit.name.eq_ignore_ascii_case(&name)).map(|unit| unit.scale)
 }
 
-/// The value of an argument in s, V, A, W, Hz or ohm: a finite number with a unit of the quantity behind it, or in the
-/// unit `bare` if there is none.
+/// The value of an argument in s, V, A, W, Hz or ohm: a finite number with a unit of the quantity behind it,
+/// or in the unit `bare` if there is none.
 ///
 /// ```
 /// use traces::units::{Quantity, parse};

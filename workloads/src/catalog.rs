@@ -106,7 +106,8 @@ pub fn find(
     Some(job.flags.check(name, request.overrides).and_then(|()| (job.make)(options, request)))
 }
 
-/// Makes the job of a name: a workload, or the rendering of the scene of that name or path. Returns the name in results, too.
+/// Makes the job of a name: a workload, or the rendering of the scene of that name or path. Returns the name
+/// in results, too.
 ///
 /// # Errors
 /// As [`find`] and [`crate::load`]; [`LoadError::Option`] for options of a scene.
@@ -134,8 +135,8 @@ pub fn load(
     Ok((scene.name().to_owned(), Box::new(Rendering::new(scene, request)?)))
 }
 
-/// The job that [`load`] made of a name, with less work for each frame. A workload is made again, with the size by `--size` or by
-/// the option that stands for it.
+/// The job that [`load`] made of a name, with less work for each frame. A workload is made again, with the
+/// size by `--size` or by the option that stands for it.
 ///
 /// # Errors
 /// As [`find`]; [`LoadError::Setting`] if the size cannot be changed.

@@ -96,8 +96,8 @@ fn remedy(error: &io::Error) -> &'static str {
 }
 
 impl LoadError {
-    /// Whether the caller made a mistake: an unknown scene or format, an invalid setting or RON scene. Others are files that are
-    /// missing, unreadable, truncated, corrupt or not supported.
+    /// Whether the caller made a mistake: an unknown scene or format, an invalid setting or RON scene. Others
+    /// are files that are missing, unreadable, truncated, corrupt or not supported.
     pub fn is_usage(&self) -> bool {
         match self {
             Self::Unknown { .. }

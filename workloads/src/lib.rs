@@ -15,7 +15,8 @@
 //! - [`collision`] finds the pairs of moving objects that may collide.
 //! - [`occlusion`] finds objects that are hidden at all times and from all of the lens.
 //! - [`deferred`] draws a G-buffer and lights it, beside forward rendering with the same lights.
-//! - [`Material`] is the look of a surface, [`material::SurfaceShader`] its cost; [`material::Lighting`] is its light.
+//! - [`Material`] is the look of a surface, [`material::SurfaceShader`] its cost; [`material::Lighting`] is
+//!   its light.
 //!
 //! ```
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {

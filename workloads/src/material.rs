@@ -1,7 +1,7 @@
 //! Materials, and the surface shader: what light meets at a point, under the light of the scene.
 //!
-//! Lights are the lamp and the sky of a scene, and point lights of finite range. Surfaces are diffuse (Lambert 1760), with a highlight
-//! (Blinn, Models of light reflection, SIGGRAPH 1977).
+//! Lights are the lamp and the sky of a scene, and point lights of finite range. Surfaces are diffuse
+//! (Lambert 1760), with a highlight (Blinn, Models of light reflection, SIGGRAPH 1977).
 
 use std::sync::Arc;
 
@@ -86,8 +86,9 @@ impl Material {
 
 /// Colours a material under a scene's light.
 ///
-/// The base colour is `texel * base * vertex colour`, the light that of [`Lighting::radiance`]. The vertex colour is left out unless
-/// [`SurfaceShader::with_vertex_colors`] asks for it. Opacity is computed for materials that are not opaque.
+/// The base colour is `texel * base * vertex colour`, the light that of [`Lighting::radiance`]. The vertex
+/// colour is left out unless [`SurfaceShader::with_vertex_colors`] asks for it. Opacity is computed for
+/// materials that are not opaque.
 #[derive(Clone, Debug)]
 pub struct SurfaceShader {
     base_color: Vec3,
@@ -244,8 +245,8 @@ impl Lighting {
         }
     }
 
-    /// Linear RGB radiance of a point: `base (lamp max(0, n.l) + mix(ground, sky, n.y)) + gloss lamp max(0, n.h)^32`, with the half
-    /// vector `h`.
+    /// Linear RGB radiance of a point: `base (lamp max(0, n.l) + mix(ground, sky, n.y)) + gloss lamp max(0,
+    /// n.h)^32`, with the half vector `h`.
     pub fn radiance(&self, lane: &Lane, at: &LitPoint) -> Vec3 {
         let [facing, glint] = at.lobes(lane, self.toward);
         let up = lane.madd(0.5, at.normal.y, 0.5);

@@ -1,4 +1,5 @@
-//! The job of a scene: every frame is one rendering. Its sample tables, by name or file, and the files of sample tables and of results.
+//! The job of a scene: every frame is one rendering. Its sample tables, by name or file, and the files of
+//! sample tables and of results.
 
 use std::io::{self, Write};
 use std::path::Path;
@@ -27,8 +28,8 @@ pub struct Rendering {
 }
 
 impl Rendering {
-    /// Renderings of `scene` with the changes of `request`. A sample table in a file sets the samples per pixel, unless
-    /// the request does.
+    /// Renderings of `scene` with the changes of `request`. A sample table in a file sets the samples per
+    /// pixel, unless the request does.
     ///
     /// # Errors
     /// [`LoadError`] if a setting or the sample table is invalid.
@@ -169,8 +170,8 @@ impl SampleChoice {
     }
 }
 
-/// Warns if the samples of a pixel do not spread over a dimension that is drawn: time, or the lens. One sample has no spread
-/// and is left out.
+/// Warns if the samples of a pixel do not spread over a dimension that is drawn: time, or the lens. One
+/// sample has no spread and is left out.
 pub(crate) fn blur_warning(samples: &dyn SampleSource, moving: bool, lens: bool) -> Option<Warning> {
     let mut pixel = vec![Sample::default(); samples.per_pixel() as usize];
     samples.pixel_into(0, 0, &mut pixel);

@@ -1,5 +1,5 @@
-//! Integer counters, one per event, and how they run over time. Work packets, the unit of work in the timing models, with their
-//! counts and the memory lines that they request.
+//! Integer counters, one per event, and how they run over time. Work packets, the unit of work in the timing
+//! models, with their counts and the memory lines that they request.
 
 use std::collections::BTreeMap;
 use std::ops::{AddAssign, Index, IndexMut};
@@ -22,8 +22,8 @@ pub enum PacketKind {
     Resolve,
     /// A group of lanes that share memory and barriers.
     Compute,
-    /// A barrier between passes: all earlier work ends, written lines move to the L2 and textures are read anew. Later packets
-    /// of these kinds wait for it.
+    /// A barrier between passes: all earlier work ends, written lines move to the L2 and textures are read
+    /// anew. Later packets of these kinds wait for it.
     Barrier(Waits),
 }
 
@@ -91,8 +91,8 @@ pub struct Packet {
     pub kind: PacketKind,
     /// Pass number in the frame, from 0.
     pub pass: u32,
-    /// Batch of triangles in the pass, from 0. Tiles wait for the vertices of their batch, vertices for the tiles of the batch
-    /// before the last.
+    /// Batch of triangles in the pass, from 0. Tiles wait for the vertices of their batch, vertices for the
+    /// tiles of the batch before the last.
     pub batch: u32,
     /// Draw number in the pass; [`Self::NONE`] for work of no single draw.
     pub draw: u32,

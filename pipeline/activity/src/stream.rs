@@ -1,21 +1,23 @@
 //! Packets of a frame in few bytes, to be timed again on other machines.
 //!
-//! Most packets resemble the one before: the same events, the next triangle, a line beside the last. So numbers are stored as
-//! differences in variable-length integers (LEB128 of DWARF, zigzag for signs), and sets of events by their place in a list.
+//! Most packets resemble the one before: the same events, the next triangle, a line beside the last. So
+//! numbers are stored as differences in variable-length integers (LEB128 of DWARF, zigzag for signs), and
+//! sets of events by their place in a list.
 
 use crate::{Event, LEVELS, LevelRequests, LineAccess, LineKind, Packet, PacketKind, Unit, Waits};
 
 /// Packets with their lines, in order. The bytes of each are
 ///
-/// - a byte (bits 0 to 2: draw, vertices, tile, resolve, compute, barrier for tiles, barrier for all; bit 3: it moves to another
-///   pass, batch or draw; bit 4: it has lines), then differences to the packet before as zigzag LEB128: if it moves, pass, batch
-///   and draw; tile; triangle;
-/// - a byte with the place of its set of events among the sets so far, or 255 and a new set of 128 bits; a count for each event,
-///   in LEB128;
-/// - the number of lines. A line is a byte (bits 0 to 3: client; bits 4 to 6: hit, below, fetch, write, allocate, drain; bit 7:
-///   goes on) and the difference to the last line of the client. One that goes on has the number of lines written to memory,
-///   their differences to the line, and for each level below the L2 four bytes: reads, writes, misses, write-backs. Client 15
-///   begins a run of as many lines as the next number says.
+/// - a byte (bits 0 to 2: draw, vertices, tile, resolve, compute, barrier for tiles, barrier for all; bit 3:
+///   it moves to another pass, batch or draw; bit 4: it has lines), then differences to the packet before as
+///   zigzag LEB128: if it moves, pass, batch and draw; tile; triangle;
+/// - a byte with the place of its set of events among the sets so far, or 255 and a new set of 128 bits; a
+///   count for each event, in LEB128;
+/// - the number of lines. A line is a byte (bits 0 to 3: client; bits 4 to 6: hit, below, fetch, write,
+///   allocate, drain; bit 7: goes on) and the difference to the last line of the client. One that goes on has
+///   the number of lines written to memory, their differences to the line, and for each level below the L2
+///   four bytes: reads, writes, misses, write-backs. Client 15 begins a run of as many lines as the next
+///   number says.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PacketStream {
     bytes: Vec<u8>,

@@ -1,15 +1,16 @@
 //! Compute: groups of lanes that share memory and barriers, and work on buffers.
 //!
 //! A [`GroupShader`] is code that computes its results and counts its work as it runs: operations on a
-//! [`Lane`], accesses to shared memory and to buffers, atomics and barriers. Lanes run one after
-//! another between barriers, and the accesses of a warp are put side by side: the n-th load of a buffer by each lane is one
-//! access of the warp, and so on for each kind. Where lanes leave a loop at different times this is
+//! [`Lane`], accesses to shared memory and to buffers, atomics and barriers. Lanes run one after another
+//! between barriers, and the accesses of a warp are put side by side: the n-th load of a buffer by each lane
+//! is one access of the warp, and so on for each kind. Where lanes leave a loop at different times this is
 //! what happens; where they take different sides of a branch it is an approximation.
 //!
 //! What depends on order:
 //!
-//! - A group sees the buffers as they were before the pass. Stores and atomics of all groups take effect in the order of
-//!   the groups when the pass ends. So groups run in parallel, and results are the same for any number of threads.
+//! - A group sees the buffers as they were before the pass. Stores and atomics of all groups take effect in
+//!   the order of the groups when the pass ends. So groups run in parallel, and results are the same for any
+//!   number of threads.
 //! - For the same reason no atomic on a buffer returns the word before it.
 //! - Caches see the lines in the order of the groups.
 //!
@@ -159,8 +160,8 @@ impl ComputePass<'_> {
     }
 }
 
-/// A surface that a pass stored, for programs of groups. Its words are where the pass wrote them, so that caches see the same
-/// lines. Fixed functions decode values, as for the typed views of Direct3D 11.
+/// A surface that a pass stored, for programs of groups. Its words are where the pass wrote them, so that
+/// caches see the same lines. Fixed functions decode values, as for the typed views of Direct3D 11.
 #[derive(Clone, Copy, Debug)]
 pub struct SurfaceView {
     words: Buffer<u32>,
@@ -349,8 +350,8 @@ impl<'a> Group<'a> {
         }
     }
 
-    /// Lets all lanes wait for each other: an operation of each. What was written to shared memory before may be used by
-    /// other lanes after it.
+    /// Lets all lanes wait for each other: an operation of each. What was written to shared memory before may
+    /// be used by other lanes after it.
     pub fn barrier(&mut self) {
         let warps = self.since_barrier.len() as u32;
         self.since_barrier.iter_mut().for_each(|ops| *ops += 1);

@@ -99,7 +99,8 @@ fn touch(accesses: &[LaneAccess], how: Touched, lines: &mut Vec<LineTouch>) {
     lines.extend(of_lines.map(|of_line| LineTouch { address: line(&of_line[0]) * LINE_BYTES, how }));
 }
 
-/// An atomic unit changes all words of a line in a step, but a word once. Units work side by side; the busiest counts.
+/// An atomic unit changes all words of a line in a step, but a word once. Units work side by side; the
+/// busiest counts.
 fn atomic(accesses: &[LaneAccess], units: u32, counts: &mut PacketCounts) {
     let line = |access: &LaneAccess| access.address / LINE_BYTES;
     let mut steps = vec![0_u32; units as usize];

@@ -10,12 +10,12 @@
 //! - triangles without area (points, segments) and triangles that reach behind the camera are included.
 //!
 //! *Precision.* The tile tests and depth planes are those of standard mode ([`traversal`](crate::traversal),
-//! [`depth`](crate::depth)). They take `f32`, so a triangle is rounded before them, relative to the middle of the
-//! tiles, and the error is carried as inflation together with that of inexact input
-//! ([`MovingTriangle::uncertain`]). For an exact triangle the sides of a tile move out by at most 2^-21 of the terms of
-//! a vertex as seen, half the extent of the tiles included: 0.002 tiles across a grid of 2048. Times and lens positions
-//! are rounded outward to `f32`. [`Rasterizer::in_doubles`] runs the same tests on `f64`, where the sides move out by 2^-45 of
-//! the terms.
+//! [`depth`](crate::depth)). They take `f32`, so a triangle is rounded before them, relative to the middle of
+//! the tiles, and the error is carried as inflation together with that of inexact input
+//! ([`MovingTriangle::uncertain`]). For an exact triangle the sides of a tile move out by at most 2^-21 of
+//! the terms of a vertex as seen, half the extent of the tiles included: 0.002 tiles across a grid of 2048.
+//! Times and lens positions are rounded outward to `f32`. [`Rasterizer::in_doubles`] runs the same tests on
+//! `f64`, where the sides move out by 2^-45 of the terms.
 //!
 //! ```
 //! use pipeline::conservative::{Grid, MovingTriangle, Rasterizer, View};
@@ -224,11 +224,12 @@ impl Precision for f32 {
     const ROUNDED: f64 = 1.0 / (1_u64 << 22) as f64;
 }
 
-/// 128 times `u` = 2^-53, half of which bounds a vertex as seen. It takes 8. So if no vertex is farther than `X` and `Y` from
-/// any point of the tile, `112 u 2 X Y` of the slack of an edge remains. Of this the coefficients of the edge and their
-/// sums over the tile take at most 32, and its roots 24: their discriminant is that of coefficients off by 2 each, and their
-/// other operations move them by at most 5 `u` of the time, in which the edge changes by `4 2 X Y`. The last sum of a root is
-/// covered by the ulp by which roots are moved outward. Sides and depths take less.
+/// 128 times `u` = 2^-53, half of which bounds a vertex as seen. It takes 8. So if no vertex is farther than
+/// `X` and `Y` from any point of the tile, `112 u 2 X Y` of the slack of an edge remains. Of this the
+/// coefficients of the edge and their sums over the tile take at most 32, and its roots 24: their
+/// discriminant is that of coefficients off by 2 each, and their other operations move them by at most 5 `u`
+/// of the time, in which the edge changes by `4 2 X Y`. The last sum of a root is covered by the ulp by which
+/// roots are moved outward. Sides and depths take less.
 impl Precision for f64 {
     const ROUNDED: f64 = 1.0 / (1_u64 << 46) as f64;
 }
@@ -239,10 +240,10 @@ const MOVED: f64 = 1.0 / (1_u64 << 50) as f64;
 /// A triangle and a view as the tile tests take them, for tiles within one rectangle.
 ///
 /// Before the tile tests a triangle is moved so that the middle of the tiles is the origin, in `f64`, scaled
-/// by powers of two so that no number or product leaves the range of its type, and rounded to that of the tests: `f32`, or
-/// `f64` for tiles that are smaller than its precision. The slack that the tile tests allow for the rounding of samples
-/// in standard mode here bounds the rounding of vertices and the uncertainty of the input. Tiles, lens positions and
-/// times are rounded outward.
+/// by powers of two so that no number or product leaves the range of its type, and rounded to that of the
+/// tests: `f32`, or `f64` for tiles that are smaller than its precision. The slack that the tile tests allow
+/// for the rounding of samples in standard mode here bounds the rounding of vertices and the uncertainty of
+/// the input. Tiles, lens positions and times are rounded outward.
 #[derive(Clone, Copy, Debug)]
 struct Rounded<C> {
     pub triangle: Triangle<C>,

@@ -77,8 +77,8 @@ pub struct Rasterizer {
 }
 
 impl Rasterizer {
-    /// A rasterizer for the whole lens and shutter in `view`, with tests in `f32`; the time of a touched tile is halved
-    /// twice.
+    /// A rasterizer for the whole lens and shutter in `view`, with tests in `f32`; the time of a touched tile
+    /// is halved twice.
     pub fn new(view: View) -> Self {
         Self { view, clip: Region::WHOLE, halvings: 2, in_doubles: false }
     }
@@ -102,8 +102,8 @@ impl Rasterizer {
         Self { halvings, ..self }
     }
 
-    /// Call `each` with every tile that `triangle` may touch (column and row) and its intervals, in the order of a Z-curve
-    /// over blocks. Does not allocate.
+    /// Call `each` with every tile that `triangle` may touch (column and row) and its intervals, in the order
+    /// of a Z-curve over blocks. Does not allocate.
     pub fn rasterize(&self, triangle: &MovingTriangle, grid: &Grid, each: impl FnMut([u32; 2], &Touch)) {
         self.rasterize_part(triangle, grid, [0..grid.columns, 0..grid.rows], each);
     }
@@ -119,8 +119,8 @@ impl Rasterizer {
         self.rasterize_counted(triangle, grid, part, |tile, touch, _| each(tile, touch));
     }
 
-    /// The same with the work of the tile loop. `each` is given the work since its last call and may take it; the rest
-    /// is returned.
+    /// The same with the work of the tile loop. `each` is given the work since its last call and may take it;
+    /// the rest is returned.
     pub fn rasterize_counted(
         &self,
         triangle: &MovingTriangle,
@@ -152,7 +152,8 @@ impl Rasterizer {
     }
 }
 
-/// What is called with every tile. It is not a parameter of a type, so that the tests are compiled here, in one piece.
+/// What is called with every tile. It is not a parameter of a type, so that the tests are compiled here, in
+/// one piece.
 type Each<'a> = &'a mut dyn FnMut([u32; 2], &Touch, &mut TileLoop);
 
 /// The test that culled a tile.
@@ -233,8 +234,8 @@ impl<'a, C: Precision> Tests<'a, C> {
         self.halved(&self.rounded.tile(rect), within, self.rasterizer.halvings)
     }
 
-    /// Narrows `within` to the part in which the triangle may touch the tile: inside its sides, beyond the near depth, and
-    /// inside its own edges. Which face it shows does not matter, as it may have no area.
+    /// Narrows `within` to the part in which the triangle may touch the tile: inside its sides, beyond the
+    /// near depth, and inside its own edges. Which face it shows does not matter, as it may have no area.
     fn part(&mut self, tile: &TileRect<C>, within: &mut Box5<C>) -> Result<(), Culled> {
         let Rounded { triangle, shear, near, depth_slack, .. } = &self.rounded;
         let (mut is_left, madds) = narrow_by_sides::<f64, C>(triangle, shear, tile, within);

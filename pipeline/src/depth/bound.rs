@@ -57,7 +57,8 @@ pub const fn interval_madds(bound: DepthBound, moving: bool, lens: bool) -> u32 
     }
 }
 
-/// Multiply-adds of one interval of a triangle in conservative mode, by [`DepthBound::LocalPlanes`]: counted likewise.
+/// Multiply-adds of one interval of a triangle in conservative mode, by [`DepthBound::LocalPlanes`]: counted
+/// likewise.
 pub(crate) const fn exact_interval_madds(moving: bool, lens: bool) -> u32 {
     match (moving, lens) {
         (false, false) => 32,
@@ -124,8 +125,8 @@ impl ExactBounder {
         Self { facts, shutter }
     }
 
-    /// Interval of the depths of all points seen in `tile` and `within` of a triangle whose vertices are off by half the
-    /// slack, and by `depth` in depth. It is empty if there are none.
+    /// Interval of the depths of all points seen in `tile` and `within` of a triangle whose vertices are off
+    /// by half the slack, and by `depth` in depth. It is empty if there are none.
     pub fn over<C: Coordinate>(&self, tile: &TileRect<C>, within: &Box5<C>, depth: C) -> [C; 2] {
         // Twice the error covers the rounding of vertices at a time, and of the bound.
         let [lo, hi] =

@@ -131,8 +131,9 @@ impl DepthBoxes {
         boxes
     }
 
-    /// Part of `within` in which a triangle may pass `test`; everything if it `culls` nothing. `depth(part)` gives its
-    /// nearest and farthest depth in a part. It is compared with the stored depths of every overlapping box.
+    /// Part of `within` in which a triangle may pass `test`; everything if it `culls` nothing. `depth(part)`
+    /// gives its nearest and farthest depth in a part. It is compared with the stored depths of every
+    /// overlapping box.
     pub fn compare(
         &self,
         within: &Box5,
@@ -162,8 +163,8 @@ impl DepthBoxes {
         self.box_of_slot.get(slot).map_or(0, |&box_index| box_index as usize)
     }
 
-    /// Record that the depths in `slots` were written, after a test that `raises` some or only lowers them. Returns the
-    /// number of boxes with a new nearest depth.
+    /// Record that the depths in `slots` were written, after a test that `raises` some or only lowers them.
+    /// Returns the number of boxes with a new nearest depth.
     pub fn write(&mut self, depth: &[f32], slots: &[u16], raises: bool) -> u32 {
         let mut lowered = 0;
         for &slot in slots {

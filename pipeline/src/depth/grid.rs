@@ -1,4 +1,5 @@
-//! Division of lens and time into boxes (thesis, Paper VI, section 3), and the farthest stored depths of tiles in them, level by level.
+//! Division of lens and time into boxes (thesis, Paper VI, section 3), and the farthest stored depths of
+//! tiles in them, level by level.
 
 use std::ops::Range;
 
@@ -206,7 +207,8 @@ impl Pyramid {
         level.farthest[(row * level.columns + column) as usize * self.grid.len() + index]
     }
 
-    /// Depths compared to find the farthest of a tile: of its samples on the first level, else those of its child tiles.
+    /// Depths compared to find the farthest of a tile: of its samples on the first level, else those of its
+    /// child tiles.
     pub fn compared(&self, level: usize, [column, row]: [u32; 2]) -> u32 {
         self.levels[level].compared[(row * self.levels[level].columns + column) as usize]
     }

@@ -7,8 +7,9 @@
 //! - [`Pyramid`]: farthest stored depths of larger and larger tiles, for occlusion queries,
 //! - [`Real`]: numbers of the depth bounds and of tests of points: `f64`, or a number that counts its operations.
 //!
-//! *Moving planes* that bound a triangle from one side (thesis, Paper VI, Appendix A, second test). For any vector `n`, `n . p` over a moving triangle is between the minimum and maximum over its vertices.
-//! The vertices move linearly, so at time `t` between two ends it is at most
+//! *Moving planes* that bound a triangle from one side (thesis, Paper VI, Appendix A, second test). For any
+//! vector `n`, `n . p` over a moving triangle is between the minimum and maximum over its vertices. The
+//! vertices move linearly, so at time `t` between two ends it is at most
 //!
 //! ```text
 //! h(t) = (1 - t) max_i n . q_i + t max_i n . r_i

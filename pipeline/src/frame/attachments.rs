@@ -1,4 +1,5 @@
-//! Surfaces of a frame as targets and as bindings of draws, with load and store operations, and why a pass is refused.
+//! Surfaces of a frame as targets and as bindings of draws, with load and store operations, and why a pass is
+//! refused.
 
 use std::fmt;
 use std::sync::Arc;

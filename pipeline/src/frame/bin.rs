@@ -1,8 +1,9 @@
 //! Bins: coarse tiles, each rasterized by one worker, and the logs of their work.
 //!
-//! Memory of bins has the set-up records of triangles, and the list of triangles of each bin. Set-up writes them through the triangle
-//! buffer, and the tile loop reads them. As in the parameter buffer of a tile-based GPU (Antochi et al., "Memory bandwidth requirements of tile-based rendering", SAMOS 2004),
-//! a batch has its records one after the other, and lists grow by lines. Two batches are in memory at once, in turns.
+//! Memory of bins has the set-up records of triangles, and the list of triangles of each bin. Set-up writes
+//! them through the triangle buffer, and the tile loop reads them. As in the parameter buffer of a tile-based
+//! GPU (Antochi et al., "Memory bandwidth requirements of tile-based rendering", SAMOS 2004), a batch has its
+//! records one after the other, and lists grow by lines. Two batches are in memory at once, in turns.
 
 use std::collections::VecDeque;
 
@@ -328,7 +329,8 @@ impl BinMemory {
         }
     }
 
-    /// Read the entries `from..to` of the list of a bin of the first batch, which are the triangles `listed`, and their records.
+    /// Read the entries `from..to` of the list of a bin of the first batch, which are the triangles `listed`,
+    /// and their records.
     pub fn read(
         &self,
         (bin, from): (usize, u32),
@@ -368,8 +370,8 @@ impl BatchBins {
     }
 }
 
-/// Bytes of the set-up record of a triangle: three vertices as they are on the image plane, with the attributes that are shaded, and
-/// its number.
+/// Bytes of the set-up record of a triangle: three vertices as they are on the image plane, with the
+/// attributes that are shaded, and its number.
 fn record_bytes(pass: &Pass<'_>, triangle: &Triangle) -> u64 {
     let geometry = &pass.draws[pass.locate(triangle.id).0].geometry;
     let ends = |still: bool| if still { 1 } else { 2 };

@@ -31,7 +31,8 @@ struct Cells {
 }
 
 impl<'a> Grid<'a> {
-    /// Grid over the triangle with these `corners`, which may be `moving`, for a tile of `pass` that starts at pixel `origin`.
+    /// Grid over the triangle with these `corners`, which may be `moving`, for a tile of `pass` that starts
+    /// at pixel `origin`.
     pub fn new(
         pass: &Pass<'_>,
         (corners, moving): (&'a [Corner; 3], bool),
@@ -44,7 +45,8 @@ impl<'a> Grid<'a> {
         Self { corners, reference, image: pass.origin, plain, samples, origin, side_px, cells }
     }
 
-    /// Cell of the sample in `slot`. A sample whose surface point is behind the camera at the reference uses its own pixel.
+    /// Cell of the sample in `slot`. A sample whose surface point is behind the camera at the reference uses
+    /// its own pixel.
     #[inline]
     pub fn cell(&mut self, slot: usize) -> [i32; 2] {
         let (base, lane) = (slot / LANES * LANES, slot % LANES);

@@ -1,6 +1,6 @@
-//! Conservative mode as a mode of the pipeline: triangles stream through vertices, set-up and the tile loop, and every
-//! tile that a triangle may touch runs a [`TileShader`]. No sample is tested. Tile tests have the costs of standard mode;
-//! the lanes of the shader count what they do.
+//! Conservative mode as a mode of the pipeline: triangles stream through vertices, set-up and the tile loop,
+//! and every tile that a triangle may touch runs a [`TileShader`]. No sample is tested. Tile tests have the
+//! costs of standard mode; the lanes of the shader count what they do.
 
 use std::collections::HashSet;
 use std::ops::Range;
@@ -33,8 +33,8 @@ pub struct Primitive {
     pub rasterizer: Rasterizer,
     /// Columns and rows of tiles that are tested (scissor).
     pub scissor: [Range<u32>; 2],
-    /// Number of the body that the triangle belongs to, such as the bounding volume of which it is a face. Triangles of a
-    /// body follow each other and share the state of the shader.
+    /// Number of the body that the triangle belongs to, such as the bounding volume of which it is a face.
+    /// Triangles of a body follow each other and share the state of the shader.
     pub body: u32,
     /// Whether it is the triangle before it in another clip region, so that its vertices are there.
     pub reuses_vertices: bool,
@@ -88,9 +88,9 @@ pub struct TileIntervals<'a> {
     pub touch: &'a Touch,
 }
 
-/// Shader of conservative mode: runs for every triangle and tile that it may touch. Results have to depend on the
-/// arguments alone, and on what was stored before the draw. Its lanes have no helpers: nothing is interpolated, so no lane needs the
-/// differences to its neighbours.
+/// Shader of conservative mode: runs for every triangle and tile that it may touch. Results have to depend on
+/// the arguments alone, and on what was stored before the draw. Its lanes have no helpers: nothing is
+/// interpolated, so no lane needs the differences to its neighbours.
 pub trait TileShader: Sync {
     /// State that the triangles of a body share.
     type BodyState: Default;
@@ -182,8 +182,8 @@ impl<T> BodyLog<T> {
 }
 
 impl Gpu<'_> {
-    /// Begins a pass in conservative mode. Heat maps show its work on tiles where they are in the image of the frame, if they are
-    /// there at all.
+    /// Begins a pass in conservative mode. Heat maps show its work on tiles where they are in the image of
+    /// the frame, if they are there at all.
     pub fn begin_conservative(&mut self, name: &str, placement: Option<Placement>) -> ConservativePass {
         self.open_placed(name, placement);
         ConservativePass::default()

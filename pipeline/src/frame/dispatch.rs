@@ -1,5 +1,5 @@
-//! Passes without triangles. Dispatch of groups: they run in parallel, and their packets follow in the order of the groups.
-//! Full-screen passes: a program runs for every pixel of an image, tile by tile.
+//! Passes without triangles. Dispatch of groups: they run in parallel, and their packets follow in the order
+//! of the groups. Full-screen passes: a program runs for every pixel of an image, tile by tile.
 
 use activity::{Counts, Event, Packet, PacketCounts, PacketKind, Waits};
 use glam::Vec3;
@@ -40,9 +40,9 @@ impl Gpu<'_> {
     /// Runs the groups of a pass. It waits for earlier passes that wrote what it uses, or that use what it writes.
     ///
     /// # Errors
-    /// [`PassError::Compute`] if the GPU has no compute unit, if groups are too large for it, or if the program does
-    /// what it may not; [`PassError::Buffer`] if a buffer is of another frame; [`PassError::Memory`] if the buffers of the
-    /// frame are too large.
+    /// [`PassError::Compute`] if the GPU has no compute unit, if groups are too large for it, or if the
+    /// program does what it may not; [`PassError::Buffer`] if a buffer is of another frame;
+    /// [`PassError::Memory`] if the buffers of the frame are too large.
     pub fn dispatch(&mut self, pass: &ComputePass<'_>) -> Result<Counts, PassError> {
         let failed = |error| PassError::Compute { pass: pass.name.to_owned(), error };
         let spec = pass.check(self.spec().compute.as_ref()).map_err(failed)?;
@@ -128,10 +128,10 @@ fn touch(memory: &mut MemorySystem, address: u64, how: Touched, counts: &mut Pac
 const PIXEL_BYTES: u64 = 4;
 
 impl Gpu<'_> {
-    /// Draws an image in a pass of its own: `pixel` gives the colour of the pixel at a column and row. What its lanes do is
-    /// counted as they do it, in quads of 2 x 2 pixels: the n-th programs of the lanes of a warp run in step, and a lane without one, as
-    /// beyond an odd side of the image, is a helper. Helpers fetch what their neighbours fetch; they neither read nor write depth and
-    /// colour.
+    /// Draws an image in a pass of its own: `pixel` gives the colour of the pixel at a column and row. What
+    /// its lanes do is counted as they do it, in quads of 2 x 2 pixels: the n-th programs of the lanes of a
+    /// warp run in step, and a lane without one, as beyond an odd side of the image, is a helper. Helpers
+    /// fetch what their neighbours fetch; they neither read nor write depth and colour.
     pub fn shade_pixels(
         &mut self,
         name: &str,
@@ -155,8 +155,8 @@ impl Gpu<'_> {
         }
     }
 
-    /// Runs a program for the pixel at every column and row, in the pass that was begun, in quads as [`Self::shade_pixels`]. Returns
-    /// its values, row by row.
+    /// Runs a program for the pixel at every column and row, in the pass that was begun, in quads as
+    /// [`Self::shade_pixels`]. Returns its values, row by row.
     pub fn run_pixels<T: Clone + Default + Send>(
         &mut self,
         viewport: Viewport,

@@ -1,5 +1,6 @@
-//! Fragments: covered samples of passes whose result depends on the order of triangles. Each is tested, shaded and stored
-//! before the next triangle; other passes store the nearest triangle and shade what is visible in the end.
+//! Fragments: covered samples of passes whose result depends on the order of triangles. Each is tested,
+//! shaded and stored before the next triangle; other passes store the nearest triangle and shade what is
+//! visible in the end.
 
 use glam::Vec4;
 

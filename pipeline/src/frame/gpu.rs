@@ -20,8 +20,9 @@ use crate::surface::{SurfaceSpec, Texels};
 /// Receiver of packets, each with the lines it requests from the L2.
 type Emit<'e> = Box<dyn FnMut(&Packet, &[LineAccess]) + 'e>;
 
-/// The modelled GPU during a frame. It draws passes in order and emits every work packet, in the order of the hardware, with the
-/// lines that the packet requests from the L2. Results and packets are the same for any number of threads.
+/// The modelled GPU during a frame. It draws passes in order and emits every work packet, in the order of the
+/// hardware, with the lines that the packet requests from the L2. Results and packets are the same for any
+/// number of threads.
 pub struct Gpu<'e> {
     spec: &'e PipelineSpec,
     memory: MemorySystem,
@@ -66,7 +67,8 @@ pub struct Rendered {
     pub visible: Vec<(u32, u32)>,
     /// Count of every event of the pass.
     pub counts: Counts,
-    /// Samples that passed, by draw; 0 for draws that are no [`Query`](crate::Query), and those up to the end of one that ends early.
+    /// Samples that passed, by draw; 0 for draws that are no [`Query`](crate::Query), and those up to the end
+    /// of one that ends early.
     pub passed: Vec<u64>,
     /// Images or depths in memory.
     pub region: MemoryRange,
@@ -180,8 +182,8 @@ impl<'e> Gpu<'e> {
         })
     }
 
-    /// The GPU with heat maps of `events` over images of the size of `viewport`. Events of passes of another size have no
-    /// position.
+    /// The GPU with heat maps of `events` over images of the size of `viewport`. Events of passes of another
+    /// size have no position.
     #[must_use]
     pub fn with_heat(self, events: &[Event], viewport: Viewport) -> Self {
         Self { heat: FrameHeat::new(events, self.spec, viewport), ..self }
@@ -195,10 +197,11 @@ impl<'e> Gpu<'e> {
         Self::new(spec, |_, _| ())
     }
 
-    /// A GPU for images alone. The visibility engine finds what samples see, faster than the model of the hardware and to
-    /// the same bytes; such passes have no counts and no packets. Passes into surfaces, with state that depends on the order
-    /// of triangles (blending, discarding shaders, depth and stencil state, queries), with clip planes of a geometry, of
-    /// orthographic cameras and with the thresholds of [`Features`](super::Features) are drawn as on other GPUs.
+    /// A GPU for images alone. The visibility engine finds what samples see, faster than the model of the
+    /// hardware and to the same bytes; such passes have no counts and no packets. Passes into surfaces, with
+    /// state that depends on the order of triangles (blending, discarding shaders, depth and stencil state,
+    /// queries), with clip planes of a geometry, of orthographic cameras and with the thresholds of
+    /// [`Features`](super::Features) are drawn as on other GPUs.
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -229,14 +232,14 @@ impl<'e> Gpu<'e> {
         self.surfaces.create(spec, self.spec.tile_px, &mut self.space)
     }
 
-    /// Values of all samples of a surface as its format keeps them, in the order `(y width + x) samples + index`; `None` while
-    /// nothing is stored in it. Depths are in `x`, stencil values in `y`.
+    /// Values of all samples of a surface as its format keeps them, in the order `(y width + x) samples +
+    /// index`; `None` while nothing is stored in it. Depths are in `x`, stencil values in `y`.
     pub fn contents(&self, id: SurfaceId) -> Option<Vec<Vec4>> {
         Some(self.surfaces.get(id)?.texels.as_ref()?.values())
     }
 
-    /// Starts a pass whose packets are made outside of rasterization. Their tiles are those of an image of the size of
-    /// `viewport`, if any.
+    /// Starts a pass whose packets are made outside of rasterization. Their tiles are those of an image of
+    /// the size of `viewport`, if any.
     pub(super) fn open(&mut self, name: &str, viewport: Option<Viewport>) {
         let (name, draws, others) = (name.to_owned(), Vec::new(), Counts::default());
         self.start(PassReport { name, triangles: 0, draws, others });
@@ -305,7 +308,8 @@ impl<'e> Gpu<'e> {
         &mut self.memory
     }
 
-    /// Emits a packet of a pass that was begun, which sets up `triangles`, with the lines requested since the one before.
+    /// Emits a packet of a pass that was begun, which sets up `triangles`, with the lines requested since the
+    /// one before.
     pub(super) fn push(&mut self, packet: &Packet, triangles: usize) {
         self.heat.add(packet, self.is_on_map);
         self.emit(packet, triangles);
@@ -344,8 +348,8 @@ impl<'e> Gpu<'e> {
     /// Draws a pass.
     ///
     /// # Errors
-    /// [`PassError`] if a cache of the settings is invalid, if a surface or buffer cannot be used as it is, or if the surfaces of
-    /// the frame are too large.
+    /// [`PassError`] if a cache of the settings is invalid, if a surface or buffer cannot be used as it is,
+    /// or if the surfaces of the frame are too large.
     pub fn draw(&mut self, pass: &RasterPass<'_>) -> Result<Rendered, PassError> {
         let number = self.passes.len() as u32;
         let has_heat = self.heat.is_of(pass.settings.viewport);
@@ -430,8 +434,8 @@ impl<'e> Gpu<'e> {
         }
     }
 
-    /// Packets that have to wait for earlier passes, if any: those that read their results, or write what they read. A target
-    /// of several passes needs no wait, as the units of depth and colour work in order.
+    /// Packets that have to wait for earlier passes, if any: those that read their results, or write what
+    /// they read. A target of several passes needs no wait, as the units of depth and colour work in order.
     fn waits(&self, reads: &Reads, pass: &RasterPass<'_>) -> Option<Waits> {
         let is_pending = |address: &u64| self.is_pending(*address);
         if reads.vertices.iter().any(is_pending) {
@@ -490,8 +494,8 @@ impl RasterPass<'_> {
         Ok(self.onto(Target::Depth).with_visible().render(|_, _| ())?.visible)
     }
 
-    /// Draws the pass for its images and what its samples see alone, as a [`Gpu::uncounted`] does. Whether it was counted
-    /// depends on the pass, so its counts mean nothing.
+    /// Draws the pass for its images and what its samples see alone, as a [`Gpu::uncounted`] does. Whether it
+    /// was counted depends on the pass, so its counts mean nothing.
     ///
     /// # Errors
     /// As [`Gpu::draw`].

@@ -17,8 +17,8 @@ pub struct HeatMap {
     pub tiles: Vec<TileHeat>,
     /// Coarse tiles, row by row, with the events of the coarse tile as a whole.
     pub coarse: Vec<TileHeat>,
-    /// Events without a position: those of vertices, groups and barriers, of passes of another size, and of emptying the caches at
-    /// the end.
+    /// Events without a position: those of vertices, groups and barriers, of passes of another size, and of
+    /// emptying the caches at the end.
     pub elsewhere: u64,
     /// Count in every pixel, row by row, for events of samples; otherwise empty.
     pub samples: Vec<u32>,
@@ -39,8 +39,8 @@ pub struct TileHeat {
     pub count: u64,
 }
 
-/// Where the tiles of a pass in conservative mode are in the image of the frame, for its heat maps: the outer corners of the first
-/// and of the last tile, as shares of the image from its left and from its top.
+/// Where the tiles of a pass in conservative mode are in the image of the frame, for its heat maps: the outer
+/// corners of the first and of the last tile, as shares of the image from its left and from its top.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Placement {
     /// Outer corner of the tile in column and row 0.

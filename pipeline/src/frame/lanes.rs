@@ -1,9 +1,10 @@
 //! Lanes of a shader that runs on the tiles of conservative mode or of a full-screen pass. Everything a lane does is
 //! counted as it is done: operations, accesses to memory and tests of points.
 //!
-//! A full-screen pass is drawn as a triangle over the image, so its lanes run in quads of pixels, with helpers. Lanes of
-//! conservative mode have none: quads are there for the differences between neighbours, and a tile shader has intervals in place
-//! of interpolated values. Each of its lanes stands alone and may be in a warp with any others of its packet.
+//! A full-screen pass is drawn as a triangle over the image, so its lanes run in quads of pixels, with
+//! helpers. Lanes of conservative mode have none: quads are there for the differences between neighbours, and
+//! a tile shader has intervals in place of interpolated values. Each of its lanes stands alone and may be in
+//! a warp with any others of its packet.
 
 use std::cell::{Cell, RefCell};
 use std::ops::Range;
@@ -82,7 +83,8 @@ impl Lanes {
         &self.costs
     }
 
-    /// Runs a program on a lane. Only lanes that are started at one place in the code, and so run one program, share a warp.
+    /// Runs a program on a lane. Only lanes that are started at one place in the code, and so run one
+    /// program, share a warp.
     #[track_caller]
     pub fn run<T>(&self, program: impl FnOnce(&Lane) -> T) -> T {
         let lane = Lane::knowing(&self.costs);
@@ -98,8 +100,9 @@ impl Lanes {
         self.runs.take()
     }
 
-    /// Counts the lanes of quads, by the programs that each of them ran. The n-th programs of the lanes of a warp run in step, and
-    /// each takes as long as the longest. A lane without an n-th program in a quad that has one is a helper.
+    /// Counts the lanes of quads, by the programs that each of them ran. The n-th programs of the lanes of a
+    /// warp run in step, and each takes as long as the longest. A lane without an n-th program in a quad that
+    /// has one is a helper.
     pub(super) fn count_quads(&self, quads: &[[Vec<Run>; 4]], warp_lanes: u32) {
         for nth in 0..quads.as_flattened().iter().map(Vec::len).max().unwrap_or(0) {
             let mut warps = Warps::new(warp_lanes);
@@ -115,8 +118,8 @@ impl Lanes {
         }
     }
 
-    /// Counts a helper lane. Its fetches are those of a neighbour, as beyond the image coordinates are clamped to its border.
-    /// Depth and colour of helpers are masked.
+    /// Counts a helper lane. Its fetches are those of a neighbour, as beyond the image coordinates are
+    /// clamped to its border. Depth and colour of helpers are masked.
     fn help(&self, lane: usize, lanes: [Option<&Run>; 4]) {
         self.count(Event::HelperInvocations, 1);
         let neighbour = [lane ^ 1, lane ^ 2, lane ^ 3].into_iter().find_map(|beside| lanes[beside]);
@@ -165,7 +168,8 @@ impl Lanes {
         self.touch(Touch { client: Client::Colour, address, bytes, write: true, whole: true });
     }
 
-    /// Times at which a point of the image is inside a moving triangle, by face: the sample test of all times at once.
+    /// Times at which a point of the image is inside a moving triangle, by face: the sample test of all times
+    /// at once.
     pub fn times_at(&self, triangle: &Triangle, shear: &Shear, at: [f64; 2]) -> [TimeIntervals; 2] {
         let (times, madds) = time_interval_counted(triangle, shear, at, &self.costs);
         self.tested(madds, times.iter().any(|face| !face.as_slice().is_empty()));
@@ -198,8 +202,8 @@ impl Lanes {
         self.touches.borrow_mut().push(touch);
     }
 
-    /// What the lanes did since they were last asked. Those of a program fill warps of `warp_lanes` lanes in the order in which they
-    /// ran.
+    /// What the lanes did since they were last asked. Those of a program fill warps of `warp_lanes` lanes in
+    /// the order in which they ran.
     pub(super) fn finish(&self, warp_lanes: u32) -> LaneWork {
         let runs = self.runs.take();
         let mut programs: Vec<(&Location<'_>, Warps)> = Vec::new();
@@ -238,8 +242,8 @@ pub(super) struct LaneWork {
 }
 
 impl LaneWork {
-    /// Adds the counts, and the accesses in order. `is_cleared` says whether a line has held nothing but the clear value
-    /// so far.
+    /// Adds the counts, and the accesses in order. `is_cleared` says whether a line has held nothing but the
+    /// clear value so far.
     pub fn add_to(
         &self,
         counts: &mut PacketCounts,
@@ -259,8 +263,8 @@ impl LaneWork {
     }
 }
 
-/// Lanes of one packet, put into warps in the order in which they start. Each lane of a warp takes as long as the longest. A warp that
-/// is not full has no other lanes: warps of other packets issue beside it.
+/// Lanes of one packet, put into warps in the order in which they start. Each lane of a warp takes as long as
+/// the longest. A warp that is not full has no other lanes: warps of other packets issue beside it.
 #[derive(Debug)]
 pub(super) struct Warps {
     /// Lanes of a full warp.

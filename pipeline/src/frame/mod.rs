@@ -1,4 +1,5 @@
-//! Frame: settings of the modelled hardware, and passes through the whole pipeline, each from vertices, set-up, bins and tiles to the replay and the image.
+//! Frame: settings of the modelled hardware, and passes through the whole pipeline, each from vertices,
+//! set-up, bins and tiles to the replay and the image.
 
 mod attachments;
 mod bin;
@@ -331,8 +332,9 @@ pub struct Features {
     pub z_max: bool,
     /// Run only those of the enabled tests that pay off.
     pub auto: bool,
-    /// Shade the visible samples of a bin after its last triangle, and no others (hidden-surface removal of tile-based
-    /// deferred renderers). Passes whose result depends on the order of triangles shade in that order.
+    /// Shade the visible samples of a bin after its last triangle, and no others (hidden-surface removal of
+    /// tile-based deferred renderers). Passes whose result depends on the order of triangles shade in that
+    /// order.
     pub hidden_surface_removal: bool,
     /// A triangle whose points are all within this distance in pixels of their mid-shutter position is drawn
     /// still at that position. 0 disables it.

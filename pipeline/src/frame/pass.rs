@@ -79,8 +79,8 @@ pub(super) struct Pass<'a> {
 }
 
 impl<'a> Pass<'a> {
-    /// Prepares pass `number` of a frame, which was checked, and gives its data addresses in `space`. It reads surfaces and
-    /// buffers as they are.
+    /// Prepares pass `number` of a frame, which was checked, and gives its data addresses in `space`. It
+    /// reads surfaces and buffers as they are.
     pub fn new(
         pass: &RasterPass<'a>,
         (number, heat): (u32, bool),
@@ -444,10 +444,11 @@ pub(super) fn resident<'s>(
 pub enum Query {
     /// How many samples pass.
     Count,
-    /// Whether any sample passes. The answer is known where a packet, the work of a triangle in a tile, leaves the depth test;
-    /// later packets of the draw in the order of the stream are dropped. The samples of a packet are tested together, so it is
-    /// finished. The front end works ahead of the tiles, so vertices and set-up are not spared. The tile loop is taken to know
-    /// the answer at once, which is the best that hardware can do.
+    /// Whether any sample passes. The answer is known where a packet, the work of a triangle in a tile,
+    /// leaves the depth test; later packets of the draw in the order of the stream are dropped. The samples
+    /// of a packet are tested together, so it is finished. The front end works ahead of the tiles, so
+    /// vertices and set-up are not spared. The tile loop is taken to know the answer at once, which is the
+    /// best that hardware can do.
     Any,
 }
 
@@ -502,8 +503,8 @@ impl<'a> Draw<'a> {
         Self { bindings, ..self }
     }
 
-    /// Addresses and bytes of the indices of a triangle and of the positions of its vertices, for programs that read them; `None`
-    /// unless the draw is [resident](super::Gpu::resident) and has the triangle.
+    /// Addresses and bytes of the indices of a triangle and of the positions of its vertices, for programs
+    /// that read them; `None` unless the draw is [resident](super::Gpu::resident) and has the triangle.
     pub fn data_of(&self, triangle: u32) -> Option<[(u64, u64); 4]> {
         let VertexBuffer { address, stride, indices } = self.resident.vertices?;
         let corners = self.geometry.triangles().get(triangle as usize)?;
@@ -567,8 +568,9 @@ pub enum Target<'a> {
     Image,
     /// The same, with room for its mip levels, for draws that [read it](Draw::reading).
     Texture,
-    /// Several images. Image `k` is the mean of the samples of each pixel whose indices are in range `k`. Ranges may overlap;
-    /// indices beyond the samples of a pixel are ignored, and an image without samples is black.
+    /// Several images. Image `k` is the mean of the samples of each pixel whose indices are in range `k`.
+    /// Ranges may overlap; indices beyond the samples of a pixel are ignored, and an image without samples is
+    /// black.
     Views(&'a [Range<u32>]),
     /// The depths of all samples, such as a shadow map. Nothing is shaded.
     Depth,

@@ -1,4 +1,5 @@
-//! Occlusion queries (thesis, Paper VI, section 3), by samples and by intervals, with their work counted where it is done.
+//! Occlusion queries (thesis, Paper VI, section 3), by samples and by intervals, with their work counted
+//! where it is done.
 
 use activity::{Counts, Event, Packet, PacketCounts, PacketKind};
 use glam::{Vec3, Vec4};
@@ -206,9 +207,9 @@ impl<'a> IntervalQueries<'a> {
 }
 
 impl Gpu<'_> {
-    /// Gathers the farthest depths of `stored`, the result of a pass over depth, in a pass of its own. It needs no wait, as the
-    /// unit of depth works in order: every stored depth is read and compared once, and the farthest of each box of a tile are compared for the next level. They are kept in fast
-    /// memory.
+    /// Gathers the farthest depths of `stored`, the result of a pass over depth, in a pass of its own. It
+    /// needs no wait, as the unit of depth works in order: every stored depth is read and compared once, and
+    /// the farthest of each box of a tile are compared for the next level. They are kept in fast memory.
     pub fn gather_farthest_depths(&mut self, name: &str, pyramid: &Pyramid, stored: MemoryRange) {
         self.open(name, None);
         self.note_read(stored.address());
@@ -237,8 +238,8 @@ impl Gpu<'_> {
         }
     }
 
-    /// Asks about boxes in a pass of its own. A query ends at its first tile that may see the box. The unit of depth writes the
-    /// answers to memory, a word each.
+    /// Asks about boxes in a pass of its own. A query ends at its first tile that may see the box. The unit
+    /// of depth writes the answers to memory, a word each.
     pub fn query_boxes(
         &mut self,
         name: &str,
@@ -263,7 +264,8 @@ impl Gpu<'_> {
         answers
     }
 
-    /// Writes the answer of query `number`. Answers follow each other, so the first of a line needs none of what was there.
+    /// Writes the answer of query `number`. Answers follow each other, so the first of a line needs none of
+    /// what was there.
     fn write_answer(&mut self, number: u32, answers: MemoryRange, counts: &mut PacketCounts) {
         counts[Event::DepthWrites] += 1;
         let address = answers.address() + u64::from(number) * ANSWER_BYTES;
@@ -409,8 +411,8 @@ impl Shader for Counted {
 }
 
 impl SampledQueries<'_> {
-    /// Asks about boxes, one after the other, over what the occluders stored. All culling of the hardware works as for
-    /// other draws.
+    /// Asks about boxes, one after the other, over what the occluders stored. All culling of the hardware
+    /// works as for other draws.
     ///
     /// # Errors
     /// [`PassError`] if the hardware cannot draw it.
@@ -423,8 +425,8 @@ impl SampledQueries<'_> {
 }
 
 impl Gpu<'_> {
-    /// Draws `pass`, and after its draws a box as a query for each object. The pass may have no draws, and load the depths that
-    /// an earlier pass stored.
+    /// Draws `pass`, and after its draws a box as a query for each object. The pass may have no draws, and
+    /// load the depths that an earlier pass stored.
     ///
     /// # Errors
     /// As [`Gpu::draw`].

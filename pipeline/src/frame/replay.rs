@@ -285,8 +285,8 @@ impl<'a> Replay<'a> {
         counts[Event::ShaderOps] += warps.ops();
     }
 
-    /// Call `each` for every line of a tile's samples, of `sample_bytes` each, that holds one of `pixels`, with the mask of
-    /// these pixels.
+    /// Call `each` for every line of a tile's samples, of `sample_bytes` each, that holds one of `pixels`,
+    /// with the mask of these pixels.
     fn lines(
         &mut self,
         tile: u32,
@@ -300,8 +300,8 @@ impl<'a> Replay<'a> {
         tile_lines([first_byte, pixel_bytes], pixels, |line, held| each(self, line, held));
     }
 
-    /// Emit the packets that end the tiles of a bin: their samples are resolved, or stored in surfaces. Depths of a depth
-    /// pass stay where they are.
+    /// Emit the packets that end the tiles of a bin: their samples are resolved, or stored in surfaces.
+    /// Depths of a depth pass stay where they are.
     pub fn resolve(&mut self, batch: u32, bin: &Bin, emit: &mut impl FnMut(&Packet, &[LineAccess])) {
         for (tile, _, pixels, touched) in bin.inside(self.pass) {
             let packet = if self.pass.is_attached {
@@ -317,7 +317,8 @@ impl<'a> Replay<'a> {
         }
     }
 
-    /// Stores the clear value where nothing was drawn, and drops what is not stored. `None` if there is nothing to do.
+    /// Stores the clear value where nothing was drawn, and drops what is not stored. `None` if there is
+    /// nothing to do.
     fn store_tile(&mut self, tile: u32, pixels: u64) -> Option<Packet> {
         let mut packet = Packet { tile, ..Packet::new(PacketKind::Resolve, self.pass.number) };
         let (pass, before) = (self.pass, packet.counts);

@@ -1,5 +1,5 @@
-//! Resolve: from the samples of pixels to their means, at the end of a raster pass and as a pass of its own; and the work of the
-//! colour unit that does it.
+//! Resolve: from the samples of pixels to their means, at the end of a raster pass and as a pass of its own;
+//! and the work of the colour unit that does it.
 
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
@@ -161,8 +161,8 @@ struct ShadedCells {
     known: KnownColours,
 }
 
-/// Colours of cells shaded before, in this tile or another one: with blur, many tiles see a cell. Each key has one place, and the
-/// last one keeps it.
+/// Colours of cells shaded before, in this tile or another one: with blur, many tiles see a cell. Each key
+/// has one place, and the last one keeps it.
 struct KnownColours(Vec<KnownQuad>);
 
 /// Colours of some cells of a quad.
@@ -264,7 +264,8 @@ pub(super) fn shade_tile(
 /// Slots of a tile, sorted by the triangles they see.
 #[derive(Default)]
 struct SlotsByTriangle {
-    /// Triangles, in the order of first sight until they are sorted, each with the number of its slots and then their end.
+    /// Triangles, in the order of first sight until they are sorted, each with the number of its slots and
+    /// then their end.
     triangles: Vec<(u32, u32, u16)>,
     /// Place in that order of the triangle of each slot.
     of_slot: Vec<u16>,
@@ -380,8 +381,8 @@ impl<'a> Sums<'a> {
         self.add_to(slot, self.pass.settings.background, 1);
     }
 
-    /// Means of the samples of each pixel of each view. A pixel without triangles has the colour of the background to the last bit,
-    /// as in tiles that no triangle touches.
+    /// Means of the samples of each pixel of each view. A pixel without triangles has the colour of the
+    /// background to the last bit, as in tiles that no triangle touches.
     fn means(self) -> Vec<Vec3> {
         let Self { pass, sums, missed, .. } = self;
         let pixels = sums.len() / pass.views.len().max(1);
@@ -498,8 +499,8 @@ impl TileResolve {
     }
 }
 
-/// Call `each` for every line that holds one of `pixels` of a tile, with the mask of these pixels. The first byte of the tile and
-/// the bytes of a pixel are given.
+/// Call `each` for every line that holds one of `pixels` of a tile, with the mask of these pixels. The first
+/// byte of the tile and the bytes of a pixel are given.
 pub(super) fn tile_lines([first_byte, pixel_bytes]: [u64; 2], pixels: u64, mut each: impl FnMut(u64, u64)) {
     if LINE_BYTES.is_multiple_of(pixel_bytes) && first_byte.is_multiple_of(LINE_BYTES) {
         return tile_lines_of_pixels(

@@ -1,4 +1,5 @@
-//! Surfaces between passes. Checks of the targets and bindings of a pass, before it is drawn. Resolve as a pass: the colour unit reads all samples of a surface and writes one colour for each pixel, tile by tile.
+//! Surfaces between passes. Checks of the targets and bindings of a pass, before it is drawn. Resolve as a
+//! pass: the colour unit reads all samples of a surface and writes one colour for each pixel, tile by tile.
 //! Mip chains are made by passes, too: each level is drawn from the one before.
 
 use activity::{Counts, Packet, PacketKind, Waits};
@@ -55,12 +56,13 @@ struct Places {
 const AVERAGED: &str = "those of colours other than integers, which have a mean";
 
 impl Gpu<'_> {
-    /// Resolves samples into the pixels of another surface, whose format may differ. The pass waits for those that read what it
-    /// overwrites; the samples need no wait, as the colour unit works in order.
+    /// Resolves samples into the pixels of another surface, whose format may differ. The pass waits for those
+    /// that read what it overwrites; the samples need no wait, as the colour unit works in order.
     ///
     /// # Errors
-    /// [`PassError::Surface`] if nothing is stored in the samples, if the surfaces differ in size or are one, if the second has
-    /// several samples, or if values of a format have no mean; [`PassError::Memory`] if the surfaces of the frame are too large.
+    /// [`PassError::Surface`] if nothing is stored in the samples, if the surfaces differ in size or are one,
+    /// if the second has several samples, or if values of a format have no mean; [`PassError::Memory`] if the
+    /// surfaces of the frame are too large.
     pub fn resolve(&mut self, pass: &ResolvePass<'_>, to: SurfaceId) -> Result<Counts, PassError> {
         let (texels, from) = self.samples_of(pass)?;
         let refused = |problem| Err(self.surfaces.refused(pass.name, to, problem));
@@ -92,8 +94,8 @@ impl Gpu<'_> {
         Ok(self.counts_of_pass())
     }
 
-    /// Resolves samples into an image, the result of the pass. The part of a pixel that they leave open, by their opacity, shows
-    /// the linear colour `background`.
+    /// Resolves samples into an image, the result of the pass. The part of a pixel that they leave open, by
+    /// their opacity, shows the linear colour `background`.
     ///
     /// # Errors
     /// As [`Self::resolve`].
@@ -194,8 +196,9 @@ impl Shader for Halve {
 }
 
 impl Gpu<'_> {
-    /// Draws every level of a surface but the finest, each in a pass of its own that reads the level before. A texel is the mean
-    /// of 2 x 2; the last column or row of an odd size is left out, as in the chains of textures. Returns the events of all passes.
+    /// Draws every level of a surface but the finest, each in a pass of its own that reads the level before.
+    /// A texel is the mean of 2 x 2; the last column or row of an odd size is left out, as in the chains of
+    /// textures. Returns the events of all passes.
     ///
     /// # Errors
     /// [`PassError::Surface`] if nothing is stored in the finest level, or values of its format have no mean.

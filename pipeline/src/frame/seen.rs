@@ -1,4 +1,5 @@
-//! Passes without counts: the visibility engine finds what the samples see, and the shading of the pipeline gives the colours.
+//! Passes without counts: the visibility engine finds what the samples see, and the shading of the pipeline
+//! gives the colours.
 
 use glam::Vec3;
 
@@ -16,8 +17,8 @@ pub(super) struct Seen {
     pub visible: Vec<(u32, u32)>,
 }
 
-/// Draws a pass without counts, to the same bytes as the modelled hardware. `None` where the engine sees other samples than the
-/// hardware, or the result depends on the order of triangles.
+/// Draws a pass without counts, to the same bytes as the modelled hardware. `None` where the engine sees
+/// other samples than the hardware, or the result depends on the order of triangles.
 pub(super) fn draw(pass: &Pass<'_>, of: &RasterPass<'_>) -> Option<Seen> {
     if !sees_the_same(pass) {
         return None;

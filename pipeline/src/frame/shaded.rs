@@ -87,7 +87,8 @@ impl<'a> ShadedTriangle<'a> {
         Self { pass, draw, triangle: number, vertices, corners, reference, sampler, attributes, covering }
     }
 
-    /// Barycentric weights of the point at which a cell is shaded: its middle, or the centroid of the covered samples.
+    /// Barycentric weights of the point at which a cell is shaded: its middle, or the centroid of the covered
+    /// samples.
     fn weights_of(&self, cell: [i32; 2]) -> [f32; 3] {
         match self.centroid(cell) {
             Some(at) => weights_at(&self.reference, at),
@@ -95,8 +96,8 @@ impl<'a> ShadedTriangle<'a> {
         }
     }
 
-    /// Image coordinate of the mean of the samples of a pixel that the triangle covers; `None` where it covers the middle or none
-    /// of them, and in draws without centroids.
+    /// Image coordinate of the mean of the samples of a pixel that the triangle covers; `None` where it
+    /// covers the middle or none of them, and in draws without centroids.
     fn centroid(&self, cell: [i32; 2]) -> Option<[f32; 2]> {
         let (corners, settings) = (self.covering.as_ref()?, self.pass.settings);
         let (viewport, source) = (settings.viewport, settings.samples);
@@ -160,7 +161,8 @@ impl<'a> ShadedTriangle<'a> {
         self.of_weights(cell, self.weights_of(cell), self.sampler.map(of_quad).as_ref())
     }
 
-    /// Shader input and texel of a cell that is shaded at the point with the given weights, in a quad with this footprint.
+    /// Shader input and texel of a cell that is shaded at the point with the given weights, in a quad with
+    /// this footprint.
     fn of_weights(
         &self,
         cell: [i32; 2],
@@ -369,8 +371,9 @@ impl ShadedTriangle<'_> {
         (ShadingPoint { pixel, sample, ..self.point_at(weights, view.t) }, texel)
     }
 
-    /// Work of the four lanes of a quad of pixels at one sample index; `line` gets every line that they read through the
-    /// texture cache. `samples` has the samples of each pixel of the quad. A helper lane uses the sample of its own pixel.
+    /// Work of the four lanes of a quad of pixels at one sample index; `line` gets every line that they read
+    /// through the texture cache. `samples` has the samples of each pixel of the quad. A helper lane uses the
+    /// sample of its own pixel.
     pub fn quad_at(
         &self,
         access: &QuadAccess,

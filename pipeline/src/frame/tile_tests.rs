@@ -117,7 +117,8 @@ impl Remaining {
 }
 
 impl Subject<'_> {
-    /// Run the tests at `tile` on the part `remaining` so far, and keep what is left. `None` if the triangle is not visible there.
+    /// Run the tests at `tile` on the part `remaining` so far, and keep what is left. `None` if the triangle
+    /// is not visible there.
     pub fn test(
         &self,
         tile: &TestTile,

@@ -238,8 +238,8 @@ impl<'a, 'p> BinWorker<'a, 'p> {
         [triangle.moving, within.lens]
     }
 
-    /// Store the covered samples in passes whose order matters, where the sample test only lists them; request the quads
-    /// to shade and update the depth bounds.
+    /// Store the covered samples in passes whose order matters, where the sample test only lists them;
+    /// request the quads to shade and update the depth bounds.
     fn shade_and_store(&mut self, triangle: &Triangle, index: usize, origin: [u32; 2]) {
         let state = self.state();
         let Scratch { samples, hits, fragments, .. } = &mut *self.scratch;
@@ -283,7 +283,8 @@ impl<'a, 'p> BinWorker<'a, 'p> {
         }
     }
 
-    /// Request the quads of the shaded samples of a tile, seen on a triangle with the given corners that may be moving.
+    /// Request the quads of the shaded samples of a tile, seen on a triangle with the given corners that may
+    /// be moving.
     fn request_quads(&mut self, (corners, moving): (&[Corner; 3], bool), index: usize, origin: [u32; 2]) {
         let Settings { spec, samples: source, .. } = *self.pass.settings;
         let (samples, side) = (&self.scratch.samples[index], spec.tile_px);
@@ -589,8 +590,9 @@ impl BinWorker<'_, '_> {
         visible.within.map(|part| (time(part), front))
     }
 
-    /// Finds the bounds of the loaded depths of a tile when they are first needed: the unit of depth reads all of them, in a packet
-    /// before that of the triangle, and each is compared once, as when [`super::Gpu::gather_farthest_depths`] does it.
+    /// Finds the bounds of the loaded depths of a tile when they are first needed: the unit of depth reads
+    /// all of them, in a packet before that of the triangle, and each is compared once, as when
+    /// [`super::Gpu::gather_farthest_depths`] does it.
     fn bound_loaded(&mut self, triangle: u32, index: usize) {
         let (origin, pass) = (self.bin.tile_origin(self.pass, index), self.pass);
         let samples = &self.scratch.samples[index];

@@ -221,14 +221,15 @@ impl Clip {
         numbers.then_some(Self { u, v, t, ..Self::NONE })
     }
 
-    /// The planes with others across `x` and `y`, shares of the image from its left (0 to 1) and from its top, or `None` if a
-    /// bound is NaN. Conservative mode has its scissors instead.
+    /// The planes with others across `x` and `y`, shares of the image from its left (0 to 1) and from its
+    /// top, or `None` if a bound is NaN. Conservative mode has its scissors instead.
     pub fn across_image(self, x: [f32; 2], y: [f32; 2]) -> Option<Self> {
         let numbers = [x, y].iter().flatten().all(|bound| !bound.is_nan());
         numbers.then_some(Self { image: [x, y], ..self })
     }
 
-    /// First and last included image coordinate on each axis, in pixels from the centre of the image; `None` without planes there.
+    /// First and last included image coordinate on each axis, in pixels from the centre of the image; `None`
+    /// without planes there.
     pub fn in_image(&self, viewport: Viewport) -> Option<[[f32; 2]; 2]> {
         let sides = [viewport.width(), viewport.height()].map(f64::from);
         let px = |share: f32, side: f64| ((f64::from(share) - 0.5) * side) as f32;

@@ -1,4 +1,5 @@
-//! Memory of the pipeline: the address space of a frame, set-associative caches (hits and misses), and traffic to the chips.
+//! Memory of the pipeline: the address space of a frame, set-associative caches (hits and misses), and
+//! traffic to the chips.
 
 mod shared;
 mod system;
@@ -49,7 +50,8 @@ pub struct AddressSpace {
 }
 
 impl AddressSpace {
-    /// End of the addresses of surfaces, vertices and textures. A line has a number of 32 bits; the upper half is for bins.
+    /// End of the addresses of surfaces, vertices and textures. A line has a number of 32 bits; the upper
+    /// half is for bins.
     pub const END: u64 = LINE_BYTES << 31;
 
     /// A new surface of `bytes`.

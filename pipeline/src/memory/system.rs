@@ -17,7 +17,8 @@ pub struct MemorySpec {
     pub colour: CacheSpec,
     /// Texture cache.
     pub texture: CacheSpec,
-    /// Triangle buffer: cache of bins, which are set-up records and lists of triangles. Without it bins take no memory.
+    /// Triangle buffer: cache of bins, which are set-up records and lists of triangles. Without it bins take
+    /// no memory.
     #[serde(default)]
     pub bins: Option<CacheSpec>,
     /// L2, shared by all.
@@ -167,8 +168,8 @@ impl MemorySystem {
         }
     }
 
-    /// Read or write the line at `address` for a group of lanes. Groups have no cache above the L2, which knows the bytes of a
-    /// line that are written: a line is not fetched to be written in part.
+    /// Read or write the line at `address` for a group of lanes. Groups have no cache above the L2, which
+    /// knows the bytes of a line that are written: a line is not fetched to be written in part.
     pub fn buffer(&mut self, address: u64, write: bool, counts: &mut PacketCounts) {
         self.l2.access(Unit::Compute, self.compressed.moved_line(address / LINE_BYTES), write, counts);
     }

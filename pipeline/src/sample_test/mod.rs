@@ -190,7 +190,8 @@ pub(crate) fn vertices_seen(corners: &[Corner; 3], rows: &SampleRows<'_>, lane: 
     corners.map(|corner| see(&corner, slope, lens, rows.t[lane]))
 }
 
-/// Whether a sample with these rays ([`crate::geometry::Shear::ray`]) is inside a triangle and beyond the near depth at time `t`.
+/// Whether a sample with these rays ([`crate::geometry::Shear::ray`]) is inside a triangle and beyond the
+/// near depth at time `t`.
 pub(crate) fn covers(corners: &[Corner; 3], [across, down]: [[f32; 2]; 2], t: f32, near: f32) -> bool {
     let seen = corners.map(|corner| see(&corner, [across[0], down[0]], [across[1], down[1]], t));
     hit(&seen, [true; 2]).is_some_and(|(depth, _)| depth > near)

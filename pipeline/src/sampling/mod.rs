@@ -116,7 +116,8 @@ pub struct TileSamples {
     pub x: Vec<f32>,
     /// Image position in pixels from the centre of the image, downwards.
     pub y: Vec<f32>,
-    /// Image position from the middle of the part of the tile in the image, as the sample table of the hardware keeps it.
+    /// Image position from the middle of the part of the tile in the image, as the sample table of the
+    /// hardware keeps it.
     pub from_middle: [Vec<f32>; 2],
     /// Lens position.
     pub u: Vec<f32>,
@@ -187,8 +188,8 @@ impl TileSamples {
         }
     }
 
-    /// Fills the arrays with samples that are sorted by time. The first pixel of the tile and its pixels inside the image are
-    /// given.
+    /// Fills the arrays with samples that are sorted by time. The first pixel of the tile and its pixels
+    /// inside the image are given.
     fn fill_sorted(
         &mut self,
         sorted: &TimedBlock,
@@ -255,7 +256,8 @@ impl TileSamples {
         u32::from(self.order[slot]) % per_pixel
     }
 
-    /// Places of the samples, by slot: the pixel in the tile, row by row, times the samples per pixel, plus the index in the pixel.
+    /// Places of the samples, by slot: the pixel in the tile, row by row, times the samples per pixel, plus
+    /// the index in the pixel.
     pub(crate) fn places(&self) -> &[u16] {
         &self.order
     }

@@ -31,8 +31,9 @@ pub enum Pattern {
         #[serde(deserialize_with = "points")]
         points: u32,
     },
-    /// The standard positions of multisample antialiasing with 1, 2, 4, 8 or 16 samples, the same in every pixel, at the
-    /// centre of the lens and in the middle of the shutter (Direct3D 11 Functional Specification 3.0, section 19.2.4).
+    /// The standard positions of multisample antialiasing with 1, 2, 4, 8 or 16 samples, the same in every
+    /// pixel, at the centre of the lens and in the middle of the shutter (Direct3D 11 Functional
+    /// Specification 3.0, section 19.2.4).
     Multisample,
     /// The same as [`Pattern::Interleaved`] with a given set: `(u, v, t)` on the lens and in time, used unchanged.
     Given {
@@ -134,7 +135,8 @@ impl Pattern {
     }
 }
 
-/// Standard positions of this many samples in sixteenths of a pixel from its centre, `y` downwards; empty for other numbers.
+/// Standard positions of this many samples in sixteenths of a pixel from its centre, `y` downwards; empty for
+/// other numbers.
 fn multisample(count: u32) -> &'static [[i8; 2]] {
     match count {
         1 => &[[0, 0]],

@@ -1,5 +1,5 @@
-//! Formats: how a value is kept in memory, and what it reads as afterwards. The rounding is that of Direct3D 11 (Functional
-//! Specification 3.0, section 3.2.3), and of IEEE 754 for halves.
+//! Formats: how a value is kept in memory, and what it reads as afterwards. The rounding is that of Direct3D
+//! 11 (Functional Specification 3.0, section 3.2.3), and of IEEE 754 for halves.
 
 use glam::Vec4;
 use half::f16;
@@ -23,8 +23,8 @@ pub enum Format {
     R32u,
     /// Depth as a single.
     D32,
-    /// Depth as a floating-point number of 24 bits (exponent of 8, fraction of 16 and no sign, as depths are positive and
-    /// may be infinite), and a stencil value.
+    /// Depth as a floating-point number of 24 bits (exponent of 8, fraction of 16 and no sign, as depths are
+    /// positive and may be infinite), and a stencil value.
     D24S8,
 }
 

@@ -1,6 +1,6 @@
-//! Surfaces: named images of a frame that passes write and later ones read, in a [`Format`], with one or more samples per
-//! pixel. What is read is what the format kept.
-//! A shader reads textures, surfaces and buffers through [`Bound`].
+//! Surfaces: named images of a frame that passes write and later ones read, in a [`Format`], with one or more
+//! samples per pixel. What is read is what the format kept. A shader reads textures, surfaces and buffers
+//! through [`Bound`].
 
 mod format;
 
@@ -82,8 +82,8 @@ impl<'a> SurfaceSpec<'a> {
         Self { name, viewport, format, samples: 1, levels: 1 }
     }
 
-    /// The surface with a chain of `levels`, at least one and at most down to a pixel. Each is half as wide and high as the one
-    /// before, rounded down.
+    /// The surface with a chain of `levels`, at least one and at most down to a pixel. Each is half as wide
+    /// and high as the one before, rounded down.
     #[must_use]
     pub fn with_levels(self, levels: u32) -> Self {
         let most = self.viewport.width().max(self.viewport.height()).ilog2() + 1;
@@ -253,7 +253,8 @@ impl<'a> Bound<'a> {
         Self(Source::Buffer(words))
     }
 
-    /// The word of buffer `number` at `index`, and the address of its line; `None` if another one is bound here, or beyond it.
+    /// The word of buffer `number` at `index`, and the address of its line; `None` if another one is bound
+    /// here, or beyond it.
     pub(crate) fn word(&self, number: u32, index: u32) -> Option<(u32, u64)> {
         let Source::Buffer(words) = &self.0 else { return None };
         words.word(number, index).map(|(word, address)| (word, address / LINE_BYTES * LINE_BYTES))
@@ -282,8 +283,8 @@ impl<'a> Bound<'a> {
     }
 }
 
-/// Mean of the two levels next to `lod`, as of a texture, and the number of bilinear fetches. Levels that are not filtered are not
-/// mixed: the nearest is read.
+/// Mean of the two levels next to `lod`, as of a texture, and the number of bilinear fetches. Levels that are
+/// not filtered are not mixed: the nearest is read.
 fn trilinear(
     levels: &[(Arc<Texels>, Layout)],
     uv: Vec2,
@@ -304,8 +305,8 @@ fn is_filtered(texels: &Texels) -> bool {
     texels.format().can_blend() && texels.samples() == 1
 }
 
-/// Mean of the four texels around `uv` by their distance; border texels continue. Integers, depths and surfaces of several
-/// samples are not filtered: the nearest texel, the first sample.
+/// Mean of the four texels around `uv` by their distance; border texels continue. Integers, depths and
+/// surfaces of several samples are not filtered: the nearest texel, the first sample.
 fn bilinear(texels: &Texels, layout: &Layout, uv: Vec2, mut line: impl FnMut(u64)) -> Vec4 {
     let (around, fraction) = taps(texels.size(), [Wrap::Clamp; 2], uv);
     let is_filtered = is_filtered(texels);

@@ -20,8 +20,9 @@
 //! last `w`. Vertices behind the camera bound those values from the other side. If no value remains there is
 //! no line.
 //!
-//! Lens spans: separate `u` tests for views over disjoint regions of the lens (Nilsson et al. 2012, section 8): "the separate lens
-//! regions could share the tile test for the v-axis, but perform separate tests for the u-axis".
+//! Lens spans: separate `u` tests for views over disjoint regions of the lens (Nilsson et al. 2012, section
+//! 8): "the separate lens regions could share the tile test for the v-axis, but perform separate tests for
+//! the u-axis".
 //!
 //! Between the regions the lens has no samples. One interval of `u` and `t` over the whole lens has to contain the
 //! gaps, and its times are those of all views together. With one interval per region a tile between the views'

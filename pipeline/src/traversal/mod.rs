@@ -5,17 +5,19 @@
 //! sample test at the corners of the tile, with an allowance for the rounding of both.
 //!
 //! Both modes of the pipeline run these tests. They take vertices in `f32` that may be off by half of
-//! [`slack`](crate::setup::Triangle::slack): in standard mode by the rounding of the sample test, in conservative mode by
-//! that of the input ([`conservative`](crate::conservative)).
+//! [`slack`](crate::setup::Triangle::slack): in standard mode by the rounding of the sample test, in
+//! conservative mode by that of the input ([`conservative`](crate::conservative)).
 //!
 //! *Cost* of each test in multiply-adds, the same for perspective and orthographic views. The kernels are
-//! generic over [`Number`]. The tests below run them with counting numbers and compare the counts with these constants.
+//! generic over [`Number`]. The tests below run them with counting numbers and compare the counts with these
+//! constants.
 //!
-//! *Motion and blur thresholds*: how far motion and blur move the outline of a triangle on the image. The image of a vertex in front of the camera moves monotonically in time on both axes, so its distance
-//! from its mid-shutter image is largest at an end. Over the lens it moves on a line, with the largest
-//! distance at the ends, by `a - s / w`, which is monotone in `w`. In an orthographic view the distance is `a
-//! w - s`, also monotone. The image of a triangle in front of the camera is the hull of the images of its
-//! vertices, so no point of its outline moves farther than they do.
+//! *Motion and blur thresholds*: how far motion and blur move the outline of a triangle on the image. The
+//! image of a vertex in front of the camera moves monotonically in time on both axes, so its distance from
+//! its mid-shutter image is largest at an end. Over the lens it moves on a line, with the largest distance at
+//! the ends, by `a - s / w`, which is monotone in `w`. In an orthographic view the distance is `a w - s`,
+//! also monotone. The image of a triangle in front of the camera is the hull of the images of its vertices,
+//! so no point of its outline moves farther than they do.
 
 mod edges;
 mod lens;

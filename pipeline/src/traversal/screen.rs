@@ -1,7 +1,8 @@
-//! What a box shows of a triangle. *Screening* of single samples by edges linearized in (X, Y, u, v, t) (Munkberg and Akenine-Moeller 2012,
-//! whose hyperplanes these are; the remainder bound is new here).
+//! What a box shows of a triangle. *Screening* of single samples by edges linearized in (X, Y, u, v, t)
+//! (Munkberg and Akenine-Moeller 2012, whose hyperplanes these are; the remainder bound is new here).
 //!
-//! *Facing test*: which face of a triangle the samples of a box see. Seen from `(u, v)` at time `t`, the determinant of its vertices is
+//! *Facing test*: which face of a triangle the samples of a box see. Seen from `(u, v)` at time `t`, the
+//! determinant of its vertices is
 //!
 //! ```text
 //! det(u, v, t) = det[x, y, w] + u s sum(A) + v s' sum(B)        A, B as in `edges`
@@ -29,8 +30,8 @@ use super::region::{Faces, Piece, TimePieces, View};
 pub struct Screen {
     /// Value of each edge in the middle of the box.
     pub value: [f32; 3],
-    /// Value of each edge in the middle of the tile, extrapolated to the middle of the lens and the start of the shutter, from which
-    /// positions of samples are.
+    /// Value of each edge in the middle of the tile, extrapolated to the middle of the lens and the start of
+    /// the shutter, from which positions of samples are.
     pub base: [f32; 3],
     /// Slope of each edge along X, Y, u, v, t.
     pub gradient: [[f32; 5]; 3],
@@ -118,15 +119,15 @@ pub(super) struct Linear<N> {
     pub extent: N,
 }
 
-/// Multiply-adds of screening one sample: three edges, one per dimension in use. The sample table has positions from the middle of
-/// the tile.
+/// Multiply-adds of screening one sample: three edges, one per dimension in use. The sample table has
+/// positions from the middle of the tile.
 pub const fn screen_madds(moving: bool, lens: bool) -> u32 {
     3 * (2 + moving as u32 + 2 * lens as u32)
 }
 
-/// Shift of the values of an edge, and its margin. If only one face can be visible, one edge on the wrong side suffices. The
-/// threshold is then shifted so far that the other side always passes. `off` is an error of the values, and `reach` how far the edge
-/// changes from the box to where positions are from.
+/// Shift of the values of an edge, and its margin. If only one face can be visible, one edge on the wrong
+/// side suffices. The threshold is then shifted so far that the other side always passes. `off` is an error
+/// of the values, and `reach` how far the edge changes from the box to where positions are from.
 fn one_sided<N: Number>(linear: &Linear<N>, [off, reach]: [f64; 2], faces: Faces) -> [f64; 2] {
     // The linear value is rounded a dozen times, each by at most 2^-24 of the sum of magnitudes.
     const ROUNDING: f64 = 1.0 / 1_048_576.0;

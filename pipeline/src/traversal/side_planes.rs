@@ -29,7 +29,8 @@ pub fn narrow_counted<N: Number>(
     (is_left.then_some(left), madds)
 }
 
-/// Narrows `within` to the part in which `triangle` may touch `tile`. Whether there is one, and the cost in multiply-adds.
+/// Narrows `within` to the part in which `triangle` may touch `tile`. Whether there is one, and the cost in
+/// multiply-adds.
 pub fn narrow_by_sides<N: Number, C: Coordinate>(
     triangle: &Triangle<C>,
     shear: &Shear<C>,
@@ -75,8 +76,9 @@ pub(super) fn narrow_sides<N: Number, C: Coordinate>(
     (true, madds)
 }
 
-/// Narrows `within` to the part in which a vertex may be beyond the depth `near`. Whether there is one, and the cost in
-/// multiply-adds. `slack` bounds the error of a depth. The near depth is a side that no lens position moves.
+/// Narrows `within` to the part in which a vertex may be beyond the depth `near`. Whether there is one, and
+/// the cost in multiply-adds. `slack` bounds the error of a depth. The near depth is a side that no lens
+/// position moves.
 pub fn narrow_near<N: Number, C: Coordinate>(
     triangle: &Triangle<C>,
     near: C,

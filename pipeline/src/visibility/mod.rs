@@ -103,15 +103,17 @@ pub(crate) struct SeenBin {
     pub origin: [u32; 2],
     /// Side in pixels, a power of two and at least 16.
     pub side_px: u32,
-    /// Triangle, or [`Visibility::NO_TRIANGLE`], of every sample: pixel by pixel in rows, also of pixels beyond the image.
+    /// Triangle, or [`Visibility::NO_TRIANGLE`], of every sample: pixel by pixel in rows, also of pixels
+    /// beyond the image.
     pub triangles: Vec<u32>,
     /// Depth of each; infinite without a triangle.
     pub depths: Vec<f32>,
 }
 
-/// Calls `take` with what the samples of each bin see of `count` triangles with these `corners`, and returns the results in the
-/// order of bins. Samples are sorted and dropped bin by bin, so those of a bin stay in the caches of the host. The value that
-/// `init` makes is for the bins that a worker takes one after another. `None` for an orthographic camera.
+/// Calls `take` with what the samples of each bin see of `count` triangles with these `corners`, and returns
+/// the results in the order of bins. Samples are sorted and dropped bin by bin, so those of a bin stay in the
+/// caches of the host. The value that `init` makes is for the bins that a worker takes one after another.
+/// `None` for an orthographic camera.
 pub(crate) fn bin_by_bin<'a, S, T: Send>(
     (camera, viewport, source): (&Camera, Viewport, &dyn SampleSource),
     (count, moving): (u32, bool),
@@ -284,8 +286,8 @@ struct TilePacket {
 }
 
 impl SortedTiles {
-    /// Sorts the tiles of the image of `sorter`. `None` if its samples do not repeat, or if packets of a tile would not be full or
-    /// not fit into a block.
+    /// Sorts the tiles of the image of `sorter`. `None` if its samples do not repeat, or if packets of a tile
+    /// would not be full or not fit into a block.
     pub fn new(sorter: &Sorter<'_>) -> Option<Self> {
         let Sorter { viewport, source, plan, .. } = *sorter;
         let [across, down] = [viewport.width(), viewport.height()].map(|side| side / SIDE_PX);
@@ -408,8 +410,8 @@ impl TilePacket {
         })
     }
 
-    /// Lowest and highest image position along an axis, with the corner of the tile. The slopes and bases of the samples are
-    /// written.
+    /// Lowest and highest image position along an axis, with the corner of the tile. The slopes and bases of
+    /// the samples are written.
     #[inline(always)]
     fn along<V: Lanes>(
         &self,

@@ -1,9 +1,9 @@
 //! Worker: rasterizes the triangles of one bin, through cells, blocks and packets.
 //!
-//! In sixteen cells at once the edges of a triangle are linearized about the middle of the box (Munkberg and Akenine-Moeller 2012), and the
-//! remainder is bounded term by term. Let `dX, dY, du, dv, dt` be offsets from the middle, `P` the position
-//! of a vertex there, `V` its velocity, `w` its depth and `w'` the change of depth. `(s, a)` is the shear of
-//! the lens in x, `(r, b)` in y. Then
+//! In sixteen cells at once the edges of a triangle are linearized about the middle of the box (Munkberg and
+//! Akenine-Moeller 2012), and the remainder is bounded term by term. Let `dX, dY, du, dv, dt` be offsets from
+//! the middle, `P` the position of a vertex there, `V` its velocity, `w` its depth and `w'` the change of
+//! depth. `(s, a)` is the shear of the lens in x, `(r, b)` in y. Then
 //!
 //! ```text
 //! P(d) = P + (du (a w - s) - dX w, dv (b w - r) - dY w) + dt (V + w' (a du - dX, b dv - dY))

@@ -49,12 +49,13 @@ fn requested(binned: &Binned) -> [[usize; 2]; 2] {
 
 #[test]
 fn records_and_lists_of_two_triangles_counted_by_hand() {
-    // Records of three positions and a number, 40 bytes: the second one lies in two lines. Four lists of two entries. The tile loop
-    // reads a line of a list and three of records in each bin.
+    // Records of three positions and a number, 40 bytes: the second one lies in two lines. Four lists of two
+    // entries. The tile loop reads a line of a list and three of records in each bin.
     let roomy = two_triangles(Some(CacheSpec::lru(64, 4)));
     assert_eq!(counted(&roomy), [8, 3 + 8, 4 * 4, 0]);
     assert_eq!(requested(&roomy), [[0, 0], [0, 0]]);
-    // With room for one line all but one line of every bin is fetched, and each line that is written makes room for the next.
+    // With room for one line all but one line of every bin is fetched, and each line that is written makes
+    // room for the next.
     let narrow = two_triangles(Some(CacheSpec::lru(1, 1)));
     assert_eq!(counted(&narrow), [8, 3 + 8, 4 * 4, 4 * 3]);
     assert_eq!(requested(&narrow), [[10, 0], [1, 12]]);

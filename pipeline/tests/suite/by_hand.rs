@@ -67,7 +67,8 @@ const BY_HAND: [(Event, u64); 25] = [
     (Event::ColourLines, 12 * 32 + 4 * 2 * 20 + 16 * (32 + 4)),
     (Event::SamplesResolved, 8192),
     (Event::PixelsResolved, 1024),
-    // The vertices fill one line and so do the indices; cleared lines are not read, and only the image is written back.
+    // The vertices fill one line and so do the indices; cleared lines are not read, and only the image is
+    // written back.
     (Event::DramReadBytes, 2 * 64),
     (Event::DramWriteBytes, 4 * 1024),
     (Event::TextureFetches, 0),
@@ -153,9 +154,9 @@ impl Shader for Columns {
     }
 }
 
-/// One triangle covers the image. The loop runs column + 1 times. Eight quads are a warp: two rows of quads of a tile, all of which
-/// take as long as its last column, or two quads with four samples each, which take as long as the second. Warps of a quad take as
-/// long as its second column.
+/// One triangle covers the image. The loop runs column + 1 times. Eight quads are a warp: two rows of quads
+/// of a tile, all of which take as long as its last column, or two quads with four samples each, which take
+/// as long as the second. Warps of a quad take as long as its second column.
 #[test]
 fn lanes_of_a_warp_take_as_long_as_the_longest() {
     let viewport = Viewport::new(32, 32).unwrap();

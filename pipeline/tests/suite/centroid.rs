@@ -1,4 +1,5 @@
-//! Centroids: where a triangle covers samples of a pixel but not its middle, attributes are those of a point inside the triangle.
+//! Centroids: where a triangle covers samples of a pixel but not its middle, attributes are those of a point
+//! inside the triangle.
 
 use activity::Event;
 use glam::{DVec2, Vec2, Vec3, Vec4};

@@ -75,8 +75,8 @@ proptest! {
         }
     }
 
-    /// The same across the image, alone and with planes across the lens. Some planes are at borders of pixels and tiles, others cut
-    /// pixels, and some leave nothing.
+    /// The same across the image, alone and with planes across the lens. Some planes are at borders of pixels
+    /// and tiles, others cut pixels, and some leave nothing.
     #[test]
     fn a_draw_is_seen_between_its_planes_across_the_image_only(
         kind in kinds(), lens: bool, switches in 0..SWITCHES, count in 1..60_u32, seed: u64, ordered: bool, of_frame: bool,

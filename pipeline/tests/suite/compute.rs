@@ -86,8 +86,8 @@ fn a_tree_in_shared_memory_adds_up() {
     let expected: Vec<u32> = data.chunks(256).map(|part| part.iter().sum()).collect();
     assert_eq!(sums[..4], expected);
     assert_eq!(sums[4..], data[4..], "nothing else is written");
-    // By hand, for a group of eight warps of 32 lanes, of which 128, 64, ..., 1 add: a load and a store; a compare, two
-    // loads, a sum and a store; and at the end a compare, a load and a store.
+    // By hand, for a group of eight warps of 32 lanes, of which 128, 64, ..., 1 add: a load and a store; a
+    // compare, two loads, a sum and a store; and at the end a compare, a load and a store.
     let adding = [4, 2, 1, 1, 1, 1, 1, 1];
     let steps = 2 + 8 * (1 + 5) + 3;
     let operations: u32 = 8 * 2 + adding.iter().map(|warps| 8 + 5 * warps + (8 - warps)).sum::<u32>() + 3 + 7;

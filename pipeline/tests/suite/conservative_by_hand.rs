@@ -41,8 +41,8 @@ fn times_and_depths_are_those_of_the_passing() {
     for (tile, touch) in touched {
         let enters = (f64::from(tile[0]) - 0.5).max(0.0) / 4.0;
         let leaves = (f64::from(tile[0]) + 1.0).min(4.0) / 4.0;
-        // Widened by 2^-20 of what makes up a distance: 8 of the tiles, 8 and 4 of a vertex and its motion, which takes
-        // that much longer at a speed of 4.
+        // Widened by 2^-20 of what makes up a distance: 8 of the tiles, 8 and 4 of a vertex and its motion,
+        // which takes that much longer at a speed of 4.
         let off = (8.0 + 12.0) / 4.0 / f64::from(1 << 20);
         let holds = |found: [f64; 2], exact: [f64; 2]| {
             found[0] <= exact[0]
@@ -68,8 +68,8 @@ fn only_doubles_separate_a_gap_of_a_billionth() {
     assert_eq!(gaps.map(|gap| touched(gap, double)), [1, 1]);
 }
 
-/// Whatever the depth and the distance, a triangle at one depth is there within the rounding of its depth to `f64`, and that
-/// of 2^-900 to `f32`.
+/// Whatever the depth and the distance, a triangle at one depth is there within the rounding of its depth to
+/// `f64`, and that of 2^-900 to `f32`.
 #[test]
 fn a_triangle_at_one_depth_stays_there() {
     for z in [0.0, 1.0, 1e-30, -3.1e7, 1e40] {

@@ -1,6 +1,6 @@
-//! Conservative mode against integers: whether a triangle touches a tile at a time and from a lens position is decided
-//! exactly, where its numbers have few bits. Every touch has to be reported in both precisions, those of a single point
-//! included.
+//! Conservative mode against integers: whether a triangle touches a tile at a time and from a lens position
+//! is decided exactly, where its numbers have few bits. Every touch has to be reported in both precisions,
+//! those of a single point included.
 
 use std::collections::HashMap;
 

@@ -1,5 +1,5 @@
-//! Conservative mode as a pass of the pipeline: its tiles are those of the rasterizer alone, and every packet counts what was
-//! done.
+//! Conservative mode as a pass of the pipeline: its tiles are those of the rasterizer alone, and every packet
+//! counts what was done.
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -145,8 +145,8 @@ fn the_tiles_are_those_of_the_rasterizer() {
     }
 }
 
-/// Lanes of a warp run in step: it takes as long as its longest lane, for each program that any of them runs. Lanes of tiles in
-/// conservative mode have no helpers.
+/// Lanes of a warp run in step: it takes as long as its longest lane, for each program that any of them runs.
+/// Lanes of tiles in conservative mode have no helpers.
 #[test]
 fn lanes_of_a_full_screen_pass_wait_for_their_warp() {
     let quads = PipelineSpec { warp_lanes: 4, ..spec(Features::ALL) };
@@ -254,8 +254,8 @@ fn lanes_of_tiles_wait_for_those_of_their_program() {
     assert!(7 * longest > own);
 }
 
-/// What happens on tiles is on the heat maps where the tiles are in the image, evenly over their pixels: here in its right half, the first
-/// row below.
+/// What happens on tiles is on the heat maps where the tiles are in the image, evenly over their pixels: here
+/// in its right half, the first row below.
 #[test]
 fn heat_maps_have_the_work_on_tiles_in_their_pixels() {
     let corners = [[0.5, 0.5, 2.0], [3.5, 0.5, 2.0], [0.5, 1.5, 4.0]];

@@ -161,8 +161,8 @@ proptest! {
     }
 }
 
-/// Two eyes see a small triangle in front of the focus in two places. Between them the whole lens has to be tested, and the
-/// eyes have nothing.
+/// Two eyes see a small triangle in front of the focus in two places. Between them the whole lens has to be
+/// tested, and the eyes have nothing.
 #[test]
 fn tiles_between_the_images_of_two_views_are_culled() {
     let eye = |middle: f32| LensRegion { u: (middle - 0.1, middle + 0.1), v: (-0.1, 0.1) };

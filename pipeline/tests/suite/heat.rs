@@ -101,8 +101,8 @@ fn tests_without_a_packet_are_counted_in_their_tile() {
     }
 }
 
-/// Over several passes of a frame every event is counted once: in its place in passes of the size of the maps, elsewhere in
-/// others.
+/// Over several passes of a frame every event is counted once: in its place in passes of the size of the
+/// maps, elsewhere in others.
 #[test]
 fn passes_of_a_frame_add_up_on_one_map() {
     let (spec, soup) = (spec(Features::ALL), Soup::new(SoupKind::Moving, 120, 4));

@@ -198,8 +198,9 @@ impl Shader for Uneven {
     }
 }
 
-/// A triangle with legs of 7.5 pixels in the first tile covers the 28 pixels with `x + y < 7` at their centres: ten quads, whose other
-/// twelve lanes are helpers. All forty load; lane `x` takes `x + 2` operations, and a warp of eight quads as long as its longest.
+/// A triangle with legs of 7.5 pixels in the first tile covers the 28 pixels with `x + y < 7` at their
+/// centres: ten quads, whose other twelve lanes are helpers. All forty load; lane `x` takes `x + 2`
+/// operations, and a warp of eight quads as long as its longest.
 #[test]
 fn helper_lanes_load_and_a_warp_waits_for_its_longest_lane() {
     let corners = [[0.0, 0.0], [7.5, 0.0], [0.0, 7.5]];

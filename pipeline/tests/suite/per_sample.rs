@@ -150,7 +150,8 @@ fn threads_change_nothing() {
     assert_eq!((one.images, one.counts), (three.images, three.counts));
 }
 
-/// Multisample antialiasing: coverage and depth by sample, one shade per pixel and triangle, or per sample on request.
+/// Multisample antialiasing: coverage and depth by sample, one shade per pixel and triangle, or per sample on
+/// request.
 #[test]
 fn multisampling_shades_once_per_pixel() {
     let viewport = Viewport::new(SIDE, SIDE).unwrap();

@@ -192,7 +192,8 @@ fn what_a_query_cannot_do_is_refused() {
     assert!(matches!(refused, PassError::Surface { problem: SurfaceProblem::Unwritten, .. }), "{refused}");
 }
 
-/// Every answer is a word that the unit of depth writes, by intervals and by samples, and is in memory when the frame ends.
+/// Every answer is a word that the unit of depth writes, by intervals and by samples, and is in memory when
+/// the frame ends.
 #[test]
 fn answers_reach_memory() {
     let stage = Stage::sampled(48, 32, 4);

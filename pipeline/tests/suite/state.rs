@@ -1,5 +1,5 @@
-//! State of draws: with any states, clip planes, discarding shaders, culling and batches, image and samples are those of storing every sample of every
-//! triangle in order.
+//! State of draws: with any states, clip planes, discarding shaders, culling and batches, image and samples
+//! are those of storing every sample of every triangle in order.
 
 use std::ops::Range;
 
@@ -244,7 +244,8 @@ impl Stored {
 }
 
 impl Part {
-    /// Stores the samples of a tile that are inside triangle `id` and are kept, front faces and back faces by themselves.
+    /// Stores the samples of a tile that are inside triangle `id` and are kept, front faces and back faces by
+    /// themselves.
     fn store(
         &self,
         tile: &TileOfSoup<'_>,
@@ -432,8 +433,8 @@ fn after_depths_alone_only_visible_samples_are_shaded() {
     assert_eq!(early[Event::SamplesHit], 6 * samples);
 }
 
-/// A shadow volume counted where depth fails (Everitt and Kilgard 2002): inside are points behind one more back face than
-/// front faces. Tiles in which all of it is hidden must not be culled.
+/// A shadow volume counted where depth fails (Everitt and Kilgard 2002): inside are points behind one more
+/// back face than front faces. Tiles in which all of it is hidden must not be culled.
 #[test]
 fn a_stencil_volume_counts_hidden_faces() {
     let stage = Stage::sampled(32, 32, 4);
@@ -536,7 +537,8 @@ fn hi_z_serves_other_depth_tests() {
     assert_eq!(all[Event::DepthWrites], 3 * samples);
 }
 
-/// Hidden-surface removal shades what is visible and nothing else; the image is the same. Passes with blending shade in order.
+/// Hidden-surface removal shades what is visible and nothing else; the image is the same. Passes with
+/// blending shade in order.
 #[test]
 fn hidden_surfaces_are_not_shaded_if_shading_waits() {
     let stage = Stage::sampled(32, 32, 4);

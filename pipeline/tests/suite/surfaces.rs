@@ -1,5 +1,6 @@
-//! Surfaces: passes onto any of them, with any formats, states, load and store operations, resolves and mip chains between them,
-//! leave what storing every sample of every triangle in order, and plain loops over samples and texels, leave.
+//! Surfaces: passes onto any of them, with any formats, states, load and store operations, resolves and mip
+//! chains between them, leave what storing every sample of every triangle in order, and plain loops over
+//! samples and texels, leave.
 
 use std::ops::Range;
 
@@ -557,16 +558,17 @@ fn loads_stores_and_clears_are_counted() {
             written.push(report.counts()[Event::DramWriteBytes]);
             written
         };
-        // A tile of 64 pixels has 8 lines of halves, 4 of bytes and 4 of depths, as 3 words of colour a pixel. The two
-        // triangles of the square have 4 x 4 blocks of pixels in common: the lines along the diagonal count twice.
+        // A tile of 64 pixels has 8 lines of halves, 4 of bytes and 4 of depths, as 3 words of colour a
+        // pixel. The two triangles of the square have 4 x 4 blocks of pixels in common: the lines along the
+        // diagonal count twice.
         let cleared = count(false, Store::Store);
         assert_eq!(cleared[..2], [64 * 3, 64 * 3]);
         // Three tiles are stored as they were cleared: 3 (8 + 4) lines of colour and 3 x 4 of depth.
         let (colour, depth) = (cleared[2] - 3 * 12, cleared[3] - 3 * 4);
         assert!((12..=24).contains(&colour) && (4..=8).contains(&depth), "{cleared:?}");
         assert_eq!(cleared[4..], [0, 4 * 16 * 64], "cleared tiles are not read, and all lines are written");
-        // The square ends at the borders of the other tiles, so these are tested, too: the 4 lines of depth of every tile are read to
-        // bound it. Of colour the lines drawn to are read; the others stay.
+        // The square ends at the borders of the other tiles, so these are tested, too: the 4 lines of depth
+        // of every tile are read to bound it. Of colour the lines drawn to are read; the others stay.
         let loaded = count(true, Store::Store);
         assert_eq!(loaded[2..], [colour, depth + 4 * 4, 8 + 4 + 4 * 4, 4 * 16 * 64]);
         assert_eq!(count(false, Store::Discard)[2..], [colour, depth, 0, 0], "nothing is written");
@@ -834,8 +836,9 @@ fn dropped_contents_are_gone() {
     });
 }
 
-/// Passes are drawn in the order in which they are requested, and read what earlier ones stored, so no cycle of them can be requested: one that
-/// reads what a later pass is to write is refused, or reads what was there before.
+/// Passes are drawn in the order in which they are requested, and read what earlier ones stored, so no cycle
+/// of them can be requested: one that reads what a later pass is to write is refused, or reads what was there
+/// before.
 #[test]
 fn a_pass_reads_what_earlier_passes_stored_and_never_what_later_ones_will() {
     with(|stage, settings| {

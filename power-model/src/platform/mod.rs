@@ -101,8 +101,8 @@ pub struct Platform {
     pub v_v: Sourced<Volts>,
     /// Constant power during a frame.
     pub constant_w: Sourced<Watts>,
-    /// Share of [`Self::constant_w`] that memory and its controllers draw, which grows with the number of channels. None if a file
-    /// does not say it.
+    /// Share of [`Self::constant_w`] that memory and its controllers draw, which grows with the number of
+    /// channels. None if a file does not say it.
     pub memory_share: Option<Sourced<Share>>,
     /// Leakage of the powered core.
     pub leakage: Leakage,
@@ -382,8 +382,8 @@ fn complete(rows: Vec<UnitRow>, file: &str) -> Result<Vec<UnitPower>, PlatformEr
         .collect()
 }
 
-/// Share of the leakage that is left between frames, of a platform that does not say it: power gating leaves memories and what is
-/// always on.
+/// Share of the leakage that is left between frames, of a platform that does not say it: power gating leaves
+/// memories and what is always on.
 const IDLE_SHARE: f64 = 0.5;
 
 impl Platform {
@@ -415,7 +415,8 @@ impl Platform {
     }
 }
 
-/// A unit's watts. In the levels below the L2 those of an idle unit are leakage and refresh, and only what is above them is the clock's.
+/// A unit's watts. In the levels below the L2 those of an idle unit are leakage and refresh, and only what is
+/// above them is the clock's.
 fn unit(row: &UnitPower, scaling: &Scaling, bound: Bound, how: &str) -> UnitPower {
     let (busy_w, idle_w) = (row.clock_tree_w.value(), row.idle_unit_w.value());
     let clock = scaling.clock_tree(row.unit).at(bound);

@@ -1,4 +1,5 @@
-//! Structure of a GPU: its memories and logic, and its energies and watts over those of the GPU that a platform was made for.
+//! Structure of a GPU: its memories and logic, and its energies and watts over those of the GPU that a
+//! platform was made for.
 
 mod weights;
 
@@ -72,8 +73,8 @@ impl Structure {
         found.find(|memory| (memory.unit, memory.name) == (other.unit, other.name))
     }
 
-    /// Area in square millimetres on the node `node_nm`: memories, logic and the die of an embedded DRAM. Wires between units and
-    /// interfaces to pins and to memory are not in it.
+    /// Area in square millimetres on the node `node_nm`: memories, logic and the die of an embedded DRAM.
+    /// Wires between units and interfaces to pins and to memory are not in it.
     pub fn area_mm2(&self, node_nm: u32) -> Estimate {
         weights::area_mm2(self, node_nm)
     }
@@ -156,8 +157,8 @@ impl Default for Scaling {
 }
 
 impl Scaling {
-    /// What `own` costs over `home`, on the node `node_nm`. Where `home` lacks a memory or a unit, the platform's numbers are for those of
-    /// `stated`.
+    /// What `own` costs over `home`, on the node `node_nm`. Where `home` lacks a memory or a unit, the
+    /// platform's numbers are for those of `stated`.
     pub fn new(own: &Structure, home: &Structure, stated: &Structure, node_nm: u32) -> Self {
         if own == home {
             return Self::default();

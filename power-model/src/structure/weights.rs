@@ -1,19 +1,21 @@
 //! What a structure weighs in area, leakage and clocks, under each assumption about transistors and ports.
-//! The cost of an SRAM lies between sizes that CACTI was run for; logic beside memories is counted in FP32 multiply-adds.
+//! The cost of an SRAM lies between sizes that CACTI was run for; logic beside memories is counted in FP32
+//! multiply-adds.
 
 use activity::{Event, Unit};
 
 use super::{Estimate, Memory, Structure};
 
-/// Powers of the accesses a cycle by which the bytes of a memory grow to have room for them: 0 where banks serve them, which only needs
-/// luck and a switch, and 1 for a copy for each. Between, a true multi-port memory of 8 ports takes 2.2 times the leakage, 2.8 times the
-/// energy and 10.9 times the area of one with one port (CACTI 7, 256 KB at 28 nm).
+/// Powers of the accesses a cycle by which the bytes of a memory grow to have room for them: 0 where banks
+/// serve them, which only needs luck and a switch, and 1 for a copy for each. Between, a true multi-port
+/// memory of 8 ports takes 2.2 times the leakage, 2.8 times the energy and 10.9 times the area of one with
+/// one port (CACTI 7, 256 KB at 28 nm).
 const PORT_POWERS: [f64; 3] = [0.0, 0.5, 1.0];
 /// The power of nominal costs.
 const NOMINAL_POWER: f64 = 0.5;
 
-/// Area of the die of an embedded DRAM for each byte, in square millimetres: its cells of 0.029 um2 alone, and 77 mm2 for 128 MB with its
-/// periphery (Hamzaoglu et al., JSSC 50(1), 2015).
+/// Area of the die of an embedded DRAM for each byte, in square millimetres: its cells of 0.029 um2 alone,
+/// and 77 mm2 for 128 MB with its periphery (Hamzaoglu et al., JSSC 50(1), 2015).
 const EDRAM_MM2_PER_BYTE: [f64; 3] = [8.0 * 0.029e-6, 77.0 / EDRAM_BYTES, 77.0 / EDRAM_BYTES];
 const EDRAM_BYTES: f64 = 134_217_728.0;
 /// Size of the memory to which the leakage of logic is compared from node to node.
@@ -74,8 +76,8 @@ impl Case {
         memories + self.madd_leakage_mw * structure.madds.iter().sum::<f64>()
     }
 
-    /// What the clock tree of `unit` drives: the energy of a cycle at full rate in picojoules. A platform's clock trees are a share of
-    /// that. For the off-chip memory it is the number of its channels.
+    /// What the clock tree of `unit` drives: the energy of a cycle at full rate in picojoules. A platform's
+    /// clock trees are a share of that. For the off-chip memory it is the number of its channels.
     pub fn clock_load(&self, structure: &Structure, unit: Unit) -> f64 {
         if unit == Unit::Dram {
             return structure.channels;
@@ -122,7 +124,8 @@ pub(super) fn area_mm2(structure: &Structure, node_nm: u32) -> Estimate {
     })
 }
 
-// Horowitz (ISSCC 2014, 45 nm): energies over those of an FP32 multiply and add. Logic that does more has more gates that switch.
+// Horowitz (ISSCC 2014, 45 nm): energies over those of an FP32 multiply and add. Logic that does more has
+// more gates that switch.
 const MADD_PJ: f64 = 0.9 + 3.7;
 const FADD: f64 = 0.9 / MADD_PJ;
 const HADD: f64 = 0.4 / MADD_PJ;
@@ -130,17 +133,17 @@ const HMUL: f64 = 1.1 / MADD_PJ;
 const IADD: f64 = 0.1 / MADD_PJ;
 const IMUL: f64 = 3.1 / MADD_PJ;
 
-/// Multiply-adds that a shader lane has gates for. Built up from parts, an operation takes 1.66 times the energy of its multiply-add
-/// beside registers (instruction and scheduling), with a pipeline's overhead 10.7 times (GPUWattch); their geometric mean, as in the
-/// energy table's row `shader_ops`.
+/// Multiply-adds that a shader lane has gates for. Built up from parts, an operation takes 1.66 times the
+/// energy of its multiply-add beside registers (instruction and scheduling), with a pipeline's overhead 10.7
+/// times (GPUWattch); their geometric mean, as in the energy table's row `shader_ops`.
 pub const LANE_MADDS: f64 = 4.2;
 
 /// Bytes of registers of a thread: 256 KB for 40 warps of 64 threads, as a core of a Tahiti has them.
 pub const REGISTER_BYTES: f64 = 102.4;
 
-/// Area of an FP32 multiply-add in squares of the node's length. Low: the multiplier of Aladdin's 40 nm library alone, 8970 um2, as a fused
-/// unit shares the adder; nominal: with its adder, 4360 um2; high: 0.045 mm2 at 32 nm, laid out and with variable precision (Kaul et al.,
-/// ISSCC 2012).
+/// Area of an FP32 multiply-add in squares of the node's length. Low: the multiplier of Aladdin's 40 nm
+/// library alone, 8970 um2, as a fused unit shares the adder; nominal: with its adder, 4360 um2; high: 0.045
+/// mm2 at 32 nm, laid out and with variable precision (Kaul et al., ISSCC 2012).
 pub(super) const MADD_SQUARES: [f64; 3] = [8970e6 / 1600.0, 13_330e6 / 1600.0, 45_000e6 / 1024.0];
 
 /// Leakage of an FP32 adder and multiplier of Aladdin's 40 nm library, in milliwatts.
@@ -148,7 +151,8 @@ pub(super) const MADD_LEAKAGE_MW: f64 = 0.053 + 0.120;
 /// Node of that library, in nanometres.
 pub(super) const MADD_LEAKAGE_NM: u32 = 40;
 
-/// Energy of an FP32 multiply-add in picojoules by node: Horowitz at 45 nm, and Stillmaker and Baas (2017) at equal voltage.
+/// Energy of an FP32 multiply-add in picojoules by node: Horowitz at 45 nm, and Stillmaker and Baas (2017) at
+/// equal voltage.
 pub(super) fn madd_pj(node_nm: u32) -> f64 {
     let ratio = match node_nm {
         ..=24 => 0.315,
@@ -160,8 +164,8 @@ pub(super) fn madd_pj(node_nm: u32) -> f64 {
     MADD_PJ * ratio
 }
 
-/// Multiply-adds' worth of logic for one `event` a cycle: the operations that its row of the energy table counts. 0 for events that
-/// only access a memory.
+/// Multiply-adds' worth of logic for one `event` a cycle: the operations that its row of the energy table
+/// counts. 0 for events that only access a memory.
 pub fn madds(event: Event) -> f64 {
     match event {
         Event::Draws => 1000.0 * IADD,
@@ -189,8 +193,9 @@ pub fn madds(event: Event) -> f64 {
 /// Runs of CACTI 7. The file says how they were made.
 const RUNS: &str = include_str!("../../tables/cacti.csv");
 
-/// Ratio within which a cost between two runs lies on either side of the interpolated one: the worst error where a run is left out
-/// and found from its neighbours. CACTI changes the organisation of a memory from size to size, so that costs are no smooth curve.
+/// Ratio within which a cost between two runs lies on either side of the interpolated one: the worst error
+/// where a run is left out and found from its neighbours. CACTI changes the organisation of a memory from
+/// size to size, so that costs are no smooth curve.
 pub const INTERPOLATION: f64 = 1.5;
 
 /// A cost of a memory.
@@ -271,8 +276,8 @@ impl Sram {
         Self { fast: runs[0].fast, node_nm: runs[0].node_nm, ln_bytes, ln_costs }
     }
 
-    /// Cost of a memory of `bytes` with one port: a straight line between runs in logarithms, the nearest of these lines beyond the
-    /// runs. Nothing costs nothing.
+    /// Cost of a memory of `bytes` with one port: a straight line between runs in logarithms, the nearest of
+    /// these lines beyond the runs. Nothing costs nothing.
     pub fn cost(&self, cost: Cost, bytes: f64) -> f64 {
         if bytes <= 0.0 {
             return 0.0;
@@ -284,8 +289,8 @@ impl Sram {
     }
 }
 
-/// The values with those that fall replaced by means of neighbours, the closest such series (pool adjacent violators; Ayer et al., Ann.
-/// Math. Statist. 26, 1955).
+/// The values with those that fall replaced by means of neighbours, the closest such series (pool adjacent
+/// violators; Ayer et al., Ann. Math. Statist. 26, 1955).
 fn never_falling(values: impl Iterator<Item = f64>) -> Vec<f64> {
     let mut pools: Vec<(f64, usize)> = Vec::new();
     for value in values {

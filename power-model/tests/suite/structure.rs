@@ -7,7 +7,8 @@ use power_model::{
 
 use super::common::{reference, table};
 
-/// Leaves each run but the first and last of its curve out and finds it from the others: none is beyond the stated interval.
+/// Leaves each run but the first and last of its curve out and finds it from the others: none is beyond the
+/// stated interval.
 #[test]
 fn a_run_that_is_left_out_lies_within_the_stated_interval() {
     let runs = SramRun::all();
@@ -106,7 +107,8 @@ fn equal_structures_have_ratios_of_one() {
     assert_eq!(Scaling::default().event(Event::L2Reads), Estimate::ONE);
 }
 
-/// Watts of files have a range; those computed from a machine that nobody could build do not, so that it is warned of, not refused.
+/// Watts of files have a range; those computed from a machine that nobody could build do not, so that it is
+/// warned of, not refused.
 #[test]
 fn a_machine_beyond_all_watts_is_still_a_machine() {
     let (home, own) = (structure(0.0, 1.0), structure(0.0, 1e12));

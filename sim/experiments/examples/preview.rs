@@ -1,5 +1,5 @@
-//! Previews of charts: `cargo run --release -p experiments --example preview [-- STUDY FOLDER]`; without arguments the studies
-//! are listed.
+//! Previews of charts: `cargo run --release -p experiments --example preview [-- STUDY FOLDER]`; without
+//! arguments the studies are listed.
 
 use std::error::Error;
 use std::path::Path;

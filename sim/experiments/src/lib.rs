@@ -6,8 +6,9 @@
 //! - [`all`]: the list of these studies.
 //! - [`reproduce`]: claims of papers, computed and compared with them.
 //!
-//! A study is measured once with an effort, full or quick. Its result is drawn, put into tables and written as JSON, and
-//! gives trade-off points: an error and a cost, which `chart all` draws for all methods in one picture.
+//! A study is measured once with an effort, full or quick. Its result is drawn, put into tables and written
+//! as JSON, and gives trade-off points: an error and a cost, which `chart all` draws for all methods in one
+//! picture.
 //!
 //! ```
 //! let growth = experiments::all().find(|study| study.name == "growth").expect("a chart of the book");

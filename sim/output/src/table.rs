@@ -81,7 +81,8 @@ pub fn si_digits(value: f64, unit: &str, digits: usize) -> String {
     format!("{text} {}{unit}", prefix.sign).trim_end().to_owned()
 }
 
-/// `12.3 ± 0.4 mJ`: mean and standard deviation with the prefix and the decimals of the mean; the mean alone if there is no deviation.
+/// `12.3 ± 0.4 mJ`: mean and standard deviation with the prefix and the decimals of the mean; the mean alone
+/// if there is no deviation.
 pub fn si_mean_sd(stats: MeanSd, unit: &str) -> String {
     if !stats.mean.is_finite() {
         return "n/a".to_owned();
@@ -155,7 +156,8 @@ pub fn counted(count: usize, thing: &str) -> String {
     format!("{} {thing}{ending}", grouped(count as u64))
 }
 
-/// Text table for a terminal: the first column is left-aligned, the others right-aligned unless all of them are texts.
+/// Text table for a terminal: the first column is left-aligned, the others right-aligned unless all of them
+/// are texts.
 #[derive(Clone, Debug, Default)]
 pub struct Table {
     rows: Vec<Vec<String>>,

@@ -1,4 +1,5 @@
-//! The terminal: errors, warnings, notes and details on standard error, coloured where it shows colours, and progress bars below them.
+//! The terminal: errors, warnings, notes and details on standard error, coloured where it shows colours, and
+//! progress bars below them.
 
 use std::io::{IsTerminal, Write, stderr};
 

@@ -1,4 +1,5 @@
-//! Cycles, energy and area of one frame of a scene on every built-in GPU: `cargo run --release -p run --example gpus -- default`.
+//! Cycles, energy and area of one frame of a scene on every built-in GPU: `cargo run --release -p
+//! run --example gpus -- default`.
 
 use output::table::{digits, si};
 use output::terminal::Progress;

@@ -198,7 +198,8 @@ const PROGRAM_BYTES: u64 = 30_000_000;
 /// Memory of one triangle of the scene in bytes.
 const TRIANGLE_BYTES: u64 = 150;
 
-/// Whether a frame is one rendering of a scene. Passes of other jobs keep surfaces, and draw all triangles, of their own.
+/// Whether a frame is one rendering of a scene. Passes of other jobs keep surfaces, and draw all triangles,
+/// of their own.
 pub(super) fn is_rendering(plan: &Plan) -> bool {
     let settings = plan.job.settings();
     let size = [settings.width, settings.height];

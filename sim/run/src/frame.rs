@@ -1,4 +1,5 @@
-//! A frame of a run or of a job: drawn, timed and with its power, and the energy of its passes; and which frames of a run differ.
+//! A frame of a run or of a job: drawn, timed and with its power, and the energy of its passes; and which
+//! frames of a run differ.
 
 use std::any::Any;
 use std::collections::HashMap;
@@ -256,7 +257,8 @@ impl PassEnergy {
 /// Largest number of bins of a frame.
 const MAX_BINS: usize = 4096;
 
-/// Draws a frame on the pipeline of `gpu`, with heat maps of some events over images of a size, and emits its packets.
+/// Draws a frame on the pipeline of `gpu`, with heat maps of some events over images of a size, and emits its
+/// packets.
 pub(crate) fn draw_on<'a>(
     gpu: &'a GpuSpec,
     heat: Option<(&[Event], Viewport)>,

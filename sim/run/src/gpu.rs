@@ -279,7 +279,8 @@ impl GpuSpec {
 /// Ratio from which watts are too far from those of the GPU of the platform to be scaled without a warning.
 const FAR: f64 = 4.0;
 
-/// Checks that platform and energy table belong to the GPU, and that it is near the one that the platform was made for.
+/// Checks that platform and energy table belong to the GPU, and that it is near the one that the platform was
+/// made for.
 pub(super) fn check_pairing(
     options: &RunOptions,
     gpu: &GpuSpec,
@@ -314,8 +315,8 @@ pub(super) fn check_pairing(
     Some(Warning::new(Code::PlatformMismatch, message))
 }
 
-/// Whether the GPU file names this platform and table, by the path in the options or by a name. A changed copy of a supplied
-/// file has the same name and is another machine.
+/// Whether the GPU file names this platform and table, by the path in the options or by a name. A changed
+/// copy of a supplied file has the same name and is another machine.
 fn belongs(own: &PowerFiles, options: &RunOptions, platform: &Platform, table: &EnergyTable) -> bool {
     let is_named =
         |own: &str, given: &Option<PathBuf>| given.as_ref().is_none_or(|given| given == Path::new(own));

@@ -1,4 +1,5 @@
-//! Hardware of a GPU: the structure that its file describes, its area, and its power beside that of the GPU of the platform.
+//! Hardware of a GPU: the structure that its file describes, its area, and its power beside that of the GPU
+//! of the platform.
 
 use activity::{Event, Unit};
 use pipeline::CacheSpec;
@@ -32,8 +33,8 @@ pub fn scaling(gpu: &GpuSpec, platform: &Platform) -> Result<Scaling, GpuError> 
     Ok(Scaling::new(&structure(gpu), &structure(&home), &stated()?, platform.node_nm))
 }
 
-/// Units for which platforms have numbers although their GPU lacks them: the compute unit of the reference GPU, and the levels below the
-/// L2 for which the rows are stated.
+/// Units for which platforms have numbers although their GPU lacks them: the compute unit of the reference
+/// GPU, and the levels below the L2 for which the rows are stated.
 fn stated() -> Result<Structure, GpuError> {
     let mut stated = structure(&GpuSpec::load("reference")?);
     stated
@@ -88,7 +89,8 @@ fn memory(name: &'static str, unit: Unit, bytes: f64, width_bytes: f64, charges:
     Memory { name, unit, bytes, width_bytes, accesses: 1.0, copies: 1.0, charges }
 }
 
-/// Memories of the fixed-function units, of the sizes in the energy table. Shares of events are those of its derivations.
+/// Memories of the fixed-function units, of the sizes in the energy table. Shares of events are those of its
+/// derivations.
 fn fixed(gpu: &GpuSpec) -> Vec<Memory> {
     let access = Charge::access;
     let vertices = f64::from(gpu.pipeline.vertex_reuse) * VERTEX_BYTES;
@@ -363,8 +365,9 @@ pub(crate) mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(96))]
 
-        /// From a machine drawn at random, none of its numbers that adds hardware lowers area, leakage, idle power, or the power of a busy
-        /// unit: but for the shared memories of more cores, which have the same accesses together.
+        /// From a machine drawn at random, none of its numbers that adds hardware lowers area, leakage, idle
+        /// power, or the power of a busy unit: but for the shared memories of more cores, which have the same
+        /// accesses together.
         #[test]
         fn no_number_that_adds_hardware_makes_anything_cheaper(
             start in prop::collection::vec(0..3_u32, GROW.len()),
@@ -387,8 +390,9 @@ pub(crate) mod tests {
         }
     }
 
-    /// `shared_cycles` counts accesses to the shared memories of all cores. With more cores each memory has fewer in a cycle, so it needs
-    /// fewer ports, and an access costs less energy. Cores that keep their accesses cost more.
+    /// `shared_cycles` counts accesses to the shared memories of all cores. With more cores each memory has
+    /// fewer in a cycle, so it needs fewer ports, and an access costs less energy. Cores that keep their
+    /// accesses cost more.
     #[test]
     fn cores_that_keep_their_accesses_to_shared_memory_cost_more() {
         let platform = Platform::builtin("reference").unwrap();
@@ -462,10 +466,12 @@ pub(crate) mod tests {
         }
     }
 
-    /// Areas beside those of products: they have what is not modelled (interfaces, video, displays, wires), and not the 5D units.
+    /// Areas beside those of products: they have what is not modelled (interfaces, video, displays, wires),
+    /// and not the 5D units.
     #[test]
     fn areas_are_below_those_of_products() {
-        // Tahiti: 365 mm2 (HotHardware, HD 7970 review). Ivy Bridge: 160 mm2, 113 mm2 without graphics (AnandTech, i7 3770K review).
+        // Tahiti: 365 mm2 (HotHardware, HD 7970 review). Ivy Bridge: 160 mm2, 113 mm2 without graphics
+        // (AnandTech, i7 3770K review).
         for (name, node_nm, product_mm2) in [("discrete", 28, 365.0), ("hd_4000", 22, 47.0)] {
             let area = structure(&GpuSpec::load(name).unwrap()).area_mm2(node_nm);
             println!("{name}: {area:?}, product {product_mm2} mm2");

@@ -42,8 +42,8 @@ pub(super) fn events(quantities: &[HeatQuantity]) -> Vec<Event> {
     events
 }
 
-/// Writes the heat maps of a frame, made of the `maps` of its events: as PNG, as EXR (values of pixels) and as CSV (values of
-/// tiles). The brightness of `image`, the frame's image, shades the PNG.
+/// Writes the heat maps of a frame, made of the `maps` of its events: as PNG, as EXR (values of pixels) and
+/// as CSV (values of tiles). The brightness of `image`, the frame's image, shades the PNG.
 pub(super) fn write_all(
     plan: &Plan,
     dir: &OutDir,

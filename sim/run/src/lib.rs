@@ -360,8 +360,8 @@ impl RunError {
         }
     }
 
-    /// Whether the request is at fault (exit code 2): a wrong value, or an input that is missing or damaged. Other failures come
-    /// while it runs (exit code 1).
+    /// Whether the request is at fault (exit code 2): a wrong value, or an input that is missing or damaged.
+    /// Other failures come while it runs (exit code 1).
     pub fn is_usage(&self) -> bool {
         match self {
             Self::Output(error) => error.is_usage(),

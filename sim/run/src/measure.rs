@@ -251,8 +251,8 @@ mod tests {
     use output::terminal::Progress;
     use workloads::Overrides;
 
-    /// Energy error of each frame of a run, as a share, in a trace without noise by a recorder of a rate and a resolution, and the
-    /// place of the marked frame.
+    /// Energy error of each frame of a run, as a share, in a trace without noise by a recorder of a rate and
+    /// a resolution, and the place of the marked frame.
     fn errors_without_noise(measurement: &Measurement, rate_hz: f64, bits: u32) -> (Vec<f64>, usize) {
         let spec = DeviceSpec { rate_hz, bits, ..measurement.device.spec().clone() };
         let device = Device::new(spec).unwrap().noise_free();
@@ -291,8 +291,9 @@ mod tests {
                     worst(false)
                 );
                 println!("{text}");
-                // Of 24 frames of one kind these two have the largest error in one case of twelve. A mark that other frames are not
-                // placed by changes both by a share of the time between frames: by 3 % where it did.
+                // Of 24 frames of one kind these two have the largest error in one case of twelve. A mark
+                // that other frames are not placed by changes both by a share of the time between frames: by
+                // 3 % where it did.
                 assert!(worst(true) <= 2.0 * worst(false).max(NO_ERROR), "{text}");
             }
         }

@@ -39,8 +39,8 @@ impl PacingChoice {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Change {
-    /// Names from the file inward, separated by dots: `gpu.pipeline.tile_px`. Entries of lists are named by their `name`,
-    /// `event` or `unit`, or by their number from 0.
+    /// Names from the file inward, separated by dots: `gpu.pipeline.tile_px`. Entries of lists are named by
+    /// their `name`, `event` or `unit`, or by their number from 0.
     pub path: String,
     /// The value as in the file; text may be without quotes.
     pub value: String,

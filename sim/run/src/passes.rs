@@ -19,8 +19,8 @@ pub struct PassSummary {
     pub name: String,
     /// Number of passes of this name.
     pub passes: u64,
-    /// All of them. Their time is from the end of the pass before to their own end; that of all passes adds up to the busy time of
-    /// the frames.
+    /// All of them. Their time is from the end of the pass before to their own end; that of all passes adds
+    /// up to the busy time of the frames.
     #[serde(flatten)]
     pub all: WorkSummary,
     /// Draws of a pass, by their place in it. Empty if there is one draw only, or too many.
@@ -56,8 +56,8 @@ pub(crate) fn limit_draws(report: &mut FrameReport) {
     report.passes.iter_mut().filter(|pass| pass.draws.len() > MAX_DRAWS).for_each(|pass| pass.forget_draws());
 }
 
-/// Time of passes and spans of draws, without those of single draws where there are too many to list, and without spans that
-/// nobody reads: those of draws that take turns are for stalls alone.
+/// Time of passes and spans of draws, without those of single draws where there are too many to list, and
+/// without spans that nobody reads: those of draws that take turns are for stalls alone.
 pub(crate) fn limited_times(timed: &Timed) -> (Vec<PassTime>, Vec<DrawSpan>) {
     let mut times = timed.passes.clone();
     times.iter_mut().filter(|pass| pass.draws_ps.len() > MAX_DRAWS).for_each(|pass| pass.draws_ps.clear());
@@ -162,8 +162,8 @@ fn seconds(time_ps: u64) -> f64 {
     time_ps as f64 * 1e-12
 }
 
-/// Adds the passes of a frame. `timed_j` is its energy besides the events, between two times. Draws that share the time of a pass
-/// share it by their times.
+/// Adds the passes of a frame. `timed_j` is its energy besides the events, between two times. Draws that
+/// share the time of a pass share it by their times.
 fn add<'a>(groups: &mut Vec<Group<'a>>, frame: &FrameWork<'a>, timed_j: impl Fn(f64, f64) -> f64) {
     let mut before_ps = 0;
     for (number, pass) in frame.report.passes.iter().enumerate() {

@@ -59,7 +59,8 @@ impl Plan {
         Ok(Self { files, ..plan? })
     }
 
-    /// Plan of the same job on the GPU, platform and energy table that `options` name. Scene and view of the options are not used.
+    /// Plan of the same job on the GPU, platform and energy table that `options` name. Scene and view of the
+    /// options are not used.
     ///
     /// # Errors
     /// The first input that is missing or invalid.

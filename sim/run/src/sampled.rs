@@ -199,7 +199,7 @@ fn summary(
 }
 
 /// Confidence level of the intervals.
-pub const CONFIDENCE: f64 = 0.95;
+const CONFIDENCE: f64 = 0.95;
 
 /// Estimates of cycles and energy of every frame, from simulated frames and previews.
 pub struct Forecast {

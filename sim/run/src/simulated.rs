@@ -1,10 +1,11 @@
-//! Results of the simulator: the frames of a run, which dimensions and units were modelled, and how far its cycles and its energy may be
-//! from those at timing level `stepped`.
+//! Results of the simulator: the frames of a run, which dimensions and units were modelled, and how far its
+//! cycles and its energy may be from those at timing level `stepped`.
 //!
-//! Stated errors are factors: an error of 0.05 says that the number at `stepped` is at most 1.05 times as large and at least 1/1.05
-//! times. They are quantiles of errors that were measured on GPUs drawn at random, apart for each level, with and without its accuracy
-//! warnings, so that they hold for 95 % of runs that are like those (split conformal prediction by groups; Papadopoulos et al. 2002, Vovk,
-//! Gammerman and Shafer 2005). `quintile chart stated-errors` measures them, and how often they hold.
+//! Stated errors are factors: an error of 0.05 says that the number at `stepped` is at most 1.05 times as
+//! large and at least 1/1.05 times. They are quantiles of errors that were measured on GPUs drawn at random,
+//! apart for each level, with and without its accuracy warnings, so that they hold for 95 % of runs that are
+//! like those (split conformal prediction by groups; Papadopoulos et al. 2002, Vovk, Gammerman and Shafer
+//! 2005). `quintile chart stated-errors` measures them, and how often they hold.
 
 use std::sync::OnceLock;
 
@@ -356,8 +357,8 @@ impl StatedError {
         row.map_or(Self::UNKNOWN, |row| Self { cycles: row.cycles, energy: row.energy })
     }
 
-    /// Stated error of the sum over `frames`: the mean of those of simulated frames, by time, as errors of frames of one scene do not
-    /// cancel.
+    /// Stated error of the sum over `frames`: the mean of those of simulated frames, by time, as errors of
+    /// frames of one scene do not cancel.
     pub fn of_frames<'a>(level: Level, frames: impl IntoIterator<Item = &'a RunFrame>) -> Self {
         let (mut sum, mut time_s) = (Self::default(), 0.0);
         for frame in frames {
@@ -369,8 +370,8 @@ impl StatedError {
         if time_s > 0.0 { Self { cycles: sum.cycles / time_s, energy: sum.energy / time_s } } else { sum }
     }
 
-    /// With a further error of a prediction, as relative half-widths. Errors are added, as one may be as large as it can while the
-    /// other is.
+    /// With a further error of a prediction, as relative half-widths. Errors are added, as one may be as
+    /// large as it can while the other is.
     #[must_use]
     pub fn beside(self, cycles: f64, energy: f64) -> Self {
         Self { cycles: self.cycles + cycles, energy: self.energy + energy }

@@ -192,7 +192,8 @@ pub struct Detection {
 }
 
 impl Summary {
-    /// Time, energy and power per frame, measured and true: mean and standard deviation in SI units. A single frame has no deviation.
+    /// Time, energy and power per frame, measured and true: mean and standard deviation in SI units. A single
+    /// frame has no deviation.
     pub fn headline(&self) -> Vec<Headline> {
         let sd = |deviation: f64| (self.settings.frames > 1).then_some(deviation);
         let row = |label: &str, unit: &str, pick: fn(&Figures) -> Spread| {

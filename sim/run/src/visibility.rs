@@ -1,5 +1,5 @@
-//! Without timing: the visible triangle of every sample of a scene, and the rate of finding them; and images alone, drawn by the
-//! visibility engine where it gives the same bytes.
+//! Without timing: the visible triangle of every sample of a scene, and the rate of finding them; and images
+//! alone, drawn by the visibility engine where it gives the same bytes.
 
 use std::time::Instant;
 

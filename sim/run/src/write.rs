@@ -142,8 +142,8 @@ fn frames(outcome: &FinishedRun) -> Vec<FrameSpan> {
         .collect()
 }
 
-/// Passes of a frame that starts at `start_s`, each from the end of the one before, with their draws; no passes or draws if there are
-/// more than `most`.
+/// Passes of a frame that starts at `start_s`, each from the end of the one before, with their draws; no
+/// passes or draws if there are more than `most`.
 fn passes(observed: &Observed, start_s: f64, most: usize) -> Vec<PassSpan> {
     if observed.times.len() > most {
         return Vec::new();

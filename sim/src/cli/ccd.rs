@@ -22,7 +22,8 @@ use crate::cli::may_hold_results;
     A file that is broken or has coordinates beyond 1e60 does not stop the others. It is reported, its case has no row in \
     the CSV and an `error` in the JSON, and the exit code is 1.")]
 pub struct CcdArgs {
-    /// .mts files (gzipped or not), a case each, or .ply, .obj or .off files two by two: a mesh at time 0 and at time 1
+    /// .mts files (gzipped or not), a case each, or .ply, .obj or .off files two by two: a mesh at time 0 and
+    /// at time 1
     #[arg(value_name = "FILE", required = true)]
     pub files: Vec<PathBuf>,
     /// Pixels across each of the three images

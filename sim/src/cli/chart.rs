@@ -63,7 +63,8 @@ pub struct ChartArgs {
     /// Seed of the GPUs of `stated-errors`, instead of its own
     #[arg(long, value_name = "N", value_parser = crate::cli::parse::seed)]
     pub seed: Option<u64>,
-    /// Smaller images, fewer samples and a coarser reference: seconds for one chart instead of minutes, minutes for `all`
+    /// Smaller images, fewer samples and a coarser reference: seconds for one chart instead of minutes,
+    /// minutes for `all`
     #[arg(long)]
     pub quick: bool,
     /// Folder for the results; created if missing
@@ -279,7 +280,8 @@ pub struct ReproduceArgs {
     /// Which paper
     #[arg(value_name = "PAPER", ignore_case = true, value_parser = named(Paper::ALL.map(|paper| (paper, paper.number(), paper.title()))))]
     pub paper: Paper,
-    /// Fewer values, frames and repetitions: some minutes. Verdicts then say at how many of the settings they were reached
+    /// Fewer values, frames and repetitions: some minutes. Verdicts then say at how many of the settings they
+    /// were reached
     #[arg(long)]
     pub quick: bool,
     /// Only this row, for example VI-13; may be given more than once
@@ -288,7 +290,8 @@ pub struct ReproduceArgs {
     /// Settings in place of the committed ones; a copy of sim/experiments/papers/paper6.ron with other values
     #[arg(long, value_name = "FILE")]
     pub settings: Option<PathBuf>,
-    /// Folder with public cases of collision detection for row VI-1 (*.mts.gz, queries/); without it none is run, and other rows refuse it
+    /// Folder with public cases of collision detection for row VI-1 (*.mts.gz, queries/); without it none is
+    /// run, and other rows refuse it
     #[arg(long, value_name = "DIR")]
     pub collision_data: Option<PathBuf>,
     /// Folder for the results; created if missing

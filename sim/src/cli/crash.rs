@@ -1,5 +1,5 @@
-//! Unusual ends: the report of a crash (its place, and the command that repeats the frame), interrupts (Ctrl-C), and the request of a
-//! scheduler to end, which work in steps follows between two steps.
+//! Unusual ends: the report of a crash (its place, and the command that repeats the frame), interrupts
+//! (Ctrl-C), and the request of a scheduler to end, which work in steps follows between two steps.
 
 use std::any::Any;
 use std::backtrace::{Backtrace, BacktraceStatus};
@@ -97,9 +97,9 @@ fn alone(arguments: &[String], frame: u32) -> Vec<String> {
 #[cfg(unix)]
 const GRACE_S: u64 = 20;
 
-/// Handles interrupt, termination and hang-up: unfinished files are removed, a message is printed, and the process ends with
-/// 128 plus the number of the signal, as in shells. Signals that the caller ignores (`nohup`, background jobs of scripts)
-/// stay ignored.
+/// Handles interrupt, termination and hang-up: unfinished files are removed, a message is printed, and the
+/// process ends with 128 plus the number of the signal, as in shells. Signals that the caller ignores
+/// (`nohup`, background jobs of scripts) stay ignored.
 ///
 /// Work that follows `stop` ends by itself after USR1, and within 20 s after a first termination.
 #[cfg(unix)]

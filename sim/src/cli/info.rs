@@ -22,7 +22,8 @@ use crate::cli::args::SceneArgs;
     --camera, changed or not. Unchanged, it gives the same bytes."
 )]
 pub struct InfoArgs {
-    /// A built-in scene or a workload (see `quintile list`), a scene file as for `quintile run`, or an .m5d, .mts or .smp file
+    /// A built-in scene or a workload (see `quintile list`), a scene file as for `quintile run`, or an .m5d,
+    /// .mts or .smp file
     #[arg(value_name = "SCENE|WORKLOAD|FILE")]
     pub scene: PathBuf,
     /// Changes to the scene

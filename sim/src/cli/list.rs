@@ -1,6 +1,7 @@
 //! `quintile list`, with the options of each workload.
 //!
-//! Defaults are those of the workloads themselves. Ranges are checked against what the workloads accept by the tests below.
+//! Defaults are those of the workloads themselves. Ranges are checked against what the workloads accept by
+//! the tests below.
 
 use activity::spec::suggestion;
 use experiments::{ALL, CHARTS};

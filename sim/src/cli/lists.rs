@@ -28,8 +28,8 @@ pub(super) struct Listed {
     pub out: PathBuf,
 }
 
-/// The runs that `sets` make of `options`, each in a folder of its own below `out`; a single one in `out` itself. The last option that has
-/// several values varies fastest.
+/// The runs that `sets` make of `options`, each in a folder of its own below `out`; a single one in `out`
+/// itself. The last option that has several values varies fastest.
 ///
 /// # Errors
 /// If a value cannot be set, is listed twice, or is one too many.

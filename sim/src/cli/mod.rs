@@ -1,5 +1,5 @@
-//! Subcommands of `quintile`: arguments in, results and messages out. Output files are checked before the work starts. On printing a closed
-//! pipe is not an error; a full disk is.
+//! Subcommands of `quintile`: arguments in, results and messages out. Output files are checked before the
+//! work starts. On printing a closed pipe is not an error; a full disk is.
 
 mod args;
 mod ccd;

@@ -1,4 +1,5 @@
-//! Parsers of flag values: numbers, and physical quantities whose unit may be left out. Errors describe the expected form.
+//! Parsers of flag values: numbers, and physical quantities whose unit may be left out. Errors describe the
+//! expected form.
 
 use std::ops::Range;
 use std::str::FromStr;

@@ -32,7 +32,8 @@ pub struct RecordArgs {
     /// Options of a workload in a .ron file
     #[arg(long, value_name = "FILE.ron")]
     pub options: Option<PathBuf>,
-    /// An option of a workload, or a value in the file of GPU or scene, such as gpu.pipeline.tile_px=8; may be given several times
+    /// An option of a workload, or a value in the file of GPU or scene, such as gpu.pipeline.tile_px=8; may
+    /// be given several times
     #[arg(long, value_name = "NAME=VALUE", value_parser = setting)]
     pub set: Vec<(String, String)>,
     /// The file for the frames

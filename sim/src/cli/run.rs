@@ -40,17 +40,18 @@ pub struct RunArgs {
     /// A built-in scene or a workload (see `quintile list`), or a .ron, .gltf, .glb, .obj, .ply, .off or .stl file
     #[arg(default_value = "default", value_name = "SCENE|WORKLOAD|FILE")]
     pub scene: PathBuf,
-    /// Repeat the run that wrote this summary.json, to the same bytes; only --out, --force, --threads,
-    /// --dry-run, --json and the options of messages can be added. Refused if the program version or an input differs, unless with --force
+    /// Repeat the run that wrote this summary.json, to the same bytes;
+    /// only --out, --force, --threads, --dry-run, --json and the options of messages can be added. Refused if
+    /// the program version or an input differs, unless with --force
     #[arg(long, value_name = "SUMMARY", conflicts_with_all = SETTINGS)]
     pub again: Option<PathBuf>,
     /// Options of a workload in a .ron file
     #[arg(long, value_name = "FILE.ron")]
     pub options: Option<PathBuf>,
-    /// An option of a workload (bins=8, or workload.bins=8), a value in the file of GPU, platform, energy table or scene
-    /// (gpu.pipeline.tile_px=8), or, where a scene is run, an option of the run as sweep files name it (timing=bound); may be given
-    /// several times, and overrides others. With several values, as tile_px=4,8, each has a run in a folder of its own below DIR, and a
-    /// table compares them
+    /// An option of a workload (bins=8, or workload.bins=8), a value in the file of GPU, platform, energy
+    /// table or scene (gpu.pipeline.tile_px=8), or, where a scene is run, an option of the run as sweep files
+    /// name it (timing=bound); may be given several times, and overrides others. With several values, as
+    /// tile_px=4,8, each has a run in a folder of its own below DIR, and a table compares them
     #[arg(long, value_name = "NAME=VALUE[,VALUE...]", value_parser = setting)]
     pub set: Vec<(String, String)>,
     /// Folder for the results; created if missing
@@ -63,7 +64,8 @@ pub struct RunArgs {
     /// Changes to the scene
     #[command(flatten)]
     pub view: SceneArgs,
-    /// A built-in GPU or a .ron file; its file names the platform and the energy table that belong to it (see `quintile list`)
+    /// A built-in GPU or a .ron file; its file names the platform and the energy table that belong to it (see
+    /// `quintile list`)
     #[arg(long, value_name = "NAME|FILE", default_value = "reference")]
     pub gpu: PathBuf,
     /// A built-in platform or a .ron file [default: the GPU's own]
@@ -78,7 +80,8 @@ pub struct RunArgs {
     /// Timing level; `quintile chart timing` shows its accuracy
     #[arg(long, value_enum, default_value_t)]
     pub timing: TimingChoice,
-    /// Let a probe choose level, frames and dimensions so that the error of cycles and energy is at most this, for example 2%
+    /// Let a probe choose level, frames and dimensions so that the error of cycles and energy is at most
+    /// this, for example 2%
     #[arg(long, value_name = "P%", value_parser = percent, conflicts_with = "timing", allow_hyphen_values = true)]
     pub accuracy: Option<f64>,
     /// Let a probe choose the most accurate options that take no longer than this, for example 30s, 500ms or
@@ -91,8 +94,9 @@ pub struct RunArgs {
     /// When the next frame starts
     #[arg(long, value_name = "PACING", default_value = "vsync", value_parser = pacing())]
     pub pacing: PacingChoice,
-    /// Samples per second of the recorder, 1 to 10 million: a number in Hz, or with its unit, such as 50kHz or 1MHz [default: 50kHz,
-    /// or up to 1MHz where frames are shorter than two samples or, without idle time between them, than fifty]
+    /// Samples per second of the recorder, 1 to 10 million: a number in Hz, or with its unit, such as 50kHz
+    /// or 1MHz [default: 50kHz, or up to 1MHz where frames are shorter than two samples or, without idle time
+    /// between them, than fifty]
     #[arg(long, value_name = "HZ", allow_hyphen_values = true, value_parser = rate)]
     pub trace_rate: Option<f64>,
     /// Samples in one packet of the recorder; a packet is lost as a whole
@@ -107,8 +111,8 @@ pub struct RunArgs {
     /// Also write every frame as EXR (linear light)
     #[arg(long)]
     pub exr: bool,
-    /// Write heat maps of a counter, or of the energy of all counters (joules), as PNG, EXR and CSV in heat/; may be given several
-    /// times
+    /// Write heat maps of a counter, or of the energy of all counters (joules), as PNG, EXR and CSV in heat/;
+    /// may be given several times
     #[arg(long, value_name = "COUNTER|joules", value_parser = quantity)]
     pub heat: Vec<HeatQuantity>,
     /// Worker threads.
@@ -213,7 +217,8 @@ pub(super) fn pacing() -> impl TypedValueParser<Value = PacingChoice> {
     ])
 }
 
-/// Refuses options without effect on images alone that are given with their default values; others are refused with the plan.
+/// Refuses options without effect on images alone that are given with their default values; others are
+/// refused with the plan.
 pub(super) fn check_given(matches: &ArgMatches) -> Result<(), RunError> {
     if matches.get_one::<TimingChoice>("timing") != Some(&TimingChoice::None) {
         return Ok(());
@@ -285,7 +290,8 @@ pub(super) fn one_gpu(gpu: &Path) -> Result<(), Failure> {
     }
 }
 
-/// Runs with `options` into `out`, and prints its results, or adds them to `json`; returns the summary, unless it is a dry run.
+/// Runs with `options` into `out`, and prints its results, or adds them to `json`; returns the summary,
+/// unless it is a dry run.
 fn one(
     args: &RunArgs,
     terminal: &Terminal,

@@ -28,7 +28,8 @@ use crate::cli::parse::{per_pixel, size, tests};
     quintile visibility cloth-ball.mts.gz --print-camera > camera.ron\n\n\
     The layouts of all files, and the hashed samples, are described in docs/formats.md.")]
 pub struct VisibilityArgs {
-    /// A moving mesh: an .m5d or .mts file, a .ply, .obj, .off or .stl file, or two of equal topology as the ends of the shutter
+    /// A moving mesh: an .m5d or .mts file, a .ply, .obj, .off or .stl file, or two of equal topology as the
+    /// ends of the shutter
     #[arg(value_name = "FILE", required = true, num_args = 1..=2)]
     pub files: Vec<PathBuf>,
     /// A .ron file, or a description such as 'position: (1, 2, 3), target: (0, 0, 0)'; without it an .m5d

@@ -143,7 +143,8 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Writes the plan of all points that were requested, beside those of an earlier plan, so that they can be merged.
+    /// Writes the plan of all points that were requested, beside those of an earlier plan, so that they can
+    /// be merged.
     ///
     /// # Errors
     /// If it cannot be written.

@@ -144,8 +144,8 @@ impl Axis {
         }
     }
 
-    /// Settings at `share` of the axis, from 0 to below 1: one of its values, or any number of a range without `count` and
-    /// `step`.
+    /// Settings at `share` of the axis, from 0 to below 1: one of its values, or any number of a range
+    /// without `count` and `step`.
     pub(crate) fn at(&self, share: f64) -> Vec<Setting> {
         match self.len() {
             0 => self.between(share),
@@ -153,8 +153,8 @@ impl Axis {
         }
     }
 
-    /// The number of a range at `share` of the way from its first to its last. Whole numbers have equal parts of the way, or with
-    /// `log` parts as wide as the ratio to the next one.
+    /// The number of a range at `share` of the way from its first to its last. Whole numbers have equal parts
+    /// of the way, or with `log` parts as wide as the ratio to the next one.
     fn between(&self, share: f64) -> Vec<Setting> {
         let Self::Range { path, from, to, log, whole, .. } = self else { return Vec::new() };
         let (low, high) = if *whole { (from.ceil(), to.floor() + 1.0) } else { (*from, *to) };

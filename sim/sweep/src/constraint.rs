@@ -1,7 +1,7 @@
 //! Constraints: expressions over settings that hold for every point of a sweep.
 //!
-//! In order of binding: `||`, `&&`, comparisons, `+ -`, `* / %`, and `! -` before a value. Values are numbers, `true`, `false`, text in
-//! quotes, paths of settings, and expressions in parentheses.
+//! In order of binding: `||`, `&&`, comparisons, `+ -`, `* / %`, and `! -` before a value. Values are
+//! numbers, `true`, `false`, text in quotes, paths of settings, and expressions in parentheses.
 
 use std::cmp::Ordering;
 

@@ -107,7 +107,8 @@ pub enum SweepError {
 }
 
 impl SweepError {
-    /// Whether the request is at fault, or an input that it names (exit code 2), rather than what came while it ran (exit code 1).
+    /// Whether the request is at fault, or an input that it names (exit code 2), rather than what came while
+    /// it ran (exit code 1).
     pub fn is_usage(&self) -> bool {
         match self {
             Self::Folder { source, .. } => source.kind() == ErrorKind::NotADirectory,
@@ -171,8 +172,8 @@ fn kept(error: &WriteError) -> &'static str {
     }
 }
 
-/// `file` with the line of `place` in its RON `text`; `file` alone if it is not found. A place is a field of the sweep, such as `points`,
-/// or an entry of its list, such as `axes[2]`.
+/// `file` with the line of `place` in its RON `text`; `file` alone if it is not found. A place is a field of
+/// the sweep, such as `points`, or an entry of its list, such as `axes[2]`.
 pub(crate) fn placed(text: &str, file: &str, place: &str) -> String {
     match line_of(text, place) {
         Some(line) => format!("{file}:{line}"),

@@ -242,7 +242,8 @@ pub struct PassMeans {
     pub mj: f64,
 }
 
-/// Passes of a run in the order of their first use. Their times add up to the busy time, their energies to the busy energy.
+/// Passes of a run in the order of their first use. Their times add up to the busy time, their energies to
+/// the busy energy.
 pub(crate) fn passes(plan: &Plan, frames: &[&RunFrame]) -> Vec<PassMeans> {
     let count = frames.len().max(1) as f64;
     let means = |pass: run::PassSummary| PassMeans {
@@ -253,7 +254,8 @@ pub(crate) fn passes(plan: &Plan, frames: &[&RunFrame]) -> Vec<PassMeans> {
     passes_of(plan, frames.iter().copied()).into_iter().map(means).collect()
 }
 
-/// Busy energy in joules, mean per frame, with all energies and watts at their low and at their high end. Nothing is timed again.
+/// Busy energy in joules, mean per frame, with all energies and watts at their low and at their high end.
+/// Nothing is timed again.
 ///
 /// # Errors
 /// If table and platform do not match.

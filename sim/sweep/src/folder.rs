@@ -79,8 +79,8 @@ impl Folder {
         }
     }
 
-    /// Creates the folder and writes `plan` into it, unless it is there. An earlier plan of the same sweep is replaced, results
-    /// stay.
+    /// Creates the folder and writes `plan` into it, unless it is there. An earlier plan of the same sweep is
+    /// replaced, results stay.
     ///
     /// # Errors
     /// As [`Self::check`], and if the folder cannot be written.
@@ -280,7 +280,8 @@ impl Folder {
         })
     }
 
-    /// Removes what killed processes left of points that are finished. Files of other points may be about to be finished.
+    /// Removes what killed processes left of points that are finished. Files of other points may be about to
+    /// be finished.
     ///
     /// # Errors
     /// If a folder cannot be read.

@@ -1,4 +1,5 @@
-//! All results of a sweep in one table in Parquet: columns of whole numbers, numbers or text, each of which may lack values.
+//! All results of a sweep in one table in Parquet: columns of whole numbers, numbers or text, each of which
+//! may lack values.
 
 use std::io::Write;
 use std::path::PathBuf;
@@ -19,12 +20,12 @@ use crate::{Folder, Status, SweepError};
 /// Name of the table.
 pub const RESULTS: &str = "results.parquet";
 
-/// Writes `results.parquet` of the sweep in `folder`: a row for each point, in the order of the plan. Returns its path. With
-/// `partial`, points without a result are rows with a reason, too.
+/// Writes `results.parquet` of the sweep in `folder`: a row for each point, in the order of the plan. Returns
+/// its path. With `partial`, points without a result are rows with a reason, too.
 ///
 /// # Errors
-/// [`SweepError::Unfinished`] if points are missing, [`SweepError::InTheWay`] if a file of the user has this name, and if a file
-/// cannot be read or written.
+/// [`SweepError::Unfinished`] if points are missing, [`SweepError::InTheWay`] if a file of the user has this
+/// name, and if a file cannot be read or written.
 pub fn merge(folder: &Folder, partial: bool) -> Result<PathBuf, SweepError> {
     let plan = folder.plan()?;
     let mut dir = folder.open("sweep merge", [RESULTS])?;

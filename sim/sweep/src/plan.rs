@@ -38,8 +38,8 @@ pub struct Plan {
     pub settings: Vec<Setting>,
     /// Points in order.
     pub points: Vec<Point>,
-    /// Timing levels that screen designs, from the coarsest; empty without screening. All points at one level come before those at
-    /// the next.
+    /// Timing levels that screen designs, from the coarsest; empty without screening. All points at one level
+    /// come before those at the next.
     pub screen: Vec<Level>,
     /// Version of the program that planned it, as in the ids.
     pub program: String,
@@ -53,8 +53,8 @@ pub(crate) fn idle(place: &str) -> String {
 }
 
 impl Plan {
-    /// Plans the sweep in the file at `path`, with the settings of `--quick` if it is given. `program` is the git revision of the
-    /// program and whatever else changes with it.
+    /// Plans the sweep in the file at `path`, with the settings of `--quick` if it is given. `program` is the
+    /// git revision of the program and whatever else changes with it.
     ///
     /// # Errors
     /// If the file is invalid, a setting is unknown, a value can never be valid, or an input cannot be read.

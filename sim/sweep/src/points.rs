@@ -1,5 +1,5 @@
-//! Points of a sweep: the values of its axes, combined. In trials, points are planned as runs, to refuse settings with which no point
-//! can run, and to find their input files.
+//! Points of a sweep: the values of its axes, combined. In trials, points are planned as runs, to refuse
+//! settings with which no point can run, and to find their input files.
 
 use std::collections::HashMap;
 use std::path::PathBuf;
@@ -236,8 +236,9 @@ impl<'a> Trials<'a> {
         Self { points, tried: HashMap::new(), inputs: HashMap::new(), hashes: HashMap::new() }
     }
 
-    /// Tries each setting in points that have it, spread over the sweep, until one of them can run. In a `grid` each value is
-    /// tried for itself; otherwise a value may be in one point alone, where others may be to blame.
+    /// Tries each setting in points that have it, spread over the sweep, until one of them can run. In a
+    /// `grid` each value is tried for itself; otherwise a value may be in one point alone, where others may
+    /// be to blame.
     ///
     /// # Errors
     /// The first refusal of a setting that was refused in all of them.
@@ -282,7 +283,8 @@ impl<'a> Trials<'a> {
         tried
     }
 
-    /// Names and hashes of the input files of a point. There are none if no point with the same settings for files can run.
+    /// Names and hashes of the input files of a point. There are none if no point with the same settings for
+    /// files can run.
     ///
     /// # Errors
     /// If a file cannot be read.
@@ -306,8 +308,9 @@ impl<'a> Trials<'a> {
     }
 }
 
-/// Rounds ranges of any numbers where a setting takes whole numbers only: there a number that runs, or is refused for another reason,
-/// is refused when it is written with a decimal point. `common` are the settings of all points.
+/// Rounds ranges of any numbers where a setting takes whole numbers only: there a number that runs, or is
+/// refused for another reason, is refused when it is written with a decimal point. `common` are the settings
+/// of all points.
 pub(crate) fn round_whole(axes: &mut [Axis], common: &[Setting]) {
     let start = |axis: &Axis| match axis.whole_number_between() {
         Some((path, number)) => vec![Setting::new(path, number.to_string())],
@@ -334,8 +337,8 @@ fn key(settings: &[Setting]) -> Vec<&Setting> {
     settings.iter().filter(|setting| setting.names_files()).collect()
 }
 
-/// All points, and those of each setting that varies, in order of first use: of each of its values if `by_value`, of the first [`MAX_VALUES`] of them. With the path of
-/// that setting.
+/// All points, and those of each setting that varies, in order of first use: of each of its values if
+/// `by_value`, of the first [`MAX_VALUES`] of them. With the path of that setting.
 fn owners(points: &[Vec<Setting>], by_value: bool) -> Vec<(Option<&str>, Vec<usize>)> {
     let mut groups: HashMap<(&str, &str), usize> = HashMap::new();
     let mut values: HashMap<&str, usize> = HashMap::new();

@@ -157,10 +157,11 @@ impl<'a> Work<'a> {
         Expected { runs: self.runs, pending: self.pending.len(), host_s: costs.is_known().then_some(host_s) }
     }
 
-    /// Runs all pending points on the current pool, those with equal drawings together. Each result is on disk, whole, before it
-    /// counts; a point that fails is a result with a reason. The first groups are the probe for the expected time. In a sweep that
-    /// screens, one level after the other runs, each on the designs that the one before has left. The state is that of the
-    /// shard; points are left over if the work was to stop.
+    /// Runs all pending points on the current pool, those with equal drawings together. Each result is on
+    /// disk, whole, before it counts; a point that fails is a result with a reason. The first groups are the
+    /// probe for the expected time. In a sweep that screens, one level after the other runs, each on the
+    /// designs that the one before has left. The state is that of the shard; points are left over if the work
+    /// was to stop.
     ///
     /// # Errors
     /// If a result cannot be written. Those that were written stay.
@@ -303,8 +304,9 @@ impl Shard {
         }
     }
 
-    /// The shard of this task by the variables of Slurm, PBS or HyperQueue, which `variable` looks up; all points outside of
-    /// a task. `count` is the number of tasks if it is given; PBS and HyperQueue do not say it.
+    /// The shard of this task by the variables of Slurm, PBS or HyperQueue, which `variable` looks up; all
+    /// points outside of a task. `count` is the number of tasks if it is given; PBS and HyperQueue do not say
+    /// it.
     ///
     /// Numbers of tasks may start at 0, 1 or elsewhere: those that follow each other are different shards.
     ///

@@ -1,13 +1,15 @@
 //! Screening: designs that a coarse timing level shows to be far from the frontier are not run at the finer ones.
 //!
-//! Levels differ in time and energy by a factor that varies from design to design. Some designs, drawn by a hash of their settings, run
-//! at both levels. A design is dropped if another one is better in both by more than the range of these factors: within it the order may
-//! turn. Designs that are kept add to the range, and where it grows more of them are kept. For designs like those that ran at
-//! both levels, a further one is outside of a range of `n` with a probability of 2 / (n + 1) (conformal prediction, Vovk, Gammerman
-//! and Shafer 2005).
+//! Levels differ in time and energy by a factor that varies from design to design. Some designs, drawn by a
+//! hash of their settings, run at both levels. A design is dropped if another one is better in both by more
+//! than the range of these factors: within it the order may turn. Designs that are kept add to the range, and
+//! where it grows more of them are kept. For designs like those that ran at both levels, a further one is
+//! outside of a range of `n` with a probability of 2 / (n + 1) (conformal prediction, Vovk, Gammerman and
+//! Shafer 2005).
 //!
-//! Designs that the coarse level `packet` cannot distinguish by its stated error do not all run: those on its own frontier do, and others are
-//! undecided against them. Where one that ran is outside of the stated error, the range decides as above.
+//! Designs that the coarse level `packet` cannot distinguish by its stated error do not all run: those on its
+//! own frontier do, and others are undecided against them. Where one that ran is outside of the stated error,
+//! the range decides as above.
 
 use std::collections::{BTreeMap, HashSet};
 
@@ -18,8 +20,8 @@ use crate::execute::{Measured, Outcome};
 use crate::plan::{Plan, Point};
 use crate::{Folder, SweepError};
 
-/// Number of designs of a workload that run at both levels whatever they cost: with as many a further design is outside of their
-/// range with a probability of 5 %.
+/// Number of designs of a workload that run at both levels whatever they cost: with as many a further design
+/// is outside of their range with a probability of 5 %.
 const CALIBRATED: usize = 39;
 
 /// Logarithms of busy time and busy energy.
@@ -61,7 +63,8 @@ impl Design<'_> {
     }
 }
 
-/// Range of the factors between two levels, as a difference of logarithms; `None` with fewer than two designs at both.
+/// Range of the factors between two levels, as a difference of logarithms; `None` with fewer than two designs
+/// at both.
 fn range(designs: &[Design<'_>]) -> Option<Cost> {
     let both: Vec<Cost> = designs
         .iter()
@@ -122,7 +125,8 @@ fn reason(coarse: Level, design: &Design<'_>, designs: &[Design<'_>]) -> Outcome
     Outcome::ScreenedOut(text)
 }
 
-/// Order in which designs are drawn: as random as a hash, and the same for every build of the program, as ids are not.
+/// Order in which designs are drawn: as random as a hash, and the same for every build of the program, as ids
+/// are not.
 fn draw_order(point: &Point) -> String {
     let settings = point.settings.iter().filter(|setting| &*setting.path != "timing");
     let mut lines: Vec<String> = settings.map(|set| format!("{:?}={:?}", set.path, set.value)).collect();
@@ -130,7 +134,8 @@ fn draw_order(point: &Point) -> String {
     sha256_of_text(&lines.join("\n"))
 }
 
-/// Designs of one workload that run at the fine level: `calibrated` of them to compare levels, and those that may be on its frontier.
+/// Designs of one workload that run at the fine level: `calibrated` of them to compare levels, and those that
+/// may be on its frontier.
 fn kept<'a>(designs: &[Design<'a>], calibrated: usize) -> Vec<&'a Point> {
     let mut known: Vec<&Design<'_>> = designs.iter().filter(|design| design.coarse.is_some()).collect();
     known.sort_by_cached_key(|design| draw_order(design.point));
@@ -305,7 +310,8 @@ mod tests {
         ],
     "#;
 
-    /// Plan of these designs with further fields or at a level, run in a folder: costs by settings without the level, at the last level.
+    /// Plan of these designs with further fields or at a level, run in a folder: costs by settings without
+    /// the level, at the last level.
     fn costs(scene: &str, size: &str, more: &str) -> (HashMap<String, Cost>, Status, f64) {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("designs.ron");
@@ -333,8 +339,9 @@ mod tests {
         (last.iter().filter_map(of).collect(), status, host_s)
     }
 
-    /// Share of the true frontier that screening has found within the stated error, and by how much a frontier design at worst lost: how far the
-    /// nearest design found is behind it, in the worse of time and energy.
+    /// Share of the true frontier that screening has found within the stated error, and by how much a
+    /// frontier design at worst lost: how far the nearest design found is behind it, in the worse of time and
+    /// energy.
     fn recall(found: &[Cost], truth: &[Cost], stated: Cost) -> (f64, f64) {
         let is_better = |a: &Cost, b: &Cost| (0..2).all(|of| a[of] <= b[of]) && a != b;
         let optimal = || truth.iter().filter(|cost| !truth.iter().any(|other| is_better(other, cost)));

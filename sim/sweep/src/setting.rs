@@ -12,8 +12,8 @@ use serde_json::{Map, Value, json};
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Setting {
-    /// An option of a run (`timing`), a view option (`samples`), a value in an input file (`gpu.core_hz`), or an option of a
-    /// workload (`workload.bins`).
+    /// An option of a run (`timing`), a view option (`samples`), a value in an input file (`gpu.core_hz`), or
+    /// an option of a workload (`workload.bins`).
     pub path: Arc<str>,
     /// The value.
     pub value: Arc<str>,
@@ -120,7 +120,8 @@ impl Setting {
         of_file || matches!(&*self.path, "gpu" | "platform" | "energy")
     }
 
-    /// The first stage of a run that depends on it. A GPU as a whole, and all that is not known to be later, is of the drawing.
+    /// The first stage of a run that depends on it. A GPU as a whole, and all that is not known to be later,
+    /// is of the drawing.
     pub(crate) fn stage(&self) -> Stage {
         match &*self.path {
             "platform" | "energy" | "bound" | "pacing" => Stage::Power,
@@ -213,8 +214,8 @@ pub(crate) fn planned_beside(drawn: &Plan, settings: &[Setting]) -> Result<Plan,
 /// Options of a run with `settings`.
 ///
 /// # Errors
-/// [`RunError::Setting`] for a value of the wrong type. Values in input files and options of workloads are checked when the
-/// run is planned.
+/// [`RunError::Setting`] for a value of the wrong type. Values in input files and options of workloads are
+/// checked when the run is planned.
 fn options(settings: &[Setting]) -> Result<RunOptions, RunError> {
     check_scene(settings)?;
     let mut options = RunOptions::default();
@@ -258,7 +259,8 @@ pub fn with(options: &RunOptions, setting: &Setting) -> Result<RunOptions, RunEr
     })
 }
 
-/// The value in JSON: a number, `true`, a pair such as `(64, 48)`, or text. Frames are a pair or a range such as `0..4`.
+/// The value in JSON: a number, `true`, a pair such as `(64, 48)`, or text. Frames are a pair or a range such
+/// as `0..4`.
 fn json_of(setting: &Setting) -> Value {
     let text = setting.value.trim();
     // Runs that are compared have a timing level; `null` would leave it out.

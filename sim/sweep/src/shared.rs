@@ -1,5 +1,6 @@
-//! Work that points share: what is drawn does not depend on clocks, rates and energies, and the time of a frame does not depend on
-//! energies. So points with the same drawing are a group, which is drawn once; those of them with the same machine are timed once.
+//! Work that points share: what is drawn does not depend on clocks, rates and energies, and the time of a
+//! frame does not depend on energies. So points with the same drawing are a group, which is drawn once; those
+//! of them with the same machine are timed once.
 
 use std::collections::HashMap;
 use std::iter::Sum;
@@ -52,7 +53,8 @@ impl<'a> Group<'a> {
         self.timings.iter().flatten().copied()
     }
 
-    /// Runs its points and passes each result on. A failure and a panic are results, too. Nothing is begun once `stop` holds.
+    /// Runs its points and passes each result on. A failure and a panic are results, too. Nothing is begun
+    /// once `stop` holds.
     ///
     /// # Errors
     /// Those of `done`.

@@ -35,8 +35,8 @@ pub struct SlurmArray {
 }
 
 impl SlurmArray {
-    /// Tasks of `threads` each for runs that are expected to take `expected` on `host_threads`. `tasks` is their number if it
-    /// is given; otherwise a task takes about ten minutes.
+    /// Tasks of `threads` each for runs that are expected to take `expected` on `host_threads`. `tasks` is
+    /// their number if it is given; otherwise a task takes about ten minutes.
     pub fn new(expected: &Expected, host_threads: usize, threads: usize, tasks: Option<usize>) -> Self {
         let total_s = expected.host_s.unwrap_or(0.0) * host_threads as f64 / threads as f64;
         let packed = libm::ceil(total_s / TASK_S) as usize;
@@ -104,7 +104,8 @@ impl Scripts {
     /// Place in `folder`, which is created if missing.
     ///
     /// # Errors
-    /// [`SweepError::InTheWay`] if a file there is not of this program or was edited, and if the folder cannot be written.
+    /// [`SweepError::InTheWay`] if a file there is not of this program or was edited, and if the folder
+    /// cannot be written.
     pub fn open(folder: &Folder) -> Result<Self, SweepError> {
         Ok(Self(folder.open("sweep slurm", SCRIPTS)?))
     }

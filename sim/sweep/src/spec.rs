@@ -44,13 +44,15 @@ pub struct SweepSpec {
     /// Number of runs of each point, with one seed after another.
     #[serde(default = "one")]
     pub repetitions: u32,
-    /// Timing levels, from the coarsest: designs that one of them shows to be far from the frontier do not run at the next.
+    /// Timing levels, from the coarsest: designs that one of them shows to be far from the frontier do not
+    /// run at the next.
     #[serde(default)]
     pub screen: Vec<Level>,
     /// Combinations that are left out: a point with all values of an entry.
     #[serde(default)]
     pub forbidden: Vec<BTreeMap<String, Text>>,
-    /// Expressions over settings of the file that hold for every point, such as `gpu.pipeline.tile_px <= 8`; others are left out.
+    /// Expressions over settings of the file that hold for every point, such as `gpu.pipeline.tile_px <= 8`;
+    /// others are left out.
     #[serde(default)]
     pub constraints: Vec<String>,
 }
@@ -66,7 +68,8 @@ pub enum Combination {
     /// Each value with each; the last axis varies fastest.
     #[default]
     Grid,
-    /// Latin hypercube (McKay, Beckman and Conover 1979): each axis is cut into `count` equal parts, with a point in each.
+    /// Latin hypercube (McKay, Beckman and Conover 1979): each axis is cut into `count` equal parts, with a
+    /// point in each.
     LatinHypercube {
         /// Number of points.
         count: u32,

@@ -1,5 +1,5 @@
-//! Every number of the GPU files, platform files and energy tables that come with the program, replaced by extreme values:
-//! one small frame then runs, or the file is refused, in bounded memory.
+//! Every number of the GPU files, platform files and energy tables that come with the program, replaced by
+//! extreme values: one small frame then runs, or the file is refused, in bounded memory.
 
 use std::ops::Range;
 use std::process::Command;

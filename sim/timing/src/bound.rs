@@ -175,8 +175,8 @@ struct Segment {
     /// Time of a barrier without contention; `None` for other packets.
     pub barrier: Option<Time>,
     pub work: UnitWork,
-    /// Grains for which the cores are full if no packet waits, by packets and by warps, those in which warps are sent, and those for
-    /// which clients are full of lines under way.
+    /// Grains for which the cores are full if no packet waits, by packets and by warps, those in which warps
+    /// are sent, and those for which clients are full of lines under way.
     pub full: [f64; FULL],
     pub packets: u32,
 }
@@ -202,7 +202,8 @@ struct Phase {
 }
 
 impl Phase {
-    /// The longest packet alone, if both paths have packets: for so long the phase may overlap the one before, or leave off.
+    /// The longest packet alone, if both paths have packets: for so long the phase may overlap the one
+    /// before, or leave off.
     fn longest_overlap(&self) -> Time {
         let [front, tiles] = self.longest.map(|longest| longest.alone);
         if front > 0 && tiles > 0 { front.max(tiles) } else { 0 }
@@ -427,7 +428,8 @@ impl Uncontended {
         }
     }
 
-    /// Program time of a packet; all its warps run the same program. One of a group has operations in some of its steps only.
+    /// Program time of a packet; all its warps run the same program. One of a group has operations in some of
+    /// its steps only.
     pub fn program(&self, demand: &ServiceDemand) -> Time {
         let steps = Time::from(demand.steps());
         let Some(_) = demand.group else { return steps * self.operation };
@@ -438,8 +440,8 @@ impl Uncontended {
         steps * (self.operation - self.cycle * (self.wide - cycles.min(self.wide)))
     }
 
-    /// Time for which the packet fills the cores, by packets and by warps or, for a group, by groups, the way to them, and each
-    /// client. Warps hold their places while they wait for their lines, too.
+    /// Time for which the packet fills the cores, by packets and by warps or, for a group, by groups, the way
+    /// to them, and each client. Warps hold their places while they wait for their lines, too.
     fn full(
         &self,
         demand: &ServiceDemand,
@@ -525,8 +527,8 @@ impl std::ops::AddAssign for MemoryTime {
     }
 }
 
-/// Time each bank spends closing and opening rows, and what rows and lines take of ranks and buses. This is a lower bound:
-/// lines of each client come in stream order, and clients never close each other's rows.
+/// Time each bank spends closing and opening rows, and what rows and lines take of ranks and buses. This is a
+/// lower bound: lines of each client come in stream order, and clients never close each other's rows.
 #[derive(Clone, Debug)]
 struct Banks {
     map: AddressMap,
@@ -534,8 +536,8 @@ struct Banks {
     banks_per_rank: usize,
     times: ChipTimes,
     turns: TurnPolicy,
-    /// Time to close a row and open another, read or written. Data moves meanwhile, as row and column commands have separate
-    /// wires.
+    /// Time to close a row and open another, read or written. Data moves meanwhile, as row and column
+    /// commands have separate wires.
     row: [Time; 2],
     /// Last row of each bank and client.
     rows: Vec<[u32; CLIENTS.len()]>,

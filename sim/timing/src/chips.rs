@@ -61,7 +61,8 @@ impl ChipTimes {
 }
 
 impl ChipTimes {
-    /// Least time from the opening of a row to that of the next in its bank, if one line is read or, `kind` 1, written.
+    /// Least time from the opening of a row to that of the next in its bank, if one line is read or, `kind`
+    /// 1, written.
     pub fn row_cycle(&self, kind: usize) -> Time {
         self.precharge + self.row.max(self.activate[kind] + self.to_precharge[kind])
     }
@@ -94,9 +95,10 @@ pub(crate) struct TurnPolicy {
 impl TurnPolicy {
     pub fn new(spec: &DramSpec, times: &ChipTimes) -> Self {
         let places = spec.write_queue.map_or(spec.queue.get(), |queue| queue.get());
-        // In a queue of both the place of the last line one way is taken before the turn. Lines come to one of several channels in
-        // chunks of both kinds, and wait for the first that is full: half a chunk of the others is missing. However long the chunks
-        // are, the bus turns no more than once each way for two of them.
+        // In a queue of both the place of the last line one way is taken before the turn. Lines come to one
+        // of several channels in chunks of both kinds, and wait for the first that is full: half a chunk of
+        // the others is missing. However long the chunks are, the bus turns no more than once each way for
+        // two of them.
         let chunk = f64::from(spec.interleave_bytes.get().min(spec.row_bytes.get()) / LINE_BYTES);
         let missing = 0.5 + if spec.channels.get() > 1 { chunk } else { 0.0 };
         let pair = times.write_to_read + times.read_to_write;
@@ -123,8 +125,9 @@ impl TurnPolicy {
 
     /// Turns there and back for so many reads and writes.
     ///
-    /// A queue of writes drains once it is full. In a queue of both, `p` places, lines of one way go until all places wait for the
-    /// other: with a share `f` of writes `p / (1 - f)` writes and `p / f` reads in turn.
+    /// A queue of writes drains once it is full. In a queue of both, `p` places, lines of one way go until
+    /// all places wait for the other: with a share `f` of writes `p / (1 - f)` writes and `p / f` reads in
+    /// turn.
     pub fn pairs(&self, lines: [u64; 2]) -> f64 {
         self.pairs_per_line(lines) * (lines[0] + lines[1]) as f64
     }

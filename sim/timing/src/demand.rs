@@ -1,6 +1,6 @@
-//! Service demand of packets: the work of each station of one machine for a packet. All levels read the same demands. Work is in
-//! fractions of a cycle: a unit that has time left in a cycle goes on with the next packet in the same cycle. Also the work of the units,
-//! and the time it takes them.
+//! Service demand of packets: the work of each station of one machine for a packet. All levels read the same
+//! demands. Work is in fractions of a cycle: a unit that has time left in a cycle goes on with the next
+//! packet in the same cycle. Also the work of the units, and the time it takes them.
 
 use std::ops::Range;
 
@@ -186,7 +186,8 @@ impl DemandBuilder {
         }
     }
 
-    /// Demand of the next packet of the stream; passes come one after another. `lines` are appended to `store`, sorted by client.
+    /// Demand of the next packet of the stream; passes come one after another. `lines` are appended to
+    /// `store`, sorted by client.
     pub fn build(
         &mut self,
         packet: &Packet,
@@ -348,7 +349,8 @@ impl Server {
         if self.at == now { self.used } else { 0 }
     }
 
-    /// Serve `work` from the cycle at `start` on, after what is used of it. Returns the beginning of the cycle in which it ends.
+    /// Serve `work` from the cycle at `start` on, after what is used of it. Returns the beginning of the
+    /// cycle in which it ends.
     pub fn serve(&mut self, start: Time, period: Time, work: Work) -> Time {
         let end = self.used_at(start) + work;
         *self = Self { at: start + period * (end / CYCLE), used: end % CYCLE };

@@ -1,9 +1,10 @@
-//! Time of the draws and of the passes of a frame: when each pass began and ended, and how long its work takes every unit.
+//! Time of the draws and of the passes of a frame: when each pass began and ended, and how long its work
+//! takes every unit.
 //!
-//! Packets count in the order of the stream, as instructions do that commit in order (Gottschall, Eeckhout and Jahre 2021,
-//! time-proportional instruction profiling): each takes the time from the latest end before it to its own end. So a draw gets the
-//! time by which it delays the frame, and the times of all draws add up to it. Work of the front end takes time only where no tile
-//! leaves after it that does not wait for it.
+//! Packets count in the order of the stream, as instructions do that commit in order (Gottschall, Eeckhout
+//! and Jahre 2021, time-proportional instruction profiling): each takes the time from the latest end before
+//! it to its own end. So a draw gets the time by which it delays the frame, and the times of all draws add up
+//! to it. Work of the front end takes time only where no tile leaves after it that does not wait for it.
 
 use std::collections::VecDeque;
 
@@ -143,7 +144,8 @@ impl DrawTimes {
         }
     }
 
-    /// The parts of every pass of a frame that ends at `end_ps`, and its spans in order of time; none if there are too many.
+    /// The parts of every pass of a frame that ends at `end_ps`, and its spans in order of time; none if
+    /// there are too many.
     pub fn finish(mut self, clocks: &Clocks, end_ps: u64) -> (Vec<PassParts>, Vec<DrawSpan>) {
         while let Some(front) = self.ahead.pop_front() {
             self.advance(front);
@@ -171,8 +173,8 @@ pub struct PassTime {
     pub end_ps: u64,
     /// Time that its work takes each unit at its rates, all servers together. It is the same at all levels.
     pub busy_ps: [u64; Unit::COUNT],
-    /// Time of each draw, by number: its part of the time from the end of the pass before to the end of this one. What is
-    /// missing is that of the resolve, the barrier and the last lines to memory.
+    /// Time of each draw, by number: its part of the time from the end of the pass before to the end of this
+    /// one. What is missing is that of the resolve, the barrier and the last lines to memory.
     pub draws_ps: Vec<u64>,
 }
 

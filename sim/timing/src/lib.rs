@@ -77,22 +77,23 @@ pub struct Timed {
     /// Row time of the busiest memory bank over the busy time of the busiest unit; `None` at the level
     /// `stepped`. Levels differ most where it is large, as they order lines differently.
     pub rows: Option<f64>,
-    /// Share of the frame for which a memory bank opens rows that it may not have to: lines of the same row that may wait side by
-    /// side, in an order that is not known; only at the level `packet`.
+    /// Share of the frame for which a memory bank opens rows that it may not have to: lines of the same row
+    /// that may wait side by side, in an order that is not known; only at the level `packet`.
     pub disputed: Option<f64>,
-    /// Utilization of memory whose channels queue less than the time in which a row closes and another one opens; `None` if they queue
-    /// more, and at the level `stepped`.
+    /// Utilization of memory whose channels queue less than the time in which a row closes and another one
+    /// opens; `None` if they queue more, and at the level `stepped`.
     pub short_queues: Option<f64>,
     /// Share of the frame that batches and passes may overlap, the longest packet of each; only at the level `bound`.
     pub overlap: Option<f64>,
     /// The passes of the frame, by number.
     pub passes: Vec<PassTime>,
-    /// When the frame spent its time on which draw, in order; empty at the level `bound`, and at `packet` if draws take turns
-    /// very often.
+    /// When the frame spent its time on which draw, in order; empty at the level `bound`, and at `packet` if
+    /// draws take turns very often.
     pub spans: Vec<DrawSpan>,
 }
 
-/// Utilization of memory, if a queue of its channels holds less than the time in which a row closes and another one opens.
+/// Utilization of memory, if a queue of its channels holds less than the time in which a row closes and
+/// another one opens.
 fn short_queues(dram: &DramSpec, timeline: &activity::Timeline) -> Option<f64> {
     let writes = dram.write_queue.map_or(u32::MAX, |queue| queue.get());
     let queued = dram.queue.get().min(writes) * dram.burst_cycles.get();
@@ -222,11 +223,12 @@ impl<'a> FrameClock<'a> {
 /// Reason why the time of a frame may be inaccurate at its level.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum AccuracyWarning {
-    /// Share of the frame for which a memory bank opens rows in an order that `packet` and `bound` do not know: those that other
-    /// lines may have open at `packet`, all at `bound`, there over the busy time of the busiest unit.
+    /// Share of the frame for which a memory bank opens rows in an order that `packet` and `bound` do not
+    /// know: those that other lines may have open at `packet`, all at `bound`, there over the busy time of
+    /// the busiest unit.
     MemoryRows(f64),
-    /// Utilization of memory whose queues are shorter than the opening of a row: which lines are in the queue of a channel, and which
-    /// wait in front of it, decides how well rows and buses are used.
+    /// Utilization of memory whose queues are shorter than the opening of a row: which lines are in the queue
+    /// of a channel, and which wait in front of it, decides how well rows and buses are used.
     MemoryQueue(f64),
     /// Share of the frame that batches and passes may overlap. `bound` does not know for how much of it they do.
     BatchOverlap(f64),
@@ -234,12 +236,13 @@ pub enum AccuracyWarning {
     ShortPackets(f64),
 }
 
-/// Smallest disputed share of the frame that gives a warning at `packet`, and smallest row time over busy time at `bound`.
+/// Smallest disputed share of the frame that gives a warning at `packet`, and smallest row time over busy
+/// time at `bound`.
 const MIN_ROWS: f64 = 0.2;
 /// Least utilization of memory with short queues that gives a warning at `packet`, and at `bound`.
 const MIN_QUEUED: [f64; 2] = [0.2, 0.15];
-/// Smallest share of the frame that batches and passes may overlap that gives a warning: half of it is what `bound` takes, and any part
-/// may be right.
+/// Smallest share of the frame that batches and passes may overlap that gives a warning: half of it is what
+/// `bound` takes, and any part may be right.
 const MIN_OVERLAP: f64 = 0.16;
 /// Packets with fewer cycles than this give a warning.
 const MIN_PACKET_CYCLES: f64 = 2.0;

@@ -1,4 +1,5 @@
-//! Recording of a frame in bins of time: events and busy time, and where each unit's time went (busy, starved, blocked, idle).
+//! Recording of a frame in bins of time: events and busy time, and where each unit's time went (busy,
+//! starved, blocked, idle).
 
 use activity::{Bin, Counts, Event, PacketCounts, Timeline, Unit};
 
@@ -95,8 +96,9 @@ impl Recorder {
         self.bins[bin].counts[event] += times;
     }
 
-    /// Record that `busy` of the `of` servers of `unit`, at least one, worked from `start_ps` to `end_ps`. Its time in each bin is
-    /// rounded down, so that servers recorded one by one are together busy for no longer than the bin.
+    /// Record that `busy` of the `of` servers of `unit`, at least one, worked from `start_ps` to `end_ps`.
+    /// Its time in each bin is rounded down, so that servers recorded one by one are together busy for no
+    /// longer than the bin.
     pub fn busy(&mut self, unit: Unit, start_ps: u64, end_ps: u64, busy: u64, of: u64) {
         for (bin, from, to) in self.span(start_ps, end_ps) {
             self.bins[bin].busy_ps[unit as usize] += part(to - from, busy, of);
@@ -320,8 +322,8 @@ impl Stalls {
         })
     }
 
-    /// Server time of `unit` between two times of the frame, in picoseconds. An interval that is in it in part counts in
-    /// part.
+    /// Server time of `unit` between two times of the frame, in picoseconds. An interval that is in it in
+    /// part counts in part.
     pub fn between(&self, unit: Unit, [from_ps, to_ps]: [u64; 2]) -> UnitTime {
         let first = (from_ps / self.interval_ps()).saturating_sub(1);
         let mut sum = UnitTime::default();

@@ -154,8 +154,8 @@ pub struct DramSpec {
     pub latency_cycles: Cycles,
     /// Lines that may wait at a channel, at least 2; lines to read if there is a `write_queue`.
     pub queue: Bounded<2, 65_536>,
-    /// Lines to write that may wait at a channel. Reads go first until it is full or no read waits; then all writes in it go.
-    /// Without it reads and writes share `queue`, and any line may go first.
+    /// Lines to write that may wait at a channel. Reads go first until it is full or no read waits; then all
+    /// writes in it go. Without it reads and writes share `queue`, and any line may go first.
     #[serde(default)]
     pub write_queue: Option<Entries>,
     /// Channels; not necessarily a power of two.
@@ -348,8 +348,8 @@ impl MachineSpec {
         Common { in_flight, lines_per_cycle: bins.lines_per_cycle.get(), ..common }
     }
 
-    /// Check that every rate belongs to the unit it is written for, and that a channel of memory can queue all lines of
-    /// a request. Types check all single fields.
+    /// Check that every rate belongs to the unit it is written for, and that a channel of memory can queue
+    /// all lines of a request. Types check all single fields.
     ///
     /// # Errors
     /// The first wrong value: its field, such as `depth.rates`, and the message.
@@ -388,7 +388,8 @@ impl MachineSpec {
 }
 
 impl DramSpec {
-    /// Check what single fields cannot: a request may write `most_written` lines to a channel, and chips work between refreshes.
+    /// Check what single fields cannot: a request may write `most_written` lines to a channel, and chips work
+    /// between refreshes.
     fn validate(&self, most_written: u32) -> Result<(), (String, String)> {
         if let Some(queue) = self.write_queue.map(|queue| queue.get()).filter(|&queue| queue < most_written) {
             let message = format!(

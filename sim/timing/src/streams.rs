@@ -87,8 +87,8 @@ pub struct Failure {
     pub units: MachineSpec,
 }
 
-/// All challenging streams for `units`, in batches of `batch` triangles; those of groups come last, for machines that have
-/// them.
+/// All challenging streams for `units`, in batches of `batch` triangles; those of groups come last, for
+/// machines that have them.
 pub fn failures(units: &MachineSpec, batch: u32) -> Vec<Failure> {
     let on = |name, packets| Failure { name, packets, units: units.clone() };
     let mut narrow = on("queues of one", tiny(batch));

@@ -1,7 +1,7 @@
 //! Warnings: results are there, but a method is weak for this input, or something that a file asks for was ignored.
 //!
-//! A [`Warning`] has a [`Code`] that never changes its meaning, and a message for people. All codes are declared in one place, with
-//! what they mean and the section of the book that explains them.
+//! A [`Warning`] has a [`Code`] that never changes its meaning, and a message for people. All codes are
+//! declared in one place, with what they mean and the section of the book that explains them.
 //!
 //! ```
 //! use warnings::{Code, Warning};
@@ -116,11 +116,12 @@ codes! {
     CoordinatesCoarse = "coordinates-coarse" in Simulator,
     /// Triangles in view and in front of the camera are nearer than its near plane, as a whole or in part.
     NearPlaneCuts = "near-plane-cuts" in Simulator,
-    /// A memory bank opens rows in an order that the level does not know: at `packet` for at least a fifth of the time rows that other
-    /// lines may have open, at `bound` any rows for at least a fifth of the busiest unit's time.
+    /// A memory bank opens rows in an order that the level does not know: at `packet` for at least a fifth of
+    /// the time rows that other lines may have open, at `bound` any rows for at least a fifth of the busiest
+    /// unit's time.
     MemoryRows = "memory-rows" in Simulator,
-    /// The queue of a memory channel is shorter than the opening of a row, and memory is busy for a fifth of the frame or more, at `bound`
-    /// for 15 %.
+    /// The queue of a memory channel is shorter than the opening of a row, and memory is busy for a fifth of
+    /// the frame or more, at `bound` for 15 %.
     MemoryQueue = "memory-queue" in Simulator,
     /// At `bound`: the longest packets of batches and passes take 16 % of the frame or more.
     BatchOverlap = "batch-overlap" in Simulator,
@@ -165,7 +166,8 @@ codes! {
     ShadowBanding = "shadow-banding" in Workload,
     /// The bias is below half a texel of the map or above eight.
     ShadowBias = "shadow-bias" in Workload,
-    /// `soft-shadows` draws textured, cut-out, blended or vertex-coloured surfaces, as opaque ones of their base colour.
+    /// `soft-shadows` draws textured, cut-out, blended or vertex-coloured surfaces, as opaque ones of their
+    /// base colour.
     MaterialsSimplified = "materials-simplified" in Workload,
     /// The shader of `multiview` runs a quarter more often than with an unlimited cache.
     ShadingCacheSmall = "shading-cache-small" in Workload,
@@ -301,7 +303,8 @@ impl PartialEq<&str> for Code {
     }
 }
 
-/// A run has entered a regime its methods are known to be bad at, or has gone on without something its input asks for.
+/// A run has entered a regime its methods are known to be bad at, or has gone on without something its input
+/// asks for.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 pub struct Warning {
     /// Its subject.
@@ -332,8 +335,9 @@ impl Warning {
         Self { code, message: message.into(), count: 1, details: Vec::new(), kind: None }
     }
 
-    /// A warning about one `thing`, a noun whose plural ends in `s`; `what` goes on after the noun, and `detail` says which
-    /// thing it is. [`Warning::fold`] makes one warning of all that are about the same kind of thing.
+    /// A warning about one `thing`, a noun whose plural ends in `s`; `what` goes on after the noun, and
+    /// `detail` says which thing it is. [`Warning::fold`] makes one warning of all that are about the same
+    /// kind of thing.
     pub fn about(code: Code, thing: &'static str, what: &'static str, detail: impl Into<String>) -> Self {
         let kind = Kind { thing, what };
         Self { code, message: kind.message(1), count: 1, details: vec![detail.into()], kind: Some(kind) }
@@ -359,7 +363,8 @@ impl Warning {
         self
     }
 
-    /// The warnings in order of their codes, those about the same kind of thing as one with a count, and equal ones once.
+    /// The warnings in order of their codes, those about the same kind of thing as one with a count, and
+    /// equal ones once.
     pub fn fold(all: impl IntoIterator<Item = Self>) -> Vec<Self> {
         let mut counted: BTreeMap<(Code, Kind), Self> = BTreeMap::new();
         let mut folded = Vec::new();

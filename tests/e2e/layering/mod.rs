@@ -80,7 +80,8 @@ fn crates_use_only_allowed_crates() {
     assert_eq!(found, known, "a new crate needs its place in the arrows");
 }
 
-/// Every counted event comes from the pipeline: workloads, runs and experiments say what their code did, and make no packets.
+/// Every counted event comes from the pipeline: workloads, runs and experiments say what their code did, and
+/// make no packets.
 #[test]
 fn packets_are_built_in_the_pipeline_alone() {
     let above = ["workloads/src", "sim/run/src", "sim/experiments/src", "sim/sweep/src", "sim/src"];
@@ -99,7 +100,8 @@ fn packets_are_built_in_the_pipeline_alone() {
     assert_eq!(found, ["streams.rs"]);
 }
 
-/// All ways to a packet of one's own are found: from nothing, from another one, by a copy that is changed, and after test modules.
+/// All ways to a packet of one's own are found: from nothing, from another one, by a copy that is changed,
+/// and after test modules.
 #[test]
 fn packets_made_of_others_and_after_tests_are_found() {
     for code in [

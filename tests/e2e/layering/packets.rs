@@ -1,8 +1,8 @@
 //! Code that makes packets or changes their counts, from its sources.
 //!
-//! `syn` knows no types, so a change is known by the names of a packet's fields: whatever is written to one of them counts, but for a
-//! field of `self` and for sums into a whole `counts` of what is no local copy, as other structures have one, too. Test modules are
-//! skipped, wherever they are in a file.
+//! `syn` knows no types, so a change is known by the names of a packet's fields: whatever is written to one
+//! of them counts, but for a field of `self` and for sums into a whole `counts` of what is no local copy, as
+//! other structures have one, too. Test modules are skipped, wherever they are in a file.
 
 use syn::visit::{self, Visit};
 use syn::{Attribute, Expr, File, Item, Local, Macro, Member, Pat, Path, Type, UnOp, UseTree};

@@ -12,8 +12,8 @@ pub struct Refusals {
 }
 
 impl Refusals {
-    /// Checks that a call failed with `code` and one message. The message has to contain every part of `says` (the file, the
-    /// place and what is wrong), and `remedy`: what to do.
+    /// Checks that a call failed with `code` and one message. The message has to contain every part of `says`
+    /// (the file, the place and what is wrong), and `remedy`: what to do.
     pub fn check(&mut self, ended: &Ended, code: i32, says: &[&str], remedy: &str) {
         let Ended { stdout, stderr, .. } = ended;
         let mut complain = |holds: bool, what: &str| {

@@ -1,7 +1,7 @@
 //! Checking JSON against the part of JSON Schema (2020-12) that the schemas of this repository use.
 //!
-//! Written by ourselves, as a library for all of it brings fifty crates. A word it does not know is an error, so that nothing
-//! goes unchecked.
+//! Written by ourselves, as a library for all of it brings fifty crates. A word it does not know is an error,
+//! so that nothing goes unchecked.
 
 use std::fs;
 

@@ -1,4 +1,5 @@
-//! Programs in Python: the driver for Ray, and readers of the table. The variable `QUINTILE_PYTHON` names the interpreter.
+//! Programs in Python: the driver for Ray, and readers of the table. The variable `QUINTILE_PYTHON` names the
+//! interpreter.
 
 use std::fs;
 use std::path::Path;

@@ -1,8 +1,10 @@
-//! Maximal Poisson-disk points per second of one thread's CPU time, beside the `poisson` crate and, where it is there, scipy.
+//! Maximal Poisson-disk points per second of one thread's CPU time, beside the `poisson` crate and, where it
+//! is there, scipy.
 //!
-//! `cargo run --release --manifest-path tests/rivals/Cargo.toml`. With `QUINTILE_SCIPY=PYTHON` (a Python that has scipy) its engine runs in the same
-//! minutes. Medians of five runs; packing density and largest hole say how good the points are. With `space` after `--` only
-//! points in space and ever more of them, a line as soon as it is known: of six runs at the distances below the crate saw no end.
+//! `cargo run --release --manifest-path tests/rivals/Cargo.toml`. With `QUINTILE_SCIPY=PYTHON` (a Python that
+//! has scipy) its engine runs in the same minutes. Medians of five runs; packing density and largest hole say
+//! how good the points are. With `space` after `--` only points in space and ever more of them, a line as
+//! soon as it is known: of six runs at the distances below the crate saw no end.
 
 #![allow(clippy::unwrap_used, reason = "a benchmark that cannot run may as well panic")]
 

@@ -81,8 +81,8 @@ fn errors(relative: &[f64]) -> Errors {
     Errors { mean, median: magnitudes.get(magnitudes.len() / 2).copied().unwrap_or(f64::NAN) }
 }
 
-/// Frames one of whose ends is wrong, how many of them say so, and how many of the right ones say so. The last one ends at the end mark, wherever
-/// that is.
+/// Frames one of whose ends is wrong, how many of them say so, and how many of the right ones say so. The
+/// last one ends at the end mark, wherever that is.
 fn wrong(case: &Case, frames: &[FrameEnergy]) -> (usize, usize, usize) {
     let found_s: Vec<f64> = frames.iter().map(|frame| frame.start_s).collect();
     let truth_s: Vec<f64> = case.truth.iter().map(|frame| frame.start_s).collect();

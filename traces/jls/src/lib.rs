@@ -1,17 +1,17 @@
 //! JLS version 2, the recordings of Joulescope instruments: reading and writing, in pieces, in files of any
 //! length.
 //!
-//! - [`Writer`] writes signals of one fixed rate in f32, with the summaries (mean, standard deviation, lowest, highest)
-//!   that let viewers zoom, the times of first and last sample, and a JSON text of your own.
-//! - [`Reader`] lists the signals of a file; a [`SampleReader`] reads the samples of one of them, in any of the common
-//!   sample types, from any sample on.
+//! - [`Writer`] writes signals of one fixed rate in f32, with the summaries (mean, standard deviation,
+//!   lowest, highest) that let viewers zoom, the times of first and last sample, and a JSON text of your own.
+//! - [`Reader`] lists the signals of a file; a [`SampleReader`] reads the samples of one of them, in any of
+//!   the common sample types, from any sample on.
 //!
 //! Summaries, annotations and times are written, but not read. The layout is Jetperch's (JLS 0.17,
 //! `include/jls/format.h`, Apache-2.0); the code is our own. Every checksum is verified; a damaged file is an
 //! error, never a panic, and no length that a file states is allocated on trust.
 //!
-//! All numbers in a file are little-endian. It is a header and a sequence of chunks. A chunk is a header, a payload, and checksums of
-//! both. The chunks of one kind and signal form a doubly linked list.
+//! All numbers in a file are little-endian. It is a header and a sequence of chunks. A chunk is a header, a
+//! payload, and checksums of both. The chunks of one kind and signal form a doubly linked list.
 //!
 //! ```
 //! use jls::{Reader, SignalName, Timestamp, Writer};

@@ -17,8 +17,9 @@ const PIECE_SAMPLES: usize = 1 << 16;
 const TASK_SAMPLES: usize = 1 << 12;
 /// Most samples: they are not held in memory, but take time.
 const MAX_SAMPLES: f64 = (1_u64 << 36) as f64;
-/// Largest change of the energy without a warning, as a share. On a rail as assumed by default, a specified voltage misses at most
-/// 0.1 V of 12 V, and gain and offset of a meter are a percent or so: several times that is another voltage, or too few codes.
+/// Largest change of the energy without a warning, as a share. On a rail as assumed by default, a specified
+/// voltage misses at most 0.1 V of 12 V, and gain and offset of a meter are a percent or so: several times
+/// that is another voltage, or too few codes.
 const MAX_ENERGY_CHANGE: f64 = 0.03;
 
 /// A trace as a coarser device would have recorded it: the original is read again whenever samples are

@@ -236,7 +236,8 @@ impl DeviceSpec {
         Self { name: format!("daq-{rate}-{}bit", self.bits), ..self }
     }
 
-    /// The largest current that a trace with these peaks brings, A: that of its power on the rail where it has no voltage.
+    /// The largest current that a trace with these peaks brings, A: that of its power on the rail where it
+    /// has no voltage.
     fn peak_a(&self, peaks: &Peaks) -> f64 {
         if peaks.has_voltage { peaks.current_a } else { peaks.power_w / self.rail_v }
     }

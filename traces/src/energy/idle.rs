@@ -66,7 +66,8 @@ impl<'a> Idle<'a> {
         }
     }
 
-    /// Warning if frames of a trace that starts at `start_s`, from which nothing is taken off yet, draw less than idle power.
+    /// Warning if frames of a trace that starts at `start_s`, from which nothing is taken off yet, draw less
+    /// than idle power.
     pub fn above_frames(&self, start_s: f64, frames: &[FrameEnergy]) -> Option<Warning> {
         let idle_j: f64 = frames.iter().map(|frame| self.energy_j(start_s, frame.start_s, frame.end_s)).sum();
         let total_j: f64 = frames.iter().map(|frame| frame.energy_j).sum();
@@ -113,8 +114,9 @@ const MIN_CLIPPED: (f64, usize) = (1e-3, 8);
 /// A range ends where its last value occurs more often than this many times the value next to it.
 const MIN_CLIPPED_RATIO: usize = 4;
 
-/// Warning about a trace whose current was clipped: its greatest or least value occurs far more often than the next one, which noise
-/// would reach as often. Noise below a step of the converter leaves steady power on one value as well, and says nothing.
+/// Warning about a trace whose current was clipped: its greatest or least value occurs far more often than
+/// the next one, which noise would reach as often. Noise below a step of the converter leaves steady power on
+/// one value as well, and says nothing.
 pub fn clipped_current(trace: &Trace) -> Option<Warning> {
     let current_a = trace.current_a();
     let mut steps_a: Vec<f64> = current_a.windows(2).map(|two| f64::from((two[1] - two[0]).abs())).collect();

@@ -1,5 +1,5 @@
-//! The one rule for the energy of a trace, and the energy of each frame from start to start: of a trace in memory, or of one
-//! of any length in one pass, to the same last bit.
+//! The one rule for the energy of a trace, and the energy of each frame from start to start: of a trace in
+//! memory, or of one of any length in one pass, to the same last bit.
 
 use crate::frames::{Flags, Found};
 use crate::io::{TraceChunk, TraceHeader, TraceReader, TraceWriter, WriteError};

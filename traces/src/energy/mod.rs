@@ -138,8 +138,8 @@ impl FrameTable {
         &self.outliers
     }
 
-    /// Writes the table as CSV with the header [`TABLE_COLUMNS`] and the names of extra columns; numbers in the shortest form that reads
-    /// back the same.
+    /// Writes the table as CSV with the header [`TABLE_COLUMNS`] and the names of extra columns; numbers in
+    /// the shortest form that reads back the same.
     ///
     /// # Errors
     /// [`TableError`] if the writer fails.

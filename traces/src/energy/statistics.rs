@@ -44,7 +44,8 @@ impl FrameSummary {
 }
 
 /// The frames without an incomplete last one, which ends with the trace or at an end mark and is much longer
-/// or shorter than the others; or, where it `ends_with_trace`, which may be anywhere in it, shorter than their spread allows.
+/// or shorter than the others; or, where it `ends_with_trace`, which may be anywhere in it, shorter than
+/// their spread allows.
 pub fn whole(frames: &[FrameEnergy], ends_with_trace: bool) -> &[FrameEnergy] {
     let odd = |flags: Flags| flags.contains(Flag::Long) || flags.contains(Flag::Short);
     let cut = |last: &FrameEnergy| {
@@ -59,8 +60,8 @@ pub fn whole(frames: &[FrameEnergy], ends_with_trace: bool) -> &[FrameEnergy] {
 /// Fewest frames with a usual length: of two, either may be the odd one.
 const MIN_FRAMES: usize = 3;
 
-/// Whether the last frame is shorter than those before it by as much as makes an outlier: a whole frame that is left out by mistake
-/// shifts the mean by nothing, a part of one that is not does.
+/// Whether the last frame is shorter than those before it by as much as makes an outlier: a whole frame that
+/// is left out by mistake shifts the mean by nothing, a part of one that is not does.
 fn is_shorter(frames: &[FrameEnergy]) -> bool {
     let lengths_s: Vec<f64> = frames.iter().map(FrameEnergy::duration_s).collect();
     lengths_s.len() >= MIN_FRAMES
@@ -292,8 +293,8 @@ pub struct Histogram {
 const MIN_WIDTH_SHARE: f64 = 1e-12;
 
 impl Histogram {
-    /// The distribution of finite values. The number of bins is the square root of that of the values, at most `max_bins`;
-    /// no values give one empty bin.
+    /// The distribution of finite values. The number of bins is the square root of that of the values, at
+    /// most `max_bins`; no values give one empty bin.
     pub fn of(values: &[f64], max_bins: usize) -> Self {
         let bins = ((values.len() as f64).sqrt() as usize).clamp(1, max_bins.max(1));
         let low = values.iter().copied().reduce(f64::min).unwrap_or(0.0);

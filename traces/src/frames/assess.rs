@@ -1,10 +1,11 @@
 //! Confidence of each start, and warnings about the result as a whole: also about work before the first start
 //! and after the last frame.
 //!
-//! *Consensus*: found starts are tried as marks. Any ordinary frame as the mark gives the same frames, and among them the one that was marked. Where a search has lost its way it does
-//! not: the frames found from its own starts are others, and the mark is none of them. So several found starts, evenly chosen, are tried
-//! as marks, by tracking and by the sum of squares. The method whose searches agree more with its first one is taken, and how many
-//! of them find a frame is the confidence in that.
+//! *Consensus*: found starts are tried as marks. Any ordinary frame as the mark gives the same frames, and
+//! among them the one that was marked. Where a search has lost its way it does not: the frames found from its
+//! own starts are others, and the mark is none of them. So several found starts, evenly chosen, are tried as
+//! marks, by tracking and by the sum of squares. The method whose searches agree more with its first one is
+//! taken, and how many of them find a frame is the confidence in that.
 
 use super::marks::{Marks, Placement, Window};
 use super::threshold::{MIN_SEPARATION, Rule, Threshold};
@@ -167,8 +168,8 @@ impl Found {
         self
     }
 
-    /// Adds the warning about a window that is longer than the time after which power repeats, where the frames found do not show it:
-    /// starts nearer than half the window are never found.
+    /// Adds the warning about a window that is longer than the time after which power repeats, where the
+    /// frames found do not show it: starts nearer than half the window are never found.
     pub(crate) fn warn_of_long_window(&mut self, repetition_s: Option<f64>) {
         let warned = self.warnings.iter().any(|warning| warning.code == Code::WindowLongerThanFrame);
         let window_s = self.window.pre_s + self.window.post_s;
@@ -355,8 +356,9 @@ impl Votes {
             weight * 2.0 * shared as f64 / (own.len() + other.len()) as f64 / self.searches as f64;
     }
 
-    /// A result with the share of all searches that find a start or a frame as its confidence; the first search counts with the
-    /// confidence that it has, and where no other has looked the others agree as they do elsewhere.
+    /// A result with the share of all searches that find a start or a frame as its confidence; the first
+    /// search counts with the confidence that it has, and where no other has looked the others agree as they
+    /// do elsewhere.
     fn applied(&self, found: Found) -> Found {
         let share = |votes: &[f64], index: usize, own: f64| {
             let elsewhere = self.agreement * self.searches as f64;

@@ -3,11 +3,11 @@
 //! A frame begins in little power, between the end of the frame before and its own draws. The alignment
 //! follows the draws.
 //!
-//! - A changed gap: if the gap before the draws has become longer, power does not show whether the wait for the frame has,
-//!   or its own quiet beginning (the front end). The start may be anywhere in the added time. Starts whose gap begins or
-//!   ends at another distance than at the mark are suspect.
-//! - A missing gap: a start amidst work, where others nearby have an idle gap, may lie within a frame. Where a frame takes
-//!   two ticks of the display at a slow clock, its middle is on a tick, too.
+//! - A changed gap: if the gap before the draws has become longer, power does not show whether the wait for
+//!   the frame has, or its own quiet beginning (the front end). The start may be anywhere in the added time.
+//!   Starts whose gap begins or ends at another distance than at the mark are suspect.
+//! - A missing gap: a start amidst work, where others nearby have an idle gap, may lie within a frame. Where
+//!   a frame takes two ticks of the display at a slow clock, its middle is on a tick, too.
 
 use super::SUSPECT_CONFIDENCE;
 use crate::stats::{mean, nth_smallest, upper_median};

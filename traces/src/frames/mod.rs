@@ -2,8 +2,9 @@
 //! is compared with every window of the trace by summed squared difference. A threshold chosen from the trace
 //! itself separates starts from the rest; where it cannot, the result carries a [`Warning`].
 //!
-//! Constants of the finder have their reason beside them. Those that state none were tuned on the synthetic scenes and
-//! seeds of `docs/finding.md`, section *Flags*, which also has the result on seeds that were not used.
+//! Constants of the finder have their reason beside them. Those that state none were tuned on the synthetic
+//! scenes and seeds of `docs/finding.md`, section *Flags*, which also has the result on seeds that were not
+//! used.
 
 mod assess;
 mod find;
@@ -87,11 +88,11 @@ fn marked_start(mark: &Placed) -> FrameStart {
     FrameStart { time_s: mark.mark_s, distance_w2: 0.0, confidence: 1.0, marked: true }
 }
 
-/// Frames of lower confidence are flagged. Confidence is 1 at the mean distance of the matches and 0 at that of the other
-/// minima, on a logarithmic scale: below one half a start is nearer to the others.
+/// Frames of lower confidence are flagged. Confidence is 1 at the mean distance of the matches and 0 at that
+/// of the other minima, on a logarithmic scale: below one half a start is nearer to the others.
 const MIN_CONFIDENCE: f64 = 0.5;
-/// Confidence factor of a start that may be misplaced: below [`MIN_CONFIDENCE`], so that its frames are flagged however
-/// well it matches. Its exact value only orders flagged frames; confidence is not calibrated.
+/// Confidence factor of a start that may be misplaced: below [`MIN_CONFIDENCE`], so that its frames are
+/// flagged however well it matches. Its exact value only orders flagged frames; confidence is not calibrated.
 const SUSPECT_CONFIDENCE: f64 = 0.8 * MIN_CONFIDENCE;
 /// Confidence factor of a start beyond a phase slip: below [`SUSPECT_CONFIDENCE`], as it is off by a part of a frame.
 const SLIPPED_CONFIDENCE: f64 = 0.6 * MIN_CONFIDENCE;
@@ -208,15 +209,15 @@ pub enum FinderMethod {
     /// to each other, and at an even period.
     Tracking,
     /// Tracking. With fewer than 20 samples in the window, the most even of tracking, the sum of squares and
-    /// normalized; with fewer than 8 the sum of squares. Also the sum of squares for fewer than 16 frames, or for more than
-    /// 16 million samples without a warning.
+    /// normalized; with fewer than 8 the sum of squares. Also the sum of squares for fewer than 16 frames, or
+    /// for more than 16 million samples without a warning.
     #[default]
     Auto,
-    /// The same, but the sum of squares also where searches from the frames found agree more by it than by tracking. How far
-    /// these searches agree is the confidence.
+    /// The same, but the sum of squares also where searches from the frames found agree more by it than by
+    /// tracking. How far these searches agree is the confidence.
     Consensus,
-    /// Segmentation of the whole trace by one probabilistic model, or the result of another method where a criterion without truth
-    /// prefers that.
+    /// Segmentation of the whole trace by one probabilistic model, or the result of another method where a
+    /// criterion without truth prefers that.
     Segments,
 }
 

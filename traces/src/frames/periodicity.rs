@@ -1,9 +1,10 @@
 //! Periodicity: how regular the gaps between starts are. Wrong starts rarely keep the period.
 //!
-//! *V-sync snapping*: frames that wait for the display start on the ticks of one clock. Where the beginning of a frame varies, templates are aligned by its most prominent part, up to a
-//! millisecond after the start. The sequence then wanders, although the frames do not. If nearly all gaps are
-//! whole numbers of one period, the display sets that period. If the starts of such a trace are spread all
-//! the same, the mark and the period give their positions.
+//! *V-sync snapping*: frames that wait for the display start on the ticks of one clock. Where the beginning
+//! of a frame varies, templates are aligned by its most prominent part, up to a millisecond after the start.
+//! The sequence then wanders, although the frames do not. If nearly all gaps are whole numbers of one period,
+//! the display sets that period. If the starts of such a trace are spread all the same, the mark and the
+//! period give their positions.
 
 use super::profile::normalized;
 use crate::stats::{moments, upper_median};
@@ -72,13 +73,15 @@ pub(crate) fn regularity(offsets: &[usize], span: usize) -> f64 {
 
 /// Greatest lag of a repetition, samples.
 const MAX_LAG_SAMPLES: usize = 1 << 15;
-/// The first of all peaks at least this share of the highest is the repetition (McLeod and Wyvill 2005, who take 0.8 to 1).
+/// The first of all peaks at least this share of the highest is the repetition (McLeod and Wyvill 2005, who
+/// take 0.8 to 1).
 const FIRST_PEAK_SHARE: f64 = 0.9;
 /// Least correlation of a repetition: half of the variance.
 const MIN_REPETITION: f64 = 0.5;
 
-/// After how many samples power repeats itself in the middle of a trace, whatever frames are: the first high peak of its
-/// autocorrelation (McLeod and Wyvill, *A Smarter Way to Find Pitch*, 2005). `None` where none is high.
+/// After how many samples power repeats itself in the middle of a trace, whatever frames are: the first high
+/// peak of its autocorrelation (McLeod and Wyvill, *A Smarter Way to Find Pitch*, 2005). `None` where none is
+/// high.
 pub(crate) fn repetition_samples(power: &[f64]) -> Option<usize> {
     let lags = (power.len() / 2).min(MAX_LAG_SAMPLES);
     let from = power.len() / 2 - lags;

@@ -1,8 +1,8 @@
 //! Distance profiles: the distance of a template to every window of a trace, by summed squares or by shape,
 //! and its minima.
 //!
-//! Narrow templates are summed directly, wide ones correlated by the Fourier transform, block by block: by overlap and save
-//! (Oppenheim and Schafer 2010, section 8.7.3), in f32 or f64.
+//! Narrow templates are summed directly, wide ones correlated by the Fourier transform, block by block: by
+//! overlap and save (Oppenheim and Schafer 2010, section 8.7.3), in f32 or f64.
 //!
 //! Templates are real, so two blocks of a signal share a transform, one as its real part and one as its
 //! imaginary part (Press et al. 2007, section 12.3), and come out in the same way.
@@ -93,9 +93,10 @@ impl Correlator {
 /// Least norm of a window, as a share of the template's: steady power then resembles nothing.
 const MIN_NORM_SHARE: f64 = 0.05;
 
-/// z-normalized squared distance (Goldin and Kanellakis 1995; Mueen's MASS) at every offset, in W^2: `2 |q|^2 (1 - r)`, with `r` the
-/// correlation coefficient and `|q|` the template's norm about its mean. It is what the summed squared difference would be had the
-/// segment the template's mean and norm: neither idle power nor a factor on power changes it.
+/// z-normalized squared distance (Goldin and Kanellakis 1995; Mueen's MASS) at every offset, in W^2: `2 |q|^2
+/// (1 - r)`, with `r` the correlation coefficient and `|q|` the template's norm about its mean. It is what
+/// the summed squared difference would be had the segment the template's mean and norm: neither idle power
+/// nor a factor on power changes it.
 pub(super) fn normalized(power: &[f64], template: &[f64]) -> Vec<f64> {
     let width = template.len();
     if width == 0 || power.len() < width {

@@ -1,21 +1,22 @@
 //! Registration of starts finer than a sample: each is aligned with its neighbours, and all alignments are
 //! reconciled by least squares.
 //!
-//! Where content changes, the window of the marked frame is a poor reference, as draws after the start move. Successive
-//! frames differ little, and least right after the start. So the shift of each frame against its next few is measured
-//! around the start, and positions `x_i` are chosen to fit all shifts: minimize
-//! `sum w_ij (x_j - x_i - s_ij)^2 + sum u (x_i - c_i)^2`, with `c_i` the position by template and marks fixed, by Gauss-Seidel
-//! sweeps. An edge just at the end of the compared window enters some shifts only and pulls the result by up to a quarter of
-//! a sample (a test shows it).
+//! Where content changes, the window of the marked frame is a poor reference, as draws after the start move.
+//! Successive frames differ little, and least right after the start. So the shift of each frame against its
+//! next few is measured around the start, and positions `x_i` are chosen to fit all shifts: minimize `sum
+//! w_ij (x_j - x_i - s_ij)^2 + sum u (x_i - c_i)^2`, with `c_i` the position by template and marks fixed, by
+//! Gauss-Seidel sweeps. An edge just at the end of the compared window enters some shifts only and pulls the
+//! result by up to a quarter of a sample (a test shows it).
 //!
-//! *Refinement*: starts move to where neighbouring frames begin to agree. Frames are aligned by the power after their start. If the part in between has become shorter since the
-//! mark (a front end with less to do), a start at the distance of the mark lies in the end of the frame
-//! before. That end varies from frame to frame, so neighbours differ there, and the energy from start to
-//! start varies with them. A start therefore moves to the first sample from which on neighbours agree about
-//! as well as anywhere near. Starts that agree already do not move; nor do starts at an edge, which each
-//! frame samples at another phase, nor up into more power, as power falls at the end of a frame; nor past
-//! most of the work in the window, as a frame that is busy for a few samples differs from its neighbours
-//! while it works, and agrees with them in the idle gap after it.
+//! *Refinement*: starts move to where neighbouring frames begin to agree. Frames are aligned by the power
+//! after their start. If the part in between has become shorter since the mark (a front end with less to do),
+//! a start at the distance of the mark lies in the end of the frame before. That end varies from frame to
+//! frame, so neighbours differ there, and the energy from start to start varies with them. A start therefore
+//! moves to the first sample from which on neighbours agree about as well as anywhere near. Starts that agree
+//! already do not move; nor do starts at an edge, which each frame samples at another phase, nor up into more
+//! power, as power falls at the end of a frame; nor past most of the work in the window, as a frame that is
+//! busy for a few samples differs from its neighbours while it works, and agrees with them in the idle gap
+//! after it.
 
 use super::subsample::{ScaledPair, between, nearest, vertex};
 use crate::stats::{mean, moments, upper_median};
@@ -388,8 +389,8 @@ mod tests {
 
     #[test]
     fn what_a_start_is_the_mark_says_and_no_frame_beside_it_becomes_longer() {
-        // Neighbours differ after every start, also after the marked one: moving all but that would make the frame before
-        // it shorter and it longer by the move.
+        // Neighbours differ after every start, also after the marked one: moving all but that would make the
+        // frame before it shorter and it longer by the move.
         let (power, right) = frames(60, |_| 4);
         let early: Vec<f64> = right.iter().map(|start| start - 16.0).collect();
         let mut marked = [false; 60];

@@ -161,14 +161,14 @@ fn unexplained(template: &[f64], own: f64, segment: &[f64]) -> f64 {
 
 /// Products of a direct search from which estimates are worth their transforms.
 const MIN_PRODUCTS: usize = 1 << 20;
-/// Least variance of a segment, as a share of the squares of all that is searched, for an estimate: rounding of a transform in f64,
-/// about 1e-13 of these, is then below 1e-6 of the share that is left unexplained.
+/// Least variance of a segment, as a share of the squares of all that is searched, for an estimate: rounding
+/// of a transform in f64, about 1e-13 of these, is then below 1e-6 of the share that is left unexplained.
 const MIN_VARIANCE_SHARE: f64 = 1e-6;
 /// Largest error of an estimate.
 const MAX_ESTIMATE_ERROR: f64 = 1e-4;
 
-/// [`unexplained`] at every shift from 0 on, by one correlation; NaN where rounding may be too large, and none if a direct search
-/// is cheap.
+/// [`unexplained`] at every shift from 0 on, by one correlation; NaN where rounding may be too large, and
+/// none if a direct search is cheap.
 fn estimates(template: &[f64], own: f64, segment: &[f64]) -> Vec<f64> {
     let (width, shifts) = (template.len(), (segment.len() + 1).saturating_sub(template.len()));
     if shifts * width < MIN_PRODUCTS {

@@ -89,8 +89,8 @@ pub struct Threshold {
     /// Difference of the populations' mean logarithms over the sum of their standard deviations; above 2 is
     /// clear.
     pub separation: f64,
-    /// Share of the trace, from the first to the last minimum, that the starts divide evenly (gaps of 0.6 to 1.6 median
-    /// gaps); 0 for fewer than four gaps. Evidence of its own where the separation is weak.
+    /// Share of the trace, from the first to the last minimum, that the starts divide evenly (gaps of 0.6 to
+    /// 1.6 median gaps); 0 for fewer than four gaps. Evidence of its own where the separation is weak.
     pub regularity: f64,
 }
 

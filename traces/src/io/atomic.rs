@@ -1,5 +1,5 @@
-//! Files that are written whole or not at all. An interrupt removes those that are unfinished: a signal handler has no
-//! arguments, so it finds them in a list of the whole process.
+//! Files that are written whole or not at all. An interrupt removes those that are unfinished: a signal
+//! handler has no arguments, so it finds them in a list of the whole process.
 
 use std::collections::BTreeMap;
 use std::error::Error;
@@ -50,8 +50,8 @@ pub fn try_place(path: &Path) -> Result<(), WriteError> {
     temporary(&destination(path)?).map(drop)
 }
 
-/// A new file beside `path` that is removed unless it is finished, and its path: `.name.XXXXXX.part`. Six random letters keep
-/// threads, processes and hosts apart.
+/// A new file beside `path` that is removed unless it is finished, and its path: `.name.XXXXXX.part`. Six
+/// random letters keep threads, processes and hosts apart.
 fn temporary(path: &Path) -> Result<(Unfinished, File, PathBuf), WriteError> {
     let io = |source| WriteError::Io { path: path.to_owned(), source };
     let name = path.file_name().ok_or_else(|| WriteError::NoName { path: path.to_owned() })?;

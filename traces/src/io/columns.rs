@@ -1,4 +1,5 @@
-//! The columns of a trace, chosen by their names or by hand, and the interface that a reader of their rows implements.
+//! The columns of a trace, chosen by their names or by hand, and the interface that a reader of their rows
+//! implements.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -101,8 +102,8 @@ pub(super) fn numbered(columns: usize) -> Vec<String> {
     (1..=columns).map(|number| format!("column {number}")).collect()
 }
 
-/// Chooses among columns without names: those requested by number; else times, voltages and currents in this order, without times where
-/// there are two.
+/// Chooses among columns without names: those requested by number; else times, voltages and currents in this
+/// order, without times where there are two.
 pub(super) fn layout_of_unnamed(
     path: &Path,
     columns: usize,
@@ -179,7 +180,8 @@ fn pick(path: &Path, names: &[String], column: &str, of: Quantity) -> Result<Pic
 /// Factor from a column to s, V, A or W, by the unit that the file has beside its name, if that is not empty.
 ///
 /// # Errors
-/// [`ReadError::Unit`] if name and unit contradict each other, or the unit is of something else; [`ReadError::UnitUnknown`].
+/// [`ReadError::Unit`] if name and unit contradict each other, or the unit is of something else;
+/// [`ReadError::UnitUnknown`].
 fn scale_by(path: &Path, picked: &Picked, text: &str, of: Quantity) -> Result<f64, ReadError> {
     if text.is_empty() {
         return Ok(picked.scale);
@@ -450,8 +452,8 @@ pub(super) trait RowSource: Send {
     /// Skips rows, up to the end.
     fn skip(&mut self, rows: u64) -> Result<(), ReadError>;
 
-    /// Appends up to `limit` rows to the values of `batch`, as they are in the file; the stamps are those of these rows alone.
-    /// Returns the number of rows, 0 at the end.
+    /// Appends up to `limit` rows to the values of `batch`, as they are in the file; the stamps are those of
+    /// these rows alone. Returns the number of rows, 0 at the end.
     fn next(&mut self, layout: &Layout, limit: usize, batch: &mut RowBatch) -> Result<usize, ReadError>;
 
     /// The repair made when the file was opened and in the rows read since.

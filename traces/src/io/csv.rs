@@ -58,8 +58,8 @@ const TASK_ROWS: usize = 1 << 12;
 const HELD_ROWS: usize = 1 << 18;
 
 /// Writes the samples. Times are whole nanoseconds written as seconds; values have the digits that read back
-/// as the same number in f32 and in f64, so that an integral in f64 gives the same joules as here. A sample takes about
-/// [`ROW_BYTES`].
+/// as the same number in f32 and in f64, so that an integral in f64 gives the same joules as here. A sample
+/// takes about [`ROW_BYTES`].
 ///
 /// # Errors
 /// [`WriteError::Encode`] if the writer fails, [`WriteError::Read`] if the samples cannot be read.
@@ -402,8 +402,8 @@ fn shown(field: &[u8]) -> String {
     String::from_utf8_lossy(field).chars().take(40).collect()
 }
 
-/// Whether a field is a date or a time of day: figures in at least three parts between `-`, `/` or `:`, such as `2026-01-31` and
-/// `12:00:00.5`.
+/// Whether a field is a date or a time of day: figures in at least three parts between `-`, `/` or `:`, such
+/// as `2026-01-31` and `12:00:00.5`.
 fn is_date(field: &[u8]) -> bool {
     let text = std::str::from_utf8(field).unwrap_or_default();
     let figures = |part: &str| part.starts_with(|c: char| c.is_ascii_digit());

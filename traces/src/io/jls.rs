@@ -68,8 +68,8 @@ impl<W: Write + Seek> Writer<W> {
     /// that show the time of day.
     ///
     /// # Errors
-    /// [`WriteError`] if the rate (Hz) is not whole to 1 in 1000, the start is beyond about 8.5e9 s from 2018, a mark is
-    /// not finite, the description is longer than 64 MiB, or `out` cannot be written.
+    /// [`WriteError`] if the rate (Hz) is not whole to 1 in 1000, the start is beyond about 8.5e9 s from
+    /// 2018, a mark is not finite, the description is longer than 64 MiB, or `out` cannot be written.
     pub fn new(out: W, rate_hz: f64, start_s: f64, metadata: &Metadata) -> Result<Self, WriteError> {
         let whole_hz = whole_rate_hz(rate_hz)?;
         let description = describe(rate_hz, start_s, None, metadata)?.to_keyed_json()?;

@@ -1,8 +1,9 @@
 //! Trace files: one file or folder per format, with its reader and its writer.
 //!
-//! [`FORMATS`] lists all of them: one table for readers, writers, the command, its help and its errors. [`read`] reads a file, as [`ReadOptions`] say; [`Rows`] reads one in pieces that does not
-//! fit into memory. [`save`] and the modules of the formats write a [`TraceReader`]: a trace in memory, or a [`Recording`],
-//! a file of any length. [`perfetto`] also writes timelines of frames and units.
+//! [`FORMATS`] lists all of them: one table for readers, writers, the command, its help and its errors.
+//! [`read`] reads a file, as [`ReadOptions`] say; [`Rows`] reads one in pieces that does not fit into memory.
+//! [`save`] and the modules of the formats write a [`TraceReader`]: a trace in memory, or a [`Recording`], a
+//! file of any length. [`perfetto`] also writes timelines of frames and units.
 
 pub mod atomic;
 mod columns;

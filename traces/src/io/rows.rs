@@ -1,5 +1,5 @@
-//! Rows of a file of any format, in pieces, so that no file has to fit into memory; and rails among their columns that are
-//! the sum of others and would count twice.
+//! Rows of a file of any format, in pieces, so that no file has to fit into memory; and rails among their
+//! columns that are the sum of others and would count twice.
 
 use super::columns::{Layout, Open, Opened, Rail, RowBatch, RowSource, no_names};
 use super::samples::Description;
@@ -11,7 +11,8 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-/// The first bytes of files that hold no trace, or none that is read; what they are, and the remedy if it is not to give a trace.
+/// The first bytes of files that hold no trace, or none that is read; what they are, and the remedy if it is
+/// not to give a trace.
 const FOREIGN: [(&[u8], &str, Option<&str>); 9] = [
     (b"\xd3tagfmt", "a JLS recording of version 1", Some("export it to CSV from the program that made it")),
     (b"\x89HDF\r\n", "an HDF5 file", Some("export its channels to CSV or Parquet")),
@@ -393,12 +394,13 @@ pub fn rail_of_sums(path: &Path, options: &ReadOptions) -> Result<Option<SumOfRa
     }))
 }
 
-/// Least difference of a power that is not read from voltage times current that is said, as a share: that of means of products from
-/// products of means, and of the gains of two meters, is a percent or so.
+/// Least difference of a power that is not read from voltage times current that is said, as a share: that of
+/// means of products from products of means, and of the gains of two meters, is a percent or so.
 const MIN_POWER_DIFFERENCE: f64 = 0.02;
 
-/// How many times voltage times current, on average over the first rows, a column of power is that is beside them and not read; `None`
-/// if they agree, if either cannot be read, and unless there is one rail with one such column.
+/// How many times voltage times current, on average over the first rows, a column of power is that is beside
+/// them and not read; `None` if they agree, if either cannot be read, and unless there is one rail with one
+/// such column.
 pub fn unread_power_ratio(path: &Path, options: &ReadOptions) -> Option<f64> {
     let rows = Rows::open(path, options).ok()?;
     let ([_], [power]) = (rows.rails(), rows.unread()) else { return None };

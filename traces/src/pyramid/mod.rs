@@ -12,8 +12,8 @@ use crate::pyramid::cache::Cached;
 use crate::stream::{Clock, clock};
 use crate::trace::Trace;
 
-/// Samples in a block of the lowest level: 12 bytes for 64 samples, with all levels above 0.2 bytes a sample, 2.5 % of
-/// the 8 bytes of voltage and current.
+/// Samples in a block of the lowest level: 12 bytes for 64 samples, with all levels above 0.2 bytes a sample,
+/// 2.5 % of the 8 bytes of voltage and current.
 pub const BLOCK: u64 = 64;
 /// Blocks of a level that make one of the next.
 const FANOUT: usize = 16;

@@ -1,5 +1,5 @@
-//! What the devices of [`WITNESSES`](super::WITNESSES) are made with: power as a sum of spans, and random numbers. Two of them: an
-//! interface that draws on demand, and a renderer whose frames overlap.
+//! What the devices of [`WITNESSES`](super::WITNESSES) are made with: power as a sum of spans, and random
+//! numbers. Two of them: an interface that draws on demand, and a renderer whose frames overlap.
 
 use crate::stats::Random;
 use crate::{Curve, CurveBuilder, CurveError};
@@ -194,11 +194,11 @@ impl Interface {
 
 /// A witness: an interface that draws on demand.
 ///
-/// Nothing is drawn while nothing changes. A touch starts a run of frames at the rate of the display, some of which are late; a
-/// cursor or a clock draws a single one. What is drawn is anything from a small area to the whole screen, so the longest
-/// frame takes ten times as long as the shortest. All frames begin with the same traversal of the view tree and end with
-/// the same hand-over; in between areas are filled. The processor polls for a while after the last frame, dozes, and sleeps; from sleep it
-/// wakes up by a ramp.
+/// Nothing is drawn while nothing changes. A touch starts a run of frames at the rate of the display, some of
+/// which are late; a cursor or a clock draws a single one. What is drawn is anything from a small area to the
+/// whole screen, so the longest frame takes ten times as long as the shortest. All frames begin with the same
+/// traversal of the view tree and end with the same hand-over; in between areas are filled. The processor
+/// polls for a while after the last frame, dozes, and sleeps; from sleep it wakes up by a ramp.
 pub(super) fn on_demand(count: usize, seed: u64) -> Drawn {
     let mut interface = Interface::new(seed);
     let tick_s = 1.0 / interface.dice.one_of(&DISPLAY_HZ);
@@ -339,11 +339,12 @@ impl Chip {
 
 /// A witness: a tiled renderer whose frames overlap.
 ///
-/// Three units work at once, on different frames: the processor prepares frame n + 2, geometry of n + 1 is binned, tiles of n are
-/// shaded. A frame starts where its binning does; that is the event a marker shows. Binning waits for the processor and, as there
-/// are two sets of bins, for the shading of the frame before the last. Shading is two to five render targets, each a sequence of
-/// tile rows with powers of their own; it waits for the bins. While both run they share memory, and binning is slower. Heavy
-/// and light phases of the game move the bottleneck from one unit to another. The rail sees the sum.
+/// Three units work at once, on different frames: the processor prepares frame n + 2, geometry of n + 1 is
+/// binned, tiles of n are shaded. A frame starts where its binning does; that is the event a marker shows.
+/// Binning waits for the processor and, as there are two sets of bins, for the shading of the frame before
+/// the last. Shading is two to five render targets, each a sequence of tile rows with powers of their own; it
+/// waits for the bins. While both run they share memory, and binning is slower. Heavy and light phases of the
+/// game move the bottleneck from one unit to another. The rail sees the sum.
 pub(super) fn pipelined(count: usize, seed: u64) -> Drawn {
     let mut dice = Dice::new(seed, PIPELINED, 0);
     let chip = Chip::drawn(&mut dice);

@@ -1,5 +1,5 @@
-//! Four devices of different structure that bear witness of the frame finder: what works on the scenes of one generator may
-//! have been learnt from it.
+//! Four devices of different structure that bear witness of the frame finder: what works on the scenes of one
+//! generator may have been learnt from it.
 //!
 //! Each is written as a description of how such a device behaves, with constants of its own, before any finder was
 //! scored on it. They share only how spans of power are added up ([`Layers`]) and how numbers are drawn ([`Dice`]).
@@ -193,11 +193,12 @@ impl Governor {
 
 /// A witness: one process that renders a game.
 ///
-/// A frame begins with a short submission by the driver, the same in all scenes of the game. Three to seven passes follow,
-/// each with an activity that settles from its first value to its last, as caches fill, and a grain of its own. The camera moves:
-/// work and activity of each pass follow a mean-reverting walk. Every few seconds the scene is cut, and later scenes may be
-/// earlier ones. A governor looks at the load every tenth of a second and picks one of its clocks, not always
-/// the right one. Frames are uncapped, limited to a rate by sleeping, or wait for the display, whose ticks heavy frames miss.
+/// A frame begins with a short submission by the driver, the same in all scenes of the game. Three to seven
+/// passes follow, each with an activity that settles from its first value to its last, as caches fill, and a
+/// grain of its own. The camera moves: work and activity of each pass follow a mean-reverting walk. Every few
+/// seconds the scene is cut, and later scenes may be earlier ones. A governor looks at the load every tenth
+/// of a second and picks one of its clocks, not always the right one. Frames are uncapped, limited to a rate
+/// by sleeping, or wait for the display, whose ticks heavy frames miss.
 fn one_process(count: usize, seed: u64) -> Drawn {
     let mut dice = Dice::new(seed, ONE_PROCESS, 0);
     let [static_w, dynamic_w] = [STATIC_W, DYNAMIC_W].map(|range| dice.between(range));
@@ -313,11 +314,12 @@ impl Layer {
 
 /// A witness: several processes on one rail.
 ///
-/// An application draws a frame for each tick of the display, or for each second one, and misses some. It waits for the tick plus a
-/// wake-up that differs. Its frames are layers of an interface: a number of rectangles, each a level of power; one layer in four
-/// is an animation, whose level swings. On the same rail the compositor works at every tick, with a phase of its own; sound is
-/// decoded a buffer at a time; a radio listens at its interval and now and then transfers for longer; the backlight
-/// is pulsed at a rate that has nothing to do with any of them.
+/// An application draws a frame for each tick of the display, or for each second one, and misses some. It
+/// waits for the tick plus a wake-up that differs. Its frames are layers of an interface: a number of
+/// rectangles, each a level of power; one layer in four is an animation, whose level swings. On the same rail
+/// the compositor works at every tick, with a phase of its own; sound is decoded a buffer at a time; a radio
+/// listens at its interval and now and then transfers for longer; the backlight is pulsed at a rate that has
+/// nothing to do with any of them.
 fn several_processes(count: usize, seed: u64) -> Drawn {
     let mut dice = Dice::new(seed, SEVERAL_PROCESSES, 0);
     let tick_s = 1.0 / dice.one_of(&TICKS_HZ);

@@ -1,4 +1,5 @@
-//! The kept corpus of the fuzz targets (`tests/fuzz/seeds/trace_*`): every file is read or refused, none ends the program.
+//! The kept corpus of the fuzz targets (`tests/fuzz/seeds/trace_*`): every file is read or refused, none ends
+//! the program.
 
 use std::fs;
 use std::path::{Path, PathBuf};

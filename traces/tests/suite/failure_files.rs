@@ -299,8 +299,9 @@ fn says_both(path: &Path, part: &str) {
 
 #[test]
 fn a_compression_that_is_not_read_is_named_with_the_remedy() {
-    // The footer ends with its length (4 bytes) and PAR1; in it each column's codec is the thrift i32 field 4, `15 00`
-    // for none, `15 08` for Brotli (4, zigzag). Only the first such pair after the path `voltage_V` is changed.
+    // The footer ends with its length (4 bytes) and PAR1; in it each column's codec is the thrift i32 field
+    // 4, `15 00` for none, `15 08` for Brotli (4, zigzag). Only the first such pair after the path
+    // `voltage_V` is changed.
     let ones = || Values::Float(vec![1.0; 3]);
     let mut bytes = parquet_bytes(vec![
         ("time_ns", Values::Int(vec![0, 1000, 2000])),

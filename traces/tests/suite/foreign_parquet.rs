@@ -1,4 +1,5 @@
-//! Parquet as other programs write it: optional columns, dictionaries, every way of packing (pyarrow, see the file's name).
+//! Parquet as other programs write it: optional columns, dictionaries, every way of packing (pyarrow, see the
+//! file's name).
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;

@@ -82,8 +82,8 @@ proptest! {
 
 #[test]
 fn a_file_that_pyjls_reads_stays_as_it_is() {
-    // Written on 22 November 2026 and read by pyjls 0.17 (`benches/jls_beside_pyjls.py --golden`): samples to the bit,
-    // every summary, UTC and user data.
+    // Written on 22 November 2026 and read by pyjls 0.17 (`benches/jls_beside_pyjls.py --golden`): samples to
+    // the bit, every summary, UTC and user data.
     let golden = Trace::new(channels(30_000).0, channels(30_000).1, 50e3, 1.25, Metadata::default()).unwrap();
     let bytes = written(&golden.without([1000..1100, 29_000..30_000]));
     if let Some(to) = std::env::var_os("JLS_GOLDEN") {

@@ -6,8 +6,8 @@ use traces::energy::{PowerIntegral, Score, TOLERANCE_S, TrueFrame, score};
 use traces::frames::{Found, Marks, default_window, find};
 use traces::{Curve, CurveBuilder, Trace};
 
-/// The battery rail of a phone in a recorder of +-4 A and +-6 V (assumed), with noise for a ratio of power variance to noise
-/// variance.
+/// The battery rail of a phone in a recorder of +-4 A and +-6 V (assumed), with noise for a ratio of power
+/// variance to noise variance.
 fn device(case: &Case, snr_db: f64) -> Device {
     let spec = DeviceSpec {
         rail_v: 3.85,

@@ -109,8 +109,8 @@ fn hull_faces(lane: &Lane, beam: &Beam, into: &mut BoundingVolume) {
     }
 }
 
-/// Three corners in the order that faces outward, and which corners lie in their plane; `None` if corners are on both sides of it, or
-/// the three are on a line.
+/// Three corners in the order that faces outward, and which corners lie in their plane; `None` if corners are
+/// on both sides of it, or the three are on a line.
 fn supporting(
     lane: &Lane,
     points: &[DVec3; 6],
@@ -224,7 +224,8 @@ fn refined_faces(lane: &Lane, beam: &Beam, into: &mut BoundingVolume) {
     drop_repeated(lane, into);
 }
 
-/// Drops triangles that are there twice: where a beam folds back, two parts lie on the same side of the triangle that they share.
+/// Drops triangles that are there twice: where a beam folds back, two parts lie on the same side of the
+/// triangle that they share.
 fn drop_repeated(lane: &Lane, volume: &mut BoundingVolume) {
     let is_same = |a: &[DVec3; 3], b: &[DVec3; 3]| {
         (0..3).any(|n| lane.branch(*a == [b[n], b[(n + 1) % 3], b[(n + 2) % 3]]))
@@ -320,7 +321,8 @@ mod tests {
         }
     }
 
-    /// A ray through a body leaves a hull once, and no part of a refined bound has a triangle twice: each is rasterized once.
+    /// A ray through a body leaves a hull once, and no part of a refined bound has a triangle twice: each is
+    /// rasterized once.
     #[test]
     fn bodies_have_every_face_once() {
         let mut random = Uniform::new(4);

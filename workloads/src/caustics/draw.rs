@@ -335,8 +335,8 @@ pub(super) fn reach(lane: &Lane, seen: &Seen, touch: &Touch) -> Reach {
     })
 }
 
-/// Pixels of a tile whose centres are within reach; `first` is the centre of its first pixel. Columns and rows are compared
-/// apart, and the columns are repeated in every row that is within by a product.
+/// Pixels of a tile whose centres are within reach; `first` is the centre of its first pixel. Columns and
+/// rows are compared apart, and the columns are repeated in every row that is within by a product.
 pub(super) fn within_reach(lane: &Lane, reach: &Reach, first: [f64; 2]) -> u64 {
     let is_within = |axis: usize, number: u32| {
         let at = first[axis] + f64::from(number);
@@ -394,7 +394,8 @@ mod tests {
         }
     }
 
-    /// Pixels within reach are those of a comparison of every centre, for boxes that hold all, some or none of a tile.
+    /// Pixels within reach are those of a comparison of every centre, for boxes that hold all, some or none
+    /// of a tile.
     #[test]
     fn pixels_within_reach_are_those_between_its_bounds() {
         let (first, mut some) = ([-3.5, 12.5], 0);

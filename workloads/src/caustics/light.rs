@@ -1,5 +1,5 @@
-//! Light of a beam at a pixel: the pixel shader, and orthographic views of the light; and light by random rays, as a reference that
-//! shares no code with the rasterization of beams.
+//! Light of a beam at a pixel: the pixel shader, and orthographic views of the light; and light by random
+//! rays, as a reference that shares no code with the rasterization of beams.
 
 use glam::{Affine3A, DAffine3, DMat3, DVec2, DVec3};
 use pipeline::geometry::Projection;

@@ -27,7 +27,8 @@ const FACE_WORDS: u32 = 9;
 const GROUP_LANES: u32 = 64;
 /// Bytes per pixel of the buffer that accumulates light.
 const LIGHT_BYTES: u64 = 4;
-/// Bytes that mark the pixels of a tile: the number of the body that covered pixels of it last, and two words of bits.
+/// Bytes that mark the pixels of a tile: the number of the body that covered pixels of it last, and two words
+/// of bits.
 const MARK_BYTES: u64 = 12;
 /// Bytes from the marks of a tile to those of the next.
 const MARK_STRIDE: u64 = 16;
@@ -70,8 +71,8 @@ pub(super) fn tone_on(
     drawn.images.swap_remove(0)
 }
 
-/// Draws beams in a pass of `gpu`, after one that makes their bounding volumes, if there are any. The picture is that of
-/// [`super::draw()`], and the light is in the buffer.
+/// Draws beams in a pass of `gpu`, after one that makes their bounding volumes, if there are any. The picture
+/// is that of [`super::draw()`], and the light is in the buffer.
 ///
 /// # Errors
 /// [`PassError`] if the GPU does not take the pass that makes bounding volumes.

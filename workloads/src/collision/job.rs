@@ -1,5 +1,5 @@
-//! The job `quintile run ccd`: collision detection on the modelled hardware, in two sweeps over all objects along each
-//! axis, or narrowed pair by pair.
+//! The job `quintile run ccd`: collision detection on the modelled hardware, in two sweeps over all objects
+//! along each axis, or narrowed pair by pair.
 
 use std::path::{Path, PathBuf};
 
@@ -32,8 +32,8 @@ pub struct CollisionOptions {
     pub bins: u32,
     /// What a pass compares.
     pub method: Method,
-    /// Whether pairs whose swept boxes touch are drawn one by one within the space they share, of which the CPU narrows
-    /// more from axis to axis, instead of two sweeps over all objects.
+    /// Whether pairs whose swept boxes touch are drawn one by one within the space they share, of which the
+    /// CPU narrows more from axis to axis, instead of two sweeps over all objects.
     pub narrow: bool,
 }
 

@@ -134,7 +134,8 @@ fn meets_in_depth(lane: &Lane, known: &TzBox, z: [f64; 2]) -> bool {
     in_front || behind
 }
 
-/// The shader of a pass: a fragment is compared with a box, or enlarges it. One that meets its box marks the answer of its object.
+/// The shader of a pass: a fragment is compared with a box, or enlarges it. One that meets its box marks the
+/// answer of its object.
 struct BoxShader<'a> {
     primitives: &'a [BinnedPrimitive],
     pass: &'a Pass,
@@ -338,7 +339,8 @@ mod tests {
         assert!(places[places.len() - 1] + BOX_BYTES <= layout.bytes());
     }
 
-    /// By every method, fragments or pixels that meet mark the answer of their object, and the answers of all passes reach memory.
+    /// By every method, fragments or pixels that meet mark the answer of their object, and the answers of all
+    /// passes reach memory.
     #[test]
     fn answers_are_in_memory() {
         let objects = super::super::families::swarm_of(6, 1);

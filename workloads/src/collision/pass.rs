@@ -364,8 +364,9 @@ pub(super) trait PassBackend {
     /// choose what it draws.
     fn begin(&mut self, _name: &str, _pass: &Pass, _follows: bool) {}
 
-    /// Draws a part, the first (0) or the second (1) of a pair, and passes its fragments to `each`. The fragments of the
-    /// part are compared with the boxes of `known`, or enlarge those of the part. `false` if they exceed `budget`.
+    /// Draws a part, the first (0) or the second (1) of a pair, and passes its fragments to `each`. The
+    /// fragments of the part are compared with the boxes of `known`, or enlarge those of the part. `false` if
+    /// they exceed `budget`.
     fn draw(
         &mut self,
         pass: &Pass,
@@ -382,8 +383,8 @@ pub(super) trait PassBackend {
         })
     }
 
-    /// Compares the boxes of both parts in every tile and time bin, of which there are so many, and if it `merges` adds
-    /// those of the second to those of the first.
+    /// Compares the boxes of both parts in every tile and time bin, of which there are so many, and if it
+    /// `merges` adds those of the second to those of the first.
     fn compare(&mut self, _pass: &Pass, _bins: usize, _boxes: [&TzBuffer; 2], _merges: bool) {}
 
     /// Reports that a part is drawn: the first (0) or the second (1) of a pair.

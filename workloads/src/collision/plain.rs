@@ -5,10 +5,10 @@
 //! Many objects: the potentially colliding set in two linear sweeps (Govindaraju, Redon, Lin and Manocha 2003,
 //! "CULLIDE", section 3, generalized to time by the thesis, Paper VI, section 3).
 //!
-//! Along each axis every object is drawn twice in each sweep: its fragments are compared with the boxes of all objects
-//! before it, then they enlarge the boxes. The second sweep goes the other way. An object that meets the boxes of others
-//! in neither sweep touches none of them and leaves the set; the next axis is drawn with those that stay. The CPU narrows
-//! nothing.
+//! Along each axis every object is drawn twice in each sweep: its fragments are compared with the boxes of
+//! all objects before it, then they enlarge the boxes. The second sweep goes the other way. An object that
+//! meets the boxes of others in neither sweep touches none of them and leaves the set; the next axis is drawn
+//! with those that stay. The CPU narrows nothing.
 
 use activity::Event;
 use pipeline::{Gpu, PipelineSpec, Viewport};
@@ -270,8 +270,8 @@ struct Sweep<'a> {
 }
 
 impl Sweep<'_> {
-    /// Whether an object meets those before it, seen from either direction of the axis; then it is added to them. Boxes of
-    /// time and depth need no second direction.
+    /// Whether an object meets those before it, seen from either direction of the axis; then it is added to
+    /// them. Boxes of time and depth need no second direction.
     fn object(&mut self, object: &Object, backend: &mut impl PassBackend) -> [bool; 2] {
         let list: Vec<u32> = (0..object.len() as u32).collect();
         let part = Part { object, list: &list };
@@ -327,8 +327,8 @@ impl Sweep<'_> {
     }
 }
 
-/// By direction, whether two boxes meet; by depth alone, whether the second is in front of the farthest depth of the first, and whether
-/// it is behind the nearest.
+/// By direction, whether two boxes meet; by depth alone, whether the second is in front of the farthest depth
+/// of the first, and whether it is behind the nearest.
 fn overlaps(method: Method, known: &TzBox, own: &TzBox) -> [bool; 2] {
     if known.z[0] > known.z[1] {
         return [false; 2];

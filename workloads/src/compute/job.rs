@@ -29,10 +29,11 @@ pub fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<dyn Job>
     Ok(Box::new(Compute::new(options.read()?, request.overrides, request.seed)?))
 }
 
-/// Cycles of an access to shared memory, on average, from which a reduction gives a warning: half of the rate is lost.
+/// Cycles of an access to shared memory, on average, from which a reduction gives a warning: half of the rate
+/// is lost.
 pub const CYCLES_PER_ACCESS: f64 = 2.0;
-/// Atomics of a warp on a word, or cycles of one in shared memory, on average, from which a histogram gives a warning: a quarter of
-/// a warp of 32 waits in line.
+/// Atomics of a warp on a word, or cycles of one in shared memory, on average, from which a histogram gives a
+/// warning: a quarter of a warp of 32 waits in line.
 pub const ATOMICS_PER_WORD: f64 = 8.0;
 
 /// Grey to which a lower contrast draws all colours.
@@ -143,8 +144,8 @@ impl Compute {
         Ok((0..self.options.lights).map(|light| LightSphere { centre: centre(light), radius }).collect())
     }
 
-    /// Draws the image of a frame with one sample per pixel, and its mip chain. Samples of a pixel are resolved first. The last
-    /// level is the mean, without the columns and rows that odd sizes leave out.
+    /// Draws the image of a frame with one sample per pixel, and its mip chain. Samples of a pixel are
+    /// resolved first. The last level is the mean, without the columns and rows that odd sizes leave out.
     ///
     /// # Errors
     /// [`JobError`] if it cannot be drawn.
@@ -255,7 +256,8 @@ impl DrawsScene for Compute {
     }
 }
 
-/// Warns if the chain leaves out pixels. Each level halves a side and drops the rest, so a power of two is left of it.
+/// Warns if the chain leaves out pixels. Each level halves a side and drops the rest, so a power of two is
+/// left of it.
 fn left_out(viewport: Viewport) -> Option<Warning> {
     let [columns, rows] = [viewport.width(), viewport.height()].map(|side| 1_usize << side.ilog2());
     let share = (columns * rows) as f64 / viewport.pixels() as f64;

@@ -205,7 +205,8 @@ impl<'a, 'e> Kernels<'a, 'e> {
         self.gpu.values(buffer)
     }
 
-    /// Cycles that an access of a warp to shared memory takes on average, with the least it could take as 1; 1 without any.
+    /// Cycles that an access of a warp to shared memory takes on average, with the least it could take as 1;
+    /// 1 without any.
     pub fn cycles_per_shared_access(&self) -> f64 {
         let cycles = self.counts[Event::SharedCycles];
         ratio(cycles, cycles - self.counts[Event::BankConflicts])
@@ -217,8 +218,8 @@ impl<'a, 'e> Kernels<'a, 'e> {
         ratio(atomics, atomics - self.counts[Event::AtomicConflicts])
     }
 
-    /// Atomics that follow each other in an access of a warp on average, of a histogram of so many values: in shared memory all
-    /// conflicts are theirs, as lanes clear and add up words beside each other.
+    /// Atomics that follow each other in an access of a warp on average, of a histogram of so many values: in
+    /// shared memory all conflicts are theirs, as lanes clear and add up words beside each other.
     pub fn atomics_in_line(&self, values: u64) -> f64 {
         let lanes = self.gpu.spec().compute.map_or(1, |spec| spec.warp_lanes.min(self.options.group));
         let accesses = values as f64 / f64::from(lanes);
@@ -287,8 +288,9 @@ impl ImagePlane {
         }
     }
 
-    /// Distance of a point in view coordinates, with `along` to the right (or down) and `depth`, from the plane through the
-    /// camera and a column (or row) of pixels; positive to the right of it (or below). Six operations.
+    /// Distance of a point in view coordinates, with `along` to the right (or down) and `depth`, from the
+    /// plane through the camera and a column (or row) of pixels; positive to the right of it (or below). Six
+    /// operations.
     fn beyond(&self, lane: &GroupLane<'_, '_>, axis: usize, px: f32, [along, depth]: [f32; 2]) -> f32 {
         let slope = lane.sub(self.middle_px[axis], px);
         if self.is_parallel {

@@ -1,6 +1,6 @@
-//! Luminance of an image: its histogram by atomics in the shared memory of each group or in a buffer, and its mean by a tree in the
-//! shared memory of each group and a last group for their sums. Programs write the image: a tone map, an equalised image, and a heat
-//! map of lights.
+//! Luminance of an image: its histogram by atomics in the shared memory of each group or in a buffer, and its
+//! mean by a tree in the shared memory of each group and a last group for their sums. Programs write the
+//! image: a tone map, an equalised image, and a heat map of lights.
 
 use glam::{Vec3, Vec4};
 use pipeline::surface::Format;
@@ -14,8 +14,8 @@ use super::{Blocks, Order, Slots, luminance, tree};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Atomics {
-    /// In the shared memory of their group, whose counts are then added to the buffer (Podlozhnyuk 2007, "Histogram calculation in
-    /// CUDA").
+    /// In the shared memory of their group, whose counts are then added to the buffer (Podlozhnyuk 2007,
+    /// "Histogram calculation in CUDA").
     Shared,
     /// In the buffer.
     Global,

@@ -1,9 +1,9 @@
 //! Programs of groups on surfaces that raster passes of the same frame wrote.
 //!
-//! - [`Kernels`]: the mean luminance of an image by a reduction ([`Chain`]: by a mip chain), its histogram by atomics, and the lights of each tile by the
-//!   depths of a pre-pass.
-//! - [`ComputeOptions`]: sizes of groups, layouts of shared memory and kinds of atomics; [`Blocks`], [`Order`]: which pixels a lane
-//!   works on, and the steps of a tree.
+//! - [`Kernels`]: the mean luminance of an image by a reduction ([`Chain`]: by a mip chain), its histogram by
+//!   atomics, and the lights of each tile by the depths of a pre-pass.
+//! - [`ComputeOptions`]: sizes of groups, layouts of shared memory and kinds of atomics; [`Blocks`],
+//!   [`Order`]: which pixels a lane works on, and the steps of a tree.
 //! - [`job()`]: the workload.
 
 mod job;
@@ -176,8 +176,8 @@ impl ComputeOptions {
     }
 }
 
-/// Pixels of an image in blocks, one for each group. A group works on its block row by row: lanes beside each other have pixels
-/// beside each other.
+/// Pixels of an image in blocks, one for each group. A group works on its block row by row: lanes beside each
+/// other have pixels beside each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Blocks {
     /// Columns and rows of pixels that are read.
@@ -193,8 +193,8 @@ pub struct Blocks {
 const COLUMNS: u32 = 16;
 
 impl Blocks {
-    /// Blocks of an image of `size` pixels for groups of `lanes`, with `per_lane` pixels for each lane. One pixel in `step` along
-    /// each axis is read, in the middle of those it stands for.
+    /// Blocks of an image of `size` pixels for groups of `lanes`, with `per_lane` pixels for each lane. One
+    /// pixel in `step` along each axis is read, in the middle of those it stands for.
     pub fn new(size: [u32; 2], lanes: u32, per_lane: u32, step: u32) -> Self {
         let columns = COLUMNS.min(lanes);
         let offset = size.map(|side| (step / 2).min(side - 1));
@@ -218,8 +218,9 @@ impl Blocks {
         u64::from(self.grid[0]) * u64::from(self.grid[1])
     }
 
-    /// Runs `work` on each pixel of a lane that is in the image. The position of a pixel takes two operations, as the sizes of
-    /// blocks are constants, and two more where pixels are left out; whether it is inside takes a branch.
+    /// Runs `work` on each pixel of a lane that is in the image. The position of a pixel takes two
+    /// operations, as the sizes of blocks are constants, and two more where pixels are left out; whether it
+    /// is inside takes a branch.
     pub fn pixels(&self, lane: &GroupLane<'_, '_>, id: [u32; 3], size: u32, mut work: impl FnMut([u32; 2])) {
         let [columns, rows] = self.block;
         for number in (lane.index()..columns * rows).step_by(size as usize) {
@@ -270,8 +271,8 @@ pub enum Order {
 }
 
 impl Order {
-    /// Pairs of values that the steps combine, of `size` values, a power of two: the first of a pair keeps the result. The last
-    /// result is in value 0.
+    /// Pairs of values that the steps combine, of `size` values, a power of two: the first of a pair keeps
+    /// the result. The last result is in value 0.
     pub fn steps(self, size: u32) -> impl Iterator<Item = (u32, impl Fn(u32) -> [u32; 2])> {
         (0..size.ilog2()).map(move |step| {
             let active = size >> (step + 1);

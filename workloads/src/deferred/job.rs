@@ -124,8 +124,8 @@ impl Deferred {
         Self::of(crate::load(&options.scene)?, options, overrides, seed)
     }
 
-    /// The same in a given scene. Unless `overrides` change them, pixels have one sample in the middle, and the shutter has no length;
-    /// without a shutter, several samples of a pixel are those of multisampling.
+    /// The same in a given scene. Unless `overrides` change them, pixels have one sample in the middle, and
+    /// the shutter has no length; without a shutter, several samples of a pixel are those of multisampling.
     ///
     /// # Errors
     /// [`LoadError`] for an invalid option.

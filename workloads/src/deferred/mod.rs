@@ -1,12 +1,12 @@
-//! Deferred rendering: a pass writes what light meets at the visible surface of every sample (the G-buffer; Saito and Takahashi,
-//! Comprehensible rendering of 3-D shapes, SIGGRAPH 1990), a second one lights it, and a third one makes the image. Forward
-//! rendering of the same surfaces under the same lights stands beside it.
+//! Deferred rendering: a pass writes what light meets at the visible surface of every sample (the G-buffer;
+//! Saito and Takahashi, Comprehensible rendering of 3-D shapes, SIGGRAPH 1990), a second one lights it, and a
+//! third one makes the image. Forward rendering of the same surfaces under the same lights stands beside it.
 //!
-//! Positions are not stored: they follow from depth and the ray of a sample. The camera is a still pinhole; objects may move, as every
-//! sample has a surface of its own.
+//! Positions are not stored: they follow from depth and the ray of a sample. The camera is a still pinhole;
+//! objects may move, as every sample has a surface of its own.
 //!
-//! Shaders light surfaces forward, or from the G-buffer by a quad over the screen or by a light volume. Point lights have fixed
-//! positions.
+//! Shaders light surfaces forward, or from the G-buffer by a quad over the screen or by a light volume. Point
+//! lights have fixed positions.
 
 mod job;
 
@@ -174,7 +174,8 @@ const STEPS: [f64; 3] = [0.819_172_513_396_164_5, 0.671_043_606_703_789_3, 0.549
 /// Radiance of a white surface next to a light, all channels together.
 const BRIGHTNESS: f32 = 1.5;
 
-/// `count` lights of `range` scene units within `bounds`. Colours go around the hues; the first lights of more are the same.
+/// `count` lights of `range` scene units within `bounds`. Colours go around the hues; the first lights of
+/// more are the same.
 pub fn point_lights([low, high]: [Vec3; 2], count: u32, range: f32) -> Vec<PointLight> {
     let part = |number: u32, axis: usize| {
         let at = 0.5 + STEPS[axis] * f64::from(number);
@@ -189,8 +190,8 @@ pub fn point_lights([low, high]: [Vec3; 2], count: u32, range: f32) -> Vec<Point
     (1..=count).map(light).collect()
 }
 
-/// Box around the visible meshes of a frame, by the middle four fifths of their vertices along each axis: a few far ones (a floor to
-/// the horizon) do not take the lights away from the rest.
+/// Box around the visible meshes of a frame, by the middle four fifths of their vertices along each axis: a
+/// few far ones (a floor to the horizon) do not take the lights away from the rest.
 fn bounds(frame: &Frame) -> [Vec3; 2] {
     let mut along = [0, 1, 2].map(|axis| {
         let all = frame.meshes.iter().flat_map(|mesh| mesh.open.iter());

@@ -162,7 +162,8 @@ pub(super) fn read(path: &Path) -> Result<Soup, LoadError> {
     Ok(soup)
 }
 
-/// What is wrong with the line where reading stopped, if that is a number that is not finite: the parser has no word for it.
+/// What is wrong with the line where reading stopped, if that is a number that is not finite: the parser has
+/// no word for it.
 fn not_finite(source: Source<'_>, element: &ElementDef, error: &ParseError) -> Option<LoadError> {
     let number = error.line()?;
     let line = reader::open(source.path).ok()?.lines().nth(number - 1)?.ok()?;

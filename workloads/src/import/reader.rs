@@ -1,5 +1,5 @@
-//! Readers: files that may be gzipped, textures, and packed binary data, with limits on sizes; triangles of PLY, OBJ, OFF and STL
-//! files.
+//! Readers: files that may be gzipped, textures, and packed binary data, with limits on sizes; triangles of
+//! PLY, OBJ, OFF and STL files.
 
 use std::io::{BufRead, BufReader, Cursor, ErrorKind, Read};
 use std::path::Path;
@@ -120,8 +120,8 @@ fn texture(mut reader: ImageReader<Cursor<&[u8]>>, wrap: [Wrap; 2]) -> Result<Te
     Texture::from_srgb8(width, height, texels, wrap).map_err(|error| error.to_string())
 }
 
-/// The image file at `path` as a texture, or in words why it is none. TGA files do not begin in a way of their own, so what does
-/// not is what its ending says.
+/// The image file at `path` as a texture, or in words why it is none. TGA files do not begin in a way of
+/// their own, so what does not is what its ending says.
 pub(super) fn load_texture(path: &Path, wrap: [Wrap; 2]) -> Result<Texture, String> {
     let bytes = named(path).map_err(|error| error.to_string())?;
     let named = ImageFormat::from_path(path).ok().filter(|_| ::image::guess_format(&bytes).is_err());
@@ -274,8 +274,8 @@ impl Soup {
         self.warnings.extend(bounds.rounded(&path.display().to_string()));
     }
 
-    /// What has to be subtracted from positions before they are rounded to f32, so that the shape survives: zero, unless the
-    /// file is far from its origin for its size.
+    /// What has to be subtracted from positions before they are rounded to f32, so that the shape survives:
+    /// zero, unless the file is far from its origin for its size.
     pub fn origin(&self) -> DVec3 {
         Bounds::of(self.positions.iter().copied()).origin()
     }

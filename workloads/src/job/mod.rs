@@ -1,7 +1,7 @@
 //! Jobs: what a run draws, be it a rendering of a scene or a workload of many passes.
 //!
-//! A [`Job`] draws the passes of each frame on a [`Gpu`], which counts and times them. [`crate::catalog`] makes jobs by name
-//! from their options ([`OptionSource`]), and from scenes.
+//! A [`Job`] draws the passes of each frame on a [`Gpu`], which counts and times them. [`crate::catalog`]
+//! makes jobs by name from their options ([`OptionSource`]), and from scenes.
 //!
 //! A [`Fingerprint`] is equal when two frames have the same content.
 
@@ -202,8 +202,8 @@ pub trait Job: Sync + Send {
     /// The scene whose frames it draws, if any.
     fn scene(&self) -> Option<&Scene>;
 
-    /// The job with less work for each frame, if that takes neither reading files nor options: a rendering of a scene.
-    /// [`crate::catalog::reduced`] reduces any job.
+    /// The job with less work for each frame, if that takes neither reading files nor options: a rendering of
+    /// a scene. [`crate::catalog::reduced`] reduces any job.
     fn reduced(&self, to: &Reduction) -> Option<Box<dyn Job + '_>>;
 
     /// Prepares frame `number`.

@@ -59,8 +59,8 @@ impl Need {
         self.values.iter().map(value).collect::<Vec<_>>().join(" or ")
     }
 
-    /// Refuses a value other than the default where it has no effect. A default may be given anywhere, so that settings of a
-    /// sweep can be written in full.
+    /// Refuses a value other than the default where it has no effect. A default may be given anywhere, so
+    /// that settings of a sweep can be written in full.
     fn check(&self, given: &Value, defaults: &Value) -> Result<(), LoadError> {
         let chosen = match &given[self.choice] {
             Value::Null => "none".to_owned(),
@@ -81,8 +81,8 @@ impl OptionSource {
     /// Reads the options.
     ///
     /// # Errors
-    /// [`LoadError::Spec`] with the place in the file, [`LoadError::Option`] for a single value, [`LoadError::Setting`] for one without
-    /// effect.
+    /// [`LoadError::Spec`] with the place in the file, [`LoadError::Option`] for a single value,
+    /// [`LoadError::Setting`] for one without effect.
     pub fn read<T: JobOptions>(&self) -> Result<T, LoadError> {
         let mut options = self.file.as_deref().map(spec::load).transpose()?.unwrap_or_default();
         for (name, value) in &self.set {

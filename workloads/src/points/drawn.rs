@@ -1,13 +1,15 @@
-//! Random points of boxes, by a pass in conservative mode (thesis, Paper VI, section 5: "the conservative mode can be used
-//! and any number of random samples generated over the bounds").
+//! Random points of boxes, by a pass in conservative mode (thesis, Paper VI, section 5: "the conservative
+//! mode can be used and any number of random samples generated over the bounds").
 //!
-//! A box of the image, time and lens is drawn as two right triangles clipped to spans of `t`, `u` and `v`: (2,1), (2,1,1) or
-//! (2,1,1,1)-simploids. The pass has a tile for every column of a [`Lattice`], whose cells have a Poisson number of random
-//! candidates each. For every simploid and tile that it may touch, the shader makes the candidates of the cells within the
-//! bounds `t^ u^ v^`, and keeps those that are in the simploid and in the domain. Candidates depend on the cell alone, so a
-//! candidate falls into one box at most, however bounds overlap, and together they are a Poisson process.
+//! A box of the image, time and lens is drawn as two right triangles clipped to spans of `t`, `u` and `v`:
+//! (2,1), (2,1,1) or (2,1,1,1)-simploids. The pass has a tile for every column of a [`Lattice`], whose cells
+//! have a Poisson number of random candidates each. For every simploid and tile that it may touch, the shader
+//! makes the candidates of the cells within the bounds `t^ u^ v^`, and keeps those that are in the simploid
+//! and in the domain. Candidates depend on the cell alone, so a candidate falls into one box at most, however
+//! bounds overlap, and together they are a Poisson process.
 //!
-//! In tests `on_host` makes the candidates of all cells and compares each with all boxes: the reference without a rasterizer.
+//! In tests `on_host` makes the candidates of all cells and compares each with all boxes: the reference
+//! without a rasterizer.
 
 use std::ops::Range;
 
@@ -97,7 +99,8 @@ fn mixed(lane: &Lane, word: u32) -> u32 {
 }
 
 impl Lattice {
-    /// A lattice with `mean` candidates in a cell on average, random along the axes `used`; `None` if that is not within 0 and [`MAX_MEAN`].
+    /// A lattice with `mean` candidates in a cell on average, random along the axes `used`; `None` if that is
+    /// not within 0 and [`MAX_MEAN`].
     pub fn new(across: [u32; AXES], used: &[usize], mean: f64, seed: u64) -> Option<Self> {
         let is_usable = (0.0..=MAX_MEAN).contains(&mean) && across.iter().all(|count| *count > 0);
         let (mut one, mut sum) = (libm::exp(-mean), 0.0);

@@ -1,10 +1,12 @@
 //! The job `sampling`: points by rasterization (thesis, Paper VI, section 5).
 //!
-//! - *Darts* (Fig. 11): in each round the uncovered regions, squares in 2D and cubes in 3D, are drawn in conservative mode as
-//!   triangles and prisms, and the random candidates in them become points if they are free. The host removes conflicts and
-//!   divides the regions. It fills what is left after the last round, [`super::poisson`]; the facts give the share.
+//! - *Darts* (Fig. 11): in each round the uncovered regions, squares in 2D and cubes in 3D, are drawn in
+//!   conservative mode as triangles and prisms, and the random candidates in them become points if they are
+//!   free. The host removes conflicts and divides the regions. It fills what is left after the last round,
+//!   [`super::poisson`]; the facts give the share.
 //! - *Noise* (Fig. 12): points that follow a bell, from columns one dimension higher ([`crate::points`]).
-//! - *Volume* (Fig. 9): samples in a torus (3D) or a blurred disk (4D, 5D), found in standard mode ([`super::volume`]).
+//! - *Volume* (Fig. 9): samples in a torus (3D) or a blurred disk (4D, 5D), found in standard mode
+//!   ([`super::volume`]).
 
 use glam::Vec3;
 use pipeline::random::mix;
@@ -169,8 +171,8 @@ pub struct Rasterized<const D: usize> {
 }
 
 impl<const D: usize> Rasterized<D> {
-    /// Whether a point is in a region of the last round, and so was not there before: the regions are smaller than the least
-    /// distance, so there is no earlier point in them.
+    /// Whether a point is in a region of the last round, and so was not there before: the regions are smaller
+    /// than the least distance, so there is no earlier point in them.
     pub fn is_in_uncovered(&self, point: &[f64; D]) -> bool {
         let is_in = |cube: &Cube<D>| {
             (0..D).all(|axis| (cube.low[axis]..cube.low[axis] + cube.side).contains(&point[axis]))

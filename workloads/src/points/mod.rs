@@ -15,9 +15,11 @@
 //! - [`bridson`]: candidates around existing points (Bridson 2007, "Fast Poisson Disk Sampling in Arbitrary
 //!   Dimensions"; the method of scipy); fast, not maximal, and with another distribution than dart throwing.
 //!
-//! *White noise* of any density from drawn columns (thesis, Paper VI, section 5, "Adaptive White Noise", Fig. 12): the density is lifted by a dimension: columns over equal cells bound the region below it. They are tessellated into
-//! triangles (1D), prisms (2D), and simploids of four and five dimensions (3D, 4D), drawn in conservative mode, and the
-//! shader keeps the random candidates below the density. Without their height they are the points.
+//! *White noise* of any density from drawn columns (thesis, Paper VI, section 5, "Adaptive White Noise", Fig.
+//! 12): the density is lifted by a dimension: columns over equal cells bound the region below it. They are
+//! tessellated into triangles (1D), prisms (2D), and simploids of four and five dimensions (3D, 4D), drawn in
+//! conservative mode, and the shader keeps the random candidates below the density. Without their height they
+//! are the points.
 //!
 //! | D | axes of the domain | height |
 //! |---|---|---|

@@ -5,7 +5,7 @@
 //! - [`Spectrum`]: power over frequency, averaged over directions.
 //! - [`chi_square`]: whether counts follow their expectation.
 //!
-//! `docs/guide/sampling.md` compares these values with an independent implementation.
+//! `docs/guide/sampling.md` compares points by these values with those of other programs.
 
 use std::f64::consts::TAU;
 

@@ -1,10 +1,11 @@
 //! Cameras of a scene, and the pipeline's camera made from them for one frame.
 //!
-//! A camera may be placed so that everything stays in view. With the direction of the view given, a point at `(a, b)` across and `c` along it is inside the left and
-//! right sides of a pinhole frustum with its eye at `(x, y, z)` when `|a - x| <= tan_x (c - z)`. Over all
-//! points only the largest `a - tan_x c` and `-a - tan_x c` matter, so one pass finds the nearest eye exactly.
-//! A lens of radius `R` focused at `F` moves a point at depth `w` by at most `R |w/F - 1|`, which is convex in
-//! `w` and therefore largest at the nearest or farthest depth; straight paths in time are convex, too.
+//! A camera may be placed so that everything stays in view. With the direction of the view given, a point at
+//! `(a, b)` across and `c` along it is inside the left and right sides of a pinhole frustum with its eye at
+//! `(x, y, z)` when `|a - x| <= tan_x (c - z)`. Over all points only the largest `a - tan_x c` and `-a -
+//! tan_x c` matter, so one pass finds the nearest eye exactly. A lens of radius `R` focused at `F` moves a
+//! point at depth `w` by at most `R |w/F - 1|`, which is convex in `w` and therefore largest at the nearest
+//! or farthest depth; straight paths in time are convex, too.
 
 use glam::{Affine3A, DAffine3, DMat3, DVec3};
 use pipeline::{Camera, CameraError, Lane, Lens};
@@ -215,7 +216,8 @@ fn unit(v: DVec3) -> Option<DVec3> {
 }
 
 impl SceneCamera {
-    /// Position and axes in `pose`, relative to its origin; `None` for a camera that is not fitted yet or has no direction.
+    /// Position and axes in `pose`, relative to its origin; `None` for a camera that is not fitted yet or has
+    /// no direction.
     pub(super) fn stand(&self, pose: &Pose, at: Instant) -> Option<CameraFrame> {
         match &self.rig {
             Rig::LookAt(sight) => {

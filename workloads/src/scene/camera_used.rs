@@ -154,8 +154,8 @@ impl Scene {
         }
     }
 
-    /// Adds direction and motion to `described`, and returns whether the description is complete. Directions are those
-    /// of the input, before normalization, so that the camera made from them has the same bits.
+    /// Adds direction and motion to `described`, and returns whether the description is complete. Directions
+    /// are those of the input, before normalization, so that the camera made from them has the same bits.
     fn with_sight(&self, first: &Interval, described: CameraSpec) -> (CameraSpec, bool) {
         let along = |direction: DVec3, up: DVec3| CameraSpec {
             direction: Some(direction.to_array()),

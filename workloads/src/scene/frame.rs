@@ -83,8 +83,8 @@ pub enum FrameError {
 }
 
 impl Frame {
-    /// Draws of the frame, one for each mesh that has triangles: meshes in the scene's order, then blended ones from far
-    /// to near by their middles. `scene` has to be the scene that made this frame.
+    /// Draws of the frame, one for each mesh that has triangles: meshes in the scene's order, then blended
+    /// ones from far to near by their middles. `scene` has to be the scene that made this frame.
     ///
     /// # Errors
     /// [`FrameError::Draw`] if the pipeline rejects a mesh.
@@ -268,7 +268,8 @@ pub struct NearSpace {
 }
 
 impl NearSpace {
-    /// The space in view of `camera` nearer than `depth`, from the whole lens, for an image `aspect` times as wide as high.
+    /// The space in view of `camera` nearer than `depth`, from the whole lens, for an image `aspect` times as
+    /// wide as high.
     pub fn new(camera: &Camera, aspect: f64, depth: f64) -> Self {
         let half = f64::from(camera.half_height());
         let shift = 2.0 * half * camera.shift().as_dvec2();
@@ -295,8 +296,8 @@ impl NearSpace {
         Self { open, close, orthographic: camera.is_orthographic(), depth, planes }
     }
 
-    /// The depth of the nearest point inside of a triangle whose corners move from `open` to `close` in world space, and of
-    /// which the faces are drawn that `cull` leaves; `None` where nothing of it is inside.
+    /// The depth of the nearest point inside of a triangle whose corners move from `open` to `close` in world
+    /// space, and of which the faces are drawn that `cull` leaves; `None` where nothing of it is inside.
     pub fn nearest(&self, open: [Vec3; 3], close: [Vec3; 3], cull: Cull) -> Option<f64> {
         let from = open.map(|corner| self.open.transform_point3(corner.as_dvec3()));
         let to = close.map(|corner| self.close.transform_point3(corner.as_dvec3()));

@@ -1,4 +1,5 @@
-//! Summary of a scene's content, for display before rendering; where it is over all its frames, and the camera placed for that.
+//! Summary of a scene's content, for display before rendering; where it is over all its frames, and the
+//! camera placed for that.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -17,7 +18,8 @@ use super::inside::Inside;
 use super::settings::{LAST_FRAME, Settings};
 use crate::material::Alpha;
 
-/// Summary of a scene. Lengths are in scene units; bounds are those of the first requested frame, while its shutter is open.
+/// Summary of a scene. Lengths are in scene units; bounds are those of the first requested frame, while its
+/// shutter is open.
 #[derive(Clone, Debug, Serialize)]
 pub struct SceneInfo {
     /// Name of the scene, or the file it came from.
@@ -351,7 +353,8 @@ fn leaves_fitted_view(fitted: &Range<u32>) -> Warning {
 const FITTED_FRAMES: u32 = 256;
 
 impl Scene {
-    /// The middle of the bounds in the first of the scene's own frames and, for a camera that is placed by itself, its place.
+    /// The middle of the bounds in the first of the scene's own frames and, for a camera that is placed by
+    /// itself, its place.
     pub(super) fn measure(&mut self) -> Result<(DVec3, Option<Placed>), FrameError> {
         let [low, high] = self.bounds(self.own_frames.start)?;
         let centre = low + 0.5 * (high - low);
@@ -396,7 +399,8 @@ impl Scene {
         Ok(self.room.flatten())
     }
 
-    /// Every triangle when the shutter of the first of the scene's own frames opens, counter-clockwise seen from its front.
+    /// Every triangle when the shutter of the first of the scene's own frames opens, counter-clockwise seen
+    /// from its front.
     fn surface(&self) -> Result<Vec<[DVec3; 3]>, FrameError> {
         let interval = self.interval(self.own_frames.start);
         let mut surface = Vec::with_capacity(self.graph.triangle_count());

@@ -1,12 +1,13 @@
 //! Whether a scene is a room, and where in it a camera stands.
 //!
-//! A point of a surface is *enclosed* in a direction if a ray from its front side meets the front side of another. An object has
-//! most of its surface open to the outside: its rays escape. A room has most of it enclosed. A solid turned inside out cannot
-//! be distinguished from a room.
+//! A point of a surface is *enclosed* in a direction if a ray from its front side meets the front side of
+//! another. An object has most of its surface open to the outside: its rays escape. A room has most of it
+//! enclosed. A solid turned inside out cannot be distinguished from a room.
 //!
-//! Candidates for the camera stand over the floors that vertical lines cross, at eye height below the ceiling. From each, rays
-//! go out in all directions; the camera takes the place and the level direction in which its view is deepest on average.
-//! Where the front sides of a scene enclose no place, as those of a room modelled from outside, both sides count.
+//! Candidates for the camera stand over the floors that vertical lines cross, at eye height below the
+//! ceiling. From each, rays go out in all directions; the camera takes the place and the level direction in
+//! which its view is deepest on average. Where the front sides of a scene enclose no place, as those of a
+//! room modelled from outside, both sides count.
 
 use std::f64::consts::TAU;
 
@@ -27,8 +28,8 @@ const SURFACE_STRIDE: usize = 8;
 /// The share of a scene's surface that is enclosed from which on the scene is a room.
 const MIN_ENCLOSED_SHARE: f64 = 0.6;
 
-/// The least share of the directions from a camera that end on front sides, and the largest that end on back sides, where a
-/// camera is placed by default.
+/// The least share of the directions from a camera that end on front sides, and the largest that end on back
+/// sides, where a camera is placed by default.
 const SEEN_SHARES: [f64; 2] = [0.6, 0.1];
 
 /// The least mean depth of the view of a camera that is placed by default, in lengths of the diagonal of the scene.
@@ -185,7 +186,8 @@ fn directions() -> Vec<DVec3> {
     (0..DIRECTIONS).map(direction).collect()
 }
 
-/// The share of rays from the front of the surface that meet a front again; points are spread over the surface by area.
+/// The share of rays from the front of the surface that meet a front again; points are spread over the
+/// surface by area.
 fn enclosed(rays: &Rays, directions: &[DVec3], gap: f64) -> f64 {
     let areas: Vec<f64> = rays.triangles().iter().map(|triangle| normal(triangle).length()).collect();
     let total: f64 = areas.iter().sum();
@@ -229,8 +231,8 @@ fn candidates(rays: &Rays) -> Vec<(DVec3, bool)> {
     lines.flat_map(|[x, z]| over_the_floors(rays, x, z)).collect()
 }
 
-/// Eyes over each floor that the vertical line through `x` and `z` crosses: level surfaces with room above, and whether they
-/// look up.
+/// Eyes over each floor that the vertical line through `x` and `z` crosses: level surfaces with room above,
+/// and whether they look up.
 fn over_the_floors(rays: &Rays, x: f64, z: f64) -> Vec<(DVec3, bool)> {
     let [low, high] = rays.bounds();
     let (height, mut ceiling) = (high.y - low.y, high.y);
@@ -292,8 +294,8 @@ impl Around {
         share(true) >= SEEN_SHARES[0] && share(false) <= SEEN_SHARES[1]
     }
 
-    /// Mean depth of the view along `direction`; what is open, or a back side that does not count, has none. Zero where
-    /// something upright is nearer than `ahead`.
+    /// Mean depth of the view along `direction`; what is open, or a back side that does not count, has none.
+    /// Zero where something upright is nearer than `ahead`.
     fn depth(&self, direction: DVec3, directions: &[DVec3], two_sided: bool, ahead: f64) -> f64 {
         let seen =
             directions.iter().zip(&self.hits).filter(|(along, _)| along.dot(direction) >= VIEW_CONE_COS);
@@ -309,8 +311,8 @@ impl Around {
     }
 }
 
-/// Whether a point is in a closed part of a scene whose outermost surface is the room: most level rays from there cross an even
-/// number of surfaces.
+/// Whether a point is in a closed part of a scene whose outermost surface is the room: most level rays from
+/// there cross an even number of surfaces.
 fn is_in_a_part(rays: &Rays, point: DVec3) -> bool {
     let is_even = |turn: usize| {
         let angle = TAU * (turn as f64 + 0.3) / CROSSING_RAYS as f64;
@@ -328,7 +330,8 @@ fn is_in_a_part(rays: &Rays, point: DVec3) -> bool {
 mod tests {
     use super::*;
 
-    /// The sides of a box as triangles; its corners run counter-clockwise seen from outside, or from inside where `inward`.
+    /// The sides of a box as triangles; its corners run counter-clockwise seen from outside, or from inside
+    /// where `inward`.
     fn sides(low: [f64; 3], high: [f64; 3], inward: bool, open_top: bool) -> Vec<[DVec3; 3]> {
         let (low, high) = (DVec3::from(low), DVec3::from(high));
         let mut triangles = Vec::new();

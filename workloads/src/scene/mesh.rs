@@ -1,4 +1,5 @@
-//! A mesh at rest: its triangles and everything that can deform it; its bounds, and loss of precision far from the origin.
+//! A mesh at rest: its triangles and everything that can deform it; its bounds, and loss of precision far
+//! from the origin.
 
 use std::sync::Arc;
 
@@ -121,8 +122,8 @@ impl Mesh {
 }
 
 impl Mesh {
-    /// A mesh of each part, `of_triangle` naming the part of each triangle, with the vertices it uses in the order in which it
-    /// uses them. The mesh has to be one that no joints carry.
+    /// A mesh of each part, `of_triangle` naming the part of each triangle, with the vertices it uses in the
+    /// order in which it uses them. The mesh has to be one that no joints carry.
     pub(crate) fn split(&self, of_triangle: &[u32], parts: usize) -> Vec<Self> {
         let mut triangles = vec![Vec::new(); parts];
         for (corners, &part) in self.triangles.iter().zip(of_triangle) {

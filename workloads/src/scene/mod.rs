@@ -58,9 +58,9 @@ pub struct Scene {
     light: Light,
     background: Vec3,
     settings: Settings,
-    /// Frames that the scene renders where nothing else is requested. What is placed once for all frames (a fitted camera, the
-    /// lamp over its shoulder, the centre that a lens is focused on) is placed for these, so that a frame looks the same whichever
-    /// frames are rendered with it.
+    /// Frames that the scene renders where nothing else is requested. What is placed once for all frames (a
+    /// fitted camera, the lamp over its shoulder, the centre that a lens is focused on) is placed for these,
+    /// so that a frame looks the same whichever frames are rendered with it.
     own_frames: Range<u32>,
     warnings: Vec<Warning>,
     /// Shaders of each material, without and with vertex colours.
@@ -184,8 +184,8 @@ impl Scene {
     /// The scene with other settings, or playing another clip.
     ///
     /// # Errors
-    /// [`LoadError::Setting`] when a value makes no sense or the clip or camera does not exist; as [`CameraSpec::flag`] when
-    /// another camera cannot be read.
+    /// [`LoadError::Setting`] when a value makes no sense or the clip or camera does not exist; as
+    /// [`CameraSpec::flag`] when another camera cannot be read.
     pub fn with_overrides(mut self, overrides: &Overrides) -> Result<Self, LoadError> {
         let lens = self.choose_camera(overrides)?;
         self.settings = self.settings.with(&lens.over(overrides))?;
@@ -321,8 +321,8 @@ impl Scene {
         &self.warnings
     }
 
-    /// What positions and cameras of frames are relative to, in the coordinates of the scene's files: zero, unless the scene is
-    /// so far from its own origin that rounding to f32 would change its shape.
+    /// What positions and cameras of frames are relative to, in the coordinates of the scene's files: zero,
+    /// unless the scene is so far from its own origin that rounding to f32 would change its shape.
     pub fn origin(&self) -> DVec3 {
         self.origin
     }

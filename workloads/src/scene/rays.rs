@@ -4,8 +4,8 @@ use glam::DVec3;
 
 use crate::bvh::{Bounds, Bvh, Query, Ray, RayWork, bounds_of, hit};
 
-/// Triangles sorted along a space-filling curve, so that points spread over them are spread over space, and a tree over
-/// them.
+/// Triangles sorted along a space-filling curve, so that points spread over them are spread over space, and a
+/// tree over them.
 pub(super) struct Rays {
     triangles: Vec<[DVec3; 3]>,
     tree: Bvh,

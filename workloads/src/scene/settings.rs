@@ -68,7 +68,8 @@ pub struct Overrides {
     pub table: Option<String>,
     /// Name or index of an animation clip of a glTF scene.
     pub clip: Option<String>,
-    /// Name or number of one of the scene's own cameras, or a description: see [`CameraSpec::flag`](super::CameraSpec::flag).
+    /// Name or number of one of the scene's own cameras, or a description: see
+    /// [`CameraSpec::flag`](super::CameraSpec::flag).
     pub camera: Option<String>,
 }
 

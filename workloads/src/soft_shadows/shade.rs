@@ -1,6 +1,6 @@
 //! The shading pass. Each sample is shaded alone, because its light depends on its time and its point of the
-//! light. The pass over the visible samples before it leaves the number of the triangle that each sample sees in memory, where
-//! the shading pass fetches it.
+//! light. The pass over the visible samples before it leaves the number of the triangle that each sample sees
+//! in memory, where the shading pass fetches it.
 
 use std::cell::Cell;
 
@@ -120,7 +120,8 @@ impl<'a> World<'a> {
         (pixels.into_iter().map(|(colour, _)| colour).collect(), work)
     }
 
-    /// Mean of the samples of a pixel, each shaded by a program of its own; `triangle` gets the visible triangle of a sample.
+    /// Mean of the samples of a pixel, each shaded by a program of its own; `triangle` gets the visible
+    /// triangle of a sample.
     fn pixel(
         &self,
         [px, py]: [u32; 2],
@@ -142,8 +143,8 @@ impl<'a> World<'a> {
         at.iter().enumerate().map(shade).sum::<Vec3>() / at.len() as f32
     }
 
-    /// Fetches what the point of a sample is made of: positions of the triangle, and the reflectance of its draw, which are in
-    /// `albedos`.
+    /// Fetches what the point of a sample is made of: positions of the triangle, and the reflectance of its
+    /// draw, which are in `albedos`.
     fn fetch(&self, lanes: &Lanes, triangle: u32, albedos: MemoryRange) {
         let Some(face) = self.rays.faces().get(triangle as usize) else { return };
         let data = self.draws[face.draw].data_of(triangle - self.first[face.draw]);
@@ -240,8 +241,8 @@ struct Work<'w> {
     rays: &'w Cell<RayWork>,
 }
 
-/// Shades the visible samples in a pass of its own. A program fetches the number of the triangle of its sample, then the
-/// triangle; where its draw is not resident, only what it reflects.
+/// Shades the visible samples in a pass of its own. A program fetches the number of the triangle of its
+/// sample, then the triangle; where its draw is not resident, only what it reflects.
 pub fn look_ups(
     world: &World<'_>,
     samples: &dyn SampleSource,
@@ -267,7 +268,8 @@ const MAX_TRIANGLES: usize = 1 << 24;
 /// Bytes of a number.
 const NUMBER_BYTES: u64 = 4;
 
-/// The triangle that each sample sees, numbered as in a pass, in one surface of all samples or in one for each of them.
+/// The triangle that each sample sees, numbered as in a pass, in one surface of all samples or in one for
+/// each of them.
 pub struct VisibleTriangles {
     surfaces: Vec<Numbers>,
     width: u32,

@@ -3,8 +3,8 @@
 //! A [`Family`] makes a [`StressScene`] from a value of its parameter, a [`Size`] and a seed,
 //! deterministically. `quintile stress` measures the methods on it.
 //!
-//! Scenes are built from image positions in pixels, depths in scene units, and random numbers from a hash. [`Soup`] has random
-//! triangles of a known blur in pixels, for measuring how the cost grows.
+//! Scenes are built from image positions in pixels, depths in scene units, and random numbers from a hash.
+//! [`Soup`] has random triangles of a known blur in pixels, for measuring how the cost grows.
 
 mod motion;
 mod shape;

@@ -1,5 +1,5 @@
-//! Families about motion and the lens: too fast, incoherent, rotating, through the camera; a lens too large, focused inside the
-//! triangle, hit by it, combined with motion.
+//! Families about motion and the lens: too fast, incoherent, rotating, through the camera; a lens too large,
+//! focused inside the triangle, hit by it, combined with motion.
 
 use glam::{DMat3, DVec2, DVec3};
 

@@ -1,5 +1,5 @@
-//! Families about shape: too thin, too small, too large, edge-on, without area; and about neighbours: shared edges on samples,
-//! closed surfaces around the camera, layers at nearly equal depth.
+//! Families about shape: too thin, too small, too large, edge-on, without area; and about neighbours: shared
+//! edges on samples, closed surfaces around the camera, layers at nearly equal depth.
 
 use glam::{DVec2, DVec3};
 use pipeline::SampleTable;

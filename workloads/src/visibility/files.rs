@@ -1,6 +1,7 @@
-//! Files of moving triangles. `.m5d`: with their camera. `.mts`: two instants of a scene of many objects, used for public collision detection data.
-//! Little endian: `MTS1`, bytes per scalar (4 or 8), number of objects, zero; for each object its numbers of
-//! vertices and triangles; then, object after object, positions at time 0, positions at time 1, indices.
+//! Files of moving triangles. `.m5d`: with their camera. `.mts`: two instants of a scene of many objects,
+//! used for public collision detection data. Little endian: `MTS1`, bytes per scalar (4 or 8), number of
+//! objects, zero; for each object its numbers of vertices and triangles; then, object after object, positions
+//! at time 0, positions at time 1, indices.
 
 use std::iter;
 use std::path::Path;

@@ -167,13 +167,13 @@ fn bank_conflicts_are_those_of_the_layout() {
     };
     assert_eq!(conflicts(Order::Sequential, 1, false), 0);
     assert_eq!(conflicts(Order::Sequential, 33, false), 0, "an odd stride");
-    // All lanes of a warp ask one bank, in one group of 128 pixels and in that of the mean: four warps store; then two loads and a
-    // store by 64, 32, ..., 1 lanes.
+    // All lanes of a warp ask one bank, in one group of 128 pixels and in that of the mean: four warps store;
+    // then two loads and a store by 64, 32, ..., 1 lanes.
     let in_line = 4 * 31 + 3 * (2 * 31 + 31 + 15 + 7 + 3 + 1);
     assert_eq!(conflicts(Order::Sequential, 32, false), 2 * in_line);
     assert_eq!(conflicts(Order::Sequential, 32, true), 0);
-    // Lanes are 2, 4, ..., 128 words apart, twice that many for the first load: by hand, for 64, 32, ... lanes in warps of 32, of
-    // which min(32, distance) or all that are left ask a bank.
+    // Lanes are 2, 4, ..., 128 words apart, twice that many for the first load: by hand, for 64, 32, ...
+    // lanes in warps of 32, of which min(32, distance) or all that are left ask a bank.
     let of_step =
         |lanes: u64, apart: u64| lanes.div_ceil(32) * (lanes.min(32).div_ceil(32 / apart.min(32)) - 1);
     let interleaved: u64 = (0..7).map(|step| 3 * of_step(64 >> step, 2 << step)).sum();

@@ -43,9 +43,10 @@ fn rms(a: &[Vec3], b: &[Vec3]) -> f32 {
 
 /// Largest error of radiance where light of at most `light` falls on surfaces with a reflectance of at most 1.
 ///
-/// A base colour is off by half a code: 0.5 / 255 times the slope of the sRGB curve, at most 2.4 / 1.055. A normal is off by half an
-/// ulp in each component, the square root of 3 times that as an angle; diffuse light changes by the angle, and the 32nd power by 3.5
-/// times that (its steepest slope), times the gloss of 0.12. The sum is stored as a half.
+/// A base colour is off by half a code: 0.5 / 255 times the slope of the sRGB curve, at most 2.4 / 1.055. A
+/// normal is off by half an ulp in each component, the square root of 3 times that as an angle; diffuse light
+/// changes by the angle, and the 32nd power by 3.5 times that (its steepest slope), times the gloss of 0.12.
+/// The sum is stored as a half.
 fn bound(light: f32, half_ulp_of_normals: f32) -> f32 {
     let base = 0.5 / 255.0 * 2.4 / 1.055;
     let angle = 3.0_f32.sqrt() * half_ulp_of_normals;

@@ -200,7 +200,8 @@ fn workloads_without_a_scene_say_what_changes() {
     }
 }
 
-/// Heat maps have the work of conservative passes where their tiles are in the image: what lanes do and tests of tiles, all of it.
+/// Heat maps have the work of conservative passes where their tiles are in the image: what lanes do and tests
+/// of tiles, all of it.
 #[test]
 fn passes_in_conservative_mode_are_on_heat_maps() {
     let events = [Event::PixelInvocations, Event::ShaderOps, Event::TileMadds, Event::TilesVisited];

@@ -62,8 +62,8 @@ fn is_lit(map: &ShadowMap, light: &AreaLight, at: (Vec3, usize), bias: f64) -> b
     map.is_lit(&Lane::default(), light, at, bias, |_| ())
 }
 
-/// A look-up is a fetch and the operations of moving the point into the map and comparing its depth, and no fetch outside
-/// of the map.
+/// A look-up is a fetch and the operations of moving the point into the map and comparing its depth, and no
+/// fetch outside of the map.
 #[test]
 fn look_ups_cost_what_they_compute() {
     let (floor, light) = (quad(0.0, [-9.0, 9.0], [-9.0, 9.0]), above(0.6));
@@ -246,8 +246,9 @@ fn depth_passes_write_depths_only() {
     assert_eq!(counts[Event::DramWriteBytes], map.bytes(), "each depth goes to memory once");
 }
 
-/// The shading pass sees what the pass before it left in memory: every sample fetches its number, and where a triangle is seen its
-/// indices, its corners, what it reflects and, in the light's map, a depth. The image is that of the host, bit for bit.
+/// The shading pass sees what the pass before it left in memory: every sample fetches its number, and where a
+/// triangle is seen its indices, its corners, what it reflects and, in the light's map, a depth. The image is
+/// that of the host, bit for bit.
 #[test]
 fn shading_fetches_what_it_reads() {
     let scene = workloads::soft_shadows::default_scene().unwrap();

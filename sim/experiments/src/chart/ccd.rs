@@ -1,4 +1,5 @@
-//! `quintile chart ccd`: false positives of collision detection over resolution, time bins and cost, and failure modes.
+//! `quintile chart ccd`: false positives of collision detection over resolution, time bins and cost, and
+//! failure modes.
 
 use cpu_time::ThreadTime;
 use output::OutputError;

@@ -1,7 +1,7 @@
 //! `quintile chart deferred`: deferred against forward rendering over lights, overdraw, formats and samples.
 //!
-//! Error is the root of the mean squared difference to forward rendering with the same samples, over all pixels and channels in linear
-//! light. All are frame 0 on the GPU and the platform `hd_4000`.
+//! Error is the root of the mean squared difference to forward rendering with the same samples, over all
+//! pixels and channels in linear light. All are frame 0 on the GPU and the platform `hd_4000`.
 
 use activity::Event;
 use glam::{DVec3, Vec3};

@@ -1,7 +1,8 @@
 //! `quintile chart glossy`: glossy reflection and refraction on a planar receiver.
 //!
-//! Error is the root of the mean squared difference of the map to brute force by rays, over all texels and channels in linear light.
-//! Beside one pass stand accumulation, whose samples all texels share, and ray tracing with the samples of the one pass.
+//! Error is the root of the mean squared difference of the map to brute force by rays, over all texels and
+//! channels in linear light. Beside one pass stand accumulation, whose samples all texels share, and ray
+//! tracing with the samples of the one pass.
 
 use std::time::Instant;
 
@@ -295,7 +296,8 @@ pub struct Wide {
     pub over_half: f64,
     /// Error of 16 samples against rays through the same lens: noise.
     pub rmse_of_samples: f64,
-    /// Error of the lens as a model of a surface of one roughness: rays through it against rays in a cone that is the same everywhere.
+    /// Error of the lens as a model of a surface of one roughness: rays through it against rays in a cone
+    /// that is the same everywhere.
     pub rmse_of_lobe: f64,
 }
 
@@ -454,8 +456,8 @@ impl Bench {
     }
 }
 
-/// The width in texels of a straight ramp across an image, from the variance of its slope; the boxes of a texel and of a
-/// difference add their own.
+/// The width in texels of a straight ramp across an image, from the variance of its slope; the boxes of a
+/// texel and of a difference add their own.
 fn ramp(image: &[Vec3], width: usize) -> f64 {
     let column = |x: usize| image.iter().skip(x).step_by(width).map(|pixel| f64::from(pixel.x)).sum::<f64>();
     let columns: Vec<f64> = (0..width).map(column).collect();

@@ -19,8 +19,8 @@
 //! - [`tile_tests`]: what each combination of tile tests gains over what it costs.
 //! - [`timing`]: every level of timing against the reference.
 //!
-//! What they share is here: exponents of power laws (least squares on logarithms), quantiles, errors of images, and the shader of images
-//! in which only edges matter.
+//! What they share is here: exponents of power laws (least squares on logarithms), quantiles, errors of
+//! images, and the shader of images in which only edges matter.
 
 pub mod anchors;
 pub mod caustics;
@@ -44,8 +44,8 @@ pub mod timing;
 use glam::{Vec3, Vec4};
 use pipeline::{Lane, Shader, ShadingPoint};
 
-/// The exponent `p` of `y = c x^p` that fits the points best in the logarithms of both, or `None` where fewer than two
-/// points above zero differ in `x`.
+/// The exponent `p` of `y = c x^p` that fits the points best in the logarithms of both, or `None` where fewer
+/// than two points above zero differ in `x`.
 pub fn exponent(points: impl IntoIterator<Item = (f64, f64)>) -> Option<f64> {
     let positive = points.into_iter().filter(|(x, y)| *x > 0.0 && *y > 0.0 && x.is_finite() && y.is_finite());
     let logs: Vec<(f64, f64)> = positive.map(|(x, y)| (libm::log(x), libm::log(y))).collect();
@@ -62,8 +62,8 @@ pub fn upper_half(low: f64, high: f64) -> f64 {
     libm::sqrt(low) * libm::sqrt(high)
 }
 
-/// The quantiles of some values, linear between ranks, so that the median of an even number of values is the mean of the
-/// two in the middle; 0 where there are none.
+/// The quantiles of some values, linear between ranks, so that the median of an even number of values is the
+/// mean of the two in the middle; 0 where there are none.
 fn quantiles(values: impl Iterator<Item = f64>) -> impl Fn(f64) -> f64 {
     let mut values: Vec<f64> = values.collect();
     values.sort_by(f64::total_cmp);

@@ -1,5 +1,5 @@
-//! `quintile chart occlusion`: hidden boxes found by occlusion queries, and their cost, over boxes of lens and time, tiles and
-//! samples.
+//! `quintile chart occlusion`: hidden boxes found by occlusion queries, and their cost, over boxes of lens
+//! and time, tiles and samples.
 
 use activity::Event;
 use glam::Vec3;
@@ -274,7 +274,8 @@ impl OcclusionChart {
     }
 }
 
-/// Boxes of lens and time by kind: for what moves along t, for what is out of focus along u and v, for both along all.
+/// Boxes of lens and time by kind: for what moves along t, for what is out of focus along u and v, for both
+/// along all.
 const IN_TIME: [[u32; 3]; 5] = [[1, 1, 1], [1, 1, 2], [1, 1, 4], [1, 1, 8], [1, 1, 16]];
 const ON_LENS: [[u32; 3]; 4] = [[1, 1, 1], [2, 2, 1], [4, 4, 1], [8, 8, 1]];
 const IN_BOTH: [[u32; 3]; 5] = [[1, 1, 1], [1, 1, 4], [2, 2, 1], [2, 2, 4], [4, 4, 8]];

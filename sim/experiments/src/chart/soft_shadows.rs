@@ -1,8 +1,9 @@
 //! `quintile chart soft-shadows`: soft shadows from a five-dimensional shadow map against accumulation buffering.
 //!
-//! Error is the root of the mean squared difference to an image in which every sample asks the light by rays, over all pixels and
-//! channels in linear light. Cost is that of making the map, in one pass and in as many passes as light samples. Ray tracing, with
-//! samples of each pixel's own, has no map; for it the seconds of shading count, and the trade-off adds them to the maps' too.
+//! Error is the root of the mean squared difference to an image in which every sample asks the light by rays,
+//! over all pixels and channels in linear light. Cost is that of making the map, in one pass and in as many
+//! passes as light samples. Ray tracing, with samples of each pixel's own, has no map; for it the seconds of
+//! shading count, and the trade-off adds them to the maps' too.
 
 use std::time::Instant;
 
@@ -171,7 +172,8 @@ fn methods(row: &ShadowsRow) -> [(&ShadowsRow, &'static str, &Cost); 2] {
     [(row, "one pass", &row.one_pass), (row, "accumulation", &row.accumulation)]
 }
 
-/// A method with as many light samples as a row: the error over the seconds of all but the visibility from the camera.
+/// A method with as many light samples as a row: the error over the seconds of all but the visibility from
+/// the camera.
 fn seconds(row: &ShadowsRow, method: &str, rmse: f64, host_s: f64) -> TradeoffPoint {
     let level = format!("{} light samples", row.points);
     let host_s = Metric::host_s(host_s).beside(row.accumulation.host_s + row.shade_s);

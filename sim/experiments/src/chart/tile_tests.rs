@@ -259,7 +259,8 @@ impl TileTests {
         ChartPanel::over("", axes, series)
     }
 
-    /// Cost and gain of every combination, over the least cost and the greatest gain of each scene: geometric and arithmetic means.
+    /// Cost and gain of every combination, over the least cost and the greatest gain of each scene: geometric
+    /// and arithmetic means.
     fn means(&self, of: fn(&TileTestsRow) -> f64) -> Vec<Mean> {
         let scenes: Vec<&[TileTestsRow]> = self.rows.chunk_by(|a, b| a.scene == b.scene).collect();
         let combinations = scenes.first().map_or(0, |rows| rows.len());

@@ -1,12 +1,12 @@
-//! Reproduction of papers: each claim is computed from scratch and compared with the paper. A paper is a module; a row of the list of
-//! claims is a function.
+//! Reproduction of papers: each claim is computed from scratch and compared with the paper. A paper is a
+//! module; a row of the list of claims is a function.
 //!
 //! ```text
 //! settings -> scenes -> Stage (pipeline, clock, watts) -> Recording (pacing, surroundings, recorder, analysis) -> Row, Figure
 //! ```
 //!
-//! Inputs come from the papers only. A committed file of settings for each paper has what it states and what it leaves open. The
-//! verdict of a row is over all values of open settings (`Band`).
+//! Inputs come from the papers only. A committed file of settings for each paper has what it states and what
+//! it leaves open. The verdict of a row is over all values of open settings (`Band`).
 
 mod paper2;
 mod paper3;

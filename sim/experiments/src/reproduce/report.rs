@@ -205,8 +205,8 @@ struct Id {
     id: String,
 }
 
-/// Refuses a folder whose result of `paper` has rows that are not computed now, or is of the full form if this is the quick form. A
-/// file that cannot be read is no result.
+/// Refuses a folder whose result of `paper` has rows that are not computed now, or is of the full form if
+/// this is the quick form. A file that cannot be read is no result.
 pub(super) fn check_earlier(paper: Paper, options: &Options, out: &Destination) -> Result<(), RunError> {
     let file = out.folder.join(format!("{}.json", stem(paper)));
     let text = if out.force { None } else { fs::read_to_string(file).ok() };

@@ -1,5 +1,5 @@
-//! One claim of a paper, the result of the reproduction with its verdict, and the sensitivity of its condition to the settings that a paper
-//! leaves open.
+//! One claim of a paper, the result of the reproduction with its verdict, and the sensitivity of its
+//! condition to the settings that a paper leaves open.
 
 use run::RunError;
 use serde::Serialize;
@@ -224,8 +224,8 @@ impl Cases {
         Self { of, varied, cases: Vec::new(), turns: Vec::new() }
     }
 
-    /// Adds a sweep of one setting, in order, with given values of the others. Each case has its number, and whether it meets the
-    /// condition.
+    /// Adds a sweep of one setting, in order, with given values of the others. Each case has its number, and
+    /// whether it meets the condition.
     pub fn along<V: std::fmt::Display>(
         &mut self,
         setting: &str,

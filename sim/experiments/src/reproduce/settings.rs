@@ -1,7 +1,8 @@
 //! Settings of the rows: stated by the thesis, left open by it, or ours. Each paper has one committed file.
 //!
-//! A row holds if its condition is met at every value of the open settings. It differs if it is met at none, and depends
-//! otherwise. The files are in `sim/experiments/papers`; every result names the SHA-256 of its file.
+//! A row holds if its condition is met at every value of the open settings. It differs if it is met at none,
+//! and depends otherwise. The files are in `sim/experiments/papers`; every result names the SHA-256 of its
+//! file.
 
 use std::fmt::Debug;
 use std::ops::RangeInclusive;
@@ -200,8 +201,8 @@ impl<T: Debug + PartialEq> Setting<T> {
     }
 }
 
-/// Declares the settings of rows. A line is a field, the type of its value, and the check that every value of it has to pass. The
-/// first field is the description of the row.
+/// Declares the settings of rows. A line is a field, the type of its value, and the check that every value of
+/// it has to pass. The first field is the description of the row.
 macro_rules! row_settings {
     ($($(#[$doc:meta])* $row:ident { $($fields:tt)+ })+) => {$(
         $crate::reproduce::settings::settings_group! { $(#[$doc])* $row { pub about: About, } { $($fields)+ } }
@@ -234,8 +235,8 @@ macro_rules! settings_group {
 }
 pub(super) use settings_group;
 
-/// Declares the settings file of a paper: its number, its name in `sim/experiments/papers`, and its groups in order, each with the
-/// further check that it has to pass.
+/// Declares the settings file of a paper: its number, its name in `sim/experiments/papers`, and its groups in
+/// order, each with the further check that it has to pass.
 macro_rules! paper_settings {
     ($paper:expr, $file:literal { $($group:ident: $type:ty $([$further:ident])?,)+ }) => {
         /// The file.

@@ -1,5 +1,5 @@
-//! A machine that draws frames, its recorder, and the analysis of the recorded trace; and the workloads of the papers, as far as the papers
-//! describe them.
+//! A machine that draws frames, its recorder, and the analysis of the recorded trace; and the workloads of
+//! the papers, as far as the papers describe them.
 
 use std::f64::consts::{FRAC_1_SQRT_2, TAU};
 use std::sync::Arc;
@@ -42,11 +42,11 @@ pub(super) struct Sensor {
 }
 
 impl Sensor {
-    /// "Two shunt current sensors measuring up to 1 A, suitable for the current of cellular phones" (thesis, section 3.1.1). The
-    /// noise is assumed to be that of the default recorder, relative to the range.
+    /// "Two shunt current sensors measuring up to 1 A, suitable for the current of cellular phones" (thesis,
+    /// section 3.1.1). The noise is assumed to be that of the default recorder, relative to the range.
     const SHUNT: Self = Self { range_a: 1.0, noise_a: 0.005 / 30.0 };
-    /// "ACS710 Hall effect current sensors, capable of measuring up to 12 A" (thesis, section 3.1.1). Such a sensor is far noisier
-    /// than a shunt; 0.4 % of its range is assumed.
+    /// "ACS710 Hall effect current sensors, capable of measuring up to 12 A" (thesis, section 3.1.1). Such a
+    /// sensor is far noisier than a shunt; 0.4 % of its range is assumed.
     const HALL: Self = Self { range_a: 12.0, noise_a: 0.05 };
 }
 
@@ -70,8 +70,8 @@ impl Stage {
         Self::new("hd_4000", "hd_4000", Sensor::HALL)
     }
 
-    /// The phone with another power between frames. Its processor also feeds the driver while a frame runs, so that power changes by
-    /// the same amount.
+    /// The phone with another power between frames. Its processor also feeds the driver while a frame runs,
+    /// so that power changes by the same amount.
     pub fn phone_idling(idle_w: f64) -> Result<Self, RunError> {
         let mut stage = Self::phone()?;
         let platform = &mut stage.platform;
@@ -160,7 +160,8 @@ impl Stage {
         JobFrame::new(job, number, &self.gpu, &self.model)
     }
 
-    /// The phone's sequence with objects of this edge, every `step`-th of its frames simulated and each shown until the next one.
+    /// The phone's sequence with objects of this edge, every `step`-th of its frames simulated and each shown
+    /// until the next one.
     pub fn phone_sequence(
         &self,
         edge: f64,
@@ -203,13 +204,13 @@ fn swept<T>(value: Result<T, impl std::fmt::Display>) -> Result<Sourced<T>, RunE
 /// Samples per second of the papers' recorder (Paper II, section 3).
 const RATE_HZ: f64 = 40e3;
 
-/// Tracking, not `auto`: if frames are equal except for a timer that disturbs every fifteenth, the sum of squares finds only the
-/// disturbed ones, and `Auto` accepts this.
+/// Tracking, not `auto`: if frames are equal except for a timer that disturbs every fifteenth, the sum of
+/// squares finds only the disturbed ones, and `Auto` accepts this.
 const METHOD: FinderMethod = FinderMethod::Tracking;
 
-/// Number of marked starts on the PC, unless the row is about a single mark. From a single one the finder sometimes takes 15
-/// frames for one, because the timer of 64 Hz disturbs every fifteenth frame of 30 Hz at the same position. On the phone one mark
-/// is enough.
+/// Number of marked starts on the PC, unless the row is about a single mark. From a single one the finder
+/// sometimes takes 15 frames for one, because the timer of 64 Hz disturbs every fifteenth frame of 30 Hz at
+/// the same position. On the phone one mark is enough.
 pub(super) const MARKED: usize = 3;
 
 /// A trace and its ground truth.
@@ -291,8 +292,8 @@ impl Recording {
         }
     }
 
-    /// For each drawn frame, the energy of the frame found at its position, J. `None` if no frame was found there, or if the
-    /// analysis flags it as merged or split.
+    /// For each drawn frame, the energy of the frame found at its position, J. `None` if no frame was found
+    /// there, or if the analysis flags it as merged or split.
     pub fn by_true_frame_j(&self, frames: &Frames) -> Vec<Option<f64>> {
         let found: Vec<f64> = frames.found.iter().map(|frame| frame.start_s).collect();
         let truth: Vec<f64> = self.truth.frames.iter().map(|frame| frame.start_s).collect();
@@ -357,9 +358,9 @@ const OBJECTS: [u32; 2] = [23, 62];
 /// Quads along an edge of an object: 2048 triangles (Paper III, section 4).
 const CELLS: u32 = 32;
 
-/// The phone's shaders (Paper III, section 4): three matrices times a vector for a vertex, of which the pipeline does one; a
-/// normalization, a dot product and a mix of two texels for a fragment. A draw has one texture here, but its look-up is trilinear:
-/// two fetches, as many as their two without mipmaps.
+/// The phone's shaders (Paper III, section 4): three matrices times a vector for a vertex, of which the
+/// pipeline does one; a normalization, a dot product and a mix of two texels for a fragment. A draw has one
+/// texture here, but its look-up is trilinear: two fetches, as many as their two without mipmaps.
 struct Grids<'a>(pub &'a dyn Shader);
 
 impl Shader for Grids<'_> {
@@ -386,8 +387,8 @@ pub(super) fn objects(frame: u32) -> u32 {
     libm::round(fewest + (most - fewest) * wave) as u32
 }
 
-/// The synthetic scene of Paper III for the phone, 960x640: textured grids, the nearest drawn last. `edge` is that of an object where
-/// the image is 2 high and 3 wide; the paper does not say.
+/// The synthetic scene of Paper III for the phone, 960x640: textured grids, the nearest drawn last. `edge` is
+/// that of an object where the image is 2 high and 3 wide; the paper does not say.
 pub(super) fn phone(frame: u32, edge: f64) -> Result<Scene, LoadError> {
     let mut parts = Parts::new("grids of Paper III");
     let white = Material::colored("white", Vec3::ONE);
@@ -420,8 +421,8 @@ fn texture() -> Option<Texture> {
     Texture::from_srgb8(SIDE, SIDE, texels, [Wrap::Repeat; 2]).ok()
 }
 
-/// An object that faces the camera, wholly inside the image, at a place of a low-discrepancy sequence (the generalized golden
-/// ratio in two dimensions, Roberts 2018).
+/// An object that faces the camera, wholly inside the image, at a place of a low-discrepancy sequence (the
+/// generalized golden ratio in two dimensions, Roberts 2018).
 fn grid(graph: &mut Graph, object: u32, edge: f64, material: usize) {
     const STEPS: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_2];
     let place = |step: f64, room: f64| {
@@ -443,8 +444,8 @@ fn grid(graph: &mut Graph, object: u32, edge: f64, material: usize) {
 /// Spotlights of the PC's animation (Paper III, section 4).
 const LIGHTS: u16 = 32;
 
-/// The PC's shader: 32 spotlights in one forward pass on top of the surface's own. The paper has their number; each is a usual one with
-/// a cone, a range and a highlight (Blinn 1977).
+/// The PC's shader: 32 spotlights in one forward pass on top of the surface's own. The paper has their
+/// number; each is a usual one with a cone, a range and a highlight (Blinn 1977).
 struct Spotlights<'a>(pub &'a dyn Shader);
 
 impl Spotlights<'_> {

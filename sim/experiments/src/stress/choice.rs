@@ -158,7 +158,8 @@ impl Choices {
         )
     }
 
-    /// `auto` and every test on, over the best fixed choice: of each family as a whole, and at the value that is worst for it.
+    /// `auto` and every test on, over the best fixed choice: of each family as a whole, and at the value that
+    /// is worst for it.
     pub(super) fn picture(&self, look: &Look) -> Picture {
         type Cost = fn(&Choice) -> f64;
         let costs: [(&str, Cost); 2] = [
@@ -245,7 +246,8 @@ mod tests {
         assert_eq!(found, Ok::<Vec<u64>, ()>(screens));
     }
 
-    /// Families on which no set of tests is best at all values, and some that were hard to choose on; `quintile stress` has all.
+    /// Families on which no set of tests is best at all values, and some that were hard to choose on;
+    /// `quintile stress` has all.
     #[test]
     fn auto_is_as_good_as_the_best_fixed_choice_on_a_family() {
         let gpu = GpuSpec::load("reference").unwrap();

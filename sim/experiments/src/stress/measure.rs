@@ -1,5 +1,5 @@
-//! Compared methods, named sets of tests, and all of them for one value of a family: lost samples, cost, and the boxes of tile
-//! tests compared with the true ones.
+//! Compared methods, named sets of tests, and all of them for one value of a family: lost samples, cost, and
+//! the boxes of tile tests compared with the true ones.
 
 use activity::{Counts, Event};
 use glam::Vec3;
@@ -134,7 +134,8 @@ struct Pair {
     truth: Option<Hulls>,
 }
 
-/// Intervals of the pairs under a set of tests. Widths are shares of the whole lens and shutter, means over pairs that truly touch.
+/// Intervals of the pairs under a set of tests. Widths are shares of the whole lens and shutter, means over
+/// pairs that truly touch.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Intervals {
     /// Pairs looked at, those of the bounding box.
@@ -359,8 +360,8 @@ impl Place {
         Self { tile: TileRect::new(viewport, origin, side_px), shear, near }
     }
 
-    /// The box of lens and time that the tests in `features` leave for `triangle`, or `None` where they cull the tile. A test
-    /// that bounds lens or time has its line here.
+    /// The box of lens and time that the tests in `features` leave for `triangle`, or `None` where they cull
+    /// the tile. A test that bounds lens or time has its line here.
     pub fn bound(&self, features: &Features, triangle: &Triangle) -> Option<Box5> {
         let lens = !self.shear.is_none();
         let mut within = Box5::whole(lens);
@@ -450,8 +451,8 @@ impl Subject<'_> {
         })
     }
 
-    /// The triangle that every sample has to see: from all triangles against all samples where that is not too much, else from the pipeline
-    /// with every test off. Also returns whether it was brute force.
+    /// The triangle that every sample has to see: from all triangles against all samples where that is not
+    /// too much, else from the pipeline with every test off. Also returns whether it was brute force.
     pub fn reference(&self) -> Result<(Seen, bool), PassError> {
         let samples = self.viewport.pixels() as u64 * u64::from(self.samples.per_pixel());
         if samples * self.triangles() <= MAX_TESTS {

@@ -331,7 +331,8 @@ const MEASURES: [Measure; 2] = [
     },
 ];
 
-/// A measure of one family along its parameter: a small panel for each method, the other methods as grey lines behind it.
+/// A measure of one family along its parameter: a small panel for each method, the other methods as grey
+/// lines behind it.
 fn curves(report: &Report, family: &Family, measure: &Measure, look: &Look) -> Picture {
     let rows: Vec<&StressRow> = report.of(family).collect();
     let line = |name: &str| -> Vec<(f64, f64)> {

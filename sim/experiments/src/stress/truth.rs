@@ -1,12 +1,14 @@
 //! The true interval of lens and time in which a triangle touches a tile.
 //!
-//! For a pinhole it is exact ([`Sweep`]). For a lens it is a lower bound: places where a point of the triangle is seen at a
-//! point of the tile (solved for `u, v`), widened from the outermost of these by exact roots along `t`, `u` and `v` in turn.
+//! For a pinhole it is exact ([`Sweep`]). For a lens it is a lower bound: places where a point of the
+//! triangle is seen at a point of the tile (solved for `u, v`), widened from the outermost of these by exact
+//! roots along `t`, `u` and `v` in turn.
 //!
-//! Roots in time: on the homogeneous image plane a vertex is `p(s) = p_0 + s (p_1 - p_0)`. The triangle begins or ceases to touch a rectangle
-//! only where a vertex crosses a side (`x(s) - X w(s)`, linear), a corner of the rectangle crosses an edge (`p_i x p_j`
-//! seen from the corner, quadratic) or, where it reaches to the near plane, where the cut does (linear, quadratic). Between two
-//! such instants nothing changes, so one test in the middle decides (the idea of Gribel et al. 2010 for a point, here for a tile).
+//! Roots in time: on the homogeneous image plane a vertex is `p(s) = p_0 + s (p_1 - p_0)`. The triangle
+//! begins or ceases to touch a rectangle only where a vertex crosses a side (`x(s) - X w(s)`, linear), a
+//! corner of the rectangle crosses an edge (`p_i x p_j` seen from the corner, quadratic) or, where it reaches
+//! to the near plane, where the cut does (linear, quadratic). Between two such instants nothing changes, so
+//! one test in the middle decides (the idea of Gribel et al. 2010 for a point, here for a tile).
 
 use glam::{DVec2, DVec3};
 use pipeline::Shear;
@@ -347,8 +349,9 @@ mod tests {
 
     #[test]
     fn a_point_out_of_focus_is_seen_from_where_it_should() {
-        // At depth 4 and focus 2 with s = 80 the blur is 20 px in radius: u moves the image by 20 px. A triangle of a hundredth
-        // of a pixel about (-10, 4) touches the tile for u from 0.5 to 0.9, v from -0.2 to 0.2.
+        // At depth 4 and focus 2 with s = 80 the blur is 20 px in radius: u moves the image by 20 px. A
+        // triangle of a hundredth of a pixel about (-10, 4) touches the tile for u from 0.5 to 0.9, v
+        // from -0.2 to 0.2.
         let corner = |x: f32, y: f32| [4.0 * (-10.0 + x), 4.0 * (4.0 + y), 4.0];
         let open = [corner(0.0, 0.0), corner(0.01, 0.0), corner(0.0, 0.01)];
         let truth = truth(open, open, Shear::new([80.0, -80.0], [40.0, -40.0]), TILE);

@@ -1,4 +1,5 @@
-//! Studies: something is measured, drawn and written in one go. A chart of the book and the failure catalogue are studies.
+//! Studies: something is measured, drawn and written in one go. A chart of the book and the failure catalogue
+//! are studies.
 //!
 //! - [`Study`]: what a study is; [`Entry`]: one of them in a list.
 //! - [`table`]: tables whose columns are declared once.

@@ -103,7 +103,8 @@ impl TradeoffPoint {
     }
 }
 
-/// For each (cost, gain) whether it is Pareto-optimal: no other costs no more and gains no less, one of the two strictly.
+/// For each (cost, gain) whether it is Pareto-optimal: no other costs no more and gains no less, one of the
+/// two strictly.
 pub fn front(points: &[(f64, f64)]) -> Vec<bool> {
     let costs: Vec<(f64, f64)> = points.iter().map(|(cost, gain)| (*cost, -gain)).collect();
     traces::pareto::nondominated(&costs)

@@ -270,7 +270,8 @@ pub enum OutputError {
 }
 
 impl OutputError {
-    /// Whether this is a usage error (exit code 2), such as a file in place of the folder, rather than a failure (exit code 1).
+    /// Whether this is a usage error (exit code 2), such as a file in place of the folder, rather than a
+    /// failure (exit code 1).
     pub fn is_usage(&self) -> bool {
         match self {
             Self::Folder { source, .. } => {

@@ -1,4 +1,5 @@
-//! Locked folder of unfinished results, the manifest of the results that Quintile may replace, and the replacement of older results.
+//! Locked folder of unfinished results, the manifest of the results that Quintile may replace, and the
+//! replacement of older results.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File, OpenOptions, TryLockError};
@@ -304,8 +305,8 @@ fn busy(root: &Path, lock: &mut File) -> OutputError {
     OutputError::Busy { path: root.to_owned(), process }
 }
 
-/// This process, such as `123 on node7`: on a cluster other hosts have processes of the same number. Where the system does not
-/// name its host, the number alone.
+/// This process, such as `123 on node7`: on a cluster other hosts have processes of the same number. Where
+/// the system does not name its host, the number alone.
 fn owner() -> String {
     let number = std::process::id();
     match fs::read_to_string("/proc/sys/kernel/hostname") {
@@ -314,8 +315,8 @@ fn owner() -> String {
     }
 }
 
-/// Writes this process into the lock and reads it back by name. The former owner may have removed the file between opening
-/// and locking; then another process may lock another file.
+/// Writes this process into the lock and reads it back by name. The former owner may have removed the file
+/// between opening and locking; then another process may lock another file.
 fn is_still_there(lock: &mut File, path: &Path) -> io::Result<bool> {
     let owner = owner();
     lock.set_len(0)?;

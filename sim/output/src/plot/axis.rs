@@ -113,8 +113,8 @@ pub(super) struct MarkerRoom {
 }
 
 impl MarkerRoom {
-    /// Share of a range that is added at either end, so that markers stay within the panel. `length` is the share of the
-    /// axis that shows the range.
+    /// Share of a range that is added at either end, so that markers stay within the panel. `length` is the
+    /// share of the axis that shows the range.
     fn share(self, length: f64) -> f64 {
         if self.reach == 0.0 {
             return 0.0;
@@ -139,8 +139,8 @@ pub(super) fn is_drawable(low: f64, high: f64) -> bool {
 }
 
 impl AxisSpec {
-    /// Range of the drawable `values`; `None` without any. At either end `pad` of the range is added, or what `markers` need
-    /// if that is more. An axis from zero begins at zero without markers.
+    /// Range of the drawable `values`; `None` without any. At either end `pad` of the range is added, or what
+    /// `markers` need if that is more. An axis from zero begins at zero without markers.
     pub(super) fn extent(
         &self,
         values: impl IntoIterator<Item = f64>,
@@ -240,7 +240,8 @@ impl AxisSpec {
 }
 
 impl Axis {
-    /// Axis of `name` in `unit` over `low..high`, which must be drawable ([`is_drawable`]). An empty range is widened.
+    /// Axis of `name` in `unit` over `low..high`, which must be drawable ([`is_drawable`]). An empty range is
+    /// widened.
     pub fn new(name: &str, unit: &str, (low, high): (f64, f64), along: Along) -> Self {
         let (low, high) = widened(low, high);
         let prefix = if unit.is_empty() { Prefix::NONE } else { Prefix::of(low.abs().max(high.abs())) };
@@ -265,8 +266,8 @@ impl Axis {
         axis
     }
 
-    /// Position of `value`, clamped to [0, 1]: 0 is the low end, 1 the high end. `None` if the scale cannot show it. A
-    /// logarithmic scale with a row for zero can show zero.
+    /// Position of `value`, clamped to [0, 1]: 0 is the low end, 1 the high end. `None` if the scale cannot
+    /// show it. A logarithmic scale with a row for zero can show zero.
     pub fn place(&self, value: f64) -> Option<f64> {
         let zero_at = self.broken_at.map(|broken| 0.5 * (self.low + broken)).filter(|_| value == 0.0);
         let coordinate = zero_at.or_else(|| self.scale.coordinate(value))?;

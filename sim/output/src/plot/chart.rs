@@ -165,8 +165,8 @@ impl<'a> Chart<'a> {
         (0..self.panels.len()).map(|place| both(place).filter(|_| own(place))).collect()
     }
 
-    /// Series of a shared legend: those of the panel with the most, if the series of all other panels have the same names in the
-    /// same order. Small panels have no legend; their titles name the series.
+    /// Series of a shared legend: those of the panel with the most, if the series of all other panels have
+    /// the same names in the same order. Small panels have no legend; their titles name the series.
     fn shared_legend(&self) -> Option<Vec<(Key, String)>> {
         let longest = self.panels.iter().max_by_key(|panel| panel.series.len())?;
         let is_same = |panel: &ChartPanel| {

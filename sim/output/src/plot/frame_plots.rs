@@ -1,4 +1,5 @@
-//! One frame over time: its power, stacked by part, and a lane for each unit: how busy it was, and what it waited for.
+//! One frame over time: its power, stacked by part, and a lane for each unit: how busy it was, and what it
+//! waited for.
 
 use power_model::Part;
 
@@ -86,8 +87,8 @@ impl FramePowerPlot<'_> {
         places.iter().for_each(|&at| picture.dot(at, radius, INK));
     }
 
-    /// Layers from bottom to top, power without activity first. Each has its mean power over the frame, its mean power per column
-    /// and the top of the layer below.
+    /// Layers from bottom to top, power without activity first. Each has its mean power over the frame, its
+    /// mean power per column and the top of the layer below.
     fn layers(&self, bins: usize) -> Vec<Layer> {
         let columns = bins.min(MAX_COLUMNS);
         let mut floor = vec![0.0; columns];

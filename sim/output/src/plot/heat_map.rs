@@ -1,5 +1,5 @@
-//! Heat maps: a value over the image, and costs or errors of methods by test case. Images in colour beside each other, each
-//! with a caption.
+//! Heat maps: a value over the image, and costs or errors of methods by test case. Images in colour beside
+//! each other, each with a caption.
 
 use pipeline::texture::linear_to_srgb8;
 
@@ -28,7 +28,8 @@ pub enum Shading<'a> {
     Even,
     /// 0 to this value; larger values are clamped. Compared maps use the same value.
     UpTo(f64),
-    /// 0 to the 99th percentile of values above 0; larger values are clamped, so that a few hot pixels do not make all others white.
+    /// 0 to the 99th percentile of values above 0; larger values are clamped, so that a few hot pixels do not
+    /// make all others white.
     Clipped,
     /// Classes 0, 1, ... with these names, at most four.
     Classes(&'a [&'a str]),

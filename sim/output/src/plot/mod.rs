@@ -1,5 +1,5 @@
-//! Plots of runs and charts. Each is described once as a [`Picture`], and rendered as SVG, PNG and PDF. A [`Look`] sets the width
-//! and the font size.
+//! Plots of runs and charts. Each is described once as a [`Picture`], and rendered as SVG, PNG and PDF. A
+//! [`Look`] sets the width and the font size.
 //!
 //! Plots of a run:
 //!
@@ -15,8 +15,9 @@
 //! - [`Images`]: images in colour beside each other.
 //! - [`Matrix`]: costs of methods by test case.
 //!
-//! A unit has the same colour in all plots ([`part_colour`]). Without anything to draw (no samples, no frames, no finite value) the
-//! plot says so; this is no error. Only `render` and `text` use the crate `plotters`.
+//! A unit has the same colour in all plots ([`part_colour`]). Without anything to draw (no samples, no
+//! frames, no finite value) the plot says so; this is no error. Only `render` and `text` use the crate
+//! `plotters`.
 
 mod axis;
 mod chart;

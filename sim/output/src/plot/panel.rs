@@ -1,5 +1,5 @@
-//! Plot area with its axes, and labels beside points that overlap nothing. Legends, and the styles that distinguish series:
-//! colour, marker and strokes.
+//! Plot area with its axes, and labels beside points that overlap nothing. Legends, and the styles that
+//! distinguish series: colour, marker and strokes.
 
 use super::axis::{Axis, RAISED, TICK_PX, Tick, label_width};
 use super::picture::{Across, Picture, Point, Text, shortened, text, text_width};
@@ -52,7 +52,8 @@ impl Panel {
         self.bottom - (self.bottom - self.top) * self.y.fraction_at(tick.at)
     }
 
-    /// Draws grid lines at the labelled ticks of `y`, and a break above the row of zero. Called before the data are drawn.
+    /// Draws grid lines at the labelled ticks of `y`, and a break above the row of zero. Called before the
+    /// data are drawn.
     pub fn grid(&self, picture: &mut Picture) {
         for tick in self.y.ticks.iter().filter(|tick| !tick.label.is_empty()) {
             let y = self.tick_y(tick);
@@ -175,8 +176,8 @@ fn overlaps(a: &Box4, b: &Box4) -> bool {
     a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3]
 }
 
-/// Writes the names in order. Each is at the nearest position in the panel that overlaps no name, marker or line (`obstacles`).
-/// Returns the number of names without such a position; they are omitted.
+/// Writes the names in order. Each is at the nearest position in the panel that overlaps no name, marker or
+/// line (`obstacles`). Returns the number of names without such a position; they are omitted.
 pub(super) fn write(
     picture: &mut Picture,
     panel: &Panel,
@@ -287,7 +288,8 @@ impl Key {
     }
 }
 
-/// Draws a legend between the margins, in as many lines as needed, the first around `top`. Returns the height of all lines.
+/// Draws a legend between the margins, in as many lines as needed, the first around `top`. Returns the height
+/// of all lines.
 pub(super) fn legend_lines(picture: &mut Picture, top: f64, entries: &[(Key, String)]) -> f64 {
     let (left, right) = (picture.margin() + 2.0, picture.width() - picture.margin());
     let (mut x, mut y) = (left, top);
@@ -304,7 +306,8 @@ pub(super) fn legend_lines(picture: &mut Picture, top: f64, entries: &[(Key, Str
     if entries.is_empty() { 0.0 } else { y - top + LEGEND_LINE }
 }
 
-/// Draws a legend in one column within `height`, top entry at `from`. Each entry has a label, and a value that ends at `right`.
+/// Draws a legend in one column within `height`, top entry at `from`. Each entry has a label, and a value
+/// that ends at `right`.
 pub(super) fn legend_column(
     picture: &mut Picture,
     from: Point,

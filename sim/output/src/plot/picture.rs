@@ -1,6 +1,7 @@
 //! A plot as a list of shapes, independent of the file format; its width, font size and title.
 //!
-//! Text has the width of the embedded font, and is shortened where it is too wide. The font is a subset of DejaVu Sans, so no system font is needed.
+//! Text has the width of the embedded font, and is shortened where it is too wide. The font is a subset of
+//! DejaVu Sans, so no system font is needed.
 
 use std::sync::OnceLock;
 
@@ -62,8 +63,8 @@ const SUBTITLE_PX: f64 = 13.0;
 const SUBTITLE_LINE: f64 = 18.0;
 
 impl Picture {
-    /// A picture with a title and a line below it. It is `usual` pixels wide unless `look` sets the width, and at least `least`. Its
-    /// height is that of the titles; later drawing increases it.
+    /// A picture with a title and a line below it. It is `usual` pixels wide unless `look` sets the width,
+    /// and at least `least`. Its height is that of the titles; later drawing increases it.
     pub(super) fn titled(look: &Look, (usual, least): (f64, f64), [title, subtitle]: [&str; 2]) -> Self {
         let title = look.title.as_deref().unwrap_or(title);
         let paper = look.paper(usual, least);
@@ -211,8 +212,8 @@ pub(super) struct Paper {
 }
 
 impl Look {
-    /// Size of a picture that is `usual` pixels wide by default and needs at least `least`. For a narrower one the font is
-    /// smaller than requested.
+    /// Size of a picture that is `usual` pixels wide by default and needs at least `least`. For a narrower
+    /// one the font is smaller than requested.
     pub(super) fn paper(&self, usual: f64, least: f64) -> Paper {
         let Some(width_mm) = self.width_mm else {
             let zoom = self.font_pt.map_or(1.0, |pt| pt / 72.0 * SCREEN_PER_INCH / LETTERS_PX);

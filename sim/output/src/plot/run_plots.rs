@@ -36,8 +36,9 @@ const SPARSE: f64 = 0.6;
 const MARGIN: [f64; 2] = [0.6, 1.6];
 
 impl PowerRun<'_> {
-    /// Draws the lowest and highest sample per column of pixels, so that every spike is visible, a mean over about one frame, the
-    /// marked window, and lanes of frame starts. If frames cover little of the run, only their part is shown.
+    /// Draws the lowest and highest sample per column of pixels, so that every spike is visible, a mean over
+    /// about one frame, the marked window, and lanes of frame starts. If frames cover little of the run, only
+    /// their part is shown.
     pub fn picture(&self, look: &Look) -> Picture {
         let rate = format!("{} samples at {}", self.power_w.len(), si(self.rate_hz, "Hz"));
         let shown = self.shown();
@@ -220,8 +221,8 @@ fn draw_each(panel: &Panel, values: &[Extremes], left: f64, width: f64, picture:
     picture.polyline(points, MEASURED, 1.5);
 }
 
-/// Outline of columns from lowest to highest value. Each is at least a pixel high and touches its neighbours, so that a
-/// jump between two samples is a line.
+/// Outline of columns from lowest to highest value. Each is at least a pixel high and touches its neighbours,
+/// so that a jump between two samples is a line.
 fn outline(panel: &Panel, values: &[Extremes], left: f64, width: f64) -> Vec<(f64, f64)> {
     let mut upper = Vec::with_capacity(values.len() * 4);
     let mut lower = Vec::with_capacity(values.len() * 2);

@@ -144,8 +144,8 @@ impl Mark {
         finite.unzip::<f64, f64, Vec<f64>, Vec<f64>>().into()
     }
 
-    /// Largest distance of the outline of a marker from its point, with `above` series drawn later; 0 without markers. Axes
-    /// leave room for it.
+    /// Largest distance of the outline of a marker from its point, with `above` series drawn later; 0 without
+    /// markers. Axes leave room for it.
     pub(super) fn reach(&self, above: usize) -> f64 {
         CORNER_REACH
             * match self {
@@ -218,8 +218,8 @@ impl Mark {
         }
     }
 
-    /// Draws it. Curves and markers below those of the series `above`, which are drawn later, are larger, so that they stay
-    /// visible.
+    /// Draws it. Curves and markers below those of the series `above`, which are drawn later, are larger, so
+    /// that they stay visible.
     pub(super) fn draw(&self, panel: &Panel, style: Style, above: &[Series], picture: &mut Picture) {
         let path =
             |points: &[(f64, f64)]| points.iter().filter_map(|&point| panel.place(point)).collect::<Vec<_>>();
@@ -342,8 +342,8 @@ pub(super) fn means(values: &[f64], columns: usize) -> Vec<f64> {
         .collect()
 }
 
-/// Moving mean of the finite `values`: for the middle of each of `columns` segments, its position in samples and the mean
-/// over `width` samples around it.
+/// Moving mean of the finite `values`: for the middle of each of `columns` segments, its position in samples
+/// and the mean over `width` samples around it.
 pub(super) fn moving_mean(values: &[f64], width: usize, columns: usize) -> Vec<(f64, f64)> {
     let width = width.clamp(1, values.len().max(1));
     let mut sums = Vec::with_capacity(values.len() + 1);

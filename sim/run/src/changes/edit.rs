@@ -1,5 +1,5 @@
-//! Changing one value in RON text. The rest of the text stays as it is, comments included, so that the changed text is
-//! read and checked as any file.
+//! Changing one value in RON text. The rest of the text stays as it is, comments included, so that the
+//! changed text is read and checked as any file.
 
 use std::ops::Range;
 
@@ -183,8 +183,8 @@ fn is_string(text: &str) -> bool {
     text.starts_with(['"', 'r']) && text.ends_with(['"', '#'])
 }
 
-/// `text` with `value` at `path`, a list of field names, map keys, and indices or names of list entries. A field that is
-/// missing in the text is added; whether it is known is for the deserializer to say.
+/// `text` with `value` at `path`, a list of field names, map keys, and indices or names of list entries. A
+/// field that is missing in the text is added; whether it is known is for the deserializer to say.
 ///
 /// # Errors
 /// In words, if the path does not lead to a value or `value` is not one.

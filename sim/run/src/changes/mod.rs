@@ -196,8 +196,8 @@ fn without_name(error: &impl std::fmt::Display, file: &Path) -> String {
 }
 
 impl Changes<'_> {
-    /// The input `name` with its changes, of a `.ron` file or built in; `None` if it has none, and for unknown names. `in_words` is
-    /// the message of an error without the name of the file.
+    /// The input `name` with its changes, of a `.ron` file or built in; `None` if it has none, and for
+    /// unknown names. `in_words` is the message of an error without the name of the file.
     fn input<T, E>(
         &mut self,
         (file, name): (InputFile, &Path),

@@ -53,7 +53,8 @@ impl Probe {
             probe_frame(plan, &*job, number, &mut findings)?;
             bar.inc();
         }
-        // Host times are sums over the probe's frames, at a reduced size. Passes that do not depend on it are overestimated.
+        // Host times are sums over the probe's frames, at a reduced size. Passes that do not depend on it are
+        // overestimated.
         let scale = plan.pixels() as f64 / (f64::from(size[0]) * f64::from(size[1])) / some as f64;
         findings.scale_times(scale);
         Ok(Self { numbers, size, findings })

@@ -51,7 +51,8 @@ pub enum CompareError {
 }
 
 impl CompareError {
-    /// Whether the request is at fault, or a file that it names (exit code 2), rather than the writing of the result (exit code 1).
+    /// Whether the request is at fault, or a file that it names (exit code 2), rather than the writing of the
+    /// result (exit code 1).
     pub fn is_usage(&self) -> bool {
         !matches!(self, Self::Write { .. })
     }

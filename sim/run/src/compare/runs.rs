@@ -176,7 +176,8 @@ fn undecided(runs: &[Value; 2]) -> Vec<String> {
     quantities.into_iter().filter_map(quantity).collect()
 }
 
-/// A JSON value as text: strings without quotes, `-` for null, input files by path and the first digits of their SHA-256.
+/// A JSON value as text: strings without quotes, `-` for null, input files by path and the first digits of
+/// their SHA-256.
 pub fn shown(value: &Value) -> String {
     match value {
         Value::Array(items) if items.iter().any(|item| item["path"].is_string()) => {

@@ -1,4 +1,5 @@
-//! Recordings in files: a line of JSON that describes the run and its frames, then the packets of each frame, all in gzip.
+//! Recordings in files: a line of JSON that describes the run and its frames, then the packets of each frame,
+//! all in gzip.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Write};
@@ -148,7 +149,8 @@ impl RecordedRun {
     /// Reads the file at `path`.
     ///
     /// # Errors
-    /// [`RunError::Input`] if it cannot be read, [`RunError::Damaged`] if it is no recording of this version of the program.
+    /// [`RunError::Input`] if it cannot be read, [`RunError::Damaged`] if it is no recording of this version
+    /// of the program.
     pub fn read(path: &Path) -> Result<Self, RunError> {
         let name = path.display().to_string();
         let damaged = |message: String| RunError::Damaged { path: name.clone(), message };
@@ -174,8 +176,8 @@ impl RecordedRun {
         Ok(Self { about, recording: Recording { frames }, path: path.to_owned() })
     }
 
-    /// The run on the GPU, platform and energy table of `options`, at their timing level. Scene and view are those of the
-    /// recording.
+    /// The run on the GPU, platform and energy table of `options`, at their timing level. Scene and view are
+    /// those of the recording.
     ///
     /// # Errors
     /// If an input is missing or invalid, or the GPU has another pipeline than the one that drew the frames.

@@ -15,8 +15,8 @@ pub use file::RecordedRun;
 use crate::frame::{BIN_PS, DrawnFrame, draw, max_bins_per_frame};
 use crate::{Plan, RunError, RunFrame};
 
-/// Frames of a job as a pipeline drew them. What the pipeline does depends on neither time nor power, so the frames of any GPU
-/// with this pipeline follow from their packets.
+/// Frames of a job as a pipeline drew them. What the pipeline does depends on neither time nor power, so the
+/// frames of any GPU with this pipeline follow from their packets.
 pub struct Recording {
     frames: Vec<RecordedFrame>,
 }
@@ -56,8 +56,8 @@ impl Recording {
         Ok(frames.into_iter().collect::<Option<_>>().filter(|_| fits).map(|frames| Self { frames }))
     }
 
-    /// The frames with their times on the machine of each plan, whose pipelines have to be that of the recording. Packets are
-    /// read once for all of them.
+    /// The frames with their times on the machine of each plan, whose pipelines have to be that of the
+    /// recording. Packets are read once for all of them.
     ///
     /// # Errors
     /// If a frame cannot be timed.

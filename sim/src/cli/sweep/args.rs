@@ -41,14 +41,15 @@ pub enum Step {
     Slurm(SlurmArgs),
     /// Print how many points are finished, from the files of the sweep alone
     Status(StatusArgs),
-    /// Answer an optimizer: read places on the axes from standard input, a line of JSON each, and print what a point there costs
+    /// Answer an optimizer: read places on the axes from standard input, a line of JSON each, and print what
+    /// a point there costs
     Ask(AskArgs),
     /// Write DIR/results.parquet, with a row for each point
     Merge(MergeArgs),
     /// Remove results in DIR that are not of its plan: of other builds of the program, settings or inputs
     Clean(CleanArgs),
-    /// Write DIR/report.html, with tables and a picture beside it: frontiers of time, energy and area, best designs, effects and
-    /// interactions of settings; and print the frontiers
+    /// Write DIR/report.html, with tables and a picture beside it: frontiers of time, energy and area, best
+    /// designs, effects and interactions of settings; and print the frontiers
     Report(ReportArgs),
 }
 
@@ -86,8 +87,8 @@ pub struct RunStepArgs {
     /// The sweep
     #[command(flatten)]
     pub sweep: FileArgs,
-    /// Run part i of n of the points, such as 1/8 [default: that of the task by the variables of Slurm, PBS or HyperQueue;
-    /// all points outside of a task]
+    /// Run part i of n of the points, such as 1/8 [default: that of the task by the variables of Slurm, PBS
+    /// or HyperQueue; all points outside of a task]
     #[arg(long, value_name = "i/n", value_parser = Shard::parse, conflicts_with = "shards")]
     pub shard: Option<Shard>,
     /// Number of tasks, for PBS and HyperQueue, which do not give it

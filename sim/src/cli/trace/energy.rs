@@ -65,7 +65,8 @@ pub struct EnergyArgs {
     /// How the recording is subtracted
     #[arg(long, value_enum, default_value_t, requires = "idle_trace")]
     pub idle_by: IdleBy,
-    /// A pass within every frame: its name, and when it begins after the start of the frame, in milliseconds or with its unit
+    /// A pass within every frame: its name, and when it begins after the start of the frame, in milliseconds
+    /// or with its unit
     #[arg(long, value_name = "NAME=MS", value_parser = pass)]
     pub pass: Vec<(String, f64)>,
     /// Leave out the first frames: a number, or `auto` to find the warm-up
@@ -77,7 +78,8 @@ pub struct EnergyArgs {
     /// Another run of the same thing, with the same marks; may be given several times
     #[arg(long, value_name = "TRACE")]
     pub run: Vec<PathBuf>,
-    /// Threshold of the begin-to-finish method: power above which a frame is still at work, in W; a tenth above idle without it
+    /// Threshold of the begin-to-finish method: power above which a frame is still at work, in W; a tenth
+    /// above idle without it
     #[arg(long, value_name = "W", allow_hyphen_values = true, value_parser = power)]
     pub busy_above: Option<f64>,
     /// Print everything as JSON and nothing else

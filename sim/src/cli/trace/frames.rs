@@ -248,7 +248,8 @@ pub struct AlignArgs {
     /// The trace.
     #[command(flatten)]
     pub input: InputArgs,
-    /// Recorded stamps: a number in each line, in seconds, or a table with a column start, time, mark or stamp, its unit in its name (time_s, stamp_ms)
+    /// Recorded stamps: a number in each line, in seconds, or a table with a column start, time, mark or
+    /// stamp, its unit in its name (time_s, stamp_ms)
     #[arg(value_name = "STAMPS")]
     pub stamps: PathBuf,
     /// A stamp and its time in the trace, twice; without them the best fit to the frames found
@@ -268,7 +269,8 @@ pub struct AlignArgs {
     pub piped: bool,
 }
 
-/// Root mean square of rounding to whole samples, in sample periods, as 1 / sqrt 12: starts are at best known to half a sample.
+/// Root mean square of rounding to whole samples, in sample periods, as 1 / sqrt 12: starts are at best known
+/// to half a sample.
 const ROUNDING_PERIODS: f64 = 0.289;
 
 impl From<AlignError> for Failure {

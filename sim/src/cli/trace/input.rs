@@ -1,7 +1,7 @@
 //! Reading a trace, its marks and its frames, by the arguments.
 //!
-//! `-` in place of a file: standard input and standard output, by way of files in a temporary folder, as a trace is read
-//! several times and a file is written whole.
+//! `-` in place of a file: standard input and standard output, by way of files in a temporary folder, as a
+//! trace is read several times and a file is written whole.
 
 use std::fs::File;
 use std::io::{self, ErrorKind, IsTerminal, Write};
@@ -79,7 +79,8 @@ pub struct FindArgs {
     /// The start of one frame, in seconds or with its unit; may be given several times
     #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = time)]
     pub mark: Vec<f64>,
-    /// A file of starts: a number in each line, in seconds, or a table with a column start or time, its unit in its name (start_s, time_ms)
+    /// A file of starts: a number in each line, in seconds, or a table with a column start or time, its unit
+    /// in its name (start_s, time_ms)
     #[arg(long, value_name = "FILE")]
     pub mark_file: Option<PathBuf>,
     /// Propose the start of a frame near the middle of the trace, where no mark is known; look at the result
@@ -88,12 +89,13 @@ pub struct FindArgs {
     /// Where the last frame ends, in seconds or with its unit; the end of the trace without it
     #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = time)]
     pub end: Option<f64>,
-    /// The window around a mark that is compared with the trace: times before and after it, in milliseconds or with their units.
-    /// Without it 1,4, or less where power repeats sooner
+    /// The window around a mark that is compared with the trace: times before and after it, in milliseconds
+    /// or with their units. Without it 1,4, or less where power repeats sooner
     #[arg(long, value_name = "PRE,POST", value_parser = window, allow_hyphen_values = true)]
     pub window: Option<(f64, f64)>,
-    /// How starts are found: `squares` (sum of squared differences to the marked window), `normalized` (the same, regardless of level
-    /// and scale), `tracking` (the most likely sequence of starts), or `auto` (chosen by the length and the clarity of the trace)
+    /// How starts are found: `squares` (sum of squared differences to the marked window), `normalized` (the
+    /// same, regardless of level and scale), `tracking` (the most likely sequence of starts), or `auto`
+    /// (chosen by the length and the clarity of the trace)
     #[arg(long, value_name = "METHOD", default_value_t)]
     pub method: FinderMethod,
     /// Read in pieces even if the trace would fit into memory (`squares`, or `normalized` if that is the method)

@@ -1,5 +1,5 @@
-//! `quintile trace`: analysis of any power trace, recorded or synthetic. `quintile trace convert` and `quintile trace sample`: a trace in
-//! another format, and as another recorder would have written it.
+//! `quintile trace`: analysis of any power trace, recorded or synthetic. `quintile trace convert` and
+//! `quintile trace sample`: a trace in another format, and as another recorder would have written it.
 
 mod energy;
 mod frames;
@@ -239,8 +239,8 @@ fn format_of(path: &Path) -> Result<&'static TraceFormat, Failure> {
     TraceFormat::of(path).ok_or_else(refused)
 }
 
-/// Refuses a file that [`save`] could not write, or that would overwrite an input, or a description that is not that of an
-/// older `out`.
+/// Refuses a file that [`save`] could not write, or that would overwrite an input, or a description that is
+/// not that of an older `out`.
 fn may_be_saved<'a>(
     flag: &str,
     out: &Path,
@@ -296,13 +296,15 @@ pub struct SampleArgs {
     /// Bits of both converters, 1 to 24 (default: 14)
     #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = clap::value_parser!(u32).range(1..=24))]
     pub bits: Option<u32>,
-    /// Highest current, the lowest is its negative (default: the smallest of 1mA, 3mA, 10mA, ... that holds the trace's peak)
+    /// Highest current, the lowest is its negative (default: the smallest of 1mA, 3mA, 10mA, ... that holds
+    /// the trace's peak)
     #[arg(long, value_name = "A", allow_hyphen_values = true, value_parser = positive_current)]
     pub current_range: Option<f64>,
     /// Highest voltage, the lowest is its negative (default: 1.5 times the rail's)
     #[arg(long, value_name = "V", allow_hyphen_values = true, value_parser = positive_voltage)]
     pub voltage_range: Option<f64>,
-    /// Voltage of the rail without load (default: the trace's highest, or the specified one for a trace of power alone)
+    /// Voltage of the rail without load (default: the trace's highest, or the specified one for a trace of
+    /// power alone)
     #[arg(long, value_name = "V", allow_hyphen_values = true, value_parser = positive_voltage)]
     pub rail_voltage: Option<f64>,
     /// Resistance of the rail (default: 4mOhm, less where the range is above 25 A)
@@ -411,8 +413,8 @@ fn sample(args: &SampleArgs, terminal: &Terminal) -> Result<(), Failure> {
 }
 
 impl SampleArgs {
-    /// The device: that of the file, or the default one with a range that fits and no more samples than the trace has; and
-    /// what options change of it.
+    /// The device: that of the file, or the default one with a range that fits and no more samples than the
+    /// trace has; and what options change of it.
     fn spec(&self, peaks: &Peaks, trace_rate_hz: f64) -> Result<DeviceSpec, Failure> {
         let base = self.base(peaks, trace_rate_hz)?;
         let ranged = match self.current_range {

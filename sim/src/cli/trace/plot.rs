@@ -1,4 +1,5 @@
-//! `quintile trace plot` and `quintile trace pareto`: pictures of a trace and its frames, and of the settings of a table.
+//! `quintile trace plot` and `quintile trace pareto`: pictures of a trace and its frames, and of the settings
+//! of a table.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -45,10 +46,12 @@ pub struct PlotArgs {
     /// Where the shown part of the curve ends, in seconds or with its unit
     #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = time)]
     pub to: Option<f64>,
-    /// Time over which the curve's mean is drawn, in milliseconds or with its unit; a fiftieth of the range without it
+    /// Time over which the curve's mean is drawn, in milliseconds or with its unit; a fiftieth of the range
+    /// without it
     #[arg(long, value_name = "MS", allow_hyphen_values = true, value_parser = milliseconds)]
     pub low_pass: Option<f64>,
-    /// Keep the overview of a curve beside the trace as TRACE.pyramid: later plots of a long trace are then drawn at once
+    /// Keep the overview of a curve beside the trace as TRACE.pyramid: later plots of a long trace are then
+    /// drawn at once
     #[arg(long)]
     pub keep_pyramid: bool,
     /// Which frame, for `frame`; the middle one without it
@@ -469,8 +472,8 @@ fn place(show: ParetoShow, p: &Point) -> (f64, f64, f64, f64) {
     }
 }
 
-/// All groups in one picture: points with their names and deviations, and each group's frontier as steps, as between two settings
-/// there is none.
+/// All groups in one picture: points with their names and deviations, and each group's frontier as steps, as
+/// between two settings there is none.
 fn picture(subject: &str, show: ParetoShow, look: &LookArgs, groups: &Groups) -> Picture {
     let place = |s: &RatedPoint| place(show, &s.point);
     let all = || groups.values().flatten();

@@ -1,5 +1,5 @@
-//! Designs: what is set in GPU, platform and energy table, with what it costs. Their settings are factors of a model, with values by
-//! number.
+//! Designs: what is set in GPU, platform and energy table, with what it costs. Their settings are factors of
+//! a model, with values by number.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -33,7 +33,8 @@ pub struct Cost {
     pub value: f64,
     /// Standard deviation between runs that differ in their seed.
     pub deviation: f64,
-    /// Stated error of the timing level: the truth is at most `1 + error` times as large and at least `1 / (1 + error)` times.
+    /// Stated error of the timing level: the truth is at most `1 + error` times as large and at least `1 /
+    /// (1 + error)` times.
     pub error: f64,
     /// With all energies of the table at their low end.
     pub low: f64,
@@ -80,7 +81,8 @@ pub(crate) fn label<'a>(
 }
 
 impl<'a> Row<'a> {
-    /// A point with its numbers, and short names of settings; those in `same` distinguish neither designs nor workloads.
+    /// A point with its numbers, and short names of settings; those in `same` distinguish neither designs nor
+    /// workloads.
     pub fn new(point: &'a Point, measured: &Measured, names: &BTreeMap<&str, &str>, same: &[&str]) -> Self {
         let others = point.settings.iter().filter(|setting| !same.contains(&&*setting.path));
         let (settings, conditions): (Vec<&Setting>, Vec<&Setting>) =
@@ -201,7 +203,8 @@ impl Factor {
         self.codes.iter_mut().for_each(|code| *code = places[*code]);
     }
 
-    /// The factor with groups of neighbouring values in place of values, of about as many designs each; `None` if values are no numbers.
+    /// The factor with groups of neighbouring values in place of values, of about as many designs each;
+    /// `None` if values are no numbers.
     pub fn grouped(&self) -> Option<Self> {
         self.numbers()?;
         let counts: Vec<usize> =

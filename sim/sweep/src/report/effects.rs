@@ -1,9 +1,10 @@
 //! Main effects, two-way interactions and shares of variance of the settings, on the logarithms of time and energy.
 //!
-//! Main effects are those of an additive model, fitted by least squares (backfitting: Buja, Hastie and Tibshirani 1989), so that
-//! missing points do not mix effects. In a grid they are the means of the analysis of variance. Intervals are Student's, over what
-//! the other settings do to an effect: a product of factors has intervals without width. Shares of variance are those of Sobol'
-//! (1993) and, with all interactions, of Homma and Saltelli (1996); on a whole grid both are exact sums.
+//! Main effects are those of an additive model, fitted by least squares (backfitting: Buja, Hastie and
+//! Tibshirani 1989), so that missing points do not mix effects. In a grid they are the means of the analysis
+//! of variance. Intervals are Student's, over what the other settings do to an effect: a product of factors
+//! has intervals without width. Shares of variance are those of Sobol' (1993) and, with all interactions, of
+//! Homma and Saltelli (1996); on a whole grid both are exact sums.
 
 use std::collections::HashMap;
 

@@ -153,8 +153,8 @@ impl Report {
         })
     }
 
-    /// Writes the report into `folder`: its page, a picture, and tables. All are replaced together, and no file of the user. Returns
-    /// the path of the page.
+    /// Writes the report into `folder`: its page, a picture, and tables. All are replaced together, and no
+    /// file of the user. Returns the path of the page.
     ///
     /// # Errors
     /// [`SweepError::InTheWay`] if a file of the user has the name of one of them, and if they cannot be written.
@@ -171,8 +171,8 @@ impl Report {
         Ok(folder.path().join(PAGE))
     }
 
-    /// What a reader has to know before the numbers: which points are not in, by cause, which constraints do nothing, and designs whose
-    /// energies are those of another GPU.
+    /// What a reader has to know before the numbers: which points are not in, by cause, which constraints do
+    /// nothing, and designs whose energies are those of another GPU.
     pub fn notes(&self) -> Vec<String> {
         let causes = [
             (self.left_out_unfinished, "not finished (`quintile sweep run` runs them)"),

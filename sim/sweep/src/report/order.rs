@@ -1,10 +1,10 @@
-//! Order of designs: the frontier over time, energy and area, ranks as far as the stated errors decide them, and how likely the order
-//! of two designs is the other one.
+//! Order of designs: the frontier over time, energy and area, ranks as far as the stated errors decide them,
+//! and how likely the order of two designs is the other one.
 //!
-//! The logarithm of a cost is its mean, plus a part that all designs share, plus a part of its own. Shared is the place of the truth
-//! between the ends of the energy table: one standard normal number for the table, with 95 % of it between low and high, so that
-//! what moves both designs in the same way moves no order. Of its own are the stated error of the timing level and the mean over seeds, both
-//! normal and independent.
+//! The logarithm of a cost is its mean, plus a part that all designs share, plus a part of its own. Shared is
+//! the place of the truth between the ends of the energy table: one standard normal number for the table,
+//! with 95 % of it between low and high, so that what moves both designs in the same way moves no order. Of
+//! its own are the stated error of the timing level and the mean over seeds, both normal and independent.
 
 use core::f64::consts::{FRAC_1_SQRT_2, PI};
 
@@ -28,7 +28,8 @@ pub struct RatedDesign {
     pub design: Design,
     /// Whether no other is at least as good in time, energy and area, and better in one of them.
     pub on_frontier: bool,
-    /// Share of random draws within all stated uncertainties in which it is on the frontier. `None` of more than 400 designs.
+    /// Share of random draws within all stated uncertainties in which it is on the frontier. `None` of more
+    /// than 400 designs.
     pub probability: Option<f64>,
     /// Best and worst rank by time within the stated error of the timing level; undecided if they differ.
     pub time_ranks: [usize; 2],
@@ -59,8 +60,9 @@ fn area(design: &Design) -> f64 {
     design.area_mm2.unwrap_or(0.0)
 }
 
-/// Whether each point is dominated by no other, of those that are as good in all three and better in one (Kung, Luccio and
-/// Preparata 1975: sorted by the first, a staircase of the others). Equal points do not dominate one another.
+/// Whether each point is dominated by no other, of those that are as good in all three and better in one
+/// (Kung, Luccio and Preparata 1975: sorted by the first, a staircase of the others). Equal points do not
+/// dominate one another.
 pub(crate) fn nondominated(points: &[[f64; 3]]) -> Vec<bool> {
     let mut order: Vec<usize> = (0..points.len()).collect();
     let compare = |a: &[f64; 3], b: &[f64; 3]| {
@@ -114,8 +116,8 @@ fn probabilities(designs: &[Design]) -> Option<Vec<f64>> {
     Some(counts.into_iter().map(|count| f64::from(count) / DRAWS as f64).collect())
 }
 
-/// For each cost the best and the worst rank that it can have within the stated errors, from 1. Both are the same if the rank is
-/// decided; that of costs equal to the last bit is not.
+/// For each cost the best and the worst rank that it can have within the stated errors, from 1. Both are the
+/// same if the rank is decided; that of costs equal to the last bit is not.
 pub(crate) fn ranks(costs: &[&Cost]) -> Vec<[usize; 2]> {
     let ends: Vec<[f64; 2]> = costs.iter().map(|cost| ends(cost)).collect();
     let sorted = |end: usize| {

@@ -93,7 +93,8 @@ const AREA: Quantity = ("area", "mm2", |rated| rated.design.area_mm2);
 const MAX_NAMES: usize = 12;
 
 impl Report {
-    /// Designs over each two of time, energy and area. The frontier is over all three; steps are that of the two that are shown.
+    /// Designs over each two of time, energy and area. The frontier is over all three; steps are that of the
+    /// two that are shown.
     pub(super) fn picture(&self, look: &Look) -> Picture {
         let pairs = [(TIME, ENERGY), (AREA, TIME), (AREA, ENERGY)];
         let panels = pairs.into_iter().filter_map(|(x, y)| self.panel(x, y)).collect();

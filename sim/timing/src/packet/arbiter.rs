@@ -6,7 +6,8 @@ use super::calendar::{Calendar, Turn};
 use crate::clock::Time;
 use crate::demand::CLIENTS;
 
-/// Slots whose ports are remembered, a power of two. Packets that are in the pipeline at the same time are closer in time.
+/// Slots whose ports are remembered, a power of two. Packets that are in the pipeline at the same time are
+/// closer in time.
 const REMEMBERED_SLOTS: usize = 1 << 12;
 
 /// Work of each port in a slot.
@@ -27,7 +28,8 @@ impl SlotPorts {
         capacity / (1 + others.count() as u64)
     }
 
-    /// Takes up to `wanted` from the other ports that have most, and leaves each at least `part`. Returns how much of each.
+    /// Takes up to `wanted` from the other ports that have most, and leaves each at least `part`. Returns how
+    /// much of each.
     fn take(&mut self, port: usize, wanted: u64, part: u64) -> [u64; CLIENTS.len()] {
         let mut taken = [0; CLIENTS.len()];
         let mut missing = wanted;
@@ -46,7 +48,8 @@ impl SlotPorts {
     }
 }
 
-/// Work of a port that made room for others and waits in the queue of the port, which stays in order: all that comes behind waits as long.
+/// Work of a port that made room for others and waits in the queue of the port, which stays in order: all
+/// that comes behind waits as long.
 #[derive(Clone, Debug, Default)]
 struct Lag {
     /// When each part of it is done, and its work.
@@ -72,9 +75,10 @@ impl Lag {
 
 /// A calendar with ports that take turns.
 ///
-/// Requests come in stream order. So those of a unit early in the pipeline come after those of a late unit at the same time, which
-/// are of packets before theirs, and a calendar alone would serve the late unit first. Here each port gets its part of a slot, and what
-/// was there before moves on to later slots. It waits in the queue of its port; what does not fit there stalls the client.
+/// Requests come in stream order. So those of a unit early in the pipeline come after those of a late unit at
+/// the same time, which are of packets before theirs, and a calendar alone would serve the late unit first.
+/// Here each port gets its part of a slot, and what was there before moves on to later slots. It waits in the
+/// queue of its port; what does not fit there stalls the client.
 #[derive(Clone, Debug)]
 pub(super) struct Arbiter {
     calendar: Calendar,
@@ -132,8 +136,8 @@ impl Arbiter {
         }
     }
 
-    /// Give a port as much of a slot as is free, or its part of it, up to `wanted`. Returns how much it has, and how much of others
-    /// made room.
+    /// Give a port as much of a slot as is free, or its part of it, up to `wanted`. Returns how much it has,
+    /// and how much of others made room.
     fn share(&mut self, slot: usize, port: usize, wanted: u64) -> (u64, u64) {
         let free = self.calendar.free(slot).min(wanted);
         let capacity = self.calendar.capacity();

@@ -55,8 +55,8 @@ pub(super) struct Calendar {
 }
 
 impl Calendar {
-    /// A calendar with slots of `length` grains, at least 1, for `servers` servers. How fine grains are, which clocks decide, does
-    /// not change what fits in a slot.
+    /// A calendar with slots of `length` grains, at least 1, for `servers` servers. How fine grains are,
+    /// which clocks decide, does not change what fits in a slot.
     pub fn new(length: Time, servers: u32) -> Self {
         let servers = u64::from(servers);
         Self {

@@ -217,7 +217,8 @@ impl Cores {
         run
     }
 
-    /// Record that some warps waited since `since` for slots and were sent at `sent`. A group has all its slots at once.
+    /// Record that some warps waited since `since` for slots and were sent at `sent`. A group has all its
+    /// slots at once.
     fn note_turns(&mut self, demand: &ServiceDemand, chunk: &Chunk, since: Time, sent: Span) {
         match demand.group {
             Some(_) if chunk.first == 0 => self.turns.note(Wait { since, sent: sent.from, warps: chunk.of }),
@@ -230,8 +231,8 @@ impl Cores {
         }
     }
 
-    /// Packets like that of `demand` that have room on the cores at once. Only groups need room but for their warps; all groups
-    /// under way are taken to need as much.
+    /// Packets like that of `demand` that have room on the cores at once. Only groups need room but for their
+    /// warps; all groups under way are taken to need as much.
     fn most(&self, demand: &ServiceDemand, warps: u32) -> usize {
         demand.group.map_or(usize::MAX, |group| {
             let per_core = self.machine.groups_per_core(warps, group.shared_bytes).max(1);
@@ -255,18 +256,20 @@ impl Cores {
         }
     }
 
-    /// When the last packets of pixels and groups have left, if none comes any more; in the calendars they have left at `calendar`.
+    /// When the last packets of pixels and groups have left, if none comes any more; in the calendars they
+    /// have left at `calendar`.
     pub fn drain(&mut self, calendar: Time) -> Option<Left> {
         self.drain.end(calendar)
     }
 
-    /// When the last packets of pixels and groups of the batches up to `batch` have left; in the calendars they have at `calendar`.
+    /// When the last packets of pixels and groups of the batches up to `batch` have left; in the calendars
+    /// they have at `calendar`.
     pub fn left(&mut self, batch: u32, calendar: Time) -> Time {
         self.drain.left(batch, calendar)
     }
 
-    /// Send warps, as many in a cycle as the machine can, as slots on the cores and in front of the data unit become free. Returns when the
-    /// first and the last warp are sent.
+    /// Send warps, as many in a cycle as the machine can, as slots on the cores and in front of the data unit
+    /// become free. Returns when the first and the last warp are sent.
     fn send(&mut self, kind: usize, from: Time, warps: u32, unit: Option<DataUnit>) -> Span {
         let room = |count| {
             let slots = self.fifos[kind].slots.room_for(count);
@@ -327,14 +330,15 @@ impl Cores {
         Span { from: first + state.latency, to: departed + state.latency }
     }
 
-    /// Run the operations of some warps, sent from `sent` on and ready between `ready.from` and `ready.to`. Returns when the first and
-    /// the last warp are done.
+    /// Run the operations of some warps, sent from `sent` on and ready between `ready.from` and `ready.to`.
+    /// Returns when the first and the last warp are done.
     fn operate(&mut self, visit: &Visit<'_>, chunk: &Chunk, sent: Time, ready: Span) -> Span {
         let demand = visit.demand;
         let part = |part: u32| share(demand.threads, part, chunk.of).start;
         let threads = part(chunk.first + chunk.count) - part(chunk.first);
         let operations = u64::from(threads) * u64::from(demand.ops);
-        // A warp wider than a core takes several cycles per operation. One of a group has operations in some of its steps only.
+        // A warp wider than a core takes several cycles per operation. One of a group has operations in some
+        // of its steps only.
         let steps = u64::from(demand.steps().max(1));
         let lanes = operations.div_ceil(steps * u64::from(chunk.count));
         let wide = lanes.div_ceil(u64::from(self.lanes_of_core)).saturating_sub(1) * self.period;
@@ -346,8 +350,8 @@ impl Cores {
             0 => 0,
             work => self.lanes.reserve_as(visit.turn, ready.from, work).1,
         };
-        // Warps of both kinds take turns on the slots. How long others keep the lanes does not count, as a warp is faster with
-        // fewer beside it.
+        // Warps of both kinds take turns on the slots. How long others keep the lanes does not count, as a
+        // warp is faster with fewer beside it.
         let each = alone + ready.from.saturating_sub(sent);
         let held = self.slots.hold(visit.turn, sent, chunk.count, each);
         let last = (ready.to + alone).max(issued + self.alu.saturating_sub(self.period)).max(held);

@@ -1,10 +1,10 @@
 //! What the order of the calendars misses when the cores run empty.
 //!
-//! The lanes serve all warps in turn, so packets under way together end together: processor sharing (Kleinrock 1967), with a
-//! speed limit, as a warp makes a step in no less than its latency. A calendar serves them one after another. Both do the same
-//! work in the same time while packets come. When none comes any more, the last ones of the lanes leave some of them idle,
-//! and the unit behind still has most of them to do. So packets are served a second time here, in turn. Only the time of a drain
-//! comes from it.
+//! The lanes serve all warps in turn, so packets under way together end together: processor sharing
+//! (Kleinrock 1967), with a speed limit, as a warp makes a step in no less than its latency. A calendar
+//! serves them one after another. Both do the same work in the same time while packets come. When none comes
+//! any more, the last ones of the lanes leave some of them idle, and the unit behind still has most of them
+//! to do. So packets are served a second time here, in turn. Only the time of a drain comes from it.
 
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, VecDeque};
@@ -42,7 +42,8 @@ pub(super) struct Drain {
     left: usize,
     /// The last packet; its time is not known.
     last: Option<Left>,
-    /// When the last warp is sent, when the last packet begins, when the last leaves the cores and when the unit behind.
+    /// When the last warp is sent, when the last packet begins, when the last leaves the cores and when the
+    /// unit behind.
     admitted: f64,
     sent: f64,
     started: f64,
@@ -62,7 +63,8 @@ pub(super) struct Drain {
     steps: f64,
     /// Lanes of a step of all active packets.
     lanes: f64,
-    /// Active warps: the steps at which they end, in parts of [`PARTS`], the number of their packet, and how many there are.
+    /// Active warps: the steps at which they end, in parts of [`PARTS`], the number of their packet, and how
+    /// many there are.
     active: BinaryHeap<Reverse<(u64, usize, u32)>>,
     cores: CoreSizes,
 }
@@ -157,8 +159,8 @@ impl Drain {
         }
     }
 
-    /// Send up to `most` warps, a few a cycle, to slots that become free together. Returns their number; `None` if no warp is there
-    /// to free a slot.
+    /// Send up to `most` warps, a few a cycle, to slots that become free together. Returns their number;
+    /// `None` if no warp is there to free a slot.
     fn send(&mut self, most: u32) -> Option<u32> {
         let free = self.slot()?;
         let (_, slots) = self.slots.front_mut()?;
@@ -199,7 +201,8 @@ impl Drain {
         }
     }
 
-    /// When the next packet, which arrives at `arrive`, has room on the cores. They have room for `room` packets like it.
+    /// When the next packet, which arrives at `arrive`, has room on the cores. They have room for `room`
+    /// packets like it.
     pub fn admits(&mut self, arrive: Time, room: usize) -> f64 {
         let mut admitted = self.sent.max(arrive as f64);
         let room = self.cores.in_flight.min(room);
@@ -228,10 +231,11 @@ impl Drain {
         most.min(self.last_end as Time).max(calendar)
     }
 
-    /// When the last packet has left, if none comes any more; `None` if there was none. In the calendars they have left at `calendar`.
+    /// When the last packet has left, if none comes any more; `None` if there was none. In the calendars they
+    /// have left at `calendar`.
     ///
-    /// Lanes are never idle while a packet waits for them, in either order. So no more is lost than the program of a packet,
-    /// and the work behind of those under way.
+    /// Lanes are never idle while a packet waits for them, in either order. So no more is lost than the
+    /// program of a packet, and the work behind of those under way.
     pub fn end(&mut self, calendar: Time) -> Option<Left> {
         let most = calendar + self.longest + self.longest_behind * self.packets.len() as Time;
         while !self.packets.is_empty() {

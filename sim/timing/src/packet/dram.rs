@@ -1,7 +1,8 @@
 //! Memory at the level `packet`: a calendar for each bus, and the latest rows of each bank.
 //!
-//! What the chips allow is in the calendars: a refresh is a pause in them, a row keeps its bank as long as it has to stay open,
-//! and every rank has a calendar of its activations. The bus turns as often as it has to with full queues.
+//! What the chips allow is in the calendars: a refresh is a pause in them, a row keeps its bank as long as it
+//! has to stay open, and every rank has a calendar of its activations. The bus turns as often as it has to
+//! with full queues.
 
 use std::collections::HashMap;
 
@@ -28,7 +29,8 @@ const MAX_RECENT_GROUPS: usize = 256;
 /// Most rows that are remembered per bank; the queue of a channel may hold lines of as many rows as it has places.
 const MAX_REMEMBERED_ROWS: usize = 256;
 
-/// A row in use: from the line that opened it, or came to it after it had nothing to do, to the last line that came meanwhile.
+/// A row in use: from the line that opened it, or came to it after it had nothing to do, to the last line
+/// that came meanwhile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct OpenRow {
     row: u32,
@@ -71,8 +73,8 @@ struct Rank {
     refresh: Option<Pauses>,
 }
 
-/// Turns of a bus between reads and writes. Lines wait in the queues until as many as these hold go one way; so the bus turns as
-/// rarely as they allow, whatever the order in which lines come.
+/// Turns of a bus between reads and writes. Lines wait in the queues until as many as these hold go one way;
+/// so the bus turns as rarely as they allow, whatever the order in which lines come.
 #[derive(Clone, Copy, Debug, Default)]
 struct BusTurns {
     /// The latest reads and writes.
@@ -82,8 +84,8 @@ struct BusTurns {
 }
 
 impl BusTurns {
-    /// Add `count` lines of a kind, with a turn there and back that takes `pair`. Returns the time for which the bus idles because
-    /// of them.
+    /// Add `count` lines of a kind, with a turn there and back that takes `pair`. Returns the time for which
+    /// the bus idles because of them.
     fn add(&mut self, kind: usize, count: u64, pair: Time, policy: &TurnPolicy) -> Time {
         if pair == 0 {
             return 0;
@@ -153,8 +155,8 @@ impl Channel {
         }
     }
 
-    /// When a queue of `queue` lines has room for `count` more, which come at `seen`: lines leave in any order, one every
-    /// `burst`.
+    /// When a queue of `queue` lines has room for `count` more, which come at `seen`: lines leave in any
+    /// order, one every `burst`.
     fn room_for(&mut self, count: u64, seen: Time, queue: u64, burst: Time) -> Time {
         let most = queue.saturating_sub(count);
         if self.last_issued <= seen + most * burst {
@@ -230,7 +232,8 @@ pub(super) struct Dram {
     spacing: Time,
     has_ranks: bool,
     queue: u64,
-    /// Time of a full queue of lines of one bank, each of another row, and of all lines that can wait in front of a channel.
+    /// Time of a full queue of lines of one bank, each of another row, and of all lines that can wait in
+    /// front of a channel.
     longest_wait: Time,
     longest_way: Time,
     end: Time,
@@ -279,13 +282,14 @@ impl Dram {
         self.map.group(line)
     }
 
-    /// Latency of a line that is read, from the end of its place on the bus to the L2. Places begin with the column command.
+    /// Latency of a line that is read, from the end of its place on the bus to the L2. Places begin with the
+    /// column command.
     pub fn latency(&self) -> Time {
         self.times.cas + self.times.latency
     }
 
-    /// When the first and the last of `count` requests like `head` enter the queues of their channels, which have room for all
-    /// lines of a request at once. They come at `seen`.
+    /// When the first and the last of `count` requests like `head` enter the queues of their channels, which
+    /// have room for all lines of a request at once. They come at `seen`.
     pub fn admits(&mut self, head: &LineAccess, count: u32, seen: Span) -> Span {
         let channel_of = |line| self.map.locate(line).channel;
         let mut enters = seen;
@@ -300,8 +304,8 @@ impl Dram {
         Span { from: enters.from, to: enters.to.max(enters.from) }
     }
 
-    /// Transfer `count` lines of one group over the bus of their channel. The first comes to memory at `came` and enters the queue
-    /// at `seen.from`, the last at `seen.to`. Returns when the last is transferred.
+    /// Transfer `count` lines of one group over the bus of their channel. The first comes to memory at `came`
+    /// and enters the queue at `seen.from`, the last at `seen.to`. Returns when the last is transferred.
     pub fn transfer(
         &mut self,
         (line, is_write): (u32, bool),
@@ -324,6 +328,8 @@ impl Dram {
             is_alone && self.turns.pair > 0 && bank.turns_rows(kind, address.row, channel.lines, self.queue);
         let work = burst * Time::from(count);
         let open = bank.joins(address.row, seen.from);
+        // When the bus idles for the row to open.
+        let mut gap = None;
         let opened = match open {
             Some(at) => {
                 let open = bank.rows[at];
@@ -331,7 +337,8 @@ impl Dram {
                 if open.closes < Time::MAX {
                     bank.time.reserve_as(turn, open.opened.max(seen.from), work);
                 }
-                // A row that is requested later in time, though earlier in the stream, does not keep the line waiting.
+                // A row that is requested later in time, though earlier in the stream, does not keep the line
+                // waiting.
                 if open.since <= seen.from { open.opened } else { seen.from }
             }
             None => {
@@ -340,8 +347,8 @@ impl Dram {
                 let before = bank.rows[at];
                 let closing = if before == OpenRow::NONE { 0 } else { precharge };
                 let opens = closing + activate;
-                // The next row can open once the last line is issued and the chips let the row close, at the latest when a full
-                // queue has left.
+                // The next row can open once the last line is issued and the chips let the row close, at the
+                // latest when a full queue has left.
                 let held = closing + (activate + work - burst + keeps).max(self.times.row);
                 let may_close = if before.since <= seen.from { before.may_close } else { 0 };
                 let closes = may_close.max(seen.from).min(seen.from + self.longest_wait);
@@ -351,11 +358,12 @@ impl Dram {
                     begin = begin.max(activates.saturating_sub(closing));
                 }
                 bank.rows[at].closes = begin;
-                // The bus idles from the end of the last transfer on if the queue has lines of this bank alone. Those that joined
-                // their row would fill the gap.
+                // The bus idles from the end of the last transfer on if the queue has lines of this bank
+                // alone. Those that joined their row would fill the gap.
                 if is_alone && !turns_rows {
                     channel.bus.block(begin + burst, opens.saturating_sub(burst).min(before.joined));
                 }
+                gap = Some(begin + burst);
                 begin + opens
             }
         };
@@ -365,7 +373,8 @@ impl Dram {
         let pair = if turns_rows { self.turns.pair_in_bank } else { self.turns.pair };
         let turned = channel.turns.add(kind, count.into(), pair, &self.turns);
         if turned > 0 {
-            channel.bus.block(ready, turned);
+            // Turns of a bus that waits for one bank are part of the openings of its rows.
+            channel.bus.block(gap.filter(|_| turns_rows).unwrap_or(ready), turned);
         }
         let end = channel.bus.reserve_as(turn, ready, work).1.max(seen.to + burst);
         channel.lines += u64::from(count);
@@ -432,10 +441,11 @@ impl Bank {
         }
     }
 
-    /// Count the time `opens` of a row that lines open again which came at `came`, if these and the lines before of that row may
-    /// have waited side by side. In what order lines leave that wait at ports and in the queue of the channel is not known here,
-    /// as those of a client ahead of others come late in the stream. So two lines may meet if the second comes no later after the
-    /// first than all those take, `longest_way`.
+    /// Count the time `opens` of a row that lines open again which came at `came`, if these and the lines
+    /// before of that row may have waited side by side. In what order lines leave that wait at ports and in
+    /// the queue of the channel is not known here, as those of a client ahead of others come late in the
+    /// stream. So two lines may meet if the second comes no later after the first than all those take,
+    /// `longest_way`.
     fn dispute(&mut self, row: u32, came: Time, longest_way: Time, opens: Time) {
         let known = self.rows.iter().filter(|open| open.row == row).map(|open| open.until).max();
         if known.max(self.former.get(&row).copied()).is_some_and(|last| came < last + longest_way) {
@@ -459,22 +469,25 @@ impl Bank {
         self.rows[at].closes += by;
     }
 
-    /// Place of the latest row that was requested by `seen`, in time. Rows before it come later, though earlier in the stream.
+    /// Place of the latest row that was requested by `seen`, in time. Rows before it come later, though
+    /// earlier in the stream.
     fn place(&self, seen: Time) -> usize {
         self.rows.iter().position(|open| open.since <= seen).unwrap_or(self.rows.len() - 1)
     }
 
-    /// Place of the opening of `row` that a line joins which enters the queue at `seen`; `None` if it has to open its row.
+    /// Place of the opening of `row` that a line joins which enters the queue at `seen`; `None` if it has to
+    /// open its row.
     ///
-    /// First ready first come (Rixner et al. 2000): a line joins pending lines of its row, ahead of older requests to other
-    /// rows, until the row closes.
+    /// First ready first come (Rixner et al. 2000): a line joins pending lines of its row, ahead of older
+    /// requests to other rows, until the row closes.
     fn joins(&self, row: u32, seen: Time) -> Option<usize> {
         let latest = self.place(seen);
         let is_open = |&at: &usize| self.rows[at].row == row && seen < self.closed_at(at);
         Some(latest).filter(|&at| self.rows[at].row == row).or_else(|| (0..self.rows.len()).find(is_open))
     }
 
-    /// When the row at a place closes: once the chips let it and the next is requested, even if that can open only later.
+    /// When the row at a place closes: once the chips let it and the next is requested, even if that can open
+    /// only later.
     fn closed_at(&self, at: usize) -> Time {
         let open = &self.rows[at];
         let next = at.checked_sub(1).map_or(Time::MAX, |next| self.rows[next].since);

@@ -102,8 +102,8 @@ impl Levels {
 }
 
 impl CacheLevel {
-    /// Accept `lines` lines, of which the first comes at `seen.from` and the last at `seen.to`. Returns when the first and
-    /// the last are accepted.
+    /// Accept `lines` lines, of which the first comes at `seen.from` and the last at `seen.to`. Returns when
+    /// the first and the last are accepted.
     fn accept(&mut self, lines: u32, turn: Turn, seen: Span) -> Span {
         let (from, end) = self.calendar.reserve_as(turn, seen.from, u64::from(lines) * self.period);
         Span { from, to: end.saturating_sub(self.period).max(seen.to) }

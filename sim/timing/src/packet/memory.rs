@@ -176,8 +176,8 @@ impl Memory {
         Route { kind: line.is_read().then_some(line.kind), levels: line.levels, groups }
     }
 
-    /// Pass a run of a port through the L2; its first line arrives at `seen`. Returns when the first and the last line
-    /// are accepted.
+    /// Pass a run of a port through the L2; its first line arrives at `seen`. Returns when the first and the
+    /// last line are accepted.
     fn take(&mut self, port: usize, run: &Run<'_>, seen: Time, fetched: &mut Fetched) -> (Time, Time) {
         let Run { head, count, turn, last: later } = *run;
         let (mut first, end) = self.l2.reserve_as(turn, port, seen, u64::from(count) * self.period);

@@ -14,8 +14,8 @@
 //!
 //! This is the recurrence of tandem queues with finite buffers and blocking after service (Dallery and
 //! Gershwin 1992). For units that share nothing it equals the level `stepped`, to the cycle. Shared resources
-//! (lanes of the cores, the L2, buses and banks of memory) are calendars; ports of the L2 take turns in its. The front end overlaps tiles that are
-//! simulated before it, and gets up to half of a slot that they fill.
+//! (lanes of the cores, the L2, buses and banks of memory) are calendars; ports of the L2 take turns in its.
+//! The front end overlaps tiles that are simulated before it, and gets up to half of a slot that they fill.
 //!
 //! Packets arrive at their first unit when their gates open. With `tiles(b)` the time when all tiles of batch `b`
 //! have left, `front(b)` likewise, and barrier `i` done at `barrier(i)`:

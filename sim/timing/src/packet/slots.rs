@@ -5,8 +5,8 @@ use std::collections::VecDeque;
 use super::calendar::Turn;
 use crate::clock::Time;
 
-/// Slots by the time at which they become free. A warp takes the first that is free. Programs of unequal length free slots in another
-/// order than they took them, so this is no queue.
+/// Slots by the time at which they become free. A warp takes the first that is free. Programs of unequal
+/// length free slots in another order than they took them, so this is no queue.
 #[derive(Clone, Debug)]
 pub(super) struct Slots {
     /// Times in order, and how many slots become free at each.
@@ -32,7 +32,8 @@ impl Slots {
         0
     }
 
-    /// Let `warps` warps, at least 1, take the slots that become free first. The first of them is done at `from`, the last at `to`.
+    /// Let `warps` warps, at least 1, take the slots that become free first. The first of them is done at
+    /// `from`, the last at `to`.
     pub fn hold(&mut self, warps: u32, from: Time, to: Time) {
         let warps_at_once = warps.min(self.count);
         self.take(warps_at_once);
@@ -64,8 +65,8 @@ impl Slots {
     }
 }
 
-/// How much of the slots of the cores warps of both kinds hold over time. A warp holds one slot at a time, so a long program does not keep
-/// others out of slots that it does not need.
+/// How much of the slots of the cores warps of both kinds hold over time. A warp holds one slot at a time, so
+/// a long program does not keep others out of slots that it does not need.
 #[derive(Clone, Debug)]
 pub(super) struct Occupancy {
     /// Binary logarithm of the length of an interval.
@@ -85,8 +86,9 @@ impl Occupancy {
         Self { shift, capacity: u64::from(slots) << shift, held: Vec::new(), late: Vec::new(), yielded: 0 }
     }
 
-    /// Let `warps` warps hold a slot each for a time `each` from `from` on. Returns when they have had it: later, if slots are taken. What
-    /// comes late gets up to half of an interval, and what is there goes on later.
+    /// Let `warps` warps hold a slot each for a time `each` from `from` on. Returns when they have had it:
+    /// later, if slots are taken. What comes late gets up to half of an interval, and what is there goes on
+    /// later.
     pub fn hold(&mut self, turn: Turn, from: Time, warps: u32, each: Time) -> Time {
         let (mut at, mut missing, mut moved) = (from, u64::from(warps) * each, 0);
         while missing > 0 {
@@ -159,8 +161,9 @@ impl Turns {
         self.waited.push_back(wait);
     }
 
-    /// When a warp of the other kind is sent that waits since `came` and could be sent at `at`, both no earlier than for those before
-    /// it: after those that wait already, were not sent before it came, and have not yet let others pass.
+    /// When a warp of the other kind is sent that waits since `came` and could be sent at `at`, both no
+    /// earlier than for those before it: after those that wait already, were not sent before it came, and
+    /// have not yet let others pass.
     pub fn after(&mut self, came: Time, at: Time) -> Time {
         while self.waited.front().is_some_and(|wait| wait.sent < came) {
             self.waited.pop_front();

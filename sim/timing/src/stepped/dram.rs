@@ -1,8 +1,9 @@
 //! Memory chips command by command: first ready, first come (Rixner et al. 2000), and readers waiting for lines.
 //!
-//! In each cycle of its clock a channel takes one column command, which moves a line, and one row command, which closes or
-//! opens a row. Each goes to the oldest line whose command the chips can take, so that lines of one direction go on while
-//! the bus could not turn yet. With a queue of writes, reads go first until it is full. Refreshes come at fixed times.
+//! In each cycle of its clock a channel takes one column command, which moves a line, and one row command,
+//! which closes or opens a row. Each goes to the oldest line whose command the chips can take, so that lines
+//! of one direction go on while the bus could not turn yet. With a queue of writes, reads go first until it
+//! is full. Refreshes come at fixed times.
 
 use activity::{Event, LineAccess, Unit};
 
@@ -99,7 +100,8 @@ struct Channel {
 #[derive(Clone, Copy, Debug)]
 struct Places {
     lines: usize,
-    /// Places for writes, if they have a queue of their own, and the writes in it that leave no room for another request.
+    /// Places for writes, if they have a queue of their own, and the writes in it that leave no room for
+    /// another request.
     writes: Option<[usize; 2]>,
 }
 
@@ -236,7 +238,8 @@ impl Dram {
 }
 
 impl Channel {
-    /// Whether the queues have room for so many reads and writes more. A place is free in the cycle after its line left.
+    /// Whether the queues have room for so many reads and writes more. A place is free in the cycle after its
+    /// line left.
     fn has_room(&self, places: &Places, more: [usize; 2], now: Time) -> bool {
         let mut held = if self.taken_at == now { self.taken } else { [0; 2] };
         self.entries.iter().for_each(|entry| held[entry.kind()] += 1);
@@ -320,7 +323,8 @@ impl Channel {
         Some(entry)
     }
 
-    /// When the row command of a line whose row is not open can be issued: the open row of its bank closes, or its own opens.
+    /// When the row command of a line whose row is not open can be issued: the open row of its bank closes,
+    /// or its own opens.
     fn row_at(&self, entry: &Entry) -> Time {
         let bank = &self.banks[entry.bank];
         if bank.open.is_some() {
@@ -330,8 +334,8 @@ impl Channel {
         }
     }
 
-    /// Open the row of the oldest line that needs and can do so, or close another that it finds open in its bank, unless a line
-    /// waits for that one.
+    /// Open the row of the oldest line that needs and can do so, or close another that it finds open in its
+    /// bank, unless a line waits for that one.
     fn row(&mut self, now: Time, times: &ChipTimes) -> bool {
         let wanted = |bank: usize| {
             let open = self.banks[bank].open;

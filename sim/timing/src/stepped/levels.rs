@@ -1,5 +1,5 @@
-//! The L2 and the levels between it and memory, cycle by cycle: requests in front of each, and what it sends on. Hits and misses are
-//! given; the levels add their time.
+//! The L2 and the levels between it and memory, cycle by cycle: requests in front of each, and what it sends
+//! on. Hits and misses are given; the levels add their time.
 
 use activity::{Event, LEVELS, LineAccess, LineKind, Unit};
 

@@ -1,7 +1,8 @@
-//! Bounded queue between two units, like a register: changes of a cycle are visible in the next one. Pending line reads of
-//! packets and warps, and states of the units over time: busy, starved, blocked or idle.
+//! Bounded queue between two units, like a register: changes of a cycle are visible in the next one. Pending
+//! line reads of packets and warps, and states of the units over time: busy, starved, blocked or idle.
 //!
-//! Also the sources that fill the first queues: the command stream, the double-buffered bins, and barriers between passes.
+//! Also the sources that fill the first queues: the command stream, the double-buffered bins, and barriers
+//! between passes.
 
 use std::collections::VecDeque;
 

@@ -240,8 +240,8 @@ impl Shader {
         true
     }
 
-    /// The core for the next warp of a packet: the one with most free slots, or that of its group. A group takes a core
-    /// with room for all of it.
+    /// The core for the next warp of a packet: the one with most free slots, or that of its group. A group
+    /// takes a core with room for all of it.
     fn place(&self, sending: &Sending, demand: &ServiceDemand) -> Option<usize> {
         let (slots, bytes) = demand.group.map_or((1, 0), |group| (sending.warps, group.shared_bytes));
         let fits = |core: &Core| core.slots >= slots && core.shared_bytes >= bytes;

@@ -285,8 +285,8 @@ fn rows_and_banks_by_hand() {
     assert_eq!(run(&[0, 16, 1]), run(&[0, 1, 16]));
 }
 
-/// Tiles with a warp each come faster than the lanes serve them. The cores serve those under way in turn, so the last ones leave
-/// lanes idle. `packet` knows how long that takes, whatever the number of tiles.
+/// Tiles with a warp each come faster than the lanes serve them. The cores serve those under way in turn, so
+/// the last ones leave lanes idle. `packet` knows how long that takes, whatever the number of tiles.
 #[test]
 fn cores_run_empty_as_they_serve_warps_in_turn() {
     let mut machine = plain();
@@ -304,8 +304,8 @@ fn cores_run_empty_as_they_serve_warps_in_turn() {
     }
 }
 
-/// One core with two slots, and a program twenty times as long as the others. Those go through the other slot one after another, and do
-/// not wait for the long one.
+/// One core with two slots, and a program twenty times as long as the others. Those go through the other slot
+/// one after another, and do not wait for the long one.
 #[test]
 fn short_programs_pass_a_long_one_on_the_other_slot() {
     let mut machine = plain();
@@ -315,7 +315,8 @@ fn short_programs_pass_a_long_one_on_the_other_slot() {
     let packets = tiles([program(200)].into_iter().chain((0..20).map(|_| program(10))));
     let truth = stepped(&machine, &packets).cycles;
     let found = packet_level(&machine, clocks(), &packets).cycles;
-    // Twenty programs of 100 cycles and a cycle to send each, after the five units before the cores; two to leave the cores and the machine.
+    // Twenty programs of 100 cycles and a cycle to send each, after the five units before the cores; two to
+    // leave the cores and the machine.
     assert_eq!(truth, 5 + 20 * 101 + 2);
     assert!(found.abs_diff(truth) <= 2, "{found} of {truth}");
 }

@@ -253,8 +253,8 @@ proptest! {
     }
 }
 
-/// Vertices of the next pass come while groups fill the core. Where both wait for slots they are sent alternately, so short programs of
-/// vertices wait for the long ones of groups, and set-up idles meanwhile.
+/// Vertices of the next pass come while groups fill the core. Where both wait for slots they are sent
+/// alternately, so short programs of vertices wait for the long ones of groups, and set-up idles meanwhile.
 #[test]
 fn vertices_and_groups_take_turns_on_a_full_core() {
     let mut machine = roomy(1, 8);

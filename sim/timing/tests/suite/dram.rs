@@ -75,7 +75,8 @@ fn a_stream_loses_the_time_of_its_refreshes() {
 
 #[test]
 fn an_idle_rank_is_refreshed_in_time() {
-    // Two lines of a row, the second after 900 cycles of traversal: refreshed in between, so that the row has to open again.
+    // Two lines of a row, the second after 900 cycles of traversal: refreshed in between, so that the row has
+    // to open again.
     let mut machine = machine();
     let mut packets = [reads(1, 1), reads(1, 1)].concat();
     packets[1].0.counts[Event::TilesVisited] = 900;
@@ -108,7 +109,8 @@ fn a_bus_turns_once_for_the_lines_that_its_queue_holds() {
     (machine.dram.write_to_read_cycles, machine.dram.read_to_write_cycles) = (size(15), size(9));
     for queue in [4, 16] {
         machine.dram.queue = size(queue);
-        // The other half of the lines fills the queue: `2 queue - 1` lines one way, as the place of the last one is free by then.
+        // The other half of the lines fills the queue: `2 queue - 1` lines one way, as the place of the last
+        // one is free by then.
         let in_turn = |count| stream((0..count).map(|n| (n, n % 2 == 1)));
         let lines = 2 * (2 * queue - 1);
         let expected = f64::from(100 * lines) * 8.0 + 100.0 * (15.0 + 9.0);
@@ -153,8 +155,8 @@ fn a_rank_opens_at_most_four_rows_in_a_window() {
     let dram = &mut machine.dram;
     (dram.banks, dram.row_bytes, dram.burst_cycles) = (size(16), size(64), size(2));
     let all_rows = |count| reads(count, 1);
-    // Each line has a row of its own, and a bank has 16 activations to close it: the command to close it and that to open the
-    // next take turns.
+    // Each line has a row of its own, and a bank has 16 activations to close it: the command to close it and
+    // that to open the next take turns.
     dram.activate_to_activate_cycles = size(6);
     is(added(&machine, all_rows, 400, 4000), 4000.0 * 6.0, 1.0);
     machine.dram.four_activates_cycles = size(40);
@@ -246,8 +248,8 @@ fn a_clock_that_hardly_differs_takes_the_same_time() {
 
 #[test]
 fn units_far_apart_in_the_pipeline_that_share_a_bank() {
-    // Triangles are read at the head of the pipeline, and colours at its end from a row of their bank: for packets in order, lines
-    // out of the order of time.
+    // Triangles are read at the head of the pipeline, and colours at its end from a row of their bank: for
+    // packets in order, lines out of the order of time.
     let mut machine = plain();
     machine.bins = Some(BinsSpec { in_flight: size(2), lines_per_cycle: size(1) });
     machine.sample_test.latency_cycles = size(1000);

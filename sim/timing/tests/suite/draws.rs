@@ -39,7 +39,8 @@ fn draws(packets: &Packets) -> [Vec<u64>; 2] {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Two draws, one after the other or in turn: each gets the cycles of its tiles, the first also those to fill the path.
+    /// Two draws, one after the other or in turn: each gets the cycles of its tiles, the first also those to
+    /// fill the path.
     #[test]
     fn draws_get_the_time_of_their_tiles(
         counts in prop::array::uniform2(1u32..30), cycles in prop::array::uniform2(1u32..50), in_turn in any::<bool>(),

@@ -161,8 +161,9 @@ fn a_barrier_waits_for_the_lines_that_are_read_before() {
     assert_eq!([truth, found], [alone + 1 + 20 + 1, alone_packet + 1 + 20 + 1]);
 }
 
-/// A pass that resolves `n` tiles follows the tiles before it without a barrier, and a tile takes the longer of its reads and its
-/// writes. The six units before that of colour have no work, but a cycle of latency each.
+/// A pass that resolves `n` tiles follows the tiles before it without a barrier, and a tile takes the longer
+/// of its reads and its writes. The six units before that of colour have no work, but a cycle of latency
+/// each.
 #[test]
 fn a_resolve_takes_the_longer_of_its_reads_and_its_writes() {
     let mut machine = plain();

@@ -64,8 +64,8 @@ fn units_alone_reach_their_rates() {
     }
 }
 
-/// A client with enough requests per cycle reads at the bandwidth of the memory buses, less what refresh takes: rows close in 18
-/// cycles, are refreshed in 98 and open in 18, every 5362.
+/// A client with enough requests per cycle reads at the bandwidth of the memory buses, less what refresh
+/// takes: rows close in 18 cycles, are refreshed in 98 and open in 18, every 5362.
 #[test]
 fn one_client_fills_the_buses() {
     let (found, memory) = measured("bandwidth");
@@ -76,8 +76,9 @@ fn one_client_fills_the_buses() {
     assert!((memory * 264.0 / found[0] - 1.0).abs() < 0.001, "{memory}");
 }
 
-/// An HD 7970 reaches 13.3 of its 29.6 Gpixel/s when blending pixels of 8 bytes (AnandTech 5261); memory is the bottleneck, not the
-/// colour units. 264 GB/s are 16.5 Gpixel/s. The bus turns, and chips are refreshed; how the card orders lines is not known.
+/// An HD 7970 reaches 13.3 of its 29.6 Gpixel/s when blending pixels of 8 bytes (AnandTech 5261); memory is
+/// the bottleneck, not the colour units. 264 GB/s are 16.5 Gpixel/s. The bus turns, and chips are refreshed;
+/// how the card orders lines is not known.
 #[test]
 fn blended_fill_is_limited_by_memory() {
     let (found, memory) = measured("colour fill, 8 bytes");
@@ -148,8 +149,8 @@ fn groups_are_close_to_the_reference() {
     assert_eq!(far, []);
 }
 
-/// Where the queue of a memory channel is shorter than the opening of a row, `packet` is far too short on some streams. It is not beyond 8 %
-/// without a warning.
+/// Where the queue of a memory channel is shorter than the opening of a row, `packet` is far too short on
+/// some streams. It is not beyond 8 % without a warning.
 #[test]
 fn short_queues_of_memory_warn() {
     let mut gpu = Gpu::builtin("reference");

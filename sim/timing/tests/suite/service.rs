@@ -13,8 +13,8 @@ use crate::common::{
 const RATES: [f64; 5] = [1.0, 2.0, 4.0, 2.5, 0.5];
 const PACKETS: u64 = 1000;
 
-/// A unit at a station, one of its events, the kind of packets that visit it, and cycles from the start of the frame until it
-/// sees the first one.
+/// A unit at a station, one of its events, the kind of packets that visit it, and cycles from the start of
+/// the frame until it sees the first one.
 const UNITS: [(Unit, Event, PacketKind, u64); 8] = [
     (Unit::Command, Event::Indices, PacketKind::Vertices, 0),
     (Unit::Setup, Event::TrianglesIn, PacketKind::Vertices, 2),

@@ -1,8 +1,10 @@
-//! Starts by distance to the marked windows alone: minima and a threshold, in one pass over samples that need not be in memory.
+//! Starts by distance to the marked windows alone: minima and a threshold, in one pass over samples that need
+//! not be in memory.
 //!
-//! Offsets are [screened](screen) by a transform in f32; the distance of every minimum, its place finer than a sample and the energy up
-//! to there are computed in f64 while its samples are in memory. No step depends on the number of threads. The first frame of a
-//! free-running recording is searched separately: nothing was drawn before it, so the part of the window before the mark differs.
+//! Offsets are [screened](screen) by a transform in f32; the distance of every minimum, its place finer than
+//! a sample and the energy up to there are computed in f64 while its samples are in memory. No step depends
+//! on the number of threads. The first frame of a free-running recording is searched separately: nothing was
+//! drawn before it, so the part of the window before the mark differs.
 
 mod pass;
 mod screen;
@@ -156,8 +158,9 @@ impl Plan {
         (start, candidate.sum_w)
     }
 
-    /// One more start before the first one found, in what was kept of the beginning, matched only by what follows the mark, with
-    /// the threshold (and the reported distance) in proportion to the compared part. `None` if nothing there is near enough.
+    /// One more start before the first one found, in what was kept of the beginning, matched only by what
+    /// follows the mark, with the threshold (and the reported distance) in proportion to the compared part.
+    /// `None` if nothing there is near enough.
     fn start_after_idle(
         &self,
         threshold: &Threshold,
@@ -191,8 +194,8 @@ impl Plan {
     }
 }
 
-/// How much what follows the mark differs from the steady power before it, W^2: where that is nothing, idle alone resembles it.
-/// Unbounded where the window has nothing before the mark.
+/// How much what follows the mark differs from the steady power before it, W^2: where that is nothing, idle
+/// alone resembles it. Unbounded where the window has nothing before the mark.
 fn contrast_w2(before: &[f64], after: &[f64]) -> f64 {
     if before.is_empty() {
         return f64::INFINITY;
@@ -207,7 +210,8 @@ fn median_gap_s(starts: &[Summed]) -> Option<f64> {
     (!gaps.is_empty()).then(|| upper_median(&mut gaps))
 }
 
-/// Variance of the sensor noise, W^2, from the median step between neighbours: steps of the signal, being rare, hardly move it.
+/// Variance of the sensor noise, W^2, from the median step between neighbours: steps of the signal, being
+/// rare, hardly move it.
 pub(super) fn noise_variance(power: &[f64]) -> f64 {
     let count = power.len().saturating_sub(1);
     let steps = power.windows(2).map(|pair| (pair[1] - pair[0]).abs());
@@ -216,7 +220,8 @@ pub(super) fn noise_variance(power: &[f64]) -> f64 {
     sigma * sigma
 }
 
-/// The deviation of white Gaussian noise whose steps from sample to sample have this median: it is `0.6745 sqrt(2) sigma`.
+/// The deviation of white Gaussian noise whose steps from sample to sample have this median: it is `0.6745
+/// sqrt(2) sigma`.
 pub(crate) fn noise_deviation(median_step: f64) -> f64 {
     median_step / (0.674_489_75 * core::f64::consts::SQRT_2)
 }
@@ -228,8 +233,9 @@ const MIN_NORM_SHARE: f64 = 0.05;
 struct Template {
     pub watts: Vec<f64>,
     pub mean_w: f64,
-    /// By the z-normalized distance (Goldin and Kanellakis 1995; Mueen's MASS), `2 |q|^2 (1 - r)` in W^2, with `r` the correlation
-    /// coefficient and `|q|` the norm about the mean; else by the summed squared difference.
+    /// By the z-normalized distance (Goldin and Kanellakis 1995; Mueen's MASS), `2 |q|^2 (1 - r)` in W^2,
+    /// with `r` the correlation coefficient and `|q|` the norm about the mean; else by the summed squared
+    /// difference.
     pub normalized: bool,
 }
 

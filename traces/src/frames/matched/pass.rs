@@ -87,7 +87,8 @@ pub(crate) struct Plan {
 }
 
 impl Plan {
-    /// To find what resembles `windows`, the powers (W) of the marks, by [`FinderMethod::Normalized`] or else by squares.
+    /// To find what resembles `windows`, the powers (W) of the marks, by [`FinderMethod::Normalized`] or else
+    /// by squares.
     pub fn new(
         clock: Clock,
         placement: Placement,

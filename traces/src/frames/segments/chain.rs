@@ -1,7 +1,8 @@
 //! The chain of starts over candidates: evidence of durations, sums over all sequences, and the best one.
 //!
-//! Times and durations are in windows, evidence in nats. `l_j` is the evidence of candidate `j`, `h(t, d)` that of a duration `d` after
-//! a start at `t`. Sums over all sequences up to `j`, and from `j` on (Rabiner 1989; explicit durations: Ferguson 1980, Yu 2010):
+//! Times and durations are in windows, evidence in nats. `l_j` is the evidence of candidate `j`, `h(t, d)`
+//! that of a duration `d` after a start at `t`. Sums over all sequences up to `j`, and from `j` on (Rabiner
+//! 1989; explicit durations: Ferguson 1980, Yu 2010):
 //!
 //! ```text
 //! A_j = l_j + ln(1 + sum_i exp(A_i + h(t_i, t_j - t_i)))        Z = ln sum_j exp A_j
@@ -27,17 +28,17 @@ const NEAR_WEIGHTS: [f64; 3] = [1.0, 0.6, 0.3];
 const MIN_DURATIONS: usize = 4;
 /// Rounds of expectation and maximization of the shares.
 const SHARE_ROUNDS: usize = 8;
-/// Least and greatest evidence of a duration: less than what a point at a fixed phase within frames could gain by being as even as
-/// the starts.
+/// Least and greatest evidence of a duration: less than what a point at a fixed phase within frames could
+/// gain by being as even as the starts.
 const DURATION_EVIDENCE: [f64; 2] = [-3.75, 2.5];
 /// Evidence of a pause beyond the longest duration, or beyond the candidates looked back at.
 const PAUSE_EVIDENCE: f64 = -4.6;
 /// Candidates looked back at.
 const MAX_BACK: usize = 64;
 
-/// Evidence of durations against a flat density of their logarithm. The density is a mixture of that of the blocks of the trace nearby,
-/// that of all other blocks and a flat one. As the own block is left out, the shares are honest: where there is no period the flat
-/// part takes all, and durations are worth nothing.
+/// Evidence of durations against a flat density of their logarithm. The density is a mixture of that of the
+/// blocks of the trace nearby, that of all other blocks and a flat one. As the own block is left out, the
+/// shares are honest: where there is no period the flat part takes all, and durations are worth nothing.
 pub(super) struct Durations {
     first: f64,
     block: f64,
@@ -137,7 +138,8 @@ fn normalized(mut density: Vec<f64>) -> Vec<f64> {
     density
 }
 
-/// Shares of the densities nearby, of all others and of the flat one, by expectation and maximization (Dempster, Laird and Rubin 1977).
+/// Shares of the densities nearby, of all others and of the flat one, by expectation and maximization
+/// (Dempster, Laird and Rubin 1977).
 fn shares(placed: &[(usize, usize)], parts: &[Parts]) -> [f64; 3] {
     let mut shares = [0.4, 0.4, 0.2];
     for _ in 0..SHARE_ROUNDS {

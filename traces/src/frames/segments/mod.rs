@@ -1,50 +1,55 @@
 //! Segmentation: the whole trace as frames and pauses, by one hidden semi-Markov model that is learnt from it.
 //!
-//! Hidden semi-Markov models: Rabiner (1989), with durations of their own Ferguson (1980) and Yu (2010); segment models: Ostendorf, Digalakis
-//! and Kimball (1996). Everything is learnt from the trace and the mark; each term may come out to be worth nothing.
+//! Hidden semi-Markov models: Rabiner (1989), with durations of their own Ferguson (1980) and Yu (2010);
+//! segment models: Ostendorf, Digalakis and Kimball (1996). Everything is learnt from the trace and the mark;
+//! each term may come out to be worth nothing.
 //!
 //! # Appearance
 //!
-//! A start has a mean power `q_j` and a variance `v_j` at each sample `j` of the window about it; any other place has the variance `v` of the
-//! trace. The log likelihood ratio of two normal populations with these variances counts the squared distance of a sample by
+//! A start has a mean power `q_j` and a variance `v_j` at each sample `j` of the window about it; any other
+//! place has the variance `v` of the trace. The log likelihood ratio of two normal populations with these
+//! variances counts the squared distance of a sample by
 //!
 //! ```text
 //! w_j = 1/v_j - 1/v    D = sum_j w_j (x_j - q_j)^2    s = -ln(1 + D / D0)    D0 = sum_j w_j v_j
 //! ```
 //!
-//! so idle before the frame, the level of power and the shape of the first draws weigh as much as they are the same in all frames, and draws that
-//! differ from frame to frame weigh nothing. The logarithm is that of Student's t distribution: a frame with other content costs little more
-//! than the worst usual one.
+//! so idle before the frame, the level of power and the shape of the first draws weigh as much as they are
+//! the same in all frames, and draws that differ from frame to frame weigh nothing. The logarithm is that of
+//! Student's t distribution: a frame with other content costs little more than the worst usual one.
 //!
 //! # Evidence
 //!
-//! Candidates are the local maxima of `s`. The *rival* of two neighbouring starts is the best candidate between them. Starts and rivals are two
-//! normal populations of one variance (Fisher 1936), with medians `m1` and `m0`: `l = (m1 - m0)/V (s - (m1 + m0)/2)`, at most 8 nats. Rivals and
-//! not all candidates: the hard ones decide.
+//! Candidates are the local maxima of `s`. The *rival* of two neighbouring starts is the best candidate
+//! between them. Starts and rivals are two normal populations of one variance (Fisher 1936), with medians
+//! `m1` and `m0`: `l = (m1 - m0)/V (s - (m1 + m0)/2)`, at most 8 nats. Rivals and not all candidates: the
+//! hard ones decide.
 //!
 //! # Sequence
 //!
-//! Durations have evidence between bounds, from the blocks of the trace nearby, from all of it, or none; pauses may have any length. Sums over all
-//! sequences give the chance of each start and frame, the best sequence the starts ([`chain`]).
+//! Durations have evidence between bounds, from the blocks of the trace nearby, from all of it, or none;
+//! pauses may have any length. Sums over all sequences give the chance of each start and frame, the best
+//! sequence the starts ([`chain`]).
 //!
 //! # Learning
 //!
-//! Expectation and maximization (Dempster, Laird and Rubin 1977) has as many fixed points as there are parts of frames that repeat. So it begins from
-//! several sets of starts: those most like one of five parts of the mark's window, and the proposals of other methods. A criterion without truth
-//! chooses among the results:
+//! Expectation and maximization (Dempster, Laird and Rubin 1977) has as many fixed points as there are parts
+//! of frames that repeat. So it begins from several sets of starts: those most like one of five parts of the
+//! mark's window, and the proposals of other methods. A criterion without truth chooses among the results:
 //!
 //! ```text
 //! J(s) = sum_k E_k clip((min(s_k, s_k+1) - rival_k) / spread of s, -2, 4) / sum of E
 //! ```
 //!
-//! with `E_k` the work of frame `k` above the lowest power. A missed start becomes a rival and spoils the margin of a long frame; a false one has a low
-//! `s` itself. J counts with the appearance learnt, with the part of the mark that it is greatest with, and in the mean over these parts: what has
-//! drifted from the mark gains nothing in the latter two.
+//! with `E_k` the work of frame `k` above the lowest power. A missed start becomes a rival and spoils the
+//! margin of a long frame; a false one has a low `s` itself. J counts with the appearance learnt, with the
+//! part of the mark that it is greatest with, and in the mean over these parts: what has drifted from the
+//! mark gains nothing in the latter two.
 //!
 //! # Confidence
 //!
-//! The chance of a frame is its mean over all results, each weighted by `exp(J / 0.05)`: where others that are nearly as good have other frames,
-//! it is low.
+//! The chance of a frame is its mean over all results, each weighted by `exp(J / 0.05)`: where others that
+//! are nearly as good have other frames, it is low.
 
 mod chain;
 
@@ -72,7 +77,8 @@ const MIN_EVIDENCE: f64 = -6.0;
 const MIN_EXAMPLES: usize = 3;
 /// Least and greatest margin, in deviations.
 const MARGINS: [f64; 2] = [-2.0, 4.0];
-/// A start found is at a maximum of the mark's own likeness within this share of a window; a rival is this far from both ends.
+/// A start found is at a maximum of the mark's own likeness within this share of a window; a rival is this
+/// far from both ends.
 const SAME: f64 = 0.04;
 const APART: f64 = 0.3;
 /// Difference of the criterion by which a result is as likely as another to one part in e.
@@ -100,7 +106,8 @@ struct Run {
     proposal: Option<usize>,
 }
 
-/// The segmentation that the criterion prefers: one of the model's own, or one of the proposals (starts of other methods, in samples).
+/// The segmentation that the criterion prefers: one of the model's own, or one of the proposals (starts of
+/// other methods, in samples).
 pub(super) fn segment(power: &[f64], placement: &Placement, proposals: &[Vec<f64>]) -> Segmentation {
     let model = Model::new(Grid::new(power, placement));
     let mut runs: Vec<Run> = (0..VIEWS.len()).into_par_iter().map(|view| model.of_view(view)).collect();
@@ -321,7 +328,8 @@ const WINDOW_SAMPLES: usize = 100;
 const MIN_DISTANCE: f64 = 0.125;
 /// Variance that any sample of a start has beyond the noise, as a share of that of the trace.
 const MIN_VARIANCE: f64 = 0.005;
-/// Variance of a sample of a start before any is seen, as a share of that of the trace, and how many starts that counts as.
+/// Variance of a sample of a start before any is seen, as a share of that of the trace, and how many starts
+/// that counts as.
 const PRIOR: (f64, f64) = (0.3, 3.0);
 /// Weight of a mark among the starts that are learnt from.
 const MARK_WEIGHT: f64 = 2.0;

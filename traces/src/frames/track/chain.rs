@@ -1,5 +1,5 @@
-//! The best sequence of starts, by dynamic programming over pairs of neighbours (Bellman 1957). Past a place where it may have slipped
-//! to another phase of the frame, confidence is lower.
+//! The best sequence of starts, by dynamic programming over pairs of neighbours (Bellman 1957). Past a place
+//! where it may have slipped to another phase of the frame, confidence is lower.
 
 use super::Candidate;
 use super::evidence::Templates;

@@ -1,6 +1,7 @@
-//! What starts look like. The templates, and the distance to the nearest of them at every offset; the evidence that it is for a
-//! candidate, by the linear discriminant of two normal populations, starts and others (Fisher 1936); and before anything is learnt a
-//! first guess of the period and of some starts, from the distances to the marked windows alone.
+//! What starts look like. The templates, and the distance to the nearest of them at every offset; the
+//! evidence that it is for a candidate, by the linear discriminant of two normal populations, starts and
+//! others (Fisher 1936); and before anything is learnt a first guess of the period and of some starts, from
+//! the distances to the marked windows alone.
 
 use super::Candidate;
 use crate::frames::periodicity::regularity;

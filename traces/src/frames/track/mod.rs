@@ -4,16 +4,18 @@
 //! the mark. In rounds the considered part of the trace doubles; in each round
 //!
 //! 1. candidates are the local minima of the distance to the nearest template, by shape and by summed squares;
-//! 2. the weight of a distance is learnt from the starts found so far and from the samples between them ([`evidence`]);
-//! 3. the best sequence is found by dynamic programming over pairs of candidates ([`chain`]): near to a template, similar to
-//!    the one before, and at an even period that may jump now and then;
+//! 2. the weight of a distance is learnt from the starts found so far and from the samples between them
+//!    ([`evidence`]);
+//! 3. the best sequence is found by dynamic programming over pairs of candidates ([`chain`]): near to a
+//!    template, similar to the one before, and at an even period that may jump now and then;
 //! 4. starts that their neighbours resemble more than any template does become templates ([`evidence`]).
 //!
-//! Frames at another clock than the mark's are searched again. Templates follow content that changes slowly. At a clock step everything changes at once, and the sequence
-//! may go on at the same period in another phase of the frame. So where neighbours differ, frames of both
-//! sides are aligned over a whole period, the earlier ones [scaled in time](crate::frames::subsample). Outwards
-//! from the mark, each segment between two such changes is compared with the last one known to be right. If
-//! it lies elsewhere, one of its frames is corrected and used like a mark.
+//! Frames at another clock than the mark's are searched again. Templates follow content that changes slowly.
+//! At a clock step everything changes at once, and the sequence may go on at the same period in another phase
+//! of the frame. So where neighbours differ, frames of both sides are aligned over a whole period, the
+//! earlier ones [scaled in time](crate::frames::subsample). Outwards from the mark, each segment between two
+//! such changes is compared with the last one known to be right. If it lies elsewhere, one of its frames is
+//! corrected and used like a mark.
 
 mod chain;
 mod evidence;

@@ -1,9 +1,9 @@
 //! A timeline for the Perfetto viewer (<https://ui.perfetto.dev>).
 //!
-//! One process; below it a track of frames, their passes and draws, a track per unit with slices of busy time, and counter tracks of
-//! power. Field numbers are those of Perfetto v59's `trace_packet.proto`, `track_descriptor.proto`,
-//! `track_event.proto`, `counter_descriptor.proto`, `process_descriptor.proto` and `debug_annotation.proto`
-//! (Apache-2.0, google/perfetto).
+//! One process; below it a track of frames, their passes and draws, a track per unit with slices of busy
+//! time, and counter tracks of power. Field numbers are those of Perfetto v59's `trace_packet.proto`,
+//! `track_descriptor.proto`, `track_event.proto`, `counter_descriptor.proto`, `process_descriptor.proto` and
+//! `debug_annotation.proto` (Apache-2.0, google/perfetto).
 //!
 //! Tracks are bounded for the viewer: a counter track has at most [`MAX_POINTS`] points, including the lowest
 //! and the highest of each segment; a unit's track has at most [`MAX_SLICES`] slices.
@@ -126,7 +126,8 @@ pub fn write(timeline: &PerfettoTimeline<'_>, out: &mut dyn Write) -> io::Result
     Ok(())
 }
 
-/// Writes the power of a trace as a counter track, thinned out to [`MAX_POINTS`] points. Times count from the first sample.
+/// Writes the power of a trace as a counter track, thinned out to [`MAX_POINTS`] points. Times count from the
+/// first sample.
 ///
 /// # Errors
 /// [`WriteError`] names the file.

@@ -301,7 +301,8 @@ impl Fit {
         (self.before, self.rows) = (Some(stamp), row + 1);
     }
 
-    /// Learns how finely stamps are rounded; once they repeat, a row that is off by no more than that is in its place.
+    /// Learns how finely stamps are rounded; once they repeat, a row that is off by no more than that is in
+    /// its place.
     fn look_at_resolution(&mut self, stamp: Stamp) {
         let Some(step_s) = self.before.map(|before| stamp.since_s(before)) else { return };
         if step_s > 0.0 {
@@ -432,11 +433,12 @@ impl Fit {
     }
 }
 
-/// Steps of stamps that are coarser than the samples take more periods than this; otherwise a stamp that repeats is a row too many.
+/// Steps of stamps that are coarser than the samples take more periods than this; otherwise a stamp that
+/// repeats is a row too many.
 const COARSE_PERIODS: f64 = 1.1;
 
-/// Largest distance of a stamp from its place, in sample periods. Stamps that repeat may be rounded to `resolution_s`: half of it
-/// may be missing at the first row, half of it at this one.
+/// Largest distance of a stamp from its place, in sample periods. Stamps that repeat may be rounded to
+/// `resolution_s`: half of it may be missing at the first row, half of it at this one.
 pub(crate) fn max_offset_periods(repeats: bool, resolution_s: f64, rate_hz: f64) -> f64 {
     let resolution_periods = resolution_s * rate_hz;
     let is_coarse = repeats && resolution_periods > COARSE_PERIODS;

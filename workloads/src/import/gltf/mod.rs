@@ -306,8 +306,8 @@ fn unescape(uri: &str) -> Option<String> {
     String::from_utf8(bytes).ok()
 }
 
-/// All materials and, last, the default one for primitives without any (glTF 2.0, 3.9.6). Textures of those that are not in use
-/// are not read.
+/// All materials and, last, the default one for primitives without any (glTF 2.0, 3.9.6). Textures of those
+/// that are not in use are not read.
 fn materials(document: &Document, used: &Used, warnings: &mut Vec<Warning>) -> Vec<Material> {
     let mut images = Images { document, made: BTreeMap::new() };
     let mut materials = Vec::new();
@@ -465,8 +465,9 @@ fn maps(described: &Described, name: &str) -> Vec<Warning> {
     found.into_iter().flatten().collect()
 }
 
-/// Whether an extension that is not read changes the picture. Those of compression and of image formats bring what is due without
-/// them, or the file requires them and is refused; variants of materials change nothing until one is chosen.
+/// Whether an extension that is not read changes the picture. Those of compression and of image formats bring
+/// what is due without them, or the file requires them and is refused; variants of materials change nothing
+/// until one is chosen.
 fn changes_the_picture(name: &str) -> bool {
     let known = ["KHR_materials_unlit", "KHR_lights_punctual", "KHR_materials_variants"];
     let others = ["EXT_mesh_gpu_instancing", "KHR_animation_pointer", "KHR_node_visibility"];

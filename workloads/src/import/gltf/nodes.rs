@@ -247,8 +247,9 @@ fn cameras(document: &Document, tree: &Tree, warnings: &mut Vec<Warning>) -> Vec
     cameras
 }
 
-/// How much the camera sees and its near depth. The image has its own width, so the file's aspect ratio or `xmag` does not count
-/// (glTF 2.0, 3.10.3); an orthographic near plane at zero, which it allows, is left to the scene.
+/// How much the camera sees and its near depth. The image has its own width, so the file's aspect ratio or
+/// `xmag` does not count (glTF 2.0, 3.10.3); an orthographic near plane at zero, which it allows, is left to
+/// the scene.
 fn seen(camera: &Camera) -> Option<(Frustum, Option<f64>)> {
     match (&camera.type_, &camera.perspective, &camera.orthographic) {
         (Checked::Valid(CameraType::Perspective), Some(lens), _) => {

@@ -140,8 +140,8 @@ impl Textures {
     }
 }
 
-/// The file `name`, beside the material file; where it is not there, as with the full path of another machine, the file of that
-/// name in the same folder.
+/// The file `name`, beside the material file; where it is not there, as with the full path of another
+/// machine, the file of that name in the same folder.
 fn found_beside(name: &str, folder: &Path) -> PathBuf {
     let named = folder.join(name);
     let bare = name.rsplit('/').next().map(|bare| folder.join(bare)).filter(|bare| bare.is_file());

@@ -105,7 +105,8 @@ pub(crate) struct Statements {
     pub dropped: Vec<usize>,
 }
 
-/// Reads the statements of the OBJ file at `path`, gzipped or not. Statements about other things than surfaces are skipped.
+/// Reads the statements of the OBJ file at `path`, gzipped or not. Statements about other things than
+/// surfaces are skipped.
 pub(crate) fn statements(path: &Path) -> Result<Statements, LoadError> {
     let mut reading = Reading::default();
     for (line, words) in lines(path)? {
@@ -118,7 +119,8 @@ pub(crate) fn statements(path: &Path) -> Result<Statements, LoadError> {
     Ok(statements)
 }
 
-/// The lines of a text file with their numbers from one on, without comments; a backslash at the end of a line joins the next one to it.
+/// The lines of a text file with their numbers from one on, without comments; a backslash at the end of a
+/// line joins the next one to it.
 fn lines(path: &Path) -> Result<impl Iterator<Item = (usize, Result<String, LoadError>)> + '_, LoadError> {
     let mut input = reader::open(path)?;
     let mut line = 0;
@@ -265,7 +267,8 @@ impl Reading {
     }
 }
 
-/// The number of an element from zero on; the file counts from one, or back from the last of `count` where it is below zero.
+/// The number of an element from zero on; the file counts from one, or back from the last of `count` where it
+/// is below zero.
 fn number(text: &str, count: usize) -> Option<u32> {
     let number: i64 = text.parse().ok()?;
     let from_zero = if number < 0 { i64::try_from(count).ok()?.checked_add(number)? } else { number - 1 };

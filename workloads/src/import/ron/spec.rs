@@ -86,7 +86,8 @@ pub(super) struct LightSpec {
 pub(super) struct ObjectSpec {
     /// Name in messages.
     pub name: Option<String>,
-    /// A `.gltf`, `.glb`, `.obj`, `.ply`, `.off` or `.stl` file, the last four also gzipped, relative to the scene file.
+    /// A `.gltf`, `.glb`, `.obj`, `.ply`, `.off` or `.stl` file, the last four also gzipped, relative to the
+    /// scene file.
     pub file: Option<String>,
     /// Or a shape.
     pub shape: Option<ShapeSpec>,
@@ -126,8 +127,8 @@ pub(super) struct ObjectSpec {
     pub repeat: bool,
 }
 
-/// Part of lens, shutter and image; what is left out is not limited. A sample on the lower bound is inside, one on the upper bound only
-/// at the end of the axis.
+/// Part of lens, shutter and image; what is left out is not limited. A sample on the lower bound is inside,
+/// one on the upper bound only at the end of the axis.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct VisibleSpec {

@@ -146,8 +146,9 @@ pub fn ball(dimensions: usize) -> f64 {
     }
 }
 
-/// Sides of a box with borders hold as many points as those of a torus that are longer by this, in r, as a disk at the border is
-/// partly outside: 2 - 1 / 0.7476 = 0.66 on a line (Rényi 1958), 0.57 to 0.65 as counted for 10 to 1000 points in 2D and 3D.
+/// Sides of a box with borders hold as many points as those of a torus that are longer by this, in r, as a
+/// disk at the border is partly outside: 2 - 1 / 0.7476 = 0.66 on a line (Rényi 1958), 0.57 to 0.65 as
+/// counted for 10 to 1000 points in 2D and 3D.
 const BORDER: f64 = 0.6;
 
 /// Radius at which about `count` points saturate the unit cube.

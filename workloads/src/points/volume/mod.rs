@@ -4,8 +4,8 @@
 //! - [`Bounds`]: *conservative mode*. The rasterizer bounds the third coordinate of a volume in every tile:
 //!   the time of moving triangles for a [`Torus`], the depth of the surface for a [`Solid`]. Random points of
 //!   these bounds are tested.
-//! - [`standard_mode`]: samples of a pass that moving triangles cover and whose pixel shader finds them inside the volume
-//!   (Fig. 9), in three ([`Torus`]), four and five dimensions ([`Blurred`]).
+//! - [`standard_mode`]: samples of a pass that moving triangles cover and whose pixel shader finds them
+//!   inside the volume (Fig. 9), in three ([`Torus`]), four and five dimensions ([`Blurred`]).
 
 use std::collections::HashMap;
 use std::f64::consts::{PI, TAU};

@@ -25,7 +25,8 @@ pub trait Volume: Sync {
     }
 }
 
-/// A disk that moves and grows while the shutter is open, out of the focus of a lens: four dimensions at rest, five in motion.
+/// A disk that moves and grows while the shutter is open, out of the focus of a lens: four dimensions at
+/// rest, five in motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Blurred {
     /// Radius at time 0 and 1.
@@ -110,8 +111,8 @@ pub struct Covered {
     pub image: Vec<Vec3>,
 }
 
-/// Camera of the unit square, with y up, for a square image. Its focus is at half the depth of the triangles, so that a ray from
-/// the border of the lens is moved by the radius.
+/// Camera of the unit square, with y up, for a square image. Its focus is at half the depth of the triangles,
+/// so that a ray from the border of the lens is moved by the radius.
 fn camera(lens: f64) -> Option<Camera> {
     let middle = Affine3A::from_translation(Vec3::new(-0.5, -0.5, 0.0));
     let camera = Camera::orthographic(middle, 0.5, 0.01).ok()?;
@@ -152,8 +153,8 @@ impl Shader for Reject<'_> {
     }
 }
 
-/// Draws the triangles around a volume in a pass of `gpu`, for an image of `side` by `side` pixels. The pixel shader runs on
-/// every sample that they cover and discards those outside.
+/// Draws the triangles around a volume in a pass of `gpu`, for an image of `side` by `side` pixels. The pixel
+/// shader runs on every sample that they cover and discards those outside.
 ///
 /// # Errors
 /// [`PassError`] if a cache of the GPU cannot be built, or if the surfaces are too large.

@@ -9,7 +9,8 @@ use super::objects_may_collide;
 /// Two objects, and whether they collide.
 type Known = ([Object; 2], bool);
 
-/// Checks that pairs kept with refinement are kept without. Returns how many are kept, and how many of them are apart.
+/// Checks that pairs kept with refinement are kept without. Returns how many are kept, and how many of them
+/// are apart.
 fn kept(pairs: &[Known], search: Search) -> [usize; 2] {
     let kept = |(number, (pair, collides)): (usize, &Known)| {
         let refined = objects_may_collide(pair, &search);
@@ -29,8 +30,8 @@ fn reference_pairs(each: usize) -> Vec<Known> {
     reference_cases(1, each, 0).into_iter().filter_map(pair).collect()
 }
 
-/// Without the single search this fails: refinement alone keeps three of these (126, 135 and 138 of the pairs that exchange places),
-/// which end at its limit of fragments.
+/// Without the single search this fails: refinement alone keeps three of these (126, 135 and 138 of the pairs
+/// that exchange places), which end at its limit of fragments.
 #[test]
 fn refinement_keeps_no_reference_pair_that_a_single_search_separates() {
     let [kept, apart] = kept(&reference_pairs(30), Search::default());

@@ -1,6 +1,6 @@
-//! `quintile chart anchors`: rates of the model beside those that others measured on parts. GPU files of the parts are in
-//! `sim/experiments/parts`; they were written from data sheets before the first rate was looked at.
-//! The work is passes through the pipeline, timed at the level `stepped`.
+//! `quintile chart anchors`: rates of the model beside those that others measured on parts. GPU files of the
+//! parts are in `sim/experiments/parts`; they were written from data sheets before the first rate was looked
+//! at. The work is passes through the pipeline, timed at the level `stepped`.
 
 mod published;
 
@@ -190,8 +190,8 @@ struct Rate {
 }
 
 impl Work {
-    /// Rate on a GPU: what an image twice as high adds in work over what it adds in time. Filling and draining the pipeline are not
-    /// in it.
+    /// Rate on a GPU: what an image twice as high adds in work over what it adds in time. Filling and
+    /// draining the pipeline are not in it.
     pub fn rate(self, gpu: &GpuSpec, [width, height]: [u32; 2]) -> Result<Rate, StudyError> {
         let timed = |height| Stage::new(gpu, self, [width, height])?.timed();
         let (small, large) = (timed(height)?, timed(2 * height)?);

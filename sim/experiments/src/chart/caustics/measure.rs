@@ -1,6 +1,5 @@
-//! Caustics of an ocean by every method, and of crossed light volumes: the same light through the same number of triangles, on
-//! increasingly crossed sides.
-//! Also the water of the figures and its views.
+//! Caustics of an ocean by every method, and of crossed light volumes: the same light through the same number
+//! of triangles, on increasingly crossed sides. Also the water of the figures and its views.
 
 use activity::Event;
 use cpu_time::ThreadTime;
@@ -41,7 +40,8 @@ pub struct OceanCounts {
     pub runs: Vec<Vec<u32>>,
 }
 
-/// Counts the executions of every method on an ocean of `2 cells^2` volumes, its waves of this slope and so many metres deep.
+/// Counts the executions of every method on an ocean of `2 cells^2` volumes, its waves of this slope and so
+/// many metres deep.
 ///
 /// # Errors
 /// When the width or the height in `size` is zero or too large.
@@ -174,7 +174,8 @@ fn by_method(
     Ok(Method::ALL.map(row).into())
 }
 
-/// One surface of fewer and fewer triangles against photons that are refracted at the waves themselves: the light on the floor.
+/// One surface of fewer and fewer triangles against photons that are refracted at the waves themselves: the
+/// light on the floor.
 fn by_cells(effort: &CausticsEffort, slope: f64, bar: &Bar) -> Result<Vec<Coarse>, StudyError> {
     let eye = above(effort.floor_px)?;
     let squares = Squares { eye: &eye, side_px: SQUARE_PX };
@@ -218,7 +219,8 @@ pub struct Crossed {
     pub pleat: f64,
     /// For how much of their length sides of beams cross.
     pub crossing: f64,
-    /// Mean difference of the light on the floor from photons refracted at the waves themselves, as a part of its mean.
+    /// Mean difference of the light on the floor from photons refracted at the waves themselves, as a part of
+    /// its mean.
     pub floor_error: f64,
     /// That of other photons of that kind.
     pub noise: f64,

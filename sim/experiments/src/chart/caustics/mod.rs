@@ -1,5 +1,5 @@
-//! `quintile chart caustics`: shader executions and images of caustics by bounding volume, and failure modes: too few triangles,
-//! and crossed sides.
+//! `quintile chart caustics`: shader executions and images of caustics by bounding volume, and failure modes:
+//! too few triangles, and crossed sides.
 
 pub(crate) mod measure;
 

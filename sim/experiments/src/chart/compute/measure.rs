@@ -243,13 +243,14 @@ fn job(options: &ComputeOptions, size: (u32, u32)) -> Result<Compute, RunError> 
     Ok(Compute::new(options.clone(), &overrides, SEED)?)
 }
 
-/// Cycles of a time. Whole cycles stay whole: their product is exact up to some ten million cycles, and 1e-12 is no double.
+/// Cycles of a time. Whole cycles stay whole: their product is exact up to some ten million cycles, and 1e-12
+/// is no double.
 fn cycles(ps: u64, core_hz: f64) -> f64 {
     ps as f64 * core_hz / 1e12
 }
 
-/// Cycles, energy of the events and conflicts of the passes of the program: those of groups but the one that writes the image, and
-/// those that draw a mip chain.
+/// Cycles, energy of the events and conflicts of the passes of the program: those of groups but the one that
+/// writes the image, and those that draw a mip chain.
 fn cost(plan: &Plan, observed: &Observed) -> [f64; 3] {
     let (mut all, mut busy_ps, mut before_ps) = ([0.0; 3], 0, 0);
     for (pass, time) in observed.report.passes.iter().zip(&observed.times) {

@@ -1,5 +1,5 @@
-//! `quintile chart compute`: cost of programs of groups over the size of groups, the layout of shared memory and the contention of
-//! atomics, and error over cost where they approximate.
+//! `quintile chart compute`: cost of programs of groups over the size of groups, the layout of shared memory
+//! and the contention of atomics, and error over cost where they approximate.
 
 mod measure;
 
@@ -65,8 +65,8 @@ pub struct ComputeRow {
     pub events_j: f64,
     /// Cycles of shared memory that banks lose, and atomics on a word of a buffer beyond the first of a warp.
     pub conflicts: u64,
-    /// Error against the exact answer in percent, of methods that approximate: of the mean, of shares of the histogram (half of the
-    /// sum of differences), and lights in lists that reach no sample of their tile.
+    /// Error against the exact answer in percent, of methods that approximate: of the mean, of shares of the
+    /// histogram (half of the sum of differences), and lights in lists that reach no sample of their tile.
     pub error_percent: Option<f64>,
     /// Codes of the warnings.
     pub warns: Vec<&'static str>,

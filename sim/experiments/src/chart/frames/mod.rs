@@ -1,7 +1,8 @@
 //! `quintile chart frames`: how well frame starts are found, by method, over rate, noise, resolution and host time.
 //!
-//! Scenes are those of [`traces::synth`], whose frames are known. Each is recorded, frames are marked as by hand (0.1 ms off at most),
-//! and the outcome is compared with the ground truth: F1 of starts within 0.5 ms, and the energy error of frames whose two ends were found.
+//! Scenes are those of [`traces::synth`], whose frames are known. Each is recorded, frames are marked as by
+//! hand (0.1 ms off at most), and the outcome is compared with the ground truth: F1 of starts within 0.5 ms,
+//! and the energy error of frames whose two ends were found.
 
 mod witnesses;
 
@@ -491,7 +492,8 @@ fn analyse(trace: &Trace, scene: &Scene, way: Way) -> Result<FinderScore, StudyE
     })
 }
 
-/// How many frames are wrong and right, and how many of each carry a flag. The last one ends at the end mark and is left out.
+/// How many frames are wrong and right, and how many of each carry a flag. The last one ends at the end mark
+/// and is left out.
 fn flags(frames: &[FrameEnergy], scene: &Scene) -> AlarmCount {
     let found_s: Vec<f64> = frames.iter().map(|frame| frame.start_s).collect();
     let truth_s: Vec<f64> = scene.truth.iter().map(|frame| frame.start_s).collect();

@@ -12,7 +12,8 @@ use crate::study::StudyError;
 
 /// Bins of confidence, of equal width.
 const BINS: usize = 10;
-/// A start counts as found within this share of a short frame (one in twenty is shorter), and [`TOLERANCE_S`] at most.
+/// A start counts as found within this share of a short frame (one in twenty is shorter), and [`TOLERANCE_S`]
+/// at most.
 const TOLERANCE_SHARE: f64 = 0.15;
 const SHORT_PLACE: usize = 20;
 

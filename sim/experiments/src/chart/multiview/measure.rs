@@ -239,7 +239,8 @@ impl Bench {
         })
     }
 
-    /// Shader lanes of all views in one pass, and of the one nearest to the middle alone, with a cache and samples of each view.
+    /// Shader lanes of all views in one pass, and of the one nearest to the middle alone, with a cache and
+    /// samples of each view.
     ///
     /// # Errors
     /// When the cache cannot be built.

@@ -1,7 +1,7 @@
 //! `quintile chart multiview`: stereo and multi-view in one pass against view by view and accumulation.
 //!
-//! Pixels that are shaded once serve all views, the lens and the shutter. The measure is pixel shader lanes run, over those that one of the
-//! views takes alone on the same hardware.
+//! Pixels that are shaded once serve all views, the lens and the shutter. The measure is pixel shader lanes
+//! run, over those that one of the views takes alone on the same hardware.
 
 mod measure;
 
@@ -29,17 +29,19 @@ pub struct MultiviewEffort {
     pub views: &'static [u32],
     /// Entries of the shading cache.
     pub entries: &'static [u32],
-    /// Lengths of the camera line over the distance of what is in focus, for view-dependent shading and for separate tests of the
-    /// regions of the lens.
+    /// Lengths of the camera line over the distance of what is in focus, for view-dependent shading and for
+    /// separate tests of the regions of the lens.
     pub baselines: &'static [f64],
 }
 
 /// Samples for each view of a pixel (thesis, Paper VI, section 8).
 pub const SAMPLES: u32 = 8;
-/// From eye to eye, scene units, which are metres in the built-in scenes: the mean of adults is 63 mm (Dodgson 2004). The photographer's
-/// rule, a thirtieth of the distance of what is nearest, says 80 mm for `default`.
+/// From eye to eye, scene units, which are metres in the built-in scenes: the mean of adults is 63 mm
+/// (Dodgson 2004). The photographer's rule, a thirtieth of the distance of what is nearest, says 80 mm for
+/// `default`.
 const EYES: f64 = 0.065;
-/// Radius of the lens of an eye, scene units: as wide as it can be with something left between the eyes, for defocus to be seen.
+/// Radius of the lens of an eye, scene units: as wide as it can be with something left between the eyes, for
+/// defocus to be seen.
 const APERTURE: f64 = 0.4 * EYES;
 
 /// Two eyes.
@@ -47,7 +49,8 @@ pub fn stereo() -> Layout {
     Layout::stereo(EYES, APERTURE)
 }
 
-/// So many views on a line as long as both eyes and their lenses take, each with a box filter that overlaps half of the next.
+/// So many views on a line as long as both eyes and their lenses take, each with a box filter that overlaps
+/// half of the next.
 pub fn line(views: u32) -> Layout {
     Layout::line(views, EYES + 2.0 * APERTURE, APERTURE)
 }
@@ -71,7 +74,8 @@ pub struct MultiviewChart {
     pub regions: Vec<RegionTests>,
 }
 
-/// Kinds of views whose regions of the lens are tested each on their own: apart, and with box filters on adjoining strips.
+/// Kinds of views whose regions of the lens are tested each on their own: apart, and with box filters on
+/// adjoining strips.
 const KINDS: [&str; 3] = ["two eyes", "seven lenses", "seven overlapping views"];
 
 /// Views for which caches are tried.
@@ -83,7 +87,8 @@ pub struct Case {
     pub rows: Vec<Cached>,
 }
 
-/// The length, over the distance of what is in focus, of a line of views so far apart that each needs what the others have forgotten.
+/// The length, over the distance of what is in focus, of a line of views so far apart that each needs what
+/// the others have forgotten.
 const FAR_APART: f64 = 0.8;
 
 /// Views for which caches are tried, with what they are.
@@ -339,7 +344,8 @@ mod tests {
         for pair in chart.caches.iter().flat_map(|case| case.rows.chunks_exact(2)) {
             assert!(pair[0].invocations_per_pixel > pair[1].invocations_per_pixel, "{pair:?}");
         }
-        // The chart fails where an image differs; views apart leave no more samples, and fewer where they are far apart.
+        // The chart fails where an image differs; views apart leave no more samples, and fewer where they are
+        // far apart.
         assert!(chart.regions.iter().all(|row| row.equal && row.each.samples <= row.whole.samples));
         assert!(chart.regions[1].each.samples < chart.regions[1].whole.samples, "{:?}", chart.regions[1]);
         let (near, far) = (&chart.angles[0], &chart.angles[1]);

@@ -1,5 +1,5 @@
-//! Points by rasterization beside the CPU sampler: time and energy of a frame on the reference GPU, CPU time of one thread, and the
-//! error of both; and where rasterization fails.
+//! Points by rasterization beside the CPU sampler: time and energy of a frame on the reference GPU, CPU time
+//! of one thread, and the error of both; and where rasterization fails.
 
 use activity::Event;
 use cpu_time::ThreadTime;

@@ -32,7 +32,8 @@ pub struct PointsEffort {
     pub darts: u64,
     /// Points of other seeds that a spectrum is the mean of.
     pub seeds: u64,
-    /// Numbers in a unit of length get finer up to 2 to this power, from the fewest that the least distance of that sweep may have.
+    /// Numbers in a unit of length get finer up to 2 to this power, from the fewest that the least distance
+    /// of that sweep may have.
     pub finest_bits: u32,
     /// Points that follow a density.
     pub white: usize,

@@ -163,8 +163,8 @@ impl Stage {
     }
 }
 
-/// Bars of a sixteenth of a pixel with gaps as wide, which slide across many pixels before an open lens: a sample in any
-/// pixel sees a bar half of the time, and which depends on all of x, u and t at once.
+/// Bars of a sixteenth of a pixel with gaps as wide, which slide across many pixels before an open lens: a
+/// sample in any pixel sees a bar half of the time, and which depends on all of x, u and t at once.
 pub(super) struct Fence {
     viewport: Viewport,
     open: Vec<Vec3>,

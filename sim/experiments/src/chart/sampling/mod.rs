@@ -1,8 +1,8 @@
 //! `quintile chart sampling`: image error against cost, for every sample table.
 //!
-//! Error is the root of the mean squared difference to a reference of [`SamplingEffort::reference`] samples per pixel, over all
-//! pixels and the three channels, in linear light. Host time is that of one frame through the pipeline, caches and all; the
-//! table is made before.
+//! Error is the root of the mean squared difference to a reference of [`SamplingEffort::reference`] samples
+//! per pixel, over all pixels and the three channels, in linear light. Host time is that of one frame through
+//! the pipeline, caches and all; the table is made before.
 
 mod measure;
 

@@ -95,8 +95,8 @@ pub struct Group {
     pub held_out_energy: Option<f64>,
 }
 
-/// The bound that a further error stays within with a probability of 95 %, if it is like these: the conformal quantile, infinite
-/// with too few errors (Papadopoulos et al. 2002).
+/// The bound that a further error stays within with a probability of 95 %, if it is like these: the conformal
+/// quantile, infinite with too few errors (Papadopoulos et al. 2002).
 fn bound(errors: impl Iterator<Item = f64>) -> f64 {
     let mut errors: Vec<f64> = errors.collect();
     errors.sort_by(f64::total_cmp);
@@ -162,7 +162,8 @@ pub struct Flips {
     pub pairs: u64,
     /// Share of pairs in another order than at `stepped`.
     pub flipped: f64,
-    /// Share of these whose difference is within their stated errors, so that a report leaves them undecided; `None` if none flipped.
+    /// Share of these whose difference is within their stated errors, so that a report leaves them undecided;
+    /// `None` if none flipped.
     pub undecided: Option<f64>,
 }
 

@@ -1,11 +1,11 @@
-//! `quintile chart stated-errors`: errors of timing levels on GPUs drawn at random, the errors that a run states from them, and how often
-//! those hold.
+//! `quintile chart stated-errors`: errors of timing levels on GPUs drawn at random, the errors that a run
+//! states from them, and how often those hold.
 //!
-//! Scenes and workloads are in two halves, and so are the GPUs. An error is stated from one half of both and judged on the other, so
-//! neither frame nor GPU is known to it.
+//! Scenes and workloads are in two halves, and so are the GPUs. An error is stated from one half of both and
+//! judged on the other, so neither frame nor GPU is known to it.
 //!
-//! GPUs are drawn at random around the reference one. The picture shows errors over how far a GPU is from it, over its memory channels,
-//! and over how dense packets are.
+//! GPUs are drawn at random around the reference one. The picture shows errors over how far a GPU is from it,
+//! over its memory channels, and over how dense packets are.
 
 mod figures;
 

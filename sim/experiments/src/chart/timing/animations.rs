@@ -1,4 +1,5 @@
-//! What the timing chart times: one frame of each scene and workload, and animations at every level, drawn and timed as in a run.
+//! What the timing chart times: one frame of each scene and workload, and animations at every level, drawn
+//! and timed as in a run.
 
 use std::path::Path;
 
@@ -132,8 +133,8 @@ fn plan(scene: &str, gpu: &GpuSpec, extent: Extent, level: Level) -> Result<Plan
     Plan::resolve(RunOptions { scene, gpu, overrides, timing: Some(level), ..RunOptions::default() })
 }
 
-/// Seed, frames simulated, cycles of all frames and host time of some choices of representatives. Each costs the previews and its share
-/// of simulating all frames.
+/// Seed, frames simulated, cycles of all frames and host time of some choices of representatives. Each costs
+/// the previews and its share of simulating all frames.
 fn sampled(
     all: &Simulated,
     numbers: &[u32],
@@ -158,7 +159,8 @@ fn sampled(
 
 /// Built-in scenes.
 pub(super) const SCENES: [&str; 2] = ["default", "tiny"];
-/// Families of the failure catalogue, each at one value: large and tiny triangles, lens and motion, behind the camera.
+/// Families of the failure catalogue, each at one value: large and tiny triangles, lens and motion, behind
+/// the camera.
 const FAMILIES: [(&str, f64); 4] =
     [("lens-and-motion", 2.0), ("micro", 1.0), ("behind", 0.0), ("diagonals", 128.0)];
 

@@ -1,5 +1,5 @@
-//! One stream at every level: error against the reference, host time, and the cost of timing added to drawing. Streams made to
-//! break levels, and rates from outside.
+//! One stream at every level: error against the reference, host time, and the cost of timing added to
+//! drawing. Streams made to break levels, and rates from outside.
 
 use std::collections::BTreeMap;
 

@@ -15,8 +15,9 @@ const LEVELS: [&str; 4] = [Level::Stepped.name(), Level::Packet.name(), Level::B
 type Point = (f64, f64);
 
 impl TimingChart {
-    /// Error of cycles over host time, both against the reference: filled for animations simulated whole, hollow for the timing of single
-    /// frames alone. The frontier is that of the medians of animations, which are the same for all levels.
+    /// Error of cycles over host time, both against the reference: filled for animations simulated whole,
+    /// hollow for the timing of single frames alone. The frontier is that of the medians of animations, which
+    /// are the same for all levels.
     pub(super) fn picture(&self, look: &Look) -> Picture {
         let mut series =
             vec![Series::new("frontier of the medians", Mark::Steps(self.frontier())).painted(Paint::Ink)];
@@ -68,7 +69,8 @@ impl TimingChart {
         rows.map(|row| (row.relative_host, row.cycle_error_percent.abs())).collect()
     }
 
-    /// The error of every level but the reference, with its middle half and the number of points that it is the median of.
+    /// The error of every level but the reference, with its middle half and the number of points that it is
+    /// the median of.
     fn medians(&self) -> String {
         let one = |level: &&str| {
             let points = self.animations_at(level);

@@ -197,8 +197,8 @@ fn energy((mean, deviation): &(f64, f64)) -> bool {
 
 const ENERGY: &str = "a mean and a deviation above 0";
 
-/// III-1: one marked start finds the others, with V-sync and without. It is judged by the method of the paper; the tracking of
-/// this program stands beside it.
+/// III-1: one marked start finds the others, with V-sync and without. It is judged by the method of the
+/// paper; the tracking of this program stands beside it.
 fn found(bench: &Bench<'_>) -> Result<Done, RunError> {
     let with = bench.with(|settings| &settings.iii_1);
     let (row, form) = (with.settings, with.form);
@@ -306,7 +306,8 @@ fn missed(found: &[Found; 4]) -> String {
 /// A recording and what was found in it.
 type Searched = (Recording, Frames);
 
-/// Recordings of the PC's animation with one mark each: the first, and how well all of them are found by either method.
+/// Recordings of the PC's animation with one mark each: the first, and how well all of them are found by
+/// either method.
 fn scored(bench: &Bench<'_>, pacing: Pacing, first_seed: u64) -> Result<(Searched, [Found; 2]), RunError> {
     let row = &bench.settings.iii_1;
     let (marked, within_s) = (*row.marked.get(bench.form), 1e-3 * row.within_ms.get(bench.form));

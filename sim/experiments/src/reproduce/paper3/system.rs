@@ -14,8 +14,9 @@ fn launched(seed: u64) -> Circumstances {
     Circumstances { launch: true, ..settled(seed) }
 }
 
-/// The knee among the frames that are no outliers, as a number of all frames: a disturbance of the operating system lifts a frame
-/// far more than the launch does. Where there is none, outliers at the very start may be a short launch.
+/// The knee among the frames that are no outliers, as a number of all frames: a disturbance of the operating
+/// system lifts a frame far more than the launch does. Where there is none, outliers at the very start may be
+/// a short launch.
 fn settles(energies_j: &[f64]) -> WarmUp {
     let flags = outliers(energies_j);
     let at_start = flags.iter().take_while(|flag| **flag).count();
@@ -359,7 +360,8 @@ fn flagged(energies: &[f64], flags: &[bool]) -> Figure {
     )
 }
 
-/// Figure 8, upper half: standard deviation over the number of repetitions, of a frame that is never hit and of one that is.
+/// Figure 8, upper half: standard deviation over the number of repetitions, of a frame that is never hit and
+/// of one that is.
 fn growing(bench: &Bench<'_>) -> Result<Figure, RunError> {
     let shown = vec![bench.frame(); SHORT];
     let (mut energies, mut first_hits) = (vec![Vec::new(); SHORT], [None; SHORT]);

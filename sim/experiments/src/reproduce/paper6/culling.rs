@@ -1,5 +1,5 @@
-//! Rows VI-4 and VI-5: occlusion queries by intervals. VI-16: with every test and shortcut on, every sample sees what it sees by brute
-//! force.
+//! Rows VI-4 and VI-5: occlusion queries by intervals. VI-16: with every test and shortcut on, every sample
+//! sees what it sees by brute force.
 
 use activity::{Counts, Event};
 use glam::Vec3;
@@ -176,8 +176,8 @@ struct Costs {
 }
 
 impl Costs {
-    /// Over the queried objects; `charged` is the share of gathering the farthest depths that queries pay for. Of the two
-    /// sampled queries, that which ends early costs less.
+    /// Over the queried objects; `charged` is the share of gathering the farthest depths that queries pay
+    /// for. Of the two sampled queries, that which ends early costs less.
     fn of(scenes: &[(Drawn, QueryAnswers)], asked: QueriedObjects, charged: f64) -> Self {
         let mut costs = Self::default();
         for (scene, answered) in scenes {
@@ -355,8 +355,8 @@ impl Machine {
     }
 }
 
-/// The machines of the settings, and others that show what a kind of culling takes away alone, or beyond another. What any of
-/// them sees is compared with brute force.
+/// The machines of the settings, and others that show what a kind of culling takes away alone, or beyond
+/// another. What any of them sees is compared with brute force.
 struct Machines {
     all: Vec<Machine>,
     /// Samples that the lens lines spare where no other tile test runs, and beside the side planes.
@@ -492,8 +492,8 @@ pub(super) fn unchanged(task: &Task<'_>) -> Result<Done, RunError> {
 mod tests {
     use super::*;
 
-    /// Savings of lens lines are compared with brute force, not counted beside it: machines of the settings have side planes, beside
-    /// which lens lines take nothing away.
+    /// Savings of lens lines are compared with brute force, not counted beside it: machines of the settings
+    /// have side planes, beside which lens lines take nothing away.
     #[test]
     fn every_machine_that_spares_something_is_compared() {
         let scenes = catalogue(Size { side_px: 16, triangles: 8 }, 1, 6).unwrap();

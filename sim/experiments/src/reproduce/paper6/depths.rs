@@ -1,4 +1,5 @@
-//! VI-15: depth intervals by moving planes against those by vertices (Appendix A), in both modes, over what the tile test leaves.
+//! VI-15: depth intervals by moving planes against those by vertices (Appendix A), in both modes, over what
+//! the tile test leaves.
 
 use glam::{Affine3A, Vec3};
 use pipeline::conservative::{Grid, MovingTriangle, Rasterizer, Touch, View};
@@ -27,8 +28,9 @@ use crate::study::Ran;
 /// Widths of depth intervals in tiles, over those of the vertices.
 #[derive(Clone, Debug, Default)]
 struct Widths {
-    /// Sums over tiles of triangles whose facing does not change, and of those whose does: by the planes that are judged, by those
-    /// at the ends of the tile's time, and without any plane, by the vertices within that time.
+    /// Sums over tiles of triangles whose facing does not change, and of those whose does: by the planes that
+    /// are judged, by those at the ends of the tile's time, and without any plane, by the vertices within
+    /// that time.
     sums: [[f64; 3]; 2],
     tiles: [u64; 2],
     /// Tiles, or places, with a depth outside.
@@ -41,8 +43,8 @@ struct Widths {
 }
 
 impl Widths {
-    /// Widths of a tile by the planes that are judged, by local ones, and by the vertices within the tile's time, with that by
-    /// vertices over the whole shutter.
+    /// Widths of a tile by the planes that are judged, by local ones, and by the vertices within the tile's
+    /// time, with that by vertices over the whole shutter.
     fn add(&mut self, turns: bool, vertices: f64, widths: [f64; 3]) {
         let class = usize::from(turns);
         for (sum, width) in self.sums[class].iter_mut().zip(widths) {
@@ -106,8 +108,8 @@ impl Widths {
     }
 }
 
-/// Whether planes are narrower than the null, which has none: the vertices within the tile's own time. The condition of the row is
-/// about the vertices over the whole shutter, which that time alone beats.
+/// Whether planes are narrower than the null, which has none: the vertices within the tile's own time. The
+/// condition of the row is about the vertices over the whole shutter, which that time alone beats.
 #[derive(Default)]
 struct AgainstNull {
     /// How many cases there are.
@@ -450,7 +452,8 @@ impl<'a> Alone<'a> {
         widths
     }
 
-    /// A place of the triangle at some time, seen through some place on the lens, or `None` where that is nearer than the near depth.
+    /// A place of the triangle at some time, seen through some place on the lens, or `None` where that is
+    /// nearer than the near depth.
     fn place(&self, ends: &[[[f64; 3]; 3]; 2], uniform: impl Fn(u64) -> f64) -> Option<Seen> {
         let (mut b, mut c) = (uniform(0), uniform(1));
         if b + c > 1.0 {
@@ -583,8 +586,8 @@ mod tests {
         widths
     }
 
-    /// Narrower than the vertices over the whole shutter, with no gain by planes at all: the condition holds, and the row says that
-    /// no interval is narrower than that of the null.
+    /// Narrower than the vertices over the whole shutter, with no gain by planes at all: the condition holds,
+    /// and the row says that no interval is narrower than that of the null.
     #[test]
     fn planes_that_gain_nothing_are_not_narrower_than_the_null() {
         let idle = widths([1.0, 1.0, 1.0], [1.8, 1.8, 1.8]);

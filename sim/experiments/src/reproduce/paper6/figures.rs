@@ -1,5 +1,5 @@
-//! Figures of Paper VI: two objects that overlap (6), one beam by each method and light in water (7), and images of points (11),
-//! glossy surfaces (14) and views (17).
+//! Figures of Paper VI: two objects that overlap (6), one beam by each method and light in water (7), and
+//! images of points (11), glossy surfaces (14) and views (17).
 
 use std::path::Path;
 
@@ -158,8 +158,8 @@ impl Shown {
     }
 }
 
-/// Figure 11 in space: balls of half the least distance around the points before the last pass, so that they touch at most, and the
-/// uncovered regions that it draws.
+/// Figure 11 in space: balls of half the least distance around the points before the last pass, so that they
+/// touch at most, and the uncovered regions that it draws.
 pub(super) fn balls_and_uncovered(darts: &Rasterized<3>, radius: f64) -> Result<Figure, RunError> {
     let side = (SIDE * radius).min(1.0);
     let is_inside = |point: &[f64; 3]| point.iter().all(|at| *at < side);

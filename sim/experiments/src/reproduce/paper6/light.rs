@@ -1,5 +1,5 @@
-//! Rows VI-6 and VI-7: caustic volumes as moving triangles. Rows VI-11 and VI-12: glossy reflection and refraction, and motion-blurred
-//! soft shadows.
+//! Rows VI-6 and VI-7: caustic volumes as moving triangles. Rows VI-11 and VI-12: glossy reflection and
+//! refraction, and motion-blurred soft shadows.
 
 use activity::Event;
 use glam::{DVec3, Vec3};
@@ -233,7 +233,8 @@ fn turned(row: &Lost, form: Form, height_m: f64) -> Result<(Coverage, Ran), RunE
     covered(&beams, &eye, Floor { height_m })
 }
 
-/// Which receivers on a floor are covered, which the host finds, and what the modelled hardware draws of the same beams.
+/// Which receivers on a floor are covered, which the host finds, and what the modelled hardware draws of the
+/// same beams.
 fn covered(beams: &[Beam], eye: &Eye, floor: Floor) -> Result<(Coverage, Ran), RunError> {
     let (_, drawn) = on_hardware(beams, eye, Method::Moving, Light::Floor(floor))?;
     Ok((receivers(beams, eye, Method::Moving, &floor), drawn))

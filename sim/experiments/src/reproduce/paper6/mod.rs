@@ -1,7 +1,7 @@
 //! Paper VI, "Design and Novel Uses of Higher-Dimensional Rasterization": a module for each use.
 //!
-//! Public cases of collision detection are read from a folder that a user names: scenes (`*.mts.gz`) and, in `queries`, files of queries
-//! of one vertex and one face or of two edges.
+//! Public cases of collision detection are read from a folder that a user names: scenes (`*.mts.gz`) and, in
+//! `queries`, files of queries of one vertex and one face or of two edges.
 
 mod collision;
 mod culling;
@@ -105,8 +105,8 @@ pub(super) fn rows(options: &Options, progress: &Progress) -> Result<(Origin, Ve
     Ok((task.origin, done))
 }
 
-/// What the file says of figures that were not drawn when it was committed, and what holds now. Files of settings are not changed
-/// once a number was computed with them.
+/// What the file says of figures that were not drawn when it was committed, and what holds now. Files of
+/// settings are not changed once a number was computed with them.
 const DRAWN_SINCE: [[&str; 2]; 7] = [
     ["; Figure 6 itself is not drawn.", "."],
     [
@@ -133,7 +133,8 @@ fn with_figures(limits: &str) -> String {
     DRAWN_SINCE.iter().fold(limits.to_owned(), |limits, [said, now]| limits.replace(said, now))
 }
 
-/// Scenes of every family of the failure catalogue: one in the middle of its sweep, or so many from its harmless end on.
+/// Scenes of every family of the failure catalogue: one in the middle of its sweep, or so many from its
+/// harmless end on.
 fn catalogue(size: Size, of_each: usize, seed: u64) -> Result<Vec<StressScene>, RunError> {
     let mut scenes = Vec::new();
     for family in families() {
@@ -159,7 +160,8 @@ struct Public {
     pub scenes: usize,
     /// Pairs of their objects that collide, by the lists that come with them.
     pub known: usize,
-    /// Those of them in which two triangles were seen to cross or to share a corner; which pairs the others are is not known.
+    /// Those of them in which two triangles were seen to cross or to share a corner; which pairs the others
+    /// are is not known.
     pub seen: usize,
     /// Pairs of scenes, at least, and queries missed by `quintile ccd`.
     pub missed_closer: usize,

@@ -1,4 +1,5 @@
-//! Row VI-8: samples in a torus that is drawn as moving triangles, and how far they scatter about what is expected of them.
+//! Row VI-8: samples in a torus that is drawn as moving triangles, and how far they scatter about what is
+//! expected of them.
 
 use pipeline::Lane;
 use pipeline::sampling::{HashedSamples, LensShape};
@@ -79,7 +80,8 @@ impl Disk {
     }
 }
 
-/// How many standard errors a count is off, each of `all` independent samples being counted with the probability `share`.
+/// How many standard errors a count is off, each of `all` independent samples being counted with the
+/// probability `share`.
 fn count_off(n: f64, all: f64, share: f64) -> f64 {
     (n - all * share) / (all * share * (1.0 - share)).sqrt()
 }
@@ -105,9 +107,9 @@ impl Filled {
         self.off.iter().fold(0.0, |most: f64, off| most.max(off.abs()))
     }
 
-    /// Deviations in the octants of the torus, its halves along x, y and t: of the count, and of the mean of the integrand among
-    /// those counted. By symmetry each octant expects the same. Count and mean of independent samples are uncorrelated; count and
-    /// integral are not.
+    /// Deviations in the octants of the torus, its halves along x, y and t: of the count, and of the mean of
+    /// the integrand among those counted. By symmetry each octant expects the same. Count and mean of
+    /// independent samples are uncorrelated; count and integral are not.
     fn by_octant(&self, torus: &Torus) -> Vec<f64> {
         let mean = torus.moment() / torus.volume();
         let mut octants = [(0.0, 0.0, 0.0); 8];
@@ -203,7 +205,8 @@ fn rarity(errors: f64) -> f64 {
     upper_tail(errors * errors, 1)
 }
 
-/// The tolerance that the file states. It is wrong, but files of settings are not changed once a number was computed with them.
+/// The tolerance that the file states. It is wrong, but files of settings are not changed once a number was
+/// computed with them.
 const SAID_OF_TOLERANCE: &str =
     "The samples of a pixel are stratified, so that 3 standard errors of independent ones are generous.";
 

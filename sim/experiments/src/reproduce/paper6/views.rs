@@ -169,7 +169,8 @@ const GROUPS: [Group; 8] = [
     |to, from| to.policy = from.policy,
 ];
 
-/// The point at which every setting has the value that `better` takes for the best by itself, the others as in `base`.
+/// The point at which every setting has the value that `better` takes for the best by itself, the others as
+/// in `base`.
 fn corner(base: &Point, found: &[(Point, f64)], better: fn(f64, f64) -> bool) -> Point {
     let mut corner = base.clone();
     for copy in GROUPS {
@@ -188,7 +189,8 @@ fn corner(base: &Point, found: &[(Point, f64)], better: fn(f64, f64) -> bool) ->
 /// Whether the first of two numbers lies further towards an end of a range.
 type Further = fn(f64, f64) -> bool;
 
-/// All settings together at the values that raise, and that lower, the number by themselves; those not met in a sweep.
+/// All settings together at the values that raise, and that lower, the number by themselves; those not met in
+/// a sweep.
 fn over_corners(tried: &mut Tried<'_>, base: &Point) -> Result<[f64; 2], RunError> {
     let ends: [(&str, Further); 2] = [
         ("every setting as it lowers the number", |a, b| a < b),
@@ -281,7 +283,8 @@ fn said(base: &Point, ours: f64, [low, high]: [f64; 2]) -> String {
     )
 }
 
-/// At which sizes of the cache the condition is met: at all of them it says nothing about the size that the claim names.
+/// At which sizes of the cache the condition is met: at all of them it says nothing about the size that the
+/// claim names.
 fn cache_sizes(row: &Views, form: Form, entries: &[Entries]) -> String {
     let increase = |(quads, all, one): &Entries| (*quads, 100.0 * (all / one - 1.0));
     let (met, not): (Vec<_>, Vec<_>) =
@@ -381,7 +384,8 @@ fn over_entries(name: &'static str, row: &Views, entries: &[Entries]) -> Figure 
     )
 }
 
-/// The band over the distance of the eyes, a curve for each size of the image, with what the paper reports and the limits of the row.
+/// The band over the distance of the eyes, a curve for each size of the image, with what the paper reports
+/// and the limits of the row.
 fn banded(name: &'static str, row: &Views, form: Form, curves: &Curves) -> Figure {
     let named = |((across, down), points): &(Size, Vec<(f64, f64)>)| {
         line(&format!("{across}x{down} pixels"), points.clone())
