@@ -194,6 +194,10 @@ fn message(code: &Error, field: Option<&str>, word: &str) -> String {
         {
             not_whole()
         }
+        Error::InvalidIdentifier(_) if word.parse::<f64>().is_ok() => of_field(format!(
+            "`{word}` is a number, and a name is expected: one of the values that are listed for the field, or \
+             Assumed({word}, \"why\") for a number of a platform"
+        )),
         Error::InvalidIdentifier(_) | Error::SuggestRawIdentifier(_) => {
             of_field(format!("`{word}` is not a field name; write fields as `name: value`"))
         }

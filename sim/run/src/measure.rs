@@ -154,7 +154,7 @@ impl Resolution {
     pub fn raised_line(&self) -> Option<String> {
         self.raised.then(|| {
             format!(
-                "recorder: {}, raised from {} because the shortest frame is busy for {} only; --trace-rate sets it",
+                "recorder: {}, raised from {} for the shortest frame, busy for {}; --trace-rate sets it",
                 si(self.rate_hz, "Hz"),
                 si(DEFAULT_RATE_HZ, "Hz"),
                 si(self.shortest_busy_s, "s")

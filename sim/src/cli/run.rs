@@ -30,7 +30,7 @@ use crate::cli::parse::{duration, named, percent, rate, setting, share_below_one
     after_help = "Example:\n  quintile run Fox.glb --clip Run --frames 0..60 --lens 2 --samples 16 --out fox\n  \
     quintile run Fox.glb --frames 0..300 --accuracy 2% --verify --out fox\n  \
     quintile run ccd --set resolution=64 --set bins=8 --out ccd\n\n\
-    The chapter of a workload in the book lists its options and defaults; an unknown name after `--set` lists the known ones. Workloads \
+    The chapter of a workload in the book lists its options and defaults; an unknown name after `--set` lists the known ones, or the nearest. Workloads \
     refuse flags without effect.\n\n\
     Results are in DIR: images/, report.html, summary.json, frames.csv, trace.parquet, trace.csv, plots/ and \
     timeline.perfetto-trace (open it at ui.perfetto.dev). They appear together when all are whole; results of an earlier run \
@@ -95,8 +95,8 @@ pub struct RunArgs {
     #[arg(long, value_name = "PACING", default_value = "vsync", value_parser = pacing())]
     pub pacing: PacingChoice,
     /// Samples per second of the recorder, 1 to 10 million: a number in Hz, or with its unit, such as 50kHz
-    /// or 1MHz [default: 50kHz, or up to 1MHz where frames are shorter than two samples or, without idle time
-    /// between them, than fifty]
+    /// or 1MHz [default: 50kHz, or up to 1MHz where the shortest frame is busy for less than two samples or
+    /// lasts for fewer than fifty]
     #[arg(long, value_name = "HZ", allow_hyphen_values = true, value_parser = rate)]
     pub trace_rate: Option<f64>,
     /// Samples in one packet of the recorder; a packet is lost as a whole

@@ -130,7 +130,7 @@ impl<'a> Search<'a> {
     fn settings(&self, question: &Question) -> Result<Vec<Setting>, String> {
         let (given, axes) = (question.at.len(), self.spec.axes.len());
         if given != axes {
-            return Err(format!("`at` has {given} numbers, and there are {axes} axes"));
+            return Err(format!("`at` has {given} numbers for {axes} axes"));
         }
         if let Some(wrong) = question.at.iter().find(|place| !(0.0..=1.0).contains(*place)) {
             return Err(format!("`at` has {wrong}; places on an axis are 0 to 1"));
@@ -196,7 +196,7 @@ mod tests {
         assert_ne!(first.busy_ms, ask(&[0.25, 0.6]).busy_ms);
         let reason = |answer: Answer| answer.error.unwrap();
         assert!(reason(ask(&[0.25, 0.9])).contains("constraints[0] leaves this point out"));
-        assert!(reason(ask(&[0.5])).contains("1 numbers, and there are 2 axes"));
+        assert!(reason(ask(&[0.5])).contains("1 numbers for 2 axes"));
         assert!(reason(ask(&[0.5, 1.5])).contains("0 to 1"));
         assert_eq!(search.finish().unwrap(), 2);
         assert_eq!(Status::of(&out).unwrap().0.finished, 2);

@@ -76,7 +76,8 @@ pub struct InputArgs {
 /// Which frames.
 #[derive(Clone, Debug, Args)]
 pub struct FindArgs {
-    /// The start of one frame, in seconds or with its unit; may be given several times
+    /// The start of one frame, in seconds or with its unit; may be given several times. A trace with marks in
+    /// its description needs none
     #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = time)]
     pub mark: Vec<f64>,
     /// A file of starts: a number in each line, in seconds, or a table with a column start or time, its unit
@@ -86,7 +87,8 @@ pub struct FindArgs {
     /// Propose the start of a frame near the middle of the trace, where no mark is known; look at the result
     #[arg(long, conflicts_with_all = ["mark", "mark_file"])]
     pub auto: bool,
-    /// Where the last frame ends, in seconds or with its unit; the end of the trace without it
+    /// Where the last frame ends, in seconds or with its unit; without it the end mark of the trace, else its
+    /// end
     #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = time)]
     pub end: Option<f64>,
     /// The window around a mark that is compared with the trace: times before and after it, in milliseconds
@@ -94,7 +96,8 @@ pub struct FindArgs {
     #[arg(long, value_name = "PRE,POST", value_parser = window, allow_hyphen_values = true)]
     pub window: Option<(f64, f64)>,
     /// How starts are found: `squares` (sum of squared differences to the marked window), `normalized` (the
-    /// same, regardless of level and scale), `tracking` (the most likely sequence of starts), or `auto`
+    /// same, regardless of level and scale), `tracking` (the most likely sequence of starts), `consensus`
+    /// (agreement of four starts tried as marks), `segments` (one segmentation of the whole trace), or `auto`
     /// (chosen by the length and the clarity of the trace)
     #[arg(long, value_name = "METHOD", default_value_t)]
     pub method: FinderMethod,
