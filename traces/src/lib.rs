@@ -48,6 +48,7 @@
 //! - Input that is not a trace is an error that names file and row; nothing panics, and nothing is repaired silently.
 
 pub mod align;
+mod clock;
 pub mod curve;
 pub mod device;
 pub mod energy;
