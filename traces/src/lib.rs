@@ -54,6 +54,7 @@ pub mod device;
 pub mod energy;
 pub mod frames;
 pub mod io;
+mod pairing;
 pub mod pareto;
 pub mod pyramid;
 pub mod search;
