@@ -19,6 +19,7 @@ mod resolve_pass;
 mod seen;
 mod settings;
 mod shaded;
+mod target_checks;
 mod test_selection;
 mod tile_tests;
 mod worker;
