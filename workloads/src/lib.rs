@@ -35,6 +35,7 @@
 
 pub mod accumulation;
 mod bounded;
+mod builtin;
 mod bvh;
 pub mod catalog;
 pub mod caustics;
@@ -58,6 +59,7 @@ pub mod soft_shadows;
 pub mod stress;
 pub mod visibility;
 
+pub use builtin::builtin_names;
 pub use error::LoadError;
 pub use import::{load, load_text};
 pub use job::Job;
@@ -67,4 +69,3 @@ pub use regime::Regime;
 pub use rendering::{Rendering, write_hits};
 pub use samples::{FixedSamples, SampleChoice, write_samples};
 pub use scene::{Frame, FrameError, FrameMesh, Overrides, Scene, Settings};
-pub use shapes::builtin_names;
