@@ -1,4 +1,5 @@
-//! Settings of a frame: the functional parameters of the hardware and their checks, the image, and its samples.
+//! Settings of a frame: the functional parameters of the hardware and their checks, the image, and its
+//! samples.
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};

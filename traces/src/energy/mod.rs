@@ -1,5 +1,5 @@
-//! Energy between any two times, and per frame; the table of frames, `frames.csv`; found frames compared with the
-//! ground truth.
+//! Energy between any two times, and per frame; the table of frames, `frames.csv`; found frames compared with
+//! the ground truth.
 
 mod idle;
 mod integral;

@@ -69,7 +69,8 @@ impl Scene {
         Ok((centre, placed))
     }
 
-    /// Smallest and largest coordinates, relative to the origin of positions, while the shutter of `frame` is open.
+    /// Smallest and largest coordinates, relative to the origin of positions, while the shutter of `frame` is
+    /// open.
     pub(super) fn bounds(&self, frame: u32) -> Result<[DVec3; 2], FrameError> {
         let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         self.visit_points(frame, false, &mut |point| {
@@ -177,7 +178,8 @@ fn is_within(inner: &Range<u32>, outer: &Range<u32>) -> bool {
     outer.start <= inner.start && inner.end <= outer.end
 }
 
-/// All frames of a range that is not empty, or [`FITTED_FRAMES`] of them, evenly, with the first and the last.
+/// All frames of a range that is not empty, or [`FITTED_FRAMES`] of them, evenly, with the first and the
+/// last.
 fn some_of(frames: &Range<u32>) -> Vec<u32> {
     let count = frames.end - frames.start;
     let looked_at = count.min(FITTED_FRAMES);

@@ -39,8 +39,8 @@ struct Waiting {
 /// Packets of a frame not yet in any queue.
 ///
 /// Tiles wait for the set-up of their whole batch. The front end waits for the tiles of the batch before the
-/// last. A barrier waits for all packets before it, tiles after it wait for the barrier, and so does the front
-/// end if the barrier says so.
+/// last. A barrier waits for all packets before it, tiles after it wait for the barrier, and so does the
+/// front end if the barrier says so.
 #[derive(Clone, Debug)]
 pub(super) struct Sources {
     /// Packets of each path, in order, and the next of each path.
@@ -48,8 +48,8 @@ pub(super) struct Sources {
     next: [usize; 2],
     set_up: Vec<Gate>,
     traversed: Vec<Gate>,
-    /// Packets between barriers. Group 0 comes before the first barrier; each barrier is the first packet of its
-    /// group.
+    /// Packets between barriers. Group 0 comes before the first barrier; each barrier is the first packet of
+    /// its group.
     groups: Vec<Gate>,
     /// Each barrier alone, and its packet.
     barriers: Vec<Gate>,
@@ -182,8 +182,8 @@ impl Sources {
         }
     }
 
-    /// The unit that the next packet of a path waits for, if it may not start: the last unit of the tiles at a
-    /// barrier.
+    /// The unit that the next packet of a path waits for, if it may not start: the last unit of the tiles at
+    /// a barrier.
     fn waits_for(&self, path: usize, now: Time) -> Option<Unit> {
         let &next = self.paths[path].get(self.next[path])?;
         let closed = |gate: &Gate| !gate.is_open(now);
