@@ -48,11 +48,13 @@
 //! - Input that is not a trace is an error that names file and row; nothing panics, and nothing is repaired silently.
 
 pub mod align;
+mod clock;
 pub mod curve;
 pub mod device;
 pub mod energy;
 pub mod frames;
 pub mod io;
+mod pairing;
 pub mod pareto;
 pub mod pyramid;
 pub mod search;

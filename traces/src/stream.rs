@@ -3,13 +3,13 @@
 //! The method is that of [`frames`](crate::frames) by the sum of squares or the normalized distance, to the
 //! bit: a trace in memory is searched in the same way.
 
+pub use crate::clock::{Clock, clock};
 use crate::energy::FrameEnergy;
 use crate::frames::{
     FinderMethod, Found, FrameSpan, MarkError, Marks, MatchPlan, Matched, Placement, Samples,
 };
 use crate::io::{ReadError, ReadOptions, RowBatch, Rows};
 use crate::stats::PairSum;
-pub use crate::times::{Clock, clock};
 use crate::trace::Metadata;
 use rayon::prelude::*;
 use std::path::Path;

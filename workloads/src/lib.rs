@@ -35,6 +35,7 @@
 
 pub mod accumulation;
 mod bounded;
+mod builtin;
 mod bvh;
 pub mod catalog;
 pub mod caustics;
@@ -51,18 +52,20 @@ pub mod occlusion;
 pub mod points;
 mod regime;
 mod rendering;
+mod samples;
 pub mod scene;
 pub mod shapes;
 pub mod soft_shadows;
 pub mod stress;
 pub mod visibility;
 
+pub use builtin::builtin_names;
 pub use error::LoadError;
 pub use import::{load, load_text};
 pub use job::Job;
 pub use job::{Fingerprint, FingerprintError};
 pub use material::{Alpha, Light, Material};
 pub use regime::Regime;
-pub use rendering::{FixedSamples, Rendering, SampleChoice, write_hits, write_samples};
+pub use rendering::{Rendering, write_hits};
+pub use samples::{FixedSamples, SampleChoice, write_samples};
 pub use scene::{Frame, FrameError, FrameMesh, Overrides, Scene, Settings};
-pub use shapes::builtin_names;

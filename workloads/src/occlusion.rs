@@ -30,7 +30,7 @@ use crate::error::LoadError;
 use crate::job::{
     Drawn, Draws, Fact, Flag, Flags, Job, JobError, JobOptions, Need, OptionSource, Request, must_hold,
 };
-use crate::rendering::SampleChoice;
+use crate::samples::SampleChoice;
 use crate::scene::Settings;
 
 /// Kind of the queries.

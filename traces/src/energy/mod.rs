@@ -1,5 +1,5 @@
-//! Energy between any two times, and per frame; the table of frames, `frames.csv`; found frames compared with the
-//! ground truth.
+//! Energy between any two times, and per frame; the table of frames, `frames.csv`; found frames compared with
+//! the ground truth.
 
 mod idle;
 mod integral;
@@ -7,7 +7,8 @@ mod run;
 mod statistics;
 
 use crate::io::csv::push_decimal;
-pub use crate::stats::{Spread, TOLERANCE_S, found_beside_true, pairs, true_beside_found, true_frames};
+pub use crate::pairing::{TOLERANCE_S, found_beside_true, pairs, true_beside_found, true_frames};
+pub use crate::stats::Spread;
 use core::ops::Range;
 pub use idle::{
     Idle, IdleTooShort, SegmentEnergy, SegmentError, clipped_current, idle_in_frames, negative_power,
@@ -365,13 +366,6 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_is_true_if_its_ends_follow_each_other() {
-        let found_s = [0.0, 1.0, 3.0, 3.5, 4.0];
-        assert_eq!(true_frames(&found_s, &[0.0, 1.0, 2.0, 3.0, 4.0], 0.1), [true, false, false, false]);
-        assert!(true_frames(&[], &[1.0], 0.1).is_empty());
-    }
-
-    #[test]
     fn one_missed_one_false_one_late() {
         let found = [found(0.0, 1.0), found(1.01, 2.2), found(1.5, 1.0), found(3.0, 1.0)];
         let truth = [truth(0.0, 1.0), truth(1.0, 2.0), truth(2.0, 1.0), truth(3.0, 1.0), truth(4.0, 1.0)];
@@ -393,11 +387,5 @@ mod tests {
         let score = score(&[], &[truth(0.0, 1.0)], 0.1);
         assert_eq!((score.precision(), score.recall(), score.f1()), (0.0, 0.0, 0.0));
         assert_eq!((score.median_timing_error_s(), score.worst_energy_error()), (None, None));
-    }
-
-    #[test]
-    fn the_nearer_of_two_found_starts_is_the_partner() {
-        assert_eq!(pairs(&[0.9, 1.01], &[1.0], 0.2), [(1, 0)]);
-        assert_eq!(pairs(&[0.9, 1.01], &[1.0, 1.1], 0.2), [(0, 0), (1, 1)]);
     }
 }

@@ -10,7 +10,7 @@
 use super::marks::{Marks, Placement, Window};
 use super::threshold::{MIN_SEPARATION, Rule, Threshold};
 use super::{FinderMethod, Flag, Found, FrameStart, MIN_CONFIDENCE, Sampling, median_duration_s, spans};
-use crate::stats::{TOLERANCE_S, true_beside_found};
+use crate::pairing::{TOLERANCE_S, true_beside_found};
 use crate::trace::{Metadata, Trace};
 use core::ops::Range;
 use rayon::prelude::*;

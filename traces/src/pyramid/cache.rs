@@ -1,8 +1,8 @@
 //! The cache file of a pyramid: a header, checksums of groups of entries, and the entries, level by level.
 
 use super::{BLOCK, ENTRY_BYTES, Entry, FANOUT, Pyramid, Store};
+use crate::clock::Clock;
 use crate::io::{ReadOptions, WriteError, atomic};
-use crate::stream::Clock;
 use crc32c::crc32c;
 use std::fs;
 use std::fs::File;

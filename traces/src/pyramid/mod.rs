@@ -7,9 +7,9 @@ mod cache;
 use core::ops::Range;
 use std::path::{Path, PathBuf};
 
+use crate::clock::{Clock, clock};
 use crate::io::{ReadError, ReadOptions, RowBatch, Rows, Stamps, rate_of_steps_hz, read};
 use crate::pyramid::cache::Cached;
-use crate::stream::{Clock, clock};
 use crate::trace::Trace;
 
 /// Samples in a block of the lowest level: 12 bytes for 64 samples, with all levels above 0.2 bytes a sample,

@@ -17,7 +17,7 @@ use crate::job::{
     must_hold,
 };
 use crate::material::{PointLight, SurfaceShader};
-use crate::rendering::{SampleChoice, blur_warning};
+use crate::samples::{SampleChoice, blur_warning};
 use crate::scene::{Frame, Overrides, Scene};
 use crate::shapes;
 

@@ -15,9 +15,9 @@ use activity::spec::suggestion;
 use glam::DVec3;
 use warnings::{Code, Warning};
 
+use crate::builtin::{builtin, builtin_names};
 use crate::error::LoadError;
 use crate::scene::{Local, Node, Parts, Scene, Trs};
-use crate::shapes::{builtin, builtin_names};
 pub(crate) use obj::{Face, statements};
 use reader::{Soup, TriangleMaterials};
 

@@ -8,6 +8,7 @@ mod frame;
 mod graph;
 mod info;
 pub(crate) mod inside;
+mod measure;
 mod mesh;
 mod rays;
 mod settings;
@@ -19,10 +20,10 @@ pub use camera_spec::{CameraKey, CameraSpec, InterpolationSpec};
 pub use camera_used::{CameraSource, CameraUsed, OwnCamera};
 pub use frame::{Frame, FrameError, FrameMesh, NearSpace};
 pub use graph::{Channels, Clip, Graph, Local, Motion, Node, Property, Spin, Trs, world_poses};
-pub(crate) use info::lens_leaves_view;
 pub use info::{
     CameraInfo, ClipInfo, LensInfo, LightInfo, MaterialInfo, MeshInfo, SceneInfo, SettingsInfo, TextureInfo,
 };
+pub(crate) use measure::lens_leaves_view;
 pub(crate) use mesh::Bounds;
 pub use mesh::{Influences, Instance, Mesh, Normals, Skin, Target};
 pub use settings::{Overrides, Settings};
@@ -40,8 +41,8 @@ use crate::material::{Light, Material, SurfaceShader};
 use camera::{Standing, between};
 use deform::Pose;
 use frame::Interval;
-use info::Placed;
 use inside::Inside;
+use measure::Placed;
 
 /// A scene that can be rendered frame by frame.
 #[derive(Clone, Debug)]
@@ -195,7 +196,7 @@ impl Scene {
             self.playing = Some(index);
             self.room = None;
         }
-        let placed = |code| code == warnings::Code::CoordinatesRecentred || info::CODES.contains(&code);
+        let placed = |code| code == warnings::Code::CoordinatesRecentred || measure::CODES.contains(&code);
         self.warnings.retain(|warning| !placed(warning.code));
         self.prepare()?;
         Ok(self)

@@ -8,14 +8,16 @@ mod dram;
 mod levels;
 mod queue;
 mod shader;
+mod sources;
 mod stage;
 
 use activity::{LEVELS, LineAccess, PacketCounts, Unit};
 
 use self::dram::Dram;
 use self::levels::{L2, Levels};
-use self::queue::{Meter, Queue, Sources, Waits};
+use self::queue::{Meter, Queue, Waits};
 use self::shader::{CoreEnv, Shader};
+use self::sources::Sources;
 use self::stage::{Stage, StageEnv};
 use crate::clock::{Clocks, Time};
 use crate::demand::{CYCLE, DemandBuilder, ServiceDemand, Station, Work, port};

@@ -2,11 +2,11 @@
 
 use super::screen::{Buffers, Screen, minima};
 use super::{Piece, Template, powers};
+use crate::clock::Clock;
 use crate::frames::marks::{Marks, Placed, Placement};
 use crate::frames::subsample::vertex;
 use crate::frames::{FinderMethod, spacing};
 use crate::stats::{PairSum, mean};
-use crate::times::Clock;
 use core::ops::Range;
 use multiversion::multiversion;
 use rayon::prelude::*;
