@@ -9,7 +9,7 @@
 //! The queries are in the pipeline ([`pipeline::IntervalQueries`], [`pipeline::SampledQueries`]), which counts their
 //! work. *An interval query never reports a visible object as hidden.*
 //!
-//! - [`depths_of`]: depths of a scene, of which a [`pipeline::depth::Pyramid`] is made.
+//! - [`depths_of`]: depths of samples, of which a [`pipeline::depth::Pyramid`] is made.
 //! - [`WallScene`]: walls, solid or slatted, with boxes behind them; [`job()`]: `quintile run occlusion`.
 
 use std::sync::Arc;
