@@ -345,26 +345,11 @@ fn seen_area<R: Real>(ends: &[Points<R>], slopes: &[[R; 2]; 2]) -> R {
 
 #[cfg(test)]
 mod tests {
+    use super::super::counting::{Counted, madds};
     use super::*;
     use crate::geometry::{Cull, MovingVertex};
     use crate::random::{mix, unit};
     use crate::setup::{SetupResult, set_up};
-    use crate::traversal::Number;
-    use crate::traversal::counted::{Counted, count};
-
-    impl Real for Counted {
-        fn new(value: f64) -> Self {
-            Self::constant(value)
-        }
-
-        fn value(self) -> f64 {
-            self.value
-        }
-
-        fn madd(self, b: Self, c: Self) -> Self {
-            self * b + c
-        }
-    }
 
     fn triangle(moving: bool) -> Triangle {
         let open = [[-40.0, -40.0, 4.0], [40.0, -30.0, 5.0], [0.0, 50.0, 6.0]];
@@ -382,7 +367,7 @@ mod tests {
     const TILE: TileRect = TileRect { x: [-1.0, 1.0], y: [-1.0, 1.0] };
 
     fn counted<const N: usize>(values: [f64; N]) -> [Counted; N] {
-        values.map(Counted::constant)
+        values.map(Counted)
     }
 
     fn counting(facts: &Facts<f64>) -> Facts<Counted> {
@@ -408,17 +393,19 @@ mod tests {
             }
             let shear = Shear { parallel, ..SHEAR };
             let facts = counting(&Facts::new(&triangle(moving), &shear));
-            let (set_up, shutter) =
-                count(|| (bound == DepthBound::Planes || !moving).then(|| facts.shutter()));
+            let mut shutter = None;
+            let set_up =
+                madds(|| shutter = (bound == DepthBound::Planes || !moving).then(|| facts.shutter()));
             assert_eq!(set_up, set_up_madds(bound, moving), "set-up, {bound:?} {moving}");
             let lens_box = lens.then(|| [counted([-0.5, 0.5]); 2]);
             let region = Region { tile: [counted([-1.0, 1.0]); 2], lens: lens_box, t: counted([0.25, 0.5]) };
-            let (over, found) = count(|| facts.over(shutter.as_ref(), &region));
+            let mut found = None;
+            let over = madds(|| found = facts.over(shutter.as_ref(), &region));
             assert!(found.is_some());
             // The vertices at the ends of the interval are computed in any case.
             assert_eq!(over, interval_madds(bound, moving, lens), "tile, {bound:?} {moving} {lens}");
             if bound == DepthBound::LocalPlanes {
-                let (exact, _) = count(|| facts.exact(shutter.as_ref(), &region, Counted::constant(0.01)));
+                let exact = madds(|| _ = facts.exact(shutter.as_ref(), &region, Counted(0.01)));
                 assert_eq!(exact, exact_interval_madds(moving, lens), "exact, {moving} {lens}");
             }
         }

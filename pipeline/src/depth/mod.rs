@@ -162,6 +162,65 @@ fn hull<R: Real>(a: [R; 2], b: [R; 2]) -> [R; 2] {
     [a[0].smaller(b[0]), a[1].larger(b[1])]
 }
 
+#[cfg(test)]
+mod counting {
+    use super::Real;
+    use std::cell::Cell;
+    use std::ops::{Add, Div, Mul, Neg, Sub};
+
+    thread_local!(static MADDS: Cell<u32> = const { Cell::new(0) });
+
+    /// A number that counts multiply-adds; a separate addition, multiplication or division counts as one.
+    #[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
+    pub struct Counted(pub f64);
+
+    fn count(value: f64) -> Counted {
+        MADDS.set(MADDS.get() + 1);
+        Counted(value)
+    }
+
+    /// Multiply-adds of `work`.
+    pub fn madds(work: impl FnOnce()) -> u32 {
+        MADDS.set(0);
+        work();
+        MADDS.get()
+    }
+
+    macro_rules! operator {
+        ($($name:ident $method:ident $op:tt),*) => {$(
+            impl $name for Counted {
+                type Output = Self;
+                fn $method(self, other: Self) -> Self {
+                    count(self.0 $op other.0)
+                }
+            }
+        )*};
+    }
+
+    operator!(Add add +, Sub sub -, Mul mul *, Div div /);
+
+    impl Neg for Counted {
+        type Output = Self;
+        fn neg(self) -> Self {
+            Self(-self.0)
+        }
+    }
+
+    impl Real for Counted {
+        fn new(value: f64) -> Self {
+            Self(value)
+        }
+
+        fn value(self) -> f64 {
+            self.0
+        }
+
+        fn madd(self, b: Self, c: Self) -> Self {
+            count(self.0 * b.0 + c.0)
+        }
+    }
+}
+
 /// Three points.
 pub type Points<R> = [[R; 3]; 3];
 
