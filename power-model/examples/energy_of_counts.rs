@@ -8,7 +8,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut counts = Counts::default();
     counts[Event::ColourWrites] = 1 << 20;
     counts[Event::DramWriteBytes] = 4 << 20;
-    for bound in [Bound::Low, Bound::Nominal, Bound::High] {
+    for bound in Bound::ALL {
         let energy = PowerModel::at(&table, &platform, bound)?.counts_energy(&counts);
         println!("{bound:?}: {:.3} mJ", 1e3 * energy.total_j());
         for (part, joules) in energy.iter().filter(|(_, joules)| *joules > 0.0) {

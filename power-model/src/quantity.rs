@@ -203,6 +203,11 @@ pub enum Bound {
     High,
 }
 
+impl Bound {
+    /// All, in rising order.
+    pub const ALL: [Self; 3] = [Self::Low, Self::Nominal, Self::High];
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -148,21 +148,6 @@ impl EnergyTable {
         Self { entries: self.entries.iter().map(entry).collect(), ..self.clone() }
     }
 
-    /// Nominal energy per event at V0 in joules, indexed by event.
-    pub fn nominal(&self) -> [f64; Event::COUNT] {
-        self.joules(Bound::Nominal)
-    }
-
-    /// Lowest energy per event at V0 in joules, indexed by event.
-    pub fn low(&self) -> [f64; Event::COUNT] {
-        self.joules(Bound::Low)
-    }
-
-    /// Highest energy per event at V0 in joules, indexed by event.
-    pub fn high(&self) -> [f64; Event::COUNT] {
-        self.joules(Bound::High)
-    }
-
     /// Energy per event at V0 in joules, at one end of every interval.
     pub fn joules(&self, bound: Bound) -> [f64; Event::COUNT] {
         let mut joules = [0.0; Event::COUNT];
@@ -170,17 +155,6 @@ impl EnergyTable {
             joules[row.event() as usize] = row.joules(bound);
         }
         joules
-    }
-}
-
-impl EnergyRow {
-    /// Energy at one end of the interval, in joules.
-    pub fn joules(&self, bound: Bound) -> f64 {
-        match bound {
-            Bound::Low => self.low_j(),
-            Bound::Nominal => self.nominal_j(),
-            Bound::High => self.high_j(),
-        }
     }
 }
 
@@ -231,19 +205,9 @@ impl EnergyRow {
         self.event
     }
 
-    /// Smallest energy that the sources allow, in joules.
-    pub fn low_j(&self) -> f64 {
-        self.pj[0] * J_PER_PJ
-    }
-
-    /// Nominal energy in joules.
-    pub fn nominal_j(&self) -> f64 {
-        self.pj[1] * J_PER_PJ
-    }
-
-    /// Largest energy that the sources allow, in joules.
-    pub fn high_j(&self) -> f64 {
-        self.pj[2] * J_PER_PJ
+    /// Energy at one end of the interval, in joules.
+    pub fn joules(&self, bound: Bound) -> f64 {
+        self.pj[bound as usize] * J_PER_PJ
     }
 
     /// The row for a GPU that differs from that of the platform by `scaling`.
@@ -341,7 +305,7 @@ mod tests {
     #[test]
     fn bounds_enclose_the_nominal() {
         let table = EnergyTable::builtin("28nm").unwrap();
-        let (low, nominal, high) = (table.low(), table.nominal(), table.high());
+        let [low, nominal, high] = Bound::ALL.map(|bound| table.joules(bound));
         for event in Event::ALL {
             let at = event as usize;
             assert!(low[at] <= nominal[at] && nominal[at] <= high[at], "{event:?}");

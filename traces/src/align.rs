@@ -212,7 +212,7 @@ const MAX_SCALE_RATIO: f64 = 1.3;
 
 /// The line that pairs most stamps, and of those with as many the one that leaves least; with whether another
 /// place pairs nearly as many. `None` where none pairs `least`.
-pub(super) fn paired(stamps_s: &[f64], starts_s: &[f64], least: usize) -> Option<Alignment> {
+fn paired(stamps_s: &[f64], starts_s: &[f64], least: usize) -> Option<Alignment> {
     let gap_s = usual_gap(starts_s)?;
     let scale = gap_s / usual_gap(stamps_s)?;
     let fewer = stamps_s.len().min(starts_s.len());

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 /// The largest |time| a trace may reach, s: its nanoseconds must fit an i64.
-pub const TIME_LIMIT_S: f64 = 9.0e9;
+const TIME_LIMIT_S: f64 = 9.0e9;
 /// The lowest and highest sample rate, Hz: above it, time stamps in whole nanoseconds would be equal.
 pub const RATE_LIMITS_HZ: [f64; 2] = [1e-6, 1e8];
 
@@ -31,7 +31,7 @@ pub enum TraceError {
         /// The rate, Hz.
         rate_hz: f64,
     },
-    /// Start or end is not finite or beyond [`TIME_LIMIT_S`].
+    /// Start or end is not finite or beyond `TIME_LIMIT_S`.
     #[error("the trace reaches {time_s} s: times must be finite and within 9e9 s of zero")]
     Time {
         /// The time, s.

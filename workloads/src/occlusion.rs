@@ -9,7 +9,7 @@
 //! The queries are in the pipeline ([`pipeline::IntervalQueries`], [`pipeline::SampledQueries`]), which counts their
 //! work. *An interval query never reports a visible object as hidden.*
 //!
-//! - [`depths()`]: depths of a scene, of which a [`pipeline::depth::Pyramid`] is made.
+//! - [`depths_of`]: depths of samples, of which a [`pipeline::depth::Pyramid`] is made.
 //! - [`WallScene`]: walls, solid or slatted, with boxes behind them; [`job()`]: `quintile run occlusion`.
 
 use std::sync::Arc;
@@ -21,7 +21,7 @@ use pipeline::random::mix;
 use pipeline::sampling::SampleSource;
 use pipeline::{
     Camera, Cull, Draw, DrawError, Geometry, Gpu, IntervalAnswer, IntervalQueries, Lane, Lens, MovingBox,
-    PassError, Query, RasterPass, SampledAnswer, Shader, ShadingPoint, Target, Viewport,
+    Query, RasterPass, SampledAnswer, Shader, ShadingPoint, Target, Viewport,
 };
 use serde::{Deserialize, Serialize};
 use warnings::{Code, Warning};
@@ -406,18 +406,6 @@ impl WallSceneSpec {
         let about = |at: Vec3| [at - half, at + half];
         MovingBox { open: about(at - half_motion), close: about(at + half_motion) }
     }
-}
-/// Depth of every sample of `draws` in the order `(y width + x) per_pixel + index`, infinite for no hit.
-///
-/// # Errors
-/// [`PassError`] if the hardware cannot draw it.
-pub fn depths(
-    camera: &Camera,
-    draws: &[Draw<'_>],
-    settings: &pipeline::Settings<'_>,
-) -> Result<Vec<f32>, PassError> {
-    let pass = RasterPass::new(camera, draws, settings).onto(Target::Depth).with_visible();
-    Ok(depths_of(&pass.uncounted()?.visible))
 }
 
 /// Depths of visible samples, as [`pipeline::Rendered::visible`] has them.

@@ -9,10 +9,6 @@ use pipeline::sampling::{LensRegion, LensRegions, SampleSpec};
 use pipeline::*;
 use proptest::prelude::*;
 
-fn culls() -> impl Strategy<Value = Cull> {
-    prop_oneof![Just(Cull::None), Just(Cull::Back), Just(Cull::Front)]
-}
-
 fn depths() -> impl Strategy<Value = DepthSpec> {
     let boxes = (1..=5_u32, 1..=4_u32, 1..=9_u32).prop_map(|(u, v, t)| [u, v, t]);
     let bound = (0..4_usize).prop_map(|index| DepthBound::ALL[index]);

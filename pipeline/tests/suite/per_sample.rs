@@ -1,5 +1,6 @@
 //! Shading of every sample at its own position, the alternative to the shading cache.
 
+use crate::common::stage::quad;
 use crate::common::{Flat, Plain, QUAD, Soup, SoupKind, camera, pixel_camera, rectangle, spec};
 use activity::{Counts, Event};
 use glam::{Vec2, Vec3, Vec4};
@@ -26,10 +27,6 @@ fn render_with(shading: Shading, per_pixel: u32, draws: &[Draw<'_>]) -> Rendered
     let spec = PipelineSpec { shading, ..spec(Features::ALL) };
     let settings = Settings { spec: &spec, viewport, samples: &table, background: Vec3::ZERO };
     RasterPass::new(&pixel_camera(viewport, 0.25), draws, &settings).render(|_, _| ()).unwrap()
-}
-
-fn quad<'a>(open: &'a [Vec3], close: &'a [Vec3], shader: &'a dyn Shader) -> Draw<'a> {
-    Draw::new(Geometry::new(open, close, &QUAD).unwrap(), shader, Cull::None)
 }
 
 /// Larger than the image.

@@ -41,10 +41,6 @@ fn agree(found: &Seen, expected: &Seen) -> Result<(), TestCaseError> {
     Ok(())
 }
 
-fn culls() -> impl Strategy<Value = Cull> {
-    prop_oneof![Just(Cull::None), Just(Cull::Back), Just(Cull::Front)]
-}
-
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(96))]
 

@@ -144,16 +144,16 @@ pub const REGISTER_BYTES: f64 = 102.4;
 /// Area of an FP32 multiply-add in squares of the node's length. Low: the multiplier of Aladdin's 40 nm
 /// library alone, 8970 um2, as a fused unit shares the adder; nominal: with its adder, 4360 um2; high: 0.045
 /// mm2 at 32 nm, laid out and with variable precision (Kaul et al., ISSCC 2012).
-pub(super) const MADD_SQUARES: [f64; 3] = [8970e6 / 1600.0, 13_330e6 / 1600.0, 45_000e6 / 1024.0];
+const MADD_SQUARES: [f64; 3] = [8970e6 / 1600.0, 13_330e6 / 1600.0, 45_000e6 / 1024.0];
 
 /// Leakage of an FP32 adder and multiplier of Aladdin's 40 nm library, in milliwatts.
-pub(super) const MADD_LEAKAGE_MW: f64 = 0.053 + 0.120;
+const MADD_LEAKAGE_MW: f64 = 0.053 + 0.120;
 /// Node of that library, in nanometres.
-pub(super) const MADD_LEAKAGE_NM: u32 = 40;
+const MADD_LEAKAGE_NM: u32 = 40;
 
 /// Energy of an FP32 multiply-add in picojoules by node: Horowitz at 45 nm, and Stillmaker and Baas (2017) at
 /// equal voltage.
-pub(super) fn madd_pj(node_nm: u32) -> f64 {
+fn madd_pj(node_nm: u32) -> f64 {
     let ratio = match node_nm {
         ..=24 => 0.315,
         25..=29 => 0.51,

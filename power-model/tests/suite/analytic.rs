@@ -10,7 +10,7 @@ const US_PS: u64 = 1_000_000;
 fn an_event_at_a_known_rate_draws_rate_times_energy() {
     // 3000 per microsecond are 3e9 per second.
     let frame = model(&bare()).frame(&steady(US_PS, 4, Event::SampleMadds, 3000, 0)).unwrap();
-    let expected_w = 3e9 * table().nominal()[Event::SampleMadds as usize];
+    let expected_w = 3e9 * table().joules(Bound::Nominal)[Event::SampleMadds as usize];
     for watts in frame.watts() {
         assert!((watts[at(Unit::SampleTest)] / expected_w - 1.0).abs() < 1e-14);
         assert_eq!(watts.iter().sum::<f64>(), watts[at(Unit::SampleTest)]);
@@ -59,7 +59,7 @@ fn a_partial_last_bin_keeps_its_joules_and_its_watts_are_over_its_own_length() {
     let mut timeline = steady(US_PS, 3, Event::SampleMadds, 1000, 0);
     timeline.duration_ps = 2 * US_PS + US_PS / 4;
     let frame = model(&platform).frame(&timeline).unwrap();
-    let event_j = 1000.0 * table().nominal()[Event::SampleMadds as usize];
+    let event_j = 1000.0 * table().joules(Bound::Nominal)[Event::SampleMadds as usize];
     assert_eq!(frame.energy()[Part::Unit(Unit::SampleTest)], event_j + event_j + event_j);
     assert!((frame.energy()[Part::Constant] / (2.0 * 2.25e-6) - 1.0).abs() < 1e-14);
     let last_w = frame.watts()[2];

@@ -3,6 +3,7 @@
 //! The table holds three digits; a row that differs from its derivation fails here.
 
 use activity::{Bin, Event, Timeline};
+use power_model::Bound;
 
 use super::common::{model, reference, table};
 
@@ -167,7 +168,7 @@ fn every_row_follows_from_its_ingredients() {
     for row in table().rows() {
         let expected = front(row.event()).or_else(|| back(row.event()));
         let expected = expected.unwrap_or_else(|| panic!("{:?} is not derived here", row.event()));
-        let written = [row.low_j(), row.nominal_j(), row.high_j()].map(|joules| joules * 1e12);
+        let written = Bound::ALL.map(|bound| row.joules(bound) * 1e12);
         for (written_pj, expected_pj) in written.into_iter().zip(expected) {
             let off = (written_pj / expected_pj - 1.0).abs();
             assert!(off < 6e-3, "{:?}: {written_pj} pJ written, {expected_pj} pJ derived", row.event());
@@ -180,8 +181,8 @@ fn every_row_follows_from_its_ingredients() {
 /// width), and the shader core's.
 #[test]
 fn a_multiply_add_lies_between_published_figures() {
-    let madd_pj = table().nominal()[Event::SampleMadds as usize] * 1e12;
-    let shader_pj = table().nominal()[Event::ShaderOps as usize] * 1e12;
+    let madd_pj = table().joules(Bound::Nominal)[Event::SampleMadds as usize] * 1e12;
+    let shader_pj = table().joules(Bound::Nominal)[Event::ShaderOps as usize] * 1e12;
     assert!(FMUL < madd_pj && madd_pj < 40.0 / 4.0, "{madd_pj} pJ");
     assert!(madd_pj < shader_pj && shader_pj < 31.0, "{shader_pj} pJ");
 }
@@ -189,7 +190,7 @@ fn a_multiply_add_lies_between_published_figures() {
 /// Energy per byte grows with the distance from the arithmetic: cache line, L2 line, DRAM.
 #[test]
 fn energy_per_byte_grows_with_distance() {
-    for joules in [table().low(), table().nominal(), table().high()] {
+    for joules in Bound::ALL.map(|bound| table().joules(bound)) {
         let per_byte = [
             joules[Event::TextureLines as usize] / 64.0,
             joules[Event::L2Reads as usize] / 64.0,
@@ -202,7 +203,7 @@ fn energy_per_byte_grows_with_distance() {
 /// A line costs more in each level on the way to memory, so that a hit saves energy.
 #[test]
 fn energy_per_line_grows_from_level_to_level() {
-    for joules in [table().low(), table().nominal(), table().high()] {
+    for joules in Bound::ALL.map(|bound| table().joules(bound)) {
         let dram = 64.0 * joules[Event::DramReadBytes as usize];
         let levels = [Event::L2Reads, Event::LlcReads, Event::EdramReads].map(|event| joules[event as usize]);
         assert!(levels.is_sorted() && levels[2] < 0.55 * dram, "{levels:?}, {dram}");
@@ -212,7 +213,7 @@ fn energy_per_line_grows_from_level_to_level() {
 /// An LPDDR3 channel pair at its peak of 12.8 GB/s draws about 1 W (43 pJ/B in the device alone: 0.55 W).
 #[test]
 fn memory_at_its_peak_draws_between_the_device_and_three_times_it() {
-    let peak_w = 12.8e9 * table().nominal()[Event::DramReadBytes as usize];
+    let peak_w = 12.8e9 * table().joules(Bound::Nominal)[Event::DramReadBytes as usize];
     assert!((0.55..3.0 * 0.55).contains(&peak_w), "{peak_w} W");
 }
 

@@ -93,7 +93,7 @@ proptest! {
 
     #[test]
     fn low_nominal_and_high_stay_in_order(timeline in timeline()) {
-        let joules = [Bound::Low, Bound::Nominal, Bound::High].map(|bound| {
+        let joules = Bound::ALL.map(|bound| {
             let model = PowerModel::at(&super::common::table(), &reference(), bound).unwrap();
             model.frame(&timeline).unwrap().energy().total_j()
         });

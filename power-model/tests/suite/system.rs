@@ -2,8 +2,8 @@
 
 use activity::Event;
 use power_model::{
-    Cause, Circumstances, FramePower, PacedFrame, Pacing, PacingError, Platform, Pulse, Run, Surrounded,
-    overlay, pace,
+    Bound, Cause, Circumstances, FramePower, PacedFrame, Pacing, PacingError, Platform, Pulse, Run,
+    Surrounded, overlay, pace,
 };
 use proptest::prelude::*;
 use traces::device::{Device, DeviceSpec};
@@ -182,12 +182,12 @@ fn a_table_of_another_node_is_scaled_in_the_core_only() {
     let hd_4000 = Platform::builtin("hd_4000").unwrap();
     let (scaled, table) = (model(&hd_4000), table());
     let volts = hd_4000.v_v.value() / table.v0_v();
-    let expected = 0.62 * volts * volts * table.nominal()[Event::SampleMadds as usize];
+    let expected = 0.62 * volts * volts * table.joules(Bound::Nominal)[Event::SampleMadds as usize];
     assert!((scaled.event_j(Event::SampleMadds) / expected - 1.0).abs() < 1e-12);
     // The platform's own rows are not scaled.
     assert!((scaled.event_j(Event::DramReadBytes) / 24e-12 - 1.0).abs() < 1e-12);
     let memory = model(&phone()).event_j(Event::DramReadBytes);
-    assert_eq!(memory, table.nominal()[Event::DramReadBytes as usize]);
+    assert_eq!(memory, table.joules(Bound::Nominal)[Event::DramReadBytes as usize]);
 }
 
 #[test]

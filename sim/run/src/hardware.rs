@@ -373,7 +373,7 @@ pub(crate) mod tests {
             start in prop::collection::vec(0..3_u32, GROW.len()),
             which in 0..GROW.len(),
             by in 1..5_u32,
-            bound in prop::sample::select(vec![Bound::Low, Bound::Nominal, Bound::High]),
+            bound in prop::sample::select(Bound::ALL.to_vec()),
         ) {
             let at = |index: usize, doublings: u32| (GROW[index].0, GROW[index].1 * f64::from(1 << doublings));
             let few: Vec<_> = (0..GROW.len()).map(|index| at(index, start[index])).collect();
@@ -430,7 +430,7 @@ pub(crate) mod tests {
             let gpu = GpuSpec::load(&platform.made_for).unwrap();
             let scaling = scaling(&gpu, &platform).unwrap();
             let table = EnergyTable::builtin("28nm").unwrap();
-            for bound in [Bound::Low, Bound::Nominal, Bound::High] {
+            for bound in Bound::ALL {
                 assert_eq!(platform.on(&scaling, bound), platform.at(bound), "{name}");
                 let [plain, scaled] = [
                     PowerModel::at(&table, &platform, bound),

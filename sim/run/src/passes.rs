@@ -47,7 +47,7 @@ pub struct WorkSummary {
 }
 
 /// Name of the last row: results that are written to memory when a frame ends.
-pub const WRITE_BACK: &str = "write back";
+const WRITE_BACK: &str = "write back";
 /// Largest number of draws of a pass that are listed.
 const MAX_DRAWS: usize = 256;
 

@@ -368,7 +368,7 @@ fn ratio(full: u64, preview: u64) -> f64 {
 }
 
 /// Index of the frame with the median cycles of its preview; the earlier of two.
-pub fn median(previews: &[FramePreview]) -> usize {
+fn median(previews: &[FramePreview]) -> usize {
     let mut order: Vec<usize> = (0..previews.len()).collect();
     order.sort_by_key(|&place| (previews[place].cycles, place));
     order[order.len() / 2]

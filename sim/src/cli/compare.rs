@@ -4,9 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use output::table::{Table, count_or_digits, digits, grouped, si};
-use run::compare::{
-    Change, CompareError, Comparison, FolderComparison, ImageComparison, RunComparison, compare, shown,
-};
+use run::compare::{Change, Comparison, FolderComparison, ImageComparison, RunComparison, compare, shown};
 
 use super::{Failure, may_hold_results, print, print_json};
 
@@ -34,12 +32,6 @@ pub struct CompareArgs {
     /// Print as JSON
     #[arg(long)]
     pub json: bool,
-}
-
-impl From<CompareError> for Failure {
-    fn from(error: CompareError) -> Self {
-        Self { message: error.to_string(), code: if error.is_usage() { 2 } else { 1 } }
-    }
 }
 
 pub(super) fn run(args: &CompareArgs) -> Result<(), Failure> {

@@ -24,6 +24,8 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use ::run::RunError;
+use ::run::compare::CompareError;
+use ::sweep::SweepError;
 use args::MessageArgs;
 use chart::{ChartArgs, StressArgs};
 use clap::error::ErrorKind;
@@ -35,7 +37,12 @@ use info::InfoArgs;
 use output::terminal::Terminal;
 use run::RunArgs;
 use trace::TraceArgs;
-use traces::io::{ReadOptions, Rows, atomic};
+use traces::align::AlignError;
+use traces::frames::MarkError;
+use traces::io::{ReadError, ReadOptions, Rows, atomic};
+use traces::pareto::ParetoError;
+use traces::table::TableReadError;
+use traces::times::TimesError;
 use visibility::{SamplesArgs, VisibilityArgs};
 
 /// A cycle-approximate simulator of a tile-based 5D rasterization pipeline, with an energy trace for every frame.
@@ -171,11 +178,20 @@ struct Failure {
     code: u8,
 }
 
-impl From<RunError> for Failure {
-    fn from(error: RunError) -> Self {
-        Self { message: error.to_string(), code: if error.is_usage() { 2 } else { 1 } }
-    }
+/// Failures with the message of an error, and an exit code that depends on it.
+macro_rules! failures {
+    ($code:expr => $($error:ty),+) => {$(
+        impl From<$error> for Failure {
+            fn from(error: $error) -> Self {
+                let code: fn(&$error) -> u8 = $code;
+                Self { message: error.to_string(), code: code(&error) }
+            }
+        }
+    )+};
 }
+
+failures!(|error| if error.is_usage() { 2 } else { 1 } => RunError, CompareError, SweepError);
+failures!(|_| 2 => AlignError, MarkError, ParetoError, ReadError, TableReadError, TimesError);
 
 impl From<workloads::LoadError> for Failure {
     fn from(error: workloads::LoadError) -> Self {

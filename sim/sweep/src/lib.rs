@@ -40,8 +40,8 @@ pub use merge::{RESULTS, merge};
 pub use plan::{Plan, Point};
 pub use points::combinations;
 pub use report::{
-    ALL_WORKLOADS, Cost, Design, Effect, Failure, Interaction, Measure, NearBest, NoEffect, Pair,
-    RatedDesign, Report, ReportOptions, Share, Winner,
+    Cost, Design, Effect, Failure, Interaction, Measure, NearBest, NoEffect, Pair, RatedDesign, Report,
+    ReportOptions, Share, Winner,
 };
 pub use setting::{Setting, Text, is_option, with};
 pub use slurm::{Scripts, SlurmArray, SlurmJob, submit};

@@ -45,13 +45,14 @@ use activity::{LineAccess, Packet};
 use serde::{Deserialize, Serialize};
 use warnings::{Code, Warning};
 
+use packet::MAX_CYCLES;
 use stepped::{Stalled, StepOptions, Stream};
 
 pub use bound::{BoundClock, Totals, bound};
 pub use clock::{Clocks, Time};
 pub use demand::{CLIENTS, CYCLE, DemandBuilder, ServiceDemand, Station, Work};
 pub use draws::{DrawSpan, PassTime};
-pub use packet::{MAX_CYCLES, PacketClock};
+pub use packet::PacketClock;
 pub use recorder::{Reason, Recorder, Stalls, UnitTime};
 pub use spec::{
     BinsSpec, Chips, ClientSpec, Clock, Common, Cycles, DramSpec, Entries, MachineSpec, Rates, RefreshSpec,

@@ -228,37 +228,6 @@ pub(super) fn uncovered_work(power: &[f64], starts: &[f64]) -> Option<Warning> {
     ))
 }
 
-#[cfg(test)]
-mod uncovered_tests {
-    use super::*;
-
-    /// Idle of 500 samples, frames of 100, busy for 70, and idle again.
-    fn power(frames: usize) -> Vec<f64> {
-        let work = (0..100 * frames).map(|i| if i % 100 < 70 { 3.0 } else { 1.0 });
-        [1.0; 500].into_iter().chain(work).chain([1.0; 500]).collect()
-    }
-
-    fn starts(from: usize, to: usize) -> Vec<f64> {
-        (from..to).map(|frame| 500.0 + 100.0 * frame as f64).collect()
-    }
-
-    #[test]
-    fn frames_left_out_at_either_end_are_counted() {
-        let power = power(40);
-        assert_eq!(uncovered_lengths(&power, &starts(0, 40)), Some(0));
-        assert_eq!(uncovered_lengths(&power, &starts(7, 40)), Some(7));
-        assert_eq!(uncovered_lengths(&power, &starts(7, 30)), Some(17));
-        assert_eq!(uncovered_lengths(&power, &starts(0, 2)), None);
-    }
-
-    #[test]
-    fn one_frame_more_or_less_is_no_matter() {
-        let power = power(40);
-        assert!(uncovered_work(&power, &starts(1, 39)).is_none());
-        assert!(uncovered_work(&power, &starts(0, 37)).unwrap().message.contains("about 3 frames"));
-    }
-}
-
 /// Found starts that are tried as marks.
 const TRIED: usize = 4;
 /// Samples about the mark in which they are tried: hundreds of frames, and little beside a search of a long trace.
@@ -384,16 +353,7 @@ fn weight(found_s: &[f64], marks: &Marks, part: &Trace) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// Starts with gaps of so many seconds, all of one confidence.
-    fn starts(gaps_s: &[f64], confidence: f64) -> Vec<FrameStart> {
-        let mut time_s = 0.0;
-        let mut start = |gap_s: f64| {
-            time_s += gap_s;
-            FrameStart { time_s, distance_w2: 0.0, confidence, marked: false }
-        };
-        core::iter::once(0.0).chain(gaps_s.iter().copied()).map(&mut start).collect()
-    }
+    use crate::frames::tests::starts;
 
     #[test]
     fn many_frames_of_low_confidence_give_a_warning() {
@@ -406,5 +366,31 @@ mod tests {
             found.warnings.iter().any(|warning| warning.code == "low-confidence")
         };
         assert!(!warned(0) && !warned(2) && warned(3));
+    }
+
+    /// Idle of 500 samples, frames of 100, busy for 70, and idle again.
+    fn power(frames: usize) -> Vec<f64> {
+        let work = (0..100 * frames).map(|i| if i % 100 < 70 { 3.0 } else { 1.0 });
+        [1.0; 500].into_iter().chain(work).chain([1.0; 500]).collect()
+    }
+
+    fn every_100(from: usize, to: usize) -> Vec<f64> {
+        (from..to).map(|frame| 500.0 + 100.0 * frame as f64).collect()
+    }
+
+    #[test]
+    fn frames_left_out_at_either_end_are_counted() {
+        let power = power(40);
+        assert_eq!(uncovered_lengths(&power, &every_100(0, 40)), Some(0));
+        assert_eq!(uncovered_lengths(&power, &every_100(7, 40)), Some(7));
+        assert_eq!(uncovered_lengths(&power, &every_100(7, 30)), Some(17));
+        assert_eq!(uncovered_lengths(&power, &every_100(0, 2)), None);
+    }
+
+    #[test]
+    fn one_frame_more_or_less_is_no_matter() {
+        let power = power(40);
+        assert!(uncovered_work(&power, &every_100(1, 39)).is_none());
+        assert!(uncovered_work(&power, &every_100(0, 37)).unwrap().message.contains("about 3 frames"));
     }
 }

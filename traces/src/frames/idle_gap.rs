@@ -33,7 +33,7 @@ struct Bound {
 const BOUNDS: [Bound; 2] =
     [Bound { rises: 0.1, above: 0.1, moved: 0.06 }, Bound { rises: 0.35, above: 0.5, moved: 0.08 }];
 /// Frames on either side that are averaged.
-pub(super) const NEIGHBOURS: usize = 8;
+const NEIGHBOURS: usize = 8;
 /// Samples that are averaged.
 const SMOOTHED_SAMPLES: usize = 3;
 /// Smaller moves, in samples, are noise.
@@ -201,6 +201,7 @@ pub(super) fn lowest_w(power: &[f64], start: f64, width: usize, gap_samples: usi
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::stats::Random;
 
     const WIDTH: usize = 250;
 
@@ -285,18 +286,10 @@ mod tests {
         assert_eq!(shifted_gap_confidence(&[1.0; 9], &[3.0], &[true], WIDTH), [1.0]);
         assert!(shifted_gap_confidence(&[], &[], &[], WIDTH).is_empty());
     }
-}
-
-#[cfg(test)]
-mod no_idle_gap_tests {
-    use super::*;
-    use crate::stats::Random;
-
-    const WIDTH: usize = 250;
 
     /// 40 frames with a rest of `rest` samples before 300 of draws, in noise of up to `noise_w` either way,
     /// and their starts.
-    fn frames(rest: usize, noise_w: f64) -> (Vec<f64>, Vec<f64>) {
+    fn frames_in_noise(rest: usize, noise_w: f64) -> (Vec<f64>, Vec<f64>) {
         let (mut power, mut starts) = (vec![1.2; 300], Vec::new());
         for _ in 0..40 {
             power.extend(vec![0.2; rest]);
@@ -311,7 +304,7 @@ mod no_idle_gap_tests {
         (power, starts)
     }
 
-    fn suspect(power: &[f64], starts: &[f64], noise_w: f64) -> Vec<usize> {
+    fn amidst_work(power: &[f64], starts: &[f64], noise_w: f64) -> Vec<usize> {
         let left = missing_gap_confidence(power, starts, WIDTH, noise_w);
         (0..starts.len()).filter(|&start| left[start] < 1.0).collect()
     }
@@ -319,28 +312,28 @@ mod no_idle_gap_tests {
     #[test]
     fn a_start_amidst_work_is_suspect_and_those_around_it_are_not() {
         for noise_w in [0.0, 0.05] {
-            let (power, mut starts) = frames(10, noise_w);
+            let (power, mut starts) = frames_in_noise(10, noise_w);
             starts.insert(21, starts[20] + 155.0);
             starts.insert(31, starts[30] + 155.0);
-            assert_eq!(suspect(&power, &starts, noise_w), [21, 31]);
+            assert_eq!(amidst_work(&power, &starts, noise_w), [21, 31]);
         }
     }
 
     #[test]
     fn where_every_other_frame_is_cut_in_two_the_cuts_are_what_is_suspect() {
-        let (power, starts) = frames(10, 0.02);
+        let (power, starts) = frames_in_noise(10, 0.02);
         let cut: Vec<f64> = starts[..39].iter().flat_map(|start| [*start, start + 155.0]).collect();
-        assert_eq!(suspect(&power, &cut, 0.02), (0..39).map(|frame| 2 * frame + 1).collect::<Vec<_>>());
+        assert_eq!(amidst_work(&power, &cut, 0.02), (0..39).map(|frame| 2 * frame + 1).collect::<Vec<_>>());
     }
 
     #[test]
     fn where_no_frame_has_a_rest_or_noise_hides_it_nothing_is_suspect() {
-        let (power, starts) = frames(0, 0.05);
-        assert!(suspect(&power, &starts, 0.05).is_empty());
-        let (power, mut starts) = frames(10, 2.0);
+        let (power, starts) = frames_in_noise(0, 0.05);
+        assert!(amidst_work(&power, &starts, 0.05).is_empty());
+        let (power, mut starts) = frames_in_noise(10, 2.0);
         starts.insert(21, starts[20] + 155.0);
-        assert!(suspect(&power, &starts, 2.0).is_empty());
-        assert!(suspect(&[], &[], 0.0).is_empty());
+        assert!(amidst_work(&power, &starts, 2.0).is_empty());
+        assert!(amidst_work(&[], &[], 0.0).is_empty());
         assert_eq!(missing_gap_confidence(&[1.0; 20], &[3.0, 9.0], 10, 0.0), [1.0; 2]);
     }
 

@@ -415,7 +415,7 @@ mod tests {
     const FINE: Sampling = Sampling { window: 250, rate_hz: 50e3 };
 
     /// Starts with gaps of so many seconds, all of one confidence.
-    fn starts(gaps_s: &[f64], confidence: f64) -> Vec<FrameStart> {
+    pub(super) fn starts(gaps_s: &[f64], confidence: f64) -> Vec<FrameStart> {
         let mut time_s = 0.0;
         let mut start = |gap_s: f64| {
             time_s += gap_s;

@@ -34,7 +34,7 @@ pub fn description_path(path: &Path) -> PathBuf {
 
 /// The places of a description, in the order in which they are tried: [`description_path`], then
 /// [`sidecar_path`], also without `.gz`.
-pub(crate) fn description_paths(path: &Path) -> impl Iterator<Item = PathBuf> {
+fn description_paths(path: &Path) -> impl Iterator<Item = PathBuf> {
     let inner = path.with_extension("");
     let unpacked = inner.extension().is_some().then(|| sidecar_path(&inner));
     [description_path(path), sidecar_path(path)].into_iter().chain(unpacked)
@@ -71,7 +71,7 @@ pub fn write<W: Write + Send>(trace: &dyn TraceReader, out: W) -> Result<(), Wri
 ///
 /// # Errors
 /// As [`write()`].
-pub fn write_with<W: Write + Send>(trace: &dyn TraceReader, out: W, delimiter: u8) -> Result<(), WriteError> {
+fn write_with<W: Write + Send>(trace: &dyn TraceReader, out: W, delimiter: u8) -> Result<(), WriteError> {
     let out = BufWriter::with_capacity(1 << 16, out);
     let mut writer = Writer { out, header: trace.header(), delimiter: char::from(delimiter) };
     writer.head().map_err(encode)?;

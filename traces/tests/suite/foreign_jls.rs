@@ -1,14 +1,11 @@
 //! JLS as pyjls writes it (`tests/foreign/make_jls.py`), whole and damaged.
 
+use crate::common::foreign;
 use crate::common::jls::sealed;
 use proptest::prelude::*;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use traces::Trace;
 use traces::io::{ReadError, ReadOptions, RepairKind, Rows, read};
-
-fn foreign(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/foreign").join(name)
-}
 
 fn named(voltage: &str, current: &str) -> ReadOptions {
     let column = |name: &str| Some(name.to_owned());

@@ -1,15 +1,12 @@
 //! Parquet as other programs write it: optional columns, dictionaries, every way of packing (pyarrow, see the
 //! file's name).
 
+use crate::common::foreign;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use std::path::Path;
 use traces::io::{ReadOptions, read};
 use traces::table::InputTable;
-
-fn foreign(name: &str) -> std::path::PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/foreign").join(name)
-}
 
 #[test]
 fn packed_pages_hold_the_same_samples_as_the_text_beside_them() {

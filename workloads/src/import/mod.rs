@@ -158,37 +158,41 @@ pub(crate) fn foreign(path: &Path) -> Option<String> {
     Some(format!("it is {name} file, which is not read; {convert}"))
 }
 
-/// A material with a normal or bump map.
-fn normal_map(material: &str) -> Warning {
-    about_material(
-        Code::NormalMapIgnored,
-        "normal map",
-        "ignored: surfaces keep the normals of their vertices",
-        material,
-    )
+/// What a warning says of a material: the code, what it is about, and what becomes of that.
+#[derive(Clone, Copy)]
+struct Remark(Code, &'static str, &'static str);
+
+const NORMAL_MAP: Remark =
+    Remark(Code::NormalMapIgnored, "normal map", "ignored: surfaces keep the normals of their vertices");
+const EMISSIVE: Remark = Remark(Code::EmissiveIgnored, "emissive material", "drawn without emitting light");
+const OPACITY_MAP: Remark =
+    Remark(Code::AlphaIgnored, "opacity map", "ignored: the opacity of the material is the same everywhere");
+const FILTER: Remark = Remark(
+    Code::AlphaIgnored,
+    "transmissive material",
+    "drawn without filtering the light of what is behind",
+);
+const VERTEX_ALPHA: Remark =
+    Remark(Code::AlphaIgnored, "material", "with opacities of vertices, which are ignored");
+const METALLIC: Remark =
+    Remark(Code::MetallicIgnored, "metallic material", "drawn as diffuse ones with a faint highlight");
+const REFLECTION: Remark = Remark(
+    Code::ReflectionIgnored,
+    "material",
+    "with a highlight or reflections of its own: every surface has the same faint highlight",
+);
+const DISPLACEMENT: Remark =
+    Remark(Code::DisplacementIgnored, "displacement map", "ignored: surfaces stay where they are");
+
+impl Remark {
+    fn of(self, material: &str) -> Warning {
+        Warning::about(self.0, self.1, self.2, format!("material `{material}`"))
+    }
 }
 
-/// An emissive material.
-fn emissive(material: &str) -> Warning {
-    about_material(Code::EmissiveIgnored, "emissive material", "drawn without emitting light", material)
-}
-
-/// A material with a map of its opacity alone.
-fn opacity_map(material: &str) -> Warning {
-    let what = "ignored: the opacity of the material is the same everywhere";
-    about_material(Code::AlphaIgnored, "opacity map", what, material)
-}
-
-/// A material that filters the light behind it.
-fn filter(material: &str) -> Warning {
-    let what = "drawn without filtering the light of what is behind";
-    about_material(Code::AlphaIgnored, "transmissive material", what, material)
-}
-
-/// A material whose opacity is that of its vertices.
-fn vertex_alpha(material: &str) -> Warning {
-    let what = "with opacities of vertices, which are ignored";
-    about_material(Code::AlphaIgnored, "material", what, material)
+/// The remarks that hold for a material.
+fn remarks<const N: usize>(found: [(bool, Remark); N], material: &str) -> impl Iterator<Item = Warning> {
+    found.into_iter().filter(|(holds, _)| *holds).map(move |(_, remark)| remark.of(material))
 }
 
 /// A texture that cannot be read, for the reason `why`.
@@ -197,33 +201,10 @@ fn texture(material: &str, why: &str) -> Warning {
     Warning::about(Code::MissingImage, "texture", "not read: the material's colour is used alone", detail)
 }
 
-/// A material that is metallic.
-fn metallic(material: &str) -> Warning {
-    let what = "drawn as diffuse ones with a faint highlight";
-    about_material(Code::MetallicIgnored, "metallic material", what, material)
-}
-
-/// A material with its own highlight, roughness or reflections.
-fn reflection(material: &str) -> Warning {
-    let what = "with a highlight or reflections of its own: every surface has the same faint highlight";
-    about_material(Code::ReflectionIgnored, "material", what, material)
-}
-
-/// A material with a displacement map.
-fn displacement(material: &str) -> Warning {
-    let what = "ignored: surfaces stay where they are";
-    about_material(Code::DisplacementIgnored, "displacement map", what, material)
-}
-
 /// A file with face colours.
 fn face_colors(path: &Path) -> Warning {
     let what = "with colours for faces, which are drawn without them";
     Warning::about(Code::FaceColorsIgnored, "file", what, path.display().to_string())
-}
-
-/// A warning about a material.
-fn about_material(code: Code, thing: &'static str, what: &'static str, material: &str) -> Warning {
-    Warning::about(code, thing, what, format!("material `{material}`"))
 }
 
 /// Loads a scene: a built-in one by name, or a `.ron`, `.gltf`, `.glb`, `.obj`, `.ply`, `.off` or `.stl` file

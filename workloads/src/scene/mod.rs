@@ -383,7 +383,7 @@ pub struct Parts {
 }
 
 /// A light blue-grey.
-pub const DEFAULT_BACKGROUND: Vec3 = Vec3::new(0.42, 0.50, 0.60);
+const DEFAULT_BACKGROUND: Vec3 = Vec3::new(0.42, 0.50, 0.60);
 
 impl Parts {
     /// Parts without shapes, with a fitted camera and default light, background and settings.

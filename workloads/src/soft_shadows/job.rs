@@ -198,7 +198,7 @@ impl DrawsScene for SoftShadows {
 }
 
 /// The draws of a frame, opaque and without culling, and the reflectance of each.
-pub(crate) fn parts<'a>(scene: &'a Scene, frame: &'a Frame) -> Result<(Vec<Draw<'a>>, Vec<Vec3>), JobError> {
+fn parts<'a>(scene: &'a Scene, frame: &'a Frame) -> Result<(Vec<Draw<'a>>, Vec<Vec3>), JobError> {
     let draws =
         frame.draws(scene)?.into_iter().map(|draw| draw.with_state(DrawState::new(Cull::None))).collect();
     let drawn = frame.drawn(scene).into_iter();

@@ -98,56 +98,6 @@ fn camera([tan_half, radius, focus, near]: [f64; 4]) -> Result<Camera, String> {
     Ok(camera.with_lens(Some(lens)))
 }
 
-#[cfg(test)]
-mod m5d_tests {
-    use super::*;
-
-    fn file() -> Vec<u8> {
-        let mut data = b"M5DSCN1\0".to_vec();
-        for word in [1_u32, 0, 64, 48, 4, 0] {
-            data.extend(word.to_le_bytes());
-        }
-        data.extend(7_u64.to_le_bytes());
-        for number in [60.0_f64, 0.577, 0.25, 8.0, 0.1] {
-            data.extend(number.to_le_bytes());
-        }
-        for corner in 0..18 {
-            data.extend((corner as f32).to_le_bytes());
-        }
-        data
-    }
-
-    fn message(data: &[u8]) -> String {
-        parse_m5d(Path::new("a.m5d"), data).unwrap_err().to_string()
-    }
-
-    #[test]
-    fn a_file_is_read_as_written() {
-        let scene = parse_m5d(Path::new("a.m5d"), &file()).unwrap();
-        assert_eq!(
-            (scene.viewport.width(), scene.viewport.height(), scene.per_pixel, scene.seed),
-            (64, 48, 4, 7)
-        );
-        assert_eq!(scene.open[2], Vec3::new(6.0, 7.0, 8.0));
-        assert_eq!(scene.close[0], Vec3::new(9.0, 10.0, 11.0));
-        assert!(scene.camera.lens().is_some());
-    }
-
-    #[test]
-    fn broken_files_say_where() {
-        let good = file();
-        assert!(message(&good[..40]).contains("truncated"));
-        assert!(message(&good[..good.len() - 4]).contains("68 bytes follow"));
-        assert!(message(b"M5DSMP1\0").contains("M5DSCN1"));
-        let mut huge = good.clone();
-        huge[8..12].copy_from_slice(&u32::MAX.to_le_bytes());
-        assert!(message(&huge).contains("announced"));
-        let mut nan = good.clone();
-        nan[80..84].copy_from_slice(&f32::NAN.to_le_bytes());
-        assert!(message(&nan).contains("byte 84"), "{}", message(&nan));
-    }
-}
-
 /// First bytes of the file.
 pub(super) const MTS_MAGIC: &[u8; 4] = b"MTS1";
 
@@ -358,5 +308,50 @@ mod tests {
         let mut index = good;
         index[first + 144 + 8..first + 144 + 12].copy_from_slice(&3_u32.to_le_bytes());
         assert_message(&index, &["object 0: triangle 0 uses vertex 3, but there are only 3", "fix"]);
+    }
+
+    fn m5d() -> Vec<u8> {
+        let mut data = b"M5DSCN1\0".to_vec();
+        for word in [1_u32, 0, 64, 48, 4, 0] {
+            data.extend(word.to_le_bytes());
+        }
+        data.extend(7_u64.to_le_bytes());
+        for number in [60.0_f64, 0.577, 0.25, 8.0, 0.1] {
+            data.extend(number.to_le_bytes());
+        }
+        for corner in 0..18 {
+            data.extend((corner as f32).to_le_bytes());
+        }
+        data
+    }
+
+    fn m5d_message(data: &[u8]) -> String {
+        parse_m5d(Path::new("a.m5d"), data).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn an_m5d_file_is_read_as_written() {
+        let scene = parse_m5d(Path::new("a.m5d"), &m5d()).unwrap();
+        assert_eq!(
+            (scene.viewport.width(), scene.viewport.height(), scene.per_pixel, scene.seed),
+            (64, 48, 4, 7)
+        );
+        assert_eq!(scene.open[2], Vec3::new(6.0, 7.0, 8.0));
+        assert_eq!(scene.close[0], Vec3::new(9.0, 10.0, 11.0));
+        assert!(scene.camera.lens().is_some());
+    }
+
+    #[test]
+    fn broken_m5d_files_say_where() {
+        let good = m5d();
+        assert!(m5d_message(&good[..40]).contains("truncated"));
+        assert!(m5d_message(&good[..good.len() - 4]).contains("68 bytes follow"));
+        assert!(m5d_message(b"M5DSMP1\0").contains("M5DSCN1"));
+        let mut huge = good.clone();
+        huge[8..12].copy_from_slice(&u32::MAX.to_le_bytes());
+        assert!(m5d_message(&huge).contains("announced"));
+        let mut nan = good.clone();
+        nan[80..84].copy_from_slice(&f32::NAN.to_le_bytes());
+        assert!(m5d_message(&nan).contains("byte 84"), "{}", m5d_message(&nan));
     }
 }

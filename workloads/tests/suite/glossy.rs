@@ -8,17 +8,12 @@ use workloads::accumulation::{RayWork, Rays, SharedSamples};
 use workloads::glossy::{Effect, Glossy, GlossyOptions, Lobe, Map, Receiver, default_scene, receiver};
 use workloads::job::Job;
 
-use crate::common::{White, drawn_on, spec};
+use crate::common::{White, drawn_on, rmse, spec};
 
 const EYE: (DVec3, DVec3) = (DVec3::new(0.3, 2.0, 0.4), DVec3::new(-0.1, -1.0, -0.2));
 
 fn table(samples: u32, shape: LensShape) -> SampleTable {
     SampleTable::new(&SampleSpec { lens: shape, ..SampleSpec::default() }, samples, 7).unwrap()
-}
-
-fn rmse(a: &[Vec3], b: &[Vec3]) -> f64 {
-    let sum: f64 = a.iter().zip(b).map(|(a, b)| f64::from((*a - *b).length_squared())).sum();
-    (sum / (3.0 * a.len() as f64)).sqrt()
 }
 
 /// The map of a white half plane at a height, with its edge across the receiver, and the brightness of each

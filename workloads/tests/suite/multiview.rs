@@ -7,7 +7,7 @@ use workloads::job::Job;
 use workloads::multiview::{Layout, MultiView, MultiViewOptions, Rig, Show, Target, Views};
 use workloads::{Overrides, Scene};
 
-use crate::common::{White, bits, drawn_on, spec};
+use crate::common::{White, bits, drawn_on, rmse, spec};
 
 const LAYOUTS: [(Layout, u32); 4] = [
     (Layout::stereo(0.28, 0.11), 8),
@@ -38,11 +38,6 @@ fn one_pass(scene: &Scene, layout: (Layout, u32), spec: &PipelineSpec) -> Views 
     with(scene, layout, spec, |rig, draws, to| {
         rig.one_pass(draws, to, &mut Gpu::quiet(to.spec).unwrap()).unwrap()
     })
-}
-
-fn rmse(a: &[Vec3], b: &[Vec3]) -> f64 {
-    let sum: f64 = a.iter().zip(b).map(|(a, b)| f64::from((*a - *b).length_squared())).sum();
-    (sum / (3.0 * a.len() as f64)).sqrt()
 }
 
 #[test]

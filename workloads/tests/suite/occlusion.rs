@@ -6,13 +6,13 @@ use pipeline::depth::{BoxGrid, Pyramid};
 use pipeline::geometry::Projection;
 use pipeline::{
     FrameReport, Gpu, IntervalQueries, LensShape, MovingBox, PipelineSpec, RasterPass, SampleTable,
-    SampledQueries, Settings, Viewport,
+    SampledQueries, Settings, Target, Viewport,
 };
 use proptest::prelude::*;
 use workloads::Overrides;
 use workloads::catalog::find;
 use workloads::job::{Job, OptionSource, Request};
-use workloads::occlusion::{WallScene, WallSceneSpec, depths};
+use workloads::occlusion::{WallScene, WallSceneSpec, depths_of};
 use workloads::visibility::Unshaded;
 
 use crate::common::bits;
@@ -31,7 +31,8 @@ fn query(wall_scene: &WallScene, size: [u32; 2], per_pixel: u32, grids: &[([u32;
     let spec = crate::common::spec();
     let settings = Settings { spec: &spec, viewport, samples: &samples, background: Vec3::ZERO };
     let walls = [wall_scene.walls(&Unshaded).unwrap()];
-    let depths = depths(&wall_scene.camera, &walls, &settings).unwrap();
+    let pass = RasterPass::new(&wall_scene.camera, &walls, &settings).onto(Target::Depth).with_visible();
+    let depths = depths_of(&pass.uncounted().unwrap().visible);
     let sampled =
         SampledQueries { occluders: RasterPass::new(&wall_scene.camera, &walls, &settings), any: false };
     let all = sampled.ask(&wall_scene.boxes).unwrap().answers;

@@ -336,3 +336,7 @@ pub const QUAD: [[u32; 3]; 2] = [[0, 1, 2], [0, 2, 3]];
 pub fn rectangle(x: [f32; 2], y: [f32; 2], z: f32) -> [Vec3; 4] {
     [[x[0], y[0]], [x[1], y[0]], [x[1], y[1]], [x[0], y[1]]].map(|[x, y]| Vec3::new(x * z, y * z, z))
 }
+
+pub fn culls() -> impl Strategy<Value = Cull> {
+    prop_oneof![Just(Cull::None), Just(Cull::Back), Just(Cull::Front)]
+}

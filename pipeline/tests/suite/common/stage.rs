@@ -60,7 +60,7 @@ impl Stage {
     }
 }
 
-pub fn quad<'a>(open: &'a [Vec3], close: &'a [Vec3], shader: &'a Flat) -> Draw<'a> {
+pub fn quad<'a>(open: &'a [Vec3], close: &'a [Vec3], shader: &'a dyn Shader) -> Draw<'a> {
     Draw::new(Geometry::new(open, close, &QUAD).unwrap(), shader, Cull::None)
 }
 

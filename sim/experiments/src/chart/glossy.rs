@@ -36,9 +36,9 @@ pub struct GlossyEffort {
 }
 
 /// Radius of the lens where it does not vary, scene units.
-pub const ROUGHNESS: f64 = 0.25;
+const ROUGHNESS: f64 = 0.25;
 /// Both effects, each with its name.
-pub const EFFECTS: [(&str, Effect); 2] =
+const EFFECTS: [(&str, Effect); 2] =
     [("reflection", Effect::Reflection), ("refraction", Effect::Refraction(1.33))];
 
 /// Everything the chart found.

@@ -37,7 +37,7 @@ pub struct SampledEffort {
 pub(super) const HOST_TIME: &str = "host time of a run, relative to all frames simulated";
 
 /// The quantities that are predicted.
-pub const QUANTITIES: [&str; 3] = ["cycles", "energy", "power"];
+const QUANTITIES: [&str; 3] = ["cycles", "energy", "power"];
 
 /// One choice of representatives: the totals of an animation predicted from them.
 #[derive(Clone, Debug, Serialize)]
@@ -48,7 +48,7 @@ pub struct Trial {
     pub seed: u64,
     /// Frames that were simulated.
     pub simulated: usize,
-    /// The quantity: one of [`QUANTITIES`].
+    /// The quantity: one of `QUANTITIES`.
     pub quantity: &'static str,
     /// Value with all frames simulated: cycles a frame, joules a frame, watts.
     pub truth: f64,

@@ -42,7 +42,7 @@ pub struct Choice {
 }
 
 /// The most that `auto` may take over the best fixed choice.
-pub const MAX_OVER_BEST: f64 = 1.05;
+const MAX_OVER_BEST: f64 = 1.05;
 
 /// `auto` and every fixed choice on `family` at `value`.
 ///
@@ -128,7 +128,7 @@ impl Choices {
         }
     }
 
-    /// The families on which `auto` takes more than [`MAX_OVER_BEST`] of the best fixed choice.
+    /// The families on which `auto` takes more than `MAX_OVER_BEST` of the best fixed choice.
     pub fn families_over(&self) -> usize {
         over(&self.families)
     }

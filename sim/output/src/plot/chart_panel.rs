@@ -1,5 +1,3 @@
-//! A panel of a chart: axes, series and the marked range.
-//!
 //! A panel of a chart in its place: heading, axes, series and legend.
 
 use std::ops::Range;

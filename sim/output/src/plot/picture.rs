@@ -289,13 +289,13 @@ pub(super) fn shortened(label: &str, size: f64, room: f64) -> String {
 }
 
 /// Regular font with Latin-1, Latin Extended-A and the symbols of plots. See `assets/README.md`.
-pub(super) const REGULAR: &[u8] = include_bytes!("../../assets/DejaVuSans-subset.ttf");
+const REGULAR: &[u8] = include_bytes!("../../assets/DejaVuSans-subset.ttf");
 
 /// Bold font with the same characters.
-pub(super) const BOLD: &[u8] = include_bytes!("../../assets/DejaVuSans-Bold-subset.ttf");
+const BOLD: &[u8] = include_bytes!("../../assets/DejaVuSans-Bold-subset.ttf");
 
 /// Font family in SVG: DejaVu if installed, otherwise fonts of similar width.
-pub(super) const FAMILY: &str = "DejaVu Sans, Verdana, Segoe UI, Helvetica, Arial, sans-serif";
+const FAMILY: &str = "DejaVu Sans, Verdana, Segoe UI, Helvetica, Arial, sans-serif";
 
 /// Characters of the subset beyond the Latin letters.
 const SYMBOLS: &str = "–—…→←−≤≥≈ΩσμΔ∞";

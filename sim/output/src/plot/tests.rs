@@ -1,4 +1,5 @@
 //! Properties of every plot: text lies inside the picture and on no other text, and odd input is no error.
+//! Colours differ for every kind of vision.
 
 use activity::Unit;
 use power_model::Part;
@@ -346,4 +347,100 @@ fn pictures_are_as_wide_as_requested() {
     assert!(width.abs_diff(1004) <= 1, "85 mm at 300 pixels an inch: {width}");
     let titled = chart.picture(&Look { title: Some("Another".to_owned()), ..Look::default() }).svg().unwrap();
     assert!(titled.contains("Another") && !titled.contains("Own title") && titled.contains("own subject"));
+}
+
+type Rgb = [f64; 3];
+type Transform = [[f64; 3]; 3];
+
+/// Normal vision, complete protanopia and deuteranopia, on linear RGB: Machado, Oliveira and Fernandes, "A
+/// Physiologically-based Model for Simulation of Color Vision Deficiency", 2009, severity 1.
+const VISIONS: [Transform; 3] = [
+    [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+    [
+        [0.152_286, 1.052_583, -0.204_868],
+        [0.114_503, 0.786_281, 0.099_216],
+        [-0.003_882, -0.048_116, 1.051_998],
+    ],
+    [
+        [0.367_322, 0.860_646, -0.227_968],
+        [0.280_085, 0.672_501, 0.047_413],
+        [-0.011_820, 0.042_940, 0.968_881],
+    ],
+];
+
+fn product(matrix: &Transform, v: Rgb) -> Rgb {
+    [0, 1, 2].map(|row| (0..3).map(|column| matrix[row][column] * v[column]).sum())
+}
+
+fn linear(colour: Colour) -> Rgb {
+    colour.rgb.map(|part| {
+        let part = f64::from(part) / 255.0;
+        if part <= 0.040_45 { part / 12.92 } else { ((part + 0.055) / 1.055).powf(2.4) }
+    })
+}
+
+/// Oklab, in which distances are about as large as they look (B. Ottosson, 2020).
+fn oklab(rgb: Rgb) -> Rgb {
+    let cones = product(
+        &[
+            [0.412_221_470_8, 0.536_332_536_3, 0.051_445_992_9],
+            [0.211_903_498_2, 0.680_699_545_1, 0.107_396_956_6],
+            [0.088_302_461_9, 0.281_718_837_6, 0.629_978_700_5],
+        ],
+        rgb.map(|part| part.clamp(0.0, 1.0)),
+    );
+    product(
+        &[
+            [0.210_454_255_3, 0.793_617_785_0, -0.004_072_046_8],
+            [1.977_998_495_1, -2.428_592_205_0, 0.450_593_709_9],
+            [0.025_904_037_1, 0.782_771_766_2, -0.808_675_766_0],
+        ],
+        cones.map(f64::cbrt),
+    )
+}
+
+/// Smallest difference of two colours over all kinds of vision.
+fn distance(a: Colour, b: Colour) -> f64 {
+    let in_vision = |vision: &Transform| {
+        let [a, b] = [a, b].map(|colour| oklab(product(vision, linear(colour))));
+        a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt()
+    };
+    VISIONS.iter().map(in_vision).fold(f64::INFINITY, f64::min)
+}
+
+fn least(colours: &[Colour]) -> f64 {
+    let pairs = colours.iter().enumerate().flat_map(|(i, a)| colours[..i].iter().map(|b| distance(*a, *b)));
+    pairs.fold(f64::INFINITY, f64::min)
+}
+
+/// For comparison: the eight colours of Okabe and Ito are 0.076 apart by this measure.
+#[test]
+fn units_differ_in_every_vision() {
+    let units = Unit::ALL.map(unit_colour);
+    assert!(least(&units) > 0.12, "{}", least(&units));
+    let neighbours = units.windows(2).map(|pair| distance(pair[0], pair[1])).fold(f64::INFINITY, f64::min);
+    assert!(neighbours > 0.24, "{neighbours}");
+    let parts = Part::ALL.map(part_colour);
+    assert!(least(&parts) > 0.05, "{}", least(&parts));
+}
+
+#[test]
+fn series_states_and_classes_differ_in_every_vision() {
+    assert!(least(&SERIES) > 0.12 && least(&STATES) > 0.15 && least(&CLASSES) > 0.14);
+    assert!(least(&[MEASURED, TRUTH, MARK, BACKGROUND]) > 0.14);
+    assert!(SERIES.iter().all(|colour| distance(*colour, BACKGROUND) > 0.2), "seen on white");
+}
+
+#[test]
+fn heat_grows_darker_in_every_vision() {
+    for vision in &VISIONS {
+        let lightness = |step: u32| oklab(product(vision, linear(heat(f64::from(step) / 20.0))))[0];
+        assert!((0..20).all(|step| lightness(step) > lightness(step + 1) + 0.01));
+    }
+}
+
+#[test]
+fn a_unit_is_known_by_its_name() {
+    assert!(Unit::ALL.into_iter().all(|unit| named_unit_colour(unit.name()) == Some(unit_colour(unit))));
+    assert_eq!(named_unit_colour("leakage"), None);
 }

@@ -118,7 +118,7 @@ impl ProbedFrame {
 }
 
 /// Larger of the relative errors of cycles and energy.
-pub(super) fn relative_error(found: &FrameCost, truth: &FrameCost) -> f64 {
+fn relative_error(found: &FrameCost, truth: &FrameCost) -> f64 {
     let relative = |found: f64, truth: f64| if found == truth { 0.0 } else { (found / truth - 1.0).abs() };
     relative(found.cycles, truth.cycles).max(relative(found.energy_j, truth.energy_j))
 }

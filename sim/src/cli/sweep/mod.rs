@@ -11,7 +11,7 @@ use run::Input;
 use serde::Serialize;
 use sweep::{
     Answer, Expected, Folder, Plan, Question, RatedDesign, Report, ReportOptions, Scripts, Search, Shard,
-    SlurmArray, SlurmJob, Status, SweepError, Work, merge, submit,
+    SlurmArray, SlurmJob, Status, Work, merge, submit,
 };
 
 use self::args::{
@@ -23,12 +23,6 @@ use super::run::REVISION;
 use super::{Failure, print, print_json};
 
 pub use self::args::SweepArgs;
-
-impl From<SweepError> for Failure {
-    fn from(error: SweepError) -> Self {
-        Self { message: error.to_string(), code: if error.is_usage() { 2 } else { 1 } }
-    }
-}
 
 /// What a step did, with the folder.
 #[derive(Serialize)]

@@ -8,7 +8,7 @@ use output::table::{Table, counted, si, si_digits};
 use output::terminal::Terminal;
 use serde::Serialize;
 use serde_json::{Value, json};
-use traces::align::{AlignError, Alignment};
+use traces::align::Alignment;
 use traces::energy::{FrameSummary, FrameTable, InverseUnits, whole};
 use traces::frames::{Rule, Threshold};
 use traces::io::atomic::write_file;
@@ -272,12 +272,6 @@ pub struct AlignArgs {
 /// Root mean square of rounding to whole samples, in sample periods, as 1 / sqrt 12: starts are at best known
 /// to half a sample.
 const ROUNDING_PERIODS: f64 = 0.289;
-
-impl From<AlignError> for Failure {
-    fn from(error: AlignError) -> Self {
-        Self { message: error.to_string(), code: 2 }
-    }
-}
 
 /// Refuses an anchor at a time outside the trace.
 fn check_anchor((stamp_s, time_s): (f64, f64), trace: &TraceHeader) -> Result<(), Failure> {

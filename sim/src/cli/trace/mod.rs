@@ -18,10 +18,8 @@ use output::terminal::Terminal;
 use plot::{ParetoArgs, PlotArgs};
 use serde_json::json;
 use traces::device::{Device, DeviceSpec, MAX_PACKET_SAMPLES, Peaks, RATES_HZ};
-use traces::frames::MarkError;
-use traces::io::{self, ReadError, TraceFormat, TraceHeader, TraceReader, WriteError, csv, endings};
+use traces::io::{self, TraceFormat, TraceHeader, TraceReader, WriteError, csv, endings};
 use traces::search::SearchError;
-use traces::times::TimesError;
 use warnings::{Code, Warning};
 
 use self::input::{InputArgs, trace_format};
@@ -90,24 +88,6 @@ fn run_on_files(args: &TraceArgs, terminal: &Terminal) -> Result<(), Failure> {
         TraceCommand::Sample(args) => sample(args, terminal),
         TraceCommand::Plot(args) => plot::run(args, terminal),
         TraceCommand::Pareto(args) => plot::pareto(args, terminal),
-    }
-}
-
-impl From<ReadError> for Failure {
-    fn from(error: ReadError) -> Self {
-        wrong(error.to_string())
-    }
-}
-
-impl From<MarkError> for Failure {
-    fn from(error: MarkError) -> Self {
-        wrong(error.to_string())
-    }
-}
-
-impl From<TimesError> for Failure {
-    fn from(error: TimesError) -> Self {
-        wrong(error.to_string())
     }
 }
 

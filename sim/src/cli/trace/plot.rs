@@ -13,9 +13,9 @@ use traces::Trace;
 use traces::energy::{FrameEnergy, Histogram, Repeats, mean_over_discarded, whole};
 use traces::io::atomic::write_file;
 use traces::io::{ReadError, ReadOptions};
-use traces::pareto::{ParetoError, Point, RatedPoint, SettingColumns, frontiers, write_csv};
+use traces::pareto::{Point, RatedPoint, SettingColumns, frontiers, write_csv};
 use traces::pyramid::{Column, Pyramid, moving_means_w, pyramid_path};
-use traces::table::{InputTable, TableReadError};
+use traces::table::InputTable;
 use traces::trace::check_span;
 
 use super::input::shown as name_of;
@@ -397,18 +397,6 @@ pub enum ParetoShow {
     Energy,
     /// Energy by time (Paper IV, Figures 7 to 9)
     Power,
-}
-
-impl From<TableReadError> for Failure {
-    fn from(error: TableReadError) -> Self {
-        wrong(error.to_string())
-    }
-}
-
-impl From<ParetoError> for Failure {
-    fn from(error: ParetoError) -> Self {
-        wrong(error.to_string())
-    }
 }
 
 type Groups = BTreeMap<String, Vec<RatedPoint>>;

@@ -100,7 +100,7 @@ pub struct Failure {
 }
 
 /// Name of the effects over all workloads.
-pub const ALL_WORKLOADS: &str = "all workloads";
+const ALL_WORKLOADS: &str = "all workloads";
 
 impl Report {
     /// Report of the sweep in `folder`.

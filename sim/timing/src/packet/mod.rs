@@ -118,7 +118,7 @@ pub struct PacketClock {
 
 /// Longest frame in core cycles, half a second to some seconds of hardware time. Calendars of shared
 /// resources take about three bytes per cycle.
-pub const MAX_CYCLES: u64 = 1 << 30;
+pub(crate) const MAX_CYCLES: u64 = 1 << 30;
 
 /// Most changes between draws that are remembered; they are for slices of draws that do not take turns.
 const MAX_SPANS: usize = 1 << 12;
@@ -198,7 +198,7 @@ impl PacketClock {
         }
     }
 
-    /// Whether the frame takes more than [`MAX_CYCLES`]. Later packets are not timed, and
+    /// Whether the frame takes more than `MAX_CYCLES`. Later packets are not timed, and
     /// [`PacketClock::finish`] returns the time of the packets before.
     pub fn is_too_long(&self) -> bool {
         self.is_too_long

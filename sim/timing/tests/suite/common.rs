@@ -170,3 +170,17 @@ pub fn bound_level(machine: &MachineSpec, clocks: Clocks, packets: &Packets) -> 
     packets.iter().for_each(|(packet, lines)| clock.push(packet, lines));
     clock.finish()
 }
+
+/// The times at `stepped`, `packet` and `bound`.
+pub fn levels(machine: &MachineSpec, packets: &Packets) -> [Timed; 3] {
+    [
+        stepped(machine, packets),
+        packet_level(machine, clocks(), packets),
+        bound_level(machine, clocks(), packets),
+    ]
+}
+
+/// Cycles at the same levels.
+pub fn cycles(machine: &MachineSpec, packets: &Packets) -> [u64; 3] {
+    levels(machine, packets).map(|timed| timed.cycles)
+}

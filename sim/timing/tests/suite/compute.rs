@@ -6,7 +6,8 @@ use timing::MachineSpec;
 use timing::stepped::StepOptions;
 
 use crate::common::{
-    Packets, bound_level, clocks, packet, packet_level, plain, rates, read, size, stepped, stepped_as, tile,
+    Packets, bound_level, clocks, cycles, packet, packet_level, plain, rates, read, size, stepped,
+    stepped_as, tile,
 };
 
 /// Units before the cores, one cycle of latency each.
@@ -28,15 +29,6 @@ fn group(lanes: u32, ops: u32, steps: u32, shared_bytes: u32) -> Packet {
 
 fn groups(count: u32, group: Packet) -> Packets {
     vec![(group, Vec::new()); count as usize]
-}
-
-/// Cycles at each level.
-fn cycles(machine: &MachineSpec, packets: &Packets) -> [u64; 3] {
-    [
-        stepped(machine, packets).cycles,
-        packet_level(machine, clocks(), packets).cycles,
-        bound_level(machine, clocks(), packets).cycles,
-    ]
 }
 
 /// Cores of 64 lanes that the groups of these tests never fill: latency limits them.

@@ -4,7 +4,9 @@ use activity::{Event, LineAccess, LineKind, Unit};
 use timing::stepped::StepOptions;
 use timing::{BinsSpec, Clocks, MachineSpec, RefreshSpec, Timed};
 
-use crate::common::{Packets, bound_level, clocks, packet_level, plain, size, stepped, stepped_as, tile};
+use crate::common::{
+    Packets, bound_level, clocks, cycles, packet_level, plain, size, stepped, stepped_as, tile,
+};
 
 /// A machine that only memory limits: a bus that takes 8 cycles a line, one bank of one row.
 fn machine() -> MachineSpec {
@@ -38,15 +40,6 @@ pub fn stream(lines: impl IntoIterator<Item = (u32, bool)>) -> Packets {
 
 fn reads(count: u32, stride: u32) -> Packets {
     stream((0..count).map(|n| (n * stride, false)))
-}
-
-/// Cycles at `stepped`, `packet` and `bound`.
-fn cycles(machine: &MachineSpec, packets: &Packets) -> [u64; 3] {
-    [
-        stepped(machine, packets).cycles,
-        packet_level(machine, clocks(), packets).cycles,
-        bound_level(machine, clocks(), packets).cycles,
-    ]
 }
 
 /// Cycles that `more` lines add in a long stream.

@@ -2,9 +2,9 @@
 
 use activity::{Event, LineAccess, Packet, PacketKind};
 use proptest::prelude::*;
-use timing::{DrawSpan, MachineSpec, Timed};
+use timing::{DrawSpan, Timed};
 
-use crate::common::{Packets, bound_level, clocks, packet_level, plain, stepped};
+use crate::common::{Packets, bound_level, clocks, levels, packet_level, plain, stepped};
 use crate::conservation::{machine, passes, through_levels};
 
 /// Picoseconds of a cycle.
@@ -100,14 +100,6 @@ proptest! {
             }
         }
     }
-}
-
-fn levels(machine: &MachineSpec, packets: &Packets) -> [Timed; 3] {
-    [
-        stepped(machine, packets),
-        packet_level(machine, clocks(), packets),
-        bound_level(machine, clocks(), packets),
-    ]
 }
 
 /// Time of each pass from the end of the one before.

@@ -3,12 +3,9 @@
 use activity::{Counts, Event, LineAccess, LineKind, Packet, PacketKind, Timeline, Unit, Waits};
 use proptest::prelude::*;
 use timing::stepped::StepOptions;
-use timing::{MachineSpec, Recorder, Timed};
+use timing::{Recorder, Timed};
 
-use crate::common::{
-    Packets, bound_level, client, clocks, packet_level, packet_level_into, plain, read, size, stepped,
-    stepped_into,
-};
+use crate::common::{Packets, client, clocks, levels, packet_level_into, plain, read, size, stepped_into};
 use crate::conservation::{OF_BARRIERS, machine, passes, through_levels, total};
 
 /// Cycles of a front end that works `cycles` in the command unit: one more in set-up, and three latencies.
@@ -42,15 +39,6 @@ fn in_turn(passes: &[(u32, u32)], between: Option<Waits>) -> Packets {
         all.extend(pass(number, front, tiles));
     }
     all
-}
-
-/// The levels `stepped` and `packet`, which agree here, and `bound`.
-fn levels(machine: &MachineSpec, packets: &Packets) -> [Timed; 3] {
-    [
-        stepped(machine, packets),
-        packet_level(machine, clocks(), packets),
-        bound_level(machine, clocks(), packets),
-    ]
 }
 
 /// Cycles of the first two levels; `bound` has to be off by no more than `slack`.

@@ -242,7 +242,7 @@ const MAX_DOUBLE_DEVIATION: f64 = 0.1;
 
 /// Whether the period goes on as before after one odd gap that is not two periods. A clock step would change
 /// it for longer.
-pub(super) fn slip(before: f64, between: f64, after: f64) -> bool {
+fn slip(before: f64, between: f64, after: f64) -> bool {
     let ratio = between / before;
     !within(ratio, ODD_RATIOS)
         && (ratio - 2.0).abs() > MAX_DOUBLE_DEVIATION

@@ -318,7 +318,7 @@ fn merged(start_ns: u64, bin_ns: f64, busy: &[f64], group: usize) -> Vec<BusySli
 
 /// Reduces `points` to at most `limit` (at least 4), in order, as [`Thinner`] does. Points that are not
 /// finite are dropped.
-pub fn decimate(points: &[(u64, f64)], limit: usize) -> Vec<(u64, f64)> {
+fn decimate(points: &[(u64, f64)], limit: usize) -> Vec<(u64, f64)> {
     let finite: Vec<(u64, f64)> = points.iter().copied().filter(|(_, value)| value.is_finite()).collect();
     let mut thinner = Thinner::new(finite.len() as u64, limit);
     finite.iter().for_each(|(_, value)| thinner.push(*value));

@@ -3,8 +3,14 @@
 pub mod jls;
 pub mod jls_traces;
 
+use std::path::{Path, PathBuf};
 use traces::energy::TrueFrame;
 use traces::{Curve, CurveBuilder};
+
+/// A file that another program made.
+pub fn foreign(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/foreign").join(name)
+}
 
 /// A curve and its frames.
 pub struct Case {

@@ -26,7 +26,7 @@ use warnings::{Code, Warning};
 
 use crate::error::{LoadError, Source};
 use crate::import;
-use crate::import::{about_material, reader};
+use crate::import::{Remark, reader};
 use crate::material::{Alpha, Material};
 use crate::scene::Bounds;
 use crate::scene::{Clip, Instance, Mesh, Parts};
@@ -349,7 +349,7 @@ impl Images<'_, '_> {
         let (image, wrap) = (texture.source.value(), self.wrap(index));
         if self.is_blocky(index) {
             let what = "without filter drawn with one: magnified texels have soft edges";
-            warnings.push(about_material(Code::TextureFilterIgnored, "texture", what, material));
+            warnings.push(Remark(Code::TextureFilterIgnored, "texture", what).of(material));
         }
         let document = self.document;
         let key = (image, wrap.map(|wrap| wrap as u8));
@@ -431,7 +431,7 @@ fn left_out(document: &Document, used: &Used, made: &[Material], alpha: &[f32]) 
     for (index, described) in root.materials.iter().enumerate().filter(|(index, _)| used.materials[*index]) {
         let name = &made[index].name;
         if !matches!(described.alpha_mode, Checked::Valid(AlphaMode::Opaque)) && alpha[index] < 1.0 {
-            warnings.push(import::vertex_alpha(name));
+            warnings.push(import::VERTEX_ALPHA.of(name));
         }
         // Unlit materials have none of these (KHR_materials_unlit).
         if !made[index].unlit {
@@ -444,7 +444,7 @@ fn left_out(document: &Document, used: &Used, made: &[Material], alpha: &[f32]) 
     warnings
 }
 
-fn maps(described: &Described, name: &str) -> Vec<Warning> {
+fn maps(described: &Described, name: &str) -> impl Iterator<Item = Warning> {
     let surface = &described.pbr_metallic_roughness;
     let normal = described.normal_texture.as_ref().is_some_and(|map| map.scale != 0.0);
     let occlusion = described.occlusion_texture.as_ref().is_some_and(|map| map.strength.0 > 0.0);
@@ -455,14 +455,14 @@ fn maps(described: &Described, name: &str) -> Vec<Warning> {
     let gloss = "ignored: every surface has the same faint highlight";
     let shaded = "ignored: ambient occlusion is not drawn";
     let found = [
-        normal.then(|| import::normal_map(name)),
-        emissive.then(|| import::emissive(name)),
-        occlusion.then(|| about_material(Code::OcclusionMapIgnored, "occlusion map", shaded, name)),
-        metallic.then(|| import::metallic(name)),
-        glossy.then(|| import::reflection(name)),
-        rough.then(|| about_material(Code::MetallicIgnored, "metallic-roughness map", gloss, name)),
+        (normal, import::NORMAL_MAP),
+        (emissive, import::EMISSIVE),
+        (occlusion, Remark(Code::OcclusionMapIgnored, "occlusion map", shaded)),
+        (metallic, import::METALLIC),
+        (glossy, import::REFLECTION),
+        (rough, Remark(Code::MetallicIgnored, "metallic-roughness map", gloss)),
     ];
-    found.into_iter().flatten().collect()
+    import::remarks(found, name)
 }
 
 /// Whether an extension that is not read changes the picture. Those of compression and of image formats bring

@@ -11,8 +11,8 @@ use warnings::{Code, Warning};
 use super::{Statements, broken, lines};
 use crate::error::{LoadError, Source};
 use crate::import;
-use crate::import::reader;
 use crate::import::reader::{Paint, Soup, TriangleMaterials, grey, linear};
+use crate::import::{Remark, reader};
 use crate::material::{Alpha, Material};
 
 /// Gives each triangle of `soup` the material that the file at `path` names for it.
@@ -78,8 +78,9 @@ impl Library {
         found.faces.iter().filter_map(|face| face.material).for_each(|name| used[name as usize] = true);
         let names = found.materials.iter().zip(used).filter(|(_, used)| *used && self.whole);
         let names = names.map(|(name, _)| name).filter(|name| !self.described.contains_key(*name));
-        let what = "missing from the material files: drawn grey";
-        names.map(|name| import::about_material(Code::MissingMaterial, "material", what, name)).collect()
+        let missing =
+            Remark(Code::MissingMaterial, "material", "missing from the material files: drawn grey");
+        names.map(|name| missing.of(name)).collect()
     }
 }
 
@@ -104,15 +105,15 @@ impl Textures {
     fn paint(&mut self, described: &Described, folder: &Path, warnings: &mut Vec<Warning>) -> Paint {
         let name = &described.name;
         let left_out = [
-            described.opacity_map.then(|| import::opacity_map(name)),
-            described.shine.filters.then(|| import::filter(name)),
-            described.bumpy.then(|| import::normal_map(name)),
-            described.displaced.then(|| import::displacement(name)),
-            (described.metallic > 0.0).then(|| import::metallic(name)),
-            described.shines().then(|| import::reflection(name)),
-            described.emissive.then(|| import::emissive(name)),
+            (described.opacity_map, import::OPACITY_MAP),
+            (described.shine.filters, import::FILTER),
+            (described.bumpy, import::NORMAL_MAP),
+            (described.displaced, import::DISPLACEMENT),
+            (described.metallic > 0.0, import::METALLIC),
+            (described.shines(), import::REFLECTION),
+            (described.emissive, import::EMISSIVE),
         ];
-        warnings.extend(left_out.into_iter().flatten());
+        warnings.extend(import::remarks(left_out, name));
         let map = described.texture.as_ref();
         let texture = map.map(|map| self.texture(map, folder)).and_then(|read| match read {
             Ok(texture) => Some(texture),
@@ -162,11 +163,8 @@ fn untextured(found: &Statements, looks: &TriangleMaterials) -> Vec<Warning> {
     let materials = looks.materials.iter().map(|paint| &paint.material).zip(bare);
     let materials = materials.filter(|(material, bare)| *bare && material.texture.is_some());
     let what = "on faces without texture coordinates: these show one texel, or the base colour where no face has any";
-    materials
-        .map(|(material, _)| {
-            import::about_material(Code::MissingTexcoord, "textured material", what, &material.name)
-        })
-        .collect()
+    let untextured = Remark(Code::MissingTexcoord, "textured material", what);
+    materials.map(|(material, _)| untextured.of(&material.name)).collect()
 }
 
 /// A material of the file.

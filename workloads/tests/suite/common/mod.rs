@@ -5,6 +5,7 @@ pub mod meshes;
 use std::path::PathBuf;
 
 use activity::Packet;
+use glam::Vec3;
 use pipeline::{FrameReport, Gpu, PipelineSpec};
 use serde_json::{Value, json};
 use workloads::LoadError;
@@ -175,7 +176,7 @@ pub fn spec() -> PipelineSpec {
 }
 
 /// The bits of an image.
-pub fn bits(image: &[glam::Vec3]) -> Vec<[u32; 3]> {
+pub fn bits(image: &[Vec3]) -> Vec<[u32; 3]> {
     image.iter().map(|pixel| pixel.to_array().map(f32::to_bits)).collect()
 }
 
@@ -196,4 +197,10 @@ pub fn drawn_on(spec: &PipelineSpec, job: &dyn Job, number: u32) -> (Drawn, Fram
     let report = gpu.finish();
     assert_eq!(sum, report.counts());
     (drawn, report)
+}
+
+/// Root mean square of the difference of two images, over all channels.
+pub fn rmse(a: &[Vec3], b: &[Vec3]) -> f64 {
+    let sum: f64 = a.iter().zip(b).map(|(a, b)| f64::from((*a - *b).length_squared())).sum();
+    (sum / (3.0 * a.len() as f64)).sqrt()
 }

@@ -327,7 +327,7 @@ pub(crate) const SLOPE: f64 = 0.15;
 /// Decides what the waves are like.
 const SEED: u64 = 1;
 /// Pixels along a side of the squares that are compared: next to a focus single pixels have no bound.
-pub(super) const SQUARE_PX: u32 = 8;
+const SQUARE_PX: u32 = 8;
 
 pub(crate) fn water(cells: u32, slope: f64) -> Ocean {
     Ocean::new(cells, SIDE_M, DEPTH_M, [WAVE_M, slope], SEED)
@@ -344,7 +344,7 @@ pub(crate) fn aside_of(depth_m: f64, size: [u32; 2]) -> Result<Eye, StudyError> 
 }
 
 /// Water about `middle`, `reach` metres up and down.
-pub(super) fn from_the_side(middle: DVec3, reach: f64, size: [u32; 2]) -> Result<Eye, StudyError> {
+fn from_the_side(middle: DVec3, reach: f64, size: [u32; 2]) -> Result<Eye, StudyError> {
     let from = middle + 80.0 * DVec3::new(0.3, 0.35, 1.0).normalize();
     eye([from, middle, DVec3::Y], reach, size)
 }

@@ -56,7 +56,7 @@ pub fn line(views: u32) -> Layout {
 }
 
 /// The policies, each with its name.
-pub const POLICIES: [(&str, Replacement); 3] =
+const POLICIES: [(&str, Replacement); 3] =
     [("lru", Replacement::Lru), ("fifo", Replacement::Fifo), ("random", Replacement::Random { seed: 1 })];
 
 /// Everything the chart found.

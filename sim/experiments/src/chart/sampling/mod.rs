@@ -52,14 +52,14 @@ pub struct SamplingRow {
     pub scene: &'static str,
     /// The sample table.
     pub table: &'static str,
-    /// Exponent of error over samples per pixel, from [`FIT_FROM`] samples on.
+    /// Exponent of error over samples per pixel, from `FIT_FROM` samples on.
     pub exponent: Option<f64>,
     /// From few samples to many.
     pub points: Vec<Point>,
 }
 
 /// Exponents are fitted from this many samples per pixel on.
-pub const FIT_FROM: u32 = 4;
+const FIT_FROM: u32 = 4;
 
 /// Everything the chart found.
 #[derive(Clone, Debug, Serialize)]
