@@ -45,7 +45,10 @@ fn a_second_termination_drops_what_is_in_flight() {
     );
     let out = inputs.path("out");
     let planned = || Path::new(&out).join("plan.jsonl").exists();
-    let first = quintile().spawn(["sweep", "run", &file, "--out", &out]).once(planned).signal("TERM");
+    let started = quintile().spawn(["sweep", "run", &file, "--out", &out]).once(planned);
+    // The first runs begin soon after the plan is written, and take far longer than this.
+    std::thread::sleep(Duration::from_secs(2));
+    let first = started.signal("TERM");
     // Two signals at once are one.
     std::thread::sleep(Duration::from_millis(300));
     let ended = first.signal("TERM").end();

@@ -160,39 +160,46 @@ pub(crate) fn foreign(path: &Path) -> Option<String> {
 
 /// What a warning says of a material: the code, what it is about, and what becomes of that.
 #[derive(Clone, Copy)]
-struct Remark(Code, &'static str, &'static str);
+struct Unsupported(Code, &'static str, &'static str);
 
-const NORMAL_MAP: Remark =
-    Remark(Code::NormalMapIgnored, "normal map", "ignored: surfaces keep the normals of their vertices");
-const EMISSIVE: Remark = Remark(Code::EmissiveIgnored, "emissive material", "drawn without emitting light");
-const OPACITY_MAP: Remark =
-    Remark(Code::AlphaIgnored, "opacity map", "ignored: the opacity of the material is the same everywhere");
-const FILTER: Remark = Remark(
+const NORMAL_MAP: Unsupported =
+    Unsupported(Code::NormalMapIgnored, "normal map", "ignored: surfaces keep the normals of their vertices");
+const EMISSIVE: Unsupported =
+    Unsupported(Code::EmissiveIgnored, "emissive material", "drawn without emitting light");
+const OPACITY_MAP: Unsupported = Unsupported(
+    Code::AlphaIgnored,
+    "opacity map",
+    "ignored: the opacity of the material is the same everywhere",
+);
+const FILTER: Unsupported = Unsupported(
     Code::AlphaIgnored,
     "transmissive material",
     "drawn without filtering the light of what is behind",
 );
-const VERTEX_ALPHA: Remark =
-    Remark(Code::AlphaIgnored, "material", "with opacities of vertices, which are ignored");
-const METALLIC: Remark =
-    Remark(Code::MetallicIgnored, "metallic material", "drawn as diffuse ones with a faint highlight");
-const REFLECTION: Remark = Remark(
+const VERTEX_ALPHA: Unsupported =
+    Unsupported(Code::AlphaIgnored, "material", "with opacities of vertices, which are ignored");
+const METALLIC: Unsupported =
+    Unsupported(Code::MetallicIgnored, "metallic material", "drawn as diffuse ones with a faint highlight");
+const REFLECTION: Unsupported = Unsupported(
     Code::ReflectionIgnored,
     "material",
     "with a highlight or reflections of its own: every surface has the same faint highlight",
 );
-const DISPLACEMENT: Remark =
-    Remark(Code::DisplacementIgnored, "displacement map", "ignored: surfaces stay where they are");
+const DISPLACEMENT: Unsupported =
+    Unsupported(Code::DisplacementIgnored, "displacement map", "ignored: surfaces stay where they are");
 
-impl Remark {
+impl Unsupported {
     fn of(self, material: &str) -> Warning {
         Warning::about(self.0, self.1, self.2, format!("material `{material}`"))
     }
 }
 
-/// The remarks that hold for a material.
-fn remarks<const N: usize>(found: [(bool, Remark); N], material: &str) -> impl Iterator<Item = Warning> {
-    found.into_iter().filter(|(holds, _)| *holds).map(move |(_, remark)| remark.of(material))
+/// Features of a material that are not supported.
+fn unsupported<const N: usize>(
+    found: [(bool, Unsupported); N],
+    material: &str,
+) -> impl Iterator<Item = Warning> {
+    found.into_iter().filter(|(holds, _)| *holds).map(move |(_, feature)| feature.of(material))
 }
 
 /// A texture that cannot be read, for the reason `why`.
