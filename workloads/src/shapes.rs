@@ -1,6 +1,5 @@
 //! Procedural solids and surfaces. Unless stated otherwise they are closed, counter-clockwise seen from
-//! outside, centred at the origin, and have normals and texture coordinates.
-//! Also a texture to put on them.
+//! outside, centred at the origin, and have normals and texture coordinates. [`checker`] is a texture for them.
 
 use glam::{DVec2, Vec2, Vec3};
 use pipeline::{Texture, Wrap};

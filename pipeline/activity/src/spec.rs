@@ -194,12 +194,12 @@ fn message(code: &Error, field: Option<&str>, word: &str) -> String {
         {
             not_whole()
         }
-        Error::InvalidIdentifier(_) if word.parse::<f64>().is_ok() => of_field(format!(
-            "`{word}` is a number, and a name is expected: one of the values that are listed for the field, or \
-             Assumed({word}, \"why\") for a number of a platform"
-        )),
         Error::InvalidIdentifier(_) | Error::SuggestRawIdentifier(_) => {
-            of_field(format!("`{word}` is not a field name; write fields as `name: value`"))
+            let expected = match word.parse::<f64>() {
+                Ok(_) => "is a number, and a name is expected; the built-in files show what is written there",
+                Err(_) => "is not a field name; write fields as `name: value`",
+            };
+            of_field(format!("`{word}` {expected}"))
         }
         Error::IntegerOutOfBounds if word.starts_with('-') => {
             of_field(format!("`{word}` is below 0; write 0 or more"))
@@ -339,6 +339,17 @@ mod tests {
             "did you mean `quads_shaded`?"
         );
         assert_eq!(suggestion("foo", &["look", "seconds"]), "known: look, seconds");
+    }
+
+    #[test]
+    fn a_number_in_place_of_a_name_is_reported_as_a_number() {
+        #[derive(Debug, Deserialize)]
+        enum Level {
+            #[allow(dead_code)]
+            Assumed(f64),
+        }
+        let error = parse::<Level>("0.80", "level.ron").unwrap_err().to_string();
+        assert!(error.contains("`0.80` is a number, and a name is expected"), "{error}");
     }
 
     #[test]

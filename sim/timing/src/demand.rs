@@ -1,6 +1,6 @@
 //! Service demand of packets: the work of each station of one machine for a packet. All levels read the same
 //! demands. Work is in fractions of a cycle: a unit that has time left in a cycle goes on with the next
-//! packet in the same cycle. Also the work of the units, and the time it takes them.
+//! packet in the same cycle. [`Server`] is a unit that does so.
 
 use std::ops::Range;
 

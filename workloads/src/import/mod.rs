@@ -160,46 +160,52 @@ pub(crate) fn foreign(path: &Path) -> Option<String> {
 
 /// What a warning says of a material: the code, what it is about, and what becomes of that.
 #[derive(Clone, Copy)]
-struct Unsupported(Code, &'static str, &'static str);
+struct MaterialWarning(Code, &'static str, &'static str);
 
-const NORMAL_MAP: Unsupported =
-    Unsupported(Code::NormalMapIgnored, "normal map", "ignored: surfaces keep the normals of their vertices");
-const EMISSIVE: Unsupported =
-    Unsupported(Code::EmissiveIgnored, "emissive material", "drawn without emitting light");
-const OPACITY_MAP: Unsupported = Unsupported(
+const NORMAL_MAP: MaterialWarning = MaterialWarning(
+    Code::NormalMapIgnored,
+    "normal map",
+    "ignored: surfaces keep the normals of their vertices",
+);
+const EMISSIVE: MaterialWarning =
+    MaterialWarning(Code::EmissiveIgnored, "emissive material", "drawn without emitting light");
+const OPACITY_MAP: MaterialWarning = MaterialWarning(
     Code::AlphaIgnored,
     "opacity map",
     "ignored: the opacity of the material is the same everywhere",
 );
-const FILTER: Unsupported = Unsupported(
+const FILTER: MaterialWarning = MaterialWarning(
     Code::AlphaIgnored,
     "transmissive material",
     "drawn without filtering the light of what is behind",
 );
-const VERTEX_ALPHA: Unsupported =
-    Unsupported(Code::AlphaIgnored, "material", "with opacities of vertices, which are ignored");
-const METALLIC: Unsupported =
-    Unsupported(Code::MetallicIgnored, "metallic material", "drawn as diffuse ones with a faint highlight");
-const REFLECTION: Unsupported = Unsupported(
+const VERTEX_ALPHA: MaterialWarning =
+    MaterialWarning(Code::AlphaIgnored, "material", "with opacities of vertices, which are ignored");
+const METALLIC: MaterialWarning = MaterialWarning(
+    Code::MetallicIgnored,
+    "metallic material",
+    "drawn as diffuse ones with a faint highlight",
+);
+const REFLECTION: MaterialWarning = MaterialWarning(
     Code::ReflectionIgnored,
     "material",
     "with a highlight or reflections of its own: every surface has the same faint highlight",
 );
-const DISPLACEMENT: Unsupported =
-    Unsupported(Code::DisplacementIgnored, "displacement map", "ignored: surfaces stay where they are");
+const DISPLACEMENT: MaterialWarning =
+    MaterialWarning(Code::DisplacementIgnored, "displacement map", "ignored: surfaces stay where they are");
 
-impl Unsupported {
+impl MaterialWarning {
     fn of(self, material: &str) -> Warning {
         Warning::about(self.0, self.1, self.2, format!("material `{material}`"))
     }
 }
 
-/// Features of a material that are not supported.
-fn unsupported<const N: usize>(
-    found: [(bool, Unsupported); N],
+/// The warnings that hold for a material.
+fn material_warnings<const N: usize>(
+    found: [(bool, MaterialWarning); N],
     material: &str,
 ) -> impl Iterator<Item = Warning> {
-    found.into_iter().filter(|(holds, _)| *holds).map(move |(_, feature)| feature.of(material))
+    found.into_iter().filter(|(holds, _)| *holds).map(move |(_, warning)| warning.of(material))
 }
 
 /// A texture that cannot be read, for the reason `why`.

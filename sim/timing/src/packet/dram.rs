@@ -133,6 +133,7 @@ struct Waiting {
     seen: Time,
     issued: Time,
     count: u64,
+    /// Their bank in the channel, and their row.
     bank: usize,
     row: u32,
 }

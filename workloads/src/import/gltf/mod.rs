@@ -26,7 +26,7 @@ use warnings::{Code, Warning};
 
 use crate::error::{LoadError, Source};
 use crate::import;
-use crate::import::{Unsupported, reader};
+use crate::import::{MaterialWarning, reader};
 use crate::material::{Alpha, Material};
 use crate::scene::Bounds;
 use crate::scene::{Clip, Instance, Mesh, Parts};
@@ -349,7 +349,7 @@ impl Images<'_, '_> {
         let (image, wrap) = (texture.source.value(), self.wrap(index));
         if self.is_blocky(index) {
             let what = "without filter drawn with one: magnified texels have soft edges";
-            warnings.push(Unsupported(Code::TextureFilterIgnored, "texture", what).of(material));
+            warnings.push(MaterialWarning(Code::TextureFilterIgnored, "texture", what).of(material));
         }
         let document = self.document;
         let key = (image, wrap.map(|wrap| wrap as u8));
@@ -457,12 +457,12 @@ fn maps(described: &Described, name: &str) -> impl Iterator<Item = Warning> {
     let found = [
         (normal, import::NORMAL_MAP),
         (emissive, import::EMISSIVE),
-        (occlusion, Unsupported(Code::OcclusionMapIgnored, "occlusion map", shaded)),
+        (occlusion, MaterialWarning(Code::OcclusionMapIgnored, "occlusion map", shaded)),
         (metallic, import::METALLIC),
         (glossy, import::REFLECTION),
-        (rough, Unsupported(Code::MetallicIgnored, "metallic-roughness map", gloss)),
+        (rough, MaterialWarning(Code::MetallicIgnored, "metallic-roughness map", gloss)),
     ];
-    import::unsupported(found, name)
+    import::material_warnings(found, name)
 }
 
 /// Whether an extension that is not read changes the picture. Those of compression and of image formats bring

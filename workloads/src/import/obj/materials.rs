@@ -12,7 +12,7 @@ use super::{Statements, broken, lines};
 use crate::error::{LoadError, Source};
 use crate::import;
 use crate::import::reader::{Paint, Soup, TriangleMaterials, grey, linear};
-use crate::import::{Unsupported, reader};
+use crate::import::{MaterialWarning, reader};
 use crate::material::{Alpha, Material};
 
 /// Gives each triangle of `soup` the material that the file at `path` names for it.
@@ -79,7 +79,7 @@ impl Library {
         let names = found.materials.iter().zip(used).filter(|(_, used)| *used && self.whole);
         let names = names.map(|(name, _)| name).filter(|name| !self.described.contains_key(*name));
         let missing =
-            Unsupported(Code::MissingMaterial, "material", "missing from the material files: drawn grey");
+            MaterialWarning(Code::MissingMaterial, "material", "missing from the material files: drawn grey");
         names.map(|name| missing.of(name)).collect()
     }
 }
@@ -113,7 +113,7 @@ impl Textures {
             (described.shines(), import::REFLECTION),
             (described.emissive, import::EMISSIVE),
         ];
-        warnings.extend(import::unsupported(left_out, name));
+        warnings.extend(import::material_warnings(left_out, name));
         let map = described.texture.as_ref();
         let texture = map.map(|map| self.texture(map, folder)).and_then(|read| match read {
             Ok(texture) => Some(texture),
@@ -163,7 +163,7 @@ fn untextured(found: &Statements, looks: &TriangleMaterials) -> Vec<Warning> {
     let materials = looks.materials.iter().map(|paint| &paint.material).zip(bare);
     let materials = materials.filter(|(material, bare)| *bare && material.texture.is_some());
     let what = "on faces without texture coordinates: these show one texel, or the base colour where no face has any";
-    let untextured = Unsupported(Code::MissingTexcoord, "textured material", what);
+    let untextured = MaterialWarning(Code::MissingTexcoord, "textured material", what);
     materials.map(|(material, _)| untextured.of(&material.name)).collect()
 }
 
