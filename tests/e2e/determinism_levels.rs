@@ -32,12 +32,10 @@ fn frames(results: &Results) -> Vec<Value> {
 fn any_number_of_threads_gives_the_same_bytes_at_every_level() {
     for level in LEVELS {
         let one = run(level, &["--threads", "1"]);
-        for threads in ["2", "16"] {
-            assert_same(
-                &one,
-                &run(level, &["--threads", threads]).files(),
-                &format!("{level}, {threads} threads"),
-            );
+        let others = if level == "packet" { &["2", "16"][..] } else { &["16"] };
+        for threads in others {
+            let other = run(level, &["--threads", threads]).files();
+            assert_same(&one, &other, &format!("{level}, {threads} threads"));
         }
     }
 }
@@ -65,12 +63,10 @@ fn additional_outputs_leave_the_others_unchanged() {
             files
         };
         let plain = files(&run(level, &[]));
-        for extra in [&["--exr"][..], &["--heat", "samples_tested"], &["--json"]] {
-            let more = files(&run(level, extra));
-            assert!(more.len() >= plain.len());
-            for (name, bytes) in &plain {
-                assert!(bytes == &more[name], "{level} with {extra:?}: {} differs", name.display());
-            }
+        let more = files(&run(level, &["--exr", "--heat", "samples_tested", "--json"]));
+        assert!(more.len() > plain.len());
+        for (name, bytes) in &plain {
+            assert!(bytes == &more[name], "{level}: {} differs", name.display());
         }
     }
 }

@@ -402,7 +402,14 @@ fn public_cases_are_run_where_their_folder_is_given() {
     write(&format!("{}{}", query(-1, 1), query(2, 0)));
     let out = TempDir::new().expect("a folder");
     let data = folder.path().display().to_string();
-    let (ended, json) = reproduce("VI", out.path(), &["--row", "VI-1", "--collision-data", &data]);
+    // Generated cases, which the whole form draws, at a low resolution.
+    let resolutions = "resolution_px: Open(value: 32, over: [8, 32, 128], quick: [8, 32]";
+    let low = "resolution_px: Open(value: 8, over: [8, 32, 128], quick: [8]";
+    let inputs = Inputs::new();
+    let settings = inputs.put("settings.ron", &committed(6).replace(resolutions, low));
+    let args = ["--row", "VI-1", "--settings", &settings, "--collision-data", &data];
+    let (ended, json) = reproduce("VI", out.path(), &args);
+    assert_eq!(json["settings"]["committed"], false);
     let row = row(&json, "VI-1");
     assert_eq!((ended.code, &row["verdict"]), (Some(0), &"holds".into()), "{row}");
     assert_eq!([number(row, "public_queries"), number(row, "public_cases_that_collide_drawn")], [2.0, 1.0]);
@@ -418,17 +425,16 @@ fn public_cases_are_run_where_their_folder_is_given() {
     assert!(!row["note"].as_str().unwrap_or_default().contains("no public case"), "{row}");
     // Where nothing public collides, nothing public was tested.
     write(&query(2, 0));
-    let (_, json) = reproduce("VI", out.path(), &["--row", "VI-1", "--collision-data", &data]);
+    let (_, json) = reproduce("VI", out.path(), &args);
     let note = self::row(&json, "VI-1")["note"].as_str().unwrap_or_default();
     assert!(note.starts_with("no public case that collides was tested"), "{note}");
     // A truth that is wrong shows: the point that stays above does not collide, so it is missed.
     write(&query(2, 1));
-    let (ended, json) = reproduce("VI", out.path(), &["--row", "VI-1", "--collision-data", &data]);
+    let (ended, json) = reproduce("VI", out.path(), &args);
     assert_eq!((ended.code, &self::row(&json, "VI-1")["verdict"]), (Some(1), &"differs".into()));
     write("1,2,3\n");
     let out = out.path().display().to_string();
-    let broken =
-        quintile().call(["reproduce", "VI", "--row", "VI-1", "--collision-data", &data, "--out", &out]);
+    let broken = quintile().call(["reproduce", "VI", "--out", &out].iter().chain(&args));
     assert_eq!(broken.code, Some(2));
     assert!(broken.stderr.contains("data_0_0.csv.gz:1: seven numbers are expected"), "{}", broken.stderr);
 }

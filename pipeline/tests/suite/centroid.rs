@@ -99,51 +99,61 @@ fn drawn(of: &Triangles, per_pixel: u32, (centroid, moves): (bool, bool), image:
 }
 
 /// Image coordinates of the samples of a pixel, and of its middle.
-fn places(per_pixel: u32, [x, y]: [u32; 2]) -> (Vec<DVec2>, DVec2) {
-    let corner = DVec2::new(f64::from(x), f64::from(y)) - 0.5 * f64::from(SIDE);
-    let at = |s: &sampling::Sample| corner + DVec2::new(s.x.into(), s.y.into());
-    (stage(per_pixel).table.pixel(x, y).iter().map(at).collect(), corner + 0.5)
+struct Pixel {
+    samples: Vec<DVec2>,
+    middle: DVec2,
 }
 
-fn pixels() -> impl Iterator<Item = [u32; 2]> {
-    (0..SIDE).flat_map(|y| (0..SIDE).map(move |x| [x, y]))
+/// All pixels, row by row.
+fn pixels(per_pixel: u32) -> Vec<Pixel> {
+    let table = stage(per_pixel).table;
+    let pixel = |x, y| {
+        let corner = DVec2::new(f64::from(x), f64::from(y)) - 0.5 * f64::from(SIDE);
+        let at = |s: &sampling::Sample| corner + DVec2::new(s.x.into(), s.y.into());
+        Pixel { samples: table.pixel(x, y).iter().map(at).collect(), middle: corner + 0.5 }
+    };
+    (0..SIDE).flat_map(|y| (0..SIDE).map(move |x| [x, y])).map(|[x, y]| pixel(x, y)).collect()
 }
 
 /// Where a triangle is shaded in a pixel, by testing every sample in double precision.
-fn shaded_at(of: &Triangles, triangle: u32, per_pixel: u32, pixel: [u32; 2]) -> (DVec2, bool) {
-    let (samples, middle) = places(per_pixel, pixel);
-    let covered: Vec<DVec2> = samples.into_iter().filter(|at| of.seen(triangle, *at).is_inside).collect();
-    if of.seen(triangle, middle).is_inside || covered.is_empty() {
-        return (middle, false);
+fn shaded_at(of: &Triangles, triangle: u32, pixel: &Pixel) -> (DVec2, bool) {
+    let is_inside = |at: &&DVec2| of.seen(triangle, **at).is_inside;
+    let covered: Vec<&DVec2> = pixel.samples.iter().filter(is_inside).collect();
+    if is_inside(&&pixel.middle) || covered.is_empty() {
+        return (pixel.middle, false);
     }
-    (covered.iter().sum::<DVec2>() / covered.len() as f64, true)
+    (covered.iter().copied().sum::<DVec2>() / covered.len() as f64, true)
 }
 
 #[test]
 fn attributes_are_those_of_brute_force() {
     for (per_pixel, seed) in [2, 4, 8].into_iter().flat_map(|n| (0..4).map(move |seed| (n, seed))) {
         let of = Triangles::new(6, seed);
+        let pixels = pixels(per_pixel);
         for centroid in [true, false] {
             let (values, _) = drawn(&of, per_pixel, (centroid, false), false);
             let (mut compared, mut at_centroids, mut left_out) = (0, 0, 0);
-            for (number, pixel) in pixels().enumerate() {
-                for (sample, at) in places(per_pixel, pixel).0.into_iter().enumerate() {
-                    let seen = (0..6).map(|id| (id, of.seen(id, at))).filter(|(_, seen)| seen.is_inside);
+            for (number, pixel) in pixels.iter().enumerate() {
+                for (sample, at) in pixel.samples.iter().enumerate() {
+                    let seen = (0..6).map(|id| (id, of.seen(id, *at))).filter(|(_, seen)| seen.is_inside);
                     let nearest = seen.min_by(|a, b| a.1.depth.total_cmp(&b.1.depth));
                     let value = values[number * per_pixel as usize + sample];
                     let Some((id, _)) = nearest else {
                         assert_eq!(value, Vec4::new(0.0, 0.0, 0.0, 1.0));
                         continue;
                     };
-                    let (point, is_moved) = shaded_at(&of, id, per_pixel, pixel);
-                    let point = if centroid { point } else { places(per_pixel, pixel).1 };
+                    let (point, is_moved) = shaded_at(&of, id, pixel);
+                    let point = if centroid { point } else { pixel.middle };
                     let [_, u, v] = of.seen(id, point).weights;
                     if u.abs().max(v.abs()) > 20.0 {
                         left_out += 1;
                         continue;
                     }
                     let error = (f64::from(value.x) - u).abs().max((f64::from(value.y) - v).abs());
-                    assert!(error < 1e-3, "{per_pixel} samples, seed {seed}, {pixel:?}: {value} for {u} {v}");
+                    assert!(
+                        error < 1e-3,
+                        "{per_pixel} samples, seed {seed}, pixel {number}: {value} for {u} {v}"
+                    );
                     compared += 1;
                     at_centroids += u32::from(is_moved);
                 }
@@ -178,7 +188,7 @@ fn middles_extrapolate_and_centroids_do_not() {
             (drawn(&of, per_pixel, (false, false), false), drawn(&of, per_pixel, (true, false), false));
         assert!(beyond(&middles) > 0.01, "{per_pixel}: {}", beyond(&middles));
         assert!(beyond(&centroids) < 1e-5, "{per_pixel}: {}", beyond(&centroids));
-        let moved = pixels().filter(|pixel| shaded_at(&of, 0, per_pixel, *pixel).1).count();
+        let moved = pixels(per_pixel).iter().filter(|pixel| shaded_at(&of, 0, pixel).1).count();
         assert_eq!((none, count), (0, moved as u64), "every pixel with a centroid is counted once");
         assert!(count > 0);
     }

@@ -64,7 +64,18 @@ impl ChipTimes {
     /// Least time from the opening of a row to that of the next in its bank, if one line is read or, `kind`
     /// 1, written.
     pub fn row_cycle(&self, kind: usize) -> Time {
-        self.precharge + self.row.max(self.activate[kind] + self.to_precharge[kind])
+        self.precharge + self.holds(kind, 1)
+    }
+
+    /// Least time from the opening of a row until it may close, with `count` lines, at least 1, of a kind.
+    pub fn holds(&self, kind: usize, count: u32) -> Time {
+        let lines = self.burst * Time::from(count - 1);
+        self.row.max(self.activate[kind] + lines + self.to_precharge[kind])
+    }
+
+    /// When a row may close that is open for lines of a kind from `opened` on, the last issued at `issued`.
+    pub fn may_close(&self, kind: usize, opened: Time, issued: Time) -> Time {
+        (issued + self.to_precharge[kind]).max((opened + self.row).saturating_sub(self.activate[kind]))
     }
 
     /// Time between the activations of a rank that opens row after row.

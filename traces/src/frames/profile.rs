@@ -156,13 +156,26 @@ fn first_lowest(values: &[f64]) -> usize {
     lowest
 }
 
-/// The transforms of templates of one width and what is needed to apply them.
-pub(crate) struct OverlapSave<T: FftNum> {
+/// Transforms of blocks of one length, there and back.
+#[derive(Clone)]
+pub(crate) struct Transforms<T> {
     forward: Arc<dyn Fft<T>>,
     inverse: Arc<dyn Fft<T>>,
+    block: usize,
+}
+
+impl<T: FftNum> Transforms<T> {
+    pub fn new(block: usize) -> Self {
+        let mut planner = FftPlanner::new();
+        Self { forward: planner.plan_fft_forward(block), inverse: planner.plan_fft_inverse(block), block }
+    }
+}
+
+/// The transforms of templates of one width and what is needed to apply them.
+pub(crate) struct OverlapSave<T: FftNum> {
+    transforms: Transforms<T>,
     spectra: Vec<Vec<Complex<T>>>,
     width: usize,
-    block: usize,
 }
 
 /// The buffers of a thread.
@@ -176,23 +189,31 @@ pub(crate) struct Buffers<T> {
 impl<T: FftNum> OverlapSave<T> {
     /// Prepares templates of equal width, each value times `factor`, for transforms of `block` samples.
     pub fn new(templates: &[Vec<f64>], factor: f64, block: usize) -> Self {
-        let mut planner = FftPlanner::new();
-        let (forward, inverse) = (planner.plan_fft_forward(block), planner.plan_fft_inverse(block));
+        Self::with(Transforms::new(block), templates.iter().map(Vec::as_slice), factor)
+    }
+
+    /// The same, with transforms that are ready.
+    pub fn with<'a>(
+        transforms: Transforms<T>,
+        templates: impl ExactSizeIterator<Item = &'a [f64]> + Clone,
+        factor: f64,
+    ) -> Self {
+        let block = transforms.block;
         let value = |&watts: &f64| T::from_f64(factor * watts / block as f64).unwrap_or_else(T::zero);
-        let spectrum = |template: &Vec<f64>| {
+        let spectrum = |template: &[f64]| {
             let mut padded: Vec<Complex<T>> = template.iter().map(|watts| value(watts).into()).collect();
             padded.resize(block, Complex::zero());
-            forward.process(&mut padded);
+            transforms.forward.process(&mut padded);
             padded.iter().map(Complex::conj).collect()
         };
-        let spectra = templates.iter().map(spectrum).collect();
-        let width = templates.first().map_or(1, Vec::len);
-        Self { forward, inverse, spectra, width, block }
+        let width = templates.clone().next().map_or(1, <[f64]>::len);
+        let spectra = templates.map(spectrum).collect();
+        Self { transforms, spectra, width }
     }
 
     /// How many offsets a block answers for.
     pub fn step(&self) -> usize {
-        self.block - self.width + 1
+        self.transforms.block - self.width + 1
     }
 
     /// Hands every template's correlation with two blocks, whose first offsets are `from` and a step later,
@@ -205,25 +226,26 @@ impl<T: FftNum> OverlapSave<T> {
         buffers: &mut Buffers<T>,
         mut take: impl FnMut(usize, &[Complex<T>]),
     ) {
-        let scratches = [self.forward.get_inplace_scratch_len(), self.inverse.get_inplace_scratch_len()];
+        let Transforms { forward, inverse, block } = &self.transforms;
+        let scratches = [forward.get_inplace_scratch_len(), inverse.get_inplace_scratch_len()];
         buffers.scratch.resize(scratches[0].max(scratches[1]), Complex::zero());
         let [first, second] = [from, from + self.step()].map(|from| self.segment(signal, from));
         buffers.signal.clear();
         buffers.signal.extend(first.iter().zip(second).map(|(&re, &im)| Complex { re, im }));
         buffers.signal.extend(first[second.len()..].iter().map(|&re| Complex::from(re)));
-        buffers.signal.resize(self.block, Complex::zero());
-        self.forward.process_with_scratch(&mut buffers.signal, &mut buffers.scratch[..scratches[0]]);
+        buffers.signal.resize(*block, Complex::zero());
+        forward.process_with_scratch(&mut buffers.signal, &mut buffers.scratch[..scratches[0]]);
         for (index, spectrum) in self.spectra.iter().enumerate() {
             buffers.product.clear();
             buffers.product.extend(buffers.signal.iter().zip(spectrum).map(|(a, b)| a * b));
-            self.inverse.process_with_scratch(&mut buffers.product, &mut buffers.scratch[..scratches[1]]);
+            inverse.process_with_scratch(&mut buffers.product, &mut buffers.scratch[..scratches[1]]);
             take(index, &buffers.product);
         }
     }
 
     /// The samples of the block whose first offset is `from`, as far as there are any.
     fn segment<'a>(&self, signal: &'a [T], from: usize) -> &'a [T] {
-        &signal[from.min(signal.len())..signal.len().min(from + self.block)]
+        &signal[from.min(signal.len())..signal.len().min(from + self.transforms.block)]
     }
 }
 

@@ -18,7 +18,7 @@
 //! busy for a few samples differs from its neighbours while it works, and agrees with them in the idle gap
 //! after it.
 
-use super::subsample::{ScaledPair, between, nearest, vertex};
+use super::subsample::{ScaledSearch, between, nearest, vertex};
 use crate::stats::{mean, moments, upper_median};
 use rayon::prelude::*;
 
@@ -84,11 +84,16 @@ pub(super) fn register(
         .min(width - anchor.min(width - 1));
     let (skip, length) = (anchor - before, before + after);
     let reach = ((MAX_SHIFT_SHARE * width as f64) as usize).max(MIN_MAX_SHIFT_SAMPLES);
+    let [scaled_before, scaled_after, scaled_reach] =
+        SCALED_SHARES.map(|share| (share * width as f64) as usize);
+    let search = &ScaledSearch::new(scaled_before, scaled_after, scaled_reach.max(MIN_MAX_SHIFT_SAMPLES));
     let of_frame = |earlier: usize| {
         let later = LAGS.into_iter().map(move |lag| earlier + lag).filter(|later| *later < offsets.len());
         later.filter_map(move |later| {
             let (ratio, shift, weight) = (later - earlier <= MAX_CLOCK_LAG)
-                .then(|| scaled(power, [offsets[earlier], offsets[later]], anchor, width))
+                .then(|| {
+                    scaled(power, [offsets[earlier], offsets[later]].map(|offset| offset + anchor), search)
+                })
                 .flatten()
                 .or_else(|| shift(power, [offsets[earlier] + skip, offsets[later] + skip], length, reach))?;
             Some(Link { earlier, later, ratio, shift, weight })
@@ -100,17 +105,13 @@ pub(super) fn register(
     offsets.iter().zip(moves).map(|(&offset, by)| offset as f64 + by).collect()
 }
 
-/// Ratio, shift and its inverse variance where two frames, by the offsets of their windows, are clearly at
-/// different clocks.
-fn scaled(power: &[f64], offsets: [usize; 2], anchor: usize, width: usize) -> Option<(f64, f64, f64)> {
-    let [before, after, reach] = SCALED_SHARES.map(|share| (share * width as f64) as usize);
-    let starts = offsets.map(|offset| offset + anchor);
-    let pair = ScaledPair { power, starts, before, after, reach: reach.max(MIN_MAX_SHIFT_SAMPLES) };
-    let plain = pair.unscaled()?;
-    let fit = (plain.unexplained > POOR_UNEXPLAINED).then(|| pair.best()).flatten()?;
+/// Ratio, shift and its inverse variance where two frames, by their starts, are clearly at different clocks.
+fn scaled(power: &[f64], starts: [usize; 2], search: &ScaledSearch) -> Option<(f64, f64, f64)> {
+    let plain = search.unscaled(power, starts)?;
+    let fit = (plain.unexplained > POOR_UNEXPLAINED).then(|| search.best(power, starts)).flatten()?;
     let clear = fit.unexplained < MAX_SCALED_RATIO * plain.unexplained
         && (fit.ratio - 1.0).abs() > MIN_CLOCK_DEVIATION;
-    let variance = 2.0 * fit.unexplained / (before + after) as f64 / fit.curvature + 1.0;
+    let variance = 2.0 * fit.unexplained / search.width() as f64 / fit.curvature + 1.0;
     clear.then_some((fit.ratio, fit.shift, 1.0 / variance))
 }
 

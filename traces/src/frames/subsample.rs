@@ -5,8 +5,9 @@
 //! from the start. So the earlier frame is scaled about its start by one ratio after another, and the shift
 //! is taken from the best ratio.
 
-use super::profile::{Buffers, OverlapSave, difference};
+use super::profile::{Buffers, OverlapSave, Transforms, difference};
 use core::ops::RangeInclusive;
+use rustfft::num_complex::Complex;
 
 /// The best alignment near offset `near`, in samples, fractional: the minimum of the summed squared
 /// difference within `reach` of it and the vertex of the parabola through it and its two neighbours.
@@ -75,59 +76,84 @@ pub(super) struct ScaledFit {
     pub curvature: f64,
 }
 
-/// Two frames to be aligned, by where their starts are thought to be, and what of them is compared: `before`
-/// and `after` samples of the later one, for shifts up to `reach`.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct ScaledPair<'a> {
-    pub power: &'a [f64],
-    pub starts: [usize; 2],
-    pub before: usize,
-    pub after: usize,
-    pub reach: usize,
+/// How the starts of two frames are compared: `before` and `after` samples of the later one, for shifts up to
+/// `reach`.
+pub(super) struct ScaledSearch {
+    before: usize,
+    after: usize,
+    reach: usize,
+    /// Those of the estimates; `None` if a direct search is cheap.
+    transforms: Option<Transforms<f64>>,
 }
 
-impl ScaledPair<'_> {
-    /// The ratio and the shift that leave least unexplained; `None` where the trace ends too early or nothing
-    /// fits best.
-    pub fn best(&self) -> Option<ScaledFit> {
-        let fits = (-MAX_POWER..=MAX_POWER)
-            .filter_map(|power| Some((power, self.fit(libm::pow(RATIO_STEP, f64::from(power)))?)));
-        let (power, fit) = fits.min_by(|a, b| a.1.unexplained.total_cmp(&b.1.unexplained))?;
+/// The surroundings of the start of the earlier frame, scaled about it, of mean 0.
+struct Scaled {
+    ratio: f64,
+    values: Vec<f64>,
+    /// Sum of their squares.
+    own: f64,
+}
+
+impl ScaledSearch {
+    pub fn new(before: usize, after: usize, reach: usize) -> Self {
+        let (width, shifts) = (before + after, 2 * reach + 1);
+        let block = (width + 2 * reach).next_power_of_two();
+        let transforms = (shifts * width >= MIN_PRODUCTS).then(|| Transforms::new(block));
+        Self { before, after, reach, transforms }
+    }
+
+    /// Samples that are compared at a shift.
+    pub fn width(&self) -> usize {
+        self.before + self.after
+    }
+
+    /// The ratio and the shift that leave least unexplained, from where the starts of two frames are thought to
+    /// be; `None` where the trace ends too early or nothing fits best.
+    pub fn best(&self, power: &[f64], starts: [usize; 2]) -> Option<ScaledFit> {
+        let ratios = (-MAX_POWER..=MAX_POWER).map(|power| libm::pow(RATIO_STEP, f64::from(power)));
+        let ratios: Vec<f64> = ratios.collect();
+        let fits = self.fits(power, starts, &ratios).into_iter();
+        let best = fits.min_by(|a, b| a.unexplained.total_cmp(&b.unexplained))?;
         // What fits best by the greatest ratio would fit better by a greater one.
-        (power.abs() < MAX_POWER).then_some(fit)
+        let ends = [ratios.first(), ratios.last()];
+        (!ends.contains(&Some(&best.ratio))).then_some(best)
     }
 
     /// The fit of clocks that are the same.
-    pub fn unscaled(&self) -> Option<ScaledFit> {
-        self.fit(1.0)
+    pub fn unscaled(&self, power: &[f64], starts: [usize; 2]) -> Option<ScaledFit> {
+        self.fits(power, starts, &[1.0]).pop()
     }
 
-    /// The part of the later frame that is compared at any shift.
-    fn searched(&self) -> Option<&[f64]> {
-        let first = self.starts[1].checked_sub(self.before + self.reach)?;
-        self.power.get(first..self.starts[1] + self.after + self.reach)
+    /// The best shifts at ratios, where there is one.
+    fn fits(&self, power: &[f64], starts: [usize; 2], ratios: &[f64]) -> Vec<ScaledFit> {
+        let first = starts[1].checked_sub(self.before + self.reach);
+        let segment = first.and_then(|first| power.get(first..starts[1] + self.after + self.reach));
+        let Some(segment) = segment else { return Vec::new() };
+        let scaled = |&ratio: &f64| self.scaled(power, starts[0], ratio);
+        let templates: Vec<Scaled> = ratios.iter().filter_map(scaled).collect();
+        let estimates = self.estimates(&templates, segment);
+        let fits = templates.iter().enumerate().map(|(at, template)| {
+            let estimates = estimates.get(at).map_or(&[][..], Vec::as_slice);
+            self.fit(template, segment, estimates)
+        });
+        fits.flatten().collect()
     }
 
-    /// The surroundings of the start of the earlier frame, scaled about it, of mean 0.
-    fn scaled(&self, ratio: f64) -> Option<Vec<f64>> {
-        let value = |index: usize| {
-            let place = self.starts[0] as f64 + (index as f64 - self.before as f64) / ratio;
-            between(self.power, place)
-        };
-        let mut values = (0..self.before + self.after).map(value).collect::<Option<Vec<f64>>>()?;
+    fn scaled(&self, power: &[f64], start: usize, ratio: f64) -> Option<Scaled> {
+        let value = |index: usize| between(power, start as f64 + (index as f64 - self.before as f64) / ratio);
+        let mut values = (0..self.width()).map(value).collect::<Option<Vec<f64>>>()?;
         let mean = values.iter().sum::<f64>() / values.len() as f64;
         values.iter_mut().for_each(|watts| *watts -= mean);
-        Some(values)
+        let own = values.iter().map(|x| x * x).sum();
+        Some(Scaled { ratio, values, own })
     }
 
-    /// The best shift at one ratio.
-    fn fit(&self, ratio: f64) -> Option<ScaledFit> {
-        let (segment, template) = (self.searched()?, self.scaled(ratio)?);
-        let own: f64 = template.iter().map(|x| x * x).sum();
-        let unlike = |shift: usize| unexplained(&template, own, &segment[shift..shift + template.len()]);
+    /// The best shift of a template. Most shifts are ruled out by an estimate; what is left is compared as it
+    /// would be without one.
+    fn fit(&self, template: &Scaled, segment: &[f64], estimates: &[f64]) -> Option<ScaledFit> {
+        let Scaled { ratio, values, own } = template;
+        let unlike = |shift: usize| unexplained(values, *own, &segment[shift..shift + values.len()]);
         let last = (2 * self.reach).checked_sub(1)?;
-        // Most shifts are ruled out by an estimate; what is left is compared as it would be without one.
-        let estimates = estimates(&template, own, segment);
         let lowest = (1..=last).step_by(COARSE_STEP_SAMPLES).filter_map(|shift| estimates.get(shift));
         let limit = lowest.copied().fold(f64::INFINITY, f64::min) + MAX_ESTIMATE_ERROR;
         let judged = |shift: usize| match estimates.get(shift) {
@@ -138,12 +164,47 @@ impl ScaledPair<'_> {
         let [left, middle, right] = [at - 1, at, at + 1].map(unlike);
         let curvature = left - 2.0 * middle + right;
         (middle <= left.min(right) && curvature > 0.0).then(|| ScaledFit {
-            ratio,
+            ratio: *ratio,
             shift: at as f64 - self.reach as f64 + vertex(left, middle, right),
             unexplained: middle,
             curvature,
         })
     }
+
+    /// [`unexplained`] of each template at every shift from 0 on, by correlation; NaN where rounding may be too
+    /// large, and none if a direct search is cheap.
+    fn estimates(&self, templates: &[Scaled], segment: &[f64]) -> Vec<Vec<f64>> {
+        let Some(transforms) = &self.transforms else { return Vec::new() };
+        let mean = segment.iter().sum::<f64>() / segment.len() as f64;
+        let segment: Vec<f64> = segment.iter().map(|watts| watts - mean).collect();
+        let values = templates.iter().map(|template| &template.values[..]);
+        let correlator = OverlapSave::with(transforms.clone(), values, 1.0);
+        let variances = variances(&segment, self.width());
+        let mut estimates = Vec::with_capacity(templates.len());
+        correlator.pair(&segment, 0, &mut Buffers::default(), |at, inner| {
+            let own = templates[at].own;
+            let estimate = |(inner, variance): (&Complex<f64>, &f64)| match inner.re {
+                _ if variance.is_nan() || own <= 0.0 => f64::NAN,
+                inner if inner > 0.0 => 1.0 - inner * inner / (variance * own),
+                _ => 1.0,
+            };
+            estimates.push(inner.iter().zip(&variances).map(estimate).collect());
+        });
+        estimates
+    }
+}
+
+/// Summed squares about the mean of the `width` values from every offset on; NaN where rounding may be too large.
+fn variances(values: &[f64], width: usize) -> Vec<f64> {
+    let least = MIN_VARIANCE_SHARE * values.iter().map(|x| x * x).sum::<f64>();
+    let (mut sum, mut squares) = values[..width].iter().fold((0.0, 0.0), |(a, b), x| (a + x, b + x * x));
+    let at = |offset: usize| {
+        let variance = squares - sum * sum / width as f64;
+        let (gone, next) = (values[offset], values.get(offset + width).copied().unwrap_or(0.0));
+        (sum, squares) = (sum + next - gone, squares + next * next - gone * gone);
+        if variance >= least { variance } else { f64::NAN }
+    };
+    (0..=values.len() - width).map(at).collect()
 }
 
 /// One less the squared correlation coefficient of a template (of mean 0 and squares `own`) and a segment; 1
@@ -160,41 +221,12 @@ fn unexplained(template: &[f64], own: f64, segment: &[f64]) -> f64 {
 }
 
 /// Products of a direct search from which estimates are worth their transforms.
-const MIN_PRODUCTS: usize = 1 << 20;
+const MIN_PRODUCTS: usize = 1 << 15;
 /// Least variance of a segment, as a share of the squares of all that is searched, for an estimate: rounding
 /// of a transform in f64, about 1e-13 of these, is then below 1e-6 of the share that is left unexplained.
 const MIN_VARIANCE_SHARE: f64 = 1e-6;
 /// Largest error of an estimate.
 const MAX_ESTIMATE_ERROR: f64 = 1e-4;
-
-/// [`unexplained`] at every shift from 0 on, by one correlation; NaN where rounding may be too large, and
-/// none if a direct search is cheap.
-fn estimates(template: &[f64], own: f64, segment: &[f64]) -> Vec<f64> {
-    let (width, shifts) = (template.len(), (segment.len() + 1).saturating_sub(template.len()));
-    if shifts * width < MIN_PRODUCTS {
-        return Vec::new();
-    }
-    let mean = segment.iter().sum::<f64>() / segment.len() as f64;
-    let segment: Vec<f64> = segment.iter().map(|watts| watts - mean).collect();
-    let correlator = OverlapSave::new(&[template.to_vec()], 1.0, segment.len().next_power_of_two());
-    let mut estimates = vec![f64::NAN; shifts];
-    correlator.pair(&segment, 0, &mut Buffers::default(), |_, inner| {
-        estimates.iter_mut().zip(inner).for_each(|(to, inner)| *to = inner.re);
-    });
-    let least = MIN_VARIANCE_SHARE * segment.iter().map(|x| x * x).sum::<f64>();
-    let (mut sum, mut squares) = segment[..width].iter().fold((0.0, 0.0), |(a, b), x| (a + x, b + x * x));
-    for (shift, estimate) in estimates.iter_mut().enumerate() {
-        let (inner, variance) = (*estimate, squares - sum * sum / width as f64);
-        *estimate = match variance >= least && own > 0.0 {
-            true if inner > 0.0 => 1.0 - inner * inner / (variance * own),
-            true => 1.0,
-            false => f64::NAN,
-        };
-        let (gone, next) = (segment[shift], segment.get(shift + width).copied().unwrap_or(0.0));
-        (sum, squares) = (sum + next - gone, squares + next * next - gone * gone);
-    }
-    estimates
-}
 
 #[cfg(test)]
 mod tests {
@@ -270,9 +302,7 @@ mod tests {
         for (ratio, gain) in [(1.0 / 0.58, 0.4), (0.72, 1.6), (1.0, 1.0)] {
             let power = [frame(1.0, 1.0), frame(ratio, gain)].concat();
             for thought in [880, 900, 925] {
-                let pair =
-                    ScaledPair { power: &power, starts: [300, thought], before: 20, after: 110, reach: 60 };
-                let fit = pair.best().unwrap();
+                let fit = ScaledSearch::new(20, 110, 60).best(&power, [300, thought]).unwrap();
                 let off = fit.shift - (900.0 - thought as f64);
                 assert!((fit.ratio / ratio - 1.0).abs() < 0.05, "{ratio}: {fit:?}");
                 assert!(off.abs() < 1.0 && fit.unexplained < 0.1, "{ratio} {thought}: {fit:?}");
@@ -286,35 +316,37 @@ mod tests {
         let busy = |i: usize| if (900..1000).contains(&(i % 2500)) { 2.0 } else { 0.0 };
         let power: Vec<f64> = (0..6000).map(|i| 5.0 + busy(i) + 0.01 * noise.normals(i as u64).0).collect();
         let mean = power[700..2200].iter().sum::<f64>() / 1500.0;
-        let template: Vec<f64> = power[700..2200].iter().map(|watts| watts - mean).collect();
-        let own: f64 = template.iter().map(|x| x * x).sum();
-        let found = estimates(&template, own, &power);
+        let values: Vec<f64> = power[700..2200].iter().map(|watts| watts - mean).collect();
+        let own: f64 = values.iter().map(|x| x * x).sum();
+        let template = [Scaled { ratio: 1.0, values: values.clone(), own }];
+        let found = &ScaledSearch::new(0, 1500, 2250).estimates(&template, &power)[0];
         assert_eq!(found.len(), 4501);
         let error = |(shift, estimate): (usize, &f64)| {
-            (estimate - unexplained(&template, own, &power[shift..shift + 1500])).abs()
+            (estimate - unexplained(&values, own, &power[shift..shift + 1500])).abs()
         };
         // `max` leaves NaN out.
         let worst = found.iter().enumerate().map(error).fold(0.0, f64::max);
         let known = found.iter().filter(|estimate| estimate.is_finite()).count();
         assert!(worst < 0.01 * MAX_ESTIMATE_ERROR && known > 4000, "{worst} {known}");
-        let flat = estimates(&template, own, &[vec![5.0; 3000], power].concat());
+        let longer = [vec![5.0; 3000], power].concat();
+        let flat = &ScaledSearch::new(0, 1500, 3750).estimates(&template, &longer)[0];
         assert!(flat[..1000].iter().all(|estimate| estimate.is_nan()));
-        assert!(estimates(&template[..10], own, &[1.0; 100]).is_empty());
+        assert!(ScaledSearch::new(0, 10, 45).estimates(&[], &[1.0; 100]).is_empty());
     }
 
     #[test]
     fn compared_as_they_are_frames_of_unlike_clocks_are_unlike_or_misplaced() {
         let power = [frame(1.0, 1.0), frame(1.0 / 0.58, 0.4)].concat();
-        let pair = ScaledPair { power: &power, starts: [300, 900], before: 20, after: 110, reach: 60 };
-        let (plain, best) = (pair.unscaled().unwrap(), pair.best().unwrap());
+        let (search, starts) = (ScaledSearch::new(20, 110, 60), [300, 900]);
+        let (plain, best) = (search.unscaled(&power, starts).unwrap(), search.best(&power, starts).unwrap());
         assert!(plain.unexplained > 3.0 * best.unexplained && plain.shift.abs() > 5.0, "{plain:?} {best:?}");
     }
 
     #[test]
     fn steady_power_and_the_ends_of_a_trace_have_no_fit() {
-        let pair = |starts| ScaledPair { power: &[1.0; 300], starts, before: 5, after: 50, reach: 20 };
-        assert_eq!(pair([100, 200]).best(), None);
-        assert_eq!(pair([100, 10]).best(), None);
-        assert_eq!(pair([100, 290]).best(), None);
+        let search = ScaledSearch::new(5, 50, 20);
+        for later in [200, 10, 290] {
+            assert_eq!(search.best(&[1.0; 300], [100, later]), None);
+        }
     }
 }

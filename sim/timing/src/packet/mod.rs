@@ -29,11 +29,11 @@
 //! Events of packets in bins of time. Consecutive packets of a bin are written together.
 
 mod arbiter;
+mod bank;
 mod calendar;
 mod cores;
 mod drain;
 mod dram;
-mod levels;
 mod memory;
 mod slots;
 mod station;

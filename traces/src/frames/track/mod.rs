@@ -22,7 +22,7 @@ mod evidence;
 
 use super::marks::Placement;
 use super::profile::spaced_minima;
-use crate::frames::subsample::{ScaledFit, ScaledPair};
+use crate::frames::subsample::{ScaledFit, ScaledSearch};
 use crate::stats::upper_median;
 use chain::{Chain, Graph};
 use evidence::{Evidence, FEATURES, Label, Templates};
@@ -319,9 +319,10 @@ struct ClockWindow<'a> {
 impl ClockWindow<'_> {
     /// Starts whose next one is unlike them, in order.
     fn steps(&self) -> Vec<usize> {
-        let reach = self.share(0.12);
+        let [before, after] = [BEFORE_SHARE, BEGINNING_SHARE].map(|share| self.share(share));
+        let search = ScaledSearch::new(before, after, self.share(0.12));
         let remainder = |index: usize| {
-            let fit = self.pair([index, index + 1], 0, reach).unscaled();
+            let fit = search.unscaled(self.power, self.places([index, index + 1], 0));
             fit.map_or(1.0, |fit| fit.unexplained)
         };
         let unexplained: Vec<f64> = (0..self.starts.len().saturating_sub(1)).map(remainder).collect();
@@ -393,7 +394,8 @@ impl ClockWindow<'_> {
             After::Window(share) => self.share(share),
             After::Period(share) => (share * period as f64) as usize,
         };
-        let best = |reach: usize| ScaledPair { after, ..self.pair([from, to], moved, reach) }.best();
+        let (before, places) = (self.share(BEFORE_SHARE), self.places([from, to], moved));
+        let best = |reach: usize| ScaledSearch::new(before, after, reach).best(self.power, places);
         let fit = best(period / 2)?;
         let in_place = libm::fabs(fit.shift) <= self.share(MIN_MISPLACEMENT) as f64;
         let better = || {
@@ -405,13 +407,11 @@ impl ClockWindow<'_> {
         good.then_some(fit)
     }
 
-    /// The beginnings of two frames.
-    fn pair(&self, starts: [usize; 2], moved: isize, reach: usize) -> ScaledPair<'_> {
+    /// Where the beginnings of two frames are, the first of them moved.
+    fn places(&self, starts: [usize; 2], moved: isize) -> [usize; 2] {
         let place =
             |start: usize| self.starts.get(start).map_or(usize::MAX / 2, |offset| offset + self.anchor);
-        let [before, after] = [BEFORE_SHARE, BEGINNING_SHARE].map(|share| self.share(share));
-        let starts = [place(starts[0]).saturating_add_signed(moved), place(starts[1])];
-        ScaledPair { power: self.power, starts, before, after, reach }
+        [place(starts[0]).saturating_add_signed(moved), place(starts[1])]
     }
 
     /// The shorter of the gaps beside a start.
