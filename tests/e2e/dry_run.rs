@@ -86,7 +86,7 @@ fn workloads_have_an_expected_time() {
         assert!(seconds > 0.0 && seconds < 3600.0, "{workload}: {seconds} s");
         assert!(found["expected"]["memory_bytes"].is_null(), "{workload}");
     }
-    let [small, large] = ["32", "512"].map(|resolution| {
+    let [small, large] = ["8", "64"].map(|resolution| {
         number(&dry(&["ccd", "--set", &format!("resolution={resolution}")]), "/expected/host_s")
     });
     assert!(large > 2.0 * small, "{small} s and {large} s");
