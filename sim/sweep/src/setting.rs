@@ -175,6 +175,11 @@ pub fn is_option(path: &str) -> bool {
     OPTIONS.contains(&path) || VIEW.contains(&path)
 }
 
+/// What was meant by a `path` that is nearly a known one; `None` for one that is known or like none.
+pub fn misspelt(path: &str) -> Option<String> {
+    check_path(path).err().filter(|message| message.contains("did you mean"))
+}
+
 /// Checks that `path` names a kind of setting.
 ///
 /// # Errors
