@@ -197,7 +197,7 @@ fn list_names_everything_in_text_and_in_json() {
 }
 
 #[test]
-fn list_shows_the_options_of_a_workload() {
+fn list_shows_the_options_and_facts_of_a_workload() {
     let text = quintile().call(["list", "occlusion"]);
     let json = quintile().call(["list", "occlusion", "--json"]);
     assert_eq!((text.code, json.code), (Some(0), Some(0)), "{}{}", text.stderr, json.stderr);
@@ -211,6 +211,15 @@ fn list_shows_the_options_of_a_workload() {
         let line = text.stdout.lines().find(|line| line.split_whitespace().next() == Some(name));
         let line = line.unwrap_or_else(|| panic!("no {name} in {}", text.stdout));
         assert!(!range.is_empty() && line.contains(range) && line.contains(meaning), "{line}");
+    }
+    let facts = listing["facts"].as_array().expect("a list of facts");
+    assert!(facts.len() > 3);
+    for fact in facts {
+        let [name, unit, meaning] =
+            ["name", "unit", "meaning"].map(|key| fact[key].as_str().unwrap_or_default());
+        let line = text.stdout.lines().rfind(|line| line.split_whitespace().next() == Some(name));
+        let line = line.unwrap_or_else(|| panic!("no {name} in {}", text.stdout));
+        assert!(line.contains(unit) && line.contains(meaning), "{line}");
     }
     let unknown = quintile().call(["list", "oclusion"]);
     assert_eq!(unknown.code, Some(2));

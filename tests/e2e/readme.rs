@@ -155,6 +155,31 @@ fn filters_of_tests_in_the_book_match_a_test() {
     assert!(checked > 5, "only {checked} filters were found");
 }
 
+/// The command that makes a picture of the book.
+fn command_of(picture: &str) -> String {
+    let is_of = |chart: &&experiments::study::Entry| picture.starts_with(&chart.name.replace('-', "_"));
+    match experiments::CHARTS.iter().find(is_of) {
+        Some(chart) => format!("quintile chart {}", chart.name),
+        None if picture.starts_with("stress_") => "quintile stress".to_owned(),
+        None => "quintile run".to_owned(),
+    }
+}
+
+#[test]
+fn pictures_of_the_book_have_their_command_in_their_section() {
+    let mut checked = 0;
+    for page in pages(&root().join("docs")) {
+        for section in text(&page).split("\n## ") {
+            for picture in section.split("images/").skip(1).filter_map(|rest| rest.split_once(".png)")) {
+                let command = command_of(picture.0);
+                assert!(section.contains(&command), "{}: {}: no `{command}`", page.display(), picture.0);
+                checked += 1;
+            }
+        }
+    }
+    assert!(checked > 30, "only {checked} pictures were found");
+}
+
 #[test]
 fn there_is_a_licence() {
     let names = ["LICENSE", "LICENSE-MIT", "LICENSE-APACHE", "LICENCE"];

@@ -28,7 +28,7 @@ use warnings::{Code, Warning};
 
 use crate::error::LoadError;
 use crate::job::{
-    Drawn, Draws, Fact, Flag, Flags, Job, JobError, JobOptions, Need, OptionSource, Request, must_hold,
+    Drawn, Draws, Fact, Flag, Flags, Job, JobError, JobOptions, Need, OptionSource, Request, facts, must_hold,
 };
 use crate::samples::SampleChoice;
 use crate::scene::Settings;
@@ -117,6 +117,13 @@ struct Occlusion {
     settings: Settings,
     samples: Arc<dyn SampleSource>,
     wall_scene: WallScene,
+}
+
+facts! {
+    objects "count" "boxes that are queried"
+    objects_hidden "count" "of these, those that their query finds hidden"
+    tests "count" "tests of all queries: of tiles, samples and depths"
+    depth_bytes "bytes" "stored depths that the queries read"
 }
 
 /// Run options in use. The scene has its own lens and motion.
@@ -266,10 +273,10 @@ impl Answers {
     fn facts(&self) -> Vec<Fact> {
         let hidden = self.hidden.iter().filter(|hidden| **hidden).count();
         Fact::all([
-            ("objects", self.hidden.len() as f64),
-            ("objects_hidden", hidden as f64),
-            ("tests", self.tests as f64),
-            ("depth_bytes", self.depth_bytes as f64),
+            (fact::objects, self.hidden.len() as f64),
+            (fact::objects_hidden, hidden as f64),
+            (fact::tests, self.tests as f64),
+            (fact::depth_bytes, self.depth_bytes as f64),
         ])
     }
 }

@@ -279,6 +279,9 @@ impl GpuSpec {
 /// Ratio from which watts are too far from those of the GPU of the platform to be scaled without a warning.
 const FAR: f64 = 4.0;
 
+/// Difference of a ratio from 1 from which messages state it.
+const MIN_STATED: f64 = 5e-4;
+
 /// Checks that platform and energy table belong to the GPU, and that it is near the one that the platform was
 /// made for.
 pub(super) fn check_pairing(
@@ -289,7 +292,11 @@ pub(super) fn check_pairing(
 ) -> Option<Warning> {
     let in_use = format!("platform `{}` and energy table `{}`", platform.name, table.name());
     let (ratio, of) = scaling.farthest();
-    let scaled = format!("of GPU `{}`; {of} is scaled by {}", platform.made_for, digits(ratio));
+    let scaled = if (ratio - 1.0).abs() < MIN_STATED {
+        format!("of GPU `{}`, not scaled, as memories and logic are of the same size", platform.made_for)
+    } else {
+        format!("of GPU `{}`; {of} is scaled by {}", platform.made_for, digits(ratio))
+    };
     let message = match &gpu.power {
         None => format!(
             "no platform belongs to GPU `{}`, so its watts come from {in_use}, which are those {scaled}: compare its cycles, counts and \
@@ -355,6 +362,24 @@ mod tests {
         assert!(text.contains("belongs in `units.depth`"), "{text}");
         let text = message(&REFERENCE.replace("coarse_tile_px: 32", "coarse_tile_px: 30"));
         assert!(text.starts_with("gpu.ron:11:25: ") && text.contains("coarse_tile_px"), "{text}");
+    }
+
+    #[test]
+    fn a_gpu_without_a_platform_says_what_is_scaled_where_something_is() {
+        let message = |l2: &str| {
+            let text = REFERENCE.replace("entries: 4096", l2);
+            let mut gpu = GpuSpec::parse(&text, "gpu.ron").unwrap();
+            let own = gpu.power.take().unwrap();
+            let platform = Platform::builtin(&own.platform).unwrap();
+            let table = EnergyTable::builtin(&own.energy).unwrap();
+            let scaling = crate::hardware::scaling(&gpu, &platform).unwrap();
+            let warning = check_pairing(&RunOptions::default(), &gpu, (&platform, &table), &scaling);
+            warning.unwrap().message
+        };
+        let same = message("entries: 4096");
+        assert!(same.contains("of GPU `reference`, not scaled, as") && !same.contains("1.000"), "{same}");
+        let larger = message("entries: 8192");
+        assert!(larger.contains(" is scaled by "), "{larger}");
     }
 
     #[test]

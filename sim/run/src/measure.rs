@@ -1,11 +1,11 @@
 //! Measurement of a run: the power curve is recorded as a trace, and frames and energies are found in the trace.
 
 use output::table::si;
-use power_model::{FramePower, PARTS, PacedFrame, Run, pace};
+use power_model::{FramePower, PARTS, Run, pace};
 use serde::Serialize;
-use traces::device::{Device, DeviceSpec, RATES_HZ, Sampled};
+use traces::device::{Device, DeviceSpec, RATES_HZ, SampleError, Sampled};
 use traces::energy::{self, FrameEnergy, PowerIntegral, Score, TOLERANCE_S, TrueFrame};
-use traces::frames::{Found, Marks, default_window, find, marked_only};
+use traces::frames::{Found, MarkError, Marks, default_window, find, marked_only};
 use traces::{Mark, MarkKind, Metadata, Trace};
 
 use crate::options::DEFAULT_RATE_HZ;
@@ -67,12 +67,21 @@ pub(super) fn measure(plan: &Plan, simulated: &Simulated) -> Result<Measurement,
     trace_fits(run.curve.end_s(), resolution.rate_hz)?;
     let device = Device::new(device_spec(plan, resolution.rate_hz, &powers))?;
     let Sampled { mut trace, clipped_currents, clipped_voltages } =
-        device.sample(&run.curve, 0.0, run.curve.end_s())?;
+        device.sample(&run.curve, 0.0, run.curve.end_s()).map_err(|error| match error {
+            SampleError::TooShort { .. } => too_slow(plan, &resolution, &run),
+            error => error.into(),
+        })?;
     let marks = marks(&run, &trace);
     trace.metadata = metadata(plan, &device, &marks);
     // In a run of one frame, every further start would be a false positive.
     let search = if run.frames.len() == 1 { marked_only } else { find };
-    let found = search(&trace, &marks)?;
+    let found = search(&trace, &marks).map_err(|error| match error {
+        // The marks are those of the run, so their frames fit if there are enough samples.
+        MarkError::OutsideTrace { .. } | MarkError::End { .. } | MarkError::TooShort { .. } => {
+            too_slow(plan, &resolution, &run)
+        }
+        error => error.into(),
+    })?;
     let integral = PowerIntegral::new(&trace);
     let frames = integral.frames(&found);
     let truth: Vec<_> =
@@ -83,12 +92,33 @@ pub(super) fn measure(plan: &Plan, simulated: &Simulated) -> Result<Measurement,
     Ok(Measurement { run, clipped, device, resolution, marks, found, frames, truth, score, checks, trace })
 }
 
+/// The error for a sampling rate at which no window fits the marked frame.
+fn too_slow(plan: &Plan, resolution: &Resolution, run: &Run) -> RunError {
+    let frame_s = shortest_frame_s(run);
+    let needed_hz = (MIN_BUSY_SAMPLES / resolution.shortest_busy_s).max(MIN_WINDOW_SAMPLES / frame_s);
+    let remedy = match rate_from(needed_hz) {
+        Some(rate_hz) => format!("give --trace-rate {rate_hz}"),
+        None => "draw a larger image".to_owned(),
+    };
+    let default = if plan.options.trace_rate_hz.is_some() { ", or leave it out" } else { "" };
+    RunError::Setting(format!(
+        "trace rate: {} is too low to find frames of {}: {remedy}{default}",
+        si(resolution.rate_hz, "Hz"),
+        si(frame_s, "s")
+    ))
+}
+
+/// Length of the shortest frame in seconds.
+fn shortest_frame_s(run: &Run) -> f64 {
+    run.frames.iter().map(|frame| frame.end_s - frame.start_s).fold(f64::INFINITY, f64::min)
+}
+
 /// Marks the middle frame, which is past the warm-up. The end mark is the end of the run, or the end of the
 /// trace if that is earlier by part of a sample.
 fn marks(run: &Run, trace: &Trace) -> Marks {
     let middle = &run.frames[run.frames.len() / 2];
-    let shortest = run.frames.iter().map(|frame| frame.end_s - frame.start_s).fold(f64::INFINITY, f64::min);
-    Marks::one(middle.start_s, default_window(shortest, trace.rate_hz()), run.end_s.min(trace.end_s()))
+    let window = default_window(shortest_frame_s(run), trace.rate_hz());
+    Marks::one(middle.start_s, window, run.end_s.min(trace.end_s()))
 }
 
 fn metadata(plan: &Plan, device: &Device, marks: &Marks) -> Metadata {
@@ -120,6 +150,9 @@ pub(crate) const MIN_BUSY_SAMPLES: f64 = 2.0;
 /// Smallest length of a frame in samples. The error of a start is about one sample, or two percent of such a
 /// frame.
 const MIN_FRAME_SAMPLES: f64 = 50.0;
+/// Samples of a frame that hold a window around its start wherever it begins between two samples: a fifth of
+/// them before the start, and three or more after it.
+const MIN_WINDOW_SAMPLES: f64 = 5.0;
 /// Largest number of trace samples for automatic choice of a higher rate.
 const MAX_CHOSEN_SAMPLES: f64 = 5e6;
 
@@ -137,11 +170,10 @@ pub struct Resolution {
 impl Resolution {
     /// Resolution of the frames of `run` at `given_hz`, or at the lowest rate that resolves them.
     pub(super) fn new(given_hz: Option<f64>, run: &Run) -> Self {
-        let shortest = |of: fn(&PacedFrame) -> f64| run.frames.iter().map(of).fold(f64::INFINITY, f64::min);
-        let shortest_busy_s = shortest(|frame| frame.busy_end_s - frame.start_s);
-        let shortest_frame_s = shortest(|frame| frame.end_s - frame.start_s);
+        let busy_s = run.frames.iter().map(|frame| frame.busy_end_s - frame.start_s);
+        let shortest_busy_s = busy_s.fold(f64::INFINITY, f64::min);
         let rate_hz =
-            given_hz.unwrap_or_else(|| chosen_hz(shortest_busy_s, shortest_frame_s, run.curve.end_s()));
+            given_hz.unwrap_or_else(|| chosen_hz(shortest_busy_s, shortest_frame_s(run), run.curve.end_s()));
         Self { rate_hz, raised: given_hz.is_none() && rate_hz > DEFAULT_RATE_HZ, shortest_busy_s }
     }
 
@@ -162,14 +194,18 @@ impl Resolution {
         })
     }
 
-    /// Lowest rate of the series 1, 2, 5, 10... Hz that resolves the shortest frame; `None` above the range
-    /// of recorders.
+    /// Lowest rate of [`rate_from`] that resolves the shortest frame.
     pub(super) fn needed_hz(&self) -> Option<f64> {
-        let needed_hz = MIN_BUSY_SAMPLES / self.shortest_busy_s;
-        let series =
-            (0..8).flat_map(|decade| [1.0, 2.0, 5.0].map(|step| step * libm::pow(10.0, f64::from(decade))));
-        series.into_iter().find(|rate_hz| *rate_hz >= needed_hz).filter(|rate_hz| RATES_HZ.contains(rate_hz))
+        rate_from(MIN_BUSY_SAMPLES / self.shortest_busy_s)
     }
+}
+
+/// Lowest rate of the series 1, 2, 5, 10... Hz that is at least `needed_hz`; `None` above the range of
+/// recorders.
+fn rate_from(needed_hz: f64) -> Option<f64> {
+    let mut series =
+        (0..8).flat_map(|decade| [1.0, 2.0, 5.0].map(|step| step * libm::pow(10.0, f64::from(decade))));
+    series.find(|rate_hz| *rate_hz >= needed_hz).filter(|rate_hz| RATES_HZ.contains(rate_hz))
 }
 
 /// Lowest rate that resolves the shortest frame, limited by [`MAX_CHOSEN_SAMPLES`].
@@ -295,6 +331,27 @@ mod tests {
                 // that other frames are not placed by changes both by a share of the time between frames: by
                 // 3 % where it did.
                 assert!(worst(true) <= 2.0 * worst(false).max(NO_ERROR), "{text}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_rate_that_is_too_low_is_refused_with_one_that_runs() {
+        let run = |pacing, rate_hz| {
+            let overrides = Overrides { size: Some((16, 16)), frames: Some(0..1), ..Overrides::default() };
+            let folder = tempfile::tempdir().unwrap();
+            let (scene, trace_rate_hz) = ("tiny".into(), Some(rate_hz));
+            let options = RunOptions { scene, pacing, trace_rate_hz, overrides, ..RunOptions::default() };
+            crate::run(options, &Destination::new(folder.path()), &Progress::new(true)).map(drop)
+        };
+        for pacing in [PacingChoice::Vsync, PacingChoice::Free] {
+            for rate_hz in [1.0, 2.0, 3.0, 5.0] {
+                let message = run(pacing, rate_hz).unwrap_err().to_string();
+                let start = format!("trace rate: {} is too low to find frames of ", si(rate_hz, "Hz"));
+                assert!(message.starts_with(&start) && message.ends_with(", or leave it out"), "{message}");
+                let (_, rest) = message.split_once("--trace-rate ").unwrap();
+                let given_hz = rest.split(',').next().unwrap().parse().unwrap();
+                assert!(run(pacing, given_hz).is_ok(), "{message}");
             }
         }
     }

@@ -85,19 +85,19 @@ pub fn warnings(scene: &VisibilityScene) -> Vec<Warning> {
     let draws = [Draw::new(geometry, &Unshaded, Cull::None)];
     let regime = Regime::of(&scene.camera, &draws, scene.viewport, scene.per_pixel);
     let extreme = format!(
-        "{} of {} triangles in view have coordinates whose products leave the range of 32-bit numbers: they may not be seen, or at \
+        "triangles have coordinates whose products leave the range of 32-bit numbers ({} of {} in view): they may not be seen, or at \
          wrong depths; scale mesh and camera to ordinary lengths",
         regime.extreme, regime.in_view
     );
     let empty =
         "no triangle is in view, so no sample can see one; look at the mesh and where the camera points";
     let coarse = format!(
-        "{} of {} triangles in view have coordinates so large that 32-bit numbers move them by more than a quarter of a pixel: \
+        "triangles have coordinates so large that 32-bit numbers move them by more than a quarter of a pixel ({} of {} in view): \
          they are drawn out of place; move what the camera sees to the origin",
         regime.coarse, regime.in_view
     );
     let cut = format!(
-        "the near plane cuts {} triangles in front of the camera away, or parts of them; give the camera a smaller `near`, or \
+        "the near plane cuts triangles in front of the camera away, or parts of them ({} in view); give the camera a smaller `near`, or \
          move it",
         regime.cut
     );

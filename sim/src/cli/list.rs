@@ -1,4 +1,4 @@
-//! `quintile list`, with the options of each workload.
+//! `quintile list`, with the options and facts of each workload.
 //!
 //! Defaults are those of the workloads themselves. Ranges are checked against what the workloads accept by
 //! the tests below.
@@ -9,7 +9,7 @@ use output::table::Table;
 use run::GpuSpec;
 use serde::Serialize;
 use serde_json::{Map, Value};
-use workloads::job::{JobOptions, Need};
+use workloads::job::{FactKind, JobOptions, Need};
 use workloads::{caustics, collision, compute, deferred, glossy, multiview, occlusion, points, soft_shadows};
 
 use super::{Failure, ListArgs, print, print_json};
@@ -67,12 +67,13 @@ impl Entry {
     }
 }
 
-/// A workload with its options.
+/// A workload with its options and facts.
 #[derive(Serialize)]
 struct Workload {
     #[serde(flatten)]
     entry: Entry,
     options: Vec<Listed>,
+    facts: &'static [FactKind],
 }
 
 pub(super) fn list(args: &ListArgs) -> Result<(), Failure> {
@@ -82,7 +83,7 @@ pub(super) fn list(args: &ListArgs) -> Result<(), Failure> {
     }
 }
 
-/// Prints the options of one workload.
+/// Prints the options and facts of one workload.
 fn workload(name: &str, json: bool) -> Result<(), Failure> {
     let mut workloads = workloads::catalog::names().zip(OPTIONS);
     let found = workloads.find(|((known, _), _)| *known == name);
@@ -91,7 +92,11 @@ fn workload(name: &str, json: bool) -> Result<(), Failure> {
         let message = format!("unknown workload `{name}`, {}", suggestion(name, &known));
         return Err(Failure { message, code: 2 });
     };
-    let listed = Workload { entry: Entry::new(name, what), options: options.listed()? };
+    let listed = Workload {
+        entry: Entry::new(name, what),
+        options: options.listed()?,
+        facts: workloads::catalog::facts(name),
+    };
     if json {
         return print_json(&listed, true);
     }
@@ -99,7 +104,14 @@ fn workload(name: &str, json: bool) -> Result<(), Failure> {
     for Listed { name, default, range, needs, meaning } in &listed.options {
         table.row([name, &*as_set(default), range, needs, meaning].map(str::to_owned));
     }
-    print(&format!("{name}: {what}\n\n{table}\nSet one with: quintile run {name} --set OPTION=VALUE"))
+    let mut facts = Table::of_texts(["fact", "unit", "meaning"]);
+    for FactKind { name, unit, meaning } in listed.facts {
+        facts.row([name, unit, meaning].map(|text| (*text).to_owned()));
+    }
+    print(&format!(
+        "{name}: {what}\n\n{table}\nSet one with: quintile run {name} --set OPTION=VALUE\n\n{facts}\n\
+         Means over frames, in `facts` of summary.json; each where an option above makes it"
+    ))
 }
 
 fn everything(args: &ListArgs) -> Result<(), Failure> {

@@ -39,7 +39,7 @@ pub(super) fn runs(
     out: &Path,
 ) -> Result<Vec<Listed>, Failure> {
     let lists: Vec<(String, Vec<String>)> =
-        sets.iter().map(|(path, value)| (path.clone(), split(value))).collect();
+        sets.iter().map(|(path, value)| (full(path, &options.scene), split(value))).collect();
     let (several, single): (Vec<_>, Vec<_>) = lists.into_iter().partition(|(_, values)| values.len() > 1);
     let wrong = |message: String| Failure { message: format!("--set: {message}"), code: 2 };
     let count = several.iter().try_fold(1_usize, |count, (_, values)| count.checked_mul(values.len()));
@@ -69,21 +69,35 @@ pub(super) fn runs(
     combined.into_iter().map(listed).collect()
 }
 
+/// Whether `scene` names a workload.
+fn is_workload(scene: &Path) -> bool {
+    catalog::names().any(|(name, _)| Path::new(name) == scene)
+}
+
+/// `path` as sweep files name it: a name without a dot is an option of the workload, where one runs.
+fn full(path: &str, scene: &Path) -> String {
+    if !path.contains('.') && is_workload(scene) { format!("workload.{path}") } else { path.to_owned() }
+}
+
 /// Sets one option: a value in an input file, an option of a workload, or one of the run.
 ///
 /// # Errors
-/// If its value cannot be set.
+/// If its value cannot be set, or its name is nearly that of another.
 pub(super) fn set(options: &mut RunOptions, setting: &Setting) -> Result<(), Failure> {
     let Setting { path, value } = setting;
-    let is_workload = catalog::names().any(|(name, _)| Path::new(name) == options.scene);
     if let Some(name) = path.strip_prefix("workload.") {
         options.options.set.push((name.to_owned(), value.to_string()));
     } else if path.contains('.') {
         options.changes.push(Change { path: path.to_string(), value: value.to_string() });
-    } else if is_workload || !sweep::is_option(path) {
+    } else if is_workload(&options.scene) {
         options.options.set.push((path.to_string(), value.to_string()));
-    } else {
+    } else if sweep::is_option(path) {
         *options = sweep::with(options, setting)?;
+    } else if let Some(meant) = sweep::misspelt(path) {
+        return Err(Failure { message: format!("--set {path}={value}: {meant}"), code: 2 });
+    } else {
+        // An option of a workload; scenes refuse it.
+        options.options.set.push((path.to_string(), value.to_string()));
     }
     Ok(())
 }
@@ -187,6 +201,8 @@ mod tests {
         let listed = made("glossy", &[("scene", "default"), ("workload.map_px", "64")]).unwrap();
         assert_eq!(listed[0].options.scene, Path::new("glossy"));
         assert_eq!(listed[0].options.options.set.len(), 2);
+        let listed = made("glossy", &[("texels", "64,128")]).unwrap();
+        assert_eq!(listed[1].options.options.set, [("texels".to_owned(), "128".to_owned())]);
         let scenes = made("default", &[("scene", "tiny,carousel")]).unwrap();
         assert_eq!(scenes[1].options.scene, Path::new("carousel"));
     }
@@ -205,6 +221,7 @@ mod tests {
             (&[("gpu.core_hz", "1e8,")], "an empty value"),
             (&[("gpu.core_hz", "1e8,1e8")], "has 1e8 twice"),
             (&[("gpo.core_hz", "1e8,2e8")], "did you mean `gpu.core_hz`?"),
+            (&[("timng", "bound")], "--set timng=bound: unknown setting `timng`, did you mean `timing`?"),
         ] {
             let error = made("tiny", sets).unwrap_err();
             assert!(error.contains(says), "{error}");

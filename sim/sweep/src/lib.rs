@@ -43,6 +43,6 @@ pub use report::{
     Cost, Design, Effect, Failure, Interaction, Measure, NearBest, NoEffect, Pair, RatedDesign, Report,
     ReportOptions, Share, Winner,
 };
-pub use setting::{Setting, Text, is_option, with};
+pub use setting::{Setting, Text, is_option, misspelt, with};
 pub use slurm::{Scripts, SlurmArray, SlurmJob, submit};
 pub use spec::{Combination, MAX_POINTS, SweepSpec};

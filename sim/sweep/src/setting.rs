@@ -7,6 +7,7 @@ use activity::spec::suggestion;
 use run::{Change, InputFile, Plan, RunError, RunOptions};
 use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::{Map, Value, json};
+use timing::Level;
 
 /// A setting and its value as text, which the points of a sweep share.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
@@ -175,6 +176,11 @@ pub fn is_option(path: &str) -> bool {
     OPTIONS.contains(&path) || VIEW.contains(&path)
 }
 
+/// What was meant by a `path` that is nearly a known one; `None` for one that is known or like none.
+pub fn misspelt(path: &str) -> Option<String> {
+    check_path(path).err().filter(|message| message.contains("did you mean"))
+}
+
 /// Checks that `path` names a kind of setting.
 ///
 /// # Errors
@@ -284,6 +290,13 @@ fn json_of(setting: &Setting) -> Value {
 
 /// What is wrong with a value, and which values there are.
 fn in_words(setting: &Setting, error: &serde_json::Error) -> String {
+    let Setting { path, value } = setting;
+    if &**path == "timing" && matches!(&**value, "sampled" | "none") {
+        let levels = Level::ALL.map(Level::name).join(", ");
+        return format!(
+            "designs are compared at one of {levels}: use `packet`, or `quintile run --timing {value}` for each design"
+        );
+    }
     let text = error.to_string();
     let Some((_, expected)) = text.split_once(", expected ") else { return text };
     if text.starts_with("unknown variant") {
@@ -411,6 +424,12 @@ mod tests {
             one("timing", "stepd").unwrap_err(),
             "timing: `stepd`: unknown value, did you mean `stepped`?"
         );
+        for level in ["sampled", "none"] {
+            let says = format!(
+                "timing: `{level}`: designs are compared at one of stepped, packet, bound: use `packet`, or `quintile run --timing {level}` for each design"
+            );
+            assert_eq!(one("timing", level).unwrap_err(), says);
+        }
         assert_eq!(
             one("samples", "x").unwrap_err(),
             "samples: `x`: it is not a whole number from 0, within its range"

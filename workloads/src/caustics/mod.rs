@@ -33,7 +33,7 @@ use warnings::{Code, Warning};
 
 use crate::error::LoadError;
 use crate::job::{
-    Drawn, Draws, Fact, Flag, Flags, Job, JobError, JobOptions, OptionSource, Request, must_hold,
+    Drawn, Draws, Fact, Flag, Flags, Job, JobError, JobOptions, OptionSource, Request, facts, must_hold,
 };
 use crate::scene::Settings;
 pub use beam::{Beam, Hit};
@@ -200,18 +200,30 @@ impl Caustics {
     }
 }
 
+facts! {
+    beams "count" "light volumes"
+    flux_W "W" "flux of all light volumes"
+    shader_executions "count" "executions of the shader, each for a pixel and a light volume"
+    shader_executions_per_pixel "per pixel" "the same, mean over the pixels of the image"
+    executions_that_find_light "share" "of these executions, those that find light"
+    tiles_touched "count" "tiles of 8x8 pixels that light volumes, or faces of bounding volumes, touch"
+    pixels_tested "count" "pixels of these tiles that are tested"
+    crossed_share_of_length "share" "length of a light volume over which its sides cross, mean"
+    beams_left_out "count" "light volumes that are not drawn: without volume, or reaching behind the camera"
+}
+
 fn facts(picture: &Picture, beams: &[Beam]) -> Vec<Fact> {
     let runs = picture.total_runs() as f64;
     Fact::all([
-        ("beams", beams.len() as f64),
-        ("flux_W", beams.iter().map(|beam| beam.flux_w).sum()),
-        ("shader_executions", runs),
-        ("shader_executions_per_pixel", runs / picture.runs.len().max(1) as f64),
-        ("executions_that_find_light", picture.useful as f64 / runs.max(1.0)),
-        ("tiles_touched", picture.tiles as f64),
-        ("pixels_tested", picture.tests as f64),
-        ("crossed_share_of_length", crossing(beams)),
-        ("beams_left_out", picture.skipped as f64),
+        (fact::beams, beams.len() as f64),
+        (fact::flux_W, beams.iter().map(|beam| beam.flux_w).sum()),
+        (fact::shader_executions, runs),
+        (fact::shader_executions_per_pixel, runs / picture.runs.len().max(1) as f64),
+        (fact::executions_that_find_light, picture.useful as f64 / runs.max(1.0)),
+        (fact::tiles_touched, picture.tiles as f64),
+        (fact::pixels_tested, picture.tests as f64),
+        (fact::crossed_share_of_length, crossing(beams)),
+        (fact::beams_left_out, picture.skipped as f64),
     ])
 }
 

@@ -14,7 +14,7 @@ use super::pass::Scratch;
 use super::{Method, Object, Search, Sweeps, candidates};
 use crate::error::LoadError;
 use crate::job::{
-    Drawn, Draws, Fact, Flag, Flags, Job, JobError, JobOptions, Need, OptionSource, Request, must_hold,
+    Drawn, Draws, Fact, Flag, Flags, Job, JobError, JobOptions, Need, OptionSource, Request, facts, must_hold,
 };
 use crate::scene::Settings;
 
@@ -90,6 +90,14 @@ struct Collision {
     settings: Settings,
 }
 
+facts! {
+    objects "count" "moving objects"
+    objects_that_may_collide "count" "objects that no image separates from all others"
+    pairs_whose_boxes_touch "count" "pairs of objects whose swept boxes touch"
+    pairs_that_may_collide "count" "of these, those that no image separates"
+    fragments "count" "fragments of the passes, each for a triangle and a tile that it may touch"
+}
+
 /// Run options that the job replaces. Its images are squares, sampled at pixel centres over the whole time.
 pub(crate) const FLAGS: Flags = Flags { uses: &[], instead: &[(Flag::Size, "resolution")] };
 
@@ -154,11 +162,11 @@ impl Draws for Collision {
         let kept = kept.len() as u32;
         let Emitted { image, fragments } = passes.finish();
         let facts = Fact::all([
-            ("objects", self.objects.len() as f64),
-            ("objects_that_may_collide", may_collide as f64),
-            ("pairs_whose_boxes_touch", pairs.len() as f64),
-            ("pairs_that_may_collide", f64::from(kept)),
-            ("fragments", fragments as f64),
+            (fact::objects, self.objects.len() as f64),
+            (fact::objects_that_may_collide, may_collide as f64),
+            (fact::pairs_whose_boxes_touch, pairs.len() as f64),
+            (fact::pairs_that_may_collide, f64::from(kept)),
+            (fact::fragments, fragments as f64),
         ]);
         let warnings = near_everywhere(pairs.len(), kept).into_iter().collect();
         Ok(Drawn { image, moving: true, lens: false, facts, warnings })

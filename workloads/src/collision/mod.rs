@@ -31,8 +31,8 @@ mod pass;
 mod plain;
 
 pub use detect::{Answer, candidates, detect, detect_each};
-pub(crate) use job::FLAGS;
 pub use job::{CollisionOptions, job};
+pub(crate) use job::{FACTS, FLAGS};
 pub use object::{CaseFiles, CollisionCase, Object, components, load_cases};
 pub use pair::{Method, Search, Verdict};
 pub use plain::{CollidingSet, PlainPasses, PlainResult, Sweeps};

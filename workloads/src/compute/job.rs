@@ -14,8 +14,21 @@ use super::kernels::{Kernels, LightSphere};
 use super::luminance::Show;
 use super::{ComputeOptions, Kernel};
 use crate::error::LoadError;
-use crate::job::{Drawn, DrawsScene, Fact, Flag, Flags, IMAGE_SIZE, Job, JobError, OptionSource, Request};
+use crate::job::{
+    Drawn, DrawsScene, Fact, Flag, Flags, IMAGE_SIZE, Job, JobError, OptionSource, Request, facts,
+};
 use crate::scene::{Frame, Overrides, Scene};
+
+facts! {
+    mean_luminance "luminance" "mean luminance of the image"
+    cycles_per_shared_access "ratio" "cycles of an access of a warp to shared memory over the fewest possible, mean"
+    values_counted "count" "pixels that the histogram counts"
+    fullest_bin_share "share" "of these, those in the fullest bin"
+    atomics_in_line "count" "atomics that wait for each other in an access of a warp, mean; 1 without conflicts"
+    lights_per_tile "count" "lights that reach a tile, mean over tiles"
+    most_lights "count" "lights that reach the tile with the most"
+    tiles_full "count" "tiles with more lights than a list holds"
+}
 
 /// Run options in use. Scenes are drawn without motion and lens, as bounds of tiles hold for one view.
 pub(crate) const FLAGS: Flags =
@@ -282,8 +295,10 @@ impl Compute {
         let mut kernels = Kernels::new(gpu, &self.options)?;
         let mean = kernels.mean_luminance(&image)?;
         let cycles = kernels.cycles_per_shared_access();
-        let facts =
-            [("mean_luminance", f64::from(kernels.values(mean)[0])), ("cycles_per_shared_access", cycles)];
+        let facts = [
+            (fact::mean_luminance, f64::from(kernels.values(mean)[0])),
+            (fact::cycles_per_shared_access, cycles),
+        ];
         let padding = if self.options.padded || !kernels.padding_fits() { "" } else { ", or padded=true," };
         let message = || {
             format!(
@@ -302,7 +317,7 @@ impl Compute {
         let (image, level) = (view(gpu, pixels)?, view(gpu, last)?);
         let mut kernels = Kernels::new(gpu, &self.options)?;
         let shown = kernels.display(&image, Show::ExposedBy(level), &[level.reads()])?;
-        let facts = Fact::all([("mean_luminance", f64::from(mean))]);
+        let facts = Fact::all([(fact::mean_luminance, f64::from(mean))]);
         let warnings = left_out(self.viewport()?).into_iter().collect();
         Ok(Drawn { image: shown, facts, warnings, ..Drawn::default() })
     }
@@ -317,9 +332,9 @@ impl Compute {
         let sums = kernels.sums(counts)?;
         let [all, most] = [bins.iter().sum::<u32>(), bins.iter().copied().max().unwrap_or(0)].map(f64::from);
         let facts = [
-            ("values_counted", all),
-            ("fullest_bin_share", most / all.max(1.0)),
-            ("atomics_in_line", in_line),
+            (fact::values_counted, all),
+            (fact::fullest_bin_share, most / all.max(1.0)),
+            (fact::atomics_in_line, in_line),
         ];
         let message = || {
             format!(
@@ -352,9 +367,9 @@ impl Compute {
         let shown = Kernels::new(gpu, &self.options)?.display(&image, show, &reads)?;
         let sum: u64 = tiles.counts.iter().copied().map(u64::from).sum();
         let facts = [
-            ("lights_per_tile", sum as f64 / tiles.counts.len() as f64),
-            ("most_lights", f64::from(tiles.counts.iter().copied().max().unwrap_or(0))),
-            ("tiles_full", full as f64),
+            (fact::lights_per_tile, sum as f64 / tiles.counts.len() as f64),
+            (fact::most_lights, f64::from(tiles.counts.iter().copied().max().unwrap_or(0))),
+            (fact::tiles_full, full as f64),
         ];
         let message = || {
             format!(

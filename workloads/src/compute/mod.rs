@@ -16,8 +16,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::LoadError;
 use crate::job::{JobError, JobOptions, Need, must_hold};
-pub(crate) use job::FLAGS;
 pub use job::{ATOMICS_PER_WORD, CHAIN, CYCLES_PER_ACCESS, Chain, Compute, job};
+pub(crate) use job::{FACTS, FLAGS};
 pub use kernels::{Kernels, LightSphere, TileLights};
 use luminance::Scan;
 pub use luminance::{Atomics, bin};

@@ -14,7 +14,7 @@ use super::{CameraRays, Forward, GBuffer, NormalFormat, Screen, Volume, Writer, 
 use crate::error::LoadError;
 use crate::job::{
     Drawn, DrawsScene, Fact, Flag, Flags, IMAGE_SIZE, Job, JobError, JobOptions, Need, OptionSource, Request,
-    must_hold,
+    facts, must_hold,
 };
 use crate::material::{PointLight, SurfaceShader};
 use crate::samples::{SampleChoice, blur_warning};
@@ -198,9 +198,9 @@ impl DrawsScene for Deferred {
             Method::Deferred => GBuffer::bytes(self.options.normals) * u64::from(samples),
         };
         let facts = Fact::all([
-            ("point_lights", self.lights.len() as f64),
-            ("g_buffer_bytes_per_pixel", bytes as f64),
-            ("lighting_invocations", lit_runs as f64),
+            (fact::point_lights, self.lights.len() as f64),
+            (fact::g_buffer_bytes_per_pixel, bytes as f64),
+            (fact::lighting_invocations, lit_runs as f64),
         ]);
         let mut warnings = self.regime_warnings(frame);
         let moving = frame.is_moving();
@@ -378,6 +378,12 @@ impl Lit {
         let draw = Draw::new(geometry.map_err(JobError::setting)?, &self.shader, Cull::Front);
         Ok(draw.with_state(overlay(Cull::Front, Blend::Add)).binding(bindings))
     }
+}
+
+facts! {
+    point_lights "count" "point lights besides the light of the scene"
+    g_buffer_bytes_per_pixel "bytes" "G-buffer of a pixel with all of its samples; 0 for forward rendering"
+    lighting_invocations "count" "invocations of the shader that lights"
 }
 
 /// Run options in use.

@@ -21,7 +21,7 @@ use crate::material::{Lighting, LitPoint, PointLight, SurfaceShader};
 use crate::scene::Frame;
 
 pub use job::{Deferred, DeferredOptions, LightPass, Method, Rate};
-pub(crate) use job::{FLAGS, job};
+pub(crate) use job::{FACTS, FLAGS, job};
 
 /// Format of normals and gloss.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

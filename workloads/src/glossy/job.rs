@@ -10,7 +10,9 @@ use warnings::{Code, Warning};
 
 use super::{Effect, Map, Receiver, ReceiverShader};
 use crate::error::LoadError;
-use crate::job::{Drawn, DrawsScene, Fact, Flag, Flags, Job, JobError, JobOptions, OptionSource, Request};
+use crate::job::{
+    Drawn, DrawsScene, Fact, Flag, Flags, Job, JobError, JobOptions, OptionSource, Request, facts,
+};
 use crate::material::Material;
 use crate::scene::{
     Frame, Frustum, Graph, Local, Node, Overrides, Parts, Rig, Scene, SceneCamera, Settings, Trs, tan_half,
@@ -194,15 +196,21 @@ impl DrawsScene for Glossy {
         let samples = self.table(self.options.map_samples)?;
         let drawn = map.one_pass(&draws, &samples, self.scene.background(), gpu)?;
         let facts = Fact::all([
-            ("map_texels", map.viewport.pixels() as f64),
-            ("map_samples_tested", drawn.counts[Event::SamplesTested] as f64),
-            ("blur_at_height_1", map.blur(1.0)),
+            (fact::map_texels, map.viewport.pixels() as f64),
+            (fact::map_samples_tested, drawn.counts[Event::SamplesTested] as f64),
+            (fact::blur_at_height_1, map.blur(1.0)),
         ]);
         let (memory, texels) = (drawn.region, drawn.into_image());
         let image = self.show(&map, &texels, &frame.camera, draws, memory, gpu)?.into_image();
         let (moving, warnings) = (frame.is_moving(), self.regime_warnings());
         Ok(Drawn { image, moving, lens: true, facts, warnings })
     }
+}
+
+facts! {
+    map_texels "count" "texels of the map of the receiver"
+    map_samples_tested "count" "samples tested as the map is drawn"
+    blur_at_height_1 "scene units" "width of the blur of a point one scene unit from the receiver"
 }
 
 /// Run options in use.

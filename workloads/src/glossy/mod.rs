@@ -29,7 +29,7 @@ use crate::error::LoadError;
 use crate::job::JobError;
 use crate::scene::camera::CameraFrame;
 
-pub(crate) use job::FLAGS;
+pub(crate) use job::{FACTS, FLAGS};
 pub use job::{Glossy, GlossyOptions, default_scene, job, receiver};
 
 /// A map: its camera, and the texels of the receiver.

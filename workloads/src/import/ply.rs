@@ -18,6 +18,9 @@ use crate::error::{LoadError, Source};
 /// What to do about a header that cannot be used.
 const REMEDY: &str = "export it again as a PLY file of vertices and faces";
 
+/// Most characters of a line that are quoted.
+const MAX_QUOTED: usize = 40;
+
 #[derive(Default)]
 struct Vertex {
     position: DVec3,
@@ -126,9 +129,8 @@ pub(super) fn read(path: &Path) -> Result<Soup, LoadError> {
     let source = Source { path };
     let mut input = Reader::new(reader::open(path)?);
     let header = Parser::<Skipped>::new().read_header(&mut input);
-    let header = header.map_err(|error| {
-        source.broken("header", format!("not a PLY file: {}; {REMEDY}", in_one_line(&error)))
-    })?;
+    let header =
+        header.map_err(|error| source.broken("header", wrong_header(path, &error, input.get_mut())))?;
     check(&header).map_err(|message| source.broken("header", message))?;
     let mut soup = Soup { warnings: left_out(&header, path), ..Soup::default() };
     for element in header.elements.values() {
@@ -162,11 +164,31 @@ pub(super) fn read(path: &Path) -> Result<Soup, LoadError> {
     Ok(soup)
 }
 
+/// What is wrong with a header that cannot be read, and what to do; `rest` follows it in the file at `path`.
+fn wrong_header(path: &Path, error: &ParseError, rest: &mut impl BufRead) -> String {
+    let is_truncated = rest.fill_buf().is_ok_and(<[u8]>::is_empty);
+    match error.line() {
+        Some(number) if number > 1 && is_truncated => {
+            format!("the file ends at line {number}, before `end_header`: it is truncated; get it again")
+        }
+        Some(number) => {
+            let line: String = line(path, number).unwrap_or_default().chars().take(MAX_QUOTED).collect();
+            format!("not a PLY file: line {number} cannot be read: `{line}`; {REMEDY}")
+        }
+        None => format!("not a PLY file: {}; {REMEDY}", in_one_line(error)),
+    }
+}
+
+/// Line `number`, from 1, of the file at `path`, if it can be read.
+fn line(path: &Path, number: usize) -> Option<String> {
+    reader::open(path).ok()?.lines().nth(number.checked_sub(1)?)?.ok()
+}
+
 /// What is wrong with the line where reading stopped, if that is a number that is not finite: the parser has
 /// no word for it.
 fn not_finite(source: Source<'_>, element: &ElementDef, error: &ParseError) -> Option<LoadError> {
     let number = error.line()?;
-    let line = reader::open(source.path).ok()?.lines().nth(number - 1)?.ok()?;
+    let line = line(source.path, number)?;
     let names = element.properties.values().map(|property| &property.name);
     let mut named = names.zip(line.split_whitespace());
     let (name, bad) = named.find(|(_, word)| word.parse().is_ok_and(|value: f64| !value.is_finite()))?;

@@ -22,19 +22,50 @@ use crate::scene::{Frame, FrameError, Overrides, Scene, Settings};
 pub(crate) use options::{Flag, Flags, must_hold};
 pub use options::{JobOptions, Need, OptionSource};
 
+/// A result that a job can have. It is declared by the macro `facts`, so each has a meaning.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct FactKind {
+    /// Name in `summary.json`.
+    pub name: &'static str,
+    /// Unit; `count` and `share` have none.
+    pub unit: &'static str,
+    /// Meaning in a line.
+    pub meaning: &'static str,
+}
+
+/// Declares the facts of a workload, each with name, unit and meaning: a constant in the module `fact`, and
+/// an entry of `FACTS`.
+macro_rules! facts {
+    ($($name:ident $unit:literal $meaning:literal)*) => {
+        #[allow(non_upper_case_globals, reason = "they are the names in summary.json")]
+        mod fact {
+            $(pub const $name: $crate::job::FactKind = $crate::job::FactKind {
+                name: stringify!($name),
+                unit: $unit,
+                meaning: $meaning,
+            };)*
+        }
+
+        /// All facts of the workload.
+        pub(crate) const FACTS: &[$crate::job::FactKind] = &[$(fact::$name),*];
+    };
+}
+pub(crate) use facts;
+
 /// A result of a job.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Fact {
-    /// Name, with unit.
+    /// Name, that of a [`FactKind`].
     pub name: &'static str,
     /// Value.
     pub value: f64,
 }
 
 impl Fact {
-    /// Results with these names and values.
-    pub(crate) fn all<const N: usize>(facts: [(&'static str, f64); N]) -> Vec<Self> {
-        facts.map(|(name, value)| Self { name, value }).into()
+    /// Results of these kinds with their values.
+    pub(crate) fn all<const N: usize>(facts: [(FactKind, f64); N]) -> Vec<Self> {
+        facts.map(|(kind, value)| Self { name: kind.name, value }).into()
     }
 }
 

@@ -20,7 +20,7 @@ use warnings::{Code, Warning};
 
 use crate::error::LoadError;
 use crate::job::{
-    Drawn, DrawsScene, Fact, Flag, Flags, Job, JobError, JobOptions, Need, OptionSource, Request,
+    Drawn, DrawsScene, Fact, Flag, Flags, Job, JobError, JobOptions, Need, OptionSource, Request, facts,
 };
 use crate::scene::{Frame, Overrides, Scene, Settings};
 
@@ -203,13 +203,13 @@ impl DrawsScene for MultiView {
             rig.one_pass(&draws, &to, gpu)?
         };
         let mut facts = Fact::all([
-            ("pixel_invocations", views.counts[Event::PixelInvocations] as f64),
-            ("invocations_per_pixel_and_view", per_pixel(&views, self.view)),
+            (fact::pixel_invocations, views.counts[Event::PixelInvocations] as f64),
+            (fact::invocations_per_pixel_and_view, per_pixel(&views, self.view)),
         ]);
         let mut warnings: Vec<_> = self.angle_warning(&rig).into_iter().collect();
         if self.options.check_cache {
             let value = runs_over_infinite_cache(&rig, &draws, &to, &views)?;
-            facts.push(Fact { name: "invocations_over_those_with_all_in_cache", value });
+            facts.extend(Fact::all([(fact::invocations_over_those_with_all_in_cache, value)]));
             warnings.extend(cache_warning(value, gpu.spec()));
         }
         let (image, moving) = (self.shown(&views), frame.is_moving());
@@ -243,6 +243,12 @@ fn cache_warning(ratio: f64, spec: &PipelineSpec) -> Option<Warning> {
         );
         Warning::new(Code::ShadingCacheSmall, message)
     })
+}
+
+facts! {
+    pixel_invocations "count" "invocations of the pixel shader for all views"
+    invocations_per_pixel_and_view "per pixel" "the same, mean over the pixels of all views"
+    invocations_over_those_with_all_in_cache "ratio" "the same, over those of one pass with an infinite cache"
 }
 
 /// Run options in use. The camera's lens is the one that contains all views.

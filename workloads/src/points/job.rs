@@ -24,7 +24,9 @@ use super::volume::{Blurred, Torus, Volume, fill};
 use super::white::{Named, columns_for};
 use super::{DrawnNoise, NoiseSpec, draw_noise};
 use crate::error::LoadError;
-use crate::job::{Drawn, Draws, Fact, Flag, Flags, Job, JobError, JobOptions, Need, OptionSource, Request};
+use crate::job::{
+    Drawn, Draws, Fact, Flag, Flags, Job, JobError, JobOptions, Need, OptionSource, Request, facts,
+};
 use crate::scene::Settings;
 
 /// Kind of points.
@@ -98,6 +100,18 @@ struct Sampling {
     options: PointOptions,
     settings: Settings,
     seed: u64,
+}
+
+facts! {
+    points "count" "points found"
+    points_from_passes "count" "of these, those from candidates of the passes; the host adds the others"
+    candidates "count" "candidates that the shader makes"
+    candidates_in_regions "count" "of these, those in an uncovered region"
+    uncovered_regions "count" "uncovered cells of the host, over all levels"
+    thin_regions "count" "of these, those that remain because they hold no representable point"
+    columns "count" "columns of the density that are drawn"
+    points_expected "count" "samples times the share of space that the volume fills"
+    samples_covered "count" "samples that a triangle covers"
 }
 
 /// Run options in use. Darts and noise bring their own samples; nothing but volumes moves or is out of focus.
@@ -306,12 +320,12 @@ impl Sampling {
         let spec = PoissonSpec { radius, domain, seed, spacing: Spacing::Double };
         let Rasterized { found, drawn, kept, candidates, .. } = darts::<D>(&spec, rounds, gpu)?;
         let facts = Fact::all([
-            ("points", found.points.len() as f64),
-            ("points_from_passes", drawn as f64),
-            ("candidates", candidates as f64),
-            ("candidates_in_regions", kept as f64),
-            ("uncovered_regions", found.uncovered as f64),
-            ("thin_regions", found.thin_regions as f64),
+            (fact::points, found.points.len() as f64),
+            (fact::points_from_passes, drawn as f64),
+            (fact::candidates, candidates as f64),
+            (fact::candidates_in_regions, kept as f64),
+            (fact::uncovered_regions, found.uncovered as f64),
+            (fact::thin_regions, found.thin_regions as f64),
         ]);
         let side = self.settings.height;
         let image = picture(plane(&found.points), side, (0.15 * radius * f64::from(side)) as i64);
@@ -323,9 +337,9 @@ impl Sampling {
         let spec = NoiseSpec { count: self.options.count, seed, across: columns_for(D) };
         let found: DrawnNoise<D> = draw_noise(&Named::Gauss, &spec, gpu).map_err(JobError::setting)?;
         let facts = Fact::all([
-            ("points", found.points.len() as f64),
-            ("candidates", found.candidates as f64),
-            ("columns", found.columns as f64),
+            (fact::points, found.points.len() as f64),
+            (fact::candidates, found.candidates as f64),
+            (fact::columns, found.columns as f64),
         ]);
         let image = picture(plane(&found.points), self.settings.height, 0);
         let warnings = rejected_warning(found.candidates, found.points.len()).into_iter().collect();
@@ -344,9 +358,9 @@ impl Sampling {
         };
         let found = fill(domain, side, &source, gpu)?;
         let facts = Fact::all([
-            ("points", found.points.len() as f64),
-            ("points_expected", share * found.samples as f64),
-            ("samples_covered", found.covered as f64),
+            (fact::points, found.points.len() as f64),
+            (fact::points_expected, share * found.samples as f64),
+            (fact::samples_covered, found.covered as f64),
         ]);
         let (moving, lens) = (self.options.dimensions != 4, self.options.dimensions > 3);
         Ok(Drawn { image: found.image, moving, lens, facts, ..Drawn::default() })

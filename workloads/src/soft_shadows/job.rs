@@ -14,7 +14,9 @@ use super::shade::{Shadows, VisibleTriangles, World, look_ups};
 use super::{AreaLight, LightSpec, Method, SceneView, ShadowMap};
 use crate::accumulation::SharedSamples;
 use crate::error::LoadError;
-use crate::job::{Drawn, DrawsScene, Fact, Flag, Flags, Job, JobError, JobOptions, OptionSource, Request};
+use crate::job::{
+    Drawn, DrawsScene, Fact, Flag, Flags, Job, JobError, JobOptions, OptionSource, Request, facts,
+};
 use crate::material::{Alpha, Material};
 use crate::scene::{
     self, Frame, FrameMesh, Graph, Local, Motion, Node, Overrides, Parts, Rig, Scene, SceneCamera, Settings,
@@ -109,10 +111,10 @@ impl SoftShadows {
 
     fn facts(&self, map: &ShadowMap, fetches: u64) -> Vec<Fact> {
         Fact::all([
-            ("shadow_map_bytes", map.bytes() as f64),
-            ("shadow_map_passes", f64::from(self.passes())),
-            ("shadow_map_samples_tested", map.counts[Event::SamplesTested] as f64),
-            ("shading_fetches", fetches as f64),
+            (fact::shadow_map_bytes, map.bytes() as f64),
+            (fact::shadow_map_passes, f64::from(self.passes())),
+            (fact::shadow_map_samples_tested, map.counts[Event::SamplesTested] as f64),
+            (fact::shading_fetches, fetches as f64),
         ])
     }
 
@@ -203,6 +205,13 @@ fn parts<'a>(scene: &'a Scene, frame: &'a Frame) -> Result<(Vec<Draw<'a>>, Vec<V
         frame.draws(scene)?.into_iter().map(|draw| draw.with_state(DrawState::new(Cull::None))).collect();
     let drawn = frame.drawn(scene).into_iter();
     Ok((draws, drawn.map(|mesh| scene.materials()[mesh.material].base_color).collect()))
+}
+
+facts! {
+    shadow_map_bytes "bytes" "size of the shadow map"
+    shadow_map_passes "count" "passes that draw the map"
+    shadow_map_samples_tested "count" "samples tested in these passes"
+    shading_fetches "count" "fetches from the map as the image is shaded"
 }
 
 /// Run options in use. The lens of the map is the light; the camera is a pinhole.

@@ -27,7 +27,7 @@ use crate::error::LoadError;
 use crate::job::JobError;
 use crate::scene::camera::CameraFrame;
 use crate::scene::{Frustum, tan_half};
-pub(crate) use job::FLAGS;
+pub(crate) use job::{FACTS, FLAGS};
 pub use job::{SoftShadowOptions, SoftShadows, default_scene, job};
 pub use shade::{Shadows, VisibleTriangles, World, look_ups};
 

@@ -54,6 +54,39 @@ fn a_ply_header_that_cannot_be_used_says_what_to_do() {
 }
 
 #[test]
+fn a_file_that_ends_early_says_so_wherever_it_is_cut() {
+    let files = Files::new();
+    let header = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\n";
+    for length in "ply".len()..header.len() {
+        let text = failure(load(files.put("a.ply", &header[..length])).unwrap_err());
+        let line = 1 + header[..length].trim_end().matches('\n').count();
+        let at_end = [line, line + 1].map(|line| format!("a.ply: header: the file ends at line {line}, "));
+        assert!(at_end.iter().any(|start| text.contains(start)), "{text}");
+        expect(&text, &["it is truncated; get it again"]);
+    }
+    let json = "{\n\"asset\": {\"version\": \"2.0\"},\n\"nodes\": [{}]\n";
+    for length in 1..json.len() {
+        let text = failure(load(files.put("a.gltf", &json[..length])).unwrap_err());
+        expect(&text, &["a.gltf: JSON: the file ends at line ", "it is truncated; get the file again"]);
+    }
+}
+
+#[test]
+fn a_wrong_line_of_a_ply_header_is_quoted_without_words_of_the_parser() {
+    let files = Files::new();
+    for (lines, quoted) in [
+        ("format ascii 1.0\nelment vertex 1", "line 3 cannot be read: `elment vertex 1`"),
+        ("format asc 1.0", "line 2 cannot be read: `format asc 1.0`"),
+        ("property float x", "line 2 cannot be read: `property float x`"),
+    ] {
+        let text = format!("ply\n{lines}\nend_header\n");
+        let text = failure(load(files.put("a.ply", text)).unwrap_err());
+        expect(&text, &["a.ply: header: not a PLY file: ", quoted, "; export it again as a PLY file"]);
+        assert!(!text.contains('{'), "{text}");
+    }
+}
+
+#[test]
 fn an_empty_scene_is_reported_with_its_file() {
     let files = Files::new();
     files.put("empty.obj", "v 0 0 0\n");

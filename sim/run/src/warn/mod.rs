@@ -112,8 +112,8 @@ fn degenerate(simulated: &Simulated) -> Option<Warning> {
         Warning::new(
             Code::DegenerateTriangle,
             format!(
-                "{all} of {of} triangles have no area at any time (frame {frame}): {dropped} with two equal corners were \
-                 dropped, {flat} with their corners on one line were kept, so that closed surfaces stay closed; clean the \
+                "triangles have no area at any time ({all} of {of}, frame {frame}): those with two equal corners ({dropped}) were \
+                 dropped, those with their corners on one line ({flat}) were kept, so that closed surfaces stay closed; clean the \
                  mesh where it was made"
             ),
         )
@@ -127,7 +127,7 @@ fn empty_frames(simulated: &Simulated) -> Option<Warning> {
     (empty > 0).then(|| {
         Warning::new(
             Code::EmptyFrame,
-            format!("{empty} of {} frames show nothing: check the camera", simulated.known().count()),
+            format!("frames show nothing ({empty} of {}): check the camera", simulated.known().count()),
         )
     })
 }

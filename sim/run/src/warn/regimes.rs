@@ -31,12 +31,12 @@ pub(super) fn of_regimes(simulated: &Simulated) -> Vec<Warning> {
 }
 
 /// Frame with the most triangles of a regime, counted by `of`, if they are at least `share` of those in view.
-/// The text is, for example, `12 of 40 triangles in view (frame 3)`.
+/// The text is, for example, `12 of 40 in view, frame 3`.
 fn worst_frame(simulated: &Simulated, share: f64, of: fn(&Regime) -> u64) -> Option<String> {
     let (frame, observed) = simulated.observed().max_by_key(|(_, observed)| of(&observed.regime))?;
     let (count, all) = (of(&observed.regime), observed.regime.in_view);
     (count > 0 && count as f64 >= share * all as f64)
-        .then(|| format!("{count} of {all} triangles in view (frame {})", frame.index))
+        .then(|| format!("{count} of {all} in view, frame {}", frame.index))
 }
 
 fn behind(simulated: &Simulated) -> Option<Warning> {
@@ -44,7 +44,7 @@ fn behind(simulated: &Simulated) -> Option<Warning> {
     Some(Warning::new(
         Code::BehindCamera,
         format!(
-            "{which} reach behind the camera: nothing bounds their image, so they are tested all over it; move the camera, \
+            "triangles reach behind the camera ({which}): nothing bounds their image, so they are tested all over it; move the camera, \
              or cut large triangles into smaller ones"
         ),
     ))
@@ -55,7 +55,7 @@ fn tiny(simulated: &Simulated) -> Option<Warning> {
     Some(Warning::new(
         Code::SubSampleTriangles,
         format!(
-            "{which} are smaller than the spacing of samples: most are hit by none, and tile tests cannot help; use a \
+            "triangles are smaller than the spacing of samples ({which}): most are hit by none, and tile tests cannot help; use a \
              coarser mesh, a larger image or more samples"
         ),
     ))
@@ -66,7 +66,7 @@ fn slivers(simulated: &Simulated) -> Option<Warning> {
     Some(Warning::new(
         Code::SliverTriangles,
         format!(
-            "{which} are more than a hundred times as long as high: they touch many tiles and few samples; fix the mesh \
+            "triangles are more than a hundred times as long as high ({which}): they touch many tiles and few samples; fix the mesh \
              where it was made"
         ),
     ))
@@ -77,7 +77,7 @@ fn fast(simulated: &Simulated) -> Option<Warning> {
     Some(Warning::new(
         Code::FastMotion,
         format!(
-            "{which} move by more than an image while the shutter is open: few samples see them, the image is noisy, and \
+            "triangles move by more than an image while the shutter is open ({which}): few samples see them, the image is noisy, and \
              a straight way may be far from the true one; use a shorter shutter, a higher frame rate or more samples"
         ),
     ))
@@ -88,7 +88,7 @@ fn blurred(simulated: &Simulated) -> Option<Warning> {
     Some(Warning::new(
         Code::BlurBeyondImage,
         format!(
-            "{which} are out of focus by more than an image: the lens is too large for this scene; use a smaller --lens \
+            "triangles are out of focus by more than an image ({which}): the lens is too large for this scene; use a smaller --lens \
              or another --focus"
         ),
     ))
@@ -99,7 +99,7 @@ fn extreme(simulated: &Simulated) -> Option<Warning> {
     Some(Warning::new(
         Code::CoordinatesOutOfRange,
         format!(
-            "{which} have coordinates whose products leave the range of 32-bit numbers: they may not be seen, or at wrong \
+            "triangles have coordinates whose products leave the range of 32-bit numbers ({which}): they may not be seen, or at wrong \
              depths; scale the scene to ordinary lengths"
         ),
     ))
@@ -110,7 +110,7 @@ fn coarse(simulated: &Simulated) -> Option<Warning> {
     Some(Warning::new(
         Code::CoordinatesCoarse,
         format!(
-            "{which} have coordinates so large that 32-bit numbers move them by more than a quarter of a pixel: they are drawn \
+            "triangles have coordinates so large that 32-bit numbers move them by more than a quarter of a pixel ({which}): they are drawn \
              out of place; move what the camera sees to the origin, without what is far from it"
         ),
     ))
@@ -122,7 +122,7 @@ fn cut(simulated: &Simulated) -> Option<Warning> {
         (worst.regime.cut, simulated.observed().filter(|(_, observed)| observed.regime.cut > 0).count());
     (count > 0).then(|| {
         let message = format!(
-            "the near plane cuts {count} triangles in front of the camera away, or parts of them (frame {}; some in {frames} of {} \
+            "the near plane cuts triangles in front of the camera away, or parts of them ({count} in frame {}, some in {frames} of {} \
              frames): give the camera a smaller `near`, or move it",
             frame.index,
             simulated.distinct.len()

@@ -47,15 +47,12 @@ pub struct FramesArgs {
     /// Print everything as JSON and nothing else
     #[arg(long)]
     pub json: bool,
-    /// Whether the result goes to standard output.
-    #[arg(skip)]
-    pub piped: bool,
 }
 
 /// Frames shown on the terminal.
 const SHOWN: usize = 12;
 
-pub(super) fn run(args: &FramesArgs, terminal: &Terminal) -> Result<(), Failure> {
+pub(super) fn run(args: &FramesArgs, piped: bool, terminal: &Terminal) -> Result<(), Failure> {
     let inputs = args.find.mark_file.as_deref().into_iter().chain([args.input.trace.as_path()]);
     may_hold_results("--out", args.out.as_deref(), inputs)?;
     args.out.as_deref().map_or(Ok(()), is_table)?;
@@ -75,13 +72,11 @@ pub(super) fn run(args: &FramesArgs, terminal: &Terminal) -> Result<(), Failure>
         return print_json(&json_report(&frames, &table, summary, pixels, args.inverse), true);
     }
     warn_of_frames(&frames.set, terminal);
-    report(&text(&frames.set, &table, summary, pixels), args.piped, terminal)?;
+    report(&text(&frames.set, &table, summary, pixels), piped, terminal)?;
     if args.inverse {
-        report(&inverse_text(&table, pixels, terminal), args.piped, terminal)?;
+        report(&inverse_text(&table, pixels, terminal), piped, terminal)?;
     }
-    args.out
-        .as_ref()
-        .map_or(Ok(()), |out| report(&format!("frames: {}", out.display()), args.piped, terminal))
+    args.out.as_ref().map_or(Ok(()), |out| report(&format!("frames: {}", out.display()), piped, terminal))
 }
 
 /// Refuses a name that promises another kind of file.
@@ -264,9 +259,6 @@ pub struct AlignArgs {
     /// Print as JSON and nothing else
     #[arg(long)]
     pub json: bool,
-    /// Whether the result goes to standard output.
-    #[arg(skip)]
-    pub piped: bool,
 }
 
 /// Root mean square of rounding to whole samples, in sample periods, as 1 / sqrt 12: starts are at best known
@@ -284,7 +276,7 @@ fn check_anchor((stamp_s, time_s): (f64, f64), trace: &TraceHeader) -> Result<()
     )))
 }
 
-pub(super) fn align(args: &AlignArgs, terminal: &Terminal) -> Result<(), Failure> {
+pub(super) fn align(args: &AlignArgs, piped: bool, terminal: &Terminal) -> Result<(), Failure> {
     may_hold_results("--out", args.out.as_deref(), [args.stamps.as_path(), &args.input.trace])?;
     let mut stamps = read_times(&args.stamps)?;
     stamps.sort_by(f64::total_cmp);
@@ -330,5 +322,5 @@ pub(super) fn align(args: &AlignArgs, terminal: &Terminal) -> Result<(), Failure
         "time = {} s + {} x stamp ({} pairs, {:.3e} s left)",
         alignment.offset_s, alignment.scale, alignment.pairs, alignment.residual_s
     );
-    report(&line, args.piped, terminal)
+    report(&line, piped, terminal)
 }

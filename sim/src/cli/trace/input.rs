@@ -377,35 +377,40 @@ impl Pipes {
         match &mut args.command {
             TraceCommand::Frames(args) => {
                 pipes.input(&mut args.input.trace)?;
-                args.piped = pipes.optional_output(&mut args.out, args.json)?;
+                pipes.optional_output(&mut args.out, args.json)?;
             }
             TraceCommand::Energy(args) => pipes.input(&mut args.input.trace)?,
             TraceCommand::Align(args) => {
                 pipes.input(&mut args.input.trace)?;
-                args.piped = pipes.optional_output(&mut args.out, args.json)?;
+                pipes.optional_output(&mut args.out, args.json)?;
             }
             TraceCommand::Convert(args) => {
                 pipes.input(&mut args.input.trace)?;
                 args.out = args.last.take().or(args.named.take()).unwrap_or_default();
                 let format = args.format.map(|format| (format.ending, format.is_text));
-                args.piped = pipes.output(&mut args.out, format, CSV, args.json)?;
+                pipes.output(&mut args.out, format, CSV, args.json)?;
             }
             TraceCommand::Sample(args) => {
                 pipes.input(&mut args.input.trace)?;
                 let format = args.format.map(|format| (format.ending, format.is_text));
-                args.piped = pipes.output(&mut args.out, format, CSV, args.json)?;
+                pipes.output(&mut args.out, format, CSV, args.json)?;
             }
             TraceCommand::Plot(args) => {
                 pipes.input(&mut args.input.trace)?;
                 let format = args.format.map(PlotFormat::ending);
-                args.piped = pipes.output(&mut args.out, format, PlotFormat::Svg.ending(), args.json)?;
+                pipes.output(&mut args.out, format, PlotFormat::Svg.ending(), args.json)?;
             }
             TraceCommand::Pareto(args) => {
                 pipes.input(&mut args.table)?;
-                args.piped = pipes.optional_output(&mut args.out, args.json)?;
+                pipes.optional_output(&mut args.out, args.json)?;
             }
         }
         Ok(pipes)
+    }
+
+    /// Whether the result goes to standard output.
+    pub fn has_output(&self) -> bool {
+        self.output.is_some()
     }
 
     /// Copies the result to standard output, or says why there is none.
@@ -428,25 +433,25 @@ impl Pipes {
         Ok(())
     }
 
-    fn optional_output(&mut self, out: &mut Option<PathBuf>, json: bool) -> Result<bool, Failure> {
-        out.as_mut().map_or(Ok(false), |out| self.output(out, None, CSV, json))
+    fn optional_output(&mut self, out: &mut Option<PathBuf>, json: bool) -> Result<(), Failure> {
+        out.as_mut().map_or(Ok(()), |out| self.output(out, None, CSV, json))
     }
 
-    /// Whether `out` is standard output. A format is its ending, and whether it is text.
+    /// Puts a file in place of `out` if that is standard output. A format is its ending, and whether it is text.
     fn output(
         &mut self,
         out: &mut PathBuf,
         format: Option<(&str, bool)>,
         default: (&str, bool),
         json: bool,
-    ) -> Result<bool, Failure> {
+    ) -> Result<(), Failure> {
         if !is_dash(out) {
             return match format {
                 Some((format, _)) => Err(wrong(format!(
                     "--format {format} goes with `-`, standard output; the name of a file says its format: {} has to end in .{format}",
                     out.display()
                 ))),
-                None => Ok(false),
+                None => Ok(()),
             };
         }
         if json {
@@ -463,7 +468,7 @@ impl Pipes {
         let file = self.file(&format!("standard output.{format}"))?;
         self.output = Some(file.clone());
         *out = file;
-        Ok(true)
+        Ok(())
     }
 
     fn file(&mut self, name: &str) -> Result<PathBuf, Failure> {

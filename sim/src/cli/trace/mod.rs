@@ -62,7 +62,8 @@ pub enum TraceCommand {
 pub(super) fn run(args: &TraceArgs, terminal: &Terminal) -> Result<(), Failure> {
     let mut args = args.clone();
     let pipes = Pipes::laid(&mut args)?;
-    pipes.finish(run_on_files(&args, terminal))
+    let done = run_on_files(&args, pipes.has_output(), terminal);
+    pipes.finish(done)
 }
 
 /// Prints what was done, on standard error where standard output has the result.
@@ -79,15 +80,16 @@ fn warn_with(warning: &Warning, remedy: &str, terminal: &Terminal) {
     terminal.warn_of(warning.code, &format!("{}; {remedy}", warning.message));
 }
 
-fn run_on_files(args: &TraceArgs, terminal: &Terminal) -> Result<(), Failure> {
+/// Runs on files in place of `-`; `piped` is whether the result goes to standard output.
+fn run_on_files(args: &TraceArgs, piped: bool, terminal: &Terminal) -> Result<(), Failure> {
     match &args.command {
-        TraceCommand::Frames(args) => frames::run(args, terminal),
+        TraceCommand::Frames(args) => frames::run(args, piped, terminal),
         TraceCommand::Energy(args) => energy::run(args, terminal),
-        TraceCommand::Align(args) => frames::align(args, terminal),
-        TraceCommand::Convert(args) => convert(args, terminal),
-        TraceCommand::Sample(args) => sample(args, terminal),
-        TraceCommand::Plot(args) => plot::run(args, terminal),
-        TraceCommand::Pareto(args) => plot::pareto(args, terminal),
+        TraceCommand::Align(args) => frames::align(args, piped, terminal),
+        TraceCommand::Convert(args) => convert(args, piped, terminal),
+        TraceCommand::Sample(args) => sample(args, piped, terminal),
+        TraceCommand::Plot(args) => plot::run(args, piped, terminal),
+        TraceCommand::Pareto(args) => plot::pareto(args, piped, terminal),
     }
 }
 
@@ -185,15 +187,12 @@ pub struct ConvertArgs {
     /// Format of standard output, where OUT is `-` (default: csv)
     #[arg(long, value_name = "FORMAT", value_parser = trace_format())]
     pub format: Option<&'static TraceFormat>,
-    /// Whether the result goes to standard output.
-    #[arg(skip)]
-    pub piped: bool,
 }
 
 /// Texts of more bytes are announced.
 const LARGE_BYTES: u64 = 1 << 30;
 
-fn convert(args: &ConvertArgs, terminal: &Terminal) -> Result<(), Failure> {
+fn convert(args: &ConvertArgs, piped: bool, terminal: &Terminal) -> Result<(), Failure> {
     let format = format_of(&args.out)?;
     may_be_saved("OUT", &args.out, format, [args.input.trace.as_path()])?;
     let (trace, repairs) = args.input.source(terminal)?;
@@ -208,7 +207,7 @@ fn convert(args: &ConvertArgs, terminal: &Terminal) -> Result<(), Failure> {
     }
     report(
         &format!("{}: {} at {rate_hz} Hz", args.out.display(), counted(samples as usize, "sample")),
-        args.piped,
+        piped,
         terminal,
     )
 }
@@ -332,12 +331,9 @@ pub struct SampleArgs {
     /// Format of standard output, where --out is `-` (default: csv)
     #[arg(long, value_name = "FORMAT", value_parser = trace_format())]
     pub format: Option<&'static TraceFormat>,
-    /// Whether the result goes to standard output.
-    #[arg(skip)]
-    pub piped: bool,
 }
 
-fn sample(args: &SampleArgs, terminal: &Terminal) -> Result<(), Failure> {
+fn sample(args: &SampleArgs, piped: bool, terminal: &Terminal) -> Result<(), Failure> {
     let format = format_of(&args.out)?;
     let inputs = args.device.as_deref().into_iter().chain([args.input.trace.as_path()]);
     may_be_saved("--out", &args.out, format, inputs)?;
@@ -389,7 +385,7 @@ fn sample(args: &SampleArgs, terminal: &Terminal) -> Result<(), Failure> {
         si(current_range_a[0], "A"),
         si(current_range_a[1], "A"),
     );
-    report(&line, args.piped, terminal)
+    report(&line, piped, terminal)
 }
 
 impl SampleArgs {

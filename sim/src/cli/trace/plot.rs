@@ -69,9 +69,6 @@ pub struct PlotArgs {
     /// Format of standard output, where --out is `-` (default: svg)
     #[arg(long, value_enum, value_name = "FORMAT")]
     pub format: Option<PlotFormat>,
-    /// Whether the result goes to standard output.
-    #[arg(skip)]
-    pub piped: bool,
     /// Style of pictures.
     #[command(flatten)]
     pub look: LookArgs,
@@ -104,7 +101,7 @@ const BARS: usize = 60;
 /// Frames drawn on top of one another, at most.
 const OVERLAID: usize = 400;
 
-pub(super) fn run(args: &PlotArgs, terminal: &Terminal) -> Result<(), Failure> {
+pub(super) fn run(args: &PlotArgs, piped: bool, terminal: &Terminal) -> Result<(), Failure> {
     let kind = PlotFormat::of(&args.out)?;
     may_hold_results("--out", Some(&args.out), [args.input.trace.as_path()])?;
     let (picture, shown) = match args.kind {
@@ -115,7 +112,7 @@ pub(super) fn run(args: &PlotArgs, terminal: &Terminal) -> Result<(), Failure> {
     if args.json {
         return print_json(&json!({ "out": args.out.display().to_string(), "shown": shown }), true);
     }
-    report(&format!("{}: {shown}", args.out.display()), args.piped, terminal)
+    report(&format!("{}: {shown}", args.out.display()), piped, terminal)
 }
 
 fn span(args: &PlotArgs, start_s: f64, end_s: f64) -> Result<[f64; 2], Failure> {
@@ -381,9 +378,6 @@ pub struct ParetoArgs {
     /// Print as JSON and nothing else
     #[arg(long)]
     pub json: bool,
-    /// Whether the result goes to standard output.
-    #[arg(skip)]
-    pub piped: bool,
     /// Style of pictures.
     #[command(flatten)]
     pub look: LookArgs,
@@ -401,7 +395,7 @@ pub enum ParetoShow {
 
 type Groups = BTreeMap<String, Vec<RatedPoint>>;
 
-pub(super) fn pareto(args: &ParetoArgs, terminal: &Terminal) -> Result<(), Failure> {
+pub(super) fn pareto(args: &ParetoArgs, piped: bool, terminal: &Terminal) -> Result<(), Failure> {
     may_hold_results("--out", args.out.as_deref(), [args.table.as_path()])?;
     let table = InputTable::read(&args.table)?;
     let groups = frontiers(&table, &args.columns(), args.idle_w, args.seed)?;
@@ -416,7 +410,7 @@ pub(super) fn pareto(args: &ParetoArgs, terminal: &Terminal) -> Result<(), Failu
     if args.json {
         print_json(&json!({ "idle_W": args.idle_w, "groups": groups }), true)
     } else {
-        report(&text(&groups), args.piped, terminal)
+        report(&text(&groups), piped, terminal)
     }
 }
 

@@ -147,7 +147,15 @@ impl<'a> Document<'a> {
         let (json, binary) =
             if bytes.starts_with(b"glTF") { split(source, &bytes)? } else { (&bytes[..], None) };
         let root = Root::from_slice(json).map_err(|error| {
-            source.broken("JSON", format!("not a glTF 2.0 file: {error}; export it again"))
+            let message = if error.is_eof() {
+                format!(
+                    "the file ends at line {}, within its JSON: it is truncated; get the file again",
+                    error.line()
+                )
+            } else {
+                format!("not a glTF 2.0 file: {error}; export it again")
+            };
+            source.broken("JSON", message)
         })?;
         check_positions(source, &root)?;
         validate(source, &root)?;
