@@ -452,8 +452,8 @@ pub(super) trait RowSource: Send {
     /// Skips rows, up to the end.
     fn skip(&mut self, rows: u64) -> Result<(), ReadError>;
 
-    /// Appends up to `limit` rows to the values of `batch`, as they are in the file; the stamps are those of
-    /// these rows alone. Returns the number of rows, 0 at the end.
+    /// Appends up to `limit` rows to the values of `batch`, in the units of the file; the stamps are those of
+    /// these rows alone, in s or ns. Returns the number of rows, 0 at the end.
     fn next(&mut self, layout: &Layout, limit: usize, batch: &mut RowBatch) -> Result<usize, ReadError>;
 
     /// The repair made when the file was opened and in the rows read since.

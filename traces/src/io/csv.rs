@@ -201,8 +201,8 @@ fn damaged(path: &Path, error: &::csv::Error) -> ReadError {
     ReadError::Damaged { path: path.to_owned(), format: "CSV", reason: error.to_string() }
 }
 
-/// The description beside a text, where there is one.
-fn description(path: &Path) -> Result<Description, ReadError> {
+/// The description beside a file, where there is one.
+pub(super) fn description(path: &Path) -> Result<Description, ReadError> {
     for sidecar in description_paths(path) {
         match fs::read_to_string(&sidecar) {
             Ok(json) => return Description::from_json(&sidecar, &json),
