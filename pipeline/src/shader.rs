@@ -311,6 +311,13 @@ impl<'a> Lane<'a> {
         a >> bits
     }
 
+    /// Bits that are set in both `a` and `b`.
+    #[inline(always)]
+    pub fn and(&self, a: u32, b: u32) -> u32 {
+        self.count(1);
+        a & b
+    }
+
     /// Bits that differ in `a` and `b`.
     #[inline(always)]
     pub fn xor(&self, a: u32, b: u32) -> u32 {

@@ -10,7 +10,7 @@ use glam::{Affine3A, DVec3, Vec2, Vec3};
 use pipeline::geometry::Projection;
 use pipeline::sampling::{Pattern, Sample, SampleSource, SampleSpec, TableError};
 use pipeline::setup::Corner;
-use pipeline::{Camera, CameraError, Draw, DrawError, Geometry, SampleTable, Viewport};
+use pipeline::{Camera, CameraError, Clip, Draw, DrawError, Geometry, SampleTable, Viewport};
 
 pub use crate::bvh::RayWork;
 use crate::bvh::{Bvh, Ray, bounds_of};
@@ -37,6 +37,8 @@ impl Face {
 pub struct Rays {
     faces: Vec<Face>,
     tree: Bvh,
+    /// Clip planes of each draw.
+    clips: Vec<Clip>,
 }
 
 impl Rays {
@@ -49,13 +51,14 @@ impl Rays {
             };
             geometry.triangles().iter().map(move |corners| Face { ends: ends(corners), draw })
         });
-        Self::of(faces.collect())
+        let clips = draws.iter().map(|draw| draw.geometry.clip()).collect();
+        Self { clips, ..Self::of(faces.collect()) }
     }
 
     fn of(faces: Vec<Face>) -> Self {
         let bounds = |face: &Face| face.ends.map(|end| bounds_of(&end.map(|corner| corner.as_dvec3())));
         let tree = Bvh::new(&faces.iter().map(bounds).collect::<Vec<_>>());
-        Self { faces, tree }
+        Self { faces, tree, clips: Vec::new() }
     }
 
     /// The triangles.
@@ -63,10 +66,20 @@ impl Rays {
         &self.faces
     }
 
-    /// Whether a triangle other than `but` lies between two points at time `t`; the cost is added to `work`.
-    pub fn is_blocked(&self, from: DVec3, to: DVec3, t: f32, but: u32, work: &mut RayWork) -> bool {
+    /// Whether a triangle other than `but` lies between a point and another at lens position `lens`, at time `t`;
+    /// the cost is added to `work`. Clip planes across lens and shutter count, those across an image do not.
+    pub fn is_blocked(
+        &self,
+        from: DVec3,
+        (to, lens): (DVec3, [f32; 2]),
+        t: f32,
+        but: u32,
+        work: &mut RayWork,
+    ) -> bool {
         let ray = Ray { from, along: to - from, t, beyond: 1e-6 };
-        let other = |id: usize| (id != but as usize).then(|| self.faces[id].at(t));
+        let is_there = |face: &Face| self.clips.get(face.draw).is_none_or(|clip| clip.holds(Some(lens), t));
+        let other =
+            |id: usize| (id != but as usize && is_there(&self.faces[id])).then(|| self.faces[id].at(t));
         self.tree.any(&ray, 1.0 - 1e-6, other, work)
     }
 
@@ -166,6 +179,9 @@ pub fn pinhole(camera: &Camera, [u, v]: [f32; 2]) -> Result<Camera, CameraError>
 pub struct Snapshot<'a> {
     meshes: Vec<Vec<Vec3>>,
     draws: Vec<Draw<'a>>,
+    /// Lens position, if there is a lens, and time.
+    lens: Option<[f32; 2]>,
+    t: f32,
     /// A pinhole without projection: the meshes are already on its image plane.
     pub camera: Camera,
 }
@@ -203,18 +219,22 @@ impl<'a> Snapshot<'a> {
             draw.geometry.open().iter().zip(draw.geometry.close()).map(place).collect::<Vec<_>>()
         };
         // One scene unit at depth 1 is a pixel.
-        let camera = Camera::new(Affine3A::IDENTITY, 0.5 * viewport.height() as f32, camera.near())?;
-        Ok(Self { meshes: draws.iter().map(mesh).collect(), draws: draws.to_vec(), camera })
+        let still = Camera::new(Affine3A::IDENTITY, 0.5 * viewport.height() as f32, camera.near())?;
+        let (lens, t) = (camera.lens().map(|_| [at.u, at.v]), at.t);
+        let camera = still.with_clip(camera.clip().frozen(lens, t));
+        Ok(Self { meshes: draws.iter().map(mesh).collect(), draws: draws.to_vec(), lens, t, camera })
     }
 
-    /// The still draws, with the order, triangles, shaders and culling of the original ones.
+    /// The still draws, with the order, triangles, shaders, culling and clip planes of the original ones.
     ///
     /// # Errors
     /// [`SnapshotError`] if a vertex is not finite.
     pub fn draws(&self) -> Result<Vec<Draw<'_>>, SnapshotError> {
         let pairs = self.meshes.iter().zip(&self.draws);
         let still = pairs.map(|(mesh, draw)| {
-            Ok(Draw { geometry: Geometry::new(mesh, mesh, draw.geometry.triangles())?, ..*draw })
+            let clip = draw.geometry.clip().frozen(self.lens, self.t);
+            let geometry = Geometry::new(mesh, mesh, draw.geometry.triangles())?.with_clip(clip);
+            Ok(Draw { geometry, ..*draw })
         });
         still.collect()
     }
@@ -234,8 +254,9 @@ mod tests {
         let mut first = |t| rays.first((DVec3::ZERO, DVec3::Z), t, 0.0, work);
         assert_eq!(first(0.5), Some((0, 2.0)));
         assert_eq!((first(0.0), first(1.0)), (None, None));
-        let is_blocked =
-            |along, but| rays.is_blocked(DVec3::ZERO, DVec3::Z * along, 0.5, but, &mut RayWork::default());
+        let is_blocked = |along, but| {
+            rays.is_blocked(DVec3::ZERO, (DVec3::Z * along, [0.0; 2]), 0.5, but, &mut RayWork::default())
+        };
         assert!(is_blocked(4.0, 7));
         assert!(!is_blocked(4.0, 0), "its own triangle does not count");
         assert!(!is_blocked(1.9, 7));

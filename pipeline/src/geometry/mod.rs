@@ -246,6 +246,21 @@ impl Clip {
             .map(|[lo, hi]| if hi == f32::INFINITY { [lo, hi] } else { [lo, hi.next_down()] })
     }
 
+    /// Whether a time, and a lens position if there is a lens, are within.
+    pub fn holds(&self, lens: Option<[f32; 2]>, t: f32) -> bool {
+        let [u, v, times] = self.half_open();
+        let within = |at: f32, [lo, hi]: [f32; 2]| lo <= at && at <= hi;
+        within(t, times) && lens.is_none_or(|[x, y]| within(x, u) && within(y, v))
+    }
+
+    /// The planes for a rendering at one time and lens position: those across the image, and an empty part of
+    /// the shutter if the others exclude it.
+    #[must_use]
+    pub fn frozen(&self, lens: Option<[f32; 2]>, t: f32) -> Self {
+        let t = if self.holds(lens, t) { Self::NONE.t } else { [0.0; 2] };
+        Self { t, image: self.image, ..Self::NONE }
+    }
+
     /// Both bounds, for conservative mode.
     pub fn closed(&self) -> [[f32; 2]; 3] {
         [self.u, self.v, self.t]
@@ -285,6 +300,20 @@ mod tests {
         }
         assert_eq!(Clip::new([0.0, f32::NAN], all, all), None);
         assert_eq!(Clip::new(all, all, [0.25, 0.5]).unwrap().closed()[2], [0.25, 0.5]);
+    }
+
+    #[test]
+    fn a_frozen_clip_draws_everything_or_nothing() {
+        let all = [f32::NEG_INFINITY, f32::INFINITY];
+        let clip = Clip::new([-0.5, 0.5], all, [0.25, 0.75]).unwrap().across_image([0.0, 0.5], all).unwrap();
+        let inside = Clip::NONE.across_image([0.0, 0.5], all).unwrap();
+        assert_eq!(clip.frozen(Some([0.0, 0.9]), 0.25), inside);
+        // Without a lens its planes do not count; the upper bound is excluded.
+        assert_eq!(clip.frozen(None, 0.5), inside);
+        for (lens, t) in [(Some([0.5, 0.0]), 0.5), (Some([0.0; 2]), 0.75), (None, 0.0)] {
+            let [.., [lo, hi]] = clip.frozen(lens, t).half_open();
+            assert!(lo > hi, "{lens:?} {t}");
+        }
     }
 
     #[test]

@@ -233,9 +233,7 @@ impl<'a> Cover<'a> {
         let (eye, grid) = (self.eye, self.grid);
         rasterizer.rasterize(&triangle, &grid, |tile, touch| {
             let reach = reach(&Lane::default(), seen, touch);
-            self.test(tile, Some(reach), |at| {
-                times(eye, seen, at).iter().any(|face| !face.as_slice().is_empty())
-            });
+            self.test(tile, &reach, |at| times(eye, seen, at).iter().any(|face| !face.as_slice().is_empty()));
         });
     }
 
@@ -247,6 +245,7 @@ impl<'a> Cover<'a> {
             (a.x - x) * (b.y - y) - (b.x - x) * (a.y - y)
         };
         let slack = slack(&Lane::default(), self.eye, face);
+        let reach = reach_of_face(&Lane::default(), face);
         let corners = face.map(|p| p.to_array());
         // Depth increases away from the camera.
         if (face[1] - face[0]).cross(face[2] - face[0]).z <= 0.0 {
@@ -255,19 +254,18 @@ impl<'a> Cover<'a> {
         let Some(triangle) = MovingTriangle::new(corners, corners) else { return };
         let grid = self.grid;
         Rasterizer::new(View::orthographic()).rasterize(&triangle, &grid, |tile, _| {
-            self.test(tile, None, |at| {
+            self.test(tile, &reach, |at| {
                 [(0, 1), (1, 2), (2, 0)].iter().all(|&(i, j)| edge(i, j, at) >= -slack)
             });
         });
     }
 
     /// Tests the pixels of a tile that are within reach and not yet covered.
-    fn test(&mut self, [column, row]: [u32; 2], reach: Option<Reach>, covered: impl Fn([f64; 2]) -> bool) {
+    fn test(&mut self, [column, row]: [u32; 2], reach: &Reach, covered: impl Fn([f64; 2]) -> bool) {
         self.tiles += 1;
         let tile = row * self.grid.columns + column;
         let first = self.first_pixel(tile);
-        let near = reach
-            .map_or(u64::MAX, |reach| within_reach(&Lane::default(), &reach, self.eye.pixel_centre(first)));
+        let near = within_reach(&Lane::default(), reach, self.eye.pixel_centre(first));
         let before = self.masks[tile as usize];
         let mut mask = before;
         for bit in set_bits(near & !before & in_image(self.eye, first)) {
@@ -323,16 +321,27 @@ pub(super) type Reach = [[f64; 2]; 2];
 pub(super) fn reach(lane: &Lane, seen: &Seen, touch: &Touch) -> Reach {
     let Beam { open, close, .. } = &seen.image;
     [0, 1].map(|axis| {
-        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-        for (open, close) in open.iter().zip(close) {
+        let places = open.iter().zip(close).flat_map(|(open, close)| {
             let path = lane.sub(close[axis], open[axis]);
-            for at in touch.t.map(|t| lane.madd(t, path, open[axis])) {
-                (low, high) = (lane.min(low, at), lane.max(high, at));
-            }
-        }
-        let slack = lane.mul(1e-9, lane.add(1.0, lane.max(low.abs(), high.abs())));
-        [lane.sub(low, slack), lane.add(high, slack)]
+            touch.t.map(|t| lane.madd(t, path, open[axis]))
+        });
+        around(lane, places)
     })
+}
+
+/// Bounding box of the corners of a face, with the same margin.
+pub(super) fn reach_of_face(lane: &Lane, face: &[DVec3; 3]) -> Reach {
+    [0, 1].map(|axis| around(lane, face.iter().map(|corner| corner[axis])))
+}
+
+/// Least and greatest of some places, with a margin.
+fn around(lane: &Lane, places: impl Iterator<Item = f64>) -> [f64; 2] {
+    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    for at in places {
+        (low, high) = (lane.min(low, at), lane.max(high, at));
+    }
+    let slack = lane.mul(1e-9, lane.add(1.0, lane.max(low.abs(), high.abs())));
+    [lane.sub(low, slack), lane.add(high, slack)]
 }
 
 /// Pixels of a tile whose centres are within reach; `first` is the centre of its first pixel. Columns and

@@ -11,7 +11,9 @@ use pipeline::{
 };
 
 use super::bound::BoundingVolume;
-use super::draw::{MAX_HALVINGS, Picture, TILE_PX, in_image, pixel_of, reach, set_bits, slack, within_reach};
+use super::draw::{
+    MAX_HALVINGS, Picture, TILE_PX, in_image, pixel_of, reach, reach_of_face, set_bits, slack, within_reach,
+};
 use super::light::{PixelInBeam, Seen};
 use super::{Beam, Eye, Light, Method};
 
@@ -334,8 +336,8 @@ impl LightShader<'_> {
         self.pixels((lanes, seen), (first, near), times_at, shaded);
     }
 
-    /// A tile of a face of a body. A pixel runs once for a body, as with a stencil: those that an earlier face of the
-    /// body has covered are marked in memory.
+    /// A tile of a face of a body: the pixels within its reach. A pixel runs once for a body, as with a stencil: those
+    /// that an earlier face of the body has covered are marked in memory.
     fn face(
         &self,
         marks: &mut Marks,
@@ -343,18 +345,19 @@ impl LightShader<'_> {
         (corners, tile): (&[DVec3; 3], [u32; 2]),
         shaded: &mut Shaded,
     ) {
-        let covered = marks.at(tile);
+        let (covered, first) = (marks.at(tile), tile.map(|at| at * TILE_PX));
         lanes.read(self.marks, self.mark(tile), MARK_BYTES);
         let (left, slack) = lanes.run(|lane| {
             // The number in memory is that of this body if it has covered pixels of the tile.
             let is_marked = lane.branch(*covered != 0);
-            let words = if is_marked { [*covered as u32, (*covered >> 32) as u32] } else { [0; 2] };
-            let [low, high] = words.map(|word| u64::from(lane.xor(word, u32::MAX)));
-            (high << 32 | low, slack(lane, self.eye, corners))
+            let near = within_reach(lane, &reach_of_face(lane, corners), self.eye.pixel_centre(first));
+            let halves = |mask: u64| [mask as u32, (mask >> 32) as u32];
+            let (marked, near) = (if is_marked { halves(*covered) } else { [0; 2] }, halves(near));
+            let [low, high] = [0, 1].map(|half| lane.and(lane.xor(marked[half], u32::MAX), near[half]));
+            (u64::from(high) << 32 | u64::from(low), slack(lane, self.eye, corners))
         });
         let flat = corners.map(|p| [p.x, p.y]);
         let times_at = |at| lanes.is_inside(&flat, at, slack).then_some(None);
-        let first = tile.map(|at| at * TILE_PX);
         let found = self.pixels((lanes, seen), (first, left), times_at, shaded);
         if found != 0 {
             *covered |= found;

@@ -13,8 +13,8 @@ use super::{Bounds, Method, TzBox, TzBuffer};
 
 /// Bytes of a vertex at both times.
 const VERTEX_BYTES: u32 = 24;
-/// Bytes of a box of time and depth: four numbers of 64 bits, in which conservative mode clips its intervals.
-const BOX_BYTES: u64 = 32;
+/// Bytes of an interval of time or depth: two numbers of 64 bits, in which conservative mode clips its intervals.
+const INTERVAL_BYTES: u64 = 16;
 /// Bytes of the answer about an object: whether it meets others, by direction.
 const ANSWER_BYTES: u64 = 4;
 
@@ -27,23 +27,32 @@ struct BoxLayout {
     across: u32,
     /// Boxes of a pixel.
     bins: u64,
+    /// Bytes of a box.
+    box_bytes: u64,
 }
 
 impl BoxLayout {
-    fn new(viewport: Viewport, tile_px: u32, bins: u32) -> Self {
-        Self { side: tile_px, across: viewport.width().div_ceil(tile_px), bins: u64::from(bins) }
+    fn new(viewport: Viewport, tile_px: u32, bins: u32, method: Method) -> Self {
+        // By depth alone there are no times.
+        let intervals = if method == Method::DepthOnly { 1 } else { 2 };
+        Self {
+            side: tile_px,
+            across: viewport.width().div_ceil(tile_px),
+            bins: u64::from(bins),
+            box_bytes: intervals * INTERVAL_BYTES,
+        }
     }
 
     /// Bytes of the boxes of all pixels of a square image.
     fn bytes(&self) -> u64 {
-        u64::from(self.across * self.side).pow(2) * self.bins * BOX_BYTES
+        u64::from(self.across * self.side).pow(2) * self.bins * self.box_bytes
     }
 
     /// Where the box of a pixel and a time bin begins.
     fn offset(&self, [x, y]: [u32; 2], bin: usize) -> u64 {
-        let Self { side, across, bins } = *self;
+        let Self { side, across, bins, box_bytes } = *self;
         let pixel = u64::from((y / side * across + x / side) * side * side + y % side * side + x % side);
-        (pixel * bins + bin as u64) * BOX_BYTES
+        (pixel * bins + bin as u64) * box_bytes
     }
 }
 
@@ -77,7 +86,7 @@ impl<'a, 'e> PassesOnGpu<'a, 'e> {
         objects: &[Object],
         gpu: &'a mut Gpu<'e>,
     ) -> Self {
-        let layout = BoxLayout::new(viewport, gpu.spec().tile_px, bins);
+        let layout = BoxLayout::new(viewport, gpu.spec().tile_px, bins, method);
         let most = objects.iter().map(Object::len).max().unwrap_or(0) as u64;
         let vertices = gpu.allocate(3 * most * u64::from(VERTEX_BYTES));
         let boxes = [(); 2].map(|()| gpu.allocate(layout.bytes()));
@@ -156,10 +165,10 @@ impl TileShader for BoxShader<'_> {
         let offset = self.layout.offset(tile.tile, fragment.bin);
         let Some(known) = self.known else {
             lanes.run(|_| ());
-            lanes.merge(self.target, offset, BOX_BYTES);
+            lanes.merge(self.target, offset, self.layout.box_bytes);
             return Some(fragment);
         };
-        lanes.read(self.target, offset, BOX_BYTES);
+        lanes.read(self.target, offset, self.layout.box_bytes);
         let place = self.pass.place(fragment.tile, fragment.bin);
         if lanes.run(|lane| meets(lane, known.at(place), tile.touch.t, tile.touch.z)) {
             lanes.merge(self.answers, self.answer, ANSWER_BYTES);
@@ -224,7 +233,7 @@ impl PassBackend for PassesOnGpu<'_, '_> {
             for bin in 0..bins {
                 let place = pass.place(tile, bin);
                 let offset = layout.offset(tile, bin);
-                targets.iter().for_each(|target| lanes.read(*target, offset, BOX_BYTES));
+                targets.iter().for_each(|target| lanes.read(*target, offset, layout.box_bytes));
                 let (one, other) = (first.at(place), second.at(place));
                 let met = lanes.run(|lane| match method {
                     Method::DepthOnly => meets_in_depth(lane, one, other.z),
@@ -234,7 +243,7 @@ impl PassBackend for PassesOnGpu<'_, '_> {
                     lanes.merge(answers, answer, ANSWER_BYTES);
                 }
                 if merges {
-                    lanes.merge(targets[0], offset, BOX_BYTES);
+                    lanes.merge(targets[0], offset, layout.box_bytes);
                 }
             }
         });
@@ -330,13 +339,15 @@ mod tests {
 
     #[test]
     fn every_box_has_a_place_of_its_own_in_the_buffer() {
-        let layout = BoxLayout::new(Viewport::new(19, 19).unwrap(), 8, 3);
+        let of = |method| BoxLayout::new(Viewport::new(19, 19).unwrap(), 8, 3, method);
+        let layout = of(Method::BoxBox);
+        assert_eq!(layout.bytes(), 2 * of(Method::DepthOnly).bytes());
         let places = (0..19 * 19 * 3).map(|n| layout.offset([n % 19, n / 19 % 19], (n / (19 * 19)) as usize));
         let mut places: Vec<u64> = places.collect();
-        assert_eq!(layout.offset([8, 0], 1), (64 * 3 + 1) * BOX_BYTES);
+        assert_eq!(layout.offset([8, 0], 1), (64 * 3 + 1) * layout.box_bytes);
         places.sort_unstable();
-        assert!(places.windows(2).all(|pair| pair[1] - pair[0] >= BOX_BYTES));
-        assert!(places[places.len() - 1] + BOX_BYTES <= layout.bytes());
+        assert!(places.windows(2).all(|pair| pair[1] - pair[0] >= layout.box_bytes));
+        assert!(places[places.len() - 1] + layout.box_bytes <= layout.bytes());
     }
 
     /// By every method, fragments or pixels that meet mark the answer of their object, and the answers of all

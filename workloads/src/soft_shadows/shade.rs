@@ -223,9 +223,11 @@ impl<'a> World<'a> {
                 })
             }
             Shadows::Rays => {
-                let light = self.light.point(&Lane::default(), [sample.u, sample.v]);
+                let lens = [sample.u, sample.v];
+                let light = self.light.point(&Lane::default(), lens);
                 let mut rays = work.rays.get();
-                let blocked = self.rays.is_blocked(point.place, light, sample.t, point.triangle, &mut rays);
+                let blocked =
+                    self.rays.is_blocked(point.place, (light, lens), sample.t, point.triangle, &mut rays);
                 work.rays.set(rays);
                 !blocked
             }

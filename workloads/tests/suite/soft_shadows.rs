@@ -3,7 +3,7 @@
 use activity::{Event, Unit};
 use glam::{DVec3, Vec3};
 use pipeline::sampling::{Pattern, Sample, SampleSpec};
-use pipeline::{Cull, Draw, Geometry, Gpu, Lane, Viewport};
+use pipeline::{Clip, Cull, Draw, Geometry, Gpu, Lane, Viewport};
 use proptest::prelude::*;
 use workloads::Overrides;
 use workloads::accumulation::SharedSamples;
@@ -107,9 +107,14 @@ fn one_pass_equals_accumulation_bit_for_bit() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 12, ..ProptestConfig::default() })]
 
-    /// Random triangles, a rotated light, any set: all depths are equal bit for bit.
+    /// Random triangles, some between clip planes, a rotated light, any set: all depths are equal bit for bit.
     #[test]
-    fn maps_are_equal_for_random_triangles(seed in 0_u64..1 << 32, count in 1_u32..20, radius in 0.01_f64..2.0) {
+    fn maps_are_equal_for_random_triangles(
+        seed in 0_u64..1 << 32,
+        count in 1_u32..20,
+        radius in 0.01_f64..2.0,
+        clipped in 0_usize..12,
+    ) {
         let mut state = seed;
         let mut number = || {
             state = pipeline::random::mix(state.wrapping_add(0x9E37_79B9_7F4A_7C15));
@@ -121,7 +126,12 @@ proptest! {
         let (open, by) = (points(3.0), points(1.5));
         let close: Vec<Vec3> = open.iter().zip(&by).map(|(a, b)| *a + *b).collect();
         let triangles: Vec<[u32; 3]> = (0..12).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect();
-        let draws = [draw(&open, &close, &triangles)];
+        let all = [f32::NEG_INFINITY, f32::INFINITY];
+        let clip = Clip::new([-0.5, 0.5], all, [0.2, 0.7]).and_then(|clip| clip.across_image([0.1, 0.9], all));
+        let (clipped, others) = triangles.split_at(clipped);
+        let clipped = draw(&open, &close, clipped);
+        let clipped = Draw { geometry: clipped.geometry.with_clip(clip.unwrap()), ..clipped };
+        let draws = [clipped, draw(&open, &close, others)];
         let light = LightSpec { position: [1.0, 4.0, -2.0], target: [0.3, 0.1, 0.0], radius, fov_deg: 80.0, near: 0.1 };
         let light = AreaLight::new(&light).unwrap();
         let set = set(count, seed);
@@ -207,9 +217,19 @@ fn a_floor_in_the_light_follows_the_cosine_while_it_tilts() {
 
 #[test]
 fn rays_and_a_fine_map_agree() {
+    let all = [f32::NEG_INFINITY, f32::INFINITY];
+    for clip in [Clip::NONE, Clip::new([0.0, 0.8], all, all).unwrap()] {
+        rays_agree_with_a_map(clip);
+    }
+}
+
+/// What is drawn is between clip planes across the lens, which is the light for a map.
+fn rays_agree_with_a_map(clip: Clip) {
     let scene = workloads::soft_shadows::default_scene().unwrap();
     let frame = scene.frame(1).unwrap();
-    let draws: Vec<_> = frame.draws(&scene).unwrap().into_iter().map(|d| d.culling(Cull::None)).collect();
+    let draws = frame.draws(&scene).unwrap().into_iter();
+    let draws: Vec<_> =
+        draws.map(|d| Draw { geometry: d.geometry.with_clip(clip), ..d.culling(Cull::None) }).collect();
     let light = AreaLight::new(&LightSpec::default()).unwrap();
     let viewport = Viewport::new(48, 27).unwrap();
     let (camera, set) = (frame.camera.with_lens(None), set(16, 5));
