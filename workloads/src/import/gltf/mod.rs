@@ -147,7 +147,7 @@ impl<'a> Document<'a> {
         let (json, binary) =
             if bytes.starts_with(b"glTF") { split(source, &bytes)? } else { (&bytes[..], None) };
         let root = Root::from_slice(json).map_err(|error| {
-            let message = if error.is_eof() {
+            let message = if error.is_eof() && !json.is_empty() {
                 format!(
                     "the file ends at line {}, within its JSON: it is truncated; get the file again",
                     error.line()
