@@ -413,7 +413,7 @@ fn public_cases_are_run_where_their_folder_is_given() {
     let resolutions = "resolution_px: Open(value: 32, over: [8, 32, 128], quick: [8, 32]";
     let low = "resolution_px: Open(value: 8, over: [8, 32, 128], quick: [8]";
     let inputs = Inputs::new();
-    let settings = inputs.put("settings.ron", &committed(6).replace(resolutions, low));
+    let settings = inputs.put("settings.ron", committed(6).replace(resolutions, low));
     let args = ["--row", "VI-1", "--settings", &settings, "--collision-data", &data];
     let (ended, json) = reproduce("VI", out.path(), &args);
     assert_eq!(json["settings"]["committed"], false);
