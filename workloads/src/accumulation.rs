@@ -77,7 +77,7 @@ impl Rays {
         work: &mut RayWork,
     ) -> bool {
         let ray = Ray { from, along: to - from, t, beyond: 1e-6 };
-        let is_there = |face: &Face| self.clips.get(face.draw).is_none_or(|clip| clip.holds(Some(lens), t));
+        let is_there = |face: &Face| self.clips.get(face.draw).is_none_or(|clip| clip.holds(lens, t));
         let other =
             |id: usize| (id != but as usize && is_there(&self.faces[id])).then(|| self.faces[id].at(t));
         self.tree.any(&ray, 1.0 - 1e-6, other, work)
@@ -179,8 +179,8 @@ pub fn pinhole(camera: &Camera, [u, v]: [f32; 2]) -> Result<Camera, CameraError>
 pub struct Snapshot<'a> {
     meshes: Vec<Vec<Vec3>>,
     draws: Vec<Draw<'a>>,
-    /// Lens position, if there is a lens, and time.
-    lens: Option<[f32; 2]>,
+    /// Lens position and time.
+    lens: [f32; 2],
     t: f32,
     /// A pinhole without projection: the meshes are already on its image plane.
     pub camera: Camera,
@@ -220,7 +220,7 @@ impl<'a> Snapshot<'a> {
         };
         // One scene unit at depth 1 is a pixel.
         let still = Camera::new(Affine3A::IDENTITY, 0.5 * viewport.height() as f32, camera.near())?;
-        let (lens, t) = (camera.lens().map(|_| [at.u, at.v]), at.t);
+        let (lens, t) = ([at.u, at.v], at.t);
         let camera = still.with_clip(camera.clip().frozen(lens, t));
         Ok(Self { meshes: draws.iter().map(mesh).collect(), draws: draws.to_vec(), lens, t, camera })
     }

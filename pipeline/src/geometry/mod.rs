@@ -246,17 +246,15 @@ impl Clip {
             .map(|[lo, hi]| if hi == f32::INFINITY { [lo, hi] } else { [lo, hi.next_down()] })
     }
 
-    /// Whether a time, and a lens position if there is a lens, are within.
-    pub fn holds(&self, lens: Option<[f32; 2]>, t: f32) -> bool {
-        let [u, v, times] = self.half_open();
-        let within = |at: f32, [lo, hi]: [f32; 2]| lo <= at && at <= hi;
-        within(t, times) && lens.is_none_or(|[x, y]| within(x, u) && within(y, v))
+    /// Whether a lens position and a time are within. Those of a sample count without a lens, too.
+    pub fn holds(&self, [u, v]: [f32; 2], t: f32) -> bool {
+        [u, v, t].into_iter().zip(self.half_open()).all(|(at, [lo, hi])| lo <= at && at <= hi)
     }
 
     /// The planes for a rendering at one time and lens position: those across the image, and an empty part of
     /// the shutter if the others exclude it.
     #[must_use]
-    pub fn frozen(&self, lens: Option<[f32; 2]>, t: f32) -> Self {
+    pub fn frozen(&self, lens: [f32; 2], t: f32) -> Self {
         let t = if self.holds(lens, t) { Self::NONE.t } else { [0.0; 2] };
         Self { t, image: self.image, ..Self::NONE }
     }
@@ -307,10 +305,9 @@ mod tests {
         let all = [f32::NEG_INFINITY, f32::INFINITY];
         let clip = Clip::new([-0.5, 0.5], all, [0.25, 0.75]).unwrap().across_image([0.0, 0.5], all).unwrap();
         let inside = Clip::NONE.across_image([0.0, 0.5], all).unwrap();
-        assert_eq!(clip.frozen(Some([0.0, 0.9]), 0.25), inside);
-        // Without a lens its planes do not count; the upper bound is excluded.
-        assert_eq!(clip.frozen(None, 0.5), inside);
-        for (lens, t) in [(Some([0.5, 0.0]), 0.5), (Some([0.0; 2]), 0.75), (None, 0.0)] {
+        assert_eq!(clip.frozen([0.0, 0.9], 0.25), inside);
+        // Upper bounds are excluded.
+        for (lens, t) in [([0.5, 0.0], 0.5), ([0.0; 2], 0.75), ([0.0; 2], 0.0)] {
             let [.., [lo, hi]] = clip.frozen(lens, t).half_open();
             assert!(lo > hi, "{lens:?} {t}");
         }

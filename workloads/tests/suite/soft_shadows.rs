@@ -218,13 +218,13 @@ fn a_floor_in_the_light_follows_the_cosine_while_it_tilts() {
 #[test]
 fn rays_and_a_fine_map_agree() {
     let all = [f32::NEG_INFINITY, f32::INFINITY];
-    for clip in [Clip::NONE, Clip::new([0.0, 0.8], all, all).unwrap()] {
-        rays_agree_with_a_map(clip);
-    }
+    rays_agree_with_a_map(Clip::NONE, [10_000, 300]);
+    // Planes across the lens leave out half of all samples, of the camera and of the light.
+    rays_agree_with_a_map(Clip::new([0.0, 0.8], all, all).unwrap(), [6_000, 100]);
 }
 
-/// What is drawn is between clip planes across the lens, which is the light for a map.
-fn rays_agree_with_a_map(clip: Clip) {
+/// What is drawn is between clip planes; `least` samples face the light, and are dark.
+fn rays_agree_with_a_map(clip: Clip, least: [usize; 2]) {
     let scene = workloads::soft_shadows::default_scene().unwrap();
     let frame = scene.frame(1).unwrap();
     let draws = frame.draws(&scene).unwrap().into_iter();
@@ -242,7 +242,7 @@ fn rays_agree_with_a_map(clip: Clip) {
     let facing = by_rays.iter().flatten().count();
     let wrong = by_map.iter().zip(&by_rays).filter(|(a, b)| a != b).count();
     let dark = by_rays.iter().flatten().filter(|lit| !**lit).count();
-    assert!(facing > 10_000 && dark > 300, "{facing} {dark}");
+    assert!(facing > least[0] && dark > least[1], "{facing} {dark}");
     assert!(wrong * 100 < facing, "{wrong} of {facing} differ");
     // Without a bias surfaces shade themselves; with far too much, shadows vanish.
     let wrong = |bias| {
