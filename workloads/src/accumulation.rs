@@ -51,14 +51,13 @@ impl Rays {
             };
             geometry.triangles().iter().map(move |corners| Face { ends: ends(corners), draw })
         });
-        let clips = draws.iter().map(|draw| draw.geometry.clip()).collect();
-        Self { clips, ..Self::of(faces.collect()) }
+        Self::of(faces.collect(), draws.iter().map(|draw| draw.geometry.clip()).collect())
     }
 
-    fn of(faces: Vec<Face>) -> Self {
+    fn of(faces: Vec<Face>, clips: Vec<Clip>) -> Self {
         let bounds = |face: &Face| face.ends.map(|end| bounds_of(&end.map(|corner| corner.as_dvec3())));
         let tree = Bvh::new(&faces.iter().map(bounds).collect::<Vec<_>>());
-        Self { faces, tree, clips: Vec::new() }
+        Self { faces, tree, clips }
     }
 
     /// The triangles.
@@ -77,7 +76,7 @@ impl Rays {
         work: &mut RayWork,
     ) -> bool {
         let ray = Ray { from, along: to - from, t, beyond: 1e-6 };
-        let is_there = |face: &Face| self.clips.get(face.draw).is_none_or(|clip| clip.holds(lens, t));
+        let is_there = |face: &Face| self.clips[face.draw].holds(lens, t);
         let other =
             |id: usize| (id != but as usize && is_there(&self.faces[id])).then(|| self.faces[id].at(t));
         self.tree.any(&ray, 1.0 - 1e-6, other, work)
@@ -179,9 +178,6 @@ pub fn pinhole(camera: &Camera, [u, v]: [f32; 2]) -> Result<Camera, CameraError>
 pub struct Snapshot<'a> {
     meshes: Vec<Vec<Vec3>>,
     draws: Vec<Draw<'a>>,
-    /// Lens position and time.
-    lens: [f32; 2],
-    t: f32,
     /// A pinhole without projection: the meshes are already on its image plane.
     pub camera: Camera,
 }
@@ -220,9 +216,16 @@ impl<'a> Snapshot<'a> {
         };
         // One scene unit at depth 1 is a pixel.
         let still = Camera::new(Affine3A::IDENTITY, 0.5 * viewport.height() as f32, camera.near())?;
-        let (lens, t) = ([at.u, at.v], at.t);
-        let camera = still.with_clip(camera.clip().frozen(lens, t));
-        Ok(Self { meshes: draws.iter().map(mesh).collect(), draws: draws.to_vec(), lens, t, camera })
+        let frozen = |clip: Clip| clip.frozen([at.u, at.v], at.t);
+        let clipped = |draw: &Draw<'a>| Draw {
+            geometry: draw.geometry.with_clip(frozen(draw.geometry.clip())),
+            ..*draw
+        };
+        Ok(Self {
+            meshes: draws.iter().map(mesh).collect(),
+            draws: draws.iter().map(clipped).collect(),
+            camera: still.with_clip(frozen(camera.clip())),
+        })
     }
 
     /// The still draws, with the order, triangles, shaders, culling and clip planes of the original ones.
@@ -232,9 +235,8 @@ impl<'a> Snapshot<'a> {
     pub fn draws(&self) -> Result<Vec<Draw<'_>>, SnapshotError> {
         let pairs = self.meshes.iter().zip(&self.draws);
         let still = pairs.map(|(mesh, draw)| {
-            let clip = draw.geometry.clip().frozen(self.lens, self.t);
-            let geometry = Geometry::new(mesh, mesh, draw.geometry.triangles())?.with_clip(clip);
-            Ok(Draw { geometry, ..*draw })
+            let geometry = Geometry::new(mesh, mesh, draw.geometry.triangles())?;
+            Ok(Draw { geometry: geometry.with_clip(draw.geometry.clip()), ..*draw })
         });
         still.collect()
     }
@@ -249,7 +251,7 @@ mod tests {
     #[test]
     fn a_ray_hits_a_moving_triangle_at_its_time() {
         let at = |x: f32| [Vec3::new(x, -1.0, 2.0), Vec3::new(x + 2.0, -1.0, 2.0), Vec3::new(x, 3.0, 2.0)];
-        let rays = Rays::of(vec![Face { ends: [at(-4.5), at(3.5)], draw: 0 }]);
+        let rays = Rays::of(vec![Face { ends: [at(-4.5), at(3.5)], draw: 0 }], vec![Clip::NONE]);
         let work = &mut RayWork::default();
         let mut first = |t| rays.first((DVec3::ZERO, DVec3::Z), t, 0.0, work);
         assert_eq!(first(0.5), Some((0, 2.0)));

@@ -287,8 +287,7 @@ impl Sorter<'_> {
     /// Whether a sample is between the clip planes, with a range of image coordinates.
     fn is_drawn(&self, sample: &SampleEntry, image: Option<[[f32; 2]; 2]>) -> bool {
         let within = |at: f32, [lo, hi]: [f32; 2]| (lo..=hi).contains(&at);
-        let coordinates = [sample.u, sample.v, sample.t];
-        coordinates.into_iter().zip(self.clip.half_open()).all(|(at, range)| within(at, range))
+        self.clip.holds([sample.u, sample.v], sample.t)
             && image.is_none_or(|[x, y]| within(sample.x, x) && within(sample.y, y))
     }
 

@@ -158,7 +158,10 @@ impl Channel {
         let joined = self.banks[bank].joins(row, seen.from);
         let (opened, idle) = match joined {
             Some(at) => (self.banks[bank].join(at, lines, work), None),
-            None => self.open(address, lines, rules, is_alone && !turns_rows),
+            None => {
+                let (opened, idle) = self.open(address, lines, rules, is_alone && !turns_rows);
+                (opened, Some(idle))
+            }
         };
         let ready = self.ready(bank, opened.max(seen.from));
         let pair = if turns_rows { rules.turns.pair_in_bank } else { rules.turns.pair };
@@ -183,7 +186,7 @@ impl Channel {
         lines: &Lines,
         rules: &Rules,
         blocks_bus: bool,
-    ) -> (Time, Option<Time>) {
+    ) -> (Time, Time) {
         let times = &rules.times;
         let (kind, seen) = (usize::from(lines.is_write), lines.seen.from);
         let rank = self.rank_of(bank);
@@ -211,7 +214,7 @@ impl Channel {
         if blocks_bus {
             self.bus.block(idle, opens.saturating_sub(times.burst).min(before.joined));
         }
-        (begin + opens, Some(idle))
+        (begin + opens, idle)
     }
 
     fn rank_of(&self, bank: usize) -> usize {
