@@ -1,5 +1,8 @@
 //! Counter-based random numbers: a value depends on its counter alone.
 
+/// Increment of SplitMix64: the odd number nearest to 2^64 over the golden ratio.
+pub const GOLDEN: u64 = 0x9E37_79B9_7F4A_7C15;
+
 /// Finalizer of SplitMix64 (Steele, Lea, Flood 2014): a bijection of 64-bit words that mixes all bits.
 pub const fn mix(word: u64) -> u64 {
     let z = word ^ (word >> 30);
@@ -17,7 +20,6 @@ pub const fn unit(word: u64) -> f64 {
 
 /// A 64-bit word from a seed and two counters.
 pub(crate) const fn word(seed: u64, first: u64, second: u64) -> u64 {
-    const GOLDEN: u64 = 0x9E37_79B9_7F4A_7C15;
     let inner = mix(seed.wrapping_add(GOLDEN.wrapping_mul(first.wrapping_add(1))));
     mix(inner.wrapping_add(GOLDEN.wrapping_mul(second.wrapping_add(1))))
 }
@@ -29,9 +31,8 @@ mod tests {
     #[test]
     fn splitmix_reference_values() {
         // First outputs of SplitMix64 from seed 0, as published with the generator.
-        let golden = 0x9E37_79B9_7F4A_7C15_u64;
-        assert_eq!(mix(golden), 0xE220_A839_7B1D_CDAF);
-        assert_eq!(mix(golden.wrapping_mul(2)), 0x6E78_9E6A_A1B9_65F4);
+        assert_eq!(mix(GOLDEN), 0xE220_A839_7B1D_CDAF);
+        assert_eq!(mix(GOLDEN.wrapping_mul(2)), 0x6E78_9E6A_A1B9_65F4);
     }
 
     #[test]

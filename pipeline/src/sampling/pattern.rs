@@ -5,7 +5,7 @@ use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize};
 
 use super::{LensShape, Sample, SampleSource};
-use crate::random::{mix, word};
+use crate::random::{GOLDEN, mix, word};
 
 /// Distribution of the samples of a pixel.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -300,7 +300,6 @@ pub struct HashedSamples {
     shape: LensShape,
 }
 
-const GOLDEN: u64 = 0x9E37_79B9_7F4A_7C15;
 /// 2^24.
 const RANGE: i64 = 1 << 24;
 

@@ -36,15 +36,13 @@ mod rivals;
 pub mod volume;
 pub mod white;
 
-use pipeline::random::{mix, unit};
+use pipeline::random::{GOLDEN, mix, unit};
 use pipeline::{Gpu, Lane};
 use warnings::{Code, Warning};
 
 use drawn::{AXES, Cell, Kept, Lattice, MAX_MEAN, Within, draw};
 pub use rivals::{bridson, plain_darts};
 use white::{Columns, Shaded, WhiteError, low, shares};
-
-const GOLDEN: u64 = 0x9E37_79B9_7F4A_7C15;
 
 /// A sequence of random words with random access: SplitMix64 (Steele, Lea, Flood 2014) with its own start.
 #[derive(Clone, Copy, Debug)]
