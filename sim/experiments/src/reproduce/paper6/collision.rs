@@ -6,7 +6,7 @@ use pipeline::PipelineSpec;
 use rayon::prelude::*;
 use run::{GpuSpec, RunError};
 use workloads::collision::families::{Case, cases};
-use workloads::collision::{Method, Object, PlainPasses, PlainResult, Search, candidates, detect};
+use workloads::collision::{Method, Object, PlainPasses, PlainResult, Search, candidates, detect_each};
 use workloads::shapes;
 
 use super::super::report::over_doublings;
@@ -14,7 +14,7 @@ use super::super::row::{Cases, Number, Row, numbers};
 use super::super::{Done, Figure};
 use super::figures::{Ends, overlaps};
 use super::settings::{Moving, Shape, TwoObjects};
-use super::{Pair, Public, Task, load_public};
+use super::{Pair, Public, Task, any_kept, load_public};
 use crate::reproduce::settings::Form;
 
 /// As the file has it.
@@ -186,7 +186,7 @@ pub(super) fn missed(task: &Task<'_>) -> Result<Done, RunError> {
             at.map(|(_, px, missed)| (px, missed as f64, missed == 0)),
         );
     }
-    let closer: usize = own.iter().map(missed_closer).sum::<usize>() + public.missed_closer;
+    let closer = missed_closer(&generated) + public.missed_closer;
     tried.along("quintile ccd", [("default search", closer as f64, closer == 0)]);
     let missed = looks.missed().map(|(.., missed)| missed).sum::<u64>() + closer as u64;
     let ours = format!(
@@ -254,15 +254,11 @@ fn public_text(public: &Public, given: bool) -> String {
     )
 }
 
-/// Pairs of a case that `quintile ccd` misses.
-fn missed_closer(case: &Case) -> usize {
-    let answers = detect(&case.objects, &Search::default());
-    let kept: Vec<_> = answers
-        .iter()
-        .filter(|answer| answer.verdict.may_collide())
-        .map(|answer| (answer.a, answer.b))
-        .collect();
-    case.collide.iter().filter(|pair| !kept.contains(pair)).count()
+/// Pairs that collide and that `quintile ccd` misses.
+fn missed_closer(pairs: &[Pair]) -> usize {
+    let cases: Vec<&[Object]> = pairs.iter().map(Pair::as_slice).collect();
+    let answers = detect_each(&cases, &Search::default(), || ());
+    answers.iter().filter(|answers| !any_kept(answers)).count()
 }
 
 /// A shape on its way.

@@ -20,7 +20,7 @@ use flate2::read::GzDecoder;
 use output::terminal::Progress;
 use run::RunError;
 use settings::Settings;
-use workloads::collision::{Object, Search, detect};
+use workloads::collision::{Answer, Object, Search, detect, detect_each};
 use workloads::stress::{Size, StressScene, families};
 use workloads::visibility::load_mts;
 
@@ -257,7 +257,7 @@ impl Public {
         self.known += scene.collide;
         self.seen += seen.len().min(scene.collide);
         self.missed_closer += scene.collide.saturating_sub(kept.count());
-        let pair = |answer: &&workloads::collision::Answer| [answer.a, answer.b].map(|n| objects[n].clone());
+        let pair = |answer: &&Answer| [answer.a, answer.b].map(|n| objects[n].clone());
         self.collide.extend(seen.iter().map(pair));
         Ok(())
     }
@@ -266,20 +266,15 @@ impl Public {
     fn file_of_queries(&mut self, path: &Path) -> Result<(), RunError> {
         let rows = query_rows(path)?;
         let vertex_face = path.parent().is_some_and(|folder| folder.ends_with("vertex-face"));
-        for query in rows.chunks_exact(8) {
-            self.queries += 1;
-            let [from, to] = [0, 4].map(|end| [0, 1, 2, 3].map(|corner| query[end + corner].0));
-            let ends = if vertex_face {
-                [[from, to].map(|p| [p[0]; 3]), [from, to].map(|p| [p[1], p[2], p[3]])]
-            } else {
-                [[from, to].map(|p| [p[0], p[1], p[1]]), [from, to].map(|p| [p[2], p[3], p[3]])]
-            };
-            let objects = ends.map(|ends| Object::from_ends(vec![ends], 0.0));
-            let [Some(one), Some(other)] = objects else {
-                return Err(wrong(format!("{}: a coordinate is beyond 1e60", path.display())));
-            };
-            let pair = [one, other];
-            let kept = detect(&pair, &Search::default()).iter().any(|answer| answer.verdict.may_collide());
+        let pair = |query: &[([f64; 3], bool)]| query_pair(query, vertex_face);
+        let pairs: Option<Vec<Pair>> = rows.chunks_exact(8).map(pair).collect();
+        let pairs = pairs.ok_or_else(|| wrong(format!("{}: a coordinate is beyond 1e60", path.display())))?;
+        let cases: Vec<&[Object]> = pairs.iter().map(Pair::as_slice).collect();
+        let kept: Vec<bool> =
+            detect_each(&cases, &Search::default(), || ()).iter().map(|answers| any_kept(answers)).collect();
+        self.queries += pairs.len();
+        self.query_files += 1;
+        for ((pair, kept), query) in pairs.into_iter().zip(kept).zip(rows.chunks_exact(8)) {
             if query[0].1 {
                 self.missed_closer += usize::from(!kept);
                 self.collide.push(pair);
@@ -288,9 +283,24 @@ impl Public {
                 self.apart.push(pair);
             }
         }
-        self.query_files += 1;
         Ok(())
     }
+}
+
+/// Whether a pair of objects may collide.
+fn any_kept(answers: &[Answer]) -> bool {
+    answers.iter().any(|answer| answer.verdict.may_collide())
+}
+
+/// The vertex and the face of a query, or its two edges; `None` if a coordinate is too large.
+fn query_pair(query: &[([f64; 3], bool)], vertex_face: bool) -> Option<Pair> {
+    let [from, to] = [0, 4].map(|end| [0, 1, 2, 3].map(|corner| query[end + corner].0));
+    let [one, other] = if vertex_face {
+        [[from, to].map(|p| [p[0]; 3]), [from, to].map(|p| [p[1], p[2], p[3]])]
+    } else {
+        [[from, to].map(|p| [p[0], p[1], p[1]]), [from, to].map(|p| [p[2], p[3], p[3]])]
+    };
+    Some([Object::from_ends(vec![one], 0.0)?, Object::from_ends(vec![other], 0.0)?])
 }
 
 /// The rows of a file of queries: a point, and whether the truth of its query is a collision.
