@@ -4,6 +4,7 @@ use std::ops::RangeInclusive;
 
 use output::plot::{Mark, Paint, Series};
 use pipeline::{Gpu, PipelineSpec};
+use rayon::prelude::*;
 use run::{GpuSpec, RunError};
 use workloads::points::job::{Rasterized, rasterized};
 use workloads::points::poisson::{
@@ -182,17 +183,24 @@ impl Tested {
         hardware: &PipelineSpec,
     ) -> Result<Self, RunError> {
         let expected = shares::<D>(&Named::Gauss, cells, 8);
-        let mut tested = Self { sets: Vec::new(), ran: Ran::default(), points: 0, candidates: 0 };
-        for seed in 1..=sets {
+        let one = |seed| {
             let spec = NoiseSpec { count: points as f64, seed, across: columns_for(D) };
             let mut gpu = Gpu::quiet(hardware).map_err(failed)?;
             let found = draw_noise::<D>(&Named::Gauss, &spec, &mut gpu).map_err(failed)?;
-            tested.ran += Ran { fragments: found.fragments, ..Ran::of(&gpu.finish()) };
-            tested.points += found.points.len() as u64;
-            tested.candidates += found.candidates;
-            tested.sets.push(chi_square(&counts(&found.points, cells), &expected));
-        }
-        Ok(tested)
+            Ok::<Self, RunError>(Self {
+                sets: vec![chi_square(&counts(&found.points, cells), &expected)],
+                ran: Ran { fragments: found.fragments, ..Ran::of(&gpu.finish()) },
+                points: found.points.len() as u64,
+                candidates: found.candidates,
+            })
+        };
+        let sets: Vec<Self> = (1..=sets).into_par_iter().map(one).collect::<Result<_, _>>()?;
+        Ok(Self {
+            ran: sets.iter().map(|set| set.ran).sum(),
+            points: sets.iter().map(|set| set.points).sum(),
+            candidates: sets.iter().map(|set| set.candidates).sum(),
+            sets: sets.into_iter().flat_map(|set| set.sets).collect(),
+        })
     }
 
     /// The same on the CPU, of so many points each.
@@ -204,7 +212,7 @@ impl Tested {
             let points = white_noise(density, &spec).map_err(failed)?.points;
             Ok::<ChiSquare, RunError>(chi_square(&counts(&points, cells), &expected))
         };
-        let tests = (1..=sets).map(one).collect::<Result<_, _>>()?;
+        let tests = (1..=sets).into_par_iter().map(one).collect::<Result<_, _>>()?;
         Ok(Self { sets: tests, ran: Ran::default(), points: sets * points, candidates: 0 })
     }
 
