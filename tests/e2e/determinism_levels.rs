@@ -2,7 +2,8 @@
 //! not depend on timing level or energy table.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
 
 use crate::support::{Results, quintile, without_host};
 use serde_json::Value;
@@ -15,8 +16,28 @@ fn run(level: &str, args: &[&str]) -> Results {
     quintile().run("default", &[&SMALL[..], &["--timing", level], args].concat())
 }
 
-fn assert_same(one: &Results, other: &BTreeMap<PathBuf, Vec<u8>>, what: &str) {
-    let (one, other) = (without_host(one.files()), without_host(other.clone()));
+/// Files of a run.
+type Files = BTreeMap<PathBuf, Vec<u8>>;
+
+/// Runs at every level without further arguments, which several tests compare with.
+static PLAIN: [LazyLock<Files>; 4] = [
+    LazyLock::new(|| run("stepped", &[]).files()),
+    LazyLock::new(|| run("packet", &[]).files()),
+    LazyLock::new(|| run("bound", &[]).files()),
+    LazyLock::new(|| run("sampled", &[]).files()),
+];
+
+/// Levels, and the files of their plain runs.
+fn plain() -> impl Iterator<Item = (&'static str, &'static Files)> {
+    LEVELS.into_iter().zip(PLAIN.iter().map(|files| &**files))
+}
+
+fn summary(files: &Files) -> Value {
+    serde_json::from_slice(&files[Path::new("summary.json")]).expect("summary.json is JSON")
+}
+
+fn assert_same(one: &Files, other: &Files, what: &str) {
+    let (one, other) = (without_host(one.clone()), without_host(other.clone()));
     assert!(one.len() > 10, "{what}: too few files to compare");
     assert_eq!(one.keys().collect::<Vec<_>>(), other.keys().collect::<Vec<_>>(), "{what}: other files");
     for (name, bytes) in &one {
@@ -24,18 +45,16 @@ fn assert_same(one: &Results, other: &BTreeMap<PathBuf, Vec<u8>>, what: &str) {
     }
 }
 
-fn frames(results: &Results) -> Vec<Value> {
-    results.summary()["frames"].as_array().cloned().expect("frames")
+fn frames(summary: &Value) -> Vec<Value> {
+    summary["frames"].as_array().cloned().expect("frames")
 }
 
 #[test]
 fn any_number_of_threads_gives_the_same_bytes_at_every_level() {
-    for level in LEVELS {
-        let one = run(level, &["--threads", "1"]);
-        let others = if level == "packet" { &["2", "16"][..] } else { &["16"] };
-        for threads in others {
+    for (level, files) in plain() {
+        for threads in ["1", "16"] {
             let other = run(level, &["--threads", threads]).files();
-            assert_same(&one, &other, &format!("{level}, {threads} threads"));
+            assert_same(files, &other, &format!("{level}, {threads} threads"));
         }
     }
 }
@@ -45,25 +64,25 @@ fn any_number_of_threads_gives_the_same_bytes_at_every_level() {
 fn a_choice_by_accuracy_does_not_depend_on_threads() {
     let choose = |threads: &str| {
         let args = ["--accuracy", "5%", "--verify", "--threads", threads];
-        quintile().run("default", &[&SMALL[..], &args].concat())
+        quintile().run("default", &[&SMALL[..], &args].concat()).files()
     };
-    assert_same(&choose("1"), &choose("16").files(), "--accuracy with 16 threads");
+    assert_same(&choose("1"), &choose("16"), "--accuracy with 16 threads");
 }
 
 /// Additional files change no other file, except for those that list them: request, report and manifest.
 #[test]
 fn additional_outputs_leave_the_others_unchanged() {
-    for level in LEVELS {
-        let files = |results: &Results| {
-            let mut files = without_host(results.files());
-            let mut summary = results.summary();
+    for (level, files) in plain() {
+        let compared = |files: &Files| {
+            let mut summary = summary(files);
+            let mut files = without_host(files.clone());
             ["request", "host"].iter().for_each(|key| drop(summary[key].take()));
             files.insert("summary.json".into(), summary.to_string().into_bytes());
             files.retain(|name, _| !name.ends_with("report.html") && !name.ends_with("manifest.json"));
             files
         };
-        let plain = files(&run(level, &[]));
-        let more = files(&run(level, &["--exr", "--heat", "samples_tested", "--json"]));
+        let plain = compared(files);
+        let more = compared(&run(level, &["--exr", "--heat", "samples_tested", "--json"]).files());
         assert!(more.len() > plain.len());
         for (name, bytes) in &plain {
             assert!(bytes == &more[name], "{level}: {} differs", name.display());
@@ -74,30 +93,25 @@ fn additional_outputs_leave_the_others_unchanged() {
 /// Power follows from time: another energy table changes neither cycles nor counters nor images.
 #[test]
 fn energy_tables_do_not_change_timing() {
-    for level in ["stepped", "packet", "bound"] {
-        let [low, high] = ["low", "high"].map(|bound| run(level, &["--bound", bound]));
-        let of = |results: &Results| {
-            let cycles: Vec<Value> = frames(results).iter().map(|row| row["cycles"].clone()).collect();
-            (cycles, results.summary()["counts"].clone(), results.summary()["counts_hash"].clone())
+    for (level, nominal) in plain().filter(|(level, _)| *level != "sampled") {
+        let high = run(level, &["--bound", "high"]).files();
+        let of = |summary: &Value| {
+            let cycles: Vec<Value> = frames(summary).iter().map(|row| row["cycles"].clone()).collect();
+            (cycles, summary["counts"].clone(), summary["counts_hash"].clone())
         };
-        assert_eq!(of(&low), of(&high), "{level}");
-        assert_ne!(
-            low.summary()["energy_by_part_j"],
-            high.summary()["energy_by_part_j"],
-            "{level}: nothing was changed"
-        );
-        assert!(low.bytes("images/frame_0003.png") == high.bytes("images/frame_0003.png"), "{level}");
+        let [one, other] = [nominal, &high].map(summary);
+        assert_eq!(of(&one), of(&other), "{level}");
+        assert_ne!(one["energy_by_part_j"], other["energy_by_part_j"], "{level}: nothing was changed");
+        let image = Path::new("images/frame_0003.png");
+        assert!(nominal[image] == high[image], "{level}");
     }
 }
 
 /// Events do not depend on timing.
 #[test]
 fn counters_and_their_hash_agree_at_all_levels() {
-    let [stepped, packet, bound, sampled] = LEVELS.map(|level| run(level, &[]));
-    let of = |results: &Results| {
-        let summary = results.summary();
-        (summary["counts"].clone(), summary["counts_hash"].clone())
-    };
+    let [stepped, packet, bound, sampled] = PLAIN.each_ref().map(|files| summary(files));
+    let of = |summary: &Value| (summary["counts"].clone(), summary["counts_hash"].clone());
     assert_eq!(of(&stepped), of(&packet));
     assert_eq!(of(&packet), of(&bound));
     let hash = |row: &Value| row["counts_hash"].as_str().map(str::to_owned);
@@ -120,7 +134,6 @@ fn counters_and_their_hash_agree_at_all_levels() {
 /// Control: another seed gives other samples, and so other counters.
 #[test]
 fn another_seed_has_another_hash() {
-    let [one, other] =
-        ["1", "2"].map(|seed| run("bound", &["--seed", seed]).summary()["counts_hash"].clone());
-    assert_ne!(one, other);
+    let other = run("bound", &["--seed", "2"]).summary();
+    assert_ne!(summary(&PLAIN[2])["counts_hash"], other["counts_hash"]);
 }

@@ -213,9 +213,9 @@ fn paper_three_is_whole_and_the_same_for_any_number_of_threads() {
     assert_eq!(ended.code == Some(0), row(&json, "III-2")["verdict"] == "holds");
     verdicts_follow_from_numbers(&json);
     assert_eq!(row(&json, "III-3")["verdict_text"], "holds at 2 of 4 settings (quick form, less work)");
-    // III-5 takes as long as all others, and is made of the same parts.
-    let others = ids.iter().filter(|id| **id != "III-5").flat_map(|id| ["--row", id]);
-    let args: Vec<&str> = ["--threads", "4"].into_iter().chain(others).collect();
+    // The other rows are made of the same parts: runs, traces and searches of frames.
+    let some = ["III-1", "III-2", "III-4"].iter().flat_map(|id| ["--row", id]);
+    let args: Vec<&str> = ["--threads", "4"].into_iter().chain(some).collect();
     let (_, again) = reproduce("III", &four, &args);
     for other in again["rows"].as_array().expect("a list") {
         assert_eq!(other, row(&json, other["id"].as_str().expect("an id")));

@@ -35,7 +35,8 @@ pub fn detect_each(cases: &[&[Object]], search: &Search, done: impl Fn() + Sync)
         done();
         Answer { a, b, verdict }
     };
-    let found: Vec<Answer> = pairs.par_iter().map_init(Scratch::default, search_pair).collect();
+    let found: Vec<Answer> =
+        pairs.par_iter().with_max_len(1).map_init(Scratch::default, search_pair).collect();
     let mut answers = vec![Vec::new(); cases.len()];
     for ((case, _), answer) in pairs.into_iter().zip(found) {
         answers[case].push(answer);

@@ -58,7 +58,7 @@ impl Drawn {
             let drawn = passes.pair(a, b);
             (u64::from(!drawn.may_collide()), drawn)
         };
-        let each = pairs.par_iter().map_init(|| PlainPasses::new(method, resolution), one);
+        let each = pairs.par_iter().with_max_len(1).map_init(|| PlainPasses::new(method, resolution), one);
         let (cleared, work) = each.reduce(Default::default, |(n, all), (m, drawn)| (n + m, all.and(&drawn)));
         Self { pairs: pairs.len(), cleared, work }
     }
@@ -71,7 +71,7 @@ impl Drawn {
         resolution: u32,
     ) -> Result<Self, RunError> {
         let one = |passes: &mut PlainPasses, [a, b]: &Pair| passes.pair_on(a, b, hardware);
-        let each = pairs.par_iter().map_init(|| PlainPasses::new(method, resolution), one);
+        let each = pairs.par_iter().with_max_len(1).map_init(|| PlainPasses::new(method, resolution), one);
         let each: Vec<PlainResult> = each.collect::<Result<_, _>>().map_err(RunError::setting)?;
         let cleared = each.iter().filter(|drawn| !drawn.may_collide()).count() as u64;
         let work = each.iter().fold(PlainResult::default(), |all, one| all.and(one));
