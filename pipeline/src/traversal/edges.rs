@@ -164,6 +164,7 @@ pub struct EdgeBounds<N = f64> {
 
 impl<N: Number> EdgeBounds<N> {
     /// Bounds of each of `edges` over the whole box.
+    #[inline(always)]
     pub fn new<C: Coordinate>(edges: &Edges<N, C>) -> Self {
         let skew = edges.skew();
         let range = |k: usize| edges.edges[k].range(&edges.view, skew);

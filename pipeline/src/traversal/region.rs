@@ -216,7 +216,7 @@ pub struct View<N = f64, C = f32> {
 
 impl<N: Number, C: Coordinate> View<N, C> {
     /// `triangle` seen from the middle of `tile` and `within`.
-    #[inline]
+    #[inline(always)]
     pub fn new(triangle: &Triangle<C>, shear: &Shear<C>, tile: &TileRect<C>, within: &Box5<C>) -> Self {
         let (moving, lens) = (triangle.moving, within.lens);
         let [u, v] = if lens { [within.u, within.v] } else { [[C::ZERO; 2]; 2] };
@@ -247,18 +247,16 @@ impl<N: Number, C: Coordinate> View<N, C> {
         view
     }
 
-    #[inline]
+    #[inline(always)]
     fn transform(&mut self, triangle: &Triangle<C>) {
-        let rays = [0, 1].map(|axis| self.middle_ray(axis));
+        let rays = [self.middle_ray(0), self.middle_ray(1)];
         for end in 0..if self.moving { 2 } else { 1 } {
+            let t = N::of(self.t[end]);
             for (point, corner) in self.ends[end].iter_mut().zip(&triangle.corners) {
-                let open = corner.open.map(N::of);
-                *point = if self.moving {
-                    let t = N::of(self.t[end]);
-                    [0, 1, 2].map(|axis| open[axis] + t * N::of(corner.delta[axis]))
-                } else {
-                    open
-                };
+                for axis in 0..3 {
+                    let open = N::of(corner.open[axis]);
+                    point[axis] = if self.moving { open + t * N::of(corner.delta[axis]) } else { open };
+                }
                 for (axis, [slope, base]) in rays.into_iter().enumerate() {
                     let seen = if self.lens || self.parallel { point[axis] - base } else { point[axis] };
                     point[axis] = if self.lens || !self.parallel { seen - slope * point[2] } else { seen };
@@ -287,7 +285,7 @@ impl<N: Number, C: Coordinate> View<N, C> {
         if self.parallel { N::from(1.0) } else { depth }
     }
 
-    #[inline]
+    #[inline(always)]
     fn measure(&mut self, triangle: &Triangle<C>) {
         let sway = [0, 1].map(|axis| self.sway(axis));
         for points in &self.ends[..if self.moving { 2 } else { 1 }] {
