@@ -185,15 +185,27 @@ impl<'a> Pass<'a> {
         BoxGrid::new(self.settings.spec.depth.boxes, self.lens).unwrap_or_default()
     }
 
-    /// Whether visible samples are shaded after the last triangle.
-    pub fn shades_last(&self) -> bool {
-        self.settings.spec.features.hidden_surface_removal && !self.is_ordered && !self.is_depth_only()
+    /// Whether shading waits until hidden surfaces are removed, where draws allow it.
+    pub fn shading_waits(&self) -> bool {
+        self.settings.spec.features.hidden_surface_removal && !self.is_depth_only()
+    }
+
+    /// Whether the samples of a draw have to be shaded before those of the next one: some are discarded, or
+    /// something is left of the colours before.
+    pub fn shades_in_order(&self, draw: u32) -> bool {
+        let Draw { state, shader, .. } = &self.draws[draw as usize];
+        let targets = || (0..self.colours.len()).map(|number| state.target(number));
+        let leaves = targets().any(|target| target.writes()) && !targets().all(|target| target.replaces());
+        shader.may_discard() || leaves
     }
 
     /// The tile at `origin` with its `samples` before the first draw.
     pub fn first_tile(&self, samples: &TileSamples, origin: [u32; 2]) -> DepthTile {
         let (count, Clear { depth, stencil }) = (samples.len, self.clear);
         let mut tile = DepthTile::cleared(self.depth_grid(), samples, depth);
+        if self.shading_waits() {
+            tile.waiting = vec![DepthTile::NO_TRIANGLE; count];
+        }
         if self.draws.iter().any(|draw| draw.state.stencil.is_some()) {
             tile.stencil = vec![stencil; count];
         }
