@@ -360,8 +360,8 @@ impl<'e> Gpu<'e> {
         let has_heat = self.has_heat_of(pass.settings.viewport);
         self.check_memory(pass.name)?;
         pass.check_queries()?;
-        self.surfaces.check(pass)?;
         self.check_buffers(pass.name, pass.buffers())?;
+        self.surfaces.check(pass)?;
         let stored = (&self.surfaces, &self.buffers);
         let prepared = Pass::new(pass, (number, has_heat), stored, &mut self.space);
         self.check_memory(pass.name)?;
