@@ -395,7 +395,11 @@ impl<'e> Gpu<'e> {
         let mut done = |work: Finished<'_>| match work {
             Finished::Packet(packet, lines) => {
                 report.add(packet);
-                heat.drawn(packet, prepared.heat);
+                if prepared.heat || pass.places.is_empty() {
+                    heat.drawn(packet, prepared.heat);
+                } else {
+                    heat.drawn_at(packet, || pass.places_of(packet.tile));
+                }
                 emit(packet, lines);
             }
             Finished::Tests(number, bin, log) if prepared.heat => heat.tests(prepared, number, bin, log),
