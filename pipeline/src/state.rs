@@ -262,6 +262,11 @@ impl ColourState {
         self.mask != [false; 4]
     }
 
+    /// Whether nothing is left of the colour before.
+    pub(crate) fn replaces(&self) -> bool {
+        self.blend == Blend::Replace && self.mask == [true; 4]
+    }
+
     /// Colour stored where `new` is drawn over `stored`.
     pub(crate) fn colour(&self, new: Vec4, stored: Vec4) -> Vec4 {
         Vec4::select(BVec4A::from(self.mask), self.blend.mix(new, stored), stored)

@@ -205,6 +205,9 @@ pub struct DepthTile {
     pub depth: Vec<f32>,
     /// Triangle stored last, [`Self::NO_TRIANGLE`] without any.
     pub triangle: Vec<u32>,
+    /// Triangle whose colour each sample is to get when shading no longer waits, [`Self::NO_TRIANGLE`] without
+    /// any. Only with hidden-surface removal.
+    pub waiting: Vec<u32>,
     /// Stencil value, if the pass has any.
     pub stencil: Vec<u8>,
     /// Linear RGB and opacity of each sample, by target, if colours are stored in the order of triangles.
@@ -224,6 +227,7 @@ impl DepthTile {
         Self {
             depth: vec![depth; samples.len],
             triangle: vec![Self::NO_TRIANGLE; samples.len],
+            waiting: Vec::new(),
             stencil: Vec::new(),
             colours: Vec::new(),
             boxes: DepthBoxes::cleared(grid, samples, depth),

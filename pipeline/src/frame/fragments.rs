@@ -46,6 +46,15 @@ impl Fragments {
             pixels.coloured = pixels.written;
         }
     }
+
+    /// The shaded samples wait for the colour of `triangle` instead.
+    pub fn wait(&mut self, triangle: u32, tile: &mut DepthTile, hits: &mut Hits) {
+        self.shaded.drain(..).for_each(|slot| tile.waiting[usize::from(slot)] = triangle);
+        (self.coloured, self.coloured_pixels) = (0, 0);
+        if let Some(pixels) = &mut hits.by_pixel {
+            pixels.coloured = [0; 64];
+        }
+    }
 }
 
 /// A triangle and a tile whose covered samples are stored.

@@ -246,6 +246,11 @@ impl<'e> Gpu<'e> {
         self.is_on_map = viewport.is_some_and(|viewport| self.heat.is_of(viewport));
     }
 
+    /// Whether there are heat maps over images of this size.
+    pub(super) fn has_heat_of(&self, viewport: Viewport) -> bool {
+        self.heat.is_of(viewport)
+    }
+
     /// Starts a pass over tiles of the caller, whose place in the image of the frame is given, if they are there.
     pub(super) fn open_placed(&mut self, name: &str, placement: Option<Placement>) {
         self.open(name, None);
@@ -352,11 +357,11 @@ impl<'e> Gpu<'e> {
     /// or if the surfaces of the frame are too large.
     pub fn draw(&mut self, pass: &RasterPass<'_>) -> Result<Rendered, PassError> {
         let number = self.passes.len() as u32;
-        let has_heat = self.heat.is_of(pass.settings.viewport);
+        let has_heat = self.has_heat_of(pass.settings.viewport);
         self.check_memory(pass.name)?;
         pass.check_queries()?;
-        self.surfaces.check(pass)?;
         self.check_buffers(pass.name, pass.buffers())?;
+        self.surfaces.check(pass)?;
         let stored = (&self.surfaces, &self.buffers);
         let prepared = Pass::new(pass, (number, has_heat), stored, &mut self.space);
         self.check_memory(pass.name)?;
@@ -390,7 +395,11 @@ impl<'e> Gpu<'e> {
         let mut done = |work: Finished<'_>| match work {
             Finished::Packet(packet, lines) => {
                 report.add(packet);
-                heat.drawn(packet, prepared.heat);
+                if prepared.heat || pass.places.is_empty() {
+                    heat.drawn(packet, prepared.heat);
+                } else {
+                    heat.drawn_at(packet, || pass.places_of(packet.tile));
+                }
                 emit(packet, lines);
             }
             Finished::Tests(number, bin, log) if prepared.heat => heat.tests(prepared, number, bin, log),

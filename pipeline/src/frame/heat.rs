@@ -155,12 +155,7 @@ impl HeatMap {
     /// Add a packet. Tile tests may be in packets of other tiles; [`Self::tests`] adds them.
     fn packet(&mut self, packet: &Packet) {
         let count = u64::from(packet.counts[self.event]);
-        let placed = match packet.kind {
-            PacketKind::Draw | PacketKind::Vertices | PacketKind::Compute | PacketKind::Barrier(_) => false,
-            PacketKind::Tile => true,
-            PacketKind::Resolve => packet.counts[Event::PixelsResolved] > 0,
-        };
-        if !placed {
+        if !is_placed(packet) {
             self.elsewhere += count;
         } else if !is_tile_test(self.event) {
             self.tiles[packet.tile as usize].count += count;
@@ -250,6 +245,21 @@ impl FrameHeat {
         }
     }
 
+    /// Add a packet of a drawn pass whose images are parts of that of the maps, each with the pixels of the tile.
+    /// Tile tests that wait for a packet are where that is.
+    pub fn drawn_at<I: Iterator<Item = [[u32; 2]; 2]>>(&mut self, packet: &Packet, pixels: impl Fn() -> I) {
+        let Some(map) = self.maps.first().filter(|_| is_placed(packet)) else {
+            return self.drawn(packet, false);
+        };
+        let is_inside = |range: &[[u32; 2]; 2]| range[0][1] <= map.width && range[1][1] <= map.height;
+        let parts: Vec<_> = pixels().filter(is_inside).flat_map(|range| map.parts(range)).collect();
+        if parts.is_empty() {
+            return self.drawn(packet, false);
+        }
+        let all = parts.iter().map(|(_, share)| share).sum();
+        self.maps.iter_mut().for_each(|map| map.shared(packet, &parts, all));
+    }
+
     /// Add the tile tests of bin `number` of a pass.
     pub fn tests(&mut self, pass: &Pass<'_>, number: usize, bin: &Bin, log: &BinLog) {
         self.maps.iter_mut().for_each(|map| map.tests(pass, number, bin, log));
@@ -275,6 +285,15 @@ impl FrameHeat {
     /// The maps.
     pub fn into_maps(self) -> Vec<HeatMap> {
         self.maps
+    }
+}
+
+/// Whether a packet of a drawn pass has a place in its image.
+fn is_placed(packet: &Packet) -> bool {
+    match packet.kind {
+        PacketKind::Draw | PacketKind::Vertices | PacketKind::Compute | PacketKind::Barrier(_) => false,
+        PacketKind::Tile => true,
+        PacketKind::Resolve => packet.counts[Event::PixelsResolved] > 0,
     }
 }
 

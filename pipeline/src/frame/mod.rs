@@ -79,7 +79,7 @@ fn rasterize<F: FnMut(Finished<'_>)>(pass: &Pass<'_>, replay: &mut Replay<'_>, d
         );
         let logs = rasterize_bins(pass, &mut bins, &ready, &lists);
         let last =
-            if next.is_none() && pass.shades_last() { shade_bins(pass, &mut bins) } else { Vec::new() };
+            if next.is_none() && pass.shading_waits() { shade_bins(pass, &mut bins) } else { Vec::new() };
         for ((bin, log), number) in bins.iter().zip(&logs).zip(0..) {
             for log in [Some(log), last.get(number)].into_iter().flatten() {
                 done(Finished::Tests(number, bin, log));
@@ -97,9 +97,9 @@ fn rasterize<F: FnMut(Finished<'_>)>(pass: &Pass<'_>, replay: &mut Replay<'_>, d
     bins
 }
 
-/// Logs of shading the visible samples of every bin.
+/// Logs of shading what still waits in every bin.
 fn shade_bins(pass: &Pass<'_>, bins: &mut [Bin]) -> Vec<BinLog> {
-    let shade = |scratch: &mut worker::Scratch, bin| BinWorker::new(pass, bin, scratch).shade_visible();
+    let shade = |scratch: &mut worker::Scratch, bin| BinWorker::new(pass, bin, scratch).shade_rest();
     bins.par_iter_mut().map_init(worker::Scratch::default, shade).collect()
 }
 

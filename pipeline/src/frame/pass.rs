@@ -185,15 +185,27 @@ impl<'a> Pass<'a> {
         BoxGrid::new(self.settings.spec.depth.boxes, self.lens).unwrap_or_default()
     }
 
-    /// Whether visible samples are shaded after the last triangle.
-    pub fn shades_last(&self) -> bool {
-        self.settings.spec.features.hidden_surface_removal && !self.is_ordered && !self.is_depth_only()
+    /// Whether shading waits until hidden surfaces are removed, where draws allow it.
+    pub fn shading_waits(&self) -> bool {
+        self.settings.spec.features.hidden_surface_removal && !self.is_depth_only()
+    }
+
+    /// Whether the samples of a draw have to be shaded before those of the next one: some are discarded, or
+    /// something is left of the colours before.
+    pub fn shades_in_order(&self, draw: u32) -> bool {
+        let Draw { state, shader, .. } = &self.draws[draw as usize];
+        let targets = || (0..self.colours.len()).map(|number| state.target(number));
+        let leaves = targets().any(|target| target.writes()) && !targets().all(|target| target.replaces());
+        shader.may_discard() || leaves
     }
 
     /// The tile at `origin` with its `samples` before the first draw.
     pub fn first_tile(&self, samples: &TileSamples, origin: [u32; 2]) -> DepthTile {
         let (count, Clear { depth, stencil }) = (samples.len, self.clear);
         let mut tile = DepthTile::cleared(self.depth_grid(), samples, depth);
+        if self.shading_waits() {
+            tile.waiting = vec![DepthTile::NO_TRIANGLE; count];
+        }
         if self.draws.iter().any(|draw| draw.state.stencil.is_some()) {
             tile.stencil = vec![stencil; count];
         }
@@ -559,6 +571,8 @@ pub struct RasterPass<'a> {
     pub visible: bool,
     /// Whether every sample is shaded at its own position, whatever the hardware does otherwise.
     pub per_sample: bool,
+    /// First pixels of its images within that of the frame, for heat maps; none if it is that itself.
+    pub places: &'a [[u32; 2]],
 }
 
 /// Result that a pass leaves in memory.
@@ -594,7 +608,8 @@ impl<'a> RasterPass<'a> {
     /// A pass that draws one image.
     pub fn new(camera: &'a Camera, draws: &'a [Draw<'a>], settings: &'a Settings<'a>) -> Self {
         let (name, target, clear) = ("draw", Target::Image, Clear::default());
-        Self { name, camera, draws, settings, target, clear, image: true, visible: false, per_sample: false }
+        let (image, visible, per_sample, places) = (true, false, false, Default::default());
+        Self { name, camera, draws, settings, target, clear, image, visible, per_sample, places }
     }
 
     /// The pass with another name.
@@ -625,6 +640,23 @@ impl<'a> RasterPass<'a> {
     #[must_use]
     pub fn shaded_per_sample(self) -> Self {
         Self { per_sample: true, ..self }
+    }
+
+    /// The pass with its images at `places` within that of the frame, for heat maps. What it does serves all of
+    /// them, and each has its part.
+    #[must_use]
+    pub fn shown_at(self, places: &'a [[u32; 2]]) -> Self {
+        Self { places, ..self }
+    }
+
+    /// Columns and rows of the pixels of a tile in each place of its images.
+    pub(super) fn places_of(&self, tile: u32) -> impl Iterator<Item = [[u32; 2]; 2]> {
+        let (viewport, side) = (self.settings.viewport, self.settings.spec.tile_px);
+        let (sides, across) = ([viewport.width(), viewport.height()], viewport.width().div_ceil(side));
+        let first = [tile % across * side, tile / across * side];
+        self.places.iter().map(move |place| {
+            [0, 1].map(|axis| [first[axis], (first[axis] + side).min(sides[axis])].map(|at| place[axis] + at))
+        })
     }
 
     /// Pixels of the image, in whole tiles.

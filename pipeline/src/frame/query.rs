@@ -4,7 +4,8 @@
 use activity::{Counts, Event, Packet, PacketCounts, PacketKind};
 use glam::{Vec3, Vec4};
 
-use super::{Draw, FrameReport, Gpu, PassError, Query, RasterPass};
+use super::heat::Block;
+use super::{Draw, FrameReport, Gpu, PassError, Placement, Query, RasterPass};
 use crate::depth::{Bounder, DepthBound, Pyramid, interval_madds, set_up_madds};
 use crate::geometry::{Cull, Geometry, MovingVertex, Projection};
 use crate::memory::{LINE_BYTES, MemoryRange};
@@ -206,12 +207,29 @@ impl<'a> IntervalQueries<'a> {
     }
 }
 
+/// Where the tiles of the first level are in the image.
+fn placement(pyramid: &Pyramid) -> Placement {
+    let (viewport, tiles) = (pyramid.viewport(), pyramid.size(0));
+    let sides = [viewport.width(), viewport.height()];
+    let end = |axis: usize| f64::from(tiles[axis] * pyramid.side_px(0)) / f64::from(sides[axis]);
+    Placement { first: [0.0; 2], last: [0, 1].map(end) }
+}
+
+/// Tiles of the first level that a tile of any level covers.
+fn block(pyramid: &Pyramid, level: usize, tile: [u32; 2]) -> Block {
+    let of = pyramid.size(0);
+    let edge = |axis: usize, tile: u32| (tile << level).min(of[axis]);
+    let [first, end] = [0, 1].map(|next| [0, 1].map(|axis| edge(axis, tile[axis] + next)));
+    Block { first, end, of }
+}
+
 impl Gpu<'_> {
     /// Gathers the farthest depths of `stored`, the result of a pass over depth, in a pass of its own. It
     /// needs no wait, as the unit of depth works in order: every stored depth is read and compared once, and
     /// the farthest of each box of a tile are compared for the next level. They are kept in fast memory.
     pub fn gather_farthest_depths(&mut self, name: &str, pyramid: &Pyramid, stored: MemoryRange) {
-        self.open(name, None);
+        let placement = self.has_heat_of(pyramid.viewport()).then(|| placement(pyramid));
+        self.open_placed(name, placement);
         self.note_read(stored.address());
         let first = pyramid.size(0);
         let tiles = u64::from(first[0] * first[1]);
@@ -233,7 +251,7 @@ impl Gpu<'_> {
                         self.memory().depth(line * LINE_BYTES, false, false, counts);
                     }
                 }
-                self.push(&packet, 0);
+                self.push_block(&packet, &block(pyramid, level, at));
             }
         }
     }

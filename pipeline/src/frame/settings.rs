@@ -85,8 +85,8 @@ pub struct Features {
     /// Run only those of the enabled tests that pay off.
     pub auto: bool,
     /// Shade the visible samples of a bin after its last triangle, and no others (hidden-surface removal of
-    /// tile-based deferred renderers). Passes whose result depends on the order of triangles shade in that
-    /// order.
+    /// tile-based deferred renderers). A draw that blends, discards samples or masks channels is shaded in
+    /// order: what is visible in the bin before it is shaded first, what comes after it waits again.
     pub hidden_surface_removal: bool,
     /// A triangle whose points are all within this distance in pixels of their mid-shutter position is drawn
     /// still at that position. 0 disables it.

@@ -1,7 +1,8 @@
 //! Checks of the targets and bindings of a pass, before it is drawn, and which surfaces it reads.
 
-use super::attachments::{Attachments, PassError, PassPart, SurfaceId, SurfaceProblem, Surfaces};
+use super::attachments::{Attachments, Binding, PassError, PassPart, SurfaceId, SurfaceProblem, Surfaces};
 use super::pass::{Draw, RasterPass, Target};
+use crate::buffer::BufferBinding;
 use crate::geometry::Viewport;
 use crate::state::{Blend, Compare};
 use crate::surface::{MAX_TARGETS, SurfaceSpec};
@@ -44,8 +45,11 @@ impl Surfaces {
     fn check_bindings(&self, pass: &RasterPass<'_>, targets: &Attachments) -> Result<(), PassError> {
         let bindings =
             pass.draws.iter().enumerate().flat_map(|(draw, of)| of.bindings.iter().map(move |b| (draw, b)));
-        for (draw, id) in bindings.flat_map(|(draw, b)| self.read_by(b).into_iter().map(move |id| (draw, id)))
-        {
+        let read = |binding: &Binding<'_>| match binding {
+            Binding::Buffer(buffer) => self.viewed(buffer, targets),
+            _ => self.read_by(binding),
+        };
+        for (draw, id) in bindings.flat_map(|(draw, b)| read(b).into_iter().map(move |id| (draw, id))) {
             let target = targets.all().position(|(target, ..)| target == id);
             let problem = match (self.get(id), target) {
                 (None, _) => SurfaceProblem::Unknown,
@@ -59,6 +63,12 @@ impl Surfaces {
             return Err(self.refused(pass.name, id, problem));
         }
         Ok(())
+    }
+
+    /// Target that a buffer is a view of, if any.
+    fn viewed(&self, buffer: &BufferBinding, targets: &Attachments) -> Vec<SurfaceId> {
+        let is_viewed = |id: &SurfaceId| self.get(*id).is_some_and(|state| state.region == buffer.region);
+        targets.all().map(|(id, ..)| id).filter(is_viewed).collect()
     }
 
     fn check_states(&self, pass: &RasterPass<'_>, targets: &Attachments) -> Result<(), PassError> {

@@ -75,6 +75,9 @@ impl<'a, 'p> BinWorker<'a, 'p> {
             if draw != self.draw {
                 self.record_tests();
                 self.draw = draw;
+                if self.pass.shading_waits() && self.pass.shades_in_order(draw) {
+                    self.shade_waiting();
+                }
             }
             self.listed += 1;
             self.triangle(ready);
@@ -246,8 +249,11 @@ impl<'a, 'p> BinWorker<'a, 'p> {
         let Some(tile) = &mut self.bin.tiles[index] else { return };
         if self.pass.is_ordered {
             FragmentTests::new(self.pass, triangle, &samples[index], origin).store(tile, hits, fragments);
-        } else if !self.pass.is_depth_only() && !self.pass.shades_last() {
+        } else if !self.pass.is_depth_only() {
             fragments.nearest(hits);
+        }
+        if self.pass.shading_waits() && !self.pass.shades_in_order(self.draw) {
+            fragments.wait(triangle.id, tile, hits);
         }
         if !hits.written.is_empty() {
             let lowered = tile.record_writes(&hits.written, state.may_raise_depth());
@@ -371,36 +377,41 @@ impl<'a, 'p> BinWorker<'a, 'p> {
 }
 
 impl BinWorker<'_, '_> {
-    /// Shades the visible samples of the bin, tile by tile and triangle by triangle.
-    pub fn shade_visible(mut self) -> BinLog {
-        for index in 0..self.bin.tiles.len() {
-            let Some(tile) = &self.bin.tiles[index] else { continue };
-            let of = |slot: &u16| tile.triangle[usize::from(*slot)];
-            let mut seen: Vec<u16> = (0..tile.triangle.len() as u16).collect();
-            seen.retain(|slot| of(slot) != DepthTile::NO_TRIANGLE);
-            seen.sort_by_key(of);
-            let groups: Vec<(u32, &[u16])> =
-                seen.chunk_by(|a, b| of(a) == of(b)).map(|group| (of(&group[0]), group)).collect();
-            let origin = self.bin.tile_origin(self.pass, index);
-            self.fill(index, origin, true);
-            for (triangle, slots) in groups {
-                self.shade_slots(triangle, slots, index, origin);
-            }
-        }
+    /// Shades what still waits after the last batch.
+    pub fn shade_rest(mut self) -> BinLog {
+        self.shade_waiting();
         self.log
     }
 
-    fn shade_slots(&mut self, triangle: u32, slots: &[u16], index: usize, origin: [u32; 2]) {
+    /// Shades the samples of the bin that wait, tile by tile and triangle by triangle.
+    fn shade_waiting(&mut self) {
+        for index in 0..self.bin.tiles.len() {
+            let Some(tile) = &mut self.bin.tiles[index] else { continue };
+            let mut seen: Vec<(u32, u16)> = tile.waiting.iter().copied().zip(0..).collect();
+            seen.retain(|(triangle, _)| *triangle != DepthTile::NO_TRIANGLE);
+            seen.sort_unstable();
+            tile.waiting.fill(DepthTile::NO_TRIANGLE);
+            let origin = self.bin.tile_origin(self.pass, index);
+            self.fill(index, origin, true);
+            for group in seen.chunk_by(|a, b| a.0 == b.0) {
+                self.shade_slots(group, index, origin);
+            }
+        }
+    }
+
+    /// Shades samples of a tile that see one triangle.
+    fn shade_slots(&mut self, seen: &[(u32, u16)], index: usize, origin: [u32; 2]) {
         let Scratch { samples, hits, fragments, .. } = &mut *self.scratch;
+        let triangle = seen[0].0;
         hits.clear();
-        for &slot in slots {
+        for &(_, slot) in seen {
+            hits.written.push(slot);
             let pixel = usize::from(samples[index].pixel[usize::from(slot)]);
             hits.written_pixels |= 1 << pixel;
             if let Some(pixels) = &mut hits.by_pixel {
                 pixels.written[pixel] += 1;
             }
         }
-        hits.written.extend_from_slice(slots);
         fragments.nearest(hits);
         if let Some(pixels) = &mut hits.by_pixel {
             pixels.written = [0; 64];

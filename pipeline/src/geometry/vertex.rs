@@ -149,6 +149,13 @@ impl Projection {
             .collect()
     }
 
+    /// The same, computed on a lane; a still vertex before a still camera once for both ends.
+    pub fn vertex_on(&self, lane: &Lane, ends: [Vec3; 2], is_still: bool) -> MovingVertex {
+        let open = self.image_on(lane, &self.open, ends[0]);
+        let close = if is_still { open } else { self.image_on(lane, &self.close, ends[1]) };
+        MovingVertex { open, close }
+    }
+
     fn image(&self, pose: &DAffine3, world: Vec3) -> [f32; 3] {
         self.image_on(&Lane::default(), pose, world)
     }

@@ -4,7 +4,8 @@ use crate::common::stage::{RED, still};
 use crate::common::{Plain, Soup, SoupKind, camera, pixel_camera, rectangle, spec};
 use activity::{Counts, Event};
 use glam::Vec3;
-use pipeline::frame::HeatMap;
+use pipeline::depth::{BoxGrid, Pyramid};
+use pipeline::frame::{HeatMap, TileHeat};
 use pipeline::*;
 
 fn maps(size: [u32; 2], spec: &PipelineSpec, draws: &[Draw<'_>], camera: &Camera) -> (Vec<HeatMap>, Counts) {
@@ -136,4 +137,29 @@ fn passes_of_a_frame_add_up_on_one_map() {
     assert_eq!(tested, passes[0]);
     let (resolved, passes) = elsewhere(Event::PixelsResolved);
     assert_eq!((resolved, passes[4]), (passes[0] + passes[4], 32 * 32));
+}
+
+/// Farthest depths are gathered where they are in the image, also over tiles of another size than those of the
+/// hardware and at the borders of the image, and nowhere in an image of another size.
+#[test]
+fn farthest_depths_are_gathered_in_their_tiles() {
+    let spec = spec(Features::ALL);
+    let table = SampleTable::low_discrepancy(4, 3, LensShape::Disk).unwrap();
+    let [image, other] = [[44, 28], [32, 32]].map(|[width, height]| Viewport::new(width, height).unwrap());
+    let depths = vec![1.0; image.pixels() * 4];
+    for tile_px in [8, 16] {
+        let gathered = |of: Viewport| {
+            let pyramid = Pyramid::new(image, &table, &depths, tile_px, BoxGrid::new([1; 3], false).unwrap());
+            let mut gpu = Gpu::quiet(&spec).unwrap().with_heat(&[Event::DepthReads, Event::ZCullTests], of);
+            let stored = gpu.allocate(4 * depths.len() as u64);
+            gpu.gather_farthest_depths("farthest depths", &pyramid, stored);
+            gpu.finish().heat
+        };
+        let [reads, tests] = &gathered(image)[..] else { unreachable!() };
+        assert_eq!((reads.total(), reads.elsewhere, tests.elsewhere), (depths.len() as u64, 0, 0));
+        let each_depth_once = |tile: &TileHeat| tile.count == u64::from(4 * tile.size[0] * tile.size[1]);
+        assert!(reads.tiles.iter().all(each_depth_once), "{:?}", reads.tiles);
+        assert!(tests.total() > reads.total(), "each level compares what the one before found");
+        assert!(gathered(other).iter().all(|map| map.elsewhere == map.total()));
+    }
 }

@@ -537,8 +537,7 @@ fn hi_z_serves_other_depth_tests() {
     assert_eq!(all[Event::DepthWrites], 3 * samples);
 }
 
-/// Hidden-surface removal shades what is visible and nothing else; the image is the same. Passes with
-/// blending shade in order.
+/// Hidden-surface removal shades what is visible and nothing else; the image is the same.
 #[test]
 fn hidden_surfaces_are_not_shaded_if_shading_waits() {
     let stage = Stage::sampled(32, 32, 4);
@@ -557,8 +556,49 @@ fn hidden_surfaces_are_not_shaded_if_shading_waits() {
         assert_eq!(now.images, last.images);
         let ([colours, lanes, tested], [colours_now, lanes_now, tested_now]) = (shaded(&last), shaded(&now));
         assert_eq!((5 * colours, 5 * lanes, tested), (colours_now, lanes_now, tested_now));
+        // Draws that all blend leave nothing to remove.
         let blend = DrawState { blend: Blend::Add, ..DrawState::default() };
         let [now, last] = [false, true].map(|waits| render(waits, blend, batch));
         assert_eq!((now.images, now.counts), (last.images, last.counts));
+    }
+}
+
+/// A draw that blends ends the removal of hidden surfaces before it, in its bin alone, and those after it are
+/// removed again. A draw that shades nothing ends nothing.
+#[test]
+fn hidden_surfaces_are_removed_before_and_after_blending() {
+    // Three bins, the middle one without cards.
+    let stage = Stage::sampled(96, 32, 4);
+    let card = |x, z| rectangle(x, [-16.0, 16.0], z);
+    let (left, right) = ([-48.0, -16.0], [16.0, 48.0]);
+    let layers = [9.0, 8.0, 7.0, 6.0, 5.0, 3.0, 2.0].map(|z| [card(left, z), card(right, z)]);
+    let (glass, between) = (card(left, 4.0), card(left, 2.5));
+    let blends = DrawState { blend: Blend::Add, ..DrawState::default() };
+    let depths = DrawState { colour_mask: [false; 4], ..DrawState::default() };
+    let opaque = |layers: Range<usize>| layers.flat_map(|at| [0, 1].map(|side| (at, side)));
+    let layer = |(at, side): (usize, usize)| still(&layers[at][side], &RED);
+    let draws: Vec<_> = opaque(0..5)
+        .map(layer)
+        .chain([still(&glass, &BLUE).with_state(blends)])
+        .chain(opaque(5..6).map(layer))
+        .chain([still(&between, &BLUE).with_state(depths)])
+        .chain(opaque(6..7).map(layer))
+        .collect();
+    let shaded = |hidden_surface_removal, batch_triangles| {
+        let spec =
+            PipelineSpec { batch_triangles, ..spec(Features { hidden_surface_removal, ..Features::ALL }) };
+        let drawn =
+            RasterPass::new(&stage.camera, &draws, &settings(&stage, &spec)).render(|_, _| ()).unwrap();
+        let events = [Event::ColourWrites, Event::SamplesBlended, Event::PixelInvocations];
+        (drawn.images, events.map(|event| drawn.counts[event]))
+    };
+    // Of a card that fills a bin. Both triangles shade the quads of the diagonal.
+    let (samples, lanes) = (32 * 32 * 4, 4 * (16 * 16 + 16));
+    for batch in [1, 100] {
+        let [(image, now), (same, last)] = [false, true].map(|waits| shaded(waits, batch));
+        assert_eq!(image, same);
+        // On the left the visible card, the glass and the visible card; on the right one card.
+        assert_eq!(last, [4 * samples, samples, 4 * lanes]);
+        assert_eq!(now, [15 * samples, samples, 15 * lanes]);
     }
 }

@@ -3,6 +3,7 @@
 //! samples and texels, leave.
 
 use std::ops::Range;
+use std::slice;
 
 use activity::{Event, Packet, PacketKind, Waits};
 use glam::{Vec2, Vec3, Vec4};
@@ -459,13 +460,13 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 120, failure_persistence: None, ..ProptestConfig::default() })]
     #[test]
     fn every_pass_leaves_what_storing_samples_in_order_leaves(
-        kind in kinds(), lens: bool, switches in 0..SWITCHES, auto: bool, z_min: bool, per_pixel in prop::sample::select(&[1_u32, 2, 4][..]),
+        kind in kinds(), lens: bool, switches in 0..SWITCHES, auto: bool, waits: bool, z_min: bool, per_pixel in prop::sample::select(&[1_u32, 2, 4][..]),
         batch_triangles in 1..40_u32, sizes in 0..4_usize, threads in 1..4_usize, count in 1..40_usize, seed: u64,
     ) {
         let (tile_px, coarse_tile_px) = [(8, 32), (4, 16), (2, 64), (1, 1)][sizes];
         let depth = depth::DepthSpec { z_min, ..depth::DepthSpec::default() };
         let spec = PipelineSpec {
-            tile_px, coarse_tile_px, batch_triangles, depth, ..spec(Features { auto, ..switched(switches) })
+            tile_px, coarse_tile_px, batch_triangles, depth, ..spec(Features { auto, hidden_surface_removal: waits, ..switched(switches) })
         };
         let story = Story::new(kind, lens.into(), per_pixel, count, seed);
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
@@ -780,19 +781,25 @@ fn what_surfaces_cannot_do_is_refused_by_name() {
     assert!(memory.starts_with("pass `light`: the surfaces of the frame take "), "{memory}");
 }
 
-/// The error names the surface, the first draw that reads it and the first that writes it.
+/// The error names the surface, the first draw that reads it, also as a buffer, and the first that writes it.
 #[test]
 fn feedback_names_both_draws() {
     let masked = DrawState { colour_mask: [false; 4], ..flat() };
-    let message = |states: [DrawState; 3], is_depth: bool| {
+    let message = |states: [DrawState; 3], is_depth: bool, is_viewed: bool| {
         with(|stage, settings| {
             let mut gpu = Gpu::quiet(settings.spec).unwrap();
             let [colour, depth] = [("albedo", Format::Rgba8), ("depth", Format::D32)]
                 .map(|(name, format)| gpu.create_surface(&SurfaceSpec::new(name, stage.viewport, format)));
             let mut targets = to(&[colour]);
             targets.depth = Some(Attachment::cleared(depth, Clear::default()));
-            let (corners, bindings) =
-                (screen(1.0), [Binding::Surface(if is_depth { depth } else { colour })]);
+            let (corners, read) = (screen(1.0), if is_depth { depth } else { colour });
+            let mut bindings = [Binding::Surface(read)];
+            if is_viewed {
+                let before = still(&corners, &RED);
+                let pass = RasterPass::new(&stage.camera, slice::from_ref(&before), settings);
+                gpu.draw(&pass.onto(Target::Surfaces(&targets))).unwrap();
+                bindings = [Binding::Buffer(gpu.surface_view(read).unwrap().reads())];
+            }
             let draws = [0, 1, 2].map(|number| {
                 let draw = still(&corners, &RED).with_state(states[number]);
                 if number == 0 { draw } else { draw.binding(&bindings) }
@@ -807,13 +814,16 @@ fn feedback_names_both_draws() {
         )
     };
     let cases = [
-        (message([flat(); 3], false), start("albedo", "draw 1", "draw 0")),
-        (message([masked, masked, flat()], false), start("albedo", "draw 1", "draw 2")),
-        (message([masked; 3], false), start("albedo", "draw 1", "the pass as a whole")),
-        (message([flat(), DrawState::default(), flat()], true), start("depth", "draw 1", "draw 1")),
+        ([flat(); 3], false, start("albedo", "draw 1", "draw 0")),
+        ([masked, masked, flat()], false, start("albedo", "draw 1", "draw 2")),
+        ([masked; 3], false, start("albedo", "draw 1", "the pass as a whole")),
+        ([flat(), DrawState::default(), flat()], true, start("depth", "draw 1", "draw 1")),
     ];
-    for (message, start) in cases {
-        assert!(message.starts_with(&start), "{message}");
+    for (states, is_depth, start) in cases {
+        for is_viewed in [false, true] {
+            let message = message(states, is_depth, is_viewed);
+            assert!(message.starts_with(&start), "{is_viewed}: {message}");
+        }
     }
 }
 

@@ -41,6 +41,8 @@ pub struct Plan {
     pub model: PowerModel,
     /// Warning of a platform or table that does not belong to the GPU.
     pub(crate) pairing: Option<Warning>,
+    /// Relative error on the probe of the timing level, if `--accuracy` or `--budget` chose it.
+    pub(crate) chosen: Option<f64>,
     /// When the next frame starts.
     pub pacing: Pacing,
     /// Input files, sorted by name.
@@ -121,6 +123,7 @@ impl Plan {
             scaling,
             model,
             pairing,
+            chosen: None,
             pacing,
             options,
             files,

@@ -280,16 +280,37 @@ impl AccuracyWarning {
         }
     }
 
-    /// Warning about a frame.
-    pub fn warning(self, frame: u32, level: Level) -> Warning {
-        let name = level.name();
+    /// Level that has no such warning.
+    const fn better(self) -> Level {
+        match self {
+            Self::MemoryRows(_) | Self::MemoryQueue(_) => Level::Stepped,
+            Self::BatchOverlap(_) | Self::ShortPackets(_) => Level::Packet,
+        }
+    }
+
+    /// What can be done at `level`, which the user asked for, or which was `chosen` for its relative error on a
+    /// probe.
+    fn remedy(self, level: Level, chosen: Option<f64>) -> String {
+        let (name, better) = (level.name(), self.better().name());
+        match chosen {
+            None => format!("use --timing {better}, or let --accuracy choose"),
+            Some(error) => format!(
+                "`{name}` was chosen, as its error on a probe was {:.2} %; give a smaller --accuracy, or --timing {better}",
+                1e2 * error
+            ),
+        }
+    }
+
+    /// Warning about a frame at a level that the user asked for, or that was `chosen` for its relative error on
+    /// a probe.
+    pub fn warning(self, frame: u32, level: Level, chosen: Option<f64>) -> Warning {
+        let (name, remedy) = (level.name(), self.remedy(level, chosen));
         match self {
             Self::MemoryRows(share) => Warning::new(
                 Code::MemoryRows,
                 format!(
                     "a bank of memory opens rows for {:.0} % of {} in frame {frame} that lines of the same row may have open: \
-                     times at `{name}` may be far off, as what counts is which lines wait side by side; use --timing \
-                     stepped, or let --accuracy choose",
+                     times at `{name}` may be far off, as what counts is which lines wait side by side; {remedy}",
                     100.0 * share,
                     if level == Level::Bound { "the busy time" } else { "the time" },
                 ),
@@ -299,7 +320,7 @@ impl AccuracyWarning {
                 format!(
                     "memory is busy for {:.0} % of frame {frame}, and a queue of a channel is shorter than the time in which a row \
                      opens: times at `{name}` may be a tenth too short or more, as lines wait in front of full queues in an order \
-                     that it does not know; use a longer `dram.queue` (or `dram.write_queue`), --timing stepped, or let --accuracy choose",
+                     that it does not know; use a longer `dram.queue` (or `dram.write_queue`); {remedy}",
                     100.0 * share,
                 ),
             ),
@@ -307,8 +328,7 @@ impl AccuracyWarning {
                 Code::BatchOverlap,
                 format!(
                     "the longest packets of the batches and passes of frame {frame} take {:.0} % of it: times at `{name}` may be \
-                     off by half of that, as it does not know how far batches overlap; use --timing packet, or let --accuracy \
-                     choose",
+                     off by half of that, as it does not know how far batches overlap; {remedy}",
                     100.0 * share,
                 ),
             ),
@@ -316,7 +336,7 @@ impl AccuracyWarning {
                 Code::ShortPackets,
                 format!(
                     "a packet comes every {cycles:.1} cycles of frame {frame}: with packets so short `{name}` is up to a \
-                     quarter too short; use --timing packet, or let --accuracy choose"
+                     quarter too short; {remedy}"
                 ),
             ),
         }

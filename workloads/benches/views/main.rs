@@ -47,7 +47,12 @@ fn views(spec: &PipelineSpec) {
     let scene = workloads::load("default").unwrap().with_overrides(&size).unwrap();
     let frame = scene.frame(18).unwrap();
     let draws = frame.draws(&scene).unwrap();
-    let to = Target { viewport: Viewport::new(160, 90).unwrap(), spec, background: scene.background() };
+    let to = Target {
+        viewport: Viewport::new(160, 90).unwrap(),
+        spec,
+        background: scene.background(),
+        places: &[],
+    };
     let focus = frame.camera.lens().unwrap().focus();
     for layout in [Layout::stereo(0.28, 0.11), Layout::line(7, 0.5, 0.11)] {
         let rig = Rig::new(&frame.camera, focus, &layout, 8, 1).unwrap();

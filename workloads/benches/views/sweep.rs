@@ -81,7 +81,7 @@ impl Point {
         let rig = Rig::new(&frame.camera, focus as f32, layout, self.samples, 1).unwrap();
         let spec = PipelineSpec { shading_cache: self.cache, ..*hardware };
         let viewport = Viewport::new(self.size.0, self.size.1).unwrap();
-        let to = Target { viewport, spec: &spec, background: scene.background() };
+        let to = Target { viewport, spec: &spec, background: scene.background(), places: &[] };
         let middle = (layout.views as usize - 1) / 2;
         let all = rig.one_pass(&draws, &to, &mut Gpu::quiet(to.spec).unwrap()).unwrap().counts
             [Event::PixelInvocations];

@@ -163,6 +163,14 @@ impl MultiView {
         }
     }
 
+    /// First pixel of each view in the image, unless it has the size of a view.
+    fn places(&self) -> Vec<[u32; 2]> {
+        match self.options.show {
+            Show::SideBySide => (0..self.options.views).map(|view| [view * self.view.width(), 0]).collect(),
+            Show::Interlaced | Show::One => Vec::new(),
+        }
+    }
+
     /// Warns about view-dependent materials: they are shaded for the middle of the line only.
     fn angle_warning(&self, rig: &Rig) -> Option<Warning> {
         let angle = rig.degrees();
@@ -196,7 +204,8 @@ impl DrawsScene for MultiView {
     fn draw_frame(&self, frame: &Frame, gpu: &mut Gpu<'_>) -> Result<Drawn, JobError> {
         let draws = frame.draws(&self.scene)?;
         let rig = self.rig(frame).map_err(JobError::setting)?;
-        let to = Target { viewport: self.view, spec: gpu.spec(), background: self.scene.background() };
+        let (places, background) = (self.places(), self.scene.background());
+        let to = Target { viewport: self.view, spec: gpu.spec(), background, places: &places };
         let views = if self.options.view_by_view {
             rig.view_by_view(&draws, &to, gpu)?
         } else {

@@ -24,6 +24,8 @@ pub struct Target<'a> {
     pub spec: &'a PipelineSpec,
     /// Linear RGB radiance of the background.
     pub background: Vec3,
+    /// First pixel of each view in the image of the frame, for heat maps; none if views are as large as that.
+    pub places: &'a [[u32; 2]],
 }
 
 /// Images of all views.
@@ -117,7 +119,10 @@ impl Rig {
     ) -> Result<Views, JobError> {
         let settings = settings(to, &self.table);
         let views = pipeline::Target::Views(&self.runs);
-        let pass = RasterPass::new(&self.camera, draws, &settings).named("all views").onto(views);
+        let pass = RasterPass::new(&self.camera, draws, &settings)
+            .named("all views")
+            .onto(views)
+            .shown_at(to.places);
         let Rendered { images, counts, .. } = gpu.draw(&pass)?;
         Ok(Views { images, counts, passes: 1 })
     }
@@ -136,7 +141,8 @@ impl Rig {
         let run = self.runs.get(view).cloned().unwrap_or(0..1);
         let samples = Run { table: &self.table, run };
         let (settings, name) = (settings(to, &samples), format!("view {view}"));
-        Ok(gpu.draw(&RasterPass::new(&self.camera, draws, &settings).named(&name))?)
+        let pass = RasterPass::new(&self.camera, draws, &settings).named(&name);
+        Ok(gpu.draw(&pass.shown_at(to.places.get(view..=view).unwrap_or_default()))?)
     }
 
     /// Renders each view in its own pass; the images are the same bit for bit.

@@ -134,7 +134,7 @@ impl<'a> World<'a> {
         samples.pixel_into(px, py, &mut at);
         let shade = |(index, sample): (usize, &Sample)| {
             work.lanes.run(|lane| {
-                let point = self.point([px, py], sample, triangle(index));
+                let point = self.point(lane, [px, py], sample, triangle(index));
                 let is_seen = lane.branch(point.is_some());
                 let Some(point) = point.filter(|_| is_seen) else { return self.background };
                 self.shade(lane, &point, Place { sample, index }, shadows, work)
@@ -165,8 +165,8 @@ impl<'a> World<'a> {
             let mut at = vec![Sample::default(); per_pixel];
             samples.pixel_into(px, py, &mut at);
             let of = |(index, (sample, (triangle, _))): (usize, (&Sample, &(u32, u32)))| {
-                let point = self.point([px, py], sample, *triangle)?;
                 let lane = Lane::default();
+                let point = self.point(&lane, [px, py], sample, *triangle)?;
                 let toward = self.light.point(&lane, [sample.u, sample.v]) - point.place;
                 let (lanes, rays) = (Lanes::default(), Cell::default());
                 let work = Work { lanes: &lanes, rays: &rays };
@@ -178,13 +178,15 @@ impl<'a> World<'a> {
         seen.par_chunks_exact(per_pixel).enumerate().flat_map_iter(pixel).collect()
     }
 
-    /// Surface point of a sample: interpolation and normals are fixed functions, as in the pipeline.
-    fn point(&self, [px, py]: [u32; 2], sample: &Sample, triangle: u32) -> Option<Point> {
+    /// Surface point of a sample. The lane projects the vertices; interpolation and normals are fixed functions,
+    /// as in the pipeline.
+    fn point(&self, lane: &Lane, [px, py]: [u32; 2], sample: &Sample, triangle: u32) -> Option<Point> {
         let face = self.rays.faces().get(triangle as usize)?;
+        let is_still = self.camera.open() == self.camera.close() && self.draws[face.draw].geometry.is_still();
         let [x, y] = [(px, sample.x, self.viewport.width()), (py, sample.y, self.viewport.height())]
             .map(|(pixel, within, side)| (pixel as f32 - 0.5 * side as f32) + within);
         let seen = std::array::from_fn(|k| {
-            let vertex = self.projection.vertex(face.ends[0][k], face.ends[1][k]);
+            let vertex = self.projection.vertex_on(lane, face.ends.map(|corners| corners[k]), is_still);
             let [vx, vy, w] = Corner::new(&vertex).at(sample.t);
             [(-x).mul_add(w, vx), (-y).mul_add(w, vy), w]
         });

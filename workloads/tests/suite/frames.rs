@@ -202,6 +202,32 @@ fn workloads_without_a_scene_say_what_changes() {
 
 /// Heat maps have the work of conservative passes where their tiles are in the image: what lanes do and tests
 /// of tiles, all of it.
+/// Views side by side have the work of their pass in equal parts, and one by one each its own.
+#[test]
+fn views_side_by_side_are_on_heat_maps() {
+    let events = [Event::SamplesTested, Event::PixelsResolved, Event::TileMadds];
+    for is_each in ["false", "true"] {
+        let set = vec![("view_by_view".to_owned(), is_each.to_owned())];
+        let overrides = Overrides { size: Some((26, 20)), ..Overrides::default() };
+        let request = Request { overrides: &overrides, seed: 1 };
+        let job = find("multiview", &OptionSource { file: None, set }, &request).unwrap().unwrap();
+        let viewport = Viewport::new(52, 20).unwrap();
+        let spec = crate::common::spec();
+        let mut gpu = Gpu::quiet(&spec).unwrap().with_heat(&events, viewport);
+        job.frame(job.settings().frames.start, &mut gpu).unwrap();
+        let report = gpu.finish();
+        for map in &report.heat {
+            assert_eq!((map.total(), map.elsewhere), (report.counts()[map.event], 0), "{:?}", map.event);
+        }
+        let resolved = report.heat[1].pixels();
+        assert!(resolved.iter().all(|count| (count - 1.0).abs() < 1e-3), "{is_each}: {resolved:?}");
+        let tested = report.heat[0].pixels();
+        let of_view = |first: usize| tested.chunks(52).flat_map(|row| &row[first..first + 26]).sum::<f32>();
+        let share = of_view(0) / of_view(26);
+        assert!((0.5..2.0).contains(&share), "{is_each}: {share}");
+    }
+}
+
 #[test]
 fn passes_in_conservative_mode_are_on_heat_maps() {
     let events = [Event::PixelInvocations, Event::ShaderOps, Event::TileMadds, Event::TilesVisited];

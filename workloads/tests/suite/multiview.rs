@@ -31,7 +31,7 @@ fn with<R>(
     let draws = frame.draws(scene).unwrap();
     let rig = Rig::new(&frame.camera, 4.0, &layout, samples, 3).unwrap();
     let viewport = Viewport::new(64, 48).unwrap();
-    run(&rig, &draws, &Target { viewport, spec, background: scene.background() })
+    run(&rig, &draws, &Target { viewport, spec, background: scene.background(), places: &[] })
 }
 
 fn one_pass(scene: &Scene, layout: (Layout, u32), spec: &PipelineSpec) -> Views {
@@ -110,7 +110,7 @@ fn accumulation_blurs_moving_objects_and_moving_cameras() {
             let geometry = Geometry::new(&open, &close, &[[0, 1, 2], [0, 2, 3]]).unwrap();
             let draws = [Draw::new(geometry, &White, Cull::None)];
             let rig = Rig::new(camera, 4.0, &Layout::stereo(0.28, 0.11), 64, 3).unwrap();
-            let to = Target { viewport, spec: &spec, background: Vec3::ZERO };
+            let to = Target { viewport, spec: &spec, background: Vec3::ZERO, places: &[] };
             let views = if many { Rig::accumulated } else { Rig::one_pass };
             views(&rig, &draws, &to, &mut Gpu::quiet(to.spec).unwrap()).unwrap().images
         };

@@ -2,6 +2,7 @@
 
 use activity::{Event, Unit};
 use glam::{DVec3, Vec3};
+use pipeline::geometry::Projection;
 use pipeline::sampling::{Pattern, Sample, SampleSpec};
 use pipeline::{Clip, Cull, Draw, Geometry, Gpu, Lane, Viewport};
 use proptest::prelude::*;
@@ -76,6 +77,24 @@ fn look_ups_cost_what_they_compute() {
     // Into the axes of the light 12, lens 2, scale 3, texel 4, border 1; bias and comparison 2.
     assert_eq!(look_up(Vec3::new(0.1, 0.0, 0.3)), (24, 1));
     assert_eq!(look_up(Vec3::new(0.1, 9.0, 0.3)), (22, 0));
+}
+
+/// A lane projects the vertices of the triangle that its sample sees, at both ends of the shutter if they move.
+#[test]
+fn lanes_project_the_vertices_of_their_triangle() {
+    let [floor, raised] = [0.0, 0.1].map(|height| quad(height, [-9.0, 9.0], [-9.0, 9.0]));
+    let (light, set, spec, viewport) = (above(0.6), set(4, 3), spec(), Viewport::new(8, 8).unwrap());
+    let camera = light.camera().with_lens(None);
+    let ops = |close: &[Vec3]| {
+        let draws = [draw(&floor, close, &TRIANGLES)];
+        let view = SceneView { camera: &camera, draws: &draws };
+        let mut gpu = Gpu::quiet(&spec).unwrap();
+        let seen = VisibleTriangles::draw(&view, viewport, &set, Method::OnePass, &mut gpu).unwrap();
+        let world = World::new(&view, viewport, &light, &[Vec3::ONE], Vec3::ZERO);
+        look_ups(&world, &set, &seen, Shadows::None, &mut gpu).counts[Event::ShaderOps]
+    };
+    let of_a_vertex = u64::from(Projection::new(&camera, viewport).vertex_ops());
+    assert_eq!(ops(&raised) - ops(&floor), 8 * 8 * 4 * 3 * of_a_vertex);
 }
 
 /// A light straight above, at height 4.

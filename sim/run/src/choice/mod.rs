@@ -96,6 +96,7 @@ pub(super) fn choose(
         None => probed(plan, distinct, &requested, progress)?,
     };
     plan.options.timing = Some(choice.level);
+    plan.chosen = choice.probe.error.get(&choice.level).copied();
     plan.options.sampling = choice.sampling;
     if choice.dimensions == Dimensions::WithoutSmallBlur {
         plan.gpu.pipeline.features = with_blur_thresholds(plan.gpu.pipeline.features, 1.0);

@@ -99,7 +99,7 @@ fn accuracy(plan: &Plan, simulated: &Simulated) -> Vec<Warning> {
         }
     }
     let level = plan.options.level();
-    worst.iter().map(|(frame, warning)| warning.warning(*frame, level)).collect()
+    worst.iter().map(|(frame, warning)| warning.warning(*frame, level, plan.chosen)).collect()
 }
 
 fn degenerate(simulated: &Simulated) -> Option<Warning> {
@@ -415,6 +415,15 @@ mod tests {
         }
         found.sort();
         found
+    }
+
+    #[test]
+    fn a_level_that_was_chosen_is_not_to_be_chosen_again() {
+        let message = |chosen| AccuracyWarning::MemoryRows(0.5).warning(3, Level::Packet, chosen).message;
+        let (asked, chosen) = (message(None), message(Some(0.012)));
+        assert!(asked.ends_with("use --timing stepped, or let --accuracy choose"), "{asked}");
+        let remedy = "`packet` was chosen, as its error on a probe was 1.20 %; give a smaller --accuracy, or --timing stepped";
+        assert!(chosen.ends_with(remedy), "{chosen}");
     }
 
     #[test]

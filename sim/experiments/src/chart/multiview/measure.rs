@@ -169,7 +169,7 @@ impl Bench {
     }
 
     fn target<'a>(&self, spec: &'a PipelineSpec) -> Target<'a> {
-        Target { viewport: self.viewport, spec, background: self.scene.background() }
+        Target { viewport: self.viewport, spec, background: self.scene.background(), places: &[] }
     }
 
     /// All ways of rendering so many views: two are apart as eyes are, others overlap.

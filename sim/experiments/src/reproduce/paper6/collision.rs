@@ -6,7 +6,9 @@ use pipeline::PipelineSpec;
 use rayon::prelude::*;
 use run::{GpuSpec, RunError};
 use workloads::collision::families::{Case, cases};
-use workloads::collision::{Method, Object, PlainPasses, PlainResult, Search, candidates, detect_each};
+use workloads::collision::{
+    Method, Object, PlainPasses, PlainResult, Search, Sweeps, candidates, detect_each,
+};
 use workloads::shapes;
 
 use super::super::report::over_doublings;
@@ -78,6 +80,22 @@ impl Drawn {
         Ok(Self { pairs: pairs.len(), cleared, work })
     }
 
+    /// Pairs of generated cases whose objects do not both stay in the potentially colliding set.
+    fn in_sweeps(cases: &[Case], method: Method, resolution: u32) -> Self {
+        let one = |Case { objects, collide, .. }: &Case| {
+            let set = Sweeps { method, resolution, bins: 1 }.detect(objects);
+            let is_kept = |object: &usize| set.objects.binary_search(object).is_ok();
+            let cleared = collide.iter().filter(|(a, b)| !(is_kept(a) && is_kept(b))).count();
+            Self { pairs: collide.len(), cleared: cleared as u64, work: set.work }
+        };
+        let and = |a: Self, b: Self| Self {
+            pairs: a.pairs + b.pairs,
+            cleared: a.cleared + b.cleared,
+            work: a.work.and(&b.work),
+        };
+        cases.par_iter().with_max_len(1).map(one).reduce(Self::default, and)
+    }
+
     /// Share of the pairs that are kept, in percent.
     fn kept_percent(&self) -> f64 {
         100.0 * kept_pairs(self) / self.pairs as f64
@@ -98,28 +116,37 @@ struct Looks {
     collide: Vec<Drawn>,
     /// Public queries that do not.
     apart: Vec<Drawn>,
+    /// All objects of a generated case, in two sweeps.
+    swept: Vec<Drawn>,
 }
 
 impl Looks {
-    fn new(ways: Vec<(Method, u32)>, generated: &[Pair], public: &Public) -> Self {
+    fn new(ways: Vec<(Method, u32)>, (own, generated): (&[Case], &[Pair]), public: &Public) -> Self {
+        let swept = ways.iter().map(|(method, px)| Drawn::in_sweeps(own, *method, *px)).collect();
         let each = |pairs: &[Pair]| ways.iter().map(|(method, px)| Drawn::new(pairs, *method, *px)).collect();
         let [generated, collide, apart] = [generated, &public.collide, &public.apart].map(each);
-        Self { names: ways, generated, collide, apart }
+        Self { names: ways, generated, collide, apart, swept }
     }
 
     /// Pairs missed by each way.
     fn missed(&self) -> impl Iterator<Item = (Method, u32, u64)> {
-        let both = self.generated.iter().zip(&self.collide);
-        let of = |((method, px), (own, theirs)): (&(Method, u32), (&Drawn, &Drawn))| {
-            (*method, *px, own.cleared + theirs.cleared)
+        let all = self.generated.iter().zip(&self.collide).zip(&self.swept);
+        let of = |((method, px), ((own, theirs), swept)): (&(Method, u32), ((&Drawn, &Drawn), &Drawn))| {
+            (*method, *px, own.cleared + theirs.cleared + swept.cleared)
         };
-        self.names.iter().zip(both).map(of)
+        self.names.iter().zip(all).map(of)
     }
 
     /// All work, and that of each kind of public case that there is.
     fn ran(&self, hardware: &PlainResult) -> Vec<Number> {
         let [own, collide, apart] = [&self.generated, &self.collide, &self.apart].map(|drawn| work_of(drawn));
         let mut all = ran(hardware, &own.and(&collide).and(&apart));
+        let swept = work_of(&self.swept);
+        all.extend(numbers([
+            ("passes_of_sweeps_on_the_host", swept.passes as f64),
+            ("draws_of_sweeps_on_the_host", swept.draws as f64),
+            ("fragments_of_sweeps_on_the_host", swept.fragments as f64),
+        ]));
         let some = |drawn: &[Drawn]| drawn.iter().any(|one| one.pairs > 0);
         if some(&self.collide) {
             all.extend(numbers([
@@ -173,7 +200,8 @@ pub(super) fn missed(task: &Task<'_>) -> Result<Done, RunError> {
     };
     let at =
         |&method: &Method| row.resolution_px.all(form).iter().map(move |&resolution| (method, resolution));
-    let looks = Looks::new(row.methods.get(form).iter().flat_map(at).collect(), &generated, &public);
+    let ways = row.methods.get(form).iter().flat_map(at).collect();
+    let looks = Looks::new(ways, (&own, &generated), &public);
     let (hardware, px) = (hardware()?, *row.resolution_px.get(form));
     let on_hardware = row.methods.get(form).iter().map(|&of| Drawn::on(&hardware, &generated, of, px));
     let on_hardware: Vec<Drawn> = on_hardware.collect::<Result<_, _>>()?;
@@ -190,8 +218,8 @@ pub(super) fn missed(task: &Task<'_>) -> Result<Done, RunError> {
     tried.along("quintile ccd", [("default search", closer as f64, closer == 0)]);
     let missed = looks.missed().map(|(.., missed)| missed).sum::<u64>() + closer as u64;
     let ours = format!(
-        "{missed} missed: {} generated pairs that collide{}, by {} kinds of passes and by `quintile ccd`, and {missed_there} by {} of these \
-         kinds at {px} px on the modelled hardware, which draws the generated pairs alone{}",
+        "{missed} missed: {} generated pairs that collide{}, by {} kinds of passes, of each pair and, in two sweeps, of all objects of a generated case, and by `quintile ccd`, and \
+         {missed_there} by {} of these kinds at {px} px on the modelled hardware, which draws the generated pairs alone{}",
         generated.len(),
         public_text(&public, task.collision_data.is_some()),
         looks.names.len(),
@@ -490,7 +518,7 @@ mod tests {
     }
 
     fn looks(public: &Public) -> Looks {
-        Looks::new(vec![(Method::BoxBox, 8), (Method::FragmentBox, 8)], &[], public)
+        Looks::new(vec![(Method::BoxBox, 8), (Method::FragmentBox, 8)], (&[], &[]), public)
     }
 
     #[test]

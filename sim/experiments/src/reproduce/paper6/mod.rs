@@ -97,40 +97,10 @@ pub(super) fn rows(options: &Options, progress: &Progress) -> Result<(Origin, Ve
     let bar = progress.bar("rows", wanted.len() as u64);
     let mut done = Vec::new();
     for (_, compute) in wanted {
-        let mut row = compute(&task)?;
-        row.row.about.limits = with_figures(&row.row.about.limits);
-        done.push(row);
+        done.push(compute(&task)?);
         bar.inc();
     }
     Ok((task.origin, done))
-}
-
-/// What the file says of figures that were not drawn when it was committed, and what holds now. Files of
-/// settings are not changed once a number was computed with them.
-const DRAWN_SINCE: [[&str; 2]; 7] = [
-    ["; Figure 6 itself is not drawn.", "."],
-    [
-        "In 2D the first rounds of darts are samples of rasterized squares;",
-        "The first rounds of darts are random candidates in squares (2D) and prisms (3D) that conservative mode drew;",
-    ],
-    ["and what is finer than pixels are done on the CPU.", "and later rounds are done on the CPU."],
-    [
-        "In 3D all darts are thrown on the CPU: no prism is drawn, and the 3D half of Figure 11 is not either.",
-        "Figure 11 shows the points before the last pass, and the uncovered regions that it draws.",
-    ],
-    [
-        "No triangle is drawn: points are chosen on the CPU from columns that bound the density.",
-        "Columns that bound the density are drawn in conservative mode; the number of points of a set is random, as given on average.",
-    ],
-    [
-        "Figure 14 is not drawn: the row measures the map, not the picture it is used in.",
-        "The row measures the map, not the picture it is used in (Figure 14).",
-    ],
-    ["Figure 17 is not drawn: its scene,", "Figure 17 is drawn with our scene, smaller: its scene,"],
-];
-
-fn with_figures(limits: &str) -> String {
-    DRAWN_SINCE.iter().fold(limits.to_owned(), |limits, [said, now]| limits.replace(said, now))
 }
 
 /// Scenes of every family of the failure catalogue: one in the middle of its sweep, or so many from its
@@ -326,31 +296,4 @@ fn query_rows(path: &Path) -> Result<Vec<([f64; 3], bool)>, RunError> {
         return Err(failed(rows.len(), "eight rows for each query are expected"));
     }
     Ok(rows)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_file_still_says_which_figures_were_not_drawn() {
-        let (settings, _) = load::<Settings>(None).unwrap();
-        let abouts = [
-            &settings.vi_2.about,
-            &settings.vi_9.about,
-            &settings.vi_9.about,
-            &settings.vi_9.about,
-            &settings.vi_10.about,
-            &settings.vi_11.about,
-            &settings.vi_13.about,
-        ];
-        for (about, [said, now]) in abouts.into_iter().zip(DRAWN_SINCE) {
-            assert!(about.limits.contains(said), "{}", about.id);
-            let limits = with_figures(&about.limits);
-            assert!(
-                limits.contains(now) && !limits.contains("not drawn") && !limits.contains("is drawn:"),
-                "{limits}"
-            );
-        }
-    }
 }
