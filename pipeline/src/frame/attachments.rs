@@ -240,6 +240,12 @@ pub enum PassError {
         /// Number of the buffer.
         number: u32,
     },
+    /// The frame was stopped.
+    #[error("pass `{pass}` is not drawn: the frame was stopped before it")]
+    Stopped {
+        /// The pass.
+        pass: String,
+    },
     /// The surfaces of a frame are too large.
     #[error(
         "pass `{pass}`: the surfaces of the frame take {bytes} bytes, more than the {} that can be addressed; draw fewer pixels, \

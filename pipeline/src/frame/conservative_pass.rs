@@ -203,6 +203,9 @@ impl ConservativePass {
         let numbers = numbered(draw.primitives, first);
         vertices(gpu, draw, self.workers.worker().lanes.costs());
         for (chunk, from) in chunks(draw.primitives) {
+            if gpu.is_stopped() {
+                return;
+            }
             let bodies: Vec<&[Primitive]> = chunk.chunk_by(|a, b| a.body == b.body).collect();
             let starts = bodies.iter().scan(from, |next, body| {
                 let start = *next;

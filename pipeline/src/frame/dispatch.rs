@@ -46,7 +46,7 @@ impl Gpu<'_> {
     pub fn dispatch(&mut self, pass: &ComputePass<'_>) -> Result<Counts, PassError> {
         let failed = |error| PassError::Compute { pass: pass.name.to_owned(), error };
         let spec = pass.check(self.spec().compute.as_ref()).map_err(failed)?;
-        self.check_memory(pass.name)?;
+        self.check_frame(pass.name)?;
         self.check_buffers(pass.name, pass.bindings)?;
         let (name, draws, others) = (pass.name.to_owned(), vec![Counts::default()], Counts::default());
         self.start(PassReport { name, triangles: 0, draws, others });
@@ -166,6 +166,9 @@ impl Gpu<'_> {
         let columns: Vec<u32> = (0..viewport.width()).step_by(side as usize).collect();
         let mut values = vec![T::default(); viewport.pixels()];
         for y0 in (0..viewport.height()).step_by(side as usize) {
+            if self.is_stopped() {
+                return values;
+            }
             let run = |&x0: &u32| {
                 let (lanes, mut runs) = (Lanes::default(), TileRuns::new(side));
                 let run = |[x, y]: [u32; 2]| {

@@ -1,5 +1,6 @@
 //! GPU during a frame: passes follow each other through one address space and one set of caches.
 
+use std::cell::Cell;
 use std::sync::Arc;
 
 use activity::{Counts, Event, LineAccess, Packet, PacketCounts, PacketKind, Waits};
@@ -47,6 +48,8 @@ pub struct Gpu<'e> {
     placement: Option<Placement>,
     /// Whether packets are made wherever a pass can be drawn without them, too.
     is_counted: bool,
+    /// Set where nobody wants the rest of the frame.
+    stop: Option<&'e Cell<bool>>,
 }
 
 /// First addresses of what a pass of triangles reads.
@@ -179,6 +182,7 @@ impl<'e> Gpu<'e> {
             is_on_map: false,
             placement: None,
             is_counted: true,
+            stop: None,
         })
     }
 
@@ -187,6 +191,18 @@ impl<'e> Gpu<'e> {
     #[must_use]
     pub fn with_heat(self, events: &[Event], viewport: Viewport) -> Self {
         Self { heat: FrameHeat::new(events, self.spec, viewport), ..self }
+    }
+
+    /// The GPU, which draws no further once `stop` is set, as by the taker of its packets. Passes of triangles and
+    /// groups are then refused, others find nothing.
+    #[must_use]
+    pub fn stopping(self, stop: &'e Cell<bool>) -> Self {
+        Self { stop: Some(stop), ..self }
+    }
+
+    /// Whether it draws no further.
+    pub(super) fn is_stopped(&self) -> bool {
+        self.stop.is_some_and(Cell::get)
     }
 
     /// A GPU whose packets are only counted.
@@ -285,8 +301,11 @@ impl<'e> Gpu<'e> {
         self.reads.push(address);
     }
 
-    /// Checks that all surfaces have addresses.
-    pub(super) fn check_memory(&self, pass: &str) -> Result<(), PassError> {
+    /// Checks that the frame goes on, and that all its surfaces have addresses.
+    pub(super) fn check_frame(&self, pass: &str) -> Result<(), PassError> {
+        if self.is_stopped() {
+            return Err(PassError::Stopped { pass: pass.to_owned() });
+        }
         if self.space.fits() {
             return Ok(());
         }
@@ -358,13 +377,13 @@ impl<'e> Gpu<'e> {
     pub fn draw(&mut self, pass: &RasterPass<'_>) -> Result<Rendered, PassError> {
         let number = self.passes.len() as u32;
         let has_heat = self.has_heat_of(pass.settings.viewport);
-        self.check_memory(pass.name)?;
+        self.check_frame(pass.name)?;
         pass.check_queries()?;
         self.check_buffers(pass.name, pass.buffers())?;
         self.surfaces.check(pass)?;
         let stored = (&self.surfaces, &self.buffers);
         let prepared = Pass::new(pass, (number, has_heat), stored, &mut self.space);
-        self.check_memory(pass.name)?;
+        self.check_frame(pass.name)?;
         self.passes.push(PassReport::new(pass));
         let reads = self.reads_of(&prepared.addresses, pass);
         if let Some(waits) = self.waits(&reads, pass) {

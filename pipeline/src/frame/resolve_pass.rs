@@ -103,7 +103,7 @@ impl Gpu<'_> {
         let spec = SurfaceSpec::new("", texels.viewport(), Format::Rgba8Srgb);
         let tile_px = self.spec().tile_px;
         let region = self.allocate(Layout::new(&spec, tile_px, 0).1);
-        self.check_memory(pass.name)?;
+        self.check_frame(pass.name)?;
         let to = Layout::new(&spec, tile_px, region.address()).0;
         let shown = |mean: Vec4| Vec3::splat(1.0 - mean.w) * background + mean.truncate();
         let image = mean_values(&texels).into_iter().map(shown).collect();
@@ -121,7 +121,7 @@ impl Gpu<'_> {
 
     /// The stored samples of a pass, and where they are.
     fn samples_of(&self, pass: &ResolvePass<'_>) -> Result<(std::sync::Arc<Texels>, Layout), PassError> {
-        self.check_memory(pass.name)?;
+        self.check_frame(pass.name)?;
         let refused = |problem| self.surfaces.refused(pass.name, pass.from, problem);
         let state = self.surfaces.get(pass.from).ok_or_else(|| refused(SurfaceProblem::Unknown))?;
         let format = state.spec().format;

@@ -1,9 +1,12 @@
 //! Frames of several passes: one address space, warm caches, barriers, and work by pass and by draw.
 
-use crate::common::*;
+use std::cell::Cell;
+
 use activity::{Counts, Event, Packet, PacketKind, Waits};
 use glam::{Vec2, Vec3};
 use pipeline::*;
+
+use crate::common::*;
 
 const SIDE: u32 = 64;
 
@@ -172,5 +175,20 @@ fn sixty_four_passes_of_one_triangle_are_sixty_four_times_one() {
             assert_eq!(all[event], 64 * one.counts[event], "{event:?}");
         }
         assert_eq!(packets.iter().filter(|packet| packet.kind == PacketKind::Draw).count(), 64);
+    });
+}
+
+/// Once it is stopped, here by its first packet, a GPU ends the pass of triangles that it draws, and refuses the
+/// next one.
+#[test]
+fn a_stopped_frame_is_drawn_no_further() {
+    let soup = Soup::new(SoupKind::Moving, 150, 1);
+    let draws = [soup.draw(&Plain, Cull::None)];
+    with(|settings| {
+        let (camera, stop) = (camera(true), Cell::new(false));
+        let mut gpu = Gpu::new(settings.spec, |_, _| stop.set(true)).unwrap().stopping(&stop);
+        let pass = RasterPass::new(&camera, &draws, settings).named("light");
+        assert_eq!(gpu.draw(&pass).unwrap().images, pass.render(|_, _| ()).unwrap().images);
+        assert_eq!(gpu.draw(&pass).unwrap_err(), PassError::Stopped { pass: "light".to_owned() });
     });
 }

@@ -2,6 +2,7 @@
 //! frames of a run differ.
 
 use std::any::Any;
+use std::cell::Cell;
 use std::collections::HashMap;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
@@ -14,7 +15,7 @@ use pipeline::frame::HeatMap;
 use pipeline::{FrameReport, Gpu, Viewport};
 use power_model::{FramePower, PowerModel};
 use rayon::prelude::*;
-use timing::{AccuracyWarning, FrameClock, Level, Recorder, Timed};
+use timing::{AccuracyWarning, FrameClock, Level, Recorder, Timed, TimingError};
 use warnings::Warning;
 use workloads::job::{Drawn, Fact, ReadyFrame};
 use workloads::{Fingerprint, Job, Regime};
@@ -137,14 +138,15 @@ pub(crate) struct Pictures {
     pub heat: Vec<HeatMap>,
 }
 
-/// Draws frame `number` and emits its packets.
+/// Draws frame `number` and emits its packets, until `stop` is set.
 pub(crate) fn draw<'a>(
     plan: &'a Plan,
     number: u32,
+    stop: Option<&'a Cell<bool>>,
     emit: impl FnMut(&Packet, &[LineAccess]) + 'a,
 ) -> Result<(DrawnFrame, Pictures), RunError> {
     let (ready, events) = (plan.job.prepare(number)?, heat::events(&plan.options.heat));
-    let (drawn, mut report) = draw_on(&plan.gpu, Some((&events, plan.viewport)), &*ready, emit)?;
+    let (drawn, mut report) = draw_on(&plan.gpu, Some((&events, plan.viewport)), &*ready, stop, emit)?;
     let Drawn { image, moving, lens, facts, warnings } = drawn;
     let heat = std::mem::take(&mut report.heat);
     passes::limit_draws(&mut report);
@@ -186,7 +188,16 @@ impl DrawnFrame {
 fn simulate_frame(plan: &Plan, number: u32, max_bins: usize) -> Result<(RunFrame, Pictures), RunError> {
     let level = plan.options.timing.ok_or_else(not_timed)?;
     let mut clock = FrameClock::new(level, plan.gpu.machine()?, Recorder::new(BIN_PS, max_bins));
-    let (frame, pictures) = draw(plan, number, |packet, lines| clock.push(packet, lines))?;
+    let stop = Cell::new(false);
+    let emit = |packet: &_, lines: &_| {
+        clock.push(packet, lines);
+        stop.set(clock.is_too_long());
+    };
+    let drawn = draw(plan, number, Some(&stop), emit);
+    if stop.get() {
+        return Err(TimingError::TooLong.into());
+    }
+    let (frame, pictures) = drawn?;
     Ok((frame.powered(level, &clock.finish()?, &plan.model)?, pictures))
 }
 
@@ -258,16 +269,20 @@ impl PassEnergy {
 const MAX_BINS: usize = 4096;
 
 /// Draws a frame on the pipeline of `gpu`, with heat maps of some events over images of a size, and emits its
-/// packets.
+/// packets, until `stop` is set.
 pub(crate) fn draw_on<'a>(
     gpu: &'a GpuSpec,
     heat: Option<(&[Event], Viewport)>,
     ready: &dyn ReadyFrame,
+    stop: Option<&'a Cell<bool>>,
     emit: impl FnMut(&Packet, &[LineAccess]) + 'a,
 ) -> Result<(Drawn, FrameReport), RunError> {
     let mut on = Gpu::new(&gpu.pipeline, emit).map_err(RunError::setting)?;
     if let Some((events, viewport)) = heat {
         on = on.with_heat(events, viewport);
+    }
+    if let Some(stop) = stop {
+        on = on.stopping(stop);
     }
     let drawn = ready.draw(&mut on).map_err(RunError::on(gpu))?;
     Ok((drawn, on.finish()))
@@ -281,7 +296,7 @@ impl JobFrame {
     pub fn new(job: &dyn Job, number: u32, gpu: &GpuSpec, model: &PowerModel) -> Result<Self, RunError> {
         let mut clock = FrameClock::new(Level::default(), gpu.machine()?, Recorder::new(BIN_PS, MAX_BINS));
         let emit = |packet: &_, lines: &_| clock.push(packet, lines);
-        let (drawn, report) = draw_on(gpu, None, &*job.prepare(number)?, emit)?;
+        let (drawn, report) = draw_on(gpu, None, &*job.prepare(number)?, None, emit)?;
         let timed = clock.finish()?;
         let power = model.frame(&timed.timeline);
         let power = power.map_err(|source| RunError::Timeline { frame: number, source })?;

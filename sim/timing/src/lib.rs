@@ -197,6 +197,12 @@ impl<'a> FrameClock<'a> {
         }
     }
 
+    /// Whether the frame is already too long for the level, so that [`Self::finish`] returns
+    /// [`TimingError::TooLong`] whatever comes.
+    pub fn is_too_long(&self) -> bool {
+        matches!(&self.state, State::Packet(clock) if clock.is_too_long())
+    }
+
     /// Timing of the frame.
     ///
     /// # Errors

@@ -1,10 +1,11 @@
 //! Which frames have equal inputs, and independence of a frame from others in the run.
 
+use std::cell::Cell;
 use std::collections::HashSet;
 use std::sync::Arc;
 
 use crate::common::{Builder, Files};
-use activity::Event;
+use activity::{Event, LineAccess, Packet};
 use glam::{Vec2, Vec3, Vec4};
 use pipeline::{Gpu, Lane, Lens, PipelineSpec, ShadingPoint, Viewport};
 use serde_json::json;
@@ -202,6 +203,26 @@ fn workloads_without_a_scene_say_what_changes() {
 
 /// Heat maps have the work of conservative passes where their tiles are in the image: what lanes do and tests
 /// of tiles, all of it.
+/// Passes in conservative mode end where the GPU is stopped: soon after a tenth of the packets there are no more.
+#[test]
+fn a_stopped_search_ends() {
+    let set = [("resolution", "32"), ("balls", "8")];
+    let set = set.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
+    let request = Request { overrides: &Overrides::default(), seed: 1 };
+    let job = find("ccd", &OptionSource { file: None, set }, &request).unwrap().unwrap();
+    let packets = |most: u32| {
+        let (spec, stop, mut packets) = (crate::common::spec(), Cell::new(false), 0);
+        let count = |_: &Packet, _: &[LineAccess]| {
+            packets += 1;
+            stop.set(packets >= most);
+        };
+        job.frame(0, &mut Gpu::new(&spec, count).unwrap().stopping(&stop)).unwrap();
+        packets
+    };
+    let all = packets(u32::MAX);
+    assert!(packets(all / 10) < all / 3, "{} of {all}", packets(all / 10));
+}
+
 /// Views side by side have the work of their pass in equal parts, and one by one each its own.
 #[test]
 fn views_side_by_side_are_on_heat_maps() {

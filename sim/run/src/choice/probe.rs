@@ -99,7 +99,7 @@ impl ProbedFrame {
         let started = Instant::now();
         let mut packets = PacketBuffer::default();
         let emit = |packet: &_, lines: &_| packets.push(packet, lines);
-        let (_, report) = draw_on(gpu, None, &*job.prepare(number)?, emit)?;
+        let (_, report) = draw_on(gpu, None, &*job.prepare(number)?, None, emit)?;
         Ok(Self { number, packets, counts: report.counts(), pipeline_s: started.elapsed().as_secs_f64() })
     }
 

@@ -45,7 +45,7 @@ impl Recording {
                 return Ok(None);
             }
             let mut writer = StreamWriter::default();
-            let (frame, _) = draw(plan, number, |packet, lines| writer.push(packet, lines))?;
+            let (frame, _) = draw(plan, number, None, |packet, lines| writer.push(packet, lines))?;
             let packets = writer.finish();
             bytes.fetch_add(packets.bytes().len(), Ordering::Relaxed);
             bar.inc();
