@@ -201,8 +201,6 @@ fn workloads_without_a_scene_say_what_changes() {
     }
 }
 
-/// Heat maps have the work of conservative passes where their tiles are in the image: what lanes do and tests
-/// of tiles, all of it.
 /// Passes in conservative mode end where the GPU is stopped: soon after a tenth of the packets there are no more.
 #[test]
 fn a_stopped_search_ends() {
@@ -249,6 +247,8 @@ fn views_side_by_side_are_on_heat_maps() {
     }
 }
 
+/// Heat maps have the work of conservative passes where their tiles are in the image: what lanes do and tests
+/// of tiles, all of it.
 #[test]
 fn passes_in_conservative_mode_are_on_heat_maps() {
     let events = [Event::PixelInvocations, Event::ShaderOps, Event::TileMadds, Event::TilesVisited];
