@@ -294,7 +294,7 @@ impl AccuracyWarning {
         }
     }
 
-    /// What can be done at `level`, which the user asked for, or which was `chosen` for its relative error on a
+    /// What can be done at `level`, which the user requested, or which was `chosen` for its relative error on a
     /// probe.
     fn remedy(self, level: Level, chosen: Option<f64>) -> String {
         let (name, better) = (level.name(), self.better().name());
@@ -307,7 +307,7 @@ impl AccuracyWarning {
         }
     }
 
-    /// Warning about a frame at a level that the user asked for, or that was `chosen` for its relative error on
+    /// Warning about a frame at a level that the user requested, or that was `chosen` for its relative error on
     /// a probe.
     pub fn warning(self, frame: u32, level: Level, chosen: Option<f64>) -> Warning {
         let (name, remedy) = (level.name(), self.remedy(level, chosen));
