@@ -253,9 +253,9 @@ impl<N: Number, C: Coordinate> View<N, C> {
         for end in 0..if self.moving { 2 } else { 1 } {
             let t = N::of(self.t[end]);
             for (point, corner) in self.ends[end].iter_mut().zip(&triangle.corners) {
-                for axis in 0..3 {
-                    let open = N::of(corner.open[axis]);
-                    point[axis] = if self.moving { open + t * N::of(corner.delta[axis]) } else { open };
+                for ((at, open), delta) in point.iter_mut().zip(&corner.open).zip(&corner.delta) {
+                    let open = N::of(*open);
+                    *at = if self.moving { open + t * N::of(*delta) } else { open };
                 }
                 for (axis, [slope, base]) in rays.into_iter().enumerate() {
                     let seen = if self.lens || self.parallel { point[axis] - base } else { point[axis] };

@@ -130,11 +130,10 @@ impl Looks {
 
     /// Pairs missed by each way.
     fn missed(&self) -> impl Iterator<Item = (Method, u32, u64)> {
-        let all = self.generated.iter().zip(&self.collide).zip(&self.swept);
-        let of = |((method, px), ((own, theirs), swept)): (&(Method, u32), ((&Drawn, &Drawn), &Drawn))| {
-            (*method, *px, own.cleared + theirs.cleared + swept.cleared)
-        };
-        self.names.iter().zip(all).map(of)
+        self.names.iter().enumerate().map(|(way, &(method, px))| {
+            let cleared = [&self.generated, &self.collide, &self.swept].map(|drawn| drawn[way].cleared);
+            (method, px, cleared.iter().sum())
+        })
     }
 
     /// All work, and that of each kind of public case that there is.
