@@ -48,7 +48,7 @@ pub struct Gpu<'e> {
     placement: Option<Placement>,
     /// Whether packets are made wherever a pass can be drawn without them, too.
     is_counted: bool,
-    /// Set where nobody wants the rest of the frame.
+    /// Set once the rest of the frame is not needed.
     stop: Option<&'e Cell<bool>>,
 }
 
@@ -193,8 +193,8 @@ impl<'e> Gpu<'e> {
         Self { heat: FrameHeat::new(events, self.spec, viewport), ..self }
     }
 
-    /// The GPU, which draws no further once `stop` is set, as by the taker of its packets. Passes of triangles and
-    /// groups are then refused, others find nothing.
+    /// The GPU, which draws no further once `stop` is set, for example by the code that receives its packets. Raster
+    /// and compute passes are then refused; others end early, with no result for the rest.
     #[must_use]
     pub fn stopping(self, stop: &'e Cell<bool>) -> Self {
         Self { stop: Some(stop), ..self }

@@ -246,7 +246,7 @@ impl FrameHeat {
     }
 
     /// Add a packet of a drawn pass whose images are parts of that of the maps, each with the pixels of the tile.
-    /// Tile tests that wait for a packet are where that is.
+    /// Tile tests in a packet of another tile are counted at that tile.
     pub fn drawn_at<I: Iterator<Item = [[u32; 2]; 2]>>(&mut self, packet: &Packet, pixels: impl Fn() -> I) {
         let Some(map) = self.maps.first().filter(|_| is_placed(packet)) else {
             return self.drawn(packet, false);

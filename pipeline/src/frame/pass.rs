@@ -571,7 +571,8 @@ pub struct RasterPass<'a> {
     pub visible: bool,
     /// Whether every sample is shaded at its own position, whatever the hardware does otherwise.
     pub per_sample: bool,
-    /// First pixels of its images within that of the frame, for heat maps; none if it is that itself.
+    /// First pixel of each of its images in the image of the frame, for heat maps; empty if its image is that of
+    /// the frame.
     pub places: &'a [[u32; 2]],
 }
 

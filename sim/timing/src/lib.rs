@@ -294,20 +294,20 @@ impl AccuracyWarning {
         }
     }
 
-    /// What can be done at `level`, which the user requested, or which was `chosen` for its relative error on a
+    /// What can be done at `level`, which the user requested, or which was `chosen` with this relative error on a
     /// probe.
     fn remedy(self, level: Level, chosen: Option<f64>) -> String {
         let (name, better) = (level.name(), self.better().name());
         match chosen {
             None => format!("use --timing {better}, or let --accuracy choose"),
             Some(error) => format!(
-                "`{name}` was chosen, as its error on a probe was {:.2} %; give a smaller --accuracy, or --timing {better}",
+                "`{name}` was chosen with an error of {:.2} % on a probe; give a smaller --accuracy, or --timing {better}",
                 1e2 * error
             ),
         }
     }
 
-    /// Warning about a frame at a level that the user requested, or that was `chosen` for its relative error on
+    /// Warning about a frame at a level that the user requested, or that was `chosen` with this relative error on
     /// a probe.
     pub fn warning(self, frame: u32, level: Level, chosen: Option<f64>) -> Warning {
         let (name, remedy) = (level.name(), self.remedy(level, chosen));

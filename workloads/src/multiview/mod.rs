@@ -163,7 +163,7 @@ impl MultiView {
         }
     }
 
-    /// First pixel of each view in the image, unless it has the size of a view.
+    /// First pixel of each view in the image; empty if the image has the size of a view.
     fn places(&self) -> Vec<[u32; 2]> {
         match self.options.show {
             Show::SideBySide => (0..self.options.views).map(|view| [view * self.view.width(), 0]).collect(),

@@ -24,7 +24,7 @@ pub struct Target<'a> {
     pub spec: &'a PipelineSpec,
     /// Linear RGB radiance of the background.
     pub background: Vec3,
-    /// First pixel of each view in the image of the frame, for heat maps; none if views are as large as that.
+    /// First pixel of each view in the image of the frame, for heat maps; empty if a view has the size of that image.
     pub places: &'a [[u32; 2]],
 }
 

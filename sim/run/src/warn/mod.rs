@@ -422,7 +422,7 @@ mod tests {
         let message = |chosen| AccuracyWarning::MemoryRows(0.5).warning(3, Level::Packet, chosen).message;
         let (asked, chosen) = (message(None), message(Some(0.012)));
         assert!(asked.ends_with("use --timing stepped, or let --accuracy choose"), "{asked}");
-        let remedy = "`packet` was chosen, as its error on a probe was 1.20 %; give a smaller --accuracy, or --timing stepped";
+        let remedy = "`packet` was chosen with an error of 1.20 % on a probe; give a smaller --accuracy, or --timing stepped";
         assert!(chosen.ends_with(remedy), "{chosen}");
     }
 
