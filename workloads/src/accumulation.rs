@@ -8,7 +8,7 @@
 
 use glam::{Affine3A, DVec3, Vec2, Vec3};
 use pipeline::geometry::Projection;
-use pipeline::sampling::{Pattern, Sample, SampleSource, SampleSpec, TableError};
+use pipeline::sampling::{Pattern, Sample, SampleSource, SampleSpec, TableError, TimedBlock};
 use pipeline::setup::Corner;
 use pipeline::{Camera, CameraError, Clip, Draw, DrawError, Geometry, SampleTable, Viewport};
 
@@ -97,13 +97,21 @@ impl Rays {
 
 /// Samples that all pixels share.
 #[derive(Clone, Debug, PartialEq)]
-pub struct SharedSamples(Vec<Sample>);
+pub struct SharedSamples {
+    samples: Vec<Sample>,
+    by_time: TimedBlock,
+}
 
 impl SharedSamples {
     /// Takes 1 to 256 samples in range; `None` otherwise.
     pub fn new(samples: Vec<Sample>) -> Option<Self> {
         let fits = (1..=SampleTable::MAX_PER_PIXEL as usize).contains(&samples.len());
-        (fits && samples.iter().all(Sample::is_in_range)).then_some(Self(samples))
+        (fits && samples.iter().all(Sample::is_in_range)).then(|| Self::of(samples))
+    }
+
+    /// Takes samples that are in range.
+    fn of(samples: Vec<Sample>) -> Self {
+        Self { by_time: TimedBlock::new(|_| &samples), samples }
     }
 
     /// A fixed set of `count` samples of lens and time: those of the first pixel of a table. Patterns that
@@ -112,7 +120,7 @@ impl SharedSamples {
     /// # Errors
     /// [`TableError`] if the table cannot be made.
     pub fn from_spec(spec: &SampleSpec, count: u32, seed: u64) -> Result<Self, TableError> {
-        Ok(Self(SampleTable::new(spec, count, seed)?.pixel(0, 0).to_vec()))
+        Ok(Self::of(SampleTable::new(spec, count, seed)?.pixel(0, 0).to_vec()))
     }
 
     /// The first `count` samples of a scrambled Sobol sequence.
@@ -126,29 +134,33 @@ impl SharedSamples {
 
     /// The samples.
     pub fn samples(&self) -> &[Sample] {
-        &self.0
+        &self.samples
     }
 
     /// The same samples at the pixel centre.
     #[must_use]
     pub fn centred(&self) -> Self {
-        Self(self.0.iter().map(|sample| Sample { x: 0.5, y: 0.5, ..*sample }).collect())
+        Self::of(self.samples.iter().map(|sample| Sample { x: 0.5, y: 0.5, ..*sample }).collect())
     }
 
     /// One sample at the lens centre and time 0.
     pub fn still(&self, index: usize) -> Self {
-        let Sample { x, y, .. } = self.0[index];
-        Self(vec![Sample { x, y, ..Sample::default() }])
+        let Sample { x, y, .. } = self.samples[index];
+        Self::of(vec![Sample { x, y, ..Sample::default() }])
     }
 }
 
 impl SampleSource for SharedSamples {
     fn per_pixel(&self) -> u32 {
-        self.0.len() as u32
+        self.samples.len() as u32
     }
 
     fn pixel_into(&self, _px: u32, _py: u32, into: &mut [Sample]) {
-        into.copy_from_slice(&self.0);
+        into.copy_from_slice(&self.samples);
+    }
+
+    fn block_by_time(&self, _px: u32, _py: u32) -> Option<&TimedBlock> {
+        Some(&self.by_time)
     }
 }
 

@@ -45,7 +45,7 @@ struct Timed {
 }
 
 /// Samples of a block of pixels as arrays, sorted by time; the index breaks ties.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct TimedBlock {
     /// Position in the pixel, by axis.
     within: [Vec<f32>; 2],
@@ -61,6 +61,24 @@ pub struct TimedBlock {
 }
 
 impl TimedBlock {
+    /// The block of 8x8 pixels whose samples are `of_pixel`, which gets pixels row by row. Each has 1 to 256.
+    pub fn new<'a>(of_pixel: impl Fn(u32) -> &'a [Sample]) -> Self {
+        let side = SampleTable::SHIFT_PX;
+        let timed = |pixel: u32| {
+            let samples = of_pixel(pixel);
+            let first = pixel * samples.len() as u32;
+            let timed = move |(index, sample): (u32, &Sample)| Timed {
+                sample: *sample,
+                index: index as u16,
+                pixel: pixel as u8,
+            };
+            (first..).zip(samples).map(timed)
+        };
+        let mut block = Self::default();
+        block.fill(&mut (0..side * side).flat_map(timed).collect::<Vec<_>>(), side);
+        block
+    }
+
     /// The `samples` of a block of `side_px` pixels squared, in the memory of another block.
     fn fill(&mut self, samples: &mut [Timed], side_px: u32) {
         fn refill<T>(into: &mut Vec<T>, values: impl Iterator<Item = T>) {

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{LensRegion, LensRegions, LensShape, Pattern, Sample, SampleSource, Timed, TimedBlock};
+use super::{LensRegion, LensRegions, LensShape, Pattern, Sample, SampleSource, TimedBlock};
 use crate::random::word;
 
 /// Samples of a square block of pixels. The block repeats over the image. Each copy is shifted cyclically by
@@ -149,16 +149,7 @@ impl SampleTable {
         let (blocks, side) = (Self::SIDE_PX / Self::SHIFT_PX, Self::SHIFT_PX);
         let block = |block: u32| {
             let (x0, y0) = (block % blocks * side, block / blocks * side);
-            let timed = |index: u32| {
-                let (pixel, sample) = (index / self.per_pixel, index % self.per_pixel);
-                let at = (y0 + pixel / side) * Self::SIDE_PX + x0 + pixel % side;
-                let sample = self.samples[(at * self.per_pixel + sample) as usize];
-                Timed { sample, index: index as u16, pixel: pixel as u8 }
-            };
-            let mut samples: Vec<Timed> = (0..side * side * self.per_pixel).map(timed).collect();
-            let mut block = TimedBlock::default();
-            block.fill(&mut samples, side);
-            block
+            TimedBlock::new(|pixel| self.of_pixel([x0 + pixel % side, y0 + pixel / side]))
         };
         (0..blocks * blocks).map(block).collect()
     }
@@ -170,7 +161,11 @@ impl SampleTable {
 
     /// Samples of pixel (`px`, `py`), in table order.
     pub fn pixel(&self, px: u32, py: u32) -> &[Sample] {
-        let (x, y) = self.block_pixel(px, py);
+        self.of_pixel(self.block_pixel(px, py))
+    }
+
+    /// Samples of a pixel of the table.
+    fn of_pixel(&self, [x, y]: [u32; 2]) -> &[Sample] {
         let first = ((y * Self::SIDE_PX + x) * self.per_pixel) as usize;
         &self.samples[first..first + self.per_pixel as usize]
     }
@@ -181,12 +176,12 @@ impl SampleTable {
     }
 
     /// Pixel of the block for pixel (`px`, `py`) of the image.
-    fn block_pixel(&self, px: u32, py: u32) -> (u32, u32) {
+    fn block_pixel(&self, px: u32, py: u32) -> [u32; 2] {
         let copy = word(self.seed, u64::from(px / Self::SIDE_PX), u64::from(py / Self::SIDE_PX));
         let turn = |bits: u64, at: u32| {
             (at + bits as u32 % Self::SIDE_PX / Self::SHIFT_PX * Self::SHIFT_PX) % Self::SIDE_PX
         };
-        (turn(copy & 0xFFFF, px), turn((copy >> 16) & 0xFFFF, py))
+        [turn(copy & 0xFFFF, px), turn((copy >> 16) & 0xFFFF, py)]
     }
 }
 
@@ -200,7 +195,7 @@ impl SampleSource for SampleTable {
     }
 
     fn block_by_time(&self, px: u32, py: u32) -> Option<&TimedBlock> {
-        let (x, y) = self.block_pixel(px, py);
+        let [x, y] = self.block_pixel(px, py);
         self.by_time
             .get((y / Self::SHIFT_PX * (Self::SIDE_PX / Self::SHIFT_PX) + x / Self::SHIFT_PX) as usize)
     }

@@ -35,7 +35,7 @@ pub use job::{CollisionOptions, job};
 pub(crate) use job::{FACTS, FLAGS};
 pub use object::{CaseFiles, CollisionCase, Object, components, load_cases};
 pub use pair::{Method, Search, Verdict};
-pub use plain::{CollidingSet, PlainPasses, PlainResult, Sweeps};
+pub use plain::{CollidingSet, Overlaps, PassWork, PlainPasses, Sweeps};
 
 /// Corners of a triangle at time 0 and at time 1.
 type Ends = [[[f64; 3]; 3]; 2];

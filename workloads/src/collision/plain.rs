@@ -23,10 +23,10 @@ use super::pass::{
 use super::{Bounds, TzBox, TzBuffer};
 use crate::job::{IMAGE_SIZE, JobError};
 
-/// Work of the passes, and the overlapping pixels of a pair.
+/// Work of passes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct PlainResult {
-    /// Number of passes: three with boxes of time and depth, six by depth alone.
+pub struct PassWork {
+    /// Number of passes.
     pub passes: u64,
     /// Objects drawn. By depth alone, one drawing serves both directions.
     pub draws: u64,
@@ -34,18 +34,10 @@ pub struct PlainResult {
     pub triangles: u64,
     /// Fragments: pairs of a triangle and a pixel that it may touch.
     pub fragments: u64,
-    /// Pixels in which both objects may touch, seen along x, y and z. By depth alone, those of the direction
-    /// with fewer.
-    pub overlaps: [u64; 3],
 }
 
-impl PlainResult {
-    /// Whether the pair stays in the potentially colliding set, because no projection separates it.
-    pub fn may_collide(&self) -> bool {
-        self.overlaps.iter().all(|pixels| *pixels > 0)
-    }
-
-    /// Adds the work of another pair; keeps the overlapping pixels of this one.
+impl PassWork {
+    /// Adds other work.
     #[must_use]
     pub fn and(self, other: &Self) -> Self {
         Self {
@@ -53,12 +45,11 @@ impl PlainResult {
             draws: self.draws + other.draws,
             triangles: self.triangles + other.triangles,
             fragments: self.fragments + other.fragments,
-            overlaps: self.overlaps,
         }
     }
 }
 
-impl PassBackend for PlainResult {
+impl PassBackend for PassWork {
     fn begin(&mut self, _: &str, _: &Pass, _: bool) {
         self.passes += 1;
     }
@@ -73,85 +64,143 @@ impl PassBackend for PlainResult {
     }
 }
 
-/// Draws pairs by one method at one resolution, with reused buffers.
+/// Pixels in which both objects of a pair may touch, seen along x, y and z. By depth alone, those of the
+/// direction with fewer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Overlaps(pub [u64; 3]);
+
+impl Overlaps {
+    /// Whether the pair stays in the potentially colliding set, because no projection separates it.
+    pub fn may_collide(&self) -> bool {
+        self.fewest() > 0
+    }
+
+    /// Pixels of the projection with the fewest.
+    pub fn fewest(&self) -> u64 {
+        self.0.into_iter().min().unwrap_or(0)
+    }
+}
+
+/// A pair drawn on the host.
+struct HostPasses {
+    work: PassWork,
+    /// Fragments by axis and object, once they are drawn. Methods differ in what they compare, and get the same.
+    fragments: [[Option<Vec<Fragment>>; 2]; 3],
+}
+
+impl PassBackend for HostPasses {
+    fn draw(
+        &mut self,
+        pass: &Pass,
+        (which, part): (usize, Part<'_>),
+        bins: &[Option<Bounds>],
+        budget: &mut FragmentBudget,
+        known: Option<&TzBuffer>,
+        each: &mut dyn FnMut(&Fragment),
+    ) -> bool {
+        let Self { work, fragments } = self;
+        let fragments = fragments[pass.axis][which].get_or_insert_with(|| {
+            let mut fragments = Vec::new();
+            work.passes += u64::from(which == 0);
+            work.draw(pass, (which, part), bins, budget, known, &mut |fragment| fragments.push(*fragment));
+            fragments
+        });
+        fragments.iter().for_each(each);
+        true
+    }
+}
+
+/// Draws pairs at one resolution, with reused buffers.
 pub struct PlainPasses {
-    method: Method,
     resolution: u32,
     scratch: Scratch,
 }
 
 impl PlainPasses {
     /// Makes passes with `resolution` pixels across, 1 to 1024.
-    pub fn new(method: Method, resolution: u32) -> Self {
-        Self { method, resolution, scratch: Scratch::default() }
+    pub fn new(resolution: u32) -> Self {
+        Self { resolution, scratch: Scratch::default() }
     }
 
-    /// Draws both objects in every pass, on the host.
-    pub fn pair(&mut self, a: &Object, b: &Object) -> PlainResult {
-        let mut drawn = PlainResult::default();
-        let overlaps = self.overlaps(a, b, &mut drawn);
-        let passes = match self.method {
-            // The other direction is another pass.
-            Method::DepthOnly => 2 * drawn.passes,
-            _ => drawn.passes,
-        };
-        PlainResult { overlaps, passes, ..drawn }
+    /// Draws both objects along each axis, on the host, and compares them by each of the `methods`.
+    pub fn pair(&mut self, [a, b]: [&Object; 2], methods: &[Method]) -> (Vec<Overlaps>, PassWork) {
+        let mut passes = HostPasses { work: PassWork::default(), fragments: Default::default() };
+        let overlaps = self.overlaps([a, b], methods, &mut passes);
+        (overlaps, passes.work)
     }
 
-    /// The same on a GPU, where a pass by depth alone has both directions.
+    /// The same by one method on a GPU.
     ///
     /// # Errors
     /// [`JobError`] if the GPU or the image cannot be made.
     pub fn pair_on(
         &mut self,
-        a: &Object,
-        b: &Object,
+        pair: &[Object; 2],
+        method: Method,
         hardware: &PipelineSpec,
-    ) -> Result<PlainResult, JobError> {
+    ) -> Result<(Overlaps, PassWork), JobError> {
         let viewport = Viewport::new(self.resolution, self.resolution);
         let viewport = viewport.ok_or_else(|| JobError::setting(IMAGE_SIZE))?;
         let mut gpu = Gpu::quiet(hardware)?;
-        let objects = [a.clone(), b.clone()];
-        let mut passes = PassesOnGpu::new((self.method, viewport, 1), &objects, &mut gpu);
-        let overlaps = self.overlaps(a, b, &mut passes);
+        let mut passes = PassesOnGpu::new((method, viewport, 1), pair, &mut gpu);
+        let overlaps = self.overlaps(pair.each_ref(), &[method], &mut passes)[0];
         let fragments = passes.into_fragments();
         let report = gpu.finish();
         let (passes, draws) = (report.passes.len() as u64, report.counts()[Event::Draws]);
-        Ok(PlainResult { passes, draws, triangles: report.triangles() as u64, fragments, overlaps })
+        Ok((overlaps, PassWork { passes, draws, triangles: report.triangles() as u64, fragments }))
     }
 
-    /// Pixels along x, y and z in which both objects, drawn by `backend`, may touch.
-    fn overlaps(&mut self, a: &Object, b: &Object, backend: &mut impl PassBackend) -> [u64; 3] {
-        let largest = a.largest().max(b.largest());
+    /// By method, the pixels in which both objects, drawn by `backend`, may touch.
+    fn overlaps(
+        &mut self,
+        objects: [&Object; 2],
+        methods: &[Method],
+        backend: &mut impl PassBackend,
+    ) -> Vec<Overlaps> {
+        let largest = objects.iter().map(|object| object.largest()).fold(0.0, f64::max);
         if largest > 0.0 && largest < MAX_SCALED_COORDINATE {
-            let factor = upscale_factor(largest);
-            return self.draw_pair([&a.scaled(factor), &b.scaled(factor)], backend);
+            let scaled = objects.map(|object| object.scaled(upscale_factor(largest)));
+            return self.draw_pair(scaled.each_ref(), methods, backend);
         }
-        self.draw_pair([a, b], backend)
+        self.draw_pair(objects, methods, backend)
     }
 
-    fn draw_pair(&mut self, objects: [&Object; 2], backend: &mut impl PassBackend) -> [u64; 3] {
+    fn draw_pair(
+        &mut self,
+        objects: [&Object; 2],
+        methods: &[Method],
+        backend: &mut impl PassBackend,
+    ) -> Vec<Overlaps> {
+        let mut found = vec![Overlaps([0; 3]); methods.len()];
         if objects.iter().any(|object| object.is_empty()) {
-            return [0; 3];
+            return found;
         }
         let window = Bounds { time: [0.0, 1.0], ..objects[0].bounds.hull(&objects[1].bounds) };
         let min_width = objects.iter().map(|object| object.uncertainty).fold(window.rounding(), f64::max);
         let lists = objects.map(|object| (0..object.len() as u32).collect::<Vec<_>>());
         let parts = [0, 1].map(|which| Part { object: objects[which], list: &lists[which] });
-        [0, 1, 2].map(|axis| {
+        for axis in 0..3 {
             let tiling = Tiling { resolution: self.resolution, min_width };
             let pass = Pass::new(axis, &window, tiling, Fit::Edges);
             let comparison = Comparison { pass: &pass, parts, bins: &[Some(window)] };
-            self.in_pass(&comparison, backend)
-        })
+            for (&method, found) in methods.iter().zip(&mut found) {
+                found.0[axis] = self.in_pass(method, &comparison, backend);
+            }
+        }
+        found
     }
 
     /// Pixels of a pass in which both objects may touch.
-    fn in_pass(&mut self, comparison: &Comparison<'_>, backend: &mut impl PassBackend) -> u64 {
+    fn in_pass(
+        &mut self,
+        method: Method,
+        comparison: &Comparison<'_>,
+        backend: &mut impl PassBackend,
+    ) -> u64 {
         let (scratch, budget) = (&mut self.scratch, FragmentBudget::unlimited());
         let resources = &mut Resources { scratch, budget, backend };
         // The budget is unlimited, so there always is a result. Without one, the pair would have to stay.
-        match self.method {
+        match method {
             Method::DepthOnly => comparison.depths(resources).map_or(1, |[front, behind]| front.min(behind)),
             Method::BoxBox => comparison.boxes_against_boxes(resources).map_or(1, |overlaps| overlaps.tiles),
             Method::FragmentBox => {
@@ -178,7 +227,7 @@ pub struct CollidingSet {
     /// Objects that may collide with others, in order.
     pub objects: Vec<usize>,
     /// Work of the sweeps. A pass is a sweep along an axis.
-    pub work: PlainResult,
+    pub work: PassWork,
 }
 
 impl CollidingSet {
@@ -192,7 +241,7 @@ impl CollidingSet {
 impl Sweeps {
     /// The potentially colliding set of `objects`.
     pub fn detect(&self, objects: &[Object]) -> CollidingSet {
-        let mut work = PlainResult::default();
+        let mut work = PassWork::default();
         let objects = self.detect_on(objects, &mut work);
         CollidingSet { objects, work }
     }
@@ -344,22 +393,35 @@ mod tests {
     use pipeline::random::{mix, unit};
 
     use super::super::contact_probe::cross;
-    use super::super::families::cases;
+    use super::super::families::{Case, cases};
     use super::super::{Search, detect};
     use super::*;
+
+    const METHODS: [Method; 3] = [Method::FragmentBox, Method::BoxBox, Method::DepthOnly];
 
     #[test]
     fn every_collision_stays_and_every_pass_is_drawn() {
         for case in cases(7, 3) {
-            for method in [Method::FragmentBox, Method::BoxBox, Method::DepthOnly] {
-                let mut passes = PlainPasses::new(method, 16);
-                for &(a, b) in &case.collide {
-                    let result = passes.pair(&case.objects[a], &case.objects[b]);
-                    assert!(result.may_collide(), "{} {a} {b} {method:?}", case.family);
-                    assert!(result.fragments > 0 && result.draws == 6);
-                    assert_eq!(result.passes, if method == Method::DepthOnly { 6 } else { 3 });
-                }
+            let mut passes = PlainPasses::new(16);
+            for &(a, b) in &case.collide {
+                let (overlaps, work) = passes.pair([&case.objects[a], &case.objects[b]], &METHODS);
+                assert!(overlaps.iter().all(Overlaps::may_collide), "{} {a} {b} {overlaps:?}", case.family);
+                assert!(work.fragments > 0);
+                assert_eq!((work.passes, work.draws), (3, 6));
             }
+        }
+    }
+
+    /// Methods that share the drawing say what each says with its own.
+    #[test]
+    fn methods_do_not_depend_on_each_other() {
+        let mut passes = PlainPasses::new(16);
+        for Case { objects, .. } in cases(3, 2) {
+            let pair = [&objects[0], &objects[1]];
+            let (together, work) = passes.pair(pair, &METHODS);
+            let each = METHODS.map(|method| passes.pair(pair, &[method]));
+            assert!(each.iter().all(|(_, alone)| *alone == work));
+            assert_eq!(together, each.map(|(overlaps, _)| overlaps[0]));
         }
     }
 
@@ -369,7 +431,8 @@ mod tests {
         let search = Search { resolution: 32, bins: 1, method: Method::FragmentBox, zoom: false };
         let (mut alone, mut helped) = (0, 0);
         for case in cases(5, 3).iter().filter(|case| case.objects.len() == 2) {
-            let result = PlainPasses::new(Method::FragmentBox, 32).pair(&case.objects[0], &case.objects[1]);
+            let pair = [&case.objects[0], &case.objects[1]];
+            let result = PlainPasses::new(32).pair(pair, &[Method::FragmentBox]).0[0];
             let answers = detect(&case.objects, &search);
             helped += usize::from(answers.iter().all(|answer| !answer.verdict.may_collide()));
             alone += usize::from(!result.may_collide());
@@ -382,13 +445,14 @@ mod tests {
     fn pairs_are_drawn_on_a_gpu_too() {
         let hardware = crate::job::testing::hardware();
         for case in cases(7, 1) {
-            for method in [Method::FragmentBox, Method::BoxBox, Method::DepthOnly] {
-                let mut passes = PlainPasses::new(method, 8);
+            for method in METHODS {
+                let mut passes = PlainPasses::new(8);
                 for &(a, b) in &case.collide {
-                    let on_gpu = passes.pair_on(&case.objects[a], &case.objects[b], &hardware).unwrap();
-                    assert!(on_gpu.may_collide(), "{} {a} {b} {method:?}", case.family);
-                    assert_eq!((on_gpu.passes, on_gpu.draws), (3, 6));
-                    assert!(on_gpu.fragments > 0 && on_gpu.triangles > 0);
+                    let pair = [case.objects[a].clone(), case.objects[b].clone()];
+                    let (overlaps, work) = passes.pair_on(&pair, method, &hardware).unwrap();
+                    assert!(overlaps.may_collide(), "{} {a} {b} {method:?}", case.family);
+                    assert_eq!((work.passes, work.draws), (3, 6));
+                    assert!(work.fragments > 0 && work.triangles > 0);
                 }
             }
         }
@@ -397,11 +461,9 @@ mod tests {
     #[test]
     fn empty_objects_are_apart() {
         let none = Object::from_ends(Vec::new(), 0.0).unwrap();
-        let result = PlainPasses::new(Method::BoxBox, 8).pair(&none, &none);
-        assert!(!result.may_collide() && result.draws == 0);
+        let (overlaps, work) = PlainPasses::new(8).pair([&none, &none], &[Method::BoxBox]);
+        assert!(!overlaps[0].may_collide() && work == PassWork::default());
     }
-
-    const METHODS: [Method; 3] = [Method::FragmentBox, Method::BoxBox, Method::DepthOnly];
 
     #[test]
     fn no_object_that_collides_leaves_the_set() {
@@ -455,8 +517,8 @@ mod tests {
     #[test]
     fn two_objects_are_separated_as_by_plain_passes() {
         for case in cases(5, 3).iter().filter(|case| case.objects.len() == 2) {
-            for method in METHODS {
-                let alone = PlainPasses::new(method, 16).pair(&case.objects[0], &case.objects[1]);
+            let (alone, _) = PlainPasses::new(16).pair([&case.objects[0], &case.objects[1]], &METHODS);
+            for (method, alone) in METHODS.into_iter().zip(alone) {
                 let set = Sweeps { method, resolution: 16, bins: 1 }.detect(&case.objects);
                 if !alone.may_collide() {
                     assert!(set.objects.is_empty(), "{} {method:?}", case.family);

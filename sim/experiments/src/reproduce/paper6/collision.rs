@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use run::{GpuSpec, RunError};
 use workloads::collision::families::{Case, cases};
 use workloads::collision::{
-    Method, Object, PlainPasses, PlainResult, Search, Sweeps, candidates, detect_each,
+    Method, Object, Overlaps, PassWork, PlainPasses, Search, Sweeps, candidates, detect_each,
 };
 use workloads::shapes;
 
@@ -29,7 +29,7 @@ const fn name(method: Method) -> &'static str {
 }
 
 /// What the modelled hardware drew, and what the host did, as the rows print them.
-fn ran(hardware: &PlainResult, host: &PlainResult) -> Vec<Number> {
+fn ran(hardware: &PassWork, host: &PassWork) -> Vec<Number> {
     numbers([
         ("passes", hardware.passes as f64),
         ("draws", hardware.draws as f64),
@@ -46,117 +46,156 @@ fn hardware() -> Result<PipelineSpec, RunError> {
     Ok(GpuSpec::load("reference")?.pipeline)
 }
 
-/// Pairs of one kind, and what a way of drawing them says.
-#[derive(Clone, Copy, Debug, Default)]
+/// Methods and resolutions, each with each. Methods of one resolution compare the same fragments.
+#[derive(Clone, Debug, Default)]
+struct Ways {
+    methods: Vec<Method>,
+    resolutions: Vec<u32>,
+}
+
+impl Ways {
+    /// By method, then by resolution.
+    fn each(&self) -> impl Iterator<Item = (Method, u32)> {
+        self.methods.iter().flat_map(|&method| self.resolutions.iter().map(move |&px| (method, px)))
+    }
+}
+
+/// Pairs of one kind, and what the ways of drawing them say.
+#[derive(Clone, Debug, Default)]
 struct Drawn {
     pairs: usize,
-    cleared: u64,
-    work: PlainResult,
+    /// Pairs that are cleared, by way of drawing.
+    cleared: Vec<u64>,
+    work: PassWork,
 }
 
 impl Drawn {
-    fn new(pairs: &[Pair], method: Method, resolution: u32) -> Self {
-        let one = |passes: &mut PlainPasses, [a, b]: &Pair| {
-            let drawn = passes.pair(a, b);
-            (u64::from(!drawn.may_collide()), drawn)
-        };
-        let each = pairs.par_iter().with_max_len(1).map_init(|| PlainPasses::new(method, resolution), one);
-        let (cleared, work) = each.reduce(Default::default, |(n, all), (m, drawn)| (n + m, all.and(&drawn)));
-        Self { pairs: pairs.len(), cleared, work }
+    fn new(pairs: &[Pair], ways: &Ways) -> Self {
+        let at = ways.resolutions.iter().map(|&px| cleared(pairs, &ways.methods, px));
+        let at: Vec<(Vec<u64>, PassWork)> = at.collect();
+        let cleared = (0..ways.methods.len()).flat_map(|method| at.iter().map(move |(of, _)| of[method]));
+        Self {
+            pairs: pairs.len(),
+            cleared: cleared.collect(),
+            work: work_of(at.iter().map(|(_, work)| work)),
+        }
     }
 
-    /// The same on the modelled hardware.
+    /// The same on the modelled hardware, each method with its own passes.
     fn on(
         hardware: &PipelineSpec,
         pairs: &[Pair],
-        method: Method,
+        methods: &[Method],
         resolution: u32,
     ) -> Result<Self, RunError> {
-        let one = |passes: &mut PlainPasses, [a, b]: &Pair| passes.pair_on(a, b, hardware);
-        let each = pairs.par_iter().with_max_len(1).map_init(|| PlainPasses::new(method, resolution), one);
-        let each: Vec<PlainResult> = each.collect::<Result<_, _>>().map_err(RunError::setting)?;
-        let cleared = each.iter().filter(|drawn| !drawn.may_collide()).count() as u64;
-        let work = each.iter().fold(PlainResult::default(), |all, one| all.and(one));
-        Ok(Self { pairs: pairs.len(), cleared, work })
+        let mut drawn = Self { pairs: pairs.len(), ..Self::default() };
+        for &method in methods {
+            let one = |passes: &mut PlainPasses, pair: &Pair| passes.pair_on(pair, method, hardware);
+            let each = pairs.par_iter().with_max_len(1).map_init(|| PlainPasses::new(resolution), one);
+            let each: Vec<(Overlaps, PassWork)> =
+                each.collect::<Result<_, _>>().map_err(RunError::setting)?;
+            let cleared = each.iter().filter(|(overlaps, _)| !overlaps.may_collide()).count();
+            drawn.cleared.push(cleared as u64);
+            drawn.work = each.iter().fold(drawn.work, |all, (_, one)| all.and(one));
+        }
+        Ok(drawn)
     }
 
     /// Pairs of generated cases whose objects do not both stay in the potentially colliding set.
-    fn in_sweeps(cases: &[Case], method: Method, resolution: u32) -> Self {
-        let one = |Case { objects, collide, .. }: &Case| {
+    fn in_sweeps(cases: &[Case], ways: &Ways) -> Self {
+        let pairs = cases.iter().map(|case| case.collide.len()).sum();
+        let one = |(method, resolution), Case { objects, collide, .. }: &Case| {
             let set = Sweeps { method, resolution, bins: 1 }.detect(objects);
             let is_kept = |object: &usize| set.objects.binary_search(object).is_ok();
             let cleared = collide.iter().filter(|(a, b)| !(is_kept(a) && is_kept(b))).count();
-            Self { pairs: collide.len(), cleared: cleared as u64, work: set.work }
+            (cleared as u64, set.work)
         };
-        let and = |a: Self, b: Self| Self {
-            pairs: a.pairs + b.pairs,
-            cleared: a.cleared + b.cleared,
-            work: a.work.and(&b.work),
-        };
-        cases.par_iter().with_max_len(1).map(one).reduce(Self::default, and)
+        let and = |a: (u64, PassWork), b: (u64, PassWork)| (a.0 + b.0, a.1.and(&b.1));
+        let by =
+            |way| cases.par_iter().with_max_len(1).map(|case| one(way, case)).reduce(Default::default, and);
+        let each: Vec<(u64, PassWork)> = ways.each().map(by).collect();
+        let cleared = each.iter().map(|(cleared, _)| *cleared).collect();
+        Self { pairs, cleared, work: work_of(each.iter().map(|(_, work)| work)) }
     }
 
-    /// Share of the pairs that are kept, in percent.
-    fn kept_percent(&self) -> f64 {
-        100.0 * kept_pairs(self) / self.pairs as f64
+    /// Pairs that each way keeps.
+    fn kept(&self) -> impl Iterator<Item = u64> {
+        self.cleared.iter().map(|cleared| self.pairs as u64 - cleared)
+    }
+
+    /// Share of the pairs that each way keeps, in percent.
+    fn kept_percent(&self) -> impl Iterator<Item = f64> {
+        self.kept().map(|kept| 100.0 * kept as f64 / self.pairs as f64)
     }
 }
 
-/// Work of several ways of drawing.
-fn work_of(drawn: &[Drawn]) -> PlainResult {
-    drawn.iter().fold(PlainResult::default(), |all, one| all.and(&one.work))
+/// How many pairs each method clears, and the work of drawing them.
+fn cleared(pairs: &[Pair], methods: &[Method], resolution: u32) -> (Vec<u64>, PassWork) {
+    let none = || (vec![0; methods.len()], PassWork::default());
+    let one = |passes: &mut PlainPasses, pair: &Pair| {
+        let (overlaps, work) = passes.pair(pair.each_ref(), methods);
+        (overlaps.iter().map(|overlaps| u64::from(!overlaps.may_collide())).collect::<Vec<u64>>(), work)
+    };
+    let each = pairs.par_iter().with_max_len(1).map_init(|| PlainPasses::new(resolution), one);
+    each.reduce(none, |(a, work), (b, other)| {
+        (a.iter().zip(&b).map(|(a, b)| a + b).collect(), work.and(&other))
+    })
+}
+
+/// The sum of work.
+fn work_of<'a>(each: impl Iterator<Item = &'a PassWork>) -> PassWork {
+    each.fold(PassWork::default(), |all, one| all.and(one))
 }
 
 /// Every method at every resolution.
 #[derive(Default)]
 struct Looks {
-    names: Vec<(Method, u32)>,
-    generated: Vec<Drawn>,
+    ways: Ways,
+    generated: Drawn,
     /// Public cases that collide.
-    collide: Vec<Drawn>,
+    collide: Drawn,
     /// Public queries that do not.
-    apart: Vec<Drawn>,
+    apart: Drawn,
     /// All objects of a generated case, in two sweeps.
-    swept: Vec<Drawn>,
+    swept: Drawn,
 }
 
 impl Looks {
-    fn new(ways: Vec<(Method, u32)>, (own, generated): (&[Case], &[Pair]), public: &Public) -> Self {
-        let swept = ways.iter().map(|(method, px)| Drawn::in_sweeps(own, *method, *px)).collect();
-        let each = |pairs: &[Pair]| ways.iter().map(|(method, px)| Drawn::new(pairs, *method, *px)).collect();
-        let [generated, collide, apart] = [generated, &public.collide, &public.apart].map(each);
-        Self { names: ways, generated, collide, apart, swept }
+    fn new(ways: Ways, (own, generated): (&[Case], &[Pair]), public: &Public) -> Self {
+        let swept = Drawn::in_sweeps(own, &ways);
+        let [generated, collide, apart] =
+            [generated, &public.collide, &public.apart].map(|pairs| Drawn::new(pairs, &ways));
+        Self { ways, generated, collide, apart, swept }
     }
 
     /// Pairs missed by each way.
     fn missed(&self) -> impl Iterator<Item = (Method, u32, u64)> {
-        self.names.iter().enumerate().map(|(way, &(method, px))| {
-            let cleared = [&self.generated, &self.collide, &self.swept].map(|drawn| drawn[way].cleared);
+        self.ways.each().enumerate().map(|(way, (method, px))| {
+            let cleared = [&self.generated, &self.collide, &self.swept].map(|drawn| drawn.cleared[way]);
             (method, px, cleared.iter().sum())
         })
     }
 
     /// All work, and that of each kind of public case that there is.
-    fn ran(&self, hardware: &PlainResult) -> Vec<Number> {
-        let [own, collide, apart] = [&self.generated, &self.collide, &self.apart].map(|drawn| work_of(drawn));
-        let mut all = ran(hardware, &own.and(&collide).and(&apart));
-        let swept = work_of(&self.swept);
+    fn ran(&self, hardware: &PassWork) -> Vec<Number> {
+        let Self { generated, collide, apart, swept, .. } = self;
+        let mut all =
+            ran(hardware, &work_of([generated, collide, apart].map(|drawn| &drawn.work).into_iter()));
         all.extend(numbers([
-            ("passes_of_sweeps_on_the_host", swept.passes as f64),
-            ("draws_of_sweeps_on_the_host", swept.draws as f64),
-            ("fragments_of_sweeps_on_the_host", swept.fragments as f64),
+            ("passes_of_sweeps_on_the_host", swept.work.passes as f64),
+            ("draws_of_sweeps_on_the_host", swept.work.draws as f64),
+            ("fragments_of_sweeps_on_the_host", swept.work.fragments as f64),
         ]));
-        let some = |drawn: &[Drawn]| drawn.iter().any(|one| one.pairs > 0);
-        if some(&self.collide) {
+        if collide.pairs > 0 {
             all.extend(numbers([
-                ("draws_of_public_cases_that_collide", collide.draws as f64),
-                ("fragments_of_public_cases_that_collide", collide.fragments as f64),
+                ("draws_of_public_cases_that_collide", collide.work.draws as f64),
+                ("fragments_of_public_cases_that_collide", collide.work.fragments as f64),
             ]));
         }
-        if some(&self.apart) {
+        if apart.pairs > 0 {
             all.extend(numbers([
-                ("draws_of_public_queries_that_do_not", apart.draws as f64),
-                ("fragments_of_public_queries_that_do_not", apart.fragments as f64),
+                ("draws_of_public_queries_that_do_not", apart.work.draws as f64),
+                ("fragments_of_public_queries_that_do_not", apart.work.fragments as f64),
             ]));
         }
         all
@@ -164,7 +203,7 @@ impl Looks {
 
     /// Least and greatest share of public queries that are kept although they do not collide, in percent.
     fn false_positives(&self) -> Option<[f64; 2]> {
-        let shares = || self.apart.iter().filter(|one| one.pairs > 0).map(Drawn::kept_percent);
+        let shares = || self.apart.kept_percent().filter(|share| share.is_finite());
         Some([shares().reduce(f64::min)?, shares().reduce(f64::max)?])
     }
 
@@ -173,9 +212,8 @@ impl Looks {
         if self.false_positives().is_none() {
             return String::new();
         }
-        let each = self.names.iter().zip(&self.apart);
-        let each = each
-            .map(|((method, px), one)| format!("{} at {px} px {:.1} %", name(*method), one.kept_percent()));
+        let each = self.ways.each().zip(self.apart.kept_percent());
+        let each = each.map(|((method, px), kept)| format!("{} at {px} px {kept:.1} %", name(method)));
         let ccd = 100.0 * public.kept_closer as f64 / public.apart.len() as f64;
         let each = each.collect::<Vec<_>>().join(", ");
         format!(
@@ -197,16 +235,14 @@ pub(super) fn missed(task: &Task<'_>) -> Result<Done, RunError> {
         Some(folder) => load_public(folder, row.public_scenes.get(form))?,
         None => Public::default(),
     };
-    let at =
-        |&method: &Method| row.resolution_px.all(form).iter().map(move |&resolution| (method, resolution));
-    let ways = row.methods.get(form).iter().flat_map(at).collect();
+    let methods = row.methods.get(form);
+    let ways = Ways { methods: methods.clone(), resolutions: row.resolution_px.all(form).to_vec() };
     let looks = Looks::new(ways, (&own, &generated), &public);
-    let (hardware, px) = (hardware()?, *row.resolution_px.get(form));
-    let on_hardware = row.methods.get(form).iter().map(|&of| Drawn::on(&hardware, &generated, of, px));
-    let on_hardware: Vec<Drawn> = on_hardware.collect::<Result<_, _>>()?;
-    let missed_there: u64 = on_hardware.iter().map(|drawn| drawn.cleared).sum();
+    let px = *row.resolution_px.get(form);
+    let on_hardware = Drawn::on(&hardware()?, &generated, methods, px)?;
+    let missed_there: u64 = on_hardware.cleared.iter().sum();
     let mut tried = Cases::new("pairs missed", "methods and resolution_px jointly, and `quintile ccd`");
-    for &of in row.methods.get(form) {
+    for &of in methods {
         let at = looks.missed().filter(|(method, ..)| *method == of);
         tried.along(
             &format!("resolution_px ({})", name(of)),
@@ -221,8 +257,8 @@ pub(super) fn missed(task: &Task<'_>) -> Result<Done, RunError> {
          {missed_there} by {} of these kinds at {px} px on the modelled hardware, which draws the generated pairs alone{}",
         generated.len(),
         public_text(&public, task.collision_data.is_some()),
-        looks.names.len(),
-        on_hardware.len(),
+        looks.ways.each().count(),
+        methods.len(),
         looks.text_of_others(&public)
     );
     let full = row.methods.get(Form::Full).len() * row.resolution_px.values() + 1;
@@ -238,15 +274,15 @@ pub(super) fn missed(task: &Task<'_>) -> Result<Done, RunError> {
         ("generated_cases", own.len() as f64),
     ];
     let facts = numbers(counted).into_iter().chain(facts(&looks, &public)).collect();
-    Ok(Done::bare(Row { numbers: facts, ran: looks.ran(&work_of(&on_hardware)), note, ..made }))
+    Ok(Done::bare(Row { numbers: facts, ran: looks.ran(&on_hardware.work), note, ..made }))
 }
 
 /// How many cases of each kind there are, and how many of those that do not collide are kept.
 fn facts(looks: &Looks, public: &Public) -> Vec<Number> {
     let [fewest, most] = looks.false_positives().unwrap_or([f64::NAN; 2]);
-    let cleared = || looks.apart.iter().map(|one| one.cleared);
+    let cleared = || looks.apart.cleared.iter().copied();
     numbers([
-        ("generated_pairs_that_collide", looks.generated.first().map_or(0, |one| one.pairs) as f64),
+        ("generated_pairs_that_collide", looks.generated.pairs as f64),
         ("public_scenes", public.scenes as f64),
         ("public_scene_pairs_that_collide", public.known as f64),
         ("public_scene_pairs_identified", public.seen as f64),
@@ -309,34 +345,6 @@ fn triangles(moving: &Moving) -> Vec<Ends> {
     mesh.triangles.iter().map(ends).collect()
 }
 
-/// Two objects of a case, and what each way of drawing them leaves.
-struct Looked<'a> {
-    case: &'a TwoObjects,
-    objects: Pair,
-}
-
-impl Looked<'_> {
-    fn drawn(&self, method: Method, resolution: u32) -> PlainResult {
-        PlainPasses::new(method, resolution).pair(&self.objects[0], &self.objects[1])
-    }
-
-    /// The same on the modelled hardware.
-    fn drawn_on(
-        &self,
-        hardware: &PipelineSpec,
-        method: Method,
-        resolution: u32,
-    ) -> Result<PlainResult, RunError> {
-        let [a, b] = &self.objects;
-        PlainPasses::new(method, resolution).pair_on(a, b, hardware).map_err(RunError::setting)
-    }
-
-    /// Whether boxes of time and depth and boxes of depth alone say what they have to.
-    fn is_distinguished(&self, ours: &PlainResult, depth: &PlainResult) -> bool {
-        depth.may_collide() && ours.may_collide() == self.case.collide
-    }
-}
-
 /// VI-2: time separates what depth alone cannot.
 pub(super) fn dodged(task: &Task<'_>) -> Result<Done, RunError> {
     let with = task.with(|settings| &settings.vi_2);
@@ -344,34 +352,31 @@ pub(super) fn dodged(task: &Task<'_>) -> Result<Done, RunError> {
     let refused = || RunError::setting("VI-2: a coordinate is beyond 1e60 or not a number");
     let (mut tried, mut drawn, mut said) = (
         Cases::new("pixels left of a pair", "cases, methods and resolution_px jointly"),
-        PlainResult::default(),
+        PassWork::default(),
         Vec::new(),
     );
-    let (hardware, mut there) = (hardware()?, PlainResult::default());
+    let (hardware, mut there) = (hardware()?, PassWork::default());
+    let methods = row.methods.get(form);
     for case in row.objects.get(form).iter().filter(|case| row.cases.all(form).contains(&case.name)) {
-        let objects = [object(&case.first).ok_or_else(refused)?, object(&case.second).ok_or_else(refused)?];
-        let looked = Looked { case, objects };
+        let pair = [object(&case.first).ok_or_else(refused)?, object(&case.second).ok_or_else(refused)?];
         let mut resolutions = row.resolution_px.all(form).to_vec();
         resolutions.sort_unstable();
-        for &method in row.methods.get(form) {
-            let mut at = Vec::new();
-            for &resolution in &resolutions {
-                let (ours, depth) =
-                    (looked.drawn(method, resolution), looked.drawn(Method::DepthOnly, resolution));
-                drawn = drawn.and(&ours).and(&depth);
-                let fewest = ours.overlaps.into_iter().min().unwrap_or(0);
-                at.push((resolution, fewest as f64, looked.is_distinguished(&ours, &depth)));
-                if resolution == *row.resolution_px.get(form) && method == row.methods.get(form)[0] {
-                    let on = |method| looked.drawn_on(&hardware, method, resolution);
-                    let (ours_there, depth_there) = (on(method)?, on(Method::DepthOnly)?);
-                    there = there.and(&ours_there).and(&depth_there);
-                    let same = looked.is_distinguished(&ours_there, &depth_there);
-                    let text = case_text(case, &ours, &depth, resolution);
-                    let on_hardware = if same { "does the same" } else { "does not" };
-                    said.push(format!("{text}; the modelled hardware {on_hardware}"));
-                }
-            }
+        let each: Vec<Compared> = resolutions.iter().map(|&px| Compared::new(&pair, methods, px)).collect();
+        drawn = drawn.and(&work_of(each.iter().map(|at| &at.work)));
+        for (of, &method) in methods.iter().enumerate() {
+            let at = each.iter().map(|at| {
+                (at.resolution, at.ours[of].fewest() as f64, is_distinguished(case, &at.ours[of], &at.depth))
+            });
             tried.along(&format!("resolution_px ({}, {})", case.name, name(method)), at);
+        }
+        let base = *row.resolution_px.get(form);
+        if let Some(at) = each.iter().find(|at| at.resolution == base) {
+            let on =
+                |method| PlainPasses::new(base).pair_on(&pair, method, &hardware).map_err(RunError::setting);
+            let ((ours, work), (depth, depth_work)) = (on(methods[0])?, on(Method::DepthOnly)?);
+            there = there.and(&work).and(&depth_work);
+            let same = if is_distinguished(case, &ours, &depth) { "does the same" } else { "does not" };
+            said.push(format!("{}; the modelled hardware {same}", at.text(case)));
         }
     }
     let full = row.cases.values() * row.methods.get(Form::Full).len() * row.resolution_px.values();
@@ -386,23 +391,47 @@ pub(super) fn dodged(task: &Task<'_>) -> Result<Done, RunError> {
     Ok(Done { row: Row { ran: ran(&there, &drawn), ..made }, figures })
 }
 
-/// Result of the passes for a case, in words.
-fn case_text(case: &TwoObjects, ours: &PlainResult, depth: &PlainResult, resolution: u32) -> String {
-    let kept = |drawn: &PlainResult| if drawn.may_collide() { "keep" } else { "clear" };
-    let along =
-        ["x", "y", "z"].into_iter().zip(ours.overlaps).filter(|(_, left)| *left == 0).map(|(axis, _)| axis);
-    let along: Vec<&str> = along.collect();
-    let where_ =
-        if along.is_empty() { String::new() } else { format!(" (apart along {})", along.join(" and ")) };
-    format!(
-        "{} at {resolution} px: the {} passes {} the pair{where_}, the {} by depth {} it ({} fragments)",
-        case.name,
-        ours.passes,
-        kept(ours),
-        depth.passes,
-        kept(depth),
-        ours.fragments
-    )
+/// Whether boxes of time and depth, and of depth alone, say of a case what they have to.
+fn is_distinguished(case: &TwoObjects, ours: &Overlaps, depth: &Overlaps) -> bool {
+    depth.may_collide() && ours.may_collide() == case.collide
+}
+
+/// What the passes leave of two objects.
+struct Compared {
+    resolution: u32,
+    /// By method.
+    ours: Vec<Overlaps>,
+    /// By depth alone.
+    depth: Overlaps,
+    work: PassWork,
+}
+
+impl Compared {
+    fn new(pair: &Pair, methods: &[Method], resolution: u32) -> Self {
+        let all = [methods, &[Method::DepthOnly]].concat();
+        let (mut ours, work) = PlainPasses::new(resolution).pair(pair.each_ref(), &all);
+        let depth = ours.remove(methods.len());
+        Self { resolution, ours, depth, work }
+    }
+
+    /// The first method beside depth alone, in words.
+    fn text(&self, case: &TwoObjects) -> String {
+        let kept = |drawn: &Overlaps| if drawn.may_collide() { "keep" } else { "clear" };
+        let ours = &self.ours[0];
+        let along = ["x", "y", "z"].into_iter().zip(ours.0).filter(|(_, left)| *left == 0);
+        let along: Vec<&str> = along.map(|(axis, _)| axis).collect();
+        let where_ =
+            if along.is_empty() { String::new() } else { format!(" (apart along {})", along.join(" and ")) };
+        format!(
+            "{} at {} px: the {} passes {} the pair{where_}, by depth alone in both directions they {} it ({} fragments)",
+            case.name,
+            self.resolution,
+            self.work.passes,
+            kept(ours),
+            kept(&self.depth),
+            self.work.fragments
+        )
+    }
 }
 
 /// VI-3: a fragment against a box is at least as tight as a box against a box.
@@ -412,21 +441,19 @@ pub(super) fn tighter(task: &Task<'_>) -> Result<Done, RunError> {
     let all = cases(*row.seed.get(form), *row.cases_of_each_family.get(form));
     let mut resolutions = row.resolution_px.all(form).to_vec();
     resolutions.sort_unstable();
-    let mut drawn = PlainResult::default();
-    let mut kept = |method| -> Vec<Vec<usize>> {
-        let at = |&resolution: &u32| {
-            let each: Vec<_> = all.par_iter().map(|case| false_positives(case, method, resolution)).collect();
-            drawn = each.iter().fold(drawn, |all, (_, one)| all.and(one));
-            each.into_iter().map(|(count, _)| count).collect()
-        };
-        resolutions.iter().map(at).collect()
+    let methods = [Method::BoxBox, Method::FragmentBox];
+    let at = |&resolution: &u32| -> Vec<(Vec<usize>, PassWork)> {
+        all.par_iter().map(|case| false_positives(case, &methods, resolution)).collect()
     };
-    let (boxes, fragments) = (kept(Method::BoxBox), kept(Method::FragmentBox));
-    let (hardware, apart) = (hardware()?, all.iter().flat_map(apart).collect::<Vec<Pair>>());
+    let each: Vec<Vec<(Vec<usize>, PassWork)>> = resolutions.iter().map(at).collect();
+    let drawn = work_of(each.iter().flatten().map(|(_, work)| work));
+    let [boxes, fragments] = [0, 1].map(|method| -> Vec<Vec<usize>> {
+        each.iter().map(|at| at.iter().map(|(kept, _)| kept[method]).collect()).collect()
+    });
+    let apart = all.iter().flat_map(apart).collect::<Vec<Pair>>();
     let px = *row.resolution_px.get(form);
-    let on = |method| Drawn::on(&hardware, &apart, method, px);
-    let on_hardware = [on(Method::BoxBox)?, on(Method::FragmentBox)?];
-    let there = work_of(&on_hardware);
+    let on_hardware = Drawn::on(&hardware()?, &apart, &methods, px)?;
+    let kept_there: Vec<u64> = on_hardware.kept().collect();
     let mut tried = Cases::new(
         "cases with fewer false positives for fragments, less those with more",
         "resolution_px alone",
@@ -448,25 +475,21 @@ pub(super) fn tighter(task: &Task<'_>) -> Result<Done, RunError> {
         "false positives at {resolutions:?} px: {fragments:?} for fragments, {boxes:?} for boxes; fewer in {better} of {} cases, more in {worse}; \
          on the modelled hardware at {px} px {} and {}",
         each().count(),
-        kept_pairs(&on_hardware[1]),
-        kept_pairs(&on_hardware[0])
+        kept_there[1],
+        kept_there[0]
     );
 
     let facts = numbers([
         ("cases", each().count() as f64),
         ("cases_fewer", better as f64),
         ("cases_more", worse as f64),
-        ("boxes_on_the_modelled_hardware", kept_pairs(&on_hardware[0])),
-        ("fragments_on_the_modelled_hardware", kept_pairs(&on_hardware[1])),
+        ("boxes_on_the_modelled_hardware", kept_there[0] as f64),
+        ("fragments_on_the_modelled_hardware", kept_there[1] as f64),
     ]);
     let figure = curves(&resolutions, [("fragment against box", &fragments), ("box against box", &boxes)]);
-    let row = Row { numbers: facts, ran: ran(&there, &drawn), ..with.banded(&row.about, ours, band) };
+    let row =
+        Row { numbers: facts, ran: ran(&on_hardware.work, &drawn), ..with.banded(&row.about, ours, band) };
     Ok(Done { row, figures: vec![figure] })
-}
-
-/// Pairs that were kept.
-fn kept_pairs(drawn: &Drawn) -> f64 {
-    drawn.pairs as f64 - drawn.cleared as f64
 }
 
 /// Pairs of a case whose boxes touch and that do not collide.
@@ -475,18 +498,18 @@ fn apart(case: &Case) -> impl Iterator<Item = Pair> {
     pairs.map(|(a, b)| [case.objects[a].clone(), case.objects[b].clone()])
 }
 
-/// Pairs of a case that do not collide and are kept, and what was drawn for that.
-fn false_positives(case: &Case, method: Method, resolution: u32) -> (usize, PlainResult) {
-    let mut passes = PlainPasses::new(method, resolution);
-    let (mut kept, mut all) = (0, PlainResult::default());
+/// Pairs of a case that do not collide and that each method keeps, and what was drawn for that.
+fn false_positives(case: &Case, methods: &[Method], resolution: u32) -> (Vec<usize>, PassWork) {
+    let mut passes = PlainPasses::new(resolution);
+    let mut all = (vec![0; methods.len()], PassWork::default());
     for (a, b) in candidates(&case.objects) {
         if !case.collide.contains(&(a, b)) {
-            let drawn = passes.pair(&case.objects[a], &case.objects[b]);
-            kept += usize::from(drawn.may_collide());
-            all = all.and(&drawn);
+            let (overlaps, work) = passes.pair([&case.objects[a], &case.objects[b]], methods);
+            all.0.iter_mut().zip(overlaps).for_each(|(kept, of)| *kept += usize::from(of.may_collide()));
+            all.1 = all.1.and(&work);
         }
     }
-    (kept, all)
+    all
 }
 
 fn curves(resolutions: &[u32], kept: [(&str, &Vec<usize>); 2]) -> Figure {
@@ -517,7 +540,8 @@ mod tests {
     }
 
     fn looks(public: &Public) -> Looks {
-        Looks::new(vec![(Method::BoxBox, 8), (Method::FragmentBox, 8)], (&[], &[]), public)
+        let ways = Ways { methods: vec![Method::BoxBox, Method::FragmentBox], resolutions: vec![8] };
+        Looks::new(ways, (&[], &[]), public)
     }
 
     #[test]
@@ -528,7 +552,7 @@ mod tests {
         let looks = looks(&public);
         assert!(looks.missed().all(|(.., missed)| missed == 0));
         assert_eq!(looks.false_positives(), Some([50.0, 50.0]));
-        let ran = looks.ran(&PlainResult::default());
+        let ran = looks.ran(&PassWork::default());
         let of = |name: &str| ran.iter().find(|number| number.name == name).unwrap().value;
         assert_eq!(of("draws_of_public_queries_that_do_not"), 2.0 * of("draws_of_public_cases_that_collide"));
         assert_eq!(of("draws_on_the_host"), 3.0 * of("draws_of_public_cases_that_collide"));
@@ -546,6 +570,6 @@ mod tests {
         let looks = looks(&public);
         assert!(looks.missed().all(|(.., missed)| missed == 1));
         assert_eq!((looks.false_positives(), looks.text_of_others(&public)), (None, String::new()));
-        assert!(looks.ran(&PlainResult::default()).iter().all(|number| !number.name.ends_with("do_not")));
+        assert!(looks.ran(&PassWork::default()).iter().all(|number| !number.name.ends_with("do_not")));
     }
 }
