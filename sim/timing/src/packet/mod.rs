@@ -471,7 +471,9 @@ impl Tally {
         self.count(unit, counts, from, to);
         let [begin_ps, end_ps] =
             [(from, used[0]), (to, used[1])].map(|(at, used)| self.clocks.ps_after(at, used * period, CYCLE));
-        self.recorder.busy(unit, begin_ps, end_ps, 1, 1);
+        // A data unit that serves a packet in parts waits for lines between them.
+        let (span_ps, work_ps) = (end_ps - begin_ps, self.clocks.ps_after(0, work * period, CYCLE));
+        self.recorder.busy(unit, begin_ps, end_ps, work_ps.min(span_ps), span_ps.max(1));
     }
 
     /// Record the end of a packet: all units have done their part of `counts`.
