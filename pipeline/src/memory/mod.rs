@@ -236,9 +236,11 @@ impl Cache {
         }
     }
 
-    /// Empty the cache. Returns the dirty keys in order of their entries.
+    /// Empty the cache. Returns the dirty keys in increasing order.
     pub fn flush(&mut self) -> Vec<u64> {
-        let dirty = self.lines.iter().filter(|line| line.dirty).map(|line| line.key).collect();
+        let mut dirty: Vec<u64> = self.lines.iter().filter(|line| line.dirty).map(|line| line.key).collect();
+        // The lines of a set lie in different rows of one bank of memory.
+        dirty.sort_unstable();
         self.lines.fill(Line::EMPTY);
         dirty
     }

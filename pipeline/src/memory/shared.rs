@@ -79,10 +79,7 @@ impl SharedCaches {
         for at in 0..self.levels.len() {
             let (above, below) = self.levels.split_at_mut(at + 1);
             let level = &mut above[at];
-            // By address: the lines of a set lie in different rows of one bank.
-            let mut lines = level.cache.flush();
-            lines.sort_unstable();
-            for line in lines.into_iter().filter(|line| is_kept(*line)) {
+            for line in level.cache.flush().into_iter().filter(|line| is_kept(*line)) {
                 let mut access = LineAccess::new(client, line_number(line), LineKind::Drain);
                 access.levels[level.at].writebacks += 1;
                 request(below, line, true, &mut access);

@@ -230,7 +230,9 @@ impl Summary {
 
     /// Adds the warnings about a missed accuracy or budget.
     pub(super) fn with_choice_warnings(mut self) -> Self {
-        self.warnings.extend(self.choice.iter().flat_map(warn::missed_requests));
+        let missed =
+            self.choice.iter().flat_map(|choice| warn::missed_requests(choice, self.verified.as_ref()));
+        self.warnings.extend(missed);
         self.warnings = Warning::fold(self.warnings);
         self
     }

@@ -151,7 +151,7 @@ fn passes(observed: &Observed, start_s: f64, most: usize) -> Vec<PassSpan> {
     let at = |ps: u64| ns(start_s + ps as f64 * 1e-12);
     let mut before_ps = 0;
     let span = |((pass, time), number): ((&PassReport, &PassTime), u32)| {
-        let start_ps = std::mem::replace(&mut before_ps, time.end_ps).max(time.begin_ps);
+        let start_ps = std::mem::replace(&mut before_ps, time.end_ps);
         let ends_ns = [start_ps, time.end_ps].map(at);
         let name = pass.name.clone();
         let parts = draws(observed, number, ends_ns, (at, most));

@@ -84,8 +84,8 @@ pub struct RunArgs {
     /// this, for example 2%
     #[arg(long, value_name = "P%", value_parser = percent, conflicts_with = "timing", allow_hyphen_values = true)]
     pub accuracy: Option<f64>,
-    /// Let a probe choose the most accurate options that take no longer than this, for example 30s, 500ms or
-    /// 2min
+    /// Let a probe choose the most accurate options with which frames take no longer than this, for example 30s,
+    /// 500ms or 2min; the probe and the files written come on top
     #[arg(long, value_name = "T", value_parser = duration, conflicts_with = "timing", allow_hyphen_values = true)]
     pub budget: Option<f64>,
     /// Simulate every frame at the reference as well, and report the actual error

@@ -14,7 +14,7 @@ use warnings::{Code, Warning};
 use self::regimes::of_regimes;
 use crate::heat::HeatPicture;
 use crate::measure::MIN_BUSY_SAMPLES;
-use crate::{Choice, Measurement, Observed, Plan, RunFrame, Simulated};
+use crate::{Choice, Measurement, Observed, Plan, RunFrame, Simulated, Verified};
 
 /// All warnings of a run, sorted, without duplicates.
 pub(crate) fn gather(plan: &Plan, simulated: &Simulated, measurement: &Measurement) -> Vec<Warning> {
@@ -158,8 +158,8 @@ fn heat_outside_image(simulated: &Simulated) -> Vec<Warning> {
     worst.into_iter().filter(|worst| worst.placed < MIN_PLACED).map(warning).collect()
 }
 
-/// Warnings about a choice that misses the requested accuracy or the time budget.
-pub(crate) fn missed_requests(choice: &Choice) -> Vec<Warning> {
+/// Warnings about a choice that misses the requested accuracy, as expected or as `verified`, or the time budget.
+pub(crate) fn missed_requests(choice: &Choice, verified: Option<&Verified>) -> Vec<Warning> {
     let late = choice.budget_s.zip(choice.expected_host_s).filter(|(budget, expected)| expected > budget);
     let late = late.map(|(budget_s, expected_s)| {
         let message = format!(
@@ -181,7 +181,24 @@ pub(crate) fn missed_requests(choice: &Choice) -> Vec<Warning> {
             ),
         )
     });
-    late.into_iter().chain(inexact).collect()
+    let wrong = choice
+        .accuracy
+        .zip(verified)
+        .and_then(|(accuracy, verified)| actual_error(accuracy, [choice.expected_error, verified.error]));
+    late.into_iter().chain(wrong.or(inexact)).collect()
+}
+
+/// A warning if the actual error is larger than the requested `accuracy`. The expected error and the actual one are
+/// given.
+fn actual_error(accuracy: f64, [expected, actual]: [f64; 2]) -> Option<Warning> {
+    let message = format!(
+        "the actual error is {:.2} %, more than the {} % of --accuracy; {:.2} % was expected from a probe with smaller \
+         images: use --timing stepped",
+        actual * 100.0,
+        accuracy * 100.0,
+        expected * 100.0
+    );
+    (actual > accuracy).then(|| Warning::new(Code::AccuracyMissed, message))
 }
 
 /// Relative half-width in percent above which an interval gives a warning.
@@ -348,6 +365,15 @@ mod tests {
         assert_eq!(three[0].message, "waves of 1 squares (frame 1; the same in 3 of 5 frames)");
         assert_eq!((three[0].count, three[0].details[2].as_str()), (3, "frame 4: waves of 4 squares"));
         assert!(fold(&of(&[])).is_empty());
+    }
+
+    #[test]
+    fn an_actual_error_beyond_the_requested_accuracy_is_warned_about() {
+        assert_eq!(actual_error(0.02, [0.0015, 0.02]), None);
+        let warning = actual_error(0.02, [0.0015, 0.1355]).unwrap();
+        assert_eq!(warning.code, Code::AccuracyMissed);
+        let message = "the actual error is 13.55 %, more than the 2 % of --accuracy; 0.15 % was expected";
+        assert!(warning.message.starts_with(message), "{warning}");
     }
 
     #[test]
