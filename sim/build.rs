@@ -6,7 +6,7 @@ use std::process::Command;
 
 /// Sources of the program, from the root of the repository. A change of these builds the program anew anyway,
 /// so that asking git costs nothing more.
-const SOURCES: [&str; 20] = [
+const SOURCES: [&str; 25] = [
     "Cargo.toml",
     "Cargo.lock",
     "pipeline/src",
@@ -14,15 +14,20 @@ const SOURCES: [&str; 20] = [
     "power-model/platforms",
     "power-model/src",
     "power-model/tables",
+    "sim/experiments/assets",
     "sim/experiments/papers",
+    "sim/experiments/parts",
     "sim/experiments/src",
     "sim/output/assets",
     "sim/output/src",
     "sim/run/gpus",
     "sim/run/src",
+    "sim/run/stated_errors.csv",
     "sim/src",
+    "sim/sweep/assets",
     "sim/sweep/src",
     "sim/timing/src",
+    "sim/warnings/src",
     "traces/jls/src",
     "traces/src",
     "workloads/scenes",

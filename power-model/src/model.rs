@@ -3,7 +3,7 @@
 
 use std::ops::{AddAssign, Index, IndexMut};
 
-use activity::{Bin, Counts, Event, Timeline, Unit};
+use activity::{Bin, Counts, Event, S_PER_PS, Timeline, Unit};
 use serde::{Serialize, Serializer};
 
 use crate::platform::Platform;
@@ -356,9 +356,6 @@ pub struct FramePower {
     /// Energy of the frame by part, in joules.
     energy: Energy,
 }
-
-/// Seconds in a picosecond.
-pub(crate) const S_PER_PS: f64 = 1e-12;
 
 impl FramePower {
     /// Length of a bin in seconds; the last bin may be shorter.

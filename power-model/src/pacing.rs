@@ -1,15 +1,13 @@
 //! Pacing of consecutive frames, V-sync or free-running, with idle time between them, and the power curve of the run.
 
+use activity::{PS_PER_S, S_PER_PS};
 use traces::Curve;
 use warnings::{Code, Warning};
 
 use crate::PacingError;
-use crate::model::{Energy, FramePower, Part, S_PER_PS};
+use crate::model::{Energy, FramePower, Part};
 use crate::platform::Platform;
 use crate::quantity::Hertz;
-
-/// Picoseconds in a second.
-const PS_PER_S: f64 = 1e12;
 
 /// Rule for the start of the next frame.
 #[derive(Clone, Copy, Debug, PartialEq)]

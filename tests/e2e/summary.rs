@@ -206,8 +206,7 @@ fn a_changed_program_or_input_is_refused() {
     assert_eq!(quintile().call(["run", "tiny", "--again", &summary]).code, Some(2));
 }
 
-/// Debug builds have a hook that panics.
-#[cfg(debug_assertions)]
+/// A variable of the environment makes a frame panic.
 #[test]
 fn a_crash_reports_its_place_and_a_command_to_repeat_it() {
     let inputs = Inputs::new();
@@ -221,7 +220,7 @@ fn a_crash_reports_its_place_and_a_command_to_repeat_it() {
         let ended = crate::support::Quintile::new("sh").call(["-c", shell, program, backtrace, &out]);
         assert_eq!(ended.code, Some(1), "{}", ended.stderr);
         for says in [
-            "error: sim/run/src/lib.rs:",
+            "error: sim/run/src/frame.rs:",
             "internal error in frame 2: requested by a test",
             env!("CARGO_PKG_VERSION"),
             "quintile run tiny --seed 3 --frames 2..3 --out frame_2",

@@ -16,8 +16,8 @@ const REFUSED: [(&str, &str); 68] = [
     ("beams and bodies", "light volumes, bounding volumes"),
     ("beaten by", "dominated by"),
     ("bodies and beams", "bounding volumes, light volumes"),
-    ("const least ", "const MIN_"),
-    ("const most ", "const MAX_"),
+    ("const least", "const MIN_"),
+    ("const most", "const MAX_"),
     ("doubt", "warning, low confidence"),
     ("doubted", "flagged"),
     ("doubts", "warnings"),
@@ -101,7 +101,7 @@ pub(super) fn files_with(endings: &[&str], folder: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// Whether `line`, in small letters and with spaces in the place of `_`, holds `phrase` between characters
+/// Whether `line`, in the form of [`as_words`], holds `phrase` between characters
 /// that are not part of a word.
 fn holds(line: &str, phrase: &str) -> bool {
     let inside = |c: Option<char>| c.is_some_and(char::is_alphanumeric);
@@ -112,12 +112,40 @@ fn holds(line: &str, phrase: &str) -> bool {
     })
 }
 
+/// A line as single words in small letters: identifiers are split at `_` and before capital letters.
+fn as_words(line: &str) -> String {
+    let mut words = String::new();
+    let mut before = ' ';
+    for c in line.chars() {
+        if c.is_uppercase() && before.is_lowercase() {
+            words.push(' ');
+        }
+        words.extend(c.to_lowercase());
+        before = c;
+    }
+    words.replace('_', " ")
+}
+
+/// Text of a line that is a comment alone.
+fn comment(line: &str) -> Option<&str> {
+    let text = line.trim_start().strip_prefix("//")?;
+    Some(text.trim_start_matches(['/', '!']).trim())
+}
+
+/// Whether a phrase begins at the end of a comment line and goes on in the comment line after it.
+fn is_wrapped(line: &str, next: &str, phrase: &str) -> bool {
+    let (Some(line), Some(next)) = (comment(line), comment(next)) else { return false };
+    holds(&format!("{line} {next}"), phrase) && !holds(line, phrase) && !holds(next, phrase)
+}
+
 /// Refused words in a file of this name, each as `file:line: what to write`.
 fn refused(name: &str, text: &str) -> Vec<String> {
     let mut found = Vec::new();
-    for (index, line) in text.lines().enumerate() {
-        let line = line.to_lowercase().replace('_', " ");
-        let held = REFUSED.iter().filter(|(phrase, _)| holds(&line, phrase));
+    let lines: Vec<String> = text.lines().map(as_words).collect();
+    for (index, line) in lines.iter().enumerate() {
+        let next = lines.get(index + 1).map_or("", String::as_str);
+        let is_held = |phrase: &str| holds(line, phrase) || is_wrapped(line, next, phrase);
+        let held = REFUSED.iter().filter(|(phrase, _)| is_held(phrase));
         found.extend(held.map(|(phrase, instead)| {
             format!("{name}:{}: `{phrase}` is not a word of this project: write `{instead}`", index + 1)
         }));
@@ -157,6 +185,16 @@ fn refused_words_are_found_with_file_and_line() {
         ]
     );
     assert!(refused("a.rs", "a mending, amended, recommend, intelligible\n").len() == 1);
+    for found in [
+        "const LEAST: u32 = 1;",
+        "const MOST_LIGHTS: u32 = 1;",
+        "struct KeptInVain;",
+        "/// It is kept in\n/// vain.",
+        "fn wishes() { let oneWish = 1; }",
+    ] {
+        assert_eq!(refused("a.rs", found).len(), 1, "{found}");
+    }
+    assert!(refused("a.rs", "// kept in\nlet vain = 1;\nconst LEASTWISE: u32 = 1;\n").is_empty());
     assert!(refused("a.rs", "there is no `x`; there is no `\n").len() == 1);
 }
 

@@ -8,7 +8,7 @@ use std::error::Error;
 use traces::Trace;
 use traces::energy::{PowerIntegral, TOLERANCE_S, score, true_frames};
 use traces::frames::{Marks, Options, Step, default_window, find_with};
-use traces::synth::{Recording, SCENARIOS, Scene, WITNESSES};
+use traces::synth::{HELD_OUT_DEVICES, Recording, SCENARIOS, Scene};
 
 const FRAMES: usize = 200;
 /// The marked frame, as a share of all, and the error of the mark, s.
@@ -35,7 +35,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let options: Vec<(&str, Options)> =
         steps.map(|(name, without)| (name, Options { without, ..Options::default() })).collect();
     println!("on: without: F1, energy error in percent, wrong frames with a flag, right frames with a flag");
-    for name in SCENARIOS.map(|scenario| scenario.name).into_iter().chain(WITNESSES.map(|kind| kind.name)) {
+    for name in
+        SCENARIOS.map(|scenario| scenario.name).into_iter().chain(HELD_OUT_DEVICES.map(|kind| kind.name))
+    {
         let mut sums: Vec<Sum> = options.iter().map(|_| Sum::default()).collect();
         for seed in first..=last {
             let (scene, trace) = recorded(name, seed)?;
@@ -53,7 +55,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 }
 
 fn recorded(name: &str, seed: u64) -> Result<(Scene, Trace), Box<dyn Error>> {
-    let kind = WITNESSES.iter().find(|kind| kind.name == name);
+    let kind = HELD_OUT_DEVICES.iter().find(|kind| kind.name == name);
     let scenario = SCENARIOS.iter().find(|scenario| scenario.name == name);
     let (scene, recording) = match (kind, scenario) {
         (Some(kind), _) => (kind.scene(FRAMES, seed)?, kind.recording(seed)),

@@ -1,4 +1,4 @@
-//! The finder on the [`WITNESSES`]: how well it finds, and how far its confidence is a probability. Also
+//! The finder on the [`HELD_OUT_DEVICES`]: how well it finds, and how far its confidence is a probability. Also
 //! whether a map would make it one: fits a logistic map (Platt 1999) of confidence, of how far methods agree
 //! and of how even gaps are, on all kinds of devices but one, and judges it on that one.
 //!
@@ -10,7 +10,7 @@ use std::process::ExitCode;
 use traces::Trace;
 use traces::energy::{TOLERANCE_S, pairs, true_frames};
 use traces::frames::{FinderMethod, Found, MarkError, Marks, Options, Step, default_window, find_with};
-use traces::synth::{Scene, WITNESSES};
+use traces::synth::{HELD_OUT_DEVICES, Scene};
 
 /// Frames of each device.
 const FRAMES: usize = 200;
@@ -57,20 +57,20 @@ fn run() -> Result<(), Box<dyn Error>> {
     }
     let (first, last): (u64, u64) = (first.parse()?, last.parse()?);
     let mut cases = Vec::new();
-    for witness in &WITNESSES {
+    for device in &HELD_OUT_DEVICES {
         let (mut first_mark, mut worst) = (Vec::new(), Vec::new());
         for seed in first..=last {
-            let scene = witness.scene(FRAMES, seed)?;
-            let trace = scene.record(&witness.recording(seed))?;
-            let f1 = cases_of(witness.name, &scene, &trace, &options, &mut cases)?;
-            println!("{} {seed}: F1 by mark {f1:.3?}", witness.name);
+            let scene = device.scene(FRAMES, seed)?;
+            let trace = scene.record(&device.recording(seed))?;
+            let f1 = cases_of(device.name, &scene, &trace, &options, &mut cases)?;
+            println!("{} {seed}: F1 by mark {f1:.3?}", device.name);
             first_mark.push(f1[0]);
             worst.push(f1.into_iter().fold(1.0, f64::min));
         }
         let mean = |of: &[f64]| of.iter().sum::<f64>() / of.len() as f64;
         println!(
             "{}: F1 first mark {:.3}, worst of five {:.3}",
-            witness.name,
+            device.name,
             mean(&first_mark),
             mean(&worst)
         );
@@ -85,7 +85,7 @@ fn report(cases: &[Case]) {
          right frames flagged; by the map of the others"
     );
     let everywhere = fitted(cases, |_| true);
-    for kind in WITNESSES.iter().map(|witness| witness.name).chain(["all"]) {
+    for kind in HELD_OUT_DEVICES.iter().map(|device| device.name).chain(["all"]) {
         let of: Vec<&Case> = cases.iter().filter(|case| case.kind == kind || kind == "all").collect();
         let others = fitted(cases, |case| case.kind != kind);
         let right = of.iter().filter(|case| case.right).count();
@@ -189,9 +189,9 @@ fn ranked(cases: &[&Case]) -> f64 {
 fn fitted(cases: &[Case], used: impl Fn(&Case) -> bool) -> [f64; FEATURES] {
     let of: Vec<&Case> = cases.iter().filter(|case| used(case)).collect();
     let share = |case: &Case| 1e3 / of.iter().filter(|other| other.kind == case.kind).count() as f64;
-    let shares: Vec<(&'static str, f64)> = WITNESSES
+    let shares: Vec<(&'static str, f64)> = HELD_OUT_DEVICES
         .iter()
-        .map(|witness| witness.name)
+        .map(|device| device.name)
         .filter_map(|kind| of.iter().find(|case| case.kind == kind).map(|case| (kind, share(case))))
         .collect();
     let mut weights = [0.0; FEATURES];

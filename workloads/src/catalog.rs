@@ -233,7 +233,7 @@ mod tests {
         let request = Request { overrides: &overrides, seed: 1 };
         let job = find(name, &OptionSource { file: None, set }, &request).unwrap().unwrap();
         let hardware = hardware();
-        let drawn = job.frame(0, &mut Gpu::quiet(&hardware).unwrap()).unwrap();
+        let drawn = job.frame(0, &mut Gpu::without_packets(&hardware).unwrap()).unwrap();
         drawn.facts.iter().map(|fact| fact.name).collect()
     }
 

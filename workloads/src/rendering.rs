@@ -152,7 +152,7 @@ mod tests {
         let whole = tiny();
         let drawn = |job: &dyn Job| {
             let spec = hardware();
-            let mut gpu = Gpu::quiet(&spec).unwrap();
+            let mut gpu = Gpu::without_packets(&spec).unwrap();
             let drawn = job.frame(0, &mut gpu).unwrap();
             (drawn, gpu.finish().triangles())
         };

@@ -36,3 +36,9 @@ pub use packet::{
 };
 pub use spec::{Bounded, OutOfBounds};
 pub use stream::{PacketStream, StreamError, StreamWriter};
+
+/// Seconds in a picosecond.
+pub const S_PER_PS: f64 = 1e-12;
+/// Picoseconds in a second. The product with one of the two constants and the quotient by the other may differ
+/// in the last bit.
+pub const PS_PER_S: f64 = 1e12;

@@ -7,7 +7,7 @@ use std::ops::{AddAssign, Index, IndexMut};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::events::EVENTS;
-use crate::{Event, Unit};
+use crate::{Event, S_PER_PS, Unit};
 
 /// Kind of work, which decides the units a packet passes through.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -353,7 +353,7 @@ pub struct Timeline {
 impl Timeline {
     /// Length of the frame in seconds.
     pub fn duration_s(&self) -> f64 {
-        self.duration_ps as f64 * 1e-12
+        self.duration_ps as f64 * S_PER_PS
     }
 
     /// Counts of the whole frame.

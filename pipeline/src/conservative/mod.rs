@@ -235,7 +235,7 @@ impl Precision for f64 {
 }
 
 /// Rounding of moving to the origin in `f64`, relative to the coordinates before: more than four of 2^-53 each.
-const MOVED: f64 = 1.0 / (1_u64 << 50) as f64;
+const MAX_RELATIVE_SHIFT_ERROR: f64 = 1.0 / (1_u64 << 50) as f64;
 
 /// A triangle and a view as the tile tests take them, for tiles within one rectangle.
 ///
@@ -271,7 +271,9 @@ impl Unit {
 
     /// A range with more than the rounding of [`Self::of`] on either side.
     fn outward<C: Coordinate>(&self, [lo, hi]: [f64; 2]) -> [C; 2] {
-        let off = |value: f64| MOVED * (value.abs() + self.origin.abs()) * self.scale[0] * self.scale[1];
+        let off = |value: f64| {
+            MAX_RELATIVE_SHIFT_ERROR * (value.abs() + self.origin.abs()) * self.scale[0] * self.scale[1]
+        };
         [C::at_most(self.of(lo) - off(lo)), C::at_least(self.of(hi) + off(hi))]
     }
 
@@ -378,7 +380,8 @@ impl<'a> Recentred<'a> {
         let delta = if triangle.is_moving() { [0, 1, 2].map(difference) } else { Default::default() };
         let largest = [0, 1, 2]
             .map(|axis| (0..3).map(|k| open[k][axis].abs() + delta[k][axis].abs()).fold(0.0, f64::max));
-        let depth_off = triangle.uncertainty[2] + MOVED * (triangle.largest(2) + origin[2].abs());
+        let depth_off =
+            triangle.uncertainty[2] + MAX_RELATIVE_SHIFT_ERROR * (triangle.largest(2) + origin[2].abs());
         let reach = [rect.x[1] - origin[0], rect.y[1] - origin[1]];
         Self { view, triangle, origin, reach, open, delta, largest, depth_off, rounded }
     }
@@ -402,7 +405,8 @@ impl<'a> Recentred<'a> {
         let terms =
             self.triangle.largest(axis) + if perspective { at * self.triangle.largest(2) } else { at };
         let terms = terms + s[axis].abs() + bent * self.origin[2].abs();
-        let off = self.triangle.uncertainty[axis] + by_depth * self.depth_off + MOVED * terms;
+        let off =
+            self.triangle.uncertainty[axis] + by_depth * self.depth_off + MAX_RELATIVE_SHIFT_ERROR * terms;
         let size = size.max(MIN_SIZE);
         Axis { shift, size, slack: self.rounded * size + 2.0 * off }
     }

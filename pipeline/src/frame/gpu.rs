@@ -79,8 +79,7 @@ pub struct Rendered {
 
 impl Rendered {
     /// The result with the work of writing it back to memory, when it is the only pass of a frame.
-    #[must_use]
-    pub fn with_write_back(mut self, report: &FrameReport) -> Self {
+    fn with_write_back(mut self, report: &FrameReport) -> Self {
         self.counts += &report.write_back;
         self
     }
@@ -209,7 +208,7 @@ impl<'e> Gpu<'e> {
     ///
     /// # Errors
     /// As [`Self::new`].
-    pub fn quiet(spec: &'e PipelineSpec) -> Result<Self, PassError> {
+    pub fn without_packets(spec: &'e PipelineSpec) -> Result<Self, PassError> {
         Self::new(spec, |_, _| ())
     }
 
@@ -221,8 +220,8 @@ impl<'e> Gpu<'e> {
     ///
     /// # Errors
     /// As [`Self::new`].
-    pub fn uncounted(spec: &'e PipelineSpec) -> Result<Self, PassError> {
-        Ok(Self { is_counted: false, ..Self::quiet(spec)? })
+    pub fn images_only(spec: &'e PipelineSpec) -> Result<Self, PassError> {
+        Ok(Self { is_counted: false, ..Self::without_packets(spec)? })
     }
 
     /// Functional parameters.
@@ -513,6 +512,7 @@ impl<'e> Gpu<'e> {
     }
 }
 
+// In `pass` it would make the two modules depend on each other.
 impl RasterPass<'_> {
     /// Visible triangle and bits of its depth of every sample, as in [`Rendered::visible`].
     ///
@@ -522,13 +522,13 @@ impl RasterPass<'_> {
         Ok(self.onto(Target::Depth).with_visible().render(|_, _| ())?.visible)
     }
 
-    /// Draws the pass for its images and what its samples see alone, as a [`Gpu::uncounted`] does. Whether it
+    /// Draws the pass for its images and what its samples see alone, as a [`Gpu::images_only`] does. Whether it
     /// was counted depends on the pass, so its counts mean nothing.
     ///
     /// # Errors
     /// As [`Gpu::draw`].
     pub fn uncounted(&self) -> Result<Rendered, PassError> {
-        Gpu::uncounted(self.settings.spec)?.draw(self)
+        Gpu::images_only(self.settings.spec)?.draw(self)
     }
 
     /// Draws the pass as the only one of a frame. The counts include writing the result back to memory.

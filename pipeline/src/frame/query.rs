@@ -435,7 +435,7 @@ impl SampledQueries<'_> {
     /// # Errors
     /// [`PassError`] if the hardware cannot draw it.
     pub fn ask(&self, objects: &[MovingBox]) -> Result<SampledAnswers, PassError> {
-        let mut gpu = Gpu::quiet(self.occluders.settings.spec)?;
+        let mut gpu = Gpu::without_packets(self.occluders.settings.spec)?;
         let query = if self.any { Query::Any } else { Query::Count };
         let answers = gpu.query_samples(&self.occluders.without_image(), query, objects)?;
         Ok(SampledAnswers { answers, report: gpu.finish() })

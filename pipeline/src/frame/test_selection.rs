@@ -287,12 +287,16 @@ struct Mean {
 }
 
 /// Total weight beyond which old values decay, in units of the weight of a new value.
-const MEMORY: f64 = 256.0;
+const MAX_WEIGHT_IN_SAMPLES: f64 = 256.0;
 
 impl Mean {
     /// Add `value` with `weight`.
     pub fn add(&mut self, value: f64, weight: f64) {
-        let kept = if self.weight > MEMORY * weight.max(1.0) { 1.0 - 1.0 / MEMORY } else { 1.0 };
+        let kept = if self.weight > MAX_WEIGHT_IN_SAMPLES * weight.max(1.0) {
+            1.0 - 1.0 / MAX_WEIGHT_IN_SAMPLES
+        } else {
+            1.0
+        };
         self.sum = self.sum * kept + value * weight;
         self.weight = self.weight * kept + weight;
     }

@@ -132,15 +132,16 @@ impl<N: Number> Offset<N> {
 
     /// Highest value, less an allowance for the rounding of the quotients.
     fn highest(&self) -> Option<N> {
-        let hair = N::constant(HAIR);
-        let max = self.max - self.max.abs() * hair;
+        let rounding = N::constant(MAX_RELATIVE_ROUNDING);
+        let max = self.max - self.max.abs() * rounding;
         let bounded = self.max < N::from(f32::INFINITY)
-            && (self.min == N::from(f32::NEG_INFINITY) || max >= self.min + self.min.abs() * hair);
+            && (self.min == N::from(f32::NEG_INFINITY) || max >= self.min + self.min.abs() * rounding);
         (self.possible && bounded).then_some(max)
     }
 }
 
-const HAIR: f64 = 1e-12;
+/// Bound of the rounding error of a quotient, relative to it.
+const MAX_RELATIVE_ROUNDING: f64 = 1e-12;
 
 /// The part of `range` in which a linear function with the given values at -1 and 1 is not negative.
 fn narrowed<N: Number>(range: [f32; 2], [start, end]: [N; 2], crossings: &mut u32) -> Option<[f32; 2]> {

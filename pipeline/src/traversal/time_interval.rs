@@ -58,12 +58,12 @@ impl TimeIntervals {
     }
 }
 
-/// Bound of the rounding error of a root, for a quadratic raised by [`RAISED`].
+/// Bound of the rounding error of a root, for a quadratic raised by [`RAISE_OF_LARGEST_COEFFICIENT`].
 const ROOT_ERROR: f64 = 4.0 * f64::EPSILON;
 
 /// Amount by which a quadratic is raised, relative to its largest coefficient. It is far above the rounding
 /// errors of the coefficients, the discriminant and the roots.
-const RAISED: f64 = 64.0 * f64::EPSILON;
+const RAISE_OF_LARGEST_COEFFICIENT: f64 = 64.0 * f64::EPSILON;
 
 /// Times at which the point `(x, y)`, in pixels from the centre of the image, is inside `triangle` and sees
 /// its clockwise face, and those at which it sees the other face. `shear` only says whether the view is
@@ -115,7 +115,7 @@ fn times<N: Number>(
     let edges = [edge(1, 2), edge(2, 0), edge(0, 1)];
     // Magnitude of the terms that cancel in an edge.
     let size = [0, 1].map(|axis| ends.iter().flatten().map(|p| p[axis].abs()).fold(N::zero(), N::max));
-    let raised = N::constant(RAISED);
+    let raised = N::constant(RAISE_OF_LARGEST_COEFFICIENT);
     let largest = [0, 1].map(|axis| largest(&number, at[axis], axis, triangle, shear));
     // The second term is the error of an edge by the rounding of positions.
     let error = raised * (size[0] * size[1]) + raised * (largest[0] * size[1] + largest[1] * size[0]);

@@ -72,7 +72,7 @@ fn drawn(of: &Triangles, per_pixel: u32, (centroid, moves): (bool, bool), image:
     let (stage, spec) = (stage(per_pixel), spec(Features::ALL));
     let settings =
         Settings { spec: &spec, viewport: stage.viewport, samples: &stage.table, background: Vec3::ZERO };
-    let mut gpu = Gpu::quiet(&spec).unwrap();
+    let mut gpu = Gpu::without_packets(&spec).unwrap();
     let surface = |gpu: &mut Gpu<'_>, name, format| {
         gpu.create_surface(&SurfaceSpec::new(name, stage.viewport, format).sampled(per_pixel))
     };

@@ -44,7 +44,7 @@ fn run(
     program: impl Fn(&mut Group<'_>, Buffer<u32>) + Sync,
 ) -> Result<(Counts, Vec<u32>), PassError> {
     let spec = hardware();
-    let mut gpu = Gpu::quiet(&spec)?;
+    let mut gpu = Gpu::without_packets(&spec)?;
     let buffer = gpu.buffer("data", data);
     let shader = Program(|group: &mut Group<'_>| program(group, buffer));
     let bindings = [buffer.writes()];
@@ -336,7 +336,10 @@ fn refused(error: PassError, says: &str) {
 fn what_the_hardware_lacks_is_refused() {
     let idle = Program(|_: &mut Group<'_>| ());
     let without = spec(Features::ALL);
-    refused(Gpu::quiet(&without).unwrap().dispatch(&pass(1, 32, &[], &idle)).unwrap_err(), "no compute unit");
+    refused(
+        Gpu::without_packets(&without).unwrap().dispatch(&pass(1, 32, &[], &idle)).unwrap_err(),
+        "no compute unit",
+    );
     let nothing = |_: &mut Group<'_>, _: Buffer<u32>| ();
     refused(
         run(&[0], (1, 257, 0), nothing).unwrap_err(),
@@ -368,7 +371,7 @@ fn faults_of_programs_name_group_lane_and_buffer() {
     let race = "lane 1: word 0 of the shared memory is used by another lane";
     refused(fault(|lane, _| lane.set_shared(0, lane.index())), race);
     let spec = hardware();
-    let mut gpu = Gpu::quiet(&spec).unwrap();
+    let mut gpu = Gpu::without_packets(&spec).unwrap();
     let buffer = gpu.buffer("input", &[0_u32; 32]);
     let stores = Program(|group: &mut Group<'_>| group.lanes(|lane| lane.store(buffer, lane.index(), 1)));
     for bindings in [&[buffer.reads()][..], &[]] {

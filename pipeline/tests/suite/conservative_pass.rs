@@ -152,7 +152,7 @@ fn lanes_of_a_full_screen_pass_wait_for_their_warp() {
     let quads = PipelineSpec { warp_lanes: 4, ..spec(Features::ALL) };
     let spec = spec(Features::ALL);
     let wait = |spec: &PipelineSpec, at: [u32; 2]| {
-        let mut gpu = Gpu::quiet(spec).unwrap();
+        let mut gpu = Gpu::without_packets(spec).unwrap();
         let drawn = gpu.shade_pixels("wait", Viewport::new(16, 8).unwrap(), |lanes, pixel| {
             let ops = if pixel == at { 50 } else { 3 };
             lanes.run(|lane| (0..ops).for_each(|_| assert!(lane.add(1.0, 2.0) > 0.0)));
@@ -164,7 +164,7 @@ fn lanes_of_a_full_screen_pass_wait_for_their_warp() {
     assert_eq!(wait(&quads, [5, 3]), 3 * 124 + 4 * 50);
     assert_eq!(wait(&spec, [5, 3]), 3 * 96 + 32 * 50);
     let counts = |programs: fn([u32; 2]) -> Vec<u32>| {
-        let mut gpu = Gpu::quiet(&spec).unwrap();
+        let mut gpu = Gpu::without_packets(&spec).unwrap();
         let drawn = gpu.shade_pixels("steps", Viewport::new(16, 8).unwrap(), |lanes, at| {
             for ops in programs(at) {
                 lanes.run(|lane| (0..ops).for_each(|_| assert!(lane.add(1.0, 2.0) > 0.0)));
@@ -190,7 +190,7 @@ fn lanes_of_a_full_screen_pass_wait_for_their_warp() {
 fn a_full_screen_pass_runs_every_pixel() {
     let spec = spec(Features::ALL);
     let viewport = Viewport::new(21, 13).unwrap();
-    let mut gpu = Gpu::quiet(&spec).unwrap();
+    let mut gpu = Gpu::without_packets(&spec).unwrap();
     let source = gpu.allocate(4096);
     let drawn = gpu.shade_pixels("grey", viewport, |lanes, [x, y]| {
         lanes.fetch(source.address(), 4);
@@ -231,7 +231,7 @@ fn lanes_of_tiles_wait_for_those_of_their_program() {
     let primitives = [primitive([corners; 2], 0)];
     let ops = |warp_lanes: u32| {
         let spec = PipelineSpec { warp_lanes, ..spec(Features::ALL) };
-        let (mut gpu, mut tiles) = (Gpu::quiet(&spec).unwrap(), Vec::new());
+        let (mut gpu, mut tiles) = (Gpu::without_packets(&spec).unwrap(), Vec::new());
         let vertices = gpu.allocate(72);
         let draw = ConservativeDraw {
             primitives: &primitives,
@@ -263,7 +263,7 @@ fn heat_maps_have_the_work_on_tiles_in_their_pixels() {
         [primitive([corners; 2], 0), primitive([corners.map(|[x, y, z]| [x + 3.0, y, z]); 2], 1)];
     let (spec, viewport) = (spec(Features::ALL), Viewport::new(40, 24).unwrap());
     for block in [1, 3, 8] {
-        let mut gpu = Gpu::quiet(&spec).unwrap().with_heat(&Event::ALL, viewport);
+        let mut gpu = Gpu::without_packets(&spec).unwrap().with_heat(&Event::ALL, viewport);
         let [target, vertices] = [64 * 4, 3 * 24 * 2].map(|bytes| gpu.allocate(bytes));
         let shader = Merge { target, runs: AtomicU32::new(0) };
         let placement = Placement { first: [0.5, 1.0], last: [1.0, 0.0] };

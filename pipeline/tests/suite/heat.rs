@@ -13,7 +13,7 @@ fn maps(size: [u32; 2], spec: &PipelineSpec, draws: &[Draw<'_>], camera: &Camera
     let table = SampleTable::low_discrepancy(4, 3, LensShape::Disk).unwrap();
     let settings = Settings { spec, viewport, samples: &table, background: Vec3::ZERO };
     let pass = RasterPass::new(camera, draws, &settings);
-    let mut gpu = Gpu::quiet(spec).unwrap().with_heat(&Event::ALL, viewport);
+    let mut gpu = Gpu::without_packets(spec).unwrap().with_heat(&Event::ALL, viewport);
     let rendered = gpu.draw(&pass).unwrap();
     let report = gpu.finish();
     let plain = pass.render(|_, _| ()).unwrap();
@@ -110,7 +110,7 @@ fn passes_of_a_frame_add_up_on_one_map() {
     let table = SampleTable::low_discrepancy(4, 3, LensShape::Disk).unwrap();
     let (camera, draws) = (camera(true), [soup.draw(&Plain, Cull::None)]);
     let [image, map] = [[75, 53], [32, 32]].map(|[width, height]| Viewport::new(width, height).unwrap());
-    let mut gpu = Gpu::quiet(&spec).unwrap().with_heat(&Event::ALL, image);
+    let mut gpu = Gpu::without_packets(&spec).unwrap().with_heat(&Event::ALL, image);
     for viewport in [map, image, image] {
         let settings = Settings { spec: &spec, viewport, samples: &table, background: Vec3::ZERO };
         gpu.draw(&RasterPass::new(&camera, &draws, &settings)).unwrap();
@@ -150,7 +150,8 @@ fn farthest_depths_are_gathered_in_their_tiles() {
     for tile_px in [8, 16] {
         let gathered = |of: Viewport| {
             let pyramid = Pyramid::new(image, &table, &depths, tile_px, BoxGrid::new([1; 3], false).unwrap());
-            let mut gpu = Gpu::quiet(&spec).unwrap().with_heat(&[Event::DepthReads, Event::ZCullTests], of);
+            let mut gpu =
+                Gpu::without_packets(&spec).unwrap().with_heat(&[Event::DepthReads, Event::ZCullTests], of);
             let stored = gpu.allocate(4 * depths.len() as u64);
             gpu.gather_farthest_depths("farthest depths", &pyramid, stored);
             gpu.finish().heat

@@ -94,7 +94,7 @@ fn painted<T>(
     let (stage, spec) = (Stage::sampled(size[0], size[1], 1), spec(Features::ALL));
     let settings =
         Settings { spec: &spec, viewport: stage.viewport, samples: &stage.table, background: Vec3::ZERO };
-    let mut gpu = Gpu::quiet(&spec).unwrap();
+    let mut gpu = Gpu::without_packets(&spec).unwrap();
     let id = gpu.create_surface(&SurfaceSpec::new("bloom", stage.viewport, format).mipmapped());
     let shader = Painted(paint);
     let geometry = Geometry::new(&SCREEN, &SCREEN, &[[0, 1, 2]]).unwrap();

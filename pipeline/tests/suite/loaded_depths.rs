@@ -17,7 +17,7 @@ fn screen(depth: f32) -> [Vec3; 3] {
 fn over_loaded(spec: &PipelineSpec, depths: &[f32]) -> Counts {
     let stage = Stage::sampled(16, 16, 1);
     let settings = Settings { spec, viewport: stage.viewport, samples: &stage.table, background: Vec3::ZERO };
-    let mut gpu = Gpu::quiet(spec).unwrap();
+    let mut gpu = Gpu::without_packets(spec).unwrap();
     let surface = gpu.create_surface(&SurfaceSpec::new("depth", stage.viewport, Format::D32));
     let mut draw = |depth: Attachment<Clear>, at: &[f32]| {
         let corners: Vec<[Vec3; 3]> = at.iter().map(|depth| screen(*depth)).collect();

@@ -74,7 +74,7 @@ fn target(gpu: &mut Gpu<'_>) -> SurfaceId {
 /// Values and events of a pass that loads words of a buffer of `words`.
 fn loaded(words: u32, step: u32, more: u32) -> (Vec<f32>, Counts) {
     let spec = hardware();
-    let mut gpu = Gpu::quiet(&spec).unwrap();
+    let mut gpu = Gpu::without_packets(&spec).unwrap();
     let data: Vec<f32> = (0..words).map(|word| word as f32).collect();
     let (buffer, target) = (gpu.buffer("data", &data), target(&mut gpu));
     let counts =
@@ -161,11 +161,11 @@ fn a_draw_waits_for_the_groups_that_wrote_what_it_loads_and_they_for_it() {
 #[test]
 fn a_buffer_that_is_not_bound_reads_as_zero_and_one_of_another_frame_is_refused() {
     let spec = hardware();
-    let mut gpu = Gpu::quiet(&spec).unwrap();
+    let mut gpu = Gpu::without_packets(&spec).unwrap();
     let (buffer, to) = (gpu.buffer("data", &[1.0_f32; 256]), target(&mut gpu));
     fill(&mut gpu, to, &Loads { buffer, step: 1, more: 0 }, &[]).unwrap();
     assert_eq!(gpu.contents(to).unwrap(), vec![Vec4::new(0.0, 0.0, 0.0, 1.0); 256]);
-    let mut other = Gpu::quiet(&spec).unwrap();
+    let mut other = Gpu::without_packets(&spec).unwrap();
     let to = target(&mut other);
     let bindings = [Binding::Buffer(buffer.reads())];
     let error = fill(&mut other, to, &Loads { buffer, step: 1, more: 0 }, &bindings).unwrap_err();
@@ -216,7 +216,7 @@ fn helper_lanes_load_and_a_warp_waits_for_its_longest_lane() {
         [(4, by_quad.iter().map(|last| 4 * (last + 1)).sum::<u64>()), (32, 32 * (8 + 1) + 8 * (4 + 1))]
     {
         let spec = PipelineSpec { warp_lanes, ..spec(Features::ALL) };
-        let mut gpu = Gpu::quiet(&spec).unwrap();
+        let mut gpu = Gpu::without_packets(&spec).unwrap();
         let buffer = gpu.buffer("data", &[1.0_f32; 256]);
         let bindings = [Binding::Buffer(buffer.reads())];
         let shader = Uneven(buffer);

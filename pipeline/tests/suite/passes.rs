@@ -98,7 +98,7 @@ fn data_that_are_drawn_twice_are_read_from_memory_once() {
     let draws = [soup.draw(&Plain, Cull::None)];
     let read = |resident: bool| {
         with(|settings| {
-            let mut gpu = Gpu::quiet(settings.spec).unwrap();
+            let mut gpu = Gpu::without_packets(settings.spec).unwrap();
             let draws = if resident { gpu.resident(&draws) } else { draws.to_vec() };
             let camera = camera(false);
             let pass = RasterPass::new(&camera, &draws, settings).onto(Target::Depth);
@@ -152,7 +152,7 @@ fn a_frame_that_is_too_large_names_its_pass() {
     let soup = Soup::new(SoupKind::Still, 1, 1);
     let draws = [soup.draw(&Plain, Cull::None)];
     with(|settings| {
-        let mut gpu = Gpu::quiet(settings.spec).unwrap();
+        let mut gpu = Gpu::without_packets(settings.spec).unwrap();
         gpu.allocate(memory::AddressSpace::END);
         let camera = camera(false);
         let error = gpu.draw(&RasterPass::new(&camera, &draws, settings).named("shadow")).unwrap_err();

@@ -183,7 +183,7 @@ fn what_a_query_cannot_do_is_refused() {
         let expected = PassError::QueryStores { pass: "draw".to_owned(), draw: 0 };
         assert_eq!(drawn.err(), is_refused.then_some(expected));
     }
-    let mut gpu = Gpu::quiet(&spec).unwrap();
+    let mut gpu = Gpu::without_packets(&spec).unwrap();
     let depth = gpu.create_surface(&SurfaceSpec::new("depths", stage.viewport, Format::D32));
     let never = Attachments { colours: Vec::new(), depth: Some(Attachment::loaded(depth)) };
     let pass = RasterPass::new(&stage.camera, &[], &settings).onto(Target::Surfaces(&never));
@@ -215,12 +215,12 @@ fn answers_reach_memory() {
     let grid = BoxGrid::new([1; 3], false).unwrap();
     let pyramid = Pyramid::new(stage.viewport, &stage.table, &depths, 8, grid);
     let projection = Projection::new(&stage.camera, stage.viewport);
-    let mut gpu = Gpu::quiet(&spec).unwrap();
+    let mut gpu = Gpu::without_packets(&spec).unwrap();
     gpu.query_boxes("queries", &IntervalQueries::new(&pyramid, &projection), &boxes);
     assert_eq!(written(&gpu.finish()), [21, 128]);
 
     for query in [Query::Any, Query::Count] {
-        let mut gpu = Gpu::quiet(&spec).unwrap();
+        let mut gpu = Gpu::without_packets(&spec).unwrap();
         let pass = RasterPass::new(&stage.camera, &[], &settings).onto(Target::Depth);
         gpu.query_samples(&pass, query, &boxes).unwrap();
         let report = gpu.finish();

@@ -86,7 +86,8 @@ fn samples_pixels_and_lines_are_counted() {
 fn a_raster_pass_and_a_resolve_give_the_same_image() {
     with(|stage, settings| {
         let corners = rectangle([-5.3, 6.1], [-3.2, 7.7], 1.0);
-        let (mut one, mut two) = (Gpu::quiet(settings.spec).unwrap(), Gpu::quiet(settings.spec).unwrap());
+        let (mut one, mut two) =
+            (Gpu::without_packets(settings.spec).unwrap(), Gpu::without_packets(settings.spec).unwrap());
         let drawn = one.draw(&RasterPass::new(&stage.camera, &[still(&corners, &RED)], settings)).unwrap();
         let from = samples(&mut two, stage.viewport, Format::Rgba16f);
         draw(&mut two, stage, settings, from);
@@ -127,7 +128,7 @@ fn a_resolve_waits_for_those_that_read_what_it_writes() {
 #[test]
 fn what_has_no_mean_is_refused_by_name() {
     with(|stage, settings| {
-        let mut gpu = Gpu::quiet(settings.spec).unwrap();
+        let mut gpu = Gpu::without_packets(settings.spec).unwrap();
         let from = samples(&mut gpu, stage.viewport, Format::Rgba8);
         let refused = |gpu: &mut Gpu<'_>, from, to, start: &str| {
             let message = gpu.resolve(&ResolvePass::new("average", from), to).unwrap_err().to_string();
@@ -155,7 +156,8 @@ fn what_has_no_mean_is_refused_by_name() {
             let other = new(&mut gpu, "other", stage.viewport, format, 1);
             refused(&mut gpu, from, other, "other`: its format ");
         }
-        let elsewhere = new(&mut Gpu::quiet(settings.spec).unwrap(), "x", stage.viewport, Format::Rgba8, 1);
+        let elsewhere =
+            new(&mut Gpu::without_packets(settings.spec).unwrap(), "x", stage.viewport, Format::Rgba8, 1);
         assert!(gpu.resolve(&ResolvePass::new("average", from), elsewhere.level(9)).is_err());
         assert!(gpu.resolve(&ResolvePass::new("average", elsewhere.level(1)), to).is_err());
         gpu.resolve(&ResolvePass::new("average", from).dropping(), to).unwrap();
@@ -172,7 +174,7 @@ fn what_has_no_mean_is_refused_by_name() {
 #[test]
 fn sixty_four_passes_and_a_target_larger_than_memory() {
     with(|stage, settings| {
-        let mut gpu = Gpu::quiet(settings.spec).unwrap();
+        let mut gpu = Gpu::without_packets(settings.spec).unwrap();
         let from = samples(&mut gpu, stage.viewport, Format::R32f);
         let state = DrawState { depth: DepthState::NONE, blend: Blend::Add, ..DrawState::default() };
         let one = [Vec3::new(-8.0, -8.0, 1.0), Vec3::new(40.0, -8.0, 1.0), Vec3::new(-8.0, 40.0, 1.0)];

@@ -94,7 +94,7 @@ struct Step {
 }
 
 /// Random passes over the same triangles.
-struct Story {
+struct PassSequence {
     soup: Soup,
     optics: Optics,
     table: SampleTable,
@@ -128,7 +128,7 @@ fn load<V>(r: &mut Uniform, is_written: bool, clear: V) -> Load<V> {
     }
 }
 
-impl Story {
+impl PassSequence {
     fn new(kind: SoupKind, optics: Optics, per_pixel: u32, count: usize, seed: u64) -> Self {
         let mut r = Uniform::new(seed ^ 11);
         let mut formats: Vec<Format> = (0..5).map(|_| pick(&mut r, &COLOURS)).collect();
@@ -144,7 +144,7 @@ impl Story {
     fn drawn(&self, spec: &PipelineSpec) -> Contents {
         let settings =
             Settings { spec, viewport: viewport(), samples: &self.table, background: Vec3::splat(0.5) };
-        let mut gpu = Gpu::quiet(spec).unwrap();
+        let mut gpu = Gpu::without_packets(spec).unwrap();
         let samples = self.table.per_pixel();
         let surface = |gpu: &mut Gpu<'_>, format: Format| {
             gpu.create_surface(&SurfaceSpec::new("any", viewport(), format).sampled(samples))
@@ -468,19 +468,19 @@ proptest! {
         let spec = PipelineSpec {
             tile_px, coarse_tile_px, batch_triangles, depth, ..spec(Features { auto, hidden_surface_removal: waits, ..switched(switches) })
         };
-        let story = Story::new(kind, lens.into(), per_pixel, count, seed);
+        let sequence = PassSequence::new(kind, lens.into(), per_pixel, count, seed);
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        let ((ours, levels), (reference, wanted)) = (pool.install(|| story.drawn(&spec)), story.reference());
+        let ((ours, levels), (reference, wanted)) = (pool.install(|| sequence.drawn(&spec)), sequence.reference());
         let bits = |all: &[Option<Vec<Vec4>>]| -> Vec<Option<Vec<[u32; 4]>>> {
             all.iter().map(|one| Some(one.as_ref()?.iter().map(|v| v.to_array().map(f32::to_bits)).collect())).collect()
         };
         for (number, (ours, theirs)) in bits(&ours).iter().zip(bits(&reference)).enumerate() {
-            prop_assert!(*ours == theirs, "surface {number} of {:?} differs", story.formats[number]);
+            prop_assert!(*ours == theirs, "surface {number} of {:?} differs", sequence.formats[number]);
         }
         for (number, (ours, theirs)) in levels.iter().zip(&wanted).enumerate() {
             let ours: Option<Vec<_>> = ours.as_ref().map(|levels| levels.iter().map(PlainLevel::bits).collect());
             let theirs: Option<Vec<_>> = theirs.as_ref().map(|levels| levels.iter().map(PlainLevel::bits).collect());
-            prop_assert!(ours == theirs, "levels {number} of {:?} differ", story.resolved[number]);
+            prop_assert!(ours == theirs, "levels {number} of {:?} differ", sequence.resolved[number]);
         }
     }
 }
@@ -511,7 +511,7 @@ fn loads_stores_and_clears_are_counted() {
         // One of four tiles is covered.
         let tile = rectangle([-8.0, 0.0], [0.0, 8.0], 1.0);
         let count = |load: bool, store: Store| {
-            let mut gpu = Gpu::quiet(settings.spec).unwrap();
+            let mut gpu = Gpu::without_packets(settings.spec).unwrap();
             let surface = |gpu: &mut Gpu<'_>, format| {
                 gpu.create_surface(&SurfaceSpec::new("s", stage.viewport, format))
             };
@@ -655,7 +655,7 @@ fn refusal(
     state: DrawState,
 ) -> String {
     with(|stage, settings| {
-        let mut gpu = Gpu::quiet(settings.spec).unwrap();
+        let mut gpu = Gpu::without_packets(settings.spec).unwrap();
         let (targets, read) = prepare(&mut gpu, stage.viewport);
         let bindings: Vec<Binding<'_>> = read.into_iter().map(Binding::Surface).collect();
         let corners = screen(1.0);
@@ -760,7 +760,7 @@ fn what_surfaces_cannot_do_is_refused_by_name() {
     let dropped = refusal(
         |gpu, size| {
             let other = with(|stage, settings| {
-                let mut gpu = Gpu::quiet(settings.spec).unwrap();
+                let mut gpu = Gpu::without_packets(settings.spec).unwrap();
                 (0..9).map(|_| albedo(&mut gpu, stage.viewport)).last().unwrap()
             });
             (to(&[albedo(gpu, size)]), vec![other])
@@ -787,7 +787,7 @@ fn feedback_names_both_draws() {
     let masked = DrawState { colour_mask: [false; 4], ..flat() };
     let message = |states: [DrawState; 3], is_depth: bool, is_viewed: bool| {
         with(|stage, settings| {
-            let mut gpu = Gpu::quiet(settings.spec).unwrap();
+            let mut gpu = Gpu::without_packets(settings.spec).unwrap();
             let [colour, depth] = [("albedo", Format::Rgba8), ("depth", Format::D32)]
                 .map(|(name, format)| gpu.create_surface(&SurfaceSpec::new(name, stage.viewport, format)));
             let mut targets = to(&[colour]);
@@ -831,7 +831,7 @@ fn feedback_names_both_draws() {
 #[test]
 fn dropped_contents_are_gone() {
     with(|stage, settings| {
-        let mut gpu = Gpu::quiet(settings.spec).unwrap();
+        let mut gpu = Gpu::without_packets(settings.spec).unwrap();
         let id = gpu.create_surface(&SurfaceSpec::new("s", stage.viewport, Format::Rgba8));
         let corners = screen(1.0);
         let draws = [still(&corners, &RED).with_state(flat())];
@@ -852,7 +852,7 @@ fn dropped_contents_are_gone() {
 #[test]
 fn a_pass_reads_what_earlier_passes_stored_and_never_what_later_ones_will() {
     with(|stage, settings| {
-        let mut gpu = Gpu::quiet(settings.spec).unwrap();
+        let mut gpu = Gpu::without_packets(settings.spec).unwrap();
         let [one, two] = ["one", "two"]
             .map(|name| gpu.create_surface(&SurfaceSpec::new(name, stage.viewport, Format::R32f)));
         let corners = screen(1.0);

@@ -16,8 +16,8 @@ fn bits(drawn: &Rendered) -> Bits {
 /// Draws a pass with and without counts, compares both, and returns whether it was drawn without.
 fn is_uncounted(pass: &RasterPass<'_>, what: &str) -> bool {
     let pass = pass.with_visible();
-    let counted = Gpu::quiet(pass.settings.spec).unwrap().draw(&pass).unwrap();
-    let mut gpu = Gpu::uncounted(pass.settings.spec).unwrap();
+    let counted = Gpu::without_packets(pass.settings.spec).unwrap().draw(&pass).unwrap();
+    let mut gpu = Gpu::images_only(pass.settings.spec).unwrap();
     let drawn = gpu.draw(&pass).unwrap();
     assert!(bits(&counted) == bits(&drawn), "{what}");
     assert!(counted.counts.reported().any(|(_, count)| count > 0));

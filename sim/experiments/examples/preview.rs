@@ -7,7 +7,7 @@ use std::path::Path;
 use experiments::all;
 use experiments::study::Request;
 use output::OutDir;
-use output::plot::Look;
+use output::plot::PlotStyle;
 use output::terminal::Progress;
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -19,10 +19,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         return Ok(());
     };
     let study = all().find(|study| study.name == name).ok_or("unknown study")?;
-    let (look, progress) = (Look::default(), Progress::new(true));
+    let (plot_style, progress) = (PlotStyle::default(), Progress::new(true));
     let done = OutDir::with(Path::new(folder), study.claim(), |dir| {
-        let look = &look;
-        study.run(&Request { quick: true, scenes: &[], seed: None, dir, look, progress: &progress })
+        let plot_style = &plot_style;
+        study.run(&Request { quick: true, scenes: &[], seed: None, dir, plot_style, progress: &progress })
     })??;
     print!("{}", done.text);
     println!("{} points between speed and accuracy", done.tradeoff.len());

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use activity::Event;
-use output::plot::Look;
+use output::plot::PlotStyle;
 use pipeline::frame::HeatMap;
 use power_model::Bound;
 use serde::{Deserialize, Serialize, Serializer};
@@ -158,7 +158,7 @@ pub struct RunOptions {
     /// Quantities of the heat maps.
     pub heat: Vec<HeatQuantity>,
     /// Width, title and font size of plots.
-    pub plot_style: Look,
+    pub plot_style: PlotStyle,
 }
 
 /// Serializes a path as text. Bytes that are not Unicode are replaced, so that writing the summary cannot
@@ -200,7 +200,7 @@ impl Default for RunOptions {
             seed: 1,
             exr: false,
             heat: Vec::new(),
-            plot_style: Look::default(),
+            plot_style: PlotStyle::default(),
         }
     }
 }

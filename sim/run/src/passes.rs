@@ -2,8 +2,8 @@
 
 use std::collections::{BTreeMap, HashSet};
 
-use activity::{Counts, Event, Packet, Unit};
-use output::plot::{Look, Picture, StallLane, UnitPlot};
+use activity::{Counts, Event, Packet, S_PER_PS, Unit};
+use output::plot::{Picture, PlotStyle, StallLane, UnitPlot};
 use pipeline::{FrameReport, PassReport};
 use power_model::{FramePower, Part, PowerModel};
 use serde::Serialize;
@@ -159,7 +159,7 @@ struct Group<'a> {
 }
 
 fn seconds(time_ps: u64) -> f64 {
-    time_ps as f64 * 1e-12
+    time_ps as f64 * S_PER_PS
 }
 
 /// Adds the passes of a frame. `timed_j` is its energy besides the events, between two times. Draws that
@@ -303,7 +303,7 @@ fn lane(stalls: &Stalls, unit: Unit) -> impl Iterator<Item = [f64; 3]> {
 }
 
 /// Plot of the stalls in a frame; `None` if they are not recorded.
-pub(super) fn stall_picture(frame: &RunFrame, subject: &str, look: &Look) -> Option<Picture> {
+pub(super) fn stall_picture(frame: &RunFrame, subject: &str, plot_style: &PlotStyle) -> Option<Picture> {
     let observed = frame.observed()?;
     let stalls = observed.stalls.as_ref()?;
     let group = stalls.intervals().len().div_ceil(MAX_COLUMNS).max(1);
@@ -320,8 +320,8 @@ pub(super) fn stall_picture(frame: &RunFrame, subject: &str, look: &Look) -> Opt
         StallLane { name: unit.name(), shares: shares.chunks(group).map(mean).collect(), bottleneck }
     };
     let units = Unit::ALL.into_iter().filter(|&unit| observed.counts.uses(unit)).map(of).collect();
-    let bin_s = stalls.interval_ps() as f64 * 1e-12 * group as f64;
-    Some(UnitPlot { subject, frame: u64::from(frame.index), bin_s, units }.picture(look))
+    let bin_s = stalls.interval_ps() as f64 * S_PER_PS * group as f64;
+    Some(UnitPlot { subject, frame: u64::from(frame.index), bin_s, units }.picture(plot_style))
 }
 
 /// Names of the tracks, in the order of units.

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use activity::{Counts, Unit};
+use activity::{Counts, S_PER_PS, Unit};
 use output::MeanSd;
 use output::report::Headline;
 use power_model::Energy;
@@ -353,7 +353,7 @@ fn unit_busy(simulated: &Simulated) -> BTreeMap<&'static str, f64> {
     let time: f64 = simulated.in_order().map(|frame| frame.power.duration_s()).sum();
     let busy = |unit: Unit| {
         let ps: u64 = simulated.in_order().map(|frame| frame.busy_ps[unit as usize]).sum();
-        ps as f64 * 1e-12 / time
+        ps as f64 * S_PER_PS / time
     };
     Unit::ALL.into_iter().filter(|&unit| total.uses(unit)).map(|unit| (unit.name(), busy(unit))).collect()
 }

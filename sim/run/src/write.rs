@@ -1,6 +1,6 @@
 //! Files of a run.
 
-use activity::{Packet, Unit};
+use activity::{Packet, S_PER_PS, Unit};
 use output::dir::{Claim, OutDir, SUMMARY};
 use output::terminal::Progress;
 use pipeline::PassReport;
@@ -148,7 +148,7 @@ fn passes(observed: &Observed, start_s: f64, most: usize) -> Vec<PassSpan> {
     if observed.times.len() > most {
         return Vec::new();
     }
-    let at = |ps: u64| ns(start_s + ps as f64 * 1e-12);
+    let at = |ps: u64| ns(start_s + ps as f64 * S_PER_PS);
     let mut before_ps = 0;
     let span = |((pass, time), number): ((&PassReport, &PassTime), u32)| {
         let start_ps = std::mem::replace(&mut before_ps, time.end_ps);

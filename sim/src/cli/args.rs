@@ -4,7 +4,7 @@ use std::ffi::OsString;
 use std::ops::Range;
 
 use clap::{Args, ColorChoice, ValueEnum};
-use output::plot::{COLUMN_MM, Look, undrawable};
+use output::plot::{COLUMN_MM, PlotStyle, undrawable};
 use output::terminal::{self, Terminal, Verbosity};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use workloads::Overrides;
@@ -31,7 +31,7 @@ impl ThreadArgs {
 /// Style of pictures. By default each picture has its own width, and text for a screen.
 #[derive(Clone, Debug, Default, Args)]
 #[command(next_help_heading = "Pictures")]
-pub struct LookArgs {
+pub struct PlotStyleArgs {
     /// Width of pictures in millimetres, 30 to 400, or `column` for 85 mm; text is then 8 points high
     #[arg(long, value_name = "MM|column", allow_negative_numbers = true, value_parser = width)]
     pub width: Option<f64>,
@@ -44,10 +44,10 @@ pub struct LookArgs {
     pub font_size: Option<f64>,
 }
 
-impl LookArgs {
+impl PlotStyleArgs {
     /// The flags as a style.
-    pub fn look(&self) -> Look {
-        Look { width_mm: self.width, font_pt: self.font_size, title: self.title.clone() }
+    pub fn plot_style(&self) -> PlotStyle {
+        PlotStyle { width_mm: self.width, font_pt: self.font_size, title: self.title.clone() }
     }
 }
 

@@ -12,14 +12,14 @@ use experiments::stress::{Report, StressEffort, family_named};
 use experiments::study::tradeoff::{self, Index, Section};
 use experiments::study::{Done, Entry, Request, Study, StudyError};
 use experiments::{ALL, CHARTS, all};
-use output::plot::Look;
+use output::plot::PlotStyle;
 use output::terminal::{Progress, Terminal};
 use output::{Destination, OutDir, OutputError};
 use run::RunError;
 use serde_json::{Map, Value};
 
 use super::{Failure, print, print_json};
-use crate::cli::args::{LookArgs, ThreadArgs};
+use crate::cli::args::{PlotStyleArgs, ThreadArgs};
 use crate::cli::parse::named;
 
 /// Arguments of `stress`.
@@ -46,7 +46,7 @@ pub struct StressArgs {
     pub json: bool,
     /// Style of pictures.
     #[command(flatten)]
-    pub look: LookArgs,
+    pub plot_style: PlotStyleArgs,
 }
 
 /// Arguments of `chart`.
@@ -81,7 +81,7 @@ pub struct ChartArgs {
     pub json: bool,
     /// Style of pictures.
     #[command(flatten)]
-    pub look: LookArgs,
+    pub plot_style: PlotStyleArgs,
 }
 
 /// A chart, or all of them.
@@ -169,14 +169,15 @@ pub(super) fn run(args: &ChartArgs, terminal: &Terminal) -> Result<(), Failure> 
         workloads::load(scene).map_err(RunError::from)?;
     }
     let pool = args.threads.pool()?;
-    let (look, progress) = (args.look.look(), Progress::on(terminal, args.json));
+    let (plot_style, progress) = (args.plot_style.plot_style(), Progress::on(terminal, args.json));
     let make = |study: &Entry, dir: &OutDir| {
         let ChartArgs { quick, ref scene, seed, .. } = *args;
-        let request = Request { quick, scenes: scene, seed, dir, look: &look, progress: &progress };
+        let request =
+            Request { quick, scenes: scene, seed, dir, plot_style: &plot_style, progress: &progress };
         Ok(study.run(&request)?)
     };
     match args.chart {
-        ChartArg::All => pool.install(|| run_all(args, &mut dir, &look, make)),
+        ChartArg::All => pool.install(|| run_all(args, &mut dir, &plot_style, make)),
         ChartArg::One(chart) => {
             let done = pool.install(|| make(chart, &dir))?;
             dir.publish()?;
@@ -206,7 +207,7 @@ fn show(done: &Done, json: bool, out: &Path) -> Result<(), Failure> {
 fn run_all(
     args: &ChartArgs,
     dir: &mut OutDir,
-    look: &Look,
+    plot_style: &PlotStyle,
     make: impl Fn(&Entry, &OutDir) -> Result<Done, Failure>,
 ) -> Result<(), Failure> {
     let (mut json, mut faults) = (Map::new(), Vec::new());
@@ -229,7 +230,7 @@ fn run_all(
         page.sections.push(Section { name, about, text, took_s, ..Section::default() }.with_files(files));
         page.tradeoff.points.extend(tradeoff);
         // After each, so that what there is can be looked at while the next one runs.
-        page.write(dir, look).map_err(|error| Failure { message: error.to_string(), code: 1 })?;
+        page.write(dir, plot_style).map_err(|error| Failure { message: error.to_string(), code: 1 })?;
         dir.publish()?;
     }
     match args.json {
@@ -259,7 +260,7 @@ pub(super) fn stress(args: &StressArgs, terminal: &Terminal) -> Result<(), Failu
     let only = args.family.as_deref().map(family_named).transpose()?;
     let effort = StressEffort { only, quick: args.quick };
     let report = pool.install(|| Report::measure(effort, &[], &progress))?;
-    let done = Done::new(&report, &dir, &args.look.look())?;
+    let done = Done::new(&report, &dir, &args.plot_style.plot_style())?;
     dir.publish()?;
     show(&done, args.json, &args.out)
 }

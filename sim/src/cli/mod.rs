@@ -13,6 +13,7 @@ mod parse;
 mod record;
 mod run;
 mod sample;
+mod signals;
 mod sweep;
 mod trace;
 mod visibility;
@@ -32,10 +33,11 @@ use clap::error::ErrorKind;
 use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 use clap_mangen::Man;
 use compare::CompareArgs;
-use crash::{Crashes, Stop};
+use crash::Crashes;
 use info::InfoArgs;
 use output::terminal::Terminal;
 use run::RunArgs;
+use signals::Stop;
 use trace::TraceArgs;
 use traces::align::AlignError;
 use traces::frames::MarkError;
@@ -139,7 +141,7 @@ pub fn main() -> ExitCode {
     let terminal = cli.messages.terminal();
     let stop = Stop::default();
     let follows_stop = matches!(&cli.command, Command::Sweep(args) if args.follows_stop());
-    crash::handle(terminal.clone(), follows_stop.then(|| stop.clone()));
+    signals::handle(terminal.clone(), follows_stop.then(|| stop.clone()));
     let crashes = Crashes::record();
     match std::panic::catch_unwind(AssertUnwindSafe(|| dispatch(&cli, &terminal, &stop))) {
         Ok(Ok(())) => ExitCode::SUCCESS,

@@ -21,7 +21,7 @@ use timing::Level;
 use workloads::job::OptionSource;
 
 use super::{Failure, json_text, lists, print};
-use crate::cli::args::{LookArgs, SceneArgs, ThreadArgs};
+use crate::cli::args::{PlotStyleArgs, SceneArgs, ThreadArgs};
 use crate::cli::parse::{duration, named, percent, rate, setting, share_below_one};
 
 /// Arguments of `run`.
@@ -126,7 +126,7 @@ pub struct RunArgs {
     pub json: bool,
     /// Style of pictures.
     #[command(flatten)]
-    pub look: LookArgs,
+    pub plot_style: PlotStyleArgs,
 }
 
 /// Value of `--timing`: a timing level for every frame, or sampled simulation.
@@ -375,7 +375,7 @@ fn options(args: &RunArgs) -> RunOptions {
         seed: args.seed,
         exr: args.exr,
         heat: args.heat.clone(),
-        plot_style: args.look.look(),
+        plot_style: args.plot_style.plot_style(),
     }
 }
 

@@ -1,6 +1,6 @@
 //! Plots as files: real text in SVG, letters without any system font in PNG, the same bytes every time.
 
-use output::plot::{FrameEnergyPlot, FrameEnergyPoint, Look, Picture, PowerRun};
+use output::plot::{FrameEnergyPlot, FrameEnergyPoint, Picture, PlotStyle, PowerRun};
 use output::{Claim, Destination};
 
 fn picture(subject: &str, power_w: &[f64]) -> Picture {
@@ -13,7 +13,7 @@ fn picture(subject: &str, power_w: &[f64]) -> Picture {
         true_starts_s: &[0.001, 0.002],
         mark_s: Some((0.001, 0.0015)),
     };
-    run.picture(&Look::default())
+    run.picture(&PlotStyle::default())
 }
 
 fn wave() -> Vec<f64> {
@@ -70,7 +70,7 @@ fn the_same_input_gives_the_same_bytes_on_any_thread() {
 #[test]
 fn an_empty_plot_says_so() {
     let empty = FrameEnergyPlot { subject: "tiny", frames: &[], measured_j: None, pixels: 1 };
-    assert!(empty.picture(&Look::default()).svg().unwrap().contains("no frames to show"));
+    assert!(empty.picture(&PlotStyle::default()).svg().unwrap().contains("no frames to show"));
     assert!(picture("tiny", &[]).svg().unwrap().contains("no samples to show"));
 }
 
@@ -79,7 +79,7 @@ fn the_second_axis_is_energy_per_pixel() {
     let frames =
         [0.5, 0.6].map(|energy| FrameEnergyPoint { frame: 0, measured_j: Some(energy), true_j: None });
     let plot = FrameEnergyPlot { subject: "tiny", frames: &frames, measured_j: None, pixels: 1_000_000 };
-    let svg = plot.picture(&Look::default()).svg().unwrap();
+    let svg = plot.picture(&PlotStyle::default()).svg().unwrap();
     assert!(svg.contains("energy per frame (mJ)") && svg.contains("energy per pixel (nJ)"));
 }
 

@@ -21,7 +21,7 @@ fn svg() -> String {
         samples: &samples,
         frame_j: None,
     };
-    frame.picture(&plot::Look::default()).svg().unwrap()
+    frame.picture(&plot::PlotStyle::default()).svg().unwrap()
 }
 
 fn frames(text: &str, number: f64) -> Vec<FrameRow> {

@@ -1,6 +1,7 @@
 //! Layering: allowed dependencies between crates and between modules, and rules of every crate.
 
 mod modules;
+mod opened;
 mod packets;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -209,18 +210,75 @@ fn only_sim_ends_the_process() {
 /// Inputs of a run are recorded where they are opened; no other place opens files there.
 #[test]
 fn inputs_are_opened_in_one_place() {
-    let ways = ["fs::read", "File::open", "OpenOptions"];
     let opener = Path::new("pipeline/activity/src/inputs.rs");
     for name in ["pipeline/activity", "pipeline", "workloads", "power-model"] {
         for file in rust_files(&root().join(name).join("src")).iter().filter(|file| !file.ends_with(opener)) {
-            let text = fs::read_to_string(file).expect("a source file");
-            // Unit tests come last in a file.
-            let code = text.split("#[cfg(test)]").next().unwrap_or_default();
-            for way in ways {
-                assert!(!code.contains(way), "{}: {way}: use activity::inputs", file.display());
-            }
+            let found = opened::opened(&fs::read_to_string(file).expect("a source file"));
+            assert!(found.is_empty(), "{}: {found:?}: use activity::inputs", file.display());
         }
     }
+}
+
+#[test]
+fn opened_files_are_found_behind_items_of_tests_and_not_in_them() {
+    let in_tests =
+        "#[cfg(test)]\nuse std::fs::File;\n#[cfg(test)]\nmod tests { fn f() { File::open(\"a\"); } }\n";
+    assert!(opened::opened(in_tests).is_empty());
+    for code in [
+        "fn f() { std::fs::read_to_string(\"a\"); }",
+        "fn f() { File::open(\"a\"); }",
+        "use std::fs::{self, read};",
+        "use std::fs as files;",
+        "use std::fs::*;",
+        "fn f() { OpenOptions::new(); }",
+        "fn f() { assert!(fs::read(\"a\").is_ok()); }",
+        "struct A;\nimpl A { #[cfg(test)] fn g() {} fn f() { fs::read(\"a\"); } }",
+    ] {
+        assert_eq!(opened::opened(&format!("{in_tests}{code}")).len(), 1, "{code}");
+    }
+    assert!(opened::opened("impl A { #[cfg(test)] fn g() { fs::read(\"a\"); } }").is_empty());
+}
+
+/// Files and folders by which `sim/build.rs` knows that the program changed, from the root.
+fn sources_of_the_revision() -> Vec<PathBuf> {
+    let text = fs::read_to_string(root().join("sim/build.rs")).expect("the build script");
+    let list = text.split("const SOURCES").nth(1).and_then(|rest| rest.split("];").next());
+    list.expect("a list of sources").split('"').skip(1).step_by(2).map(|path| root().join(path)).collect()
+}
+
+/// Files and folders that a source file compiles in.
+fn included(file: &Path, package: &Path) -> Vec<PathBuf> {
+    let text = fs::read_to_string(file).expect("a source file");
+    let calls = ["include_str!(", "include_bytes!("].into_iter().flat_map(|call| text.split(call).skip(1));
+    let own = "concat!(env!(\"CARGO_MANIFEST_DIR\"), \"/";
+    let path = |call: &str| {
+        let (base, rest) = match call.strip_prefix(own) {
+            Some(rest) => (package, rest),
+            None => (file.parent().expect("a folder"), call.strip_prefix('"').expect("a path")),
+        };
+        let path = base.join(rest.split('"').next().unwrap_or_default());
+        path.canonicalize().unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+    };
+    calls.map(path).collect()
+}
+
+#[test]
+fn the_revision_covers_all_that_is_compiled_in() {
+    let sources = sources_of_the_revision();
+    let sources = sources.iter().map(|path| path.canonicalize().expect("a source of the revision"));
+    let sources: Vec<PathBuf> = sources.collect();
+    let mut files = 0;
+    for package in workspace().workspace_packages() {
+        let folder = package.manifest_path.as_std_path().parent().expect("a package");
+        let code = folder.join("src");
+        let within = rust_files(&code).iter().flat_map(|file| included(file, folder)).collect::<Vec<_>>();
+        files += within.len();
+        for path in within.into_iter().chain([code.canonicalize().expect("a folder of sources")]) {
+            let is_covered = sources.iter().any(|source| path.starts_with(source));
+            assert!(is_covered, "{} is missing in SOURCES of sim/build.rs", path.display());
+        }
+    }
+    assert!(files > 15, "only {files} files are compiled in");
 }
 
 fn rust_files(folder: &Path) -> Vec<PathBuf> {

@@ -85,7 +85,8 @@ fn is_packet(of: &Type) -> bool {
     matches!(of, Type::Path(path) if ends_in_packet(&path.path))
 }
 
-fn is_test(attributes: &[Attribute]) -> bool {
+/// Whether an item is compiled for tests alone.
+pub(super) fn is_test(attributes: &[Attribute]) -> bool {
     attributes.iter().any(|attribute| {
         attribute.path().is_ident("test")
             || attribute.path().is_ident("cfg")

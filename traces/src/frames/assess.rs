@@ -391,6 +391,8 @@ mod tests {
     fn one_frame_more_or_less_is_no_matter() {
         let power = power(40);
         assert!(uncovered_work(&power, &every_100(1, 39)).is_none());
-        assert!(uncovered_work(&power, &every_100(0, 37)).unwrap().message.contains("about 3 frames"));
+        let warning = uncovered_work(&power, &every_100(0, 37)).unwrap();
+        assert_eq!(warning.code, Code::Uncovered);
+        assert!(warning.message.contains("about 3 frames"));
     }
 }

@@ -294,6 +294,8 @@ mod tests {
         let sigma = libm::sqrt(noise_variance(&noise));
         let flat = noise.chunks_exact(250).filter(|window| is_flat(window, sigma)).count();
         assert_eq!(flat, 20);
+        let warning = flat_mark([(0.5, &noise[..250])], sigma).unwrap();
+        assert_eq!(warning.code, Code::FlatMark);
         let edge = |window: &[f64]| -> Vec<f64> {
             window.iter().enumerate().map(|(at, watts)| watts + if at < 50 { 0.0 } else { 3.0 }).collect()
         };

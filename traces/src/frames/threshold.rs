@@ -46,9 +46,9 @@ pub enum Rule {
     /// and matches among many other minima are too few to sway Otsu's criterion.
     OtsuDistinct,
     /// The minima form one population far below the background: all are frame starts.
-    AllAlike,
+    AllMatch,
     /// No minimum is distinctly below the background: only the marks are kept.
-    NoneAlike,
+    NoneMatch,
     /// There was no minimum besides the marks.
     NoCandidates,
     /// Tracking has none: it takes the sequence of starts that has the most evidence as a whole.
@@ -246,7 +246,7 @@ fn all_similar(logs: &[f64], none: Threshold) -> Threshold {
     let background = libm::log(none.background_w2);
     Threshold {
         value_w2: none.noise_w2 + libm::exp(0.5 * (highest + background)),
-        rule: Rule::AllAlike,
+        rule: Rule::AllMatch,
         matched: Population { count: logs.len(), mean_w2: libm::exp(all.mean) },
         rest: Population { count: 0, mean_w2: none.background_w2 },
         separation: ratio(background - all.mean, all.deviation),
@@ -256,7 +256,7 @@ fn all_similar(logs: &[f64], none: Threshold) -> Threshold {
 
 fn none_similar(logs: &[f64], none: Threshold) -> Threshold {
     let rest = Population { count: logs.len(), mean_w2: libm::exp(moments(logs).mean) };
-    Threshold { value_w2: 0.0, rule: Rule::NoneAlike, rest, ..none }
+    Threshold { value_w2: 0.0, rule: Rule::NoneMatch, rest, ..none }
 }
 
 /// A ratio that stays finite, so that it can be written to JSON.
@@ -341,7 +341,7 @@ mod tests {
         // One frame in a trace of idle: two segments within it are nearer to its start than idle is.
         let distances: Vec<f64> =
             [121.9, 127.2].into_iter().chain((0..66).map(|i| 342.0 + 0.02 * f64::from(i))).collect();
-        assert_eq!(choose(&distances, 343.0, 0.002, 5.0, |_| 0.0).rule, Rule::NoneAlike);
+        assert_eq!(choose(&distances, 343.0, 0.002, 5.0, |_| 0.0).rule, Rule::NoneMatch);
     }
 
     #[test]
@@ -356,13 +356,13 @@ mod tests {
     fn one_low_population_is_all_frames_and_one_high_population_is_none() {
         let spread = |centre: f64| (0..50).map(move |i| centre * (1.0 + 0.01 * f64::from(i)));
         let low = choose(&spread(1.0).collect::<Vec<_>>(), 100.0, 0.5, 0.0, |_| 1.0);
-        assert_eq!((low.rule, low.matched.count), (Rule::AllAlike, 50));
+        assert_eq!((low.rule, low.matched.count), (Rule::AllMatch, 50));
         assert!(low.value_w2 > 1.5);
         let high = choose(&spread(80.0).collect::<Vec<_>>(), 100.0, 0.5, 0.0, |_| 1.0);
-        assert_eq!((high.rule, high.value_w2), (Rule::NoneAlike, 0.0));
+        assert_eq!((high.rule, high.value_w2), (Rule::NoneMatch, 0.0));
         assert_eq!(choose(&[], 100.0, 0.5, 0.0, |_| 1.0).rule, Rule::NoCandidates);
-        assert_eq!(choose(&[1.0, 1.0], 100.0, 0.5, 0.0, |_| 1.0).rule, Rule::AllAlike);
-        assert_eq!(choose(&[99.0, 99.0], 100.0, 0.5, 0.0, |_| 1.0).rule, Rule::NoneAlike);
+        assert_eq!(choose(&[1.0, 1.0], 100.0, 0.5, 0.0, |_| 1.0).rule, Rule::AllMatch);
+        assert_eq!(choose(&[99.0, 99.0], 100.0, 0.5, 0.0, |_| 1.0).rule, Rule::NoneMatch);
     }
 
     #[test]

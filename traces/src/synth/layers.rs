@@ -1,4 +1,4 @@
-//! What the devices of [`WITNESSES`](super::WITNESSES) are made with: power as a sum of spans, and random
+//! What the devices of [`HELD_OUT_DEVICES`](super::HELD_OUT_DEVICES) are made with: power as a sum of spans, and random
 //! numbers. Two of them: an interface that draws on demand, and a renderer whose frames overlap.
 
 use crate::stats::Random;
@@ -192,7 +192,7 @@ impl Interface {
     }
 }
 
-/// A witness: an interface that draws on demand.
+/// A held-out device: an interface that draws on demand.
 ///
 /// Nothing is drawn while nothing changes. A touch starts a run of frames at the rate of the display, some of
 /// which are late; a cursor or a clock draws a single one. What is drawn is anything from a small area to the
@@ -337,7 +337,7 @@ impl Chip {
     }
 }
 
-/// A witness: a tiled renderer whose frames overlap.
+/// A held-out device: a tiled renderer whose frames overlap.
 ///
 /// Three units work at once, on different frames: the processor prepares frame n + 2, geometry of n + 1 is
 /// binned, tiles of n are shaded. A frame starts where its binning does; that is the event a marker shows.

@@ -7,12 +7,12 @@
 //! resolution and noise. All random numbers are functions of (seed, purpose, frame, draw), so a longer scene
 //! begins like a shorter one.
 //!
-//! [`WITNESSES`] are four more devices of other structure, which share nothing with these scenes or each other.
+//! [`HELD_OUT_DEVICES`] are four more devices of other structure, which share nothing with these scenes or each other.
 
+mod held_out;
 mod layers;
-mod witness;
 
-pub use witness::{WITNESSES, Witness};
+pub use held_out::{HELD_OUT_DEVICES, HeldOutDevice};
 
 use crate::device::{Device, DeviceError, DeviceSpec, SampleError};
 use crate::energy::TrueFrame;

@@ -57,9 +57,12 @@ fn views(spec: &PipelineSpec) {
     for layout in [Layout::stereo(0.28, 0.11), Layout::line(7, 0.5, 0.11)] {
         let rig = Rig::new(&frame.camera, focus, &layout, 8, 1).unwrap();
         let passes = [layout.views as usize, rig.samples() as usize];
-        let one = time(|| _ = rig.one_pass(&draws, &to, &mut Gpu::quiet(to.spec).unwrap()).unwrap());
-        let each = time(|| _ = rig.view_by_view(&draws, &to, &mut Gpu::quiet(to.spec).unwrap()).unwrap());
-        let many = time(|| _ = rig.accumulated(&draws, &to, &mut Gpu::quiet(to.spec).unwrap()).unwrap());
+        let one =
+            time(|| _ = rig.one_pass(&draws, &to, &mut Gpu::without_packets(to.spec).unwrap()).unwrap());
+        let each =
+            time(|| _ = rig.view_by_view(&draws, &to, &mut Gpu::without_packets(to.spec).unwrap()).unwrap());
+        let many =
+            time(|| _ = rig.accumulated(&draws, &to, &mut Gpu::without_packets(to.spec).unwrap()).unwrap());
         let what = format!("{} views, 160x90, 8 samples", layout.views);
         print_row(&what, one, &[("view by view", passes[0], each), ("accumulation", passes[1], many)]);
     }
@@ -75,10 +78,12 @@ fn gloss(spec: &PipelineSpec) {
     for count in [16, 64] {
         let table = SampleTable::new(&SampleSpec::default(), count, 1).unwrap();
         let set = SharedSamples::interleaved(&SampleSpec::default(), count, 1).unwrap();
-        let one =
-            time(|| _ = map.one_pass(&draws, &table, Vec3::ZERO, &mut Gpu::quiet(spec).unwrap()).unwrap());
-        let many =
-            time(|| _ = map.accumulated(&draws, &set, Vec3::ZERO, &mut Gpu::quiet(spec).unwrap()).unwrap());
+        let one = time(|| {
+            _ = map.one_pass(&draws, &table, Vec3::ZERO, &mut Gpu::without_packets(spec).unwrap()).unwrap()
+        });
+        let many = time(|| {
+            _ = map.accumulated(&draws, &set, Vec3::ZERO, &mut Gpu::without_packets(spec).unwrap()).unwrap()
+        });
         let what = format!("glossy map, {}x128, {count} samples", map.viewport.width());
         print_row(&what, one, &[("accumulation", count as usize, many)]);
     }
@@ -95,7 +100,7 @@ fn shadows(spec: &PipelineSpec) {
         let set = SharedSamples::interleaved(&disk, count, 1).unwrap();
         let [one, many] = [Method::OnePass, Method::Accumulation].map(|method| {
             time(|| {
-                let gpu = &mut Gpu::quiet(spec).unwrap();
+                let gpu = &mut Gpu::without_packets(spec).unwrap();
                 _ = ShadowMap::new(&light, &draws, 256, &set, method, gpu).unwrap();
             })
         });

@@ -83,9 +83,9 @@ impl Point {
         let viewport = Viewport::new(self.size.0, self.size.1).unwrap();
         let to = Target { viewport, spec: &spec, background: scene.background(), places: &[] };
         let middle = (layout.views as usize - 1) / 2;
-        let all = rig.one_pass(&draws, &to, &mut Gpu::quiet(to.spec).unwrap()).unwrap().counts
+        let all = rig.one_pass(&draws, &to, &mut Gpu::without_packets(to.spec).unwrap()).unwrap().counts
             [Event::PixelInvocations];
-        let one = rig.view(middle, &draws, &to, &mut Gpu::quiet(to.spec).unwrap()).unwrap().counts
+        let one = rig.view(middle, &draws, &to, &mut Gpu::without_packets(to.spec).unwrap()).unwrap().counts
             [Event::PixelInvocations];
         all as f64 / one as f64 - 1.0
     }

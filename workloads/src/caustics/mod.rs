@@ -371,7 +371,7 @@ mod tests {
         let request = Request { overrides: &overrides, seed: 1 };
         let job = job(&OptionSource { file: None, set }, &request).unwrap();
         let hardware = hardware();
-        let mut gpu = Gpu::quiet(&hardware).unwrap();
+        let mut gpu = Gpu::without_packets(&hardware).unwrap();
         (job.frame(0, &mut gpu).unwrap(), gpu.finish().counts())
     }
 
@@ -417,7 +417,7 @@ mod tests {
         let (beams, eye) = (ocean.beams(0.0), Eye::new(view, 4.0, size).unwrap());
         let hardware = hardware();
         for method in Method::ALL {
-            let mut gpu = Gpu::quiet(&hardware).unwrap();
+            let mut gpu = Gpu::without_packets(&hardware).unwrap();
             let (picture, _) = draw_on(&mut gpu, &beams, &eye, method, Light::Volume).unwrap();
             assert_eq!(picture, draw(&beams, &eye, method, Some(Light::Volume)), "{method:?}");
             // Still bodies are moved to the image once, moving triangles at both ends.

@@ -305,7 +305,7 @@ fn same_id(one: &CaseFiles, other: &CaseFiles) -> LoadError {
         return refused(format!("{first} begins two cases called `{}`: give it once", one.id));
     }
     refused(format!(
-        "{first} and {second} are both called `{}`, so their rows could not be told apart: give one of them another name",
+        "{first} and {second} are both called `{}`, so their rows would be identical: give one of them another name",
         one.id
     ))
 }

@@ -141,7 +141,7 @@ impl PlainPasses {
     ) -> Result<(Overlaps, PassWork), JobError> {
         let viewport = Viewport::new(self.resolution, self.resolution);
         let viewport = viewport.ok_or_else(|| JobError::setting(IMAGE_SIZE))?;
-        let mut gpu = Gpu::quiet(hardware)?;
+        let mut gpu = Gpu::without_packets(hardware)?;
         let mut passes = PassesOnGpu::new((method, viewport, 1), pair, &mut gpu);
         let overlaps = self.overlaps(pair.each_ref(), &[method], &mut passes)[0];
         let fragments = passes.into_fragments();

@@ -235,7 +235,8 @@ fn runs_over_infinite_cache(
 ) -> Result<f64, JobError> {
     let infinite = PipelineSpec { shading_cache: INFINITE_CACHE, ..*to.spec };
     let to = Target { spec: &infinite, ..*to };
-    let least = rig.one_pass(draws, &to, &mut Gpu::quiet(&infinite)?)?.counts[Event::PixelInvocations];
+    let least =
+        rig.one_pass(draws, &to, &mut Gpu::without_packets(&infinite)?)?.counts[Event::PixelInvocations];
     Ok(views.counts[Event::PixelInvocations] as f64 / least.max(1) as f64)
 }
 

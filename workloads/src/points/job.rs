@@ -226,7 +226,7 @@ pub fn rasterized<const D: usize>(
     rounds: u32,
     hardware: &PipelineSpec,
 ) -> Result<(Rasterized<D>, FrameReport), JobError> {
-    let mut gpu = Gpu::quiet(hardware)?;
+    let mut gpu = Gpu::without_packets(hardware)?;
     let points = darts(spec, rounds, &mut gpu)?;
     Ok((points, gpu.finish()))
 }
@@ -476,7 +476,7 @@ mod tests {
     fn rounds_agree<const D: usize>(radius: f64) {
         let spec = PoissonSpec { radius, domain: Domain::Torus, seed: 3, spacing: Spacing::Double };
         let hardware = hardware();
-        let mut gpu = Gpu::quiet(&hardware).unwrap();
+        let mut gpu = Gpu::without_packets(&hardware).unwrap();
         let mut rounds = 0;
         let draw = |cubes: &[Cube<D>]| {
             let drawn = round(cubes, rounds, 3, &mut gpu)?;

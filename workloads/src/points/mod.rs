@@ -252,7 +252,7 @@ mod tests {
 
     fn drawn<const D: usize>(density: Named, spec: &NoiseSpec) -> DrawnNoise<D> {
         let hardware = hardware();
-        draw_noise(&density, spec, &mut Gpu::quiet(&hardware).unwrap()).unwrap()
+        draw_noise(&density, spec, &mut Gpu::without_packets(&hardware).unwrap()).unwrap()
     }
 
     fn on_host<const D: usize>(density: &Named, spec: &NoiseSpec) -> Vec<[f64; D]> {
@@ -313,7 +313,7 @@ mod tests {
     #[test]
     fn too_many_columns_are_refused() {
         let hardware = hardware();
-        let mut gpu = Gpu::quiet(&hardware).unwrap();
+        let mut gpu = Gpu::without_packets(&hardware).unwrap();
         for across in [0, 33] {
             let spec = NoiseSpec { count: 10.0, seed: 1, across };
             assert_eq!(draw_noise::<4>(&Named::Gauss, &spec, &mut gpu), Err(WhiteError::Columns(across)));

@@ -78,7 +78,7 @@ fn on_image<T>(
     run: impl Fn(&mut Kernels<'_, '_>, &SurfaceView) -> T,
 ) -> (T, Vec<f32>) {
     let (spec, frame) = (hardware(), first_frame(job));
-    let mut gpu = Gpu::quiet(&spec).unwrap();
+    let mut gpu = Gpu::without_packets(&spec).unwrap();
     let image = job.image(&frame, None, &mut gpu).unwrap();
     let luminances = luminances(&gpu.contents(image).unwrap());
     let view = gpu.surface_view(image).unwrap();
@@ -130,7 +130,7 @@ fn the_mean_of_a_mip_chain_is_that_of_its_pixels() {
     let options = ComputeOptions { kernel: Kernel::MipChain, ..ComputeOptions::default() };
     let error = |size: (u32, u32), samples: u32| {
         let (spec, job) = (hardware(), job(&options, size, samples));
-        let mut gpu = Gpu::quiet(&spec).unwrap();
+        let mut gpu = Gpu::without_packets(&spec).unwrap();
         let chain = job.chain(&first_frame(&job), &mut gpu).unwrap();
         let pixels = luminances(&gpu.contents(chain.pixels).unwrap());
         assert_eq!(pixels.len() as u32, size.0 * size.1);
@@ -293,7 +293,7 @@ struct Culled {
 
 fn culled(options: &ComputeOptions, size: (u32, u32), samples: u32) -> Culled {
     let (job, spec) = (job(options, size, samples), hardware());
-    let (frame, mut gpu) = (first_frame(&job), Gpu::quiet(&spec).unwrap());
+    let (frame, mut gpu) = (first_frame(&job), Gpu::without_packets(&spec).unwrap());
     let depth = job.depths(&frame, &mut gpu).unwrap();
     let (depths, view) = (gpu.contents(depth).unwrap(), gpu.surface_view(depth).unwrap());
     let lights = job.lights(&frame).unwrap();
@@ -414,7 +414,7 @@ fn groups_that_are_too_large_are_refused_with_what_fits() {
     let small = PipelineSpec { compute, ..spec() };
     let drawn = |options: ComputeOptions| {
         let job = job(&options, (40, 24), 1);
-        Job::frame(&job, 0, &mut Gpu::quiet(&small).unwrap()).map_err(|error| error.to_string())
+        Job::frame(&job, 0, &mut Gpu::without_packets(&small).unwrap()).map_err(|error| error.to_string())
     };
     let histogram = ComputeOptions { kernel: Kernel::Histogram, ..ComputeOptions::default() };
     let error = drawn(histogram.clone()).err().unwrap();
@@ -428,7 +428,7 @@ fn groups_that_are_too_large_are_refused_with_what_fits() {
 fn a_gpu_without_compute_unit_is_refused_with_a_remedy() {
     let job = job(&ComputeOptions::default(), (32, 32), 1);
     let without = spec();
-    let error = Job::frame(&job, 0, &mut Gpu::quiet(&without).unwrap()).unwrap_err().to_string();
+    let error = Job::frame(&job, 0, &mut Gpu::without_packets(&without).unwrap()).unwrap_err().to_string();
     assert!(error.contains("no compute unit; choose one with `compute` in its file"), "{error}");
 }
 
@@ -450,7 +450,7 @@ fn options_are_checked() {
 #[test]
 fn an_unwritten_surface_has_no_view() {
     let spec = hardware();
-    let mut gpu = Gpu::quiet(&spec).unwrap();
+    let mut gpu = Gpu::without_packets(&spec).unwrap();
     let job = job(&ComputeOptions::default(), (32, 32), 1);
     let depth: SurfaceId = job.depths(&first_frame(&job), &mut gpu).unwrap();
     assert!(gpu.surface_view(depth).is_some());

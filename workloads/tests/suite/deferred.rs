@@ -19,7 +19,7 @@ fn overrides(samples: u32) -> Overrides {
 
 fn drawn(job: &dyn Job) -> (Drawn, FrameReport) {
     let spec = spec();
-    let mut gpu = Gpu::quiet(&spec).unwrap();
+    let mut gpu = Gpu::without_packets(&spec).unwrap();
     let drawn = job.frame(0, &mut gpu).unwrap();
     (drawn, gpu.finish())
 }

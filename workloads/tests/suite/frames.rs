@@ -232,7 +232,7 @@ fn views_side_by_side_are_on_heat_maps() {
         let job = find("multiview", &OptionSource { file: None, set }, &request).unwrap().unwrap();
         let viewport = Viewport::new(52, 20).unwrap();
         let spec = crate::common::spec();
-        let mut gpu = Gpu::quiet(&spec).unwrap().with_heat(&events, viewport);
+        let mut gpu = Gpu::without_packets(&spec).unwrap().with_heat(&events, viewport);
         job.frame(job.settings().frames.start, &mut gpu).unwrap();
         let report = gpu.finish();
         for map in &report.heat {
@@ -265,7 +265,7 @@ fn passes_in_conservative_mode_are_on_heat_maps() {
         let viewport = Viewport::new(settings.width, settings.height).unwrap();
         // Tiles of the GPU are not those of the passes.
         let spec = PipelineSpec { tile_px: 4, ..crate::common::spec() };
-        let mut gpu = Gpu::quiet(&spec).unwrap().with_heat(&events, viewport);
+        let mut gpu = Gpu::without_packets(&spec).unwrap().with_heat(&events, viewport);
         job.frame(settings.frames.start, &mut gpu).unwrap();
         let report = gpu.finish();
         for map in &report.heat {

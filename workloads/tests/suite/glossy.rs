@@ -27,8 +27,10 @@ fn edge(height: f64, radius: f64, effect: Effect) -> (Map, Vec<f64>) {
     let geometry = Geometry::new(&corners, &corners, &triangles).unwrap();
     let draws = [Draw::new(geometry, &White, Cull::None)];
     let samples = table(64, LensShape::Square);
-    let image =
-        map.one_pass(&draws, &samples, Vec3::ZERO, &mut Gpu::quiet(&spec()).unwrap()).unwrap().into_image();
+    let image = map
+        .one_pass(&draws, &samples, Vec3::ZERO, &mut Gpu::without_packets(&spec()).unwrap())
+        .unwrap()
+        .into_image();
     let width = map.viewport.width() as usize;
     let column = |x: usize| {
         image.iter().skip(x).step_by(width).map(|p| f64::from(p.x)).sum::<f64>()
@@ -89,15 +91,21 @@ fn one_pass_accumulation_and_rays_agree() {
             map.by_rays((&rays, &colours), &[&samples as &dyn SampleSource], sky, Lobe::Lens);
         assert_eq!(work.rays, 64 * traced.len() as u64);
         assert!(work.triangles < work.rays * rays.faces().len() as u64 / 4, "{work:?}");
-        let drawn =
-            map.one_pass(&draws, &samples, sky, &mut Gpu::quiet(&spec()).unwrap()).unwrap().into_image();
+        let drawn = map
+            .one_pass(&draws, &samples, sky, &mut Gpu::without_packets(&spec()).unwrap())
+            .unwrap()
+            .into_image();
         // The samples are the same, so only samples on edges may differ, by rounding.
         assert!(rmse(&drawn, &traced) < 2e-3, "{effect:?}: {}", rmse(&drawn, &traced));
         assert!(rmse(&drawn, &vec![sky; drawn.len()]) > 0.05, "there is something to see");
         let set = SharedSamples::interleaved(&SampleSpec::default(), 64, 3).unwrap();
-        let added = map.accumulated(&draws, &set, sky, &mut Gpu::quiet(&spec()).unwrap()).unwrap().0;
+        let added =
+            map.accumulated(&draws, &set, sky, &mut Gpu::without_packets(&spec()).unwrap()).unwrap().0;
         assert!(rmse(&added, &traced) < 0.04, "{}", rmse(&added, &traced));
-        let one = map.one_pass(&draws, &set, sky, &mut Gpu::quiet(&spec()).unwrap()).unwrap().into_image();
+        let one = map
+            .one_pass(&draws, &set, sky, &mut Gpu::without_packets(&spec()).unwrap())
+            .unwrap()
+            .into_image();
         assert!(rmse(&added, &one) < 2e-3, "the same set: {}", rmse(&added, &one));
     }
 }
@@ -112,7 +120,7 @@ fn more_samples_reduce_the_error() {
     let map = Map::new(&receiver(), eye, Effect::Reflection, 0.3, 16).unwrap();
     let image = |seed, samples| {
         let table = SampleTable::new(&SampleSpec::default(), samples, seed).unwrap();
-        map.one_pass(&draws, &table, scene.background(), &mut Gpu::quiet(&spec()).unwrap())
+        map.one_pass(&draws, &table, scene.background(), &mut Gpu::without_packets(&spec()).unwrap())
             .unwrap()
             .into_image()
     };
@@ -152,7 +160,7 @@ fn a_mirror_shows_what_is_mirrored() {
     };
     let overrides = Overrides { size: Some((WIDE as u32, 216)), samples: Some(4), ..Overrides::default() };
     let job = Glossy::new(options, &overrides, 1).unwrap();
-    let image = job.frame(0, &mut Gpu::quiet(&spec()).unwrap()).unwrap().image;
+    let image = job.frame(0, &mut Gpu::without_packets(&spec()).unwrap()).unwrap().image;
     let scene = default_scene(false).unwrap().with_overrides(&overrides).unwrap();
     let frame = scene.frame(0).unwrap();
     let draws = frame.draws(&scene).unwrap();

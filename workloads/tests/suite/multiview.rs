@@ -36,7 +36,7 @@ fn with<R>(
 
 fn one_pass(scene: &Scene, layout: (Layout, u32), spec: &PipelineSpec) -> Views {
     with(scene, layout, spec, |rig, draws, to| {
-        rig.one_pass(draws, to, &mut Gpu::quiet(to.spec).unwrap()).unwrap()
+        rig.one_pass(draws, to, &mut Gpu::without_packets(to.spec).unwrap()).unwrap()
     })
 }
 
@@ -45,8 +45,8 @@ fn one_pass_equals_view_by_view_bit_for_bit() {
     let scene = scene();
     for layout in LAYOUTS {
         with(&scene, layout, &spec(), |rig, draws, to| {
-            let one = rig.one_pass(draws, to, &mut Gpu::quiet(to.spec).unwrap()).unwrap();
-            let each = rig.view_by_view(draws, to, &mut Gpu::quiet(to.spec).unwrap()).unwrap();
+            let one = rig.one_pass(draws, to, &mut Gpu::without_packets(to.spec).unwrap()).unwrap();
+            let each = rig.view_by_view(draws, to, &mut Gpu::without_packets(to.spec).unwrap()).unwrap();
             assert_eq!((one.passes, each.passes), (1, layout.0.views));
             assert_eq!(one.images.len(), layout.0.views as usize);
             for (view, (a, b)) in one.images.iter().zip(&each.images).enumerate() {
@@ -70,7 +70,7 @@ fn a_region_of_the_lens_equals_a_separate_lens() {
     let scene = scene();
     let spec = PipelineSpec { shading: Shading::PerSample, ..spec() };
     with(&scene, LAYOUTS[0], &spec, |rig, draws, to| {
-        let one = rig.one_pass(draws, to, &mut Gpu::quiet(to.spec).unwrap()).unwrap();
+        let one = rig.one_pass(draws, to, &mut Gpu::without_packets(to.spec).unwrap()).unwrap();
         let own = rig.own_cameras(draws, to).unwrap();
         for (a, b) in one.images.iter().zip(&own) {
             assert!(rmse(a, b) < 0.01, "{}", rmse(a, b));
@@ -85,8 +85,8 @@ fn accumulation_converges_to_the_same_views() {
     let layout = (Layout::stereo(0.28, 0.11), 64);
     let spec = PipelineSpec { shading: Shading::PerSample, ..spec() };
     with(&scene, layout, &spec, |rig, draws, to| {
-        let one = rig.one_pass(draws, to, &mut Gpu::quiet(to.spec).unwrap()).unwrap();
-        let many = rig.accumulated(draws, to, &mut Gpu::quiet(to.spec).unwrap()).unwrap();
+        let one = rig.one_pass(draws, to, &mut Gpu::without_packets(to.spec).unwrap()).unwrap();
+        let many = rig.accumulated(draws, to, &mut Gpu::without_packets(to.spec).unwrap()).unwrap();
         assert_eq!(many.passes, 128);
         for (a, b) in one.images.iter().zip(&many.images) {
             assert!(rmse(a, b) < 0.03, "{}", rmse(a, b));
@@ -112,7 +112,7 @@ fn accumulation_blurs_moving_objects_and_moving_cameras() {
             let rig = Rig::new(camera, 4.0, &Layout::stereo(0.28, 0.11), 64, 3).unwrap();
             let to = Target { viewport, spec: &spec, background: Vec3::ZERO, places: &[] };
             let views = if many { Rig::accumulated } else { Rig::one_pass };
-            views(&rig, &draws, &to, &mut Gpu::quiet(to.spec).unwrap()).unwrap().images
+            views(&rig, &draws, &to, &mut Gpu::without_packets(to.spec).unwrap()).unwrap().images
         };
         let (one, many, frozen) =
             (views(by, &camera, false), views(by, &camera, true), views(0.0, &still, false));

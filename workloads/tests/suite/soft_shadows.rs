@@ -26,7 +26,7 @@ fn only_different_samples_count_against_banding() {
         let options = SoftShadowOptions { points, map_px: 16, ..SoftShadowOptions::default() };
         let job = SoftShadows::new(options, &overrides, 1).unwrap();
         let first = job.settings().frames.start;
-        let warnings = job.frame(first, &mut Gpu::quiet(&spec()).unwrap()).unwrap().warnings;
+        let warnings = job.frame(first, &mut Gpu::without_packets(&spec()).unwrap()).unwrap().warnings;
         warnings.into_iter().find(|warning| warning.code == "shadow-banding").map(|warning| warning.message)
     };
     let one = warned(Some(vec![(0.0, 0.0, 0.0)]), 64).unwrap();
@@ -88,7 +88,7 @@ fn lanes_project_the_vertices_of_their_triangle() {
     let ops = |close: &[Vec3]| {
         let draws = [draw(&floor, close, &TRIANGLES)];
         let view = SceneView { camera: &camera, draws: &draws };
-        let mut gpu = Gpu::quiet(&spec).unwrap();
+        let mut gpu = Gpu::without_packets(&spec).unwrap();
         let seen = VisibleTriangles::draw(&view, viewport, &set, Method::OnePass, &mut gpu).unwrap();
         let world = World::new(&view, viewport, &light, &[Vec3::ONE], Vec3::ZERO);
         look_ups(&world, &set, &seen, Shadows::None, &mut gpu).counts[Event::ShaderOps]
@@ -104,7 +104,7 @@ fn above(radius: f64) -> AreaLight {
 }
 
 fn map(light: &AreaLight, draws: &[Draw<'_>], side: u32, set: &SharedSamples, method: Method) -> ShadowMap {
-    ShadowMap::new(light, draws, side, set, method, &mut Gpu::quiet(&spec()).unwrap()).unwrap()
+    ShadowMap::new(light, draws, side, set, method, &mut Gpu::without_packets(&spec()).unwrap()).unwrap()
 }
 
 #[test]
@@ -201,7 +201,7 @@ fn motion_blurs_the_shadow_by_the_share_of_time() {
 
 /// The visible samples of a view, in one pass.
 fn visible(view: &SceneView<'_>, viewport: Viewport, set: &SharedSamples) -> DepthPass {
-    depth_pass(view, viewport, set, Method::OnePass, &mut Gpu::quiet(&spec()).unwrap()).unwrap()
+    depth_pass(view, viewport, set, Method::OnePass, &mut Gpu::without_packets(&spec()).unwrap()).unwrap()
 }
 
 /// Lambert's law: a floor has the cosine of its angle to the light at the time of the sample, plus ambient
@@ -278,7 +278,7 @@ fn depth_passes_write_depths_only() {
     let (light, set) = (above(0.5), set(4, 1));
     let draws = [draw(&floor, &floor, &TRIANGLES)];
     let spec = spec();
-    let mut gpu = Gpu::quiet(&spec).unwrap();
+    let mut gpu = Gpu::without_packets(&spec).unwrap();
     let map = ShadowMap::new(&light, &draws, 64, &set, Method::OnePass, &mut gpu).unwrap();
     let counts = gpu.finish().counts();
     assert!(!counts.uses(Unit::Colour) && !counts.uses(Unit::ShadingCache));
@@ -298,7 +298,7 @@ fn shading_fetches_what_it_reads() {
     let albedos: Vec<Vec3> = (0..draws.len()).map(|draw| Vec3::splat(0.1 + 0.1 * draw as f32)).collect();
     let samples = (viewport.pixels() * set.samples().len()) as u64;
     for method in [Method::OnePass, Method::Accumulation] {
-        let mut gpu = Gpu::quiet(&spec).unwrap();
+        let mut gpu = Gpu::without_packets(&spec).unwrap();
         let draws = gpu.resident(&draws);
         let view = SceneView { camera: &camera, draws: &draws };
         let map = ShadowMap::new(&light, &draws, 64, &set, method, &mut gpu).unwrap();
@@ -306,7 +306,8 @@ fn shading_fetches_what_it_reads() {
         let world = World::new(&view, viewport, &light, &albedos, Vec3::splat(0.5));
         let shadows = Shadows::Map { map: &map, bias: 0.06 };
         let shaded = look_ups(&world, &set, &seen, shadows, &mut gpu);
-        let by_host = depth_pass(&view, viewport, &set, method, &mut Gpu::quiet(&spec).unwrap()).unwrap();
+        let by_host =
+            depth_pass(&view, viewport, &set, method, &mut Gpu::without_packets(&spec).unwrap()).unwrap();
         let host = by_host.samples.iter().map(|(triangle, _)| *triangle);
         let numbers = (0..viewport.pixels() as u32 * 8).map(|n| {
             let (pixel, index) = (n / 8, n as usize % 8);
@@ -333,7 +334,12 @@ fn shading_fetches_what_it_reads() {
 fn warned(options: SoftShadowOptions, samples: u32) -> Vec<&'static str> {
     let overrides = Overrides { size: Some((8, 8)), samples: Some(samples), ..Overrides::default() };
     let job = SoftShadows::new(options, &overrides, 1).unwrap();
-    job.frame(0, &mut Gpu::quiet(&spec()).unwrap()).unwrap().warnings.iter().map(|w| w.code.name()).collect()
+    job.frame(0, &mut Gpu::without_packets(&spec()).unwrap())
+        .unwrap()
+        .warnings
+        .iter()
+        .map(|w| w.code.name())
+        .collect()
 }
 
 #[test]
@@ -360,7 +366,7 @@ fn blended_surfaces_are_drawn_as_opaque_ones_and_reported() {
             &overrides,
             1,
         );
-        job.unwrap().frame(0, &mut Gpu::quiet(&spec()).unwrap()).unwrap()
+        job.unwrap().frame(0, &mut Gpu::without_packets(&spec()).unwrap()).unwrap()
     };
     let [opaque, blended] = ["1", "0.5"].map(drawn);
     assert_eq!(opaque.image, blended.image);

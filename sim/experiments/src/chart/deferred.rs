@@ -27,9 +27,11 @@ pub struct DeferredEffort {
     /// Width and height of the image in pixels.
     pub size: (u32, u32),
     /// Point lights go through the powers of 4 up to this.
-    pub most_lights: u32,
+    #[serde(rename = "most_lights")]
+    pub max_lights: u32,
     /// Layers and samples of a pixel go from 1 to this, doubling.
-    pub most: u32,
+    #[serde(rename = "most")]
+    pub max_layers_and_samples: u32,
 }
 
 /// Lights where they do not vary.
@@ -66,9 +68,9 @@ impl Sweep {
     fn values(self, effort: DeferredEffort) -> Vec<u32> {
         match self {
             Self::Lights => std::iter::successors(Some(1), |lights| Some(4 * lights))
-                .take_while(|lights| *lights <= effort.most_lights)
+                .take_while(|lights| *lights <= effort.max_lights)
                 .collect(),
-            _ => (0..=effort.most.ilog2()).map(|power| 1 << power).collect(),
+            _ => (0..=effort.max_layers_and_samples.ilog2()).map(|power| 1 << power).collect(),
         }
     }
 }
@@ -142,8 +144,10 @@ impl Study for DeferredChart {
     const FILES: &'static [&'static str] = &["deferred.csv", "deferred.json"];
 
     type Effort = DeferredEffort;
-    const FULL: DeferredEffort = DeferredEffort { size: (640, 360), most_lights: 256, most: 8 };
-    const QUICK: DeferredEffort = DeferredEffort { size: (160, 90), most_lights: 64, most: 4 };
+    const FULL: DeferredEffort =
+        DeferredEffort { size: (640, 360), max_lights: 256, max_layers_and_samples: 8 };
+    const QUICK: DeferredEffort =
+        DeferredEffort { size: (160, 90), max_lights: 64, max_layers_and_samples: 4 };
 
     fn measure(effort: DeferredEffort, _: &[String], progress: &Progress) -> Result<Self, StudyError> {
         let cases: Vec<(Sweep, u32)> = Sweep::ALL
@@ -324,7 +328,7 @@ mod tests {
 
     #[test]
     fn deferred_rendering_gains_with_overdraw_and_loses_with_samples() {
-        let least = DeferredEffort { size: (64, 36), most_lights: 16, most: 4 };
+        let least = DeferredEffort { size: (64, 36), max_lights: 16, max_layers_and_samples: 4 };
         let (_folder, chart, _) = written::<DeferredChart>(least);
         assert_eq!(chart.fault(), None);
         let find = |sweep, value, method| {

@@ -385,12 +385,13 @@ impl Bench {
         let (spec, background) = (&self.gpu.pipeline, self.scene.background());
         let table = SampleTable::new(&SampleSpec::default(), samples, 1)?;
         let started = Instant::now();
-        let one = map.one_pass(&draws, &table, background, &mut Gpu::quiet(spec)?)?;
+        let one = map.one_pass(&draws, &table, background, &mut Gpu::without_packets(spec)?)?;
         let counts = one.counts;
         let host_s = started.elapsed().as_secs_f64();
         let set = SharedSamples::interleaved(&SampleSpec::default(), samples, 1)?;
         let started = Instant::now();
-        let (many, many_counts) = map.accumulated(&draws, &set, background, &mut Gpu::quiet(spec)?)?;
+        let (many, many_counts) =
+            map.accumulated(&draws, &set, background, &mut Gpu::without_packets(spec)?)?;
         let accumulated_host_s = started.elapsed().as_secs_f64();
         let started = Instant::now();
         let (traced, work) = self.traced(&map, &[&table], Lobe::Lens)?;
@@ -430,7 +431,7 @@ impl Bench {
             let refused = |error: pipeline::DrawError| StudyError::Pipeline(error.to_string());
             let geometry = Geometry::new(&corners, &corners, &[[0, 1, 2], [0, 2, 3]]).map_err(refused)?;
             let draws = [Draw::new(geometry, &White, Cull::None)];
-            let gpu = &mut Gpu::uncounted(&self.gpu.pipeline)?;
+            let gpu = &mut Gpu::images_only(&self.gpu.pipeline)?;
             let image = map.one_pass(&draws, &table, Vec3::ZERO, gpu)?.into_image();
             let width = ramp(&image, map.viewport.width() as usize) * map.texel();
             Ok(Blur { height, width, expected: map.blur(height) })
@@ -447,7 +448,7 @@ impl Bench {
             let truth = self.by_rays(&map, Lobe::Lens)?;
             let cone = self.by_rays(&map, Lobe::Cone)?;
             let table = SampleTable::new(&SampleSpec::default(), FEW, 1)?;
-            let gpu = &mut Gpu::uncounted(&self.gpu.pipeline)?;
+            let gpu = &mut Gpu::images_only(&self.gpu.pipeline)?;
             let few = map.one_pass(&self.draws()?, &table, self.scene.background(), gpu)?.into_image();
             let rmse = |image: &[Vec3]| mean_square(&errors(image, &truth)).sqrt();
             Ok(Wide { over_half, rmse_of_samples: rmse(&few), rmse_of_lobe: rmse(&cone) })

@@ -370,7 +370,7 @@ mod tests {
     use crate::study::written;
 
     /// No more than there has to be.
-    const LEAST: GrowthEffort = GrowthEffort {
+    const MIN_EFFORT: GrowthEffort = GrowthEffort {
         side_px: 32,
         repeats: 1,
         triangles: &[50, 100, 200],
@@ -404,7 +404,7 @@ mod tests {
         };
         let with = |threads| {
             let pool = ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(|| GrowthChart::measure(LEAST, &[], &Progress::new(true))).unwrap()
+            pool.install(|| GrowthChart::measure(MIN_EFFORT, &[], &Progress::new(true))).unwrap()
         };
         let chart = with(1);
         assert_eq!(tests(&chart), tests(&with(3)));
@@ -420,7 +420,7 @@ mod tests {
 
     #[test]
     fn the_files_are_all_there_and_agree() {
-        let (folder, chart, done) = written::<GrowthChart>(LEAST);
+        let (folder, chart, done) = written::<GrowthChart>(MIN_EFFORT);
         let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
         let json: serde_json::Value = serde_json::from_str(&read("growth.json")).unwrap();
         // Triangles and samples in four kinds, blur in three.

@@ -364,7 +364,7 @@ impl Drawn {
         let settings = Settings { spec: &gpu.pipeline, viewport, samples: &table, background: Vec3::ZERO };
         let walls = [scene.walls(&Unshaded).map_err(|error| StudyError::Pipeline(error.to_string()))?];
         let occluders = RasterPass::new(&scene.camera, &walls, &settings);
-        let mut alone = Gpu::quiet(&gpu.pipeline)?;
+        let mut alone = Gpu::without_packets(&gpu.pipeline)?;
         let depths = depths_of(&alone.draw(&occluders.onto(Target::Depth).with_visible())?.visible);
         let ask = |any: bool| SampledQueries { occluders, any }.ask(&scene.boxes);
         let (seen, counted) = (ask(true)?, ask(false)?);
@@ -382,7 +382,7 @@ impl Drawn {
         let pyramid = Pyramid::new(self.viewport, &self.table, &self.depths, tile_px, grid);
         let projection = Projection::new(&self.scene.camera, self.viewport);
         let queries = IntervalQueries::new(&pyramid, &projection);
-        let mut gpu = Gpu::quiet(&self.spec)?;
+        let mut gpu = Gpu::without_packets(&self.spec)?;
         let stored = gpu.allocate(DEPTH_BYTES * self.depths.len() as u64);
         gpu.gather_farthest_depths("farthest depths", &pyramid, stored);
         let gathering = gpu.counts_of_pass();

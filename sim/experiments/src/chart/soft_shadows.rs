@@ -390,7 +390,7 @@ impl Bench<'_> {
 
     fn map(&self, set: &SharedSamples, method: Method) -> Result<(ShadowMap, Cost), StudyError> {
         let started = Instant::now();
-        let mut gpu = Gpu::quiet(self.spec())?;
+        let mut gpu = Gpu::without_packets(self.spec())?;
         let Stage { light, effort, .. } = self.stage;
         let map = ShadowMap::new(light, self.draws, effort.map_px, set, method, &mut gpu)?;
         let host_s = started.elapsed().as_secs_f64();
@@ -429,7 +429,8 @@ impl Bench<'_> {
 
     fn seen(&self, set: &SharedSamples) -> Result<Vec<(u32, u32)>, StudyError> {
         let view = SceneView { camera: &self.stage.frame.camera, draws: self.draws };
-        Ok(depth_pass(&view, self.viewport, set, Method::OnePass, &mut Gpu::uncounted(self.spec())?)?.samples)
+        Ok(depth_pass(&view, self.viewport, set, Method::OnePass, &mut Gpu::images_only(self.spec())?)?
+            .samples)
     }
 
     /// Wrong shadows over the bias.

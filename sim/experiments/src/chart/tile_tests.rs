@@ -317,7 +317,7 @@ mod tests {
     use super::*;
     use crate::study::Done;
     use output::OutDir;
-    use output::plot::Look;
+    use output::plot::PlotStyle;
 
     #[test]
     fn every_combination_is_compared_with_none_and_the_best_is_marked() {
@@ -330,7 +330,7 @@ mod tests {
         assert!(cheapest.on_efficiency_front && cheapest.tests != "-", "{cheapest:?}");
         let chart = TileTests { rows };
         let out = tempfile::tempdir().unwrap();
-        let make = |dir: &OutDir| Done::new(&chart, dir, &Look::default()).unwrap();
+        let make = |dir: &OutDir| Done::new(&chart, dir, &PlotStyle::default()).unwrap();
         let done = OutDir::with(out.path(), TileTests::claim(), make).unwrap();
         let csv = std::fs::read_to_string(out.path().join("tile_tests.csv")).unwrap();
         assert_eq!(csv.lines().count(), 1 + (1 << SWITCHES.len()));

@@ -3,7 +3,7 @@
 
 use std::fs;
 
-use output::plot::{AxisSpec, Chart, ChartPanel, Look, Mark, Picture, Scale, Series};
+use output::plot::{AxisSpec, Chart, ChartPanel, Mark, Picture, PlotStyle, Scale, Series};
 use output::table::Table;
 use output::{Claim, Destination, OutDir, OutputError};
 use run::RunError;
@@ -75,7 +75,7 @@ impl Report {
         }
         let mut text =
             format!("Paper {}: {}\n{}\n\n{table}", self.paper.number(), self.title, self.settings_text());
-        self.rows.iter().for_each(|row| text += &said(row));
+        self.rows.iter().for_each(|row| text += &described(row));
         let count = |verdict| self.rows.iter().filter(|row| row.verdict == verdict).count();
         let [holds, differs, depends, not_yet] = Verdict::ALL.map(count);
         let where_ = if self.form == Form::Quick { " at the settings of the quick form" } else { "" };
@@ -143,7 +143,7 @@ impl Report {
 }
 
 /// Text of a row.
-fn said(row: &Row) -> String {
+fn described(row: &Row) -> String {
     let about = &row.about;
     let mut text = format!("\n{}: {}\n", about.id, row.verdict_text);
     let mut line = |name: &str, what: &str| {
@@ -267,7 +267,7 @@ impl Figure {
 
     /// A figure of one panel.
     pub(super) fn of(name: &'static str, [title, subject]: [&str; 2], panel: ChartPanel) -> Self {
-        Self { name, picture: Chart::new(title, subject, vec![panel]).picture(&Look::default()) }
+        Self { name, picture: Chart::new(title, subject, vec![panel]).picture(&PlotStyle::default()) }
     }
 }
 

@@ -6,7 +6,7 @@ use workloads::stress::{Family, Size};
 
 use super::measure::{Work, combinations, on_subject};
 use crate::study::table::{Sheet, Table};
-use output::plot::{Look, Matrix, MatrixPanel, Picture};
+use output::plot::{Matrix, MatrixPanel, Picture, PlotStyle};
 use run::{GpuSpec, RunError};
 
 /// Multiply-adds at one value of a family.
@@ -160,7 +160,7 @@ impl Choices {
 
     /// `auto` and every test on, over the best fixed choice: of each family as a whole, and at the value that
     /// is worst for it.
-    pub(super) fn picture(&self, look: &Look) -> Picture {
+    pub(super) fn picture(&self, plot_style: &PlotStyle) -> Picture {
         type Cost = fn(&Choice) -> f64;
         let costs: [(&str, Cost); 2] = [
             ("auto", |choice| choice.over_best),
@@ -185,7 +185,7 @@ impl Choices {
                 MatrixPanel { name: "the worst value, with a choice for it alone", rows: values.to_vec() },
             ],
         }
-        .picture(look)
+        .picture(plot_style)
     }
 
     /// Families and values as a table.

@@ -12,7 +12,7 @@ pub mod truth;
 use choice::{Choices, Trial};
 use measure::{METHODS, StressRow, TestMethod};
 use output::dir::SUMMARY;
-use output::plot::{Chart, ChartPanel, Look, Mark, Matrix, MatrixPanel, Paint, Picture, Scale, Series};
+use output::plot::{Chart, ChartPanel, Mark, Matrix, MatrixPanel, Paint, Picture, PlotStyle, Scale, Series};
 use output::terminal::Progress;
 use output::{Claim, OutputError};
 use rayon::prelude::*;
@@ -120,16 +120,16 @@ impl Study for Report {
 
     fn draw(&self, to: &Gallery<'_>) -> Result<(), OutputError> {
         if self.families.len() > 1 {
-            to.add(&stem("matrix"), &matrix(self, to.look()))?;
-            to.add(&stem("auto"), &self.auto.picture(to.look()))?;
+            to.add(&stem("matrix"), &matrix(self, to.plot_style()))?;
+            to.add(&stem("auto"), &self.auto.picture(to.plot_style()))?;
         }
         for family in &self.families {
             let stem = stem(family.name);
             for measure in &MEASURES {
-                let picture = curves(self, family, measure, to.look());
+                let picture = curves(self, family, measure, to.plot_style());
                 to.add(&format!("{stem}{}", measure.stem), &picture)?;
             }
-            to.add(&format!("{stem}_intervals"), &intervals(self, family, to.look()))?;
+            to.add(&format!("{stem}_intervals"), &intervals(self, family, to.plot_style()))?;
         }
         Ok(())
     }
@@ -270,7 +270,7 @@ impl Report {
 }
 
 /// Cost over that of the best method, by method and family: at the first and at the worst value.
-fn matrix(report: &Report, look: &Look) -> Picture {
+fn matrix(report: &Report, plot_style: &PlotStyle) -> Picture {
     let panel = |name, first| MatrixPanel {
         name,
         rows: METHODS
@@ -296,7 +296,7 @@ fn matrix(report: &Report, look: &Look) -> Picture {
             panel("at the value of each family that is worst for the method", false),
         ],
     }
-    .picture(look)
+    .picture(plot_style)
 }
 
 /// Panels of a row on a page.
@@ -333,7 +333,7 @@ const MEASURES: [Measure; 2] = [
 
 /// A measure of one family along its parameter: a small panel for each method, the other methods as grey
 /// lines behind it.
-fn curves(report: &Report, family: &Family, measure: &Measure, look: &Look) -> Picture {
+fn curves(report: &Report, family: &Family, measure: &Measure, plot_style: &PlotStyle) -> Picture {
     let rows: Vec<&StressRow> = report.of(family).collect();
     let line = |name: &str| -> Vec<(f64, f64)> {
         let values = rows.iter().filter(|row| row.method == name).map(|row| (measure.of)(row)).enumerate();
@@ -354,7 +354,7 @@ fn curves(report: &Report, family: &Family, measure: &Measure, look: &Look) -> P
         rows.iter().map(|row| row.samples_lost).sum::<u64>()
     );
     let panels = METHODS.iter().zip(&all).map(panel).collect();
-    Chart::new(&title, &subject, panels).small(ACROSS).picture(look)
+    Chart::new(&title, &subject, panels).small(ACROSS).picture(plot_style)
 }
 
 fn values(rows: &[&StressRow]) -> Vec<String> {
@@ -364,7 +364,7 @@ fn values(rows: &[&StressRow]) -> Vec<String> {
 }
 
 /// Width of the boxes that the side planes leave, and of the true ones.
-fn intervals(report: &Report, family: &Family, look: &Look) -> Picture {
+fn intervals(report: &Report, family: &Family, plot_style: &PlotStyle) -> Picture {
     let rows: Vec<&StressRow> = report.of(family).collect();
     let curve = |name: &str, of: fn(&StressRow) -> f64| {
         let sides = rows.iter().filter(|row| row.method == "sides").enumerate();
@@ -399,7 +399,7 @@ fn intervals(report: &Report, family: &Family, look: &Look) -> Picture {
         family.what,
         rows.last().map_or("nothing", |row| row.truth)
     );
-    Chart::new(&title, &subject, panels).picture(look)
+    Chart::new(&title, &subject, panels).picture(plot_style)
 }
 
 #[cfg(test)]

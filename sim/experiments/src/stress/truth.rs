@@ -18,8 +18,8 @@ use pipeline::traversal::TileRect;
 /// Hulls of what is true of `u`, `v` and `t`, the lens in [-1, 1].
 pub type Hulls = [[f64; 2]; 3];
 
-/// A place on the lens and a time, as `[u, v, t]`.
-type Look = [f64; 3];
+/// A point of the lens and the shutter at the end of a hull, as `[u, v, t]`.
+type ExtremePoint = [f64; 3];
 
 /// A triangle, a lens and a tile.
 #[derive(Clone, Copy, Debug)]
@@ -59,7 +59,7 @@ impl Truth {
         self.seeds(&mut found);
         for _ in 0..3 {
             let Some(outermost) = found.outermost else { break };
-            outermost.as_flattened().iter().for_each(|look| self.along_axes(*look, &mut found));
+            outermost.as_flattened().iter().for_each(|point| self.along_axes(*point, &mut found));
             if found.outermost == Some(outermost) {
                 break;
             }
@@ -105,11 +105,11 @@ impl Truth {
         }
     }
 
-    /// Exact roots along each axis through `look`.
-    fn along_axes(&self, [u, v, t]: Look, found: &mut Found) {
+    /// Exact roots along each axis through a point.
+    fn along_axes(&self, [u, v, t]: ExtremePoint, found: &mut Found) {
         let along = |sweep: Sweep| sweep.touching(&self.rect, self.near);
-        let ends = |look: fn(f64, Look) -> Look, hull: [f64; 2], found: &mut Found| {
-            hull.into_iter().for_each(|s| found.add(look(s, [u, v, t])));
+        let ends = |point: fn(f64, ExtremePoint) -> ExtremePoint, hull: [f64; 2], found: &mut Found| {
+            hull.into_iter().for_each(|s| found.add(point(s, [u, v, t])));
         };
         let of = |corners: [DVec3; 3], u: f64, v: f64| corners.map(|p| self.sheared(p, u, v));
         let now = self.ends.at(t);
@@ -128,25 +128,25 @@ impl Truth {
 /// The outermost places found so far: for each of `u, v, t` the lowest and the highest.
 #[derive(Clone, Copy, Debug, Default)]
 struct Found {
-    outermost: Option<[[Look; 2]; 3]>,
+    outermost: Option<[[ExtremePoint; 2]; 3]>,
 }
 
 impl Found {
-    fn add(&mut self, look: Look) {
-        let outermost = self.outermost.get_or_insert([[look; 2]; 3]);
+    fn add(&mut self, point: ExtremePoint) {
+        let outermost = self.outermost.get_or_insert([[point; 2]; 3]);
         for (axis, [low, high]) in outermost.iter_mut().enumerate() {
-            if look[axis] < low[axis] {
-                *low = look;
+            if point[axis] < low[axis] {
+                *low = point;
             }
-            if look[axis] > high[axis] {
-                *high = look;
+            if point[axis] > high[axis] {
+                *high = point;
             }
         }
     }
 
     fn hulls(&self) -> Option<Hulls> {
         let outermost = self.outermost?;
-        Some([0, 1, 2].map(|axis| outermost[axis].map(|look| look[axis])))
+        Some([0, 1, 2].map(|axis| outermost[axis].map(|point| point[axis])))
     }
 }
 

@@ -13,7 +13,7 @@ use std::ops::AddAssign;
 use std::time::Instant;
 
 use activity::{Counts, Event};
-use output::plot::{Chart, ChartPanel, Look, Picture};
+use output::plot::{Chart, ChartPanel, Picture, PlotStyle};
 use output::terminal::Progress;
 use output::{Claim, OutDir, OutputError};
 use pipeline::FrameReport;
@@ -94,13 +94,13 @@ fn markdown_file<S: Study>() -> String {
 #[derive(Debug)]
 pub struct Gallery<'a> {
     dir: &'a OutDir,
-    look: &'a Look,
+    plot_style: &'a PlotStyle,
 }
 
 impl Gallery<'_> {
     /// Style of pictures.
-    pub fn look(&self) -> &Look {
-        self.look
+    pub fn plot_style(&self) -> &PlotStyle {
+        self.plot_style
     }
 
     /// Writes a picture as `stem`.
@@ -117,7 +117,7 @@ impl Gallery<'_> {
     /// Those of the folder.
     pub fn chart(&self, stem: &str, titles: [&str; 2], panels: Vec<ChartPanel>) -> Result<(), OutputError> {
         let [title, subject] = titles;
-        self.add(stem, &Chart::new(title, subject, panels).picture(self.look))
+        self.add(stem, &Chart::new(title, subject, panels).picture(self.plot_style))
     }
 }
 
@@ -133,7 +133,7 @@ pub struct Request<'a> {
     /// The folder for its files.
     pub dir: &'a OutDir,
     /// Style of pictures.
-    pub look: &'a Look,
+    pub plot_style: &'a PlotStyle,
     /// Display of progress.
     pub progress: &'a Progress,
 }
@@ -156,9 +156,9 @@ impl Done {
     ///
     /// # Errors
     /// Those of the folder.
-    pub fn new<S: Study>(found: &S, dir: &OutDir, look: &Look) -> Result<Self, OutputError> {
+    pub fn new<S: Study>(found: &S, dir: &OutDir, plot_style: &PlotStyle) -> Result<Self, OutputError> {
         let sheets = found.tables();
-        write(found, &sheets, dir, look)?;
+        write(found, &sheets, dir, plot_style)?;
         let texts: Vec<String> = sheets.iter().filter_map(Sheet::text).collect();
         // What was written as JSON can be printed as JSON.
         let json = serde_json::to_string_pretty(found).unwrap_or_default();
@@ -167,8 +167,13 @@ impl Done {
     }
 }
 
-fn write<S: Study>(found: &S, sheets: &[Sheet], dir: &OutDir, look: &Look) -> Result<(), OutputError> {
-    found.draw(&Gallery { dir, look })?;
+fn write<S: Study>(
+    found: &S,
+    sheets: &[Sheet],
+    dir: &OutDir,
+    plot_style: &PlotStyle,
+) -> Result<(), OutputError> {
+    found.draw(&Gallery { dir, plot_style })?;
     for sheet in sheets {
         sheet.csv_file().map_or(Ok(()), |file| dir.write_file(file, |out| sheet.write_csv(out)))?;
     }
@@ -228,7 +233,7 @@ fn run<S: Study>(request: &Request<'_>) -> Result<Done, StudyError> {
     };
     let scenes = if S::TAKES_SCENES { request.scenes } else { &[] };
     let found = S::measure(effort, scenes, request.progress)?;
-    let mut done = Done::new(&found, request.dir, request.look)?;
+    let mut done = Done::new(&found, request.dir, request.plot_style)?;
     if S::SHOWS_TIME {
         done.text += &format!("took {:.1} s\n", started.elapsed().as_secs_f64());
     }
@@ -242,7 +247,7 @@ pub(crate) fn written<S: Study>(effort: S::Effort) -> (tempfile::TempDir, S, Don
     let foreign = folder.path().join(format!("{}_old.png", S::NAME));
     std::fs::write(&foreign, b"mine").unwrap();
     let found = S::measure(effort, &[], &Progress::new(true)).unwrap();
-    let make = |dir: &OutDir| Done::new(&found, dir, &Look::default()).unwrap();
+    let make = |dir: &OutDir| Done::new(&found, dir, &PlotStyle::default()).unwrap();
     let done = OutDir::with(folder.path(), S::claim(), make).unwrap();
     let pictures = S::PICTURES.iter().flat_map(|stem| ["svg", "png"].map(|end| format!("{stem}.{end}")));
     for file in pictures.chain(files::<S>()) {

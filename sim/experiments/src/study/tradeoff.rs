@@ -1,7 +1,7 @@
 //! Speed against accuracy, the same few numbers for every method of every study, and the page of all studies.
 
 use minijinja::{Environment, context};
-use output::plot::{AxisSpec, Chart, ChartPanel, Look, Mark, Paint, Picture, Scale, Series};
+use output::plot::{AxisSpec, Chart, ChartPanel, Mark, Paint, Picture, PlotStyle, Scale, Series};
 use output::report::ReportError;
 use output::table::digits;
 use output::{Claim, OutDir, OutputError};
@@ -161,9 +161,9 @@ impl Tradeoff {
     ///
     /// # Errors
     /// Those of the folder.
-    pub fn write(&self, dir: &OutDir, look: &Look) -> Result<(), OutputError> {
+    pub fn write(&self, dir: &OutDir, plot_style: &PlotStyle) -> Result<(), OutputError> {
         let sheet = self.sheet();
-        self.picture(look).write(dir, PICTURE)?;
+        self.picture(plot_style).write(dir, PICTURE)?;
         dir.write_file("tradeoff.csv", |out| sheet.write_csv(out))?;
         let book = sheet.markdown().unwrap_or_default();
         dir.write_file("tradeoff.md", |out| Ok(out.write_all(book.as_bytes())?))?;
@@ -171,10 +171,10 @@ impl Tradeoff {
     }
 
     /// A panel for each pair of quantities, a series for each method.
-    pub fn picture(&self, look: &Look) -> Picture {
+    pub fn picture(&self, plot_style: &PlotStyle) -> Picture {
         let subject = "each point a level of a method; lower and further left is better; lines: Pareto fronts, one for \
                        each thing that is found";
-        Chart::new("Speed against accuracy of every method", subject, self.panels()).picture(look)
+        Chart::new("Speed against accuracy of every method", subject, self.panels()).picture(plot_style)
     }
 
     fn panels(&self) -> Vec<ChartPanel> {
@@ -309,8 +309,8 @@ impl Index {
     ///
     /// # Errors
     /// When the page cannot be filled or written.
-    pub fn write(&self, dir: &OutDir, look: &Look) -> Result<(), IndexError> {
-        self.tradeoff.write(dir, look)?;
+    pub fn write(&self, dir: &OutDir, plot_style: &PlotStyle) -> Result<(), IndexError> {
+        self.tradeoff.write(dir, plot_style)?;
         let mut environment = Environment::new();
         environment.set_trim_blocks(true);
         environment.set_lstrip_blocks(true);
@@ -381,7 +381,7 @@ mod tests {
         };
         let names: Vec<Vec<String>> = panels.iter().map(names).collect();
         assert_eq!(names, [vec!["fast", "slow"], vec!["other"]]);
-        let svg = all.picture(&Look::default()).svg().unwrap();
+        let svg = all.picture(&PlotStyle::default()).svg().unwrap();
         assert!(svg.contains("RMSE") && svg.contains("host time (s)") && svg.contains("wrong (%)"));
     }
 
@@ -398,7 +398,7 @@ mod tests {
         let point = TradeoffPoint::new("frames", ["packet", ""], [Metric::rmse(0.25), Metric::host_s(2.0)]);
         let tradeoff = Tradeoff { points: vec![point.of("timing")] };
         let index = Index { command: "quintile".into(), sections: vec![section], missing, tradeoff };
-        OutDir::with(folder.path(), claim(), |dir| index.write(dir, &Look::default())).unwrap().unwrap();
+        OutDir::with(folder.path(), claim(), |dir| index.write(dir, &PlotStyle::default())).unwrap().unwrap();
         let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
         let page = read("index.html");
         assert!(page.contains("Not finished") && page.contains("timing"));

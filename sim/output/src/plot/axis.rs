@@ -299,11 +299,11 @@ impl Axis {
 /// Width of a tick label. Raised digits are smaller.
 pub(super) fn label_width(label: &str) -> f64 {
     let (base, raised) = label.split_once('^').unwrap_or((label, ""));
-    text_width(base, TICK_PX, false) + text_width(raised, RAISED * TICK_PX, false)
+    text_width(base, TICK_PX, false) + text_width(raised, EXPONENT_SIZE_RATIO * TICK_PX, false)
 }
 
 /// Size of raised letters over that of others.
-pub(super) const RAISED: f64 = 0.75;
+pub(super) const EXPONENT_SIZE_RATIO: f64 = 0.75;
 
 fn have_room(ticks: &[Tick], (low, high): (f64, f64), along: Along) -> bool {
     let written: Vec<&Tick> = ticks.iter().filter(|tick| !tick.label.is_empty()).collect();

@@ -3,7 +3,7 @@
 use super::axis::{Along, Extent, MarkerRoom};
 use super::chart_panel::{Cell, ChartPanel, RIGHT, SMALL_GAP, draw_row};
 use super::panel::{Key, LEGEND_PX, aside, legend_lines};
-use super::picture::{Across, Look, Picture, Text, shortened, text, text_width};
+use super::picture::{Across, Picture, PlotStyle, Text, shortened, text, text_width};
 
 /// Panels with a title. Panels whose vertical axes have the same quantity share its range.
 #[derive(Clone, Debug)]
@@ -40,9 +40,9 @@ impl<'a> Chart<'a> {
     }
 
     /// Draws one legend above all panels if they show the same series, otherwise one below each.
-    pub fn picture(&self, look: &Look) -> Picture {
+    pub fn picture(&self, plot_style: &PlotStyle) -> Picture {
         let usual = WIDTHS[self.panels.len().clamp(1, 3) - 1];
-        let mut picture = Picture::titled(look, (usual, 300.0), [self.title, self.subject]);
+        let mut picture = Picture::titled(plot_style, (usual, 300.0), [self.title, self.subject]);
         if self.panels.is_empty() {
             return picture.nothing("nothing to show");
         }
@@ -215,8 +215,8 @@ mod tests {
     fn distances_are_the_same_both_ways_on_equal_axes() {
         let points = [(0.0, 0.0), (0.8, 0.0), (0.0, 0.4), (0.8, 0.4)];
         for width_mm in [None, Some(85.0)] {
-            let look = Look { width_mm, ..Look::default() };
-            let picture = Chart::new("t", "s", vec![even(vec![dots(&points)]).equal()]).picture(&look);
+            let plot_style = PlotStyle { width_mm, ..PlotStyle::default() };
+            let picture = Chart::new("t", "s", vec![even(vec![dots(&points)]).equal()]).picture(&plot_style);
             // The last four are the points; one more is in the legend.
             let [a, b, c, _] = centres(&picture)[1..] else { panic!("four points") };
             assert!(((b.0 - a.0) - 2.0 * (a.1 - c.1)).abs() < 1e-9, "{a:?} {b:?} {c:?}");
@@ -227,19 +227,19 @@ mod tests {
     #[test]
     fn panels_of_the_same_quantity_share_their_range() {
         let panel = |high: f64| even(vec![dots(&[(0.0, 0.0), (1.0, high)])]);
-        let picture = Chart::new("t", "s", vec![panel(10.0), panel(1.0)]).picture(&Look::default());
+        let picture = Chart::new("t", "s", vec![panel(10.0), panel(1.0)]).picture(&PlotStyle::default());
         let [_, _, ten, _, one] = centres(&picture)[..] else { panic!("four points and one in the legend") };
         assert!(one.1 > ten.1 + 100.0, "1 is lower than 10");
         let other = ChartPanel { axes: [AxisSpec::even("x", ""), AxisSpec::even("z", "")], ..panel(1.0) };
-        let picture = Chart::new("t", "s", vec![panel(10.0), other]).picture(&Look::default());
+        let picture = Chart::new("t", "s", vec![panel(10.0), other]).picture(&PlotStyle::default());
         let [_, _, ten, _, one] = centres(&picture)[..] else { panic!("four points and one in the legend") };
         assert!((one.1 - ten.1).abs() < 1.0, "another quantity has its own range");
     }
 
     #[test]
     fn points_keep_off_the_frame() {
-        let picture =
-            Chart::new("t", "s", vec![even(vec![dots(&[(0.0, 0.0), (7.0, 3.0)])])]).picture(&Look::default());
+        let picture = Chart::new("t", "s", vec![even(vec![dots(&[(0.0, 0.0), (7.0, 3.0)])])])
+            .picture(&PlotStyle::default());
         let line = picture.shapes.iter().rev().find_map(|shape| match shape {
             Shape::Polyline { points, .. } if points[1].0 - points[0].0 > 300.0 => Some(points.clone()),
             _ => None,
@@ -275,7 +275,7 @@ mod tests {
                 let series: Vec<Series> = marks().map(|mark| Series::new("s", mark)).into();
                 let panel = ChartPanel::new("", ["x", "y"], series).on(scale.clone(), up);
                 let chart = Chart { small, ..Chart::new("t", "s", vec![panel; count]) };
-                let picture = Picture::titled(&Look::default(), (WIDTHS[0], 300.0), ["t", "s"]);
+                let picture = Picture::titled(&PlotStyle::default(), (WIDTHS[0], 300.0), ["t", "s"]);
                 for cell in chart.cells(&picture, chart.across(&picture, true), true) {
                     let area = cell.area(0.0).unwrap();
                     for (index, series) in cell.panel.series.iter().enumerate() {
@@ -298,7 +298,7 @@ mod tests {
     fn a_marker_below_another_is_larger() {
         let series = [[(0.0, 0.0), (3.0, 3.0)], [(1.0, 1.0), (3.0, 3.0)], [(2.0, 0.0), (3.0, 3.0)]];
         let series = series.map(|points| dots(&points).painted(Paint::Like(0)));
-        let picture = Chart::new("t", "s", vec![even(series.into())]).picture(&Look::default());
+        let picture = Chart::new("t", "s", vec![even(series.into())]).picture(&PlotStyle::default());
         let radius = |shape: &Shape| match shape {
             Shape::Dot { radius, .. } => Some(*radius),
             _ => None,
@@ -319,7 +319,7 @@ mod tests {
             ])
         };
         let panels: Vec<_> = ["a", "b", "c", "d", "e", "f"].map(panel).into();
-        let picture = Chart::new("title", "s", panels).small(3).picture(&Look::default());
+        let picture = Chart::new("title", "s", panels).small(3).picture(&PlotStyle::default());
         let texts = texts(&picture);
         let count = |word: &str| texts.iter().filter(|text| **text == word).count();
         assert_eq!([count("y"), count("x"), count("a"), count("f")], [1, 1, 1, 1]);
@@ -329,7 +329,7 @@ mod tests {
     fn a_row_for_zero_is_called_as_requested() {
         let axes = [AxisSpec::default(), AxisSpec { zero: "exact".to_owned(), ..AxisSpec::default() }];
         let panel = ChartPanel::over("", axes, vec![dots(&[(1.0, 0.0), (2.0, 5.0), (3.0, 200.0)])]);
-        let picture = Chart::new("t", "s", vec![panel]).picture(&Look::default());
+        let picture = Chart::new("t", "s", vec![panel]).picture(&PlotStyle::default());
         assert!(texts(&picture).contains(&"exact"));
         let [_, exact, five, _] = centres(&picture)[..] else { panic!("three points and one in the legend") };
         assert!(exact.1 > five.1 + 20.0, "zero is not left out");

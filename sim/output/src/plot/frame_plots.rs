@@ -5,7 +5,7 @@ use power_model::Part;
 
 use super::axis::{Along, Axis, is_drawable};
 use super::panel::{BELOW, Key, LEGEND_LINE, Panel, aside, legend_column, legend_lines};
-use super::picture::{Across, Look, Picture, Text, shortened, text, text_width};
+use super::picture::{Across, Picture, PlotStyle, Text, shortened, text, text_width};
 use super::series::means;
 use super::{BACKGROUND, INK, MUTED, STATES, heat, named_unit_colour, part_colour};
 use crate::table::si;
@@ -46,12 +46,12 @@ const BESIDE: f64 = 760.0;
 
 impl FramePowerPlot<'_> {
     /// Draws stacked areas in the order of parts, power without activity first, and the samples over them.
-    pub fn picture(&self, look: &Look) -> Picture {
+    pub fn picture(&self, plot_style: &PlotStyle) -> Picture {
         let title = format!("Power of frame {} by part", self.frame);
         let bins = self.parts.iter().map(|part| part.power_w.len()).max().unwrap_or(0);
         let duration_s = bins as f64 * self.bin_s;
         let subtitle = format!("{} – {bins} bins of {}", self.subject, si(self.bin_s, "s"));
-        let mut picture = Picture::titled(look, (1200.0, 300.0), [&title, &subtitle]);
+        let mut picture = Picture::titled(plot_style, (1200.0, 300.0), [&title, &subtitle]);
         if bins == 0 || !(duration_s > 0.0 && duration_s.is_finite()) {
             return picture.nothing("no power to show");
         }
@@ -229,12 +229,12 @@ const SHADES: f64 = 32.0;
 
 impl UnitPlot<'_, UnitLane<'_>> {
     /// Draws a lane for each unit, shaded by its busy fraction, with the mean on the right.
-    pub fn picture(&self, look: &Look) -> Picture {
+    pub fn picture(&self, plot_style: &PlotStyle) -> Picture {
         let title = format!("How busy the units were in frame {}", self.frame);
         let bins = self.units.iter().map(|unit| unit.busy.len()).max().unwrap_or(0);
         let duration_s = bins as f64 * self.bin_s;
         let subtitle = format!("{} – {bins} bins of {}", self.subject, si(self.bin_s, "s"));
-        let mut picture = Picture::titled(look, (1200.0, 300.0), [&title, &subtitle]);
+        let mut picture = Picture::titled(plot_style, (1200.0, 300.0), [&title, &subtitle]);
         if bins == 0 || !(duration_s > 0.0 && is_drawable(0.0, duration_s)) {
             return picture.nothing("no units to show");
         }
@@ -351,11 +351,11 @@ const KEYS: [&str; 3] = ["busy", "starved", "blocked"];
 
 impl UnitPlot<'_, StallLane<'_>> {
     /// Draws a lane for each unit, filled by the shares of its states, and underlined where it is the bottleneck.
-    pub fn picture(&self, look: &Look) -> Picture {
+    pub fn picture(&self, plot_style: &PlotStyle) -> Picture {
         let title = format!("What the units waited for in frame {}", self.frame);
         let intervals = self.units.iter().map(|unit| unit.shares.len()).max().unwrap_or(0);
         let duration_s = intervals as f64 * self.bin_s;
-        let mut picture = Picture::titled(look, (1200.0, 300.0), [&title, self.subject]);
+        let mut picture = Picture::titled(plot_style, (1200.0, 300.0), [&title, self.subject]);
         if intervals == 0 || !(duration_s > 0.0 && is_drawable(0.0, duration_s)) {
             return picture.nothing("no units to show");
         }

@@ -5,7 +5,7 @@ use pipeline::texture::linear_to_srgb8;
 
 use super::axis::{Along, Axis, is_drawable};
 use super::panel::{Key, legend_lines, tick_label};
-use super::picture::{Across, Look, Picture, Point, Text, shortened, text, text_width};
+use super::picture::{Across, Picture, PlotStyle, Point, Text, shortened, text, text_width};
 use super::{AXIS, BACKGROUND, CLASSES, Colour, INK, MUTED, heat};
 use crate::table::digits;
 
@@ -67,7 +67,7 @@ const OUTLINE_ALPHA: f32 = 0.5;
 
 impl HeatMapPlot<'_> {
     /// Draws the map.
-    pub fn picture(&self, look: &Look) -> Picture {
+    pub fn picture(&self, plot_style: &PlotStyle) -> Picture {
         let [width, height] = self.size.map(|side| f64::from(side.max(1)));
         let most = self.tiles.iter().map(|tile| tile.value).fold(0.0, f64::max);
         let high = self.high(most);
@@ -83,7 +83,7 @@ impl HeatMapPlot<'_> {
             _ => self.subject.to_owned(),
         };
         let usual = MAX_IMAGE_PX.0.min(MAX_IMAGE_PX.1 * width / height) + 48.0 + BAR;
-        let mut picture = Picture::titled(look, (usual.max(760.0), 300.0), [self.title, &subject]);
+        let mut picture = Picture::titled(plot_style, (usual.max(760.0), 300.0), [self.title, &subject]);
         if self.tiles.is_empty() || !is_drawable(0.0, high) {
             return picture.nothing("nothing was counted");
         }
@@ -227,14 +227,14 @@ const DARKEST: f64 = 32.0;
 
 impl Matrix<'_> {
     /// Draws the blocks from top to bottom, with the names of columns below the last.
-    pub fn picture(&self, look: &Look) -> Picture {
+    pub fn picture(&self, plot_style: &PlotStyle) -> Picture {
         let rows: usize = self.panels.iter().map(|panel| panel.rows.len()).sum();
         let names = self.panels.iter().flat_map(|panel| panel.rows.iter().map(|(name, _)| *name));
         let left = names.map(|name| text_width(name, 13.0, false)).fold(60.0, f64::max) + 40.0;
         let columns = self.columns.len().max(1) as f64;
         let usual = (left + CELL[1] * columns + 24.0).clamp(760.0, 1410.0);
         let least = left + CELL[0] * columns + 24.0;
-        let mut picture = Picture::titled(look, (usual, least), [self.title, self.subject]);
+        let mut picture = Picture::titled(plot_style, (usual, least), [self.title, self.subject]);
         if rows == 0 || self.columns.is_empty() {
             return picture.nothing("nothing to compare");
         }
@@ -328,7 +328,7 @@ pub struct Images<'a> {
     pub images: &'a [CaptionedImage],
 }
 
-/// Width of the whole picture, unless a [`Look`] sets it.
+/// Width of the whole picture, unless a [`PlotStyle`] sets it.
 const WIDTH: f64 = 960.0;
 /// Empty pixels between images.
 const GAP: f64 = 12.0;
@@ -337,8 +337,8 @@ const CAPTION: f64 = 24.0;
 
 impl Images<'_> {
     /// Draws the images. All of a row have the same width.
-    pub fn picture(&self, look: &Look) -> Picture {
-        let mut picture = Picture::titled(look, (WIDTH, 300.0), [self.title, self.subject]);
+    pub fn picture(&self, plot_style: &PlotStyle) -> Picture {
+        let mut picture = Picture::titled(plot_style, (WIDTH, 300.0), [self.title, self.subject]);
         if self.images.is_empty() {
             return picture.nothing("no image was drawn");
         }
@@ -401,13 +401,13 @@ mod tests {
     #[test]
     fn one_hot_pixel_leaves_the_others_their_colours() {
         let tiles = row(|x| if x == 7 { 820.0 } else { f64::from(x % 10) + 1.0 });
-        let picture = plot(&tiles, Shading::Clipped, &[]).picture(&Look::default());
+        let picture = plot(&tiles, Shading::Clipped, &[]).picture(&PlotStyle::default());
         let fills = fills_of(&picture);
         assert_eq!(fills[9], heat(1.0), "ten of one in ten is the darkest");
         assert_eq!(fills[7], heat(1.0));
         let svg = picture.svg().unwrap();
         assert!(svg.contains("≥ 10.00") && svg.contains("most: 820.0"), "{svg}");
-        let even = plot(&tiles, Shading::Even, &[]).picture(&Look::default());
+        let even = plot(&tiles, Shading::Even, &[]).picture(&PlotStyle::default());
         assert_eq!(fills_of(&even)[9], heat(10.0 / 820.0), "nearly white");
     }
 
@@ -415,7 +415,7 @@ mod tests {
     fn maps_up_to_the_same_value_can_be_compared() {
         let shade = |most: f64, shading| {
             let tiles = row(|x| if x == 0 { most } else { 10.0 });
-            fills_of(&plot(&tiles, shading, &[]).picture(&Look::default()))[1]
+            fills_of(&plot(&tiles, shading, &[]).picture(&PlotStyle::default()))[1]
         };
         assert_eq!(shade(20.0, Shading::UpTo(40.0)), shade(40.0, Shading::UpTo(40.0)));
         assert_ne!(shade(20.0, Shading::Even), shade(40.0, Shading::Even));
@@ -425,7 +425,7 @@ mod tests {
     fn classes_are_named_and_have_no_shades_between_them() {
         let names = ["not shaded", "shaded without light", "with light"];
         let picture =
-            plot(&row(|x| f64::from(x % 3)), Shading::Classes(&names), &[]).picture(&Look::default());
+            plot(&row(|x| f64::from(x % 3)), Shading::Classes(&names), &[]).picture(&PlotStyle::default());
         let svg = picture.svg().unwrap();
         assert!(names.iter().all(|name| svg.contains(name)));
         let fills = fills_of(&picture);
@@ -436,7 +436,7 @@ mod tests {
     fn outlines_of_the_image_are_drawn_over_the_map() {
         let brightness: Vec<f32> = (0..200).map(|x| if x < 100 { 0.1 } else { 0.9 }).collect();
         let dark = |brightness: &[f32]| {
-            let picture = plot(&row(|_| 1.0), Shading::Even, brightness).picture(&Look::default());
+            let picture = plot(&row(|_| 1.0), Shading::Even, brightness).picture(&PlotStyle::default());
             fills_of(&picture).iter().filter(|fill| fill.rgb == INK.rgb).count()
         };
         assert_eq!((dark(&brightness), dark(&[])), (1, 0));
@@ -456,11 +456,11 @@ mod tests {
     #[test]
     fn nothing_is_said_and_cells_are_there() {
         let empty = Matrix { title: "t", subject: "s", scale: ["a", "b"], columns: vec![], panels: vec![] };
-        assert!(empty.picture(&Look::default()).svg().unwrap().contains("nothing to compare"));
+        assert!(empty.picture(&PlotStyle::default()).svg().unwrap().contains("nothing to compare"));
         let rows = vec![("one", vec![Some(1.0), None]), ("two", vec![Some(77.0), Some(f64::NAN)])];
         let panels = vec![MatrixPanel { name: "all", rows }];
         let svg = Matrix { title: "t", subject: "s", scale: ["a", "b"], columns: vec!["a", "b"], panels }
-            .picture(&Look::default())
+            .picture(&PlotStyle::default())
             .svg()
             .unwrap();
         assert!(svg.contains("77") && svg.contains("one"), "{svg}");
@@ -476,7 +476,7 @@ mod tests {
         };
         let images = ["one", "two"].map(image);
         let images = Images { title: "t", subject: "s", across: 2, images: &images };
-        let picture = images.picture(&Look::default());
+        let picture = images.picture(&PlotStyle::default());
         let rects = picture.shapes.iter().filter_map(|shape| match shape {
             Shape::Rect { from, to, fill } => Some((to.0 - from.0, to.1 - from.1, fill.rgb)),
             _ => None,

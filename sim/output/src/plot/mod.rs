@@ -1,5 +1,5 @@
 //! Plots of runs and charts. Each is described once as a [`Picture`], and rendered as SVG, PNG and PDF. A
-//! [`Look`] sets the width and the font size.
+//! [`PlotStyle`] sets the width and the font size.
 //!
 //! Plots of a run:
 //!
@@ -38,7 +38,7 @@ pub use chart::Chart;
 pub use chart_panel::ChartPanel;
 pub use frame_plots::{FramePowerPlot, PowerPart, StallLane, UnitLane, UnitPlot};
 pub use heat_map::{CaptionedImage, HeatMapPlot, HeatTile, Images, Matrix, MatrixPanel, Shading};
-pub use picture::{COLUMN_MM, Look, Picture, undrawable};
+pub use picture::{COLUMN_MM, Picture, PlotStyle, undrawable};
 pub use render::PlotError;
 pub use run_plots::{FrameEnergyPlot, FrameEnergyPoint, PowerRun};
 pub use series::{Mark, Paint, Series, Spread};

@@ -1,7 +1,7 @@
 //! Plot area with its axes, and labels beside points that overlap nothing. Legends, and the styles that
 //! distinguish series: colour, marker and strokes.
 
-use super::axis::{Axis, RAISED, TICK_PX, Tick, label_width};
+use super::axis::{Axis, EXPONENT_SIZE_RATIO, TICK_PX, Tick, label_width};
 use super::picture::{Across, Picture, Point, Text, shortened, text, text_width};
 use super::{AXIS, BACKGROUND, Colour, GRID, INK, MUTED, SERIES};
 
@@ -145,7 +145,7 @@ pub(super) fn tick_label(picture: &mut Picture, label: &str, (x, y): Point, acro
     }
     picture.text(plain(base, (left, y)));
     let behind = left + text_width(base, TICK_PX, false);
-    picture.text(Text { size: RAISED * TICK_PX, ..plain(raised, (behind + 0.5, y - 5.0)) });
+    picture.text(Text { size: EXPONENT_SIZE_RATIO * TICK_PX, ..plain(raised, (behind + 0.5, y - 5.0)) });
 }
 
 /// A name, the point it belongs to, and the radius of the point's marker.
@@ -407,7 +407,7 @@ impl Style {
 mod tests {
     use super::super::INK;
     use super::super::axis::{Along, Axis};
-    use super::super::picture::{Look, Shape};
+    use super::super::picture::{PlotStyle, Shape};
     use super::*;
 
     fn panel() -> Panel {
@@ -417,7 +417,7 @@ mod tests {
     }
 
     fn placed(points: &[Point]) -> (usize, Vec<Box4>) {
-        let mut picture = Picture::titled(&Look::default(), (400.0, 300.0), ["", ""]);
+        let mut picture = Picture::titled(&PlotStyle::default(), (400.0, 300.0), ["", ""]);
         let labels: Vec<Label<'_>> = points
             .iter()
             .map(|&at| Label { name: "lens-and-motion", at, radius: 3.0, colour: INK, bold: false })

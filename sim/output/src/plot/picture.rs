@@ -65,9 +65,13 @@ const SUBTITLE_LINE: f64 = 18.0;
 impl Picture {
     /// A picture with a title and a line below it. It is `usual` pixels wide unless `look` sets the width,
     /// and at least `least`. Its height is that of the titles; later drawing increases it.
-    pub(super) fn titled(look: &Look, (usual, least): (f64, f64), [title, subtitle]: [&str; 2]) -> Self {
-        let title = look.title.as_deref().unwrap_or(title);
-        let paper = look.paper(usual, least);
+    pub(super) fn titled(
+        plot_style: &PlotStyle,
+        (usual, least): (f64, f64),
+        [title, subtitle]: [&str; 2],
+    ) -> Self {
+        let title = plot_style.title.as_deref().unwrap_or(title);
+        let paper = plot_style.paper(usual, least);
         let mut picture = Self { paper, height: 12.0, title: title.to_owned(), shapes: Vec::new() };
         if !title.is_empty() {
             picture.heading(title, subtitle);
@@ -191,7 +195,7 @@ const SCREEN_PER_INCH: f64 = 96.0;
 /// Width, font size and title of pictures, as set by the user. The default is each picture's own.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Look {
+pub struct PlotStyle {
     /// Width in millimetres.
     pub width_mm: Option<f64>,
     /// Font size of ordinary text in points.
@@ -211,7 +215,7 @@ pub(super) struct Paper {
     pub width_mm: Option<f64>,
 }
 
-impl Look {
+impl PlotStyle {
     /// Size of a picture that is `usual` pixels wide by default and needs at least `least`. For a narrower
     /// one the font is smaller than requested.
     pub(super) fn paper(&self, usual: f64, least: f64) -> Paper {
@@ -323,7 +327,7 @@ mod tests {
 
     #[test]
     fn letters_of_a_column_are_eight_points() {
-        let paper = Look { width_mm: Some(COLUMN_MM), ..Look::default() }.paper(1200.0, 300.0);
+        let paper = PlotStyle { width_mm: Some(COLUMN_MM), ..PlotStyle::default() }.paper(1200.0, 300.0);
         let points_per_px = COLUMN_MM / 25.4 * 72.0 / paper.width;
         assert!((LETTERS_PX * points_per_px - PAPER_LETTERS_PT).abs() < 0.05, "{paper:?}");
         assert!((paper.width * paper.zoom - COLUMN_MM / 25.4 * 300.0).abs() < 1e-9);
@@ -331,10 +335,16 @@ mod tests {
 
     #[test]
     fn larger_letters_leave_less_room_on_the_same_screen() {
-        assert_eq!(Look::default().paper(1200.0, 300.0), Paper { width: 1200.0, zoom: 1.0, width_mm: None });
-        let paper = Look { font_pt: Some(19.5), ..Look::default() }.paper(1200.0, 300.0);
+        assert_eq!(
+            PlotStyle::default().paper(1200.0, 300.0),
+            Paper { width: 1200.0, zoom: 1.0, width_mm: None }
+        );
+        let paper = PlotStyle { font_pt: Some(19.5), ..PlotStyle::default() }.paper(1200.0, 300.0);
         assert_eq!((paper.width, paper.zoom), (600.0, 2.0));
-        assert_eq!(Look { font_pt: Some(39.0), ..Look::default() }.paper(1200.0, 700.0).width, 700.0);
+        assert_eq!(
+            PlotStyle { font_pt: Some(39.0), ..PlotStyle::default() }.paper(1200.0, 700.0).width,
+            700.0
+        );
     }
 
     #[test]

@@ -485,12 +485,12 @@ fn exact(value: f64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::picture::Look;
+    use super::super::picture::PlotStyle;
     use super::*;
 
     #[test]
     fn the_table_points_at_the_objects() {
-        let mut picture = Picture::titled(&Look::default(), (200.0, 100.0), ["A (title)", "below – it"]);
+        let mut picture = Picture::titled(&PlotStyle::default(), (200.0, 100.0), ["A (title)", "below – it"]);
         picture.dot((10.0, 10.0), 3.0, Colour::hex(0xff_0000).alpha(0.5));
         let bytes = picture.pdf();
         let text: String = bytes.iter().map(|&byte| char::from(byte)).collect();

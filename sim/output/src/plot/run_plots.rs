@@ -2,7 +2,7 @@
 
 use super::axis::{Along, Axis, is_drawable};
 use super::panel::{BELOW, Key, Panel, aside, legend_lines};
-use super::picture::{Across, Look, Picture, Text, text};
+use super::picture::{Across, Picture, PlotStyle, Text, text};
 use super::series::{Extremes, extremes, moving_mean};
 use super::{Colour, INK, MARK, MEASURED, MUTED, TRUTH};
 use crate::MeanSd;
@@ -39,7 +39,7 @@ impl PowerRun<'_> {
     /// Draws the lowest and highest sample per column of pixels, so that every spike is visible, a mean over
     /// about one frame, the marked window, and lanes of frame starts. If frames cover little of the run, only
     /// their part is shown.
-    pub fn picture(&self, look: &Look) -> Picture {
+    pub fn picture(&self, plot_style: &PlotStyle) -> Picture {
         let rate = format!("{} samples at {}", self.power_w.len(), si(self.rate_hz, "Hz"));
         let shown = self.shown();
         let cut = match shown {
@@ -53,7 +53,7 @@ impl PowerRun<'_> {
             _ => String::new(),
         };
         let subject = format!("{} – {rate}{cut}", self.subject);
-        let mut picture = Picture::titled(look, (1200.0, 300.0), ["Power over the run", &subject]);
+        let mut picture = Picture::titled(plot_style, (1200.0, 300.0), ["Power over the run", &subject]);
         let drawn = shown.and_then(|shown| Some((shown, shown.panel(&picture)?)));
         let Some((shown, mut panel)) = drawn else { return picture.nothing("no samples to show") };
         let (top, height) = (picture.height + 10.0, panel.bottom - panel.top);
@@ -265,8 +265,8 @@ pub struct FrameEnergyPlot<'a> {
 
 impl FrameEnergyPlot<'_> {
     /// Draws points and lines over frame numbers, with the mean and its band.
-    pub fn picture(&self, look: &Look) -> Picture {
-        let mut picture = Picture::titled(look, (1200.0, 300.0), ["Energy per frame", self.subject]);
+    pub fn picture(&self, plot_style: &PlotStyle) -> Picture {
+        let mut picture = Picture::titled(plot_style, (1200.0, 300.0), ["Energy per frame", self.subject]);
         let Some(mut panel) = self.panel(&picture) else { return picture.nothing("no frames to show") };
         let top = picture.height + 10.0;
         let legend = legend_lines(&mut picture, top, &self.legend());
@@ -379,7 +379,7 @@ mod tests {
     fn a_single_spike_in_a_million_samples_reaches_its_height() {
         let mut power_w = vec![10.0; 1_000_000];
         power_w[654_321] = 100.0;
-        let shapes = run(&power_w).picture(&Look::default()).shapes;
+        let shapes = run(&power_w).picture(&PlotStyle::default()).shapes;
         let polygon = shapes.iter().find_map(|shape| match shape {
             Shape::Polygon { points, .. } => Some(points),
             _ => None,
@@ -394,7 +394,7 @@ mod tests {
     fn what_is_not_finite_leaves_a_gap() {
         let mut power_w = vec![10.0; 100_000];
         power_w[40_000..60_000].fill(f64::NAN);
-        let polygons = run(&power_w).picture(&Look::default()).shapes;
+        let polygons = run(&power_w).picture(&PlotStyle::default()).shapes;
         let polygons = polygons.iter().filter(|shape| matches!(shape, Shape::Polygon { .. })).count();
         assert_eq!(polygons, 2);
     }
@@ -408,7 +408,7 @@ mod tests {
         let shown = run.shown().unwrap();
         let frames_s = 0.3 - 0.25 + 0.0167;
         assert!(frames_s > 0.6 * (shown.end_s() - shown.start_s), "{} to {}", shown.start_s, shown.end_s());
-        assert!(run.picture(&Look::default()).svg().unwrap().contains(" of 567 ms shown"));
+        assert!(run.picture(&PlotStyle::default()).svg().unwrap().contains(" of 567 ms shown"));
         let short = PowerRun { power_w: &power_w[..5000], start_s: 0.24, ..run };
         assert_eq!(short.shown().unwrap().power_w.len(), 5000, "frames all over are shown with all there is");
     }

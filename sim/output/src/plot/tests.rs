@@ -8,13 +8,13 @@ use super::picture::{Across, Picture, Shape, Text, text_width};
 use super::*;
 
 /// Every look that a picture has to fit: its own, that of a column, of a page, and large letters.
-fn looks() -> [Look; 4] {
-    let look = Look::default();
+fn looks() -> [PlotStyle; 4] {
+    let plot_style = PlotStyle::default();
     [
-        look.clone(),
-        Look { width_mm: Some(COLUMN_MM), title: Some(String::new()), ..look.clone() },
-        Look { width_mm: Some(175.0), font_pt: Some(7.0), title: Some("A title of its own".to_owned()) },
-        Look { font_pt: Some(16.0), ..look },
+        plot_style.clone(),
+        PlotStyle { width_mm: Some(COLUMN_MM), title: Some(String::new()), ..plot_style.clone() },
+        PlotStyle { width_mm: Some(175.0), font_pt: Some(7.0), title: Some("A title of its own".to_owned()) },
+        PlotStyle { font_pt: Some(16.0), ..plot_style },
     ]
 }
 
@@ -63,16 +63,16 @@ fn check_texts(picture: &Picture) {
     }
 }
 
-fn check(drawn: impl Fn(&Look) -> Picture) {
-    for look in looks() {
-        let picture = drawn(&look);
+fn check(drawn: impl Fn(&PlotStyle) -> Picture) {
+    for plot_style in looks() {
+        let picture = drawn(&plot_style);
         check_texts(&picture);
         assert!(picture.svg().unwrap().ends_with("</svg>\n"));
     }
-    assert!(drawn(&Look::default()).png().unwrap().starts_with(b"\x89PNG"));
+    assert!(drawn(&PlotStyle::default()).png().unwrap().starts_with(b"\x89PNG"));
 }
 
-fn power_run(rate_hz: f64, power_w: &[f64], look: &Look) -> Picture {
+fn power_run(rate_hz: f64, power_w: &[f64], plot_style: &PlotStyle) -> Picture {
     let starts = [0.0, 0.001, f64::NAN, 0.5, 1e9];
     let mark_s = Some((0.0, 0.002));
     let subject = "scene";
@@ -85,27 +85,28 @@ fn power_run(rate_hz: f64, power_w: &[f64], look: &Look) -> Picture {
         true_starts_s: &starts,
         mark_s,
     };
-    run.picture(look)
+    run.picture(plot_style)
 }
 
 #[test]
 fn power_run_takes_anything() {
     for rate_hz in [50_000.0, 1.0, 1e-9, 1e12, 0.0, -1.0, f64::NAN, f64::INFINITY] {
-        check(|look| power_run(rate_hz, &[10.0, 12.0, 30.0, f64::NAN, 11.0], look));
+        check(|plot_style| power_run(rate_hz, &[10.0, 12.0, 30.0, f64::NAN, 11.0], plot_style));
     }
     let huge = [f64::MAX, f64::MIN, f64::MAX];
     for power_w in [&[][..], &[5.0], &[0.0, 0.0], &[f64::NAN; 3], &[f64::INFINITY, 1.0], &huge, &[-3.0, 2.0]]
     {
-        check(|look| power_run(1000.0, power_w, look));
+        check(|plot_style| power_run(1000.0, power_w, plot_style));
     }
-    check(|look| power_run(1000.0, &vec![7.0; 5000], look));
+    check(|plot_style| power_run(1000.0, &vec![7.0; 5000], plot_style));
 }
 
-fn frame_power(parts: usize, bins: usize, power: f64, bin_s: f64, look: &Look) -> Picture {
+fn frame_power(parts: usize, bins: usize, power: f64, bin_s: f64, plot_style: &PlotStyle) -> Picture {
     let part = |part: &Part| PowerPart { part: *part, power_w: vec![power; bins] };
     let parts = Part::ALL.iter().cycle().take(parts).map(part).collect();
     let samples = &[(0.001, 4.0), (f64::NAN, 1.0)];
-    FramePowerPlot { subject: "scene", frame: 3, bin_s, parts, samples, frame_j: Some(0.0163) }.picture(look)
+    FramePowerPlot { subject: "scene", frame: 3, bin_s, parts, samples, frame_j: Some(0.0163) }
+        .picture(plot_style)
 }
 
 #[test]
@@ -121,7 +122,7 @@ fn frame_power_takes_anything() {
         (4, 10, 1.0, 0.0),
         (4, 10, -1.0, 1.0),
     ] {
-        check(|look| frame_power(parts, bins, power, bin_s, look));
+        check(|plot_style| frame_power(parts, bins, power, bin_s, plot_style));
     }
 }
 
@@ -141,7 +142,9 @@ fn frame_energy_takes_anything() {
     for frames in cases {
         let measured_j = crate::MeanSd::of(frames.iter().filter_map(|frame| frame.measured_j));
         for pixels in [0, 921_600] {
-            check(|look| FrameEnergyPlot { subject: "scene", frames, measured_j, pixels }.picture(look));
+            check(|plot_style| {
+                FrameEnergyPlot { subject: "scene", frames, measured_j, pixels }.picture(plot_style)
+            });
         }
     }
 }
@@ -151,11 +154,15 @@ fn unit_busy_takes_anything() {
     let lane = |bins| UnitLane { name: "a unit whose name goes on and on and on", busy: vec![0.7; bins] };
     for units in [vec![], vec![lane(0)], vec![lane(1)], vec![lane(5000); 14], vec![lane(3), lane(9)]] {
         for bin_s in [1e-6, f64::NAN, 0.0] {
-            check(|look| UnitPlot { subject: "scene", frame: 0, bin_s, units: units.clone() }.picture(look));
+            check(|plot_style| {
+                UnitPlot { subject: "scene", frame: 0, bin_s, units: units.clone() }.picture(plot_style)
+            });
         }
     }
     let units = vec![UnitLane { name: "odd", busy: vec![f64::NAN, -5.0, 7.0] }];
-    check(|look| UnitPlot { subject: "scene", frame: 0, bin_s: 1e-3, units: units.clone() }.picture(look));
+    check(|plot_style| {
+        UnitPlot { subject: "scene", frame: 0, bin_s: 1e-3, units: units.clone() }.picture(plot_style)
+    });
 }
 
 #[test]
@@ -167,7 +174,7 @@ fn stalls_take_anything() {
     };
     for units in [vec![], vec![lane("dram", 0)], vec![lane("dram", 100), lane("a unit with a name", 3)]] {
         let lanes = UnitPlot { subject: "scene", frame: 1, bin_s: 1e-5, units };
-        check(|look| lanes.picture(look));
+        check(|plot_style| lanes.picture(plot_style));
     }
 }
 
@@ -200,12 +207,12 @@ fn curves_and_their_legends_fit() {
         vec![failing(7.0..3.0)],
     ] {
         for subject in ["of a scene".to_owned(), [long; 5].join(" ")] {
-            check(|look| Chart::new(long, &subject, panels.clone()).picture(look));
+            check(|plot_style| Chart::new(long, &subject, panels.clone()).picture(plot_style));
         }
     }
     let small = |name: &str| ChartPanel { title: name.to_owned(), ..panel(1.0) };
     let panels: Vec<_> = ["sides+edges+screen", "all but coarse"].repeat(7).into_iter().map(small).collect();
-    check(|look| Chart::new("small", "s", panels.clone()).small(7).picture(look));
+    check(|plot_style| Chart::new("small", "s", panels.clone()).small(7).picture(plot_style));
 }
 
 #[test]
@@ -231,11 +238,13 @@ fn every_mark_is_drawn_and_nothing_says_so() {
     let series: Vec<Series> = marks.into_iter().map(|mark| Series::new("a", mark)).collect();
     let panel =
         |series| ChartPanel::over("", [AxisSpec::even("time", "s"), AxisSpec::even("power", "W")], series);
-    let drawn = |series: Vec<Series>, look: &Look| Chart::new("t", "s", vec![panel(series)]).picture(look);
-    check(|look| drawn(series.clone(), look));
-    let svg = drawn(series, &Look::default()).svg().unwrap();
+    let drawn = |series: Vec<Series>, plot_style: &PlotStyle| {
+        Chart::new("t", "s", vec![panel(series)]).picture(plot_style)
+    };
+    check(|plot_style| drawn(series.clone(), plot_style));
+    let svg = drawn(series, &PlotStyle::default()).svg().unwrap();
     assert!(["named", "ring", "middle", "power (W)"].iter().all(|word| svg.contains(word)));
-    assert!(drawn(vec![], &Look::default()).svg().unwrap().contains("nothing to show"));
+    assert!(drawn(vec![], &PlotStyle::default()).svg().unwrap().contains("nothing to show"));
 }
 
 /// Names of curves are whole where there is room for them on a page.
@@ -245,7 +254,7 @@ fn names_of_curves_are_whole() {
     let panel = |name: &str| {
         ChartPanel::new("panel", ["x", "y"], vec![Series::curve(name, [(1.0, 1.0), (2.0, 5.0)])])
     };
-    let picture = Chart::new("Names", "long ones", names.map(panel).into()).picture(&Look::default());
+    let picture = Chart::new("Names", "long ones", names.map(panel).into()).picture(&PlotStyle::default());
     for name in names {
         let is_name = |shape: &Shape| matches!(shape, Shape::Text(text) if text.text == name);
         assert!(picture.shapes.iter().any(is_name), "{name}");
@@ -263,7 +272,7 @@ fn heat_maps_of_any_shape_fit() {
         {
             let label = "events per pixel";
             let plot = HeatMapPlot { title, subject, label, size, tiles: &tiles, shading, brightness: &[] };
-            check(|look| plot.picture(look));
+            check(|plot_style| plot.picture(plot_style));
         }
     }
 }
@@ -275,7 +284,7 @@ fn matrices_fit() {
     let columns = vec!["a family with a name"; 14];
     let matrix =
         Matrix { title: "t", subject: "s", scale: ["the best", "32 times as much"], columns, panels };
-    check(|look| matrix.picture(look));
+    check(|plot_style| matrix.picture(plot_style));
 }
 
 /// The colour of each unit in the legend or beside the lane of a picture, by its name.
@@ -316,8 +325,8 @@ fn a_unit_has_one_colour_in_every_plot() {
             |unit: &Unit| StallLane { name: unit.name(), shares: vec![[0.0; 3]; 4], bottleneck: vec![] };
         let stalls =
             UnitPlot { subject: "s", frame: 0, bin_s: 1e-6, units: units.iter().map(lane).collect() };
-        let look = Look::default();
-        for picture in [power.picture(&look), busy.picture(&look), stalls.picture(&look)] {
+        let plot_style = PlotStyle::default();
+        for picture in [power.picture(&plot_style), busy.picture(&plot_style), stalls.picture(&plot_style)] {
             let colours = unit_colours(&picture);
             assert_eq!(colours.len(), units.len(), "{}", picture.title);
             for (name, rgb) in colours {
@@ -336,8 +345,8 @@ fn pictures_are_as_wide_as_requested() {
         "own subject",
         vec![ChartPanel::new("", ["x", "y"], vec![Series::curve("one", [(1.0, 1.0), (10.0, 5.0)])])],
     );
-    let look = Look { width_mm: Some(85.0), title: Some(String::new()), ..Look::default() };
-    let picture = chart.picture(&look);
+    let plot_style = PlotStyle { width_mm: Some(85.0), title: Some(String::new()), ..PlotStyle::default() };
+    let picture = chart.picture(&plot_style);
     let svg = picture.svg().unwrap();
     assert!(svg.contains("width=\"85.00mm\"") && !svg.contains("own subject"), "{svg}");
     let pdf: String = picture.pdf().iter().map(|&byte| char::from(byte)).collect();
@@ -345,7 +354,10 @@ fn pictures_are_as_wide_as_requested() {
     let png = picture.png().unwrap();
     let width = u32::from_be_bytes([png[16], png[17], png[18], png[19]]);
     assert!(width.abs_diff(1004) <= 1, "85 mm at 300 pixels an inch: {width}");
-    let titled = chart.picture(&Look { title: Some("Another".to_owned()), ..Look::default() }).svg().unwrap();
+    let titled = chart
+        .picture(&PlotStyle { title: Some("Another".to_owned()), ..PlotStyle::default() })
+        .svg()
+        .unwrap();
     assert!(titled.contains("Another") && !titled.contains("Own title") && titled.contains("own subject"));
 }
 

@@ -28,7 +28,7 @@ pub(crate) fn gather(plan: &Plan, simulated: &Simulated, measurement: &Measureme
     all.extend(start_errors(measurement).filter(|_| short.is_none()));
     all.extend(short);
     all.extend(detection(measurement).filter(|_| !unseen));
-    all.extend(clipped(measurement));
+    all.extend(clipped(measurement.clipped));
     all.extend(lost(measurement));
     Warning::fold(all)
 }
@@ -320,12 +320,11 @@ fn idle_above_busy(plan: &Plan, simulated: &Simulated) -> Option<Warning> {
     })
 }
 
-fn clipped(measurement: &Measurement) -> Option<Warning> {
-    (measurement.clipped > 0).then(|| {
-        Warning::new(
-            Code::ClippedSamples,
-            format!("{} samples are beyond the recorder's range", measurement.clipped),
-        )
+/// Warning about samples beyond the range of the recorder. The range holds a quarter more than the peak takes on an
+/// ideal rail; on rails below half a volt the voltage may fall by more than that under load.
+fn clipped(samples: usize) -> Option<Warning> {
+    (samples > 0).then(|| {
+        Warning::new(Code::ClippedSamples, format!("{samples} samples are beyond the recorder's range"))
     })
 }
 
@@ -377,6 +376,14 @@ mod tests {
     }
 
     #[test]
+    fn any_clipped_sample_gives_a_warning() {
+        assert_eq!(clipped(0), None);
+        let warning = clipped(3).unwrap();
+        assert_eq!(warning.code, Code::ClippedSamples);
+        assert!(warning.message.starts_with("3 samples"), "{}", warning.message);
+    }
+
+    #[test]
     fn only_wide_intervals_give_a_warning() {
         let of = |percent: f64| {
             let relative_half_width = percent / 100.0;
@@ -403,7 +410,9 @@ mod tests {
             })
         };
         assert_eq!(of(MAX_HALF_WIDTH_PERCENT), None);
-        let message = of(7.25).map(|warning| warning.to_string()).unwrap_or_default();
+        let warning = of(7.25).unwrap();
+        assert_eq!(warning.code, Code::WidePredictionInterval);
+        let message = warning.to_string();
         assert!(message.contains("3 of 36 frames") && message.contains("7.2 %"), "{message}");
     }
 

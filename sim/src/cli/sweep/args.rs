@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 use sweep::{Folder, Shard};
 
-use crate::cli::args::{LookArgs, ThreadArgs};
+use crate::cli::args::{PlotStyleArgs, ThreadArgs};
 use crate::cli::parse::percent;
 
 /// Arguments of `sweep`.
@@ -194,7 +194,7 @@ pub struct ReportArgs {
     pub within: f64,
     /// Style of the plot
     #[command(flatten)]
-    pub look: LookArgs,
+    pub plot_style: PlotStyleArgs,
 }
 
 impl FolderArgs {

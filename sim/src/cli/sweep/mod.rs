@@ -18,8 +18,8 @@ use self::args::{
     AskArgs, CleanArgs, FileArgs, FolderArgs, MergeArgs, PlanArgs, ReportArgs, RunStepArgs, SlurmArgs,
     StatusArgs, Step,
 };
-use super::crash::Stop;
 use super::run::REVISION;
+use super::signals::Stop;
 use super::{Failure, print, print_json};
 
 pub use self::args::SweepArgs;
@@ -284,7 +284,7 @@ fn print_status(out: &Path, json: bool, state: &InShard) -> Result<(), Failure> 
 fn report(args: &ReportArgs, terminal: &Terminal) -> Result<(), Failure> {
     let folder = opened(&args.folder, terminal)?;
     let report = Report::of(&folder, ReportOptions { within: args.within })?;
-    let page = report.write(&folder, &args.look.look())?;
+    let page = report.write(&folder, &args.plot_style.plot_style())?;
     let name = folder.path().display().to_string();
     if args.folder.json {
         return print_json(&Printed { out: name, done: &report }, true);

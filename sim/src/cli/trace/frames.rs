@@ -199,9 +199,9 @@ fn text(frames: &FrameSet, table: &FrameTable, summary: Option<FrameSummary>, pi
 fn reason(threshold: &Threshold) -> String {
     match threshold.rule {
         Rule::Sequence => "no threshold: the sequence with the most evidence as a whole".to_owned(),
-        Rule::NoneAlike => "no threshold: nothing else resembles the marked frame".to_owned(),
+        Rule::NoneMatch => "no threshold: nothing else resembles the marked frame".to_owned(),
         Rule::NoCandidates => "no threshold: nothing to compare with the marked frame".to_owned(),
-        Rule::AllAlike => format!("threshold {:.4e} W^2, above all minima", threshold.value_w2),
+        Rule::AllMatch => format!("threshold {:.4e} W^2, above all minima", threshold.value_w2),
         Rule::Otsu | Rule::OtsuRegular | Rule::OtsuDistinct => {
             format!("threshold {:.4e} W^2, separation {:.2}", threshold.value_w2, threshold.separation)
         }

@@ -20,7 +20,7 @@ use traces::trace::check_span;
 
 use super::input::shown as name_of;
 use super::{PlotFormat, report, write_picture, wrong};
-use crate::cli::args::LookArgs;
+use crate::cli::args::PlotStyleArgs;
 use crate::cli::parse::{milliseconds, size_of_power, time};
 use crate::cli::trace::input::{FindArgs, InputArgs};
 use crate::cli::{Failure, may_hold_results, print_json};
@@ -71,7 +71,7 @@ pub struct PlotArgs {
     pub format: Option<PlotFormat>,
     /// Style of pictures.
     #[command(flatten)]
-    pub look: LookArgs,
+    pub plot_style: PlotStyleArgs,
 }
 
 /// Kind of plot.
@@ -187,7 +187,8 @@ fn framed(args: &PlotArgs, terminal: &Terminal) -> Result<(Picture, String), Fai
 fn drawn(args: &PlotArgs, subject: &str, (title, x, y, series): Drawn) -> Picture {
     let scale = if y == POWER { Scale::FromZero } else { Scale::Even };
     let axes = [AxisSpec::even(x.0, x.1), AxisSpec { scale, ..AxisSpec::even(y.0, y.1) }];
-    Chart::new(title, subject, vec![ChartPanel::over("", axes, series)]).picture(&args.look.look())
+    Chart::new(title, subject, vec![ChartPanel::over("", axes, series)])
+        .picture(&args.plot_style.plot_style())
 }
 
 /// The kinds that show samples of frames, which are held.
@@ -380,7 +381,7 @@ pub struct ParetoArgs {
     pub json: bool,
     /// Style of pictures.
     #[command(flatten)]
-    pub look: LookArgs,
+    pub plot_style: PlotStyleArgs,
 }
 
 /// Quantity that a plot of frontiers shows over time.
@@ -404,7 +405,11 @@ pub(super) fn pareto(args: &ParetoArgs, piped: bool, terminal: &Terminal) -> Res
             write_file(out, |file| write_csv(&groups, file))?;
         } else {
             let subject = format!("{} - idle power charged: {} W", name_of(&args.table), args.idle_w);
-            write_picture(&picture(&subject, args.show, &args.look, &groups), out, PlotFormat::of(out)?)?;
+            write_picture(
+                &picture(&subject, args.show, &args.plot_style, &groups),
+                out,
+                PlotFormat::of(out)?,
+            )?;
         }
     }
     if args.json {
@@ -456,7 +461,7 @@ fn place(show: ParetoShow, p: &Point) -> (f64, f64, f64, f64) {
 
 /// All groups in one picture: points with their names and deviations, and each group's frontier as steps, as
 /// between two settings there is none.
-fn picture(subject: &str, show: ParetoShow, look: &LookArgs, groups: &Groups) -> Picture {
+fn picture(subject: &str, show: ParetoShow, plot_style: &PlotStyleArgs, groups: &Groups) -> Picture {
     let place = |s: &RatedPoint| place(show, &s.point);
     let all = || groups.values().flatten();
     let of = |on: bool| {
@@ -488,5 +493,5 @@ fn picture(subject: &str, show: ParetoShow, look: &LookArgs, groups: &Groups) ->
         ParetoShow::Power => ("Time and mean power", ("power", "W")),
     };
     let axes = [("time", "s"), y].map(|(name, unit)| AxisSpec::even(name, unit));
-    Chart::new(title, subject, vec![ChartPanel::over("", axes, series)]).picture(&look.look())
+    Chart::new(title, subject, vec![ChartPanel::over("", axes, series)]).picture(&plot_style.plot_style())
 }

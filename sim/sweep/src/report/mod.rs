@@ -13,7 +13,7 @@ mod winners;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use output::plot::Look;
+use output::plot::PlotStyle;
 use output::table::counted;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -158,15 +158,15 @@ impl Report {
     ///
     /// # Errors
     /// [`SweepError::InTheWay`] if a file of the user has the name of one of them, and if they cannot be written.
-    pub fn write(&self, folder: &Folder, look: &Look) -> Result<PathBuf, SweepError> {
+    pub fn write(&self, folder: &Folder, plot_style: &PlotStyle) -> Result<PathBuf, SweepError> {
         let tables = self.tables();
         let names = tables.iter().map(|(name, _)| *name).chain([PICTURE, PAGE]);
         let mut dir = folder.open("sweep report", names)?;
         for (name, table) in &tables {
             dir.write_file(name, |out| Ok(table(out)?))?;
         }
-        dir.write_file(PICTURE, |out| Ok(out.write_all(self.picture(look).svg()?.as_bytes())?))?;
-        dir.write_file(PAGE, |out| Ok(out.write_all(self.html(look)?.as_bytes())?))?;
+        dir.write_file(PICTURE, |out| Ok(out.write_all(self.picture(plot_style).svg()?.as_bytes())?))?;
+        dir.write_file(PAGE, |out| Ok(out.write_all(self.html(plot_style)?.as_bytes())?))?;
         dir.publish()?;
         Ok(folder.path().join(PAGE))
     }

@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 
 use minijinja::{Environment, context};
-use output::plot::{AxisSpec, Chart, ChartPanel, Look, Mark, Paint, Picture, PlotError, Series};
+use output::plot::{AxisSpec, Chart, ChartPanel, Mark, Paint, Picture, PlotError, PlotStyle, Series};
 use output::table::si;
 use serde::Serialize;
 use traces::pareto::nondominated;
@@ -46,7 +46,7 @@ impl Report {
     ///
     /// # Errors
     /// [`PageError`] if the template cannot be filled, or the picture cannot be drawn.
-    pub(super) fn html(&self, look: &Look) -> Result<String, PageError> {
+    pub(super) fn html(&self, plot_style: &PlotStyle) -> Result<String, PageError> {
         let mut environment = Environment::new();
         environment.set_trim_blocks(true);
         environment.set_lstrip_blocks(true);
@@ -76,7 +76,7 @@ impl Report {
             winners,
             interactions,
             within => format!("{:.0} %", 100.0 * self.within),
-            frontier => self.picture(look).svg()?,
+            frontier => self.picture(plot_style).svg()?,
             data => &self.workloads,
         })?)
     }
@@ -95,10 +95,10 @@ const MAX_NAMES: usize = 12;
 impl Report {
     /// Designs over each two of time, energy and area. The frontier is over all three; steps are that of the
     /// two that are shown.
-    pub(super) fn picture(&self, look: &Look) -> Picture {
+    pub(super) fn picture(&self, plot_style: &PlotStyle) -> Picture {
         let pairs = [(TIME, ENERGY), (AREA, TIME), (AREA, ENERGY)];
         let panels = pairs.into_iter().filter_map(|(x, y)| self.panel(x, y)).collect();
-        Chart::new("Designs", &self.sweep, panels).picture(look)
+        Chart::new("Designs", &self.sweep, panels).picture(plot_style)
     }
 
     fn panel(&self, x: Quantity, y: Quantity) -> Option<ChartPanel> {
@@ -245,7 +245,7 @@ mod tests {
         design.warnings = vec!["platform-mismatch".to_owned()];
         let mut report =
             Report::of_designs([("w".to_owned(), vec![design])].into(), ReportOptions::default());
-        let html = report.html(&Look::default()).unwrap();
+        let html = report.html(&PlotStyle::default()).unwrap();
         assert!(
             html.contains("gpu.a=2 *")
                 && html.contains("1 of 1 design on the frontier with platform-mismatch")
@@ -253,7 +253,7 @@ mod tests {
         assert!(!html.contains("left out"));
         (report.left_out, report.left_out_failed, report.left_out_unfinished) = (3, 1, 2);
         report.idle = vec!["constraints[1]".to_owned()];
-        let html = report.html(&Look::default()).unwrap();
+        let html = report.html(&PlotStyle::default()).unwrap();
         let says = "3 points left out: 2 not finished (`quintile sweep run` runs them), 1 failed";
         let (top, _) = html.split_once("<h2>").unwrap();
         assert!(top.contains(says) && top.contains("constraints[1] leaves out no point"), "{top}");
@@ -263,7 +263,7 @@ mod tests {
     fn a_page_holds_its_designs_and_escapes_their_names() {
         let designs = vec![exact(&[("gpu.a", "1</script>")], 1.0, 2.0), exact(&[("gpu.a", "2")], 2.0, 1.0)];
         let report = Report::of_designs([("a < b".to_owned(), designs)].into(), ReportOptions::default());
-        let html = report.html(&Look::default()).unwrap();
+        let html = report.html(&PlotStyle::default()).unwrap();
         assert!(html.contains("2 designs in 1 workload;") && html.contains("a &lt; b"), "{html}");
         assert!(!html.contains("1</script>") && html.contains("<svg"));
         assert!(

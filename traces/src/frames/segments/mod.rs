@@ -500,13 +500,13 @@ impl Likeness {
 mod tests {
     use crate::energy::{TOLERANCE_S, pairs};
     use crate::frames::{FinderMethod, Marks, Options, default_window, find_with};
-    use crate::synth::WITNESSES;
+    use crate::synth::HELD_OUT_DEVICES;
 
     #[test]
     fn runs_of_frames_lone_frames_and_pauses_are_found_by_what_all_frames_begin_with() {
-        let witness = WITNESSES.iter().find(|witness| witness.name == "on demand").unwrap();
-        let scene = witness.scene(80, 3).unwrap();
-        let trace = scene.record(&witness.recording(3)).unwrap();
+        let device = HELD_OUT_DEVICES.iter().find(|device| device.name == "on demand").unwrap();
+        let scene = device.scene(80, 3).unwrap();
+        let trace = scene.record(&device.recording(3)).unwrap();
         let truth_s: Vec<f64> = scene.truth.iter().map(|frame| frame.start_s).collect();
         // Frames from the end mark on are not searched for.
         let (end_s, truth_s) = (truth_s[70], &truth_s[..70]);

@@ -190,7 +190,7 @@ pub fn standard_mode(
     samples: &dyn SampleSource,
     spec: &PipelineSpec,
 ) -> Result<(Covered, FrameReport), PassError> {
-    let mut gpu = Gpu::quiet(spec)?;
+    let mut gpu = Gpu::without_packets(spec)?;
     let found = fill(domain, side, samples, &mut gpu)?;
     Ok((found, gpu.finish()))
 }

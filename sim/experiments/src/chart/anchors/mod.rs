@@ -6,7 +6,7 @@ mod published;
 
 use std::sync::Arc;
 
-use activity::{LineAccess, Packet, Unit};
+use activity::{LineAccess, Packet, S_PER_PS, Unit};
 use glam::{Affine3A, Vec2, Vec3, Vec4};
 use output::OutputError;
 use output::terminal::Progress;
@@ -237,7 +237,7 @@ impl<'a> Stage<'a> {
         let length_ps = ends.windows(2).last().map_or(0, |ends| ends[1] - ends[0]);
         let busy = |unit: &Unit| timed.passes.last().map(|pass| pass.busy_ps[*unit as usize]);
         let limit = Unit::ALL.into_iter().max_by_key(busy).unwrap_or(Unit::Command);
-        Ok(Timed { amount, time_s: length_ps as f64 * 1e-12, limit })
+        Ok(Timed { amount, time_s: length_ps as f64 * S_PER_PS, limit })
     }
 
     /// Draws what is timed as the last pass. Returns how much of it was done.

@@ -4,7 +4,7 @@
 pub(crate) mod measure;
 
 use output::OutputError;
-use output::plot::{ChartPanel, HeatMapPlot, HeatTile, Look, Picture, Scale, Series, Shading};
+use output::plot::{ChartPanel, HeatMapPlot, HeatTile, Picture, PlotStyle, Scale, Series, Shading};
 use output::terminal::Progress;
 use serde::Serialize;
 use workloads::caustics::{MAX_CROSSED_SHARE, Method};
@@ -174,7 +174,7 @@ impl Study for CausticsChart {
         );
         to.chart("caustics_failures", [title, &subject], panels(self))?;
         let mut maps = Method::ALL.into_iter().zip(MAPS);
-        maps.try_for_each(|(method, stem)| to.add(stem, &self.ocean.map(method, to.look())))
+        maps.try_for_each(|(method, stem)| to.add(stem, &self.ocean.map(method, to.plot_style())))
     }
 
     fn tables(&self) -> Vec<Sheet> {
@@ -357,7 +357,7 @@ const MAP_PX: u32 = 4;
 
 impl OceanCounts {
     /// Executions of a method at every pixel (Fig. 8), in colours that are the same for all methods.
-    pub fn map(&self, method: Method, look: &Look) -> Picture {
+    pub fn map(&self, method: Method, plot_style: &PlotStyle) -> Picture {
         let place = Method::ALL.iter().position(|known| *known == method).unwrap_or(0);
         let values = (0..self.runs.len()).flat_map(|place| self.tiles(place)).map(|tile| tile.value);
         HeatMapPlot {
@@ -376,7 +376,7 @@ impl OceanCounts {
             shading: Shading::UpTo(values.fold(0.0, f64::max)),
             brightness: &[],
         }
-        .picture(look)
+        .picture(plot_style)
     }
 
     /// Executions of the method at `place` over those of the prism.

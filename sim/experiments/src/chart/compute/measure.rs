@@ -1,6 +1,6 @@
 //! One program of groups: its cost in a frame, and its error against the exact answer.
 
-use activity::Event;
+use activity::{Event, PS_PER_S};
 use glam::{DVec3, Vec4};
 use output::terminal::Progress;
 use pipeline::Gpu;
@@ -133,7 +133,7 @@ impl Bench {
             (GpuSpec::load(GPU)?, ComputeOptions { list: LIST, ..ComputeOptions::default() });
         let job = job(&options, size)?;
         let frame = DrawsScene::scene(&job).frame(0).map_err(RunError::setting)?;
-        let mut on = Gpu::quiet(&gpu.pipeline).map_err(RunError::setting)?;
+        let mut on = Gpu::without_packets(&gpu.pipeline).map_err(RunError::setting)?;
         let depth = job.depths(&frame, &mut on).map_err(RunError::setting)?;
         let depths = on.contents(depth).unwrap_or_default();
         drop(on);
@@ -177,7 +177,7 @@ impl Bench {
                 Some((mean / self.mean - 1.0).abs())
             }
             (Sweep::Step, Kernel::MipChain) => {
-                let mut gpu = Gpu::quiet(&self.gpu.pipeline).map_err(RunError::setting)?;
+                let mut gpu = Gpu::without_packets(&self.gpu.pipeline).map_err(RunError::setting)?;
                 let chain = job.chain(frame, &mut gpu).map_err(RunError::setting)?;
                 Some((f64::from(chain.mean) / self.mean - 1.0).abs())
             }
@@ -196,7 +196,7 @@ impl Bench {
     }
 
     fn lists(&self, job: &Compute, options: &ComputeOptions) -> Result<TileLights, RunError> {
-        let mut gpu = Gpu::quiet(&self.gpu.pipeline).map_err(RunError::setting)?;
+        let mut gpu = Gpu::without_packets(&self.gpu.pipeline).map_err(RunError::setting)?;
         let depth = job.depths(&self.frame, &mut gpu).map_err(RunError::setting)?;
         let view = gpu.surface_view(depth).ok_or_else(|| RunError::setting("no depths"))?;
         let viewport = job.viewport().map_err(RunError::setting)?;
@@ -246,7 +246,7 @@ fn job(options: &ComputeOptions, size: (u32, u32)) -> Result<Compute, RunError> 
 /// Cycles of a time. Whole cycles stay whole: their product is exact up to some ten million cycles, and 1e-12
 /// is no double.
 fn cycles(ps: u64, core_hz: f64) -> f64 {
-    ps as f64 * core_hz / 1e12
+    ps as f64 * core_hz / PS_PER_S
 }
 
 /// Cycles, energy of the events and conflicts of the passes of the program: those of groups but the one that
@@ -291,7 +291,7 @@ fn found<T>(
     options: &ComputeOptions,
     run: impl Fn(&mut Kernels<'_, '_>, &pipeline::SurfaceView) -> Result<T, pipeline::PassError>,
 ) -> Result<T, RunError> {
-    let mut gpu = Gpu::quiet(&gpu.pipeline).map_err(RunError::setting)?;
+    let mut gpu = Gpu::without_packets(&gpu.pipeline).map_err(RunError::setting)?;
     let image = job.image(frame, None, &mut gpu).map_err(RunError::setting)?;
     let view = gpu.surface_view(image).ok_or_else(|| RunError::setting("no image"))?;
     let mut kernels = Kernels::new(&mut gpu, options).map_err(RunError::setting)?;

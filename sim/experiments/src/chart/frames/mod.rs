@@ -4,7 +4,7 @@
 //! hand (0.1 ms off at most), and the outcome is compared with the ground truth: F1 of starts within 0.5 ms,
 //! and the energy error of frames whose two ends were found.
 
-mod witnesses;
+mod held_out;
 
 use std::time::Instant;
 
@@ -17,12 +17,12 @@ use traces::energy::{FrameEnergy, PowerIntegral, TOLERANCE_S, score, true_frames
 use traces::frames::{FinderMethod, Marks, Options, default_window, find_with};
 use traces::synth::{Recording, SCENARIOS, Scenario, Scene};
 
-use self::witnesses::{WitnessRow, WitnessSummary};
+use self::held_out::{HeldOutRow, HeldOutSummary};
 use crate::study::table::{Sheet, Table, fixed, optional, plain, share};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
 use crate::study::{Gallery, Study, StudyError};
 
-pub use self::witnesses::AlarmCount;
+pub use self::held_out::AlarmCount;
 
 /// A method fails where its F1 is below this.
 pub const FAILS_BELOW: f64 = 0.9;
@@ -40,8 +40,9 @@ pub struct FramesEffort {
     pub bits: &'static [u32],
     /// Seeds of scenes and noise.
     pub seeds: &'static [u64],
-    /// Seeds of the [witnesses](traces::synth::WITNESSES).
-    pub witness_seeds: &'static [u64],
+    /// Seeds of the [held-out devices](traces::synth::HELD_OUT_DEVICES).
+    #[serde(rename = "witness_seeds")]
+    pub held_out_seeds: &'static [u64],
 }
 
 /// Search for frames.
@@ -152,7 +153,8 @@ pub struct FramesChart {
     /// By axis, value, scene and method.
     pub rows: Vec<FramesRow>,
     /// By kind of device, seed and method.
-    pub witnesses: Vec<WitnessRow>,
+    #[serde(rename = "witnesses")]
+    pub held_out: Vec<HeldOutRow>,
 }
 
 impl Study for FramesChart {
@@ -171,7 +173,7 @@ impl Study for FramesChart {
         snrs_db: &[40.0, 30.0, 20.0, 10.0, 5.0, 0.0],
         bits: &[4, 6, 8, 10, 12, 14, 16],
         seeds: &[1, 2],
-        witness_seeds: &[104, 105, 106],
+        held_out_seeds: &[104, 105, 106],
     };
     const QUICK: FramesEffort = FramesEffort {
         frames: 60,
@@ -179,7 +181,7 @@ impl Study for FramesChart {
         snrs_db: &[40.0, 10.0, 0.0],
         bits: &[6, 10, 14],
         seeds: &[1],
-        witness_seeds: &[1],
+        held_out_seeds: &[1],
     };
 
     fn measure(effort: FramesEffort, _scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
@@ -202,8 +204,8 @@ impl Study for FramesChart {
                 bar.inc();
             }
         }
-        let witnesses = witnesses::measure(effort.frames, effort.witness_seeds)?;
-        Ok(Self { effort, rows, witnesses })
+        let held_out = held_out::measure(effort.frames, effort.held_out_seeds)?;
+        Ok(Self { effort, rows, held_out })
     }
 
     fn draw(&self, to: &Gallery<'_>) -> Result<(), OutputError> {
@@ -243,8 +245,8 @@ impl Study for FramesChart {
             .data("right_flagged", |row| row.outcome.flags.right_with)
             .data("host_s_per_1e6", |row| row.outcome.host_s_per_1e6)
             .csv("frame_finding.csv");
-        let witnesses = Table::of(&self.witnesses)
-            .data("witness", |row| row.witness)
+        let devices = Table::of(&self.held_out)
+            .data("witness", |row| row.device)
             .data("seed", |row| row.seed)
             .data("method", |row| row.method)
             .data("f1", |row| row.f1.first().copied())
@@ -259,7 +261,7 @@ impl Study for FramesChart {
             .data("good", |row| row.warnings.right)
             .data("good_warned", |row| row.warnings.right_with)
             .csv("frame_witnesses.csv");
-        vec![self.by_scene(), self.by_value(), self.by_witness(), rows.sheet(), witnesses.sheet()]
+        vec![self.by_scene(), self.by_value(), self.by_device(), rows.sheet(), devices.sheet()]
     }
 
     /// Every method at each ratio of signal to noise, over all scenes.
@@ -377,10 +379,10 @@ impl FramesChart {
     }
 
     /// Every method on every kind of device.
-    fn by_witness(&self) -> Sheet {
-        let below = |of: &WitnessSummary| format!("{} of {}", of.below_simple, of.devices);
-        Table::of(witnesses::summaries(&self.witnesses))
-            .detail("device", |of| of.witness, plain)
+    fn by_device(&self) -> Sheet {
+        let below = |of: &HeldOutSummary| format!("{} of {}", of.below_simple, of.devices);
+        Table::of(held_out::summaries(&self.held_out))
+            .detail("device", |of| of.device, plain)
             .detail("method", |of| of.method, plain)
             .detail("F1, first mark", |of| of.first, fixed(3))
             .detail("F1, worst of five marks", |of| of.worst, fixed(3))
@@ -528,7 +530,7 @@ mod tests {
         snrs_db: &[30.0],
         bits: &[],
         seeds: &[1],
-        witness_seeds: &[],
+        held_out_seeds: &[],
     };
 
     fn small() -> (tempfile::TempDir, FramesChart) {

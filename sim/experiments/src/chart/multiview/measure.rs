@@ -196,9 +196,9 @@ impl Bench {
         Ok(ViewsRow {
             views,
             samples_per_view: rig.samples() / layout.strips() * layout.overlap.max(1),
-            one_pass: run(&|| rig.one_pass(&draws, &to, &mut Gpu::quiet(to.spec)?))?,
-            view_by_view: run(&|| rig.view_by_view(&draws, &to, &mut Gpu::quiet(to.spec)?))?,
-            accumulation: run(&|| rig.accumulated(&draws, &to, &mut Gpu::quiet(to.spec)?))?,
+            one_pass: run(&|| rig.one_pass(&draws, &to, &mut Gpu::without_packets(to.spec)?))?,
+            view_by_view: run(&|| rig.view_by_view(&draws, &to, &mut Gpu::without_packets(to.spec)?))?,
+            accumulation: run(&|| rig.accumulated(&draws, &to, &mut Gpu::without_packets(to.spec)?))?,
         })
     }
 
@@ -211,7 +211,7 @@ impl Bench {
         to: &Target<'_>,
     ) -> Result<(u64, Ran), StudyError> {
         let middle = (layout.views as usize - 1) / 2;
-        let mut gpu = Gpu::quiet(to.spec)?;
+        let mut gpu = Gpu::without_packets(to.spec)?;
         let counts = rig.view(middle, draws, to, &mut gpu)?.counts;
         Ok((counts[Event::PixelInvocations].max(1), Ran::of(&gpu.finish())))
     }
@@ -248,7 +248,7 @@ impl Bench {
         let spec = PipelineSpec { shading_cache, ..self.gpu.pipeline };
         let (rig, to) = (self.rig(&layout, samples)?, self.target(&spec));
         let draws = self.frame.draws(&self.scene)?;
-        let mut gpu = Gpu::quiet(to.spec)?;
+        let mut gpu = Gpu::without_packets(to.spec)?;
         let counts = rig.one_pass(&draws, &to, &mut gpu)?.counts;
         let mut ran = Ran::of(&gpu.finish());
         let (one, of_one) = self.one_view(&rig, &layout, &draws, &to)?;
@@ -271,7 +271,7 @@ impl Bench {
         let drawn = |lens_regions: bool| {
             let features = Features { lens_regions, ..self.gpu.pipeline.features };
             let spec = PipelineSpec { features, ..self.gpu.pipeline };
-            rig.one_pass(&draws, &self.target(&spec), &mut Gpu::quiet(&spec)?)
+            rig.one_pass(&draws, &self.target(&spec), &mut Gpu::without_packets(&spec)?)
         };
         let (whole, each) = (drawn(false)?, drawn(true)?);
         let bits = |views: &Views| -> Vec<_> {
@@ -291,7 +291,7 @@ impl Bench {
             let glosses: Vec<_> = draws.iter().map(|draw| Gloss { looks: draw.shader, exponent }).collect();
             let draws: Vec<_> =
                 draws.iter().zip(&glosses).map(|(draw, shader)| Draw { shader, ..*draw }).collect();
-            let found = rig.one_pass(&draws, &to, &mut Gpu::uncounted(to.spec)?)?.images;
+            let found = rig.one_pass(&draws, &to, &mut Gpu::images_only(to.spec)?)?.images;
             let truth = rig.own_cameras(&draws, &to)?;
             let pixels = |images: &[Vec<Vec3>]| images.concat();
             Ok::<_, StudyError>(mean_square(&errors(&pixels(&found), &pixels(&truth))).sqrt())

@@ -323,7 +323,7 @@ mod tests {
     use super::*;
     use crate::study::written;
 
-    const LEAST: MultiviewEffort = MultiviewEffort {
+    const MIN_EFFORT: MultiviewEffort = MultiviewEffort {
         scene: ("tiny", 1),
         size: [40, 30],
         views: &[1, 2, 7],
@@ -333,7 +333,7 @@ mod tests {
 
     #[test]
     fn one_pass_shades_less_than_its_rivals_and_errs_more_on_a_longer_line() {
-        let (_folder, chart, _) = written::<MultiviewChart>(LEAST);
+        let (_folder, chart, _) = written::<MultiviewChart>(MIN_EFFORT);
         for row in &chart.rows[1..] {
             assert!(row.one_pass.over_one_view < row.view_by_view.over_one_view, "{row:?}");
             assert!(row.one_pass.over_one_view < row.accumulation.over_one_view, "{row:?}");

@@ -125,7 +125,7 @@ fn darts<const D: usize>(radius: f64) -> Result<DrawnRow, StudyError> {
 
 fn drawn_noise<const D: usize>(count: f64) -> Result<DrawnNoise<D>, StudyError> {
     let hardware = GpuSpec::load("reference")?.pipeline;
-    let mut gpu = Gpu::quiet(&hardware).map_err(StudyError::pipeline)?;
+    let mut gpu = Gpu::without_packets(&hardware).map_err(StudyError::pipeline)?;
     let spec = NoiseSpec { count, seed: 1, across: columns_for(D) };
     draw_noise::<D>(&Named::Gauss, &spec, &mut gpu).map_err(StudyError::pipeline)
 }

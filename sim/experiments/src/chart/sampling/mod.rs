@@ -254,7 +254,7 @@ mod tests {
     };
 
     /// No more than there has to be.
-    const LEAST: SamplingEffort =
+    const MIN_EFFORT: SamplingEffort =
         SamplingEffort { size: [16, 9], most_samples: 2, reference_frames: 1, reference_samples: 8, ..SMALL };
 
     fn row<'a>(rows: &'a [SamplingRow], scene: &str, table: &str) -> &'a SamplingRow {
@@ -284,7 +284,8 @@ mod tests {
     fn the_numbers_do_not_depend_on_threads() {
         let with = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            let chart = pool.install(|| SamplingChart::measure(LEAST, &[], &Progress::new(true))).unwrap();
+            let chart =
+                pool.install(|| SamplingChart::measure(MIN_EFFORT, &[], &Progress::new(true))).unwrap();
             let errors = chart.rows.iter().flat_map(|row| &row.points).map(|point| point.rmse.to_bits());
             errors.collect::<Vec<_>>()
         };
@@ -302,7 +303,7 @@ mod tests {
 
     #[test]
     fn the_files_are_all_there_and_agree() {
-        let (folder, chart, _) = written::<SamplingChart>(LEAST);
+        let (folder, chart, _) = written::<SamplingChart>(MIN_EFFORT);
         let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
         let json: serde_json::Value = serde_json::from_str(&read("sampling.json")).unwrap();
         assert_eq!(json["rows"].as_array().unwrap().len(), chart.rows.len());

@@ -141,9 +141,9 @@ impl Study for TimingChart {
     }
 
     fn draw(&self, to: &Gallery<'_>) -> Result<(), OutputError> {
-        to.add("timing", &self.picture(to.look()))?;
-        to.add("timing_subjects", &self.subject_matrix().picture(to.look()))?;
-        to.add("timing_failures", &self.failure_matrix().picture(to.look()))
+        to.add("timing", &self.picture(to.plot_style()))?;
+        to.add("timing_subjects", &self.subject_matrix().picture(to.plot_style()))?;
+        to.add("timing_failures", &self.failure_matrix().picture(to.plot_style()))
     }
 
     fn tables(&self) -> Vec<Sheet> {

@@ -1,6 +1,6 @@
 //! Speed against accuracy of all levels in one picture.
 
-use output::plot::{AxisSpec, Chart, ChartPanel, Look, Mark, Paint, Picture, Scale, Series, Spread};
+use output::plot::{AxisSpec, Chart, ChartPanel, Mark, Paint, Picture, PlotStyle, Scale, Series, Spread};
 use timing::Level;
 
 use super::animations::SAMPLED;
@@ -18,7 +18,7 @@ impl TimingChart {
     /// Error of cycles over host time, both against the reference: filled for animations simulated whole,
     /// hollow for the timing of single frames alone. The frontier is that of the medians of animations, which
     /// are the same for all levels.
-    pub(super) fn picture(&self, look: &Look) -> Picture {
+    pub(super) fn picture(&self, plot_style: &PlotStyle) -> Picture {
         let mut series =
             vec![Series::new("frontier of the medians", Mark::Steps(self.frontier())).painted(Paint::Ink)];
         for (index, level) in LEVELS.into_iter().enumerate() {
@@ -54,7 +54,7 @@ impl TimingChart {
             self.medians()
         );
         let panels = vec![ChartPanel::over("", [across, up], series)];
-        Chart::new("Speed against accuracy of the levels of timing", &subject, panels).picture(look)
+        Chart::new("Speed against accuracy of the levels of timing", &subject, panels).picture(plot_style)
     }
 
     /// Single frames at a level, their packets given; none for the reference, with which they are compared.
@@ -160,7 +160,7 @@ mod tests {
         let expected = "packet 0.073 % (0.010 to 0.214 %, 6); bound 4.000 % (4.000 to 4.000 %, 1)";
         assert!(chart.medians().starts_with(expected), "{}", chart.medians());
         assert!((chart.frontier()[1].1 - 0.0735).abs() < 1e-12, "{:?}", chart.frontier());
-        assert!(chart.picture(&Look::default()).svg().unwrap().contains("(0.010"));
+        assert!(chart.picture(&PlotStyle::default()).svg().unwrap().contains("(0.010"));
     }
 
     #[test]
@@ -172,7 +172,7 @@ mod tests {
             ("sampled", &[(0.05, 1.0)]),
         ]);
         for width_mm in [None, Some(85.0)] {
-            let svg = chart.picture(&Look { width_mm, ..Look::default() }).svg().unwrap();
+            let svg = chart.picture(&PlotStyle { width_mm, ..PlotStyle::default() }).svg().unwrap();
             for word in
                 LEVELS.into_iter().chain(["exact", "frontier of the medians", "a frame, timing alone"])
             {

@@ -76,13 +76,13 @@ pub(super) fn warm_up(bench: &Bench<'_>) -> Result<Done, RunError> {
     let (row, form) = (with.settings, with.form);
     let near = *row.near.get(form);
     let mut tried = Cases::new("frames found off what was planted", "planted_s alone");
-    let (mut said, mut base) = (Vec::new(), None);
+    let (mut described, mut base) = (Vec::new(), None);
     let mut at = Vec::new();
     for &planted_s in row.planted_s.all(form) {
         let planted = Planted::new(bench, planted_s)?;
         let off = (planted.farthest() - planted.frames).abs();
         let [low, high] = planted.found();
-        said.push(format!("{low} to {high} of {:.0}", planted.frames));
+        described.push(format!("{low} to {high} of {:.0}", planted.frames));
         at.push((planted_s, off, off <= near));
         if planted_s == *row.planted_s.get(form) {
             base = Some(planted);
@@ -102,7 +102,7 @@ pub(super) fn warm_up(bench: &Bench<'_>) -> Result<Done, RunError> {
         "frames found of those planted, in {} recordings of each: {}; the paper's {} are the {:.0} planted with {} s, +{excess_w:.3} W; {pc_frames} \
          frames on the PC",
         base.knees.len(),
-        said.join(", "),
+        described.join(", "),
         row.frames.get(form),
         base.frames,
         row.planted_s.get(form)

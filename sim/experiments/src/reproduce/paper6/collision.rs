@@ -149,7 +149,7 @@ fn work_of<'a>(each: impl Iterator<Item = &'a PassWork>) -> PassWork {
 
 /// Every method at every resolution.
 #[derive(Default)]
-struct Looks {
+struct Comparisons {
     ways: Ways,
     generated: Drawn,
     /// Public cases that collide.
@@ -160,7 +160,7 @@ struct Looks {
     swept: Drawn,
 }
 
-impl Looks {
+impl Comparisons {
     fn new(ways: Ways, (own, generated): (&[Case], &[Pair]), public: &Public) -> Self {
         let swept = Drawn::in_sweeps(own, &ways);
         let [generated, collide, apart] =
@@ -237,13 +237,13 @@ pub(super) fn missed(task: &Task<'_>) -> Result<Done, RunError> {
     };
     let methods = row.methods.get(form);
     let ways = Ways { methods: methods.clone(), resolutions: row.resolution_px.all(form).to_vec() };
-    let looks = Looks::new(ways, (&own, &generated), &public);
+    let comparisons = Comparisons::new(ways, (&own, &generated), &public);
     let px = *row.resolution_px.get(form);
     let on_hardware = Drawn::on(&hardware()?, &generated, methods, px)?;
     let missed_there: u64 = on_hardware.cleared.iter().sum();
     let mut tried = Cases::new("pairs missed", "methods and resolution_px jointly, and `quintile ccd`");
     for &of in methods {
-        let at = looks.missed().filter(|(method, ..)| *method == of);
+        let at = comparisons.missed().filter(|(method, ..)| *method == of);
         tried.along(
             &format!("resolution_px ({})", name(of)),
             at.map(|(_, px, missed)| (px, missed as f64, missed == 0)),
@@ -251,15 +251,15 @@ pub(super) fn missed(task: &Task<'_>) -> Result<Done, RunError> {
     }
     let closer = missed_closer(&generated) + public.missed_closer;
     tried.along("quintile ccd", [("default search", closer as f64, closer == 0)]);
-    let missed = looks.missed().map(|(.., missed)| missed).sum::<u64>() + closer as u64;
+    let missed = comparisons.missed().map(|(.., missed)| missed).sum::<u64>() + closer as u64;
     let ours = format!(
         "{missed} missed: {} generated pairs that collide{}, by {} kinds of passes, of each pair and, in two sweeps, of all objects of a generated case, and by `quintile ccd`, and \
          {missed_there} by {} of these kinds at {px} px on the modelled hardware, which draws the generated pairs alone{}",
         generated.len(),
         public_text(&public, task.collision_data.is_some()),
-        looks.ways.each().count(),
+        comparisons.ways.each().count(),
         methods.len(),
-        looks.text_of_others(&public)
+        comparisons.text_of_others(&public)
     );
     let full = row.methods.get(Form::Full).len() * row.resolution_px.values() + 1;
     let band = tried.band(full)?;
@@ -273,16 +273,16 @@ pub(super) fn missed(task: &Task<'_>) -> Result<Done, RunError> {
         ("missed_on_the_modelled_hardware", missed_there as f64),
         ("generated_cases", own.len() as f64),
     ];
-    let facts = numbers(counted).into_iter().chain(facts(&looks, &public)).collect();
-    Ok(Done::bare(Row { numbers: facts, ran: looks.ran(&on_hardware.work), note, ..made }))
+    let facts = numbers(counted).into_iter().chain(facts(&comparisons, &public)).collect();
+    Ok(Done::bare(Row { numbers: facts, ran: comparisons.ran(&on_hardware.work), note, ..made }))
 }
 
 /// How many cases of each kind there are, and how many of those that do not collide are kept.
-fn facts(looks: &Looks, public: &Public) -> Vec<Number> {
-    let [fewest, most] = looks.false_positives().unwrap_or([f64::NAN; 2]);
-    let cleared = || looks.apart.cleared.iter().copied();
+fn facts(comparisons: &Comparisons, public: &Public) -> Vec<Number> {
+    let [fewest, most] = comparisons.false_positives().unwrap_or([f64::NAN; 2]);
+    let cleared = || comparisons.apart.cleared.iter().copied();
     numbers([
-        ("generated_pairs_that_collide", looks.generated.pairs as f64),
+        ("generated_pairs_that_collide", comparisons.generated.pairs as f64),
         ("public_scenes", public.scenes as f64),
         ("public_scene_pairs_that_collide", public.known as f64),
         ("public_scene_pairs_identified", public.seen as f64),
@@ -350,7 +350,7 @@ pub(super) fn dodged(task: &Task<'_>) -> Result<Done, RunError> {
     let with = task.with(|settings| &settings.vi_2);
     let (row, form) = (with.settings, with.form);
     let refused = || RunError::setting("VI-2: a coordinate is beyond 1e60 or not a number");
-    let (mut tried, mut drawn, mut said) = (
+    let (mut tried, mut drawn, mut described) = (
         Cases::new("pixels left of a pair", "cases, methods and resolution_px jointly"),
         PassWork::default(),
         Vec::new(),
@@ -376,12 +376,12 @@ pub(super) fn dodged(task: &Task<'_>) -> Result<Done, RunError> {
             let ((ours, work), (depth, depth_work)) = (on(methods[0])?, on(Method::DepthOnly)?);
             there = there.and(&work).and(&depth_work);
             let same = if is_distinguished(case, &ours, &depth) { "does the same" } else { "does not" };
-            said.push(format!("{}; the modelled hardware {same}", at.text(case)));
+            described.push(format!("{}; the modelled hardware {same}", at.text(case)));
         }
     }
     let full = row.cases.values() * row.methods.get(Form::Full).len() * row.resolution_px.values();
     let band = tried.band(full)?;
-    let made = with.banded(&row.about, said.join("; "), band);
+    let made = with.banded(&row.about, described.join("; "), band);
     let shown = row.objects.get(form).iter().find(|case| case.name == *row.cases.get(form));
     let figure = |case: &TwoObjects| {
         let [first, second] = [&case.first, &case.second].map(triangles);
@@ -539,9 +539,9 @@ mod tests {
         [point, [face, face]].map(|ends| Object::from_ends(vec![ends], 0.0).unwrap())
     }
 
-    fn looks(public: &Public) -> Looks {
+    fn comparisons(public: &Public) -> Comparisons {
         let ways = Ways { methods: vec![Method::BoxBox, Method::FragmentBox], resolutions: vec![8] };
-        Looks::new(ways, (&[], &[]), public)
+        Comparisons::new(ways, (&[], &[]), public)
     }
 
     #[test]
@@ -549,27 +549,33 @@ mod tests {
         // The point beside the diagonal passes within a pixel of the triangle; that above it stays away.
         let apart = vec![query(0.51, 0.51, 2.0), query(0.25, 0.25, 0.5)];
         let public = Public { collide: vec![query(0.25, 0.25, 2.0)], apart, ..Public::default() };
-        let looks = looks(&public);
-        assert!(looks.missed().all(|(.., missed)| missed == 0));
-        assert_eq!(looks.false_positives(), Some([50.0, 50.0]));
-        let ran = looks.ran(&PassWork::default());
+        let comparisons = comparisons(&public);
+        assert!(comparisons.missed().all(|(.., missed)| missed == 0));
+        assert_eq!(comparisons.false_positives(), Some([50.0, 50.0]));
+        let ran = comparisons.ran(&PassWork::default());
         let of = |name: &str| ran.iter().find(|number| number.name == name).unwrap().value;
         assert_eq!(of("draws_of_public_queries_that_do_not"), 2.0 * of("draws_of_public_cases_that_collide"));
         assert_eq!(of("draws_on_the_host"), 3.0 * of("draws_of_public_cases_that_collide"));
         let both =
             ["collide", "do_not"].map(|end| ran.iter().filter(|n| n.name.ends_with(end)).collect::<Vec<_>>());
         assert!(both.iter().all(|kind| kind.len() == 2 && kind.iter().all(|number| number.value > 0.0)));
-        let said = looks.text_of_others(&public);
-        assert!(said.contains("of 2 public queries that do not collide"), "{said}");
-        assert!(said.contains("box against box at 8 px 50.0 %") && said.contains("`quintile ccd` 0.0 %"));
+        let described = comparisons.text_of_others(&public);
+        assert!(described.contains("of 2 public queries that do not collide"), "{described}");
+        assert!(
+            described.contains("box against box at 8 px 50.0 %")
+                && described.contains("`quintile ccd` 0.0 %")
+        );
     }
 
     #[test]
     fn a_pair_that_is_cleared_and_collides_is_missed() {
         let public = Public { collide: vec![query(0.25, 0.25, 0.5)], ..Public::default() };
-        let looks = looks(&public);
-        assert!(looks.missed().all(|(.., missed)| missed == 1));
-        assert_eq!((looks.false_positives(), looks.text_of_others(&public)), (None, String::new()));
-        assert!(looks.ran(&PassWork::default()).iter().all(|number| !number.name.ends_with("do_not")));
+        let comparisons = comparisons(&public);
+        assert!(comparisons.missed().all(|(.., missed)| missed == 1));
+        assert_eq!(
+            (comparisons.false_positives(), comparisons.text_of_others(&public)),
+            (None, String::new())
+        );
+        assert!(comparisons.ran(&PassWork::default()).iter().all(|number| !number.name.ends_with("do_not")));
     }
 }

@@ -443,7 +443,7 @@ impl Machines {
         self.all.iter().fold(Compared::default(), |all, one| all.and(&one.found))
     }
 
-    fn said(&self) -> String {
+    fn text(&self) -> String {
         let one = |one: &Machine| format!("{}: {} of {}", one.name, one.found.differ, one.found.samples);
         self.all.iter().map(one).collect::<Vec<_>>().join("; ")
     }
@@ -461,7 +461,7 @@ pub(super) fn unchanged(task: &Task<'_>) -> Result<Done, RunError> {
         "samples that see another triangle or depth than by brute force in {} scenes, with all faces and with back faces culled: {}; \
          lens lines spare {} samples where no other tile test runs and {} beside side planes",
         scenes.len(),
-        machines.said(),
+        machines.text(),
         machines.by_lens_lines[0],
         machines.by_lens_lines[1]
     );
@@ -510,7 +510,7 @@ mod tests {
         let mut wrong = machines;
         wrong.all[1].found.differ = 3;
         assert!(
-            wrong.total().differ == 3 && wrong.said().contains("lens lines and no other tile test: 3 of")
+            wrong.total().differ == 3 && wrong.text().contains("lens lines and no other tile test: 3 of")
         );
     }
 }

@@ -150,10 +150,10 @@ pub(super) fn tighter(task: &Task<'_>) -> Result<Done, RunError> {
     let with = task.with(|settings| &settings.vi_15);
     let (row, form) = (with.settings, with.form);
     let all = Scenes::new(row, form)?;
-    let (mut tried, mut said, mut total) = (Cases::new(OF, VARIED), Vec::new(), Widths::default());
+    let (mut tried, mut described, mut total) = (Cases::new(OF, VARIED), Vec::new(), Widths::default());
     let mut against_null = AgainstNull::default();
     let mut keep = |what: String, widths: &Widths| {
-        said.push(widths.text(&what));
+        described.push(widths.text(&what));
         against_null.add(widths);
         let Widths { violations, places, triangles, tiles, .. } = widths;
         total.violations += violations;
@@ -187,7 +187,7 @@ pub(super) fn tighter(task: &Task<'_>) -> Result<Done, RunError> {
     let band = tried.band(full)?;
     let ours = format!(
         "{}; by the planes at the ends of the tile's own time, in standard mode: {}",
-        said.join("; "),
+        described.join("; "),
         locals.join(", ")
     );
     let facts = numbers([
@@ -255,7 +255,7 @@ impl<'a> Scenes<'a> {
             let StressScene { camera, viewport, samples, .. } = scene;
             let draws = [scene.draw(&Unshaded).map_err(RunError::setting)?];
             let settings = Settings { spec: &spec, viewport: *viewport, samples, background: Vec3::ZERO };
-            let mut gpu = Gpu::quiet(&spec).map_err(RunError::setting)?;
+            let mut gpu = Gpu::without_packets(&spec).map_err(RunError::setting)?;
             let pass = RasterPass::new(camera, &draws, &settings).onto(Target::Depth);
             gpu.draw(&pass).map_err(RunError::setting)?;
             Ok(Ran::of(&gpu.finish()))

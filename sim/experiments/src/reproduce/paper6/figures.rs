@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use glam::{Affine3A, DVec3, Vec3, dvec3};
-use output::plot::{CaptionedImage, HeatMapPlot, HeatTile, Images, Look, Shading};
+use output::plot::{CaptionedImage, HeatMapPlot, HeatTile, Images, PlotStyle, Shading};
 use pipeline::conservative::{Grid, MovingTriangle, Rasterizer, View};
 use pipeline::{Camera, Cull, Draw, Geometry, Gpu, LensShape, RasterPass, SampleTable, Viewport};
 use run::{GpuSpec, RunError};
@@ -27,7 +27,7 @@ fn figure(
     across: usize,
     images: &[CaptionedImage],
 ) -> Figure {
-    let picture = Images { title, subject, across, images }.picture(&Look::default());
+    let picture = Images { title, subject, across, images }.picture(&PlotStyle::default());
     Figure { name, picture }
 }
 
@@ -42,7 +42,7 @@ fn drawn(
     let (options, request) = (OptionSource { file: None, set }, Request { overrides, seed: 1 });
     let (_, job) = catalog::load(Path::new(name), &options, &request)?;
     let gpu = GpuSpec::load("reference")?;
-    let mut on = Gpu::quiet(&gpu.pipeline).map_err(RunError::setting)?;
+    let mut on = Gpu::without_packets(&gpu.pipeline).map_err(RunError::setting)?;
     let first = job.settings().frames.start;
     let image = job.frame(first, &mut on).map_err(RunError::setting)?.image;
     let size = [job.settings().width, job.settings().height];
@@ -246,7 +246,8 @@ pub(super) fn overlaps(name: &str, objects: [&[Ends]; 2], pixels: u32) -> Figure
          depth for each object"
     );
     let title = "Overlap in time and depth (Paper VI, Figure 6)";
-    let picture = Images { title, subject: &subject, across: 3, images: &images }.picture(&Look::default());
+    let picture =
+        Images { title, subject: &subject, across: 3, images: &images }.picture(&PlotStyle::default());
     Figure { name: "VI_fig6", picture }
 }
 
@@ -312,7 +313,7 @@ pub(super) fn warped() -> Result<Figure, RunError> {
         shading: Shading::Classes(&["not shaded", "shaded without light", "shaded with light"]),
         brightness: &[],
     };
-    Ok(Figure { name: "VI_fig7", picture: map.picture(&Look::default()) })
+    Ok(Figure { name: "VI_fig7", picture: map.picture(&PlotStyle::default()) })
 }
 
 /// The view of the beam.
@@ -364,7 +365,7 @@ pub(super) fn light(form: Form) -> Result<[Figure; 2], RunError> {
         // Next to a focus light has no bound.
         let shading = Shading::Clipped;
         let map = HeatMapPlot { title, subject: &subject, label, size, tiles, shading, brightness: &[] };
-        Figure { name, picture: map.picture(&Look::default()) }
+        Figure { name, picture: map.picture(&PlotStyle::default()) }
     };
     Ok([
         image("VI_caustics_volume", "in the water, from the side", "W/m", &aside, Light::Volume),

@@ -3,7 +3,7 @@
 
 use activity::Event;
 use glam::{DVec3, Vec3};
-use output::plot::{Look, Series};
+use output::plot::{PlotStyle, Series};
 use pipeline::{FrameReport, Gpu};
 use run::{GpuSpec, RunError};
 use workloads::Overrides;
@@ -121,7 +121,7 @@ fn base_on_hardware(
 /// What the modelled hardware draws of beams.
 fn on_hardware(beams: &[Beam], eye: &Eye, method: Method, light: Light) -> Result<(Picture, Ran), RunError> {
     let spec = GpuSpec::load("reference")?.pipeline;
-    let mut gpu = Gpu::quiet(&spec).map_err(RunError::setting)?;
+    let mut gpu = Gpu::without_packets(&spec).map_err(RunError::setting)?;
     let (picture, _) = draw_on(&mut gpu, beams, eye, method, light).map_err(RunError::setting)?;
     Ok((picture, Ran::of(&gpu.finish())))
 }
@@ -133,7 +133,8 @@ fn figures(base: &OceanCounts, slopes: &[(f64, OceanCounts)], form: Form) -> Res
         ("VI_fig8_prism", Method::Prism),
     ];
     let mut figures = vec![warped()?, over_slopes(slopes)];
-    figures.extend(maps.map(|(name, method)| Figure { name, picture: base.map(method, &Look::default()) }));
+    figures
+        .extend(maps.map(|(name, method)| Figure { name, picture: base.map(method, &PlotStyle::default()) }));
     figures.extend(light(form)?);
     Ok(figures)
 }
@@ -376,7 +377,7 @@ pub(super) fn shadow_row(task: &Task<'_>) -> Result<Done, RunError> {
             1,
         )?;
         let hardware = GpuSpec::load("reference")?.pipeline;
-        let mut gpu = Gpu::quiet(&hardware).map_err(RunError::setting)?;
+        let mut gpu = Gpu::without_packets(&hardware).map_err(RunError::setting)?;
         Ok((job.frame(*row.frame.get(form), &mut gpu)?, gpu.finish()))
     };
     let [(one, one_report), (many, many_report)] = [draw(false)?, draw(true)?];

@@ -185,7 +185,7 @@ impl Tested {
         let expected = shares::<D>(&Named::Gauss, cells, 8);
         let one = |seed| {
             let spec = NoiseSpec { count: points as f64, seed, across: columns_for(D) };
-            let mut gpu = Gpu::quiet(hardware).map_err(failed)?;
+            let mut gpu = Gpu::without_packets(hardware).map_err(failed)?;
             let found = draw_noise::<D>(&Named::Gauss, &spec, &mut gpu).map_err(failed)?;
             Ok::<Self, RunError>(Self {
                 sets: vec![chi_square(&counts(&found.points, cells), &expected)],

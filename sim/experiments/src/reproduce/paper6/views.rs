@@ -246,7 +246,7 @@ fn done(with: &With<'_, Views>, figures: [&'static str; 3]) -> Result<Done, RunE
     let at = |quads: u32| {
         entries.iter().find(|(count, ..)| *count == quads).map(|(_, all, one)| 100.0 * (all / one - 1.0))
     };
-    let text = said(&base, ours, corners);
+    let text = described(&base, ours, corners);
     let facts = numbers([
         ("increase_percent", ours),
         ("increase_least_percent", band.min),
@@ -275,7 +275,7 @@ fn full(row: &Views) -> usize {
         + 2
 }
 
-fn said(base: &Point, ours: f64, [low, high]: [f64; 2]) -> String {
+fn described(base: &Point, ours: f64, [low, high]: [f64; 2]) -> String {
     format!(
         "{ours:+.1} % with eyes {} apart, {}x{} pixels a view, and the other settings as given; {low:+.1} to {high:+.1} % with every open \
          setting at the value of its range that lowers or raises the number by itself",

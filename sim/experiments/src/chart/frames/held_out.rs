@@ -1,11 +1,11 @@
-//! Methods on the [`WITNESSES`]: devices of different structure, so that what was learnt on one is judged on others.
+//! Methods on the [`HELD_OUT_DEVICES`]: devices of different structure, so that what was learnt on one is judged on others.
 //! Also how many wrong and right results carry an alarm.
 
 use serde::Serialize;
 use traces::Trace;
 use traces::energy::{PowerIntegral, TOLERANCE_S, score, true_frames};
 use traces::frames::{FinderMethod, Marks, Options, default_window, find_with};
-use traces::synth::{Scene, WITNESSES, Witness};
+use traces::synth::{HELD_OUT_DEVICES, HeldOutDevice, Scene};
 
 use super::{FAILS_BELOW, HAND_S, MARKED};
 use crate::study::StudyError;
@@ -19,9 +19,10 @@ const SHORT_PLACE: usize = 20;
 
 /// One method on one device.
 #[derive(Clone, Debug, Serialize)]
-pub struct WitnessRow {
+pub struct HeldOutRow {
     /// The kind of device.
-    pub witness: &'static str,
+    #[serde(rename = "witness")]
+    pub device: &'static str,
     /// Its seed.
     pub seed: u64,
     /// The method.
@@ -69,14 +70,14 @@ impl Calibration {
 ///
 /// # Errors
 /// [`StudyError`] if a device cannot be made, recorded or searched.
-pub(super) fn measure(frames: usize, seeds: &[u64]) -> Result<Vec<WitnessRow>, StudyError> {
+pub(super) fn measure(frames: usize, seeds: &[u64]) -> Result<Vec<HeldOutRow>, StudyError> {
     let mut rows = Vec::new();
-    for witness in &WITNESSES {
+    for device in &HELD_OUT_DEVICES {
         for &seed in seeds {
-            let scene = witness.scene(frames, seed)?;
-            let trace = scene.record(&witness.recording(seed))?;
+            let scene = device.scene(frames, seed)?;
+            let trace = scene.record(&device.recording(seed))?;
             for method in FinderMethod::ALL {
-                rows.push(row(witness, seed, method, &scene, &trace)?);
+                rows.push(row(device, seed, method, &scene, &trace)?);
             }
         }
     }
@@ -84,12 +85,12 @@ pub(super) fn measure(frames: usize, seeds: &[u64]) -> Result<Vec<WitnessRow>, S
 }
 
 fn row(
-    witness: &Witness,
+    device: &HeldOutDevice,
     seed: u64,
     method: FinderMethod,
     scene: &Scene,
     trace: &Trace,
-) -> Result<WitnessRow, StudyError> {
+) -> Result<HeldOutRow, StudyError> {
     let truth_s: Vec<f64> = scene.truth.iter().map(|frame| frame.start_s).collect();
     let tolerance_s = tolerance_s(&truth_s);
     let (mut f1, mut calibration) = (Vec::new(), Calibration::default());
@@ -107,7 +108,7 @@ fn row(
             flags.add(right, frame.flags.has_low_confidence());
         }
     }
-    Ok(WitnessRow { witness: witness.name, seed, method: method.name(), f1, calibration, flags, warnings })
+    Ok(HeldOutRow { device: device.name, seed, method: method.name(), f1, calibration, flags, warnings })
 }
 
 fn tolerance_s(starts_s: &[f64]) -> f64 {
@@ -120,8 +121,8 @@ fn tolerance_s(starts_s: &[f64]) -> f64 {
 
 /// A method on all devices of a kind.
 #[derive(Clone, Debug)]
-pub(super) struct WitnessSummary {
-    pub witness: &'static str,
+pub(super) struct HeldOutSummary {
+    pub device: &'static str,
     pub method: &'static str,
     /// Mean F1 with the first mark.
     pub first: f64,
@@ -139,23 +140,23 @@ pub(super) struct WitnessSummary {
 const MAX_BELOW: f64 = 0.02;
 
 /// By kind of device and method.
-pub(super) fn summaries(rows: &[WitnessRow]) -> Vec<WitnessSummary> {
-    let first = |row: &WitnessRow| row.f1.first().copied().unwrap_or(0.0);
+pub(super) fn summaries(rows: &[HeldOutRow]) -> Vec<HeldOutSummary> {
+    let first = |row: &HeldOutRow| row.f1.first().copied().unwrap_or(0.0);
     let simple = [FinderMethod::SumOfSquares, FinderMethod::Normalized].map(FinderMethod::name);
-    let better = |of: &WitnessRow| {
-        let same = rows.iter().filter(|row| (row.witness, row.seed) == (of.witness, of.seed));
+    let better = |of: &HeldOutRow| {
+        let same = rows.iter().filter(|row| (row.device, row.seed) == (of.device, of.seed));
         same.filter(|row| simple.contains(&row.method)).map(first).fold(0.0, f64::max)
     };
     let mut all = Vec::new();
-    for witness in &WITNESSES {
+    for device in &HELD_OUT_DEVICES {
         for method in FinderMethod::ALL.map(FinderMethod::name) {
-            let of: Vec<&WitnessRow> =
-                rows.iter().filter(|row| (row.witness, row.method) == (witness.name, method)).collect();
-            let mean = |value: &dyn Fn(&WitnessRow) -> f64| {
+            let of: Vec<&HeldOutRow> =
+                rows.iter().filter(|row| (row.device, row.method) == (device.name, method)).collect();
+            let mean = |value: &dyn Fn(&HeldOutRow) -> f64| {
                 of.iter().map(|row| value(row)).sum::<f64>() / of.len().max(1) as f64
             };
-            all.push(WitnessSummary {
-                witness: witness.name,
+            all.push(HeldOutSummary {
+                device: device.name,
                 method,
                 first: mean(&first),
                 worst: mean(&|row| row.f1.iter().copied().fold(1.0, f64::min)),
@@ -234,7 +235,7 @@ mod tests {
     #[test]
     fn every_method_is_scored_on_every_device() {
         let rows = measure(40, &[1]).unwrap();
-        assert_eq!(rows.len(), WITNESSES.len() * FinderMethod::ALL.len());
+        assert_eq!(rows.len(), HELD_OUT_DEVICES.len() * FinderMethod::ALL.len());
         for summary in summaries(&rows) {
             assert!(summary.worst <= summary.first && summary.first > 0.0, "{summary:?}");
             assert_eq!(summary.devices, 1);

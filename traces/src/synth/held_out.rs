@@ -1,4 +1,4 @@
-//! Four devices of different structure that bear witness of the frame finder: what works on the scenes of one
+//! Four devices of different structure that are held out from the development of the frame finder: what works on the scenes of one
 //! generator may have been learnt from it.
 //!
 //! Each is written as a description of how such a device behaves, with constants of its own, before any finder was
@@ -13,7 +13,7 @@ use core::f64::consts::TAU;
 
 /// A kind of device, with the recorder that is used on it.
 #[derive(Clone, Copy, Debug)]
-pub struct Witness {
+pub struct HeldOutDevice {
     /// Its name.
     pub name: &'static str,
     /// What it does, in a line.
@@ -24,26 +24,26 @@ pub struct Witness {
 }
 
 /// All of them.
-pub const WITNESSES: [Witness; 4] = [
-    Witness {
+pub const HELD_OUT_DEVICES: [HeldOutDevice; 4] = [
+    HeldOutDevice {
         name: "one process",
         about: "a game with passes, scene cuts and a clock governor",
         recorder: Recording { rate_hz: 50e3, bits: 14, snr_db: 25.0, seed: 0 },
         make: one_process,
     },
-    Witness {
+    HeldOutDevice {
         name: "several processes",
         about: "an application, the compositor, sound, radio and a pulsed backlight on one rail",
         recorder: Recording { rate_hz: 40e3, bits: 12, snr_db: 22.0, seed: 0 },
         make: several_processes,
     },
-    Witness {
+    HeldOutDevice {
         name: "on demand",
         about: "an interface that draws while something moves and sleeps between",
         recorder: Recording { rate_hz: 25e3, bits: 12, snr_db: 28.0, seed: 0 },
         make: on_demand,
     },
-    Witness {
+    HeldOutDevice {
         name: "pipelined",
         about: "a tiler that bins the next frame and simulates the one after while it shades",
         recorder: Recording { rate_hz: 100e3, bits: 13, snr_db: 20.0, seed: 0 },
@@ -51,7 +51,7 @@ pub const WITNESSES: [Witness; 4] = [
     },
 ];
 
-impl Witness {
+impl HeldOutDevice {
     /// Makes a number of frames, with the time before and after them.
     ///
     /// # Errors
@@ -88,7 +88,7 @@ const GRAINS: usize = 14;
 const GRAIN: f64 = 0.06;
 /// The camera: deviation of work and activity in the long run, and its memory from frame to frame.
 const CAMERA: [f64; 2] = [0.14, 0.05];
-const MEMORY: f64 = 0.97;
+const CORRELATION_OF_FRAMES: f64 = 0.97;
 /// What differs between frames all the same.
 const UNEVEN: f64 = 0.025;
 /// Time between cuts, s, and how often one goes back to an earlier scene.
@@ -139,9 +139,9 @@ impl Pass {
 
     /// Moves the camera on by a frame.
     fn wander(&mut self, dice: &mut Dice) {
-        let kick = libm::sqrt(1.0 - MEMORY * MEMORY);
+        let kick = libm::sqrt(1.0 - CORRELATION_OF_FRAMES * CORRELATION_OF_FRAMES);
         for (walk, deviation) in self.walk.iter_mut().zip(CAMERA) {
-            *walk = MEMORY * *walk + kick * deviation * dice.normal();
+            *walk = CORRELATION_OF_FRAMES * *walk + kick * deviation * dice.normal();
         }
     }
 
@@ -191,7 +191,7 @@ impl Governor {
     }
 }
 
-/// A witness: one process that renders a game.
+/// A held-out device: one process that renders a game.
 ///
 /// A frame begins with a short submission by the driver, the same in all scenes of the game. Three to seven
 /// passes follow, each with an activity that settles from its first value to its last, as caches fill, and a
@@ -312,7 +312,7 @@ impl Layer {
     }
 }
 
-/// A witness: several processes on one rail.
+/// A held-out device: several processes on one rail.
 ///
 /// An application draws a frame for each tick of the display, or for each second one, and misses some. It
 /// waits for the tick plus a wake-up that differs. Its frames are layers of an interface: a number of
@@ -399,18 +399,18 @@ mod tests {
 
     #[test]
     fn starts_are_in_order_within_the_curve_and_seeds_differ() {
-        for witness in WITNESSES {
+        for device in HELD_OUT_DEVICES {
             for seed in 1..4 {
-                let scene = witness.scene(80, seed).unwrap();
-                assert_eq!(scene.truth.len(), 80, "{}", witness.name);
+                let scene = device.scene(80, seed).unwrap();
+                assert_eq!(scene.truth.len(), 80, "{}", device.name);
                 assert!(scene.truth.windows(2).all(|two| two[1].start_s - two[0].start_s > 1e-3));
                 assert!(scene.truth.iter().all(|frame| frame.energy_j > 0.0));
                 let last = scene.truth.last().unwrap();
-                assert!(last.start_s < scene.end_s && scene.end_s < scene.curve.end_s(), "{}", witness.name);
-                let other = witness.scene(80, seed + 1).unwrap();
+                assert!(last.start_s < scene.end_s && scene.end_s < scene.curve.end_s(), "{}", device.name);
+                let other = device.scene(80, seed + 1).unwrap();
                 assert_ne!(scene, other);
-                assert_eq!(scene, witness.scene(80, seed).unwrap());
-                assert_eq!(scene.record(&witness.recording(seed)).unwrap().lost_samples(), 0);
+                assert_eq!(scene, device.scene(80, seed).unwrap());
+                assert_eq!(scene.record(&device.recording(seed)).unwrap().lost_samples(), 0);
             }
         }
     }
