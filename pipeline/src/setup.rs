@@ -3,6 +3,7 @@
 use std::ops::{Add, Mul, Sub};
 
 use crate::geometry::{Cull, MovingVertex, Shear, Viewport};
+use crate::shader::Lane;
 
 /// A vertex `open + t delta` on the image plane, as `[x, y, w]` (see [`MovingVertex`]). In this form a still
 /// vertex equals `open` to the last bit at all times.
@@ -18,6 +19,17 @@ impl Corner {
     /// The corner at `vertex`.
     pub fn new(vertex: &MovingVertex) -> Self {
         Self { open: vertex.open, delta: difference(vertex.close, vertex.open) }
+    }
+
+    /// Vertex at time `t` ([`Self::at`]), computed on a lane; a still one is not moved.
+    pub fn vertex_on(lane: &Lane, vertex: &MovingVertex, t: f32, is_still: bool) -> [f32; 3] {
+        if is_still {
+            return vertex.open;
+        }
+        std::array::from_fn(|axis| {
+            let open = vertex.open[axis];
+            lane.fused(t, lane.sub(vertex.close[axis], open), open)
+        })
     }
 
     /// Vertex when the shutter opens and closes, rounded as in the sample test.

@@ -276,6 +276,13 @@ impl<'a> Lane<'a> {
         a * b + c
     }
 
+    /// `a b + c`, rounded once, as the sample test rounds.
+    #[inline(always)]
+    pub fn fused(&self, a: f32, b: f32, c: f32) -> f32 {
+        self.count(1);
+        a.mul_add(b, c)
+    }
+
     /// `a` with every component multiplied by `factor`.
     #[inline(always)]
     pub fn scale<T: Operand + Mul<f32, Output = T>>(&self, a: T, factor: f32) -> T {
@@ -330,6 +337,20 @@ impl<'a> Lane<'a> {
     pub fn mul_low(&self, a: u32, b: u32) -> u32 {
         self.count(1);
         a.wrapping_mul(b)
+    }
+
+    /// Largest integer not above `a`.
+    #[inline(always)]
+    pub fn floor(&self, a: f64) -> f64 {
+        self.count(1);
+        libm::floor(a)
+    }
+
+    /// Smallest integer not below `a`.
+    #[inline(always)]
+    pub fn ceil(&self, a: f64) -> f64 {
+        self.count(1);
+        libm::ceil(a)
     }
 
     /// `a` as a number in double precision.
@@ -464,7 +485,7 @@ impl<'a> Lane<'a> {
 
     /// `a` if `a > b`, a test without a branch: `then` or `otherwise`.
     #[inline(always)]
-    pub fn select_greater<T>(&self, [a, b]: [f32; 2], then: T, otherwise: T) -> T {
+    pub fn select_greater<N: PartialOrd, T>(&self, [a, b]: [N; 2], then: T, otherwise: T) -> T {
         self.count(1);
         if a > b { then } else { otherwise }
     }

@@ -255,6 +255,29 @@ const ROWS_OF_SIX: [&str; 16] = [
     "VI-13", "VI-14", "VI-15", "VI-16",
 ];
 
+/// Verdict that the page on reproduction gives for a row, if it has one.
+fn verdict_on_page<'a>(page: &'a str, id: &str) -> Option<&'a str> {
+    let (_, after) = page.split_once(&format!("\n- **{id} "))?;
+    after.split_once("**").map(|(verdict, _)| verdict)
+}
+
+/// The page has a verdict for each row, and its first lines count them.
+#[test]
+fn the_page_has_a_verdict_for_each_row() {
+    let page = fs::read_to_string(root().join("docs/guide/reproduce.md")).expect("the page");
+    let of_six = ROWS_OF_SIX.map(str::to_owned);
+    let others = (1..=2).map(|n| format!("II-{n}")).chain((1..=6).map(|n| format!("III-{n}")));
+    let mut counts = [("holds", 0), ("depends", 0), ("differs", 0)];
+    for id in others.chain(of_six) {
+        let verdict = verdict_on_page(&page, &id).unwrap_or_else(|| panic!("no verdict of {id}"));
+        let count = counts.iter_mut().find(|(word, _)| *word == verdict);
+        count.unwrap_or_else(|| panic!("{id}: {verdict}")).1 += 1;
+    }
+    let [holds, depends, differs] = counts.map(|(_, count)| count);
+    let total = format!("Of {} rows, {holds} hold, {depends} depend", holds + depends + differs);
+    assert!(page.contains(&total) && differs == 1, "{total}, {differs} differ");
+}
+
 #[test]
 fn paper_six_is_whole_in_its_quick_form() {
     let temporary = TempDir::new().expect("a folder");
@@ -298,6 +321,11 @@ fn paper_six_is_whole_in_its_quick_form() {
     says("VI-15", "ours", "null, vertices within the tile's time");
     says("VI-15", "note", "against the null");
     assert!(!row(&json, "VI-8")["limits"].as_str().is_some_and(|limits| limits.contains("generous")));
+    // The words are those of the file whose hash is printed.
+    for field in ["holds_when", "limits"] {
+        let words = row(&json, "VI-8")[field].as_str().expect("words");
+        assert!(committed(6).contains(&format!("{field}: \"{words}\"")), "{field}: {words}");
+    }
     scatter_is_judged(row(&json, "VI-8"));
     says("VI-1", "note", "no public case that collides was tested");
     let worse =

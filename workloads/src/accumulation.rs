@@ -10,7 +10,7 @@ use glam::{Affine3A, DVec3, Vec2, Vec3};
 use pipeline::geometry::Projection;
 use pipeline::sampling::{Pattern, Sample, SampleSource, SampleSpec, TableError, TimedBlock};
 use pipeline::setup::Corner;
-use pipeline::{Camera, CameraError, Clip, Draw, DrawError, Geometry, SampleTable, Viewport};
+use pipeline::{Camera, CameraError, Clip, Draw, DrawError, Geometry, Lane, SampleTable, Viewport};
 
 pub use crate::bvh::RayWork;
 use crate::bvh::{Bvh, Ray, bounds_of};
@@ -27,8 +27,17 @@ pub struct Face {
 impl Face {
     /// Corners at time `t`.
     pub fn at(&self, t: f32) -> [DVec3; 3] {
+        self.at_on(&Lane::default(), t, false)
+    }
+
+    /// The same, computed on a lane. Corners of a draw that is still are not moved.
+    pub fn at_on(&self, lane: &Lane, t: f32, is_still: bool) -> [DVec3; 3] {
         let [open, close] = self.ends.map(|end| end.map(|corner| corner.as_dvec3()));
-        std::array::from_fn(|k| open[k] + f64::from(t) * (close[k] - open[k]))
+        if is_still {
+            return open;
+        }
+        let t = DVec3::splat(f64::from(t));
+        std::array::from_fn(|k| lane.madd(t, lane.sub(close[k], open[k]), open[k]))
     }
 }
 

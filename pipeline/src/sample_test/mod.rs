@@ -27,6 +27,7 @@ mod kernel;
 
 use crate::sampling::TileSamples;
 use crate::setup::Corner;
+use crate::shader::Lane;
 pub use crate::simd::Width;
 use crate::simd::{LANES, Lanes, Mask};
 pub use kernel::{Covered, Hits, PixelHits, SampleTest, Target, madds, test_run};
@@ -180,6 +181,9 @@ impl<V: Lanes> Crossing<V> {
     }
 }
 
+/// Vertices at the ends of the edges, each opposite the vertex of its number.
+const EDGES: [[usize; 2]; 3] = [[1, 2], [2, 0], [0, 1]];
+
 /// A vertex relative to a sample: `[x', y', w]`.
 pub type Seen = [f32; 3];
 
@@ -221,7 +225,7 @@ pub(crate) fn hit(seen: &[Seen; 3], faces: [bool; 2]) -> Option<(f32, bool)> {
 /// of depth. Any tilted ray makes neighbours agree. At positive depth, where alone samples count, edges and
 /// vertices have the same owner as if the sample were moved.
 pub fn weights(seen: &[Seen; 3]) -> Option<([f64; 3], bool)> {
-    let edges = [(1, 2), (2, 0), (0, 1)].map(|(i, j)| terms(&seen[i], &seen[j]));
+    let edges = EDGES.map(|[i, j]| terms(&seen[i], &seen[j]));
     let signs = edges.map(|levels| levels.into_iter().map(sign).find(|&s| s != 0).unwrap_or(0));
     if signs[0] == 0 || signs[1] != signs[0] || signs[2] != signs[0] {
         return None;
@@ -232,6 +236,39 @@ pub fn weights(seen: &[Seen; 3]) -> Option<([f64; 3], bool)> {
     let parts = [0, 1, 2].map(|k| if sign(edges[k][level]) == signs[0] { parts[k].abs() } else { 0.0 });
     let sum: f64 = parts.iter().sum();
     (sum > 0.0).then(|| (parts.map(|part| part / sum), signs[0] < 0))
+}
+
+/// The weights of [`weights`], computed on a lane, which goes on to `B` and `C` for edges through the origin only.
+pub fn weights_on(lane: &Lane, seen: &[Seen; 3]) -> Option<[f64; 3]> {
+    let level = |[i, j]: [usize; 2], level| term_on(lane, &seen[i], &seen[j], level);
+    let is_zero = |edge: f64| lane.branch(edge == 0.0);
+    let mut parts = EDGES.map(|edge| level(edge, 0));
+    let signs: [f64; 3] = std::array::from_fn(|k| {
+        let next = |next| level(EDGES[k], next);
+        let first = Some(parts[k]).filter(|&edge| !is_zero(edge));
+        first.or_else(|| Some(next(1)).filter(|&edge| !is_zero(edge))).unwrap_or_else(|| next(2))
+    });
+    let is_inside = signs.iter().all(|&sign| lane.branch(sign > 0.0))
+        || signs.iter().all(|&sign| lane.branch(sign < 0.0));
+    if !is_inside {
+        return None;
+    }
+    for next in 1..3 {
+        if parts.iter().any(|&part| !is_zero(part)) {
+            break;
+        }
+        parts = EDGES.map(|edge| level(edge, next));
+    }
+    let parts = parts.map(f64::abs);
+    let sum = lane.add(lane.add(parts[0], parts[1]), parts[2]);
+    Some(parts.map(|part| lane.div(part, sum)))
+}
+
+/// `e`, `B` or `C` of the edge from `i` to `j`, whose products are exact.
+fn term_on(lane: &Lane, i: &Seen, j: &Seen, level: usize) -> f64 {
+    let (first, second) = [(0, 1), (1, 2), (2, 0)][level];
+    let [i, j] = [i, j].map(|seen| [seen[first], seen[second]].map(f64::from));
+    lane.madd(-j[0], i[1], lane.mul(i[0], j[1]))
 }
 
 /// Pairs of exact products whose differences are `e`, `B` and `C` of the edge from `i` to `j`.
@@ -255,6 +292,43 @@ pub fn depth(seen: &[Seen; 3], weights: &[f64; 3]) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Small integers, so that edges pass through the origin often.
+    #[test]
+    fn a_lane_computes_the_same_weights() {
+        let [mut inside, mut on_edge] = [0, 0];
+        for number in 0..20_000 {
+            let word = |k: u64| crate::random::mix(9 * number + k);
+            let seen: [Seen; 3] = std::array::from_fn(|vertex| {
+                let [x, y, w] = [0, 1, 2].map(|axis| word(3 * vertex as u64 + axis) >> 8);
+                [(x % 5) as f32 - 2.0, (y % 5) as f32 - 2.0, (w % 4) as f32]
+            });
+            let (lane, expected) = (Lane::default(), weights(&seen).map(|(weights, _)| weights));
+            let found = weights_on(&lane, &seen);
+            assert_eq!(
+                found.map(|all| all.map(f64::to_bits)),
+                expected.map(|all| all.map(f64::to_bits)),
+                "{seen:?}"
+            );
+            inside += u32::from(found.is_some());
+            on_edge += u32::from(found.is_some_and(|all| all.contains(&0.0)));
+        }
+        assert!(inside > 1000 && on_edge > 100, "{inside} {on_edge}");
+    }
+
+    #[test]
+    fn weights_cost_what_they_compute() {
+        let ops = |seen: &[Seen; 3]| {
+            let lane = Lane::default();
+            let found = weights_on(&lane, seen).is_some();
+            (lane.ops(), found)
+        };
+        // Edges 6, comparisons with zero 3 + 1, signs 3, the sum 2, quotients 6. Seen from behind, one comparison more.
+        let seen = [[2.0, 0.0, 1.0], [-1.0, 1.0, 1.0], [-1.0, -1.0, 1.0]];
+        assert_eq!(ops(&seen), (21, true));
+        assert_eq!(ops(&[seen[0], seen[2], seen[1]]), (22, true));
+        assert!(!ops(&seen.map(|[x, y, w]| [x + 9.0, y, w])).1);
+    }
 
     #[test]
     fn the_middle_of_a_triangle_has_equal_weights() {

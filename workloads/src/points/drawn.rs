@@ -138,10 +138,20 @@ impl Lattice {
         count
     }
 
+    /// Whether a box is beside a tile of cells.
+    fn is_apart(&self, lane: &Lane, tile: [u32; 2], cell: &Cell) -> bool {
+        (0..2).any(|axis| {
+            let at = f64::from(tile[axis]);
+            let [low, high] = [at, at + 1.0].map(|at| lane.mul(at, 1.0 / f64::from(self.across[axis])));
+            lane.branch(high <= cell.low[axis]) || lane.branch(low >= cell.high[axis])
+        })
+    }
+
     /// Cells along an axis that an interval may touch.
-    fn span(&self, axis: usize, [low, high]: [f64; 2]) -> Range<u32> {
+    fn span(&self, lane: &Lane, axis: usize, ends: [f64; 2]) -> Range<u32> {
         let count = f64::from(self.across[axis]);
-        (low * count).floor() as u32..((high * count).ceil() as u32).min(self.across[axis])
+        let [low, high] = ends.map(|end| lane.mul(end, count));
+        lane.floor(low) as u32..lane.min(lane.ceil(high) as u32, self.across[axis])
     }
 }
 
@@ -185,20 +195,13 @@ impl TileShader for Candidates<'_> {
     fn run(&self, stored: &mut u64, lanes: &Lanes, tile: &TileIntervals<'_>) -> Option<Tried> {
         let (number, is_upper) = (tile.primitive / 2, tile.primitive % 2 == 1);
         let (cell, lattice, touch) = (&self.cells[number], self.lattice, tile.touch);
-        let is_apart = lanes.run(|lane| {
-            let apart = |axis: usize| {
-                let at = f64::from(tile.tile[axis]);
-                let [low, high] =
-                    [at, at + 1.0].map(|at| lane.mul(at, 1.0 / f64::from(lattice.across[axis])));
-                lane.branch(high <= cell.low[axis]) || lane.branch(low >= cell.high[axis])
-            };
-            apart(0) || apart(1)
-        });
         let mut tried = Tried { candidates: 0, crowded: 0, kept: Vec::new() };
-        if is_apart {
-            return Some(tried);
-        }
-        let spans = [(2, touch.t), (3, touch.u), (4, touch.v)].map(|(axis, range)| lattice.span(axis, range));
+        let spans = lanes.run(|lane| {
+            let is_apart = lattice.is_apart(lane, tile.tile, cell);
+            let span = |(axis, range)| lattice.span(lane, axis, range);
+            (!is_apart).then(|| [(2, touch.t), (3, touch.u), (4, touch.v)].map(span))
+        });
+        let Some(spans) = spans else { return Some(tried) };
         for at in cells_within(tile.tile, &spans) {
             let kept = &mut tried.kept;
             tried.candidates += lanes.run(|lane| {

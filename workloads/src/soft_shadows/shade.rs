@@ -7,7 +7,7 @@ use std::cell::Cell;
 use glam::{DVec3, Vec3, Vec4};
 use pipeline::geometry::Projection;
 use pipeline::memory::MemoryRange;
-use pipeline::sample_test::weights;
+use pipeline::sample_test::weights_on;
 use pipeline::sampling::{Sample, SampleSource};
 use pipeline::setup::Corner;
 use pipeline::{
@@ -17,7 +17,7 @@ use pipeline::{
 use rayon::prelude::*;
 
 use super::{AreaLight, DEPTH_BYTES, Method, SceneView, ShadowMap, in_passes};
-use crate::accumulation::{RayWork, Rays, SharedSamples};
+use crate::accumulation::{Face, RayWork, Rays, SharedSamples};
 use crate::job::JobError;
 
 /// Bytes of the reflectance of a draw.
@@ -120,8 +120,8 @@ impl<'a> World<'a> {
         (pixels.into_iter().map(|(colour, _)| colour).collect(), work)
     }
 
-    /// Mean of the samples of a pixel, each shaded by a program of its own; `triangle` gets the visible
-    /// triangle of a sample.
+    /// Mean of the samples of a pixel, each shaded by a program of its own, which adds its colour to those before;
+    /// the last one divides. `triangle` gets the visible triangle of a sample.
     fn pixel(
         &self,
         [px, py]: [u32; 2],
@@ -132,15 +132,20 @@ impl<'a> World<'a> {
     ) -> Vec3 {
         let mut at = vec![Sample::default(); samples.per_pixel() as usize];
         samples.pixel_into(px, py, &mut at);
-        let shade = |(index, sample): (usize, &Sample)| {
-            work.lanes.run(|lane| {
+        let mut mean = Vec3::ZERO;
+        for (index, sample) in at.iter().enumerate() {
+            mean = work.lanes.run(|lane| {
                 let point = self.point(lane, [px, py], sample, triangle(index));
                 let is_seen = lane.branch(point.is_some());
-                let Some(point) = point.filter(|_| is_seen) else { return self.background };
-                self.shade(lane, &point, Place { sample, index }, shadows, work)
-            })
-        };
-        at.iter().enumerate().map(shade).sum::<Vec3>() / at.len() as f32
+                let colour = match point.filter(|_| is_seen) {
+                    Some(point) => self.shade(lane, &point, Place { sample, index }, shadows, work),
+                    None => self.background,
+                };
+                let sum = lane.add(mean, colour);
+                if index + 1 < at.len() { sum } else { divided(lane, sum, at.len()) }
+            });
+        }
+        mean
     }
 
     /// Fetches what the point of a sample is made of: positions of the triangle, and the reflectance of its
@@ -178,26 +183,42 @@ impl<'a> World<'a> {
         seen.par_chunks_exact(per_pixel).enumerate().flat_map_iter(pixel).collect()
     }
 
-    /// Surface point of a sample. The lane projects the vertices; interpolation and normals are fixed functions,
-    /// as in the pipeline.
-    fn point(&self, lane: &Lane, [px, py]: [u32; 2], sample: &Sample, triangle: u32) -> Option<Point> {
+    /// Surface point of a sample. All of it is computed on the lane: the pass covers the image and fetches triangles,
+    /// which no interpolator has seen.
+    fn point(&self, lane: &Lane, pixel: [u32; 2], sample: &Sample, triangle: u32) -> Option<Point> {
         let face = self.rays.faces().get(triangle as usize)?;
-        let is_still = self.camera.open() == self.camera.close() && self.draws[face.draw].geometry.is_still();
-        let [x, y] = [(px, sample.x, self.viewport.width()), (py, sample.y, self.viewport.height())]
-            .map(|(pixel, within, side)| (pixel as f32 - 0.5 * side as f32) + within);
-        let seen = std::array::from_fn(|k| {
-            let vertex = self.projection.vertex_on(lane, face.ends.map(|corners| corners[k]), is_still);
-            let [vx, vy, w] = Corner::new(&vertex).at(sample.t);
-            [(-x).mul_add(w, vx), (-y).mul_add(w, vy), w]
-        });
-        let (weights, _) = weights(&seen).unwrap_or(([1.0 / 3.0; 3], true));
-        let corners = face.at(sample.t);
-        let place: DVec3 = (0..3).map(|k| weights[k] * corners[k]).sum();
-        let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize_or_zero();
-        let to_camera = self.projection.eye().truncate().as_dvec3() - place;
-        let normal = if normal.dot(to_camera) < 0.0 { -normal } else { normal };
+        let is_still = self.draws[face.draw].geometry.is_still();
+        let weights = self.weights(lane, pixel, sample, (face, is_still));
+        let corners = face.at_on(lane, sample.t, is_still);
+        let [first, second, third] = weights.map(DVec3::splat);
+        let place = lane.madd(second, corners[1], lane.mul(first, corners[0]));
+        let place = lane.madd(third, corners[2], place);
+        let [across, along] = [1, 2].map(|k| lane.sub(corners[k], corners[0]));
+        let normal = lane.normalize(lane.cross(across, along));
+        let to_camera = lane.sub(self.projection.eye().truncate().as_dvec3(), place);
+        let normal = lane.select_greater([0.0, lane.dot(normal, to_camera)], -normal, normal);
         let albedo = self.albedos.get(face.draw).copied().unwrap_or(Vec3::ONE);
         Some(Point { place, normal, albedo, triangle })
+    }
+
+    /// Barycentric weights of a sample in its triangle, whose vertices a lane projects. What does not move in a whole
+    /// draw is projected once, and is not interpolated in time.
+    fn weights(
+        &self,
+        lane: &Lane,
+        [px, py]: [u32; 2],
+        sample: &Sample,
+        (face, is_still): (&Face, bool),
+    ) -> [f64; 3] {
+        let is_still = is_still && self.camera.open() == self.camera.close();
+        let [x, y] = [(px, sample.x, self.viewport.width()), (py, sample.y, self.viewport.height())]
+            .map(|(pixel, within, side)| lane.add(lane.sub(pixel as f32, 0.5 * side as f32), within));
+        let seen = std::array::from_fn(|k| {
+            let vertex = self.projection.vertex_on(lane, face.ends.map(|corners| corners[k]), is_still);
+            let [vx, vy, w] = Corner::vertex_on(lane, &vertex, sample.t, is_still);
+            [lane.fused(-x, w, vx), lane.fused(-y, w, vy), w]
+        });
+        weights_on(lane, &seen).unwrap_or([1.0 / 3.0; 3])
     }
 
     /// Lambert's law for one point of the light, plus ambient light.
@@ -236,6 +257,11 @@ impl<'a> World<'a> {
             Shadows::None => true,
         }
     }
+}
+
+/// A sum of `count` colours divided by their number. Quotients in double precision round to those in single precision.
+fn divided(lane: &Lane, sum: Vec3, count: usize) -> Vec3 {
+    Vec3::from(sum.to_array().map(|channel| lane.div(f64::from(channel), count as f64) as f32))
 }
 
 /// Where the work of shading a pixel is counted.

@@ -11,7 +11,6 @@ use super::super::report::dots;
 use super::super::row::{self, Cases, Number, Row, numbers};
 use super::super::{Done, Figure};
 use super::Task;
-use crate::reproduce::settings::About;
 use crate::study::Ran;
 
 fn failed(error: impl std::fmt::Display) -> RunError {
@@ -205,28 +204,6 @@ fn rarity(errors: f64) -> f64 {
     upper_tail(errors * errors, 1)
 }
 
-/// The tolerance that the file states. It is wrong, but files of settings are not changed once a number was
-/// computed with them.
-const SAID_OF_TOLERANCE: &str =
-    "The samples of a pixel are stratified, so that 3 standard errors of independent ones are generous.";
-
-/// What the file says of shapes that were not drawn when it was committed, and what holds now.
-const SAID_OF_SHAPES: &str = "no shapes in four or five dimensions.";
-const SHAPES: &str = "the shapes in four and five dimensions are judged by no condition.";
-
-/// The file's words, with what is computed in the place of that sentence.
-fn about(file: &About) -> About {
-    let kept = file.limits.replace(SAID_OF_TOLERANCE, "").replace(SAID_OF_SHAPES, SHAPES);
-    let strata = "Samples are random in their pixel and in time; the standard errors are those of samples random in the whole image.";
-    let scatter = "the deviations in the octants of the torus scatter no more than those of independent samples (chi-square, as rarely wrong \
-                   as one of them within the standard errors)";
-    About {
-        limits: format!("{} {strata}", kept.trim_end()),
-        holds_when: format!("{}; and {scatter}", file.holds_when),
-        ..file.clone()
-    }
-}
-
 /// VI-8: as many samples in a torus as its volume says, and the integral over it.
 pub(super) fn row(task: &Task<'_>) -> Result<Done, RunError> {
     let with = task.with(|settings| &settings.vi_8);
@@ -248,7 +225,7 @@ pub(super) fn row(task: &Task<'_>) -> Result<Done, RunError> {
     tried.along("scatter", [("octants", scatter.rms(), scatter.is_of_independent(most))]);
     let band = tried.band(row.seed.values() + 1)?;
     let first = &filled[0];
-    let made = with.banded(&about(&row.about), ours(first, &torus), band);
+    let made = with.banded(&row.about, ours(first, &torus), band);
     let disks = [Disk::new(4, row.seed.all(form)[0], size)?, Disk::new(5, row.seed.all(form)[0], size)?];
     let differing =
         disks.iter().map(|disk| disk.differing).chain(filled.iter().map(|one| one.differing)).sum::<usize>();
@@ -323,19 +300,13 @@ mod tests {
     use crate::reproduce::paper6::settings::Settings;
     use crate::reproduce::settings::load;
 
-    /// The report states the computed tolerance and does not repeat that of the committed file.
+    /// The file states both parts of the condition, and no tolerance that samples do not have.
     #[test]
-    fn the_file_does_not_decide_what_the_tolerance_is() {
+    fn the_file_states_both_conditions() {
         let (settings, _) = load::<Settings>(None).unwrap();
         let file = &settings.vi_8.about;
-        assert!(file.limits.contains(SAID_OF_TOLERANCE) && file.limits.contains(SAID_OF_SHAPES));
-        let about = about(file);
-        assert!(
-            !about.limits.contains("generous") && about.limits.starts_with("Standard mode, in x, y and t")
-        );
-        assert!(
-            about.holds_when.starts_with(&file.holds_when) && about.holds_when.contains("scatter no more")
-        );
+        assert!(file.holds_when.contains("standard errors") && file.holds_when.contains("scatter no more"));
+        assert!(!file.limits.contains("generous"));
     }
 
     #[test]
