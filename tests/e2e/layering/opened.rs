@@ -1,9 +1,9 @@
 //! Places in product code that open files, from its sources. Items of tests are skipped, wherever they are.
 
 use syn::visit::{self, Visit};
-use syn::{Attribute, File, ImplItem, Item, Macro, Path, UseTree};
+use syn::{File, ImplItem, Item, Macro, Path, UseTree};
 
-use super::packets::is_test;
+use super::packets::{attributes, is_test};
 
 /// What the code of a file does to open files.
 pub fn opened(text: &str) -> Vec<String> {
@@ -47,23 +47,6 @@ impl Found {
             }
             UseTree::Glob(_) => {}
         }
-    }
-}
-
-fn attributes(item: &Item) -> &[Attribute] {
-    match item {
-        Item::Const(item) => &item.attrs,
-        Item::Enum(item) => &item.attrs,
-        Item::Fn(item) => &item.attrs,
-        Item::Impl(item) => &item.attrs,
-        Item::Macro(item) => &item.attrs,
-        Item::Mod(item) => &item.attrs,
-        Item::Static(item) => &item.attrs,
-        Item::Struct(item) => &item.attrs,
-        Item::Trait(item) => &item.attrs,
-        Item::Type(item) => &item.attrs,
-        Item::Use(item) => &item.attrs,
-        _ => &[],
     }
 }
 

@@ -81,7 +81,8 @@ impl Overlaps {
     }
 }
 
-/// A pair drawn on the host.
+/// A pair drawn on the host, without a limit of fragments.
+#[derive(Default)]
 struct HostPasses {
     work: PassWork,
     /// Fragments by axis and object, once they are drawn. Methods differ in what they compare, and get the same.
@@ -124,7 +125,7 @@ impl PlainPasses {
 
     /// Draws both objects along each axis, on the host, and compares them by each of the `methods`.
     pub fn pair(&mut self, [a, b]: [&Object; 2], methods: &[Method]) -> (Vec<Overlaps>, PassWork) {
-        let mut passes = HostPasses { work: PassWork::default(), fragments: Default::default() };
+        let mut passes = HostPasses::default();
         let overlaps = self.overlaps([a, b], methods, &mut passes);
         (overlaps, passes.work)
     }
