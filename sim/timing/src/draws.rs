@@ -73,9 +73,9 @@ pub struct DrawSpan {
     pub end_ps: u64,
 }
 
-/// A packet that has left the machine.
+/// The departure of a packet from the machine.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Left {
+pub(crate) struct Departure {
     pub pass: u32,
     pub draw: u32,
     pub batch: u32,
@@ -88,10 +88,10 @@ pub(crate) struct DrawTimes {
     /// The latest end so far.
     now: Time,
     /// Packets of the front end that left after it, in order.
-    ahead: VecDeque<Left>,
+    ahead: VecDeque<Departure>,
     passes: Vec<PassParts>,
     last_pass: Option<u32>,
-    spans: Vec<Left>,
+    spans: Vec<Departure>,
     most_spans: usize,
 }
 
@@ -103,12 +103,12 @@ impl DrawTimes {
     }
 
     /// Record that the next packet of the stream left the machine at `at`.
-    pub fn left(&mut self, demand: &ServiceDemand, at: Time) {
+    pub fn departed(&mut self, demand: &ServiceDemand, at: Time) {
         self.last_pass = Some(demand.pass);
-        let left = Left { pass: demand.pass, draw: demand.draw, batch: demand.batch, at };
+        let departure = Departure { pass: demand.pass, draw: demand.draw, batch: demand.batch, at };
         if demand.front {
             if at > self.now {
-                self.ahead.push_back(left);
+                self.ahead.push_back(departure);
             }
             return;
         }
@@ -122,25 +122,27 @@ impl DrawTimes {
             }
             self.ahead.pop_front();
         }
-        self.advance(left);
+        self.advance(departure);
     }
 
     /// Record that the last tile leaves later than it was said to.
-    pub fn delayed(&mut self, tile: Left) {
+    pub fn delayed(&mut self, tile: Departure) {
         self.advance(tile);
     }
 
-    fn advance(&mut self, left: Left) {
-        if left.at <= self.now {
+    fn advance(&mut self, departure: Departure) {
+        if departure.at <= self.now {
             return;
         }
-        *PassParts::of(&mut self.passes, left.pass, left.draw) += left.at - self.now;
-        self.now = left.at;
+        *PassParts::of(&mut self.passes, departure.pass, departure.draw) += departure.at - self.now;
+        self.now = departure.at;
         let is_full = self.spans.len() > self.most_spans;
         match self.spans.last_mut() {
-            Some(last) if (last.pass, last.draw) == (left.pass, left.draw) => last.at = left.at,
+            Some(last) if (last.pass, last.draw) == (departure.pass, departure.draw) => {
+                last.at = departure.at
+            }
             _ if is_full => {}
-            _ => self.spans.push(left),
+            _ => self.spans.push(departure),
         }
     }
 
@@ -151,12 +153,12 @@ impl DrawTimes {
             self.advance(front);
         }
         if let Some(pass) = self.last_pass {
-            self.advance(Left { pass, draw: Packet::NONE, batch: 0, at: clocks.grain_from(end_ps) });
+            self.advance(Departure { pass, draw: Packet::NONE, batch: 0, at: clocks.grain_from(end_ps) });
         }
-        let span = |left: &Left| DrawSpan {
-            pass: left.pass,
-            draw: left.draw,
-            end_ps: clocks.ps(left.at).min(end_ps),
+        let span = |departure: &Departure| DrawSpan {
+            pass: departure.pass,
+            draw: departure.draw,
+            end_ps: clocks.ps(departure.at).min(end_ps),
         };
         let is_whole = self.spans.len() <= self.most_spans;
         (self.passes, if is_whole { self.spans.iter().map(span).collect() } else { Vec::new() })

@@ -8,7 +8,7 @@ use super::station::{Service, aligned};
 use super::{Span, Visit};
 use crate::clock::{Clocks, Time};
 use crate::demand::{CYCLE, DemandBuilder, Server, ServiceDemand, Station, Work, share, time_of};
-use crate::draws::Left;
+use crate::draws::Departure;
 use crate::spec::{DataUnit, MachineSpec};
 
 /// Cycles per slot of the calendars.
@@ -258,14 +258,14 @@ impl Cores {
 
     /// When the last packets of pixels and groups have left, if none comes any more; in the calendars they
     /// have left at `calendar`.
-    pub fn drain(&mut self, calendar: Time) -> Option<Left> {
+    pub fn drain(&mut self, calendar: Time) -> Option<Departure> {
         self.drain.end(calendar)
     }
 
     /// When the last packets of pixels and groups of the batches up to `batch` have left; in the calendars
     /// they have at `calendar`.
-    pub fn left(&mut self, batch: u32, calendar: Time) -> Time {
-        self.drain.left(batch, calendar)
+    pub fn departs(&mut self, batch: u32, calendar: Time) -> Time {
+        self.drain.departs(batch, calendar)
     }
 
     /// Send warps, as many in a cycle as the machine can, as slots on the cores and in front of the data unit

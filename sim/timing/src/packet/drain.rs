@@ -12,7 +12,7 @@ use std::collections::{BinaryHeap, VecDeque};
 use super::Span;
 use crate::clock::{Clocks, Time};
 use crate::demand::{ServiceDemand, Station, time_of};
-use crate::draws::Left;
+use crate::draws::Departure;
 use crate::spec::MachineSpec;
 
 /// A packet of pixels or a group on the cores.
@@ -39,9 +39,9 @@ pub(super) struct OnCores {
 pub(super) struct Drain {
     /// Packets that have not left, and the number of those that have.
     packets: VecDeque<InTurn>,
-    left: usize,
+    departures: usize,
     /// The last packet; its time is not known.
-    last: Option<Left>,
+    last: Option<Departure>,
     /// When the last warp is sent, when the last packet begins, when the last leaves the cores and when the
     /// unit behind.
     admitted: f64,
@@ -115,7 +115,7 @@ impl Drain {
         };
         Self {
             packets: VecDeque::new(),
-            left: 0,
+            departures: 0,
             last: None,
             admitted: 0.0,
             sent: 0.0,
@@ -139,7 +139,7 @@ impl Drain {
     pub fn note(&mut self, demand: &ServiceDemand, mut packet: OnCores) {
         packet.behind = time_of(demand.service[Station::Colour as usize], self.cores.behind_period);
         packet.latency = if demand.last == Station::Colour { self.cores.latencies[1] } else { 0 };
-        self.last = Some(Left { pass: demand.pass, draw: demand.draw, batch: demand.batch, at: 0 });
+        self.last = Some(Departure { pass: demand.pass, draw: demand.draw, batch: demand.batch, at: 0 });
         self.longest = self.longest.max(Time::from(packet.steps) * self.cores.alu);
         self.longest_behind = self.longest_behind.max(packet.behind);
         // Waits are longer where packets before it delay its lines; those come no later in turn.
@@ -180,7 +180,7 @@ impl Drain {
         let ready = (to - before) as f64;
         self.started = self.started.max(self.sent + self.least_data as f64).max(ready);
         self.advance(self.started);
-        let number = self.left + self.packets.len() - 1;
+        let number = self.departures + self.packets.len() - 1;
         let lanes = packet.lanes_of_warp() * f64::from(warps);
         if lanes > 0.0 {
             self.lanes += lanes;
@@ -193,7 +193,7 @@ impl Drain {
 
     /// Warps of a packet end at `at`.
     fn ended(&mut self, number: usize, warps: u32, at: f64) {
-        let packet = &mut self.packets[number - self.left];
+        let packet = &mut self.packets[number - self.departures];
         packet.remaining -= warps;
         packet.done = at;
         if warps > 0 {
@@ -220,7 +220,7 @@ impl Drain {
     }
 
     /// When the last packet of the batches up to `batch` has left; in the calendars they have at `calendar`.
-    pub fn left(&mut self, batch: u32, calendar: Time) -> Time {
+    pub fn departs(&mut self, batch: u32, calendar: Time) -> Time {
         let most = calendar + self.longest + self.longest_behind * self.packets.len() as Time;
         if self.packets.front().is_none_or(|packet| packet.batch > batch) {
             return calendar;
@@ -236,14 +236,14 @@ impl Drain {
     ///
     /// Lanes are never idle while a packet waits for them, in either order. So no more is lost than the
     /// program of a packet, and the work behind of those under way.
-    pub fn end(&mut self, calendar: Time) -> Option<Left> {
+    pub fn end(&mut self, calendar: Time) -> Option<Departure> {
         let most = calendar + self.longest + self.longest_behind * self.packets.len() as Time;
         while !self.packets.is_empty() {
             self.leave();
         }
         (self.steps, self.lanes, self.least_data) = (0.0, 0.0, Time::MAX);
         (self.longest, self.longest_behind) = (0, 0);
-        self.last.take().map(|last| Left { at: most.min(self.last_end as Time), ..last })
+        self.last.take().map(|last| Departure { at: most.min(self.last_end as Time), ..last })
     }
 
     /// Let the oldest packet leave. Returns when it leaves the cores.
@@ -252,7 +252,7 @@ impl Drain {
         {
         }
         let Some(InTurn { packet, done, .. }) = self.packets.pop_front() else { return self.departed };
-        self.left += 1;
+        self.departures += 1;
         self.departed = self.departed.max(done);
         let arrived = self.departed + self.cores.latencies[0] as f64;
         self.gone = self.gone.max(arrived) + packet.behind as f64;
@@ -269,7 +269,7 @@ impl Drain {
     /// Serve until warps end, or until `to`. Returns whether some ended.
     fn end_next(&mut self, to: f64) -> bool {
         let Some(&Reverse((ends, number, warps))) = self.active.peek() else { return false };
-        let packet = self.packets[number - self.left].packet;
+        let packet = self.packets[number - self.departures].packet;
         let ends = ends as f64 / PARTS;
         let step = self.cores.step(self.lanes, &packet);
         let until = self.now + (ends - self.steps).max(0.0) * step;

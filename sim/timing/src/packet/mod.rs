@@ -252,7 +252,7 @@ impl PacketClock {
                 if let Some(before) = demand.batch.checked_sub(2)
                     && let Some(at) = self.gates.traversed.get_mut(before as usize)
                 {
-                    *at = self.cores.left(before, *at);
+                    *at = self.cores.departs(before, *at);
                 }
                 self.walk(&demand, &counts, &lines);
             }
@@ -291,7 +291,7 @@ impl PacketClock {
         self.end = self.end.max(arrive);
         self.gates.note(demand, arrive);
         self.passes.note(demand.pass, begin, arrive);
-        self.draws.left(demand, arrive);
+        self.draws.departed(demand, arrive);
         self.builder.add_work(demand, counts, self.passes.work(demand.pass));
         if memory.from <= memory.to {
             let units = [Unit::L2, Unit::Llc, Unit::Edram, Unit::Dram];

@@ -159,7 +159,7 @@ impl<'a> Machine<'a> {
                 .map(|station| period(station) * Time::from(common[station as usize].latency_cycles)),
             sources: Sources::new(&stream.demands),
             passes: Passes::default(),
-            left: vec![0; stream.demands.len()],
+            departures: vec![0; stream.demands.len()],
             recorder,
             end: 0,
         };
@@ -221,7 +221,7 @@ impl<'a> Machine<'a> {
         let memory_end = self.l2.ends_at().max(self.levels.ends_at()).max(self.dram.ends_at());
         let end = self.shared.end.max(memory_end);
         self.meter.finish(end, &mut self.shared.recorder);
-        let SharedState { mut recorder, mut passes, left, stream, builder, .. } = self.shared;
+        let SharedState { mut recorder, mut passes, departures, stream, builder, .. } = self.shared;
         recorder.lasts(clocks.ps(end));
         let timeline = recorder.finish();
         let cycles = clocks.cycles(crate::Clock::Core, end);
@@ -229,7 +229,7 @@ impl<'a> Machine<'a> {
             builder.add_work(demand, counts, passes.work(demand.pass));
         }
         let mut draws = DrawTimes::new(usize::MAX);
-        stream.demands.iter().zip(left).for_each(|(demand, at)| draws.left(demand, at));
+        stream.demands.iter().zip(departures).for_each(|(demand, at)| draws.departed(demand, at));
         let (parts, spans) = draws.finish(&clocks, timeline.duration_ps);
         Ok(Timed {
             passes: passes.finish(self.spec, &clocks, timeline.duration_ps, &parts),
@@ -349,7 +349,7 @@ struct SharedState<'a> {
     pub sources: Sources,
     pub passes: Passes,
     /// When each packet left the machine.
-    pub left: Vec<Time>,
+    pub departures: Vec<Time>,
     pub recorder: Recorder,
     pub end: Time,
 }
@@ -405,7 +405,7 @@ impl SharedState<'_> {
         if demand.last == station {
             self.sources.done(id, demand, at);
             self.passes.note(demand.pass, at, at);
-            self.left[id as usize] = at;
+            self.departures[id as usize] = at;
             self.end = self.end.max(at);
             return Ok(());
         }
