@@ -64,7 +64,7 @@ pub use table::{EnergyRow, EnergyTable, Entry, Supply};
 
 /// Why an energy table cannot be used.
 #[derive(Debug, thiserror::Error)]
-pub enum TableError {
+pub enum EnergyTableError {
     /// The file cannot be read, is not RON, or has an invalid row.
     #[error(transparent)]
     Spec(#[from] SpecError),

@@ -5,7 +5,7 @@ use std::path::Path;
 use activity::{Event, spec};
 use serde::Deserialize;
 
-use crate::TableError;
+use crate::EnergyTableError;
 use crate::quantity::{Basis, Bound, Nanometres, Picojoules, Source, Volts};
 use crate::structure::Scaling;
 
@@ -68,11 +68,11 @@ impl EnergyTable {
     /// The built-in table `name`.
     ///
     /// # Errors
-    /// [`TableError::Unknown`] with the nearest known name.
-    pub fn builtin(name: &str) -> Result<Self, TableError> {
+    /// [`EnergyTableError::Unknown`] with the nearest known name.
+    pub fn builtin(name: &str) -> Result<Self, EnergyTableError> {
         let Some(text) = Self::builtin_text(name) else {
             let suggestion = spec::suggestion(name, &BUILTIN.map(|(known, _)| known));
-            return Err(TableError::Unknown { name: name.to_owned(), suggestion });
+            return Err(EnergyTableError::Unknown { name: name.to_owned(), suggestion });
         };
         Self::parse(text, &format!("power-model/tables/{name}.ron"))
     }
@@ -80,8 +80,8 @@ impl EnergyTable {
     /// Read the table in the RON file at `path`.
     ///
     /// # Errors
-    /// [`TableError`] if the file cannot be read, a row is invalid, or an event is missing.
-    pub fn load(path: &Path) -> Result<Self, TableError> {
+    /// [`EnergyTableError`] if the file cannot be read, a row is invalid, or an event is missing.
+    pub fn load(path: &Path) -> Result<Self, EnergyTableError> {
         Self::check(spec::load(path)?, &path.display().to_string())
     }
 
@@ -89,14 +89,14 @@ impl EnergyTable {
     ///
     /// # Errors
     /// As for [`Self::load`].
-    pub fn parse(text: &str, file: &str) -> Result<Self, TableError> {
+    pub fn parse(text: &str, file: &str) -> Result<Self, EnergyTableError> {
         Self::check(spec::parse(text, file)?, file)
     }
 
-    fn check(written: Written, file: &str) -> Result<Self, TableError> {
+    fn check(written: Written, file: &str) -> Result<Self, EnergyTableError> {
         let Written { name, doc, node_nm, v0_v, v_min_v, v_max_v, rows, free } = written;
         if !(v_min_v <= v0_v && v0_v <= v_max_v) {
-            return Err(TableError::Voltages { path: file.to_owned() });
+            return Err(EnergyTableError::Voltages { path: file.to_owned() });
         }
         let costs = rows.into_iter().map(|row| (row.event(), Entry::Costs(row)));
         let free = free.into_iter().map(|row| (row.event.0, Entry::Free(row.reason)));
@@ -159,17 +159,17 @@ impl EnergyTable {
 }
 
 /// One entry per event in the order of [`Event::ALL`]. The error names a duplicate or missing event.
-fn complete(given: impl Iterator<Item = (Event, Entry)>, file: &str) -> Result<Vec<Entry>, TableError> {
+fn complete(given: impl Iterator<Item = (Event, Entry)>, file: &str) -> Result<Vec<Entry>, EnergyTableError> {
     let mut entries: Vec<Option<Entry>> = vec![None; Event::COUNT];
     for (event, entry) in given {
         if entries[event as usize].replace(entry).is_some() {
-            return Err(TableError::Duplicate { path: file.to_owned(), event: event.name() });
+            return Err(EnergyTableError::Duplicate { path: file.to_owned(), event: event.name() });
         }
     }
     let pairs = Event::ALL.into_iter().zip(entries);
     pairs
         .map(|(event, entry)| {
-            entry.ok_or_else(|| TableError::Missing { path: file.to_owned(), event: event.name() })
+            entry.ok_or_else(|| EnergyTableError::Missing { path: file.to_owned(), event: event.name() })
         })
         .collect()
 }

@@ -8,7 +8,7 @@ use std::error::Error;
 use traces::Trace;
 use traces::energy::{PowerIntegral, TOLERANCE_S, score, true_frames};
 use traces::frames::{Marks, Options, Step, default_window, find_with};
-use traces::synth::{HELD_OUT_DEVICES, Recording, SCENARIOS, Scene};
+use traces::synth::{HELD_OUT_DEVICES, RecorderSpec, SCENARIOS, Scene};
 
 const FRAMES: usize = 200;
 /// The marked frame, as a share of all, and the error of the mark, s.
@@ -58,8 +58,10 @@ fn recorded(name: &str, seed: u64) -> Result<(Scene, Trace), Box<dyn Error>> {
     let kind = HELD_OUT_DEVICES.iter().find(|kind| kind.name == name);
     let scenario = SCENARIOS.iter().find(|scenario| scenario.name == name);
     let (scene, recording) = match (kind, scenario) {
-        (Some(kind), _) => (kind.scene(FRAMES, seed)?, kind.recording(seed)),
-        (None, Some(scenario)) => (scenario.scene(FRAMES, seed)?, Recording { seed, ..Recording::default() }),
+        (Some(kind), _) => (kind.scene(FRAMES, seed)?, kind.recorder(seed)),
+        (None, Some(scenario)) => {
+            (scenario.scene(FRAMES, seed)?, RecorderSpec { seed, ..RecorderSpec::default() })
+        }
         (None, None) => return Err(format!("no scene {name}").into()),
     };
     let trace = scene.record(&recording)?;

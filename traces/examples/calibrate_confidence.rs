@@ -61,7 +61,7 @@ fn run() -> Result<(), Box<dyn Error>> {
         let (mut first_mark, mut worst) = (Vec::new(), Vec::new());
         for seed in first..=last {
             let scene = device.scene(FRAMES, seed)?;
-            let trace = scene.record(&device.recording(seed))?;
+            let trace = scene.record(&device.recorder(seed))?;
             let f1 = cases_of(device.name, &scene, &trace, &options, &mut cases)?;
             println!("{} {seed}: F1 by mark {f1:.3?}", device.name);
             first_mark.push(f1[0]);

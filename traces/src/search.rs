@@ -6,7 +6,7 @@ use crate::frames::{
     repetition_samples,
 };
 use crate::io::{ReadError, ReadOptions, Rows};
-use crate::stream::{self, StreamError};
+use crate::stream::{self, AnalysisError};
 use crate::trace::{Metadata, Trace};
 use std::path::Path;
 use thiserror::Error;
@@ -88,11 +88,11 @@ pub enum SearchError {
     NotInPieces,
 }
 
-impl From<StreamError> for SearchError {
-    fn from(error: StreamError) -> Self {
+impl From<AnalysisError> for SearchError {
+    fn from(error: AnalysisError) -> Self {
         match error {
-            StreamError::Read(error) => Self::Read(error),
-            StreamError::Mark(error) => Self::Mark(error),
+            AnalysisError::Read(error) => Self::Read(error),
+            AnalysisError::Mark(error) => Self::Mark(error),
         }
     }
 }

@@ -37,13 +37,13 @@ pub struct Streamed {
 /// infinite `marks.end_s` stands for the end of the file.
 ///
 /// # Errors
-/// [`StreamError`] if the file cannot be read, its samples are not even or finite, or the marks are not in it.
+/// [`AnalysisError`] if the file cannot be read, its samples are not even or finite, or the marks are not in it.
 pub fn find(
     path: &Path,
     options: &ReadOptions,
     marks: &Marks,
     method: FinderMethod,
-) -> Result<Streamed, StreamError> {
+) -> Result<Streamed, AnalysisError> {
     let clock = clock(path, options)?;
     let placement = marks.place_on(clock.start_s, clock.rate_hz, clock.samples.unwrap_or(u64::MAX >> 12))?;
     let windows = windows(path, options, &placement, marks, clock)?;
@@ -68,7 +68,7 @@ pub fn find(
 
 /// Why a file could not be analysed.
 #[derive(Debug, Error)]
-pub enum StreamError {
+pub enum AnalysisError {
     /// The file.
     #[error(transparent)]
     Read(#[from] ReadError),
@@ -112,7 +112,7 @@ fn windows(
     placement: &Placement,
     marks: &Marks,
     clock: Clock,
-) -> Result<Vec<Vec<f64>>, StreamError> {
+) -> Result<Vec<Vec<f64>>, AnalysisError> {
     let mut windows = Vec::new();
     for (placed, &mark_s) in placement.marks.iter().zip(&marks.starts_s) {
         let mut rows = Rows::open(path, options)?;

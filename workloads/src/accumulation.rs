@@ -8,7 +8,7 @@
 
 use glam::{Affine3A, DVec3, Vec2, Vec3};
 use pipeline::geometry::Projection;
-use pipeline::sampling::{Pattern, Sample, SampleSource, SampleSpec, TableError, TimedBlock};
+use pipeline::sampling::{Pattern, Sample, SampleSource, SampleSpec, SampleTableError, TimedBlock};
 use pipeline::setup::Corner;
 use pipeline::{Camera, CameraError, Clip, Draw, DrawError, Geometry, Lane, SampleTable, Viewport};
 
@@ -127,16 +127,16 @@ impl SharedSamples {
     /// differ between pixels are accepted.
     ///
     /// # Errors
-    /// [`TableError`] if the table cannot be made.
-    pub fn from_spec(spec: &SampleSpec, count: u32, seed: u64) -> Result<Self, TableError> {
+    /// [`SampleTableError`] if the table cannot be made.
+    pub fn from_spec(spec: &SampleSpec, count: u32, seed: u64) -> Result<Self, SampleTableError> {
         Ok(Self::of(SampleTable::new(spec, count, seed)?.pixel(0, 0).to_vec()))
     }
 
     /// The first `count` samples of a scrambled Sobol sequence.
     ///
     /// # Errors
-    /// [`TableError`] unless `count` is 1 to 256.
-    pub fn interleaved(spec: &SampleSpec, count: u32, seed: u64) -> Result<Self, TableError> {
+    /// [`SampleTableError`] unless `count` is 1 to 256.
+    pub fn interleaved(spec: &SampleSpec, count: u32, seed: u64) -> Result<Self, SampleTableError> {
         let pattern = Pattern::Interleaved { points: count.max(1) };
         Self::from_spec(&SampleSpec { pattern, ..spec.clone() }, count, seed)
     }

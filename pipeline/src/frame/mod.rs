@@ -44,7 +44,7 @@ use pass::{Pass, Staged};
 pub use query::{IntervalAnswer, IntervalQueries, MovingBox, SampledAnswer, SampledAnswers, SampledQueries};
 use replay::Replay;
 pub use resolve_pass::ResolvePass;
-pub use settings::{Features, PipelineSpec, Settings, Shading, SpecError};
+pub use settings::{Features, PipelineSpec, PipelineSpecError, Settings, Shading};
 use test_selection::TestSelector;
 use worker::BinWorker;
 

@@ -135,7 +135,7 @@ impl Features {
 
 /// Why a pipeline specification is invalid.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum SpecError {
+pub enum PipelineSpecError {
     /// A size has an invalid value.
     #[error("`{field}` is {value}; {allowed}")]
     Size {
@@ -167,7 +167,7 @@ pub enum SpecError {
 /// Largest threshold in pixels: the side of the largest image.
 const MAX_THRESHOLD_PX: f32 = 16_384.0;
 
-impl SpecError {
+impl PipelineSpecError {
     /// The invalid field, such as `memory.l2`.
     pub fn field(&self) -> &'static str {
         match self {
@@ -181,9 +181,9 @@ impl PipelineSpec {
     ///
     /// # Errors
     /// The first invalid field, with the allowed values.
-    pub fn validate(&self) -> Result<(), SpecError> {
+    pub fn validate(&self) -> Result<(), PipelineSpecError> {
         let size = |field, value, fits: bool, allowed| {
-            if fits { Ok(()) } else { Err(SpecError::Size { field, value, allowed }) }
+            if fits { Ok(()) } else { Err(PipelineSpecError::Size { field, value, allowed }) }
         };
         size("tile_px", self.tile_px, [1, 2, 4, 8].contains(&self.tile_px), "it has to be 1, 2, 4 or 8")?;
         let coarse = self.coarse_tile_px;
@@ -198,14 +198,14 @@ impl PipelineSpec {
         size("features.facing_splits", facing_splits, facing_splits <= max, "it has to be 0 to 3")?;
         for (field, value) in [("features.still_px", still_px), ("features.in_focus_px", in_focus_px)] {
             if !(0.0..=MAX_THRESHOLD_PX).contains(&value) {
-                return Err(SpecError::Threshold { field, value: value.to_string() });
+                return Err(PipelineSpecError::Threshold { field, value: value.to_string() });
             }
         }
         let boxes = self.depth.boxes;
         let invalid = boxes.iter().copied().find(|count| !(1..=BoxGrid::MAX).contains(count));
         size("depth.boxes", invalid.unwrap_or(1), invalid.is_none(), "it has to be 1 to 16 along each axis")?;
         if let Some((field, value, allowed)) = self.compute.as_ref().and_then(ComputeSpec::invalid) {
-            return Err(SpecError::Size { field, value, allowed });
+            return Err(PipelineSpecError::Size { field, value, allowed });
         }
         let caches = [
             ("shading_cache", self.shading_cache),
@@ -218,7 +218,7 @@ impl PipelineSpec {
         let optional = [("memory.bins", self.memory.bins), ("memory.llc", llc), ("memory.edram", edram)];
         let optional = optional.into_iter().filter_map(|(field, cache)| Some((field, cache?)));
         for (field, cache) in caches.into_iter().chain(optional) {
-            Cache::new(cache).map_err(|source| SpecError::Cache { field, source })?;
+            Cache::new(cache).map_err(|source| PipelineSpecError::Cache { field, source })?;
         }
         Ok(())
     }

@@ -7,7 +7,7 @@ mod table;
 use crate::geometry::{Shear, Viewport};
 pub use lens::{LensRegion, LensRegions, LensShape};
 pub use pattern::{HashedSamples, Pattern};
-pub use table::{SampleSpec, SampleTable, TableError};
+pub use table::{SampleSpec, SampleTable, SampleTableError};
 
 /// One sample of a pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

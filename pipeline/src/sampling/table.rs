@@ -19,7 +19,7 @@ pub struct SampleTable {
 
 /// Why a sample table is invalid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum TableError {
+pub enum SampleTableError {
     /// The number of samples per pixel is out of range.
     #[error("{0} samples per pixel; it has to be 1 to {max}", max = SampleTable::MAX_PER_PIXEL)]
     PerPixel(u32),
@@ -72,8 +72,8 @@ impl SampleTable {
     /// Owen scrambled by pixel, with `u, v` mapped to the aperture.
     ///
     /// # Errors
-    /// [`TableError`] if `per_pixel` is zero or above [`Self::MAX_PER_PIXEL`].
-    pub fn low_discrepancy(per_pixel: u32, seed: u64, shape: LensShape) -> Result<Self, TableError> {
+    /// [`SampleTableError`] if `per_pixel` is zero or above [`Self::MAX_PER_PIXEL`].
+    pub fn low_discrepancy(per_pixel: u32, seed: u64, shape: LensShape) -> Result<Self, SampleTableError> {
         Self::new(&SampleSpec { lens: shape, ..SampleSpec::default() }, per_pixel, seed)
     }
 
@@ -81,30 +81,30 @@ impl SampleTable {
     /// own range of the pattern's samples.
     ///
     /// # Errors
-    /// [`TableError`] if `per_pixel` is out of range or not divisible among the regions, or if the
+    /// [`SampleTableError`] if `per_pixel` is out of range or not divisible among the regions, or if the
     /// description is invalid.
-    pub fn new(spec: &SampleSpec, per_pixel: u32, seed: u64) -> Result<Self, TableError> {
+    pub fn new(spec: &SampleSpec, per_pixel: u32, seed: u64) -> Result<Self, SampleTableError> {
         if !(1..=Self::MAX_PER_PIXEL).contains(&per_pixel) {
-            return Err(TableError::PerPixel(per_pixel));
+            return Err(SampleTableError::PerPixel(per_pixel));
         }
         if !spec.pattern.is_sane() {
-            return Err(TableError::Points);
+            return Err(SampleTableError::Points);
         }
         if !spec.pattern.has(per_pixel) {
-            return Err(TableError::Multisample(per_pixel));
+            return Err(SampleTableError::Multisample(per_pixel));
         }
         if let LensShape::Polygon { blades, .. } = spec.lens
             && !LensShape::BLADES.contains(&blades)
         {
-            return Err(TableError::Blades(blades));
+            return Err(SampleTableError::Blades(blades));
         }
-        let regions = spec.regions.rectangles().ok_or(TableError::Regions)?;
+        let regions = spec.regions.rectangles().ok_or(SampleTableError::Regions)?;
         if spec.pattern.is_on_lens() && regions != [LensRegion::WHOLE] {
-            return Err(TableError::GivenRegions);
+            return Err(SampleTableError::GivenRegions);
         }
         let count = regions.len() as u32;
         if !per_pixel.is_multiple_of(count) {
-            return Err(TableError::Shares { per_pixel, regions: count });
+            return Err(SampleTableError::Shares { per_pixel, regions: count });
         }
         let mut samples = vec![Sample::default(); (Self::SIDE_PX * Self::SIDE_PX * per_pixel) as usize];
         for (pixel, of_pixel) in (0_u32..).zip(samples.chunks_exact_mut(per_pixel as usize)) {
@@ -126,18 +126,18 @@ impl SampleTable {
     /// row by row.
     ///
     /// # Errors
-    /// [`TableError`] if `per_pixel` is zero or above [`Self::MAX_PER_PIXEL`], the block is not filled, or a
+    /// [`SampleTableError`] if `per_pixel` is zero or above [`Self::MAX_PER_PIXEL`], the block is not filled, or a
     /// sample is out of range.
-    pub fn programmed(per_pixel: u32, seed: u64, samples: Vec<Sample>) -> Result<Self, TableError> {
+    pub fn programmed(per_pixel: u32, seed: u64, samples: Vec<Sample>) -> Result<Self, SampleTableError> {
         if !(1..=Self::MAX_PER_PIXEL).contains(&per_pixel) {
-            return Err(TableError::PerPixel(per_pixel));
+            return Err(SampleTableError::PerPixel(per_pixel));
         }
         let expected = (Self::SIDE_PX * Self::SIDE_PX * per_pixel) as usize;
         if samples.len() != expected {
-            return Err(TableError::Length { found: samples.len(), expected });
+            return Err(SampleTableError::Length { found: samples.len(), expected });
         }
         if let Some(outside) = samples.iter().position(|sample| !sample.is_in_range()) {
-            return Err(TableError::Range(outside));
+            return Err(SampleTableError::Range(outside));
         }
         let regions = vec![LensRegion::WHOLE];
         let mut table = Self { per_pixel, seed, samples, regions, by_time: Vec::new() };
@@ -293,10 +293,13 @@ mod tests {
 
     #[test]
     fn a_pixel_needs_a_sample() {
-        assert_eq!(SampleTable::low_discrepancy(0, 1, LensShape::Disk).unwrap_err(), TableError::PerPixel(0));
+        assert_eq!(
+            SampleTable::low_discrepancy(0, 1, LensShape::Disk).unwrap_err(),
+            SampleTableError::PerPixel(0)
+        );
         assert_eq!(
             SampleTable::low_discrepancy(257, 1, LensShape::Disk).unwrap_err(),
-            TableError::PerPixel(257)
+            SampleTableError::PerPixel(257)
         );
     }
 
@@ -337,15 +340,15 @@ mod tests {
         let three = SampleSpec { regions: LensRegions::Across(3), ..SampleSpec::default() };
         assert_eq!(
             SampleTable::new(&three, 8, 1).unwrap_err(),
-            TableError::Shares { per_pixel: 8, regions: 3 }
+            SampleTableError::Shares { per_pixel: 8, regions: 3 }
         );
         let pattern = Pattern::Given { points: vec![(0.0, 0.0, 0.0)] };
         assert_eq!(
             SampleTable::new(&SampleSpec { pattern, ..three }, 9, 1).unwrap_err(),
-            TableError::GivenRegions
+            SampleTableError::GivenRegions
         );
         let none = SampleSpec { pattern: Pattern::Interleaved { points: 0 }, ..SampleSpec::default() };
-        assert_eq!(SampleTable::new(&none, 9, 1).unwrap_err(), TableError::Points);
+        assert_eq!(SampleTable::new(&none, 9, 1).unwrap_err(), SampleTableError::Points);
     }
 
     #[test]
@@ -355,7 +358,7 @@ mod tests {
             assert_eq!(table.per_pixel(), 8, "{name}");
         }
         let msaa = SampleSpec::named("msaa").unwrap();
-        assert_eq!(SampleTable::new(&msaa, 6, 1).unwrap_err(), TableError::Multisample(6));
+        assert_eq!(SampleTable::new(&msaa, 6, 1).unwrap_err(), SampleTableError::Multisample(6));
         assert_eq!(SampleSpec::named("owen"), Some(SampleSpec::default()));
         assert_eq!(SampleSpec::named("sobel"), None);
     }

@@ -32,7 +32,7 @@ use cells::Facing;
 pub use raster::Tally;
 use raster::{BinSurface, Queue, VisibleBinWorker};
 pub use sorter::SampleLayout;
-use sorter::{BinSamples, CellBoxes, Plan, Sorter};
+use sorter::{BinSamples, CellBoxes, Hierarchy, Sorter};
 
 /// Visible triangle of every sample of a layout.
 #[derive(Clone, Debug)]
@@ -156,8 +156,8 @@ impl<S> Scratch<S> {
 
 impl SeenBin {
     fn fill(&mut self, layout: &SampleLayout, samples: &BinSamples, surface: &BinSurface) {
-        let count = (layout.plan.bin_px.pow(2) * layout.per_pixel) as usize;
-        (self.origin, self.side_px) = (samples.origin, layout.plan.bin_px);
+        let count = (layout.hierarchy.bin_px.pow(2) * layout.per_pixel) as usize;
+        (self.origin, self.side_px) = (samples.origin, layout.hierarchy.bin_px);
         self.triangles.clear();
         self.triangles.resize(count, Visibility::NO_TRIANGLE);
         self.depths.clear();
@@ -197,7 +197,7 @@ impl FrontEnd {
         order.sort_unstable();
         let pixels = |id: u32| spans[id as usize].as_ref().map(|span| (id, span.pixels));
         let met = order.iter().filter_map(|&key| pixels(key as u32));
-        Self { placed, lists: distribute(met, layout.viewport, layout.plan.bin_px) }
+        Self { placed, lists: distribute(met, layout.viewport, layout.hierarchy.bin_px) }
     }
 
     /// Finds what the samples of a bin see of the triangles that are listed for it.
@@ -289,10 +289,13 @@ impl SortedTiles {
     /// Sorts the tiles of the image of `sorter`. `None` if its samples do not repeat, or if packets of a tile
     /// would not be full or not fit into a block.
     pub fn new(sorter: &Sorter<'_>) -> Option<Self> {
-        let Sorter { viewport, source, plan, .. } = *sorter;
+        let Sorter { viewport, source, hierarchy, .. } = *sorter;
         let [across, down] = [viewport.width(), viewport.height()].map(|side| side / SIDE_PX);
-        let in_tile =
-            Plan { block_px: plan.block_px.map(|side| side.min(SIDE_PX)), bin_px: SIDE_PX, ..*plan };
+        let in_tile = Hierarchy {
+            block_px: hierarchy.block_px.map(|side| side.min(SIDE_PX)),
+            bin_px: SIDE_PX,
+            ..*hierarchy
+        };
         let (mut number, mut origins) = (HashMap::new(), Vec::new());
         for (column, row) in (0..down).flat_map(|row| (0..across).map(move |column| (column, row))) {
             let origin = [column * SIDE_PX, row * SIDE_PX];
@@ -301,27 +304,27 @@ impl SortedTiles {
                 origins.len() - 1
             });
         }
-        let in_tiles = Sorter { plan: &in_tile, ..*sorter };
-        let tile = |origin| SortedTile::new(&in_tiles, plan.bin_px, origin);
+        let in_tiles = Sorter { hierarchy: &in_tile, ..*sorter };
+        let tile = |origin| SortedTile::new(&in_tiles, hierarchy.bin_px, origin);
         let tiles: Vec<_> = origins.into_par_iter().map(tile).collect();
         let samples = (in_tile.block_px[0] * in_tile.block_px[1] * source.per_pixel()) as usize;
         let tiles_in_block =
-            plan.block_px.map(|side| (side / SIDE_PX).max(1)).iter().product::<u32>() as usize;
+            hierarchy.block_px.map(|side| (side / SIDE_PX).max(1)).iter().product::<u32>() as usize;
         let is_together = |a: &TilePacket, b: &TilePacket| (a.block, a.cell) == (b.block, b.cell);
         let parts = tiles.iter().flat_map(|tile| tile.packets.chunk_by(is_together));
         let most = parts.map(<[_]>::len).max()?;
-        let is_good = samples >= LANES * plan.cells() && most * tiles_in_block <= LANES;
+        let is_good = samples >= LANES * hierarchy.cells() && most * tiles_in_block <= LANES;
         (is_good && sorter.clip == Clip::NONE).then(|| Self { number, cells: cell_boxes(&tiles), tiles })
     }
 
     /// Fills the bin at `origin`. Returns whether all of its tiles are whole; else it has to be sorted by itself.
     pub fn fill(&self, sorter: &Sorter<'_>, bin: &mut BinSamples, origin: [u32; 2]) -> bool {
-        let Sorter { viewport, source, plan, .. } = *sorter;
-        let ([across, down], cells) = (plan.blocks(), plan.cells());
+        let Sorter { viewport, source, hierarchy, .. } = *sorter;
+        let ([across, down], cells) = (hierarchy.blocks(), hierarchy.cells());
         bin.reset(origin, viewport, [(across * down) as usize, cells]);
         bin.cells.clone_from(&self.cells);
         let mut filled = vec![0; bin.boxes.len()];
-        let side = plan.bin_px / SIDE_PX;
+        let side = hierarchy.bin_px / SIDE_PX;
         for [x, y] in (0..side * side).map(|tile| [tile % side * SIDE_PX, tile / side * SIDE_PX]) {
             let [px, py] = [origin[0] + x, origin[1] + y];
             if px >= viewport.width() || py >= viewport.height() {
@@ -362,7 +365,7 @@ fn cell_boxes(tiles: &[SortedTile]) -> CellBoxes {
 impl SortedTile {
     /// The tile at `origin`, for bins of `bin_px` pixels squared.
     fn new(sorter: &Sorter<'_>, bin_px: u32, origin: [u32; 2]) -> Self {
-        let (bin, source, plan) = (sorter.bin(origin), sorter.source, sorter.plan);
+        let (bin, source, hierarchy) = (sorter.bin(origin), sorter.source, sorter.hierarchy);
         let per_pixel = source.per_pixel();
         let mut samples = vec![Sample::default(); (SIDE_PX * SIDE_PX * per_pixel) as usize];
         for (pixel, samples) in (0..).zip(samples.chunks_exact_mut(per_pixel as usize)) {
@@ -370,8 +373,8 @@ impl SortedTile {
         }
         let packet = |(number, places): (usize, &[u32; LANES])| {
             let part = number / LANES;
-            let (block, cell) = ((part / plan.cells()) as u32, part % plan.cells());
-            let block = [block % plan.blocks()[0], block / plan.blocks()[0]];
+            let (block, cell) = ((part / hierarchy.cells()) as u32, part % hierarchy.cells());
+            let block = [block % hierarchy.blocks()[0], block / hierarchy.blocks()[0]];
             TilePacket::new((block, cell, places), &samples, [per_pixel, bin_px])
         };
         Self { packets: bin.sample_indices.iter().enumerate().filter_map(packet).collect() }
@@ -442,14 +445,15 @@ struct Placement<'a, 's> {
 impl Kernel for Placement<'_, '_> {
     #[inline(always)]
     fn run<V: Lanes>(self) {
-        let Self { sorter: Sorter { viewport, source, shear, plan, .. }, bin, packets, filled, tile } = self;
-        let (cells, across) = (plan.cells(), plan.blocks()[0]);
-        let first = (tile[1] * plan.bin_px + tile[0]) * source.per_pixel();
+        let Self { sorter: Sorter { viewport, source, shear, hierarchy, .. }, bin, packets, filled, tile } =
+            self;
+        let (cells, across) = (hierarchy.cells(), hierarchy.blocks()[0]);
+        let first = (tile[1] * hierarchy.bin_px + tile[0]) * source.per_pixel();
         let corner = [
             Viewport::edge(bin.origin[0] + tile[0], viewport.width()),
             Viewport::edge(bin.origin[1] + tile[1], viewport.height()),
         ];
-        let [column, row] = [tile[0] / plan.block_px[0], tile[1] / plan.block_px[1]];
+        let [column, row] = [tile[0] / hierarchy.block_px[0], tile[1] / hierarchy.block_px[1]];
         for packet in packets {
             let block = ((row + packet.block[1]) * across + column + packet.block[0]) as usize;
             let turn = filled[block * cells + packet.cell];

@@ -137,7 +137,8 @@ impl VisibleBinWorker<'_> {
         ready: &BinTriangle,
         setup: &mut CellSetup,
     ) {
-        let mut active = self.scene(ready).cells::<V, MOTION, LENS>(setup) & all(self.layout.plan.cells());
+        let mut active =
+            self.scene(ready).cells::<V, MOTION, LENS>(setup) & all(self.layout.hierarchy.cells());
         self.tally.bins += 1;
         self.tally.cells += u64::from(active.count_ones());
         self.queue.clear();
@@ -161,8 +162,8 @@ impl VisibleBinWorker<'_> {
             near: self.layout.projection.near,
             bin: self.samples,
             half_px: self.layout.viewport.half_px(),
-            block_px: self.layout.plan.block_px[1],
-            block_rows: self.layout.plan.blocks()[1],
+            block_px: self.layout.hierarchy.block_px[1],
+            block_rows: self.layout.hierarchy.blocks()[1],
         }
     }
 
@@ -170,7 +171,7 @@ impl VisibleBinWorker<'_> {
     #[inline(always)]
     fn cell<V: Lanes>(&mut self, setup: &CellSetup, cell: usize) {
         let bounds = CellBounds::<V>::new(setup, cell);
-        let (across, cells) = (self.layout.plan.blocks()[0], self.layout.plan.cells());
+        let (across, cells) = (self.layout.hierarchy.blocks()[0], self.layout.hierarchy.cells());
         let [first, last] = [setup.rows[0].0[cell] as u32, setup.rows[1].0[cell] as u32 + 1];
         for group in first * across / LANES as u32..(last * across).div_ceil(LANES as u32) {
             let boxes = &self.samples.blocks[group as usize];

@@ -225,7 +225,7 @@ pub(super) struct Sorter<'a> {
     pub viewport: Viewport,
     pub source: &'a dyn SampleSource,
     pub shear: &'a Shear,
-    pub plan: &'a Plan,
+    pub hierarchy: &'a Hierarchy,
     pub clip: Clip,
 }
 
@@ -239,16 +239,16 @@ impl Sorter<'_> {
 
     /// The same into the memory of another bin.
     pub fn fill(&self, bin: &mut BinSamples, origin: [u32; 2]) {
-        let ([across, down], cells) = (self.plan.blocks(), self.plan.cells());
+        let ([across, down], cells) = (self.hierarchy.blocks(), self.hierarchy.cells());
         let blocks = (across * down) as usize;
         bin.reset(origin, self.viewport, [blocks, cells]);
         let (mut samples, mut pixel) =
             (Vec::new(), vec![Sample::default(); self.source.per_pixel() as usize]);
         for block in 0..blocks {
             let [column, row] = [block as u32 % across, block as u32 / across];
-            let first = [column * self.plan.block_px[0], row * self.plan.block_px[1]];
+            let first = [column * self.hierarchy.block_px[0], row * self.hierarchy.block_px[1]];
             self.gather(origin, first, &mut pixel, &mut samples);
-            self.split_cells(bin, block * cells, cells, &mut samples, self.plan.cell_axes);
+            self.split_cells(bin, block * cells, cells, &mut samples, self.hierarchy.cell_axes);
         }
         bin.finish();
     }
@@ -261,7 +261,7 @@ impl Sorter<'_> {
         pixel: &mut [Sample],
         samples: &mut Vec<SampleEntry>,
     ) {
-        let (viewport, [width, height]) = (self.viewport, self.plan.block_px);
+        let (viewport, [width, height]) = (self.viewport, self.hierarchy.block_px);
         let image = self.clip.in_image(viewport);
         samples.clear();
         for (row, column) in (0..height).flat_map(|row| (0..width).map(move |column| (row, column))) {
@@ -271,7 +271,7 @@ impl Sorter<'_> {
                 continue;
             }
             self.source.pixel_into(px, py, pixel);
-            let sample_index = (by * self.plan.bin_px + bx) * pixel.len() as u32;
+            let sample_index = (by * self.hierarchy.bin_px + bx) * pixel.len() as u32;
             let entries = pixel.iter().zip(sample_index..).map(|(s, sample_index)| SampleEntry {
                 x: Viewport::edge(px, viewport.width()) + s.x,
                 y: Viewport::edge(py, viewport.height()) + s.y,
@@ -310,7 +310,7 @@ impl Sorter<'_> {
     }
 
     fn cell(&self, bin: &mut BinSamples, block_cell: usize, samples: &mut [SampleEntry]) {
-        let (block, cell) = (block_cell / self.plan.cells(), block_cell % self.plan.cells());
+        let (block, cell) = (block_cell / self.hierarchy.cells(), block_cell % self.hierarchy.cells());
         for sample in &*samples {
             bin.blocks[block / LANES].include(block % LANES, sample.x, sample.y);
             for (range, at) in bin.rect.iter_mut().zip([sample.x, sample.y]) {
@@ -320,7 +320,7 @@ impl Sorter<'_> {
             bin.cells.v.include(cell, sample.v);
             bin.cells.t.include(cell, sample.t);
         }
-        self.split_packets(bin, block_cell, 0, LANES, samples, &Plan::PACKET_AXES);
+        self.split_packets(bin, block_cell, 0, LANES, samples, &Hierarchy::PACKET_AXES);
     }
 
     /// Halve the samples of a cell along each axis, down to packets. Full packets come first, so few lanes
@@ -388,7 +388,7 @@ pub(super) enum Axis {
 /// sixteen packets in a block. A *block* is a rectangle of pixels. A *bin* is a square of blocks that one
 /// worker rasterizes, small enough for its samples and depths to stay in the L2 cache of the host.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Plan {
+pub(super) struct Hierarchy {
     /// Axes that divide a block into cells, each by halving.
     pub cell_axes: &'static [Axis],
     /// Size of a block in pixels.
@@ -397,7 +397,7 @@ pub(super) struct Plan {
     pub bin_px: u32,
 }
 
-impl Plan {
+impl Hierarchy {
     /// Axes that divide a cell into packets.
     pub const PACKET_AXES: [Axis; 4] = [Axis::Y, Axis::X, Axis::Y, Axis::X];
     /// Target number of samples in a bin.
@@ -442,7 +442,7 @@ pub struct SampleLayout {
     pub(super) viewport: Viewport,
     pub(super) per_pixel: u32,
     pub(super) projection: Projection,
-    pub(super) plan: Plan,
+    pub(super) hierarchy: Hierarchy,
     pub(super) bins: Vec<BinSamples>,
 }
 
@@ -469,24 +469,31 @@ impl SampleLayout {
             return None;
         }
         let projection = Projection::new(camera, viewport);
-        let plan = Plan::new(per_pixel, moving, !projection.shear.is_none());
-        Some(Self { viewport, per_pixel, projection, plan, bins: Vec::new() })
+        let hierarchy = Hierarchy::new(per_pixel, moving, !projection.shear.is_none());
+        Some(Self { viewport, per_pixel, projection, hierarchy, bins: Vec::new() })
     }
 
     /// Sorter of its samples.
     pub(super) fn sorter<'a>(&'a self, source: &'a dyn SampleSource, clip: Clip) -> Sorter<'a> {
-        Sorter { viewport: self.viewport, source, shear: &self.projection.shear, plan: &self.plan, clip }
+        Sorter {
+            viewport: self.viewport,
+            source,
+            shear: &self.projection.shear,
+            hierarchy: &self.hierarchy,
+            clip,
+        }
     }
 
     /// Bins of the image.
     pub(super) fn bin_count(&self) -> u32 {
-        self.viewport.width().div_ceil(self.plan.bin_px) * self.viewport.height().div_ceil(self.plan.bin_px)
+        self.viewport.width().div_ceil(self.hierarchy.bin_px)
+            * self.viewport.height().div_ceil(self.hierarchy.bin_px)
     }
 
     /// First pixel of a bin.
     pub(super) fn origin(&self, bin: u32) -> [u32; 2] {
-        let across = self.viewport.width().div_ceil(self.plan.bin_px);
-        [bin % across * self.plan.bin_px, bin / across * self.plan.bin_px]
+        let across = self.viewport.width().div_ceil(self.hierarchy.bin_px);
+        [bin % across * self.hierarchy.bin_px, bin / across * self.hierarchy.bin_px]
     }
 
     /// Number of samples of the image.
@@ -500,7 +507,8 @@ impl SampleLayout {
             return None;
         }
         let (pixel, index) = (sample_index / self.per_pixel, sample_index % self.per_pixel);
-        let [x, y] = [bin.origin[0] + pixel % self.plan.bin_px, bin.origin[1] + pixel / self.plan.bin_px];
+        let [x, y] =
+            [bin.origin[0] + pixel % self.hierarchy.bin_px, bin.origin[1] + pixel / self.hierarchy.bin_px];
         let pixel = y as usize * self.viewport.width() as usize + x as usize;
         Some(pixel * self.per_pixel as usize + index as usize)
     }
@@ -514,20 +522,20 @@ mod tests {
     fn blocks_fill_their_packets_and_bins_their_blocks() {
         for per_pixel in 1..=256 {
             for (moving, lens) in [(false, false), (true, false), (false, true), (true, true)] {
-                let plan = Plan::new(per_pixel, moving, lens);
-                let samples = plan.block_px[0] * plan.block_px[1] * per_pixel;
-                let room = (plan.cells() * LANES * LANES) as u32;
-                assert!(samples <= room && (2 * samples > room || samples == per_pixel), "{plan:?}");
-                assert!(plan.blocks().iter().all(|&count| count >= 1), "{plan:?}");
-                assert_eq!(plan.blocks()[0] * plan.block_px[0], plan.bin_px);
-                assert_eq!(plan.blocks()[1] * plan.block_px[1], plan.bin_px);
+                let hierarchy = Hierarchy::new(per_pixel, moving, lens);
+                let samples = hierarchy.block_px[0] * hierarchy.block_px[1] * per_pixel;
+                let room = (hierarchy.cells() * LANES * LANES) as u32;
+                assert!(samples <= room && (2 * samples > room || samples == per_pixel), "{hierarchy:?}");
+                assert!(hierarchy.blocks().iter().all(|&count| count >= 1), "{hierarchy:?}");
+                assert_eq!(hierarchy.blocks()[0] * hierarchy.block_px[0], hierarchy.bin_px);
+                assert_eq!(hierarchy.blocks()[1] * hierarchy.block_px[1], hierarchy.bin_px);
             }
         }
     }
 
     #[test]
     fn sixteen_samples_in_five_dimensions() {
-        let plan = Plan::new(16, true, true);
-        assert_eq!((plan.block_px, plan.bin_px, plan.cells()), ([16, 16], 64, 16));
+        let hierarchy = Hierarchy::new(16, true, true);
+        assert_eq!((hierarchy.block_px, hierarchy.bin_px, hierarchy.cells()), ([16, 16], 64, 16));
     }
 }

@@ -2,11 +2,11 @@
 
 use crate::common::*;
 use glam::{Affine3A, Vec2, Vec3};
-use pipeline::frame::SpecError;
-use pipeline::sampling::{Sample, TableError};
+use pipeline::frame::PipelineSpecError;
+use pipeline::sampling::{Sample, SampleTableError};
 use pipeline::*;
 
-fn refused(change: impl FnOnce(&mut PipelineSpec)) -> SpecError {
+fn refused(change: impl FnOnce(&mut PipelineSpec)) -> PipelineSpecError {
     let mut spec = spec(Features::ALL);
     spec.validate().unwrap();
     change(&mut spec);
@@ -30,7 +30,7 @@ fn invalid_sizes_are_reported_with_the_allowed_values() {
         (refused(|s| s.depth.boxes = [1, 0, 1]), "depth.boxes"),
         (refused(|s| s.depth.boxes = [1, 1, 17]), "depth.boxes"),
     ] {
-        assert!(matches!(found, SpecError::Size { field: named, .. } if named == field), "{found:?}");
+        assert!(matches!(found, PipelineSpecError::Size { field: named, .. } if named == field), "{found:?}");
         let text = found.to_string();
         assert!(text.starts_with(&format!("`{field}` is ")) && text.contains("it has to be"), "{text}");
     }
@@ -48,7 +48,10 @@ fn caches_that_cannot_be_are_named() {
         (refused(|s| s.memory.texture = odd), "memory.texture"),
         (refused(|s| s.memory.l2 = CacheSpec::lru(u32::MAX, 1)), "memory.l2"),
     ] {
-        assert!(matches!(found, SpecError::Cache { field: named, .. } if named == field), "{found:?}");
+        assert!(
+            matches!(found, PipelineSpecError::Cache { field: named, .. } if named == field),
+            "{found:?}"
+        );
         assert!(found.to_string().starts_with(&format!("`{field}`: a cache of ")), "{found}");
     }
 }
@@ -80,7 +83,7 @@ fn an_unknown_field_of_a_cache_is_reported_with_its_neighbour() {
     assert!(error.to_string().contains("did you mean `ways`?"), "{error}");
 }
 
-fn programmed(change: impl FnOnce(&mut Vec<Sample>)) -> Result<SampleTable, TableError> {
+fn programmed(change: impl FnOnce(&mut Vec<Sample>)) -> Result<SampleTable, SampleTableError> {
     let mut samples = vec![Sample { x: 0.5, y: 0.5, u: 0.0, v: 0.0, t: 0.5 }; 64 * 64];
     change(&mut samples);
     SampleTable::programmed(1, 0, samples)
@@ -103,7 +106,7 @@ fn a_sample_outside_pixel_lens_or_shutter_is_reported_by_its_place() {
     ];
     for (place, spoil) in (0..).step_by(100).zip(bad) {
         let error = programmed(|samples| spoil(&mut samples[place])).unwrap_err();
-        assert_eq!(error, TableError::Range(place));
+        assert_eq!(error, SampleTableError::Range(place));
         assert!(error.to_string().contains(&format!("sample {place} ")), "{error}");
     }
     let good: [fn(&mut Sample); 4] =
@@ -114,12 +117,15 @@ fn a_sample_outside_pixel_lens_or_shutter_is_reported_by_its_place() {
 #[test]
 fn a_block_of_samples_has_to_be_filled() {
     let error = programmed(|samples| samples.truncate(4095)).unwrap_err();
-    assert_eq!(error, TableError::Length { found: 4095, expected: 4096 });
+    assert_eq!(error, SampleTableError::Length { found: 4095, expected: 4096 });
     assert!(error.to_string().contains("4095") && error.to_string().contains("4096"), "{error}");
-    assert_eq!(programmed(|s| s.push(s[0])).unwrap_err(), TableError::Length { found: 4097, expected: 4096 });
+    assert_eq!(
+        programmed(|s| s.push(s[0])).unwrap_err(),
+        SampleTableError::Length { found: 4097, expected: 4096 }
+    );
     for per_pixel in [0, 257, u32::MAX] {
         let error = SampleTable::programmed(per_pixel, 0, Vec::new()).unwrap_err();
-        assert_eq!(error, TableError::PerPixel(per_pixel));
+        assert_eq!(error, SampleTableError::PerPixel(per_pixel));
         assert!(error.to_string().contains("1 to 256"), "{error}");
     }
 }

@@ -38,7 +38,7 @@ use self::chart::soft_shadows::SoftShadowsChart;
 use self::chart::stated_errors::StatedErrorsChart;
 use self::chart::tile_tests::TileTests;
 use self::chart::timing::TimingChart;
-use self::stress::Report;
+use self::stress::StressChart;
 use self::study::Entry;
 
 /// The charts of the book.
@@ -64,7 +64,7 @@ pub static CHARTS: &[Entry] = &[
 ];
 
 /// The failure catalogue, which has a command of its own.
-pub static STRESS: Entry = Entry::of::<Report>();
+pub static STRESS: Entry = Entry::of::<StressChart>();
 
 /// Name and one line of `chart all`.
 pub const ALL: (&str, &str) = (

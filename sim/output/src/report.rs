@@ -23,7 +23,7 @@ pub struct ReportError(#[from] minijinja::Error);
 
 /// Contents of the report. All text is escaped.
 #[derive(Clone, Debug, Default, Serialize)]
-pub struct Report<'a> {
+pub struct RunReport<'a> {
     /// Heading, for example `default on hd7970`.
     pub title: Cow<'a, str>,
     /// Scene, GPU, platform, level of timing, command line, version: shown below the heading in this order.
@@ -104,7 +104,7 @@ struct PartView<'a> {
     busy_share: Option<f64>,
 }
 
-impl Report<'_> {
+impl RunReport<'_> {
     /// Fills the template.
     ///
     /// # Errors

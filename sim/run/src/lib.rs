@@ -7,7 +7,7 @@
 //! - [`RunOptions`]: everything that may be requested; [`Plan`]: with all inputs loaded and checked.
 //! - [`GpuSpec`]: a GPU: its pipeline, its machine, and the platform and energy table it belongs to.
 //! - [`Distinct`]: which frames differ.
-//! - [`Recording`]: drawn frames, timed again on other machines.
+//! - [`DrawnFrames`]: drawn frames, timed again on other machines.
 //! - [`frames_of`]: frames in cycles and joules, without a trace. [`run()`]: all of it, into a folder.
 //! - [`Summary`]: `summary.json`; [`compare`]: two of them side by side.
 //!
@@ -68,7 +68,7 @@ pub use options::{Change, HeatQuantity, PacingChoice, Requested, RunOptions, Sam
 pub use passes::{PassSummary, StallShares, WorkSummary, passes_of};
 pub use plan::{Plan, fits_memory, refuse_beside_images};
 pub use provenance::{HardwareSummary, Host, Input, Provenance, again, area_mm2};
-pub use recording::{MACHINES_IN_TURN, RecordedRun, Recording, TimedFrames};
+pub use recording::{DrawnFrames, MACHINES_IN_TURN, RecordedRun, TimedFrames};
 pub use sampled::{Forecast, FramePreview, Previewer, Previews, Signatures};
 pub use simulated::{
     CONFIDENCE, FrameCost, Modelled, Observed, Origin, Quantity, RunFrame, SampledSummary, Simulated,
@@ -305,7 +305,7 @@ pub enum RunError {
     #[error(transparent)]
     Platform(#[from] power_model::PlatformError),
     #[error(transparent)]
-    Table(#[from] power_model::TableError),
+    Table(#[from] power_model::EnergyTableError),
     #[error("energy table and platform: {0}")]
     Model(#[from] power_model::ModelError),
     #[error("frame {frame}: internal error of the timing model: {source}. Please report it")]
@@ -315,7 +315,7 @@ pub enum RunError {
     #[error("pacing: {0}")]
     Pacing(#[from] power_model::PacingError),
     #[error(transparent)]
-    Samples(#[from] pipeline::sampling::TableError),
+    Samples(#[from] pipeline::sampling::SampleTableError),
     #[error(transparent)]
     Device(#[from] traces::device::DeviceError),
     #[error("sampling the power curve: {0}")]
@@ -329,7 +329,7 @@ pub enum RunError {
     #[error("encoding an image: {0}")]
     Image(#[from] ImageError),
     #[error("frames.csv: {0}")]
-    Frames(#[from] traces::energy::TableError),
+    Frames(#[from] traces::energy::FrameTableError),
     #[error("{path}: cannot read it: {source}; check the path")]
     Input { path: String, source: std::io::Error },
     #[error(transparent)]

@@ -9,8 +9,8 @@ use output::plot::{
     part_colour,
 };
 use output::report::{
-    CounterRow, FactRow, FileLink, FrameNumbers, FrameRow, PartRow, PassRow, Report, ReportImage, ReportPlot,
-    UnitRow, WarningRow, WorkRow,
+    CounterRow, FactRow, FileLink, FrameNumbers, FrameRow, PartRow, PassRow, ReportImage, ReportPlot,
+    RunReport, UnitRow, WarningRow, WorkRow,
 };
 use output::table::{count_or_digits, grouped, shell_line, si};
 use power_model::{Bound, Part};
@@ -28,9 +28,9 @@ use crate::{FinishedRun, HeatQuantity, Host, Input, PassSummary, Plan, RunError,
 const MAX_DRAWS: usize = 48;
 
 /// Collects the contents of the report.
-pub(super) fn report<'a>(outcome: &'a FinishedRun, plots: &[Plot]) -> Result<Report<'a>, RunError> {
+pub(super) fn report<'a>(outcome: &'a FinishedRun, plots: &[Plot]) -> Result<RunReport<'a>, RunError> {
     let plan = &outcome.plan;
-    Ok(Report {
+    Ok(RunReport {
         title: format!("{} on {}", plan.name, plan.gpu.name).into(),
         facts: facts(outcome),
         warnings: warnings(&outcome.summary.warnings),

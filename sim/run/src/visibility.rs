@@ -7,7 +7,7 @@ use cpu_time::ProcessTime;
 use glam::Vec3;
 use output::OutDir;
 use output::dir::SUMMARY;
-use output::report::{FactRow, FileLink, Report};
+use output::report::{FactRow, FileLink, RunReport};
 use output::table::{counted, grouped};
 use output::terminal::Progress;
 use pipeline::sampling::SampleSource;
@@ -302,7 +302,7 @@ fn summary(plan: &Plan, provenance: Provenance, frames: &[Frame]) -> ImagesSumma
 }
 
 /// The report.
-fn page(plan: &Plan, summary: &ImagesSummary, frames: Vec<Frame>) -> Result<Report<'static>, RunError> {
+fn page(plan: &Plan, summary: &ImagesSummary, frames: Vec<Frame>) -> Result<RunReport<'static>, RunError> {
     let pictures: Vec<_> =
         frames.into_iter().filter_map(|frame| Some((frame.number, frame.picture?))).collect();
     let file = |(path, what): (&str, &str)| FileLink { path: path.to_owned(), what: what.to_owned() };
@@ -311,7 +311,7 @@ fn page(plan: &Plan, summary: &ImagesSummary, frames: Vec<Frame>) -> Result<Repo
         ("images/", "every frame"),
         ("manifest.json", "these files with their sizes and hashes"),
     ];
-    Ok(Report {
+    Ok(RunReport {
         title: plan.name.clone().into(),
         facts: vec![
             FactRow::new("scene", plan.name.clone()),
@@ -326,7 +326,7 @@ fn page(plan: &Plan, summary: &ImagesSummary, frames: Vec<Frame>) -> Result<Repo
         inputs: report::inputs(&summary.inputs),
         files: files.map(file).into(),
         host: report::host(&summary.host),
-        ..Report::default()
+        ..RunReport::default()
     })
 }
 

@@ -8,7 +8,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::error::{ContextKind, ContextValue};
 use clap::{Arg, Args, Command};
 use experiments::reproduce::{self, Options, Paper};
-use experiments::stress::{Report, StressEffort, family_named};
+use experiments::stress::{StressChart, StressEffort, family_named};
 use experiments::study::tradeoff::{self, Index, Section};
 use experiments::study::{Done, Entry, Request, Study, StudyError};
 use experiments::{ALL, CHARTS, all};
@@ -254,12 +254,12 @@ fn command(args: &ChartArgs) -> String {
 pub(super) fn stress(args: &StressArgs, terminal: &Terminal) -> Result<(), Failure> {
     // The folder first: that it cannot be written is better known before the work than after it.
     let out = Destination { folder: args.out.clone(), force: args.force };
-    let mut dir = out.open([Report::claim()])?;
+    let mut dir = out.open([StressChart::claim()])?;
     let pool = args.threads.pool()?;
     let progress = Progress::on(terminal, args.json);
     let only = args.family.as_deref().map(family_named).transpose()?;
     let effort = StressEffort { only, quick: args.quick };
-    let report = pool.install(|| Report::measure(effort, &[], &progress))?;
+    let report = pool.install(|| StressChart::measure(effort, &[], &progress))?;
     let done = Done::new(&report, &dir, &args.plot_style.plot_style())?;
     dir.publish()?;
     show(&done, args.json, &args.out)

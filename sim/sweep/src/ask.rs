@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::axis::Axis;
 use crate::execute::{Outcome, execute};
-use crate::plan::{Plan, Point, id_of, version};
+use crate::plan::{Point, SweepPlan, id_of, version};
 use crate::points::{Points, round_whole};
 use crate::setting::Setting;
 use crate::spec::SweepSpec;
@@ -60,7 +60,7 @@ pub struct Answer {
 }
 
 impl<'a> Search<'a> {
-    /// A search in the sweep file at `path`. `program` is the version of the program, as for [`Plan::load`].
+    /// A search in the sweep file at `path`. `program` is the version of the program, as for [`SweepPlan::load`].
     ///
     /// # Errors
     /// If the file is invalid, or the folder holds another sweep.
@@ -158,9 +158,9 @@ impl<'a> Search<'a> {
         Ok(self.asked.len())
     }
 
-    fn plan(&self, points: Vec<Point>) -> Plan {
+    fn plan(&self, points: Vec<Point>) -> SweepPlan {
         let (name, settings) = (self.spec.name.clone(), self.common.clone());
-        Plan { name, settings, points, program: version(self.program), ..Plan::default() }
+        SweepPlan { name, settings, points, program: version(self.program), ..SweepPlan::default() }
     }
 }
 

@@ -14,7 +14,7 @@ use traces::io::atomic;
 
 use crate::SweepError;
 use crate::execute::PointResult;
-use crate::plan::{Plan, Point, SCHEMA, version};
+use crate::plan::{Point, SCHEMA, SweepPlan, version};
 use crate::setting::{Setting, Texts};
 
 /// File of the plan: a header, then one line per point.
@@ -41,8 +41,8 @@ struct Header {
 }
 
 impl Header {
-    fn of(plan: &Plan) -> Self {
-        let Plan { name: sweep, settings, points, screen, program, idle } = plan.clone();
+    fn of(plan: &SweepPlan) -> Self {
+        let SweepPlan { name: sweep, settings, points, screen, program, idle } = plan.clone();
         Self { schema: SCHEMA, sweep, program, settings, points: points.len(), screen, idle }
     }
 }
@@ -68,7 +68,7 @@ impl Folder {
     ///
     /// # Errors
     /// [`SweepError::OtherSweep`] if it holds another sweep.
-    pub fn check(&self, plan: &Plan) -> Result<(), SweepError> {
+    pub fn check(&self, plan: &SweepPlan) -> Result<(), SweepError> {
         match self.header()? {
             Some(Header { sweep, .. }) if sweep != plan.name => Err(SweepError::OtherSweep {
                 folder: self.root.clone(),
@@ -84,7 +84,7 @@ impl Folder {
     ///
     /// # Errors
     /// As [`Self::check`], and if the folder cannot be written.
-    pub fn write_plan(&self, plan: &Plan) -> Result<(), SweepError> {
+    pub fn write_plan(&self, plan: &SweepPlan) -> Result<(), SweepError> {
         fs::create_dir_all(&self.root).map_err(SweepError::folder(&self.root))?;
         self.check(plan)?;
         let header = Header::of(plan);
@@ -154,7 +154,7 @@ impl Folder {
     }
 
     /// Whether the plan on disk is `plan`, without a second one in memory.
-    fn holds(&self, plan: &Plan, header: &Header) -> Result<bool, SweepError> {
+    fn holds(&self, plan: &SweepPlan, header: &Header) -> Result<bool, SweepError> {
         if self.header()?.as_ref() != Some(header) {
             return Ok(false);
         }
@@ -167,7 +167,7 @@ impl Folder {
     ///
     /// # Errors
     /// If it does not exist, or it is damaged.
-    pub fn plan(&self) -> Result<Plan, SweepError> {
+    pub fn plan(&self) -> Result<SweepPlan, SweepError> {
         let path = self.root.join(PLAN);
         let Some(header) = self.header()? else {
             let message = "it does not exist: call `quintile sweep plan FILE.ron --out DIR` first".to_owned();
@@ -180,7 +180,7 @@ impl Folder {
             return Err(SweepError::Plan { path, message });
         }
         let Header { sweep: name, settings, screen, program, idle, .. } = header;
-        Ok(Plan { name, settings, points, screen, program, idle })
+        Ok(SweepPlan { name, settings, points, screen, program, idle })
     }
 
     /// That the plan is of another build than `program`, in words; `None` if it is not, or there is no plan.
@@ -206,7 +206,7 @@ impl Folder {
     ///
     /// # Errors
     /// If a folder cannot be read.
-    pub fn others(&self, plan: &Plan) -> Result<Vec<PathBuf>, SweepError> {
+    pub fn others(&self, plan: &SweepPlan) -> Result<Vec<PathBuf>, SweepError> {
         let known: HashSet<&str> = plan.points.iter().map(|point| point.id.as_str()).collect();
         let is_other = |path: &PathBuf| {
             let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
@@ -382,15 +382,15 @@ fn damaged(path: &Path, error: &serde_json::Error) -> SweepError {
 mod tests {
     use super::*;
 
-    fn plan(name: &str) -> Plan {
+    fn plan(name: &str) -> SweepPlan {
         let point = |id: &str| Point { id: id.to_owned(), settings: vec![Setting::new("samples", "2")] };
-        Plan {
+        SweepPlan {
             name: name.to_owned(),
             settings: vec![Setting::new("scene", "tiny")],
             points: vec![point("aa01"), point("ab02")],
             program: version(Some("r1")),
             idle: vec!["constraints[0]".to_owned()],
-            ..Plan::default()
+            ..SweepPlan::default()
         }
     }
 

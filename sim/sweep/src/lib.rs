@@ -1,14 +1,14 @@
 //! Design-space exploration: many runs from one file, on one machine or a cluster.
 //!
 //! ```text
-//! SweepSpec (axes) -> points -> Plan (ids) -> Folder -> Work: execute -> a file per point -> merge -> results.parquet
+//! SweepSpec (axes) -> points -> SweepPlan (ids) -> Folder -> Work: execute -> a file per point -> merge -> results.parquet
 //! ```
 //!
-//! - [`SweepSpec`]: the sweep file. [`Plan`]: its points with ids, every value tried.
+//! - [`SweepSpec`]: the sweep file. [`SweepPlan`]: its points with ids, every value tried.
 //! - [`Folder`]: the plan and the results on disk, each file whole or absent.
 //! - [`Shard`]: which points a task runs. [`Work`]: runs those that are not finished.
 //! - [`merge()`]: all results in one table, the same bytes for any number of shards and threads.
-//! - [`Report`]: designs on the frontier of time and energy, and main effects.
+//! - [`SweepReport`]: designs on the frontier of time and energy, and main effects.
 //! - [`Search`]: points that an optimizer asks for.
 //!
 //! A point has no state but its file, so a sweep may be stopped at any moment and continued anywhere.
@@ -37,11 +37,11 @@ pub use error::SweepError;
 pub use execute::{EventCounts, Measured, measured};
 pub use folder::Folder;
 pub use merge::{RESULTS, merge};
-pub use plan::{Plan, Point};
+pub use plan::{Point, SweepPlan};
 pub use points::combinations;
 pub use report::{
-    Cost, Design, Effect, Failure, Interaction, Measure, NearBest, NoEffect, Pair, RatedDesign, Report,
-    ReportOptions, Share, Winner,
+    Cost, Design, Effect, Failure, Interaction, Measure, NearBest, NoEffect, Pair, RatedDesign,
+    ReportOptions, Share, SweepReport, Winner,
 };
 pub use setting::{Setting, Text, is_option, misspelt, with};
 pub use slurm::{Scripts, SlurmArray, SlurmJob, submit};

@@ -14,7 +14,7 @@ use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::schema::types::Type;
 
 use crate::execute::{Measured, Outcome, PassMeans};
-use crate::plan::{Plan, Point};
+use crate::plan::{Point, SweepPlan};
 use crate::{Folder, Status, SweepError};
 
 /// Name of the table.
@@ -54,7 +54,7 @@ fn damaged(folder: &Folder) -> Result<String, SweepError> {
 }
 
 /// Columns of the table: id, settings, numbers, counters, reason of a failure.
-fn columns(plan: &Plan, rows: &[Outcome]) -> Vec<Column> {
+fn columns(plan: &SweepPlan, rows: &[Outcome]) -> Vec<Column> {
     let ids = plan.points.iter().map(|point| Some(point.id.clone())).collect();
     let mut columns = vec![Column { name: "id".to_owned(), values: Values::Text(ids) }];
     columns.extend(settings(plan));
@@ -75,7 +75,7 @@ fn columns(plan: &Plan, rows: &[Outcome]) -> Vec<Column> {
 }
 
 /// A column for each setting of the sweep: those of all points, then those that vary, in order of first use.
-fn settings(plan: &Plan) -> Vec<Column> {
+fn settings(plan: &SweepPlan) -> Vec<Column> {
     let column = |path: &str, texts: Vec<Option<String>>| Column {
         name: path.to_owned(),
         values: Values::of_texts(texts),
@@ -281,20 +281,20 @@ mod tests {
     use crate::setting::Setting;
     use crate::{Shard, Work};
 
-    fn plan() -> Plan {
+    fn plan() -> SweepPlan {
         let point = |samples: &str, tile: &str| Point {
             id: format!("{samples}{tile}"),
             settings: [("samples", samples), ("gpu.pipeline.tile_px", tile)]
                 .map(|(path, value)| Setting::new(path, value))
                 .into(),
         };
-        Plan {
+        SweepPlan {
             name: "a".to_owned(),
             settings: [("scene", "tiny"), ("frames", "0..1")]
                 .map(|(path, value)| Setting::new(path, value))
                 .into(),
             points: vec![point("1", "8"), point("2", "7"), point("2", "4")],
-            ..Plan::default()
+            ..SweepPlan::default()
         }
     }
 

@@ -31,7 +31,7 @@ pub struct Point {
 
 /// A planned sweep.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Plan {
+pub struct SweepPlan {
     /// Name of the sweep.
     pub name: String,
     /// Settings of all points; others are the defaults of `quintile run`.
@@ -52,7 +52,7 @@ pub(crate) fn idle(place: &str) -> String {
     format!("{place} leaves out no point: check it, or remove it")
 }
 
-impl Plan {
+impl SweepPlan {
     /// Plans the sweep in the file at `path`, with the settings of `--quick` if it is given. `program` is the
     /// git revision of the program and whatever else changes with it.
     ///
@@ -176,14 +176,14 @@ fn id(mut settings: Vec<Setting>, inputs: &str, version: &str) -> String {
 mod tests {
     use super::*;
 
-    fn planned(text: &str) -> Result<Plan, String> {
+    fn planned(text: &str) -> Result<SweepPlan, String> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("sweep.ron");
         std::fs::write(&path, text).unwrap();
-        Plan::load(&path, false, Some("r1")).map_err(|error| error.to_string())
+        SweepPlan::load(&path, false, Some("r1")).map_err(|error| error.to_string())
     }
 
-    fn of_axis(axis: &str) -> Result<Plan, String> {
+    fn of_axis(axis: &str) -> Result<SweepPlan, String> {
         planned(&format!("(name: \"a\", settings: {{\"scene\": \"tiny\"}}, axes: [{axis}])"))
     }
 
@@ -199,7 +199,7 @@ mod tests {
         std::fs::write(&sweep, text).unwrap();
         let ids = |gpu_text: &str, revision| {
             std::fs::write(&gpu, gpu_text).unwrap();
-            let plan = Plan::load(&sweep, false, Some(revision)).unwrap();
+            let plan = SweepPlan::load(&sweep, false, Some(revision)).unwrap();
             plan.points.into_iter().map(|point| point.id).collect::<Vec<_>>()
         };
         let first = ids(mobile, "r1");

@@ -13,7 +13,7 @@ use serde::Serialize;
 
 use crate::execute::{Outcome, PointResult};
 use crate::folder::Stored;
-use crate::plan::{Plan, Point};
+use crate::plan::{Point, SweepPlan};
 use crate::report::label;
 use crate::screen::{note, screened};
 use crate::shared::{Costs, Group, groups};
@@ -93,7 +93,7 @@ fn of_other_build(count: usize) -> Option<String> {
 
 /// The points of a shard that are not finished.
 pub struct Work<'a> {
-    plan: &'a Plan,
+    plan: &'a SweepPlan,
     folder: &'a Folder,
     runs: usize,
     pending: Vec<&'a Point>,
@@ -110,7 +110,12 @@ impl<'a> Work<'a> {
     ///
     /// # Errors
     /// If a result cannot be read.
-    pub fn new(plan: &'a Plan, folder: &'a Folder, shard: Shard, retry: bool) -> Result<Self, SweepError> {
+    pub fn new(
+        plan: &'a SweepPlan,
+        folder: &'a Folder,
+        shard: Shard,
+        retry: bool,
+    ) -> Result<Self, SweepError> {
         if !plan.screen.is_empty() && !shard.is_whole() {
             let message = "a sweep that screens runs as one task, as a level needs all results of the one before: leave --shard out";
             return Err(SweepError::Shard(message.to_owned()));

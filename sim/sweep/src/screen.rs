@@ -17,7 +17,7 @@ use output::dir::sha256_of_text;
 use timing::Level;
 
 use crate::execute::{Measured, Outcome};
-use crate::plan::{Plan, Point};
+use crate::plan::{Point, SweepPlan};
 use crate::{Folder, SweepError};
 
 /// Number of designs of a workload that run at both levels whatever they cost: with as many a further design
@@ -165,7 +165,11 @@ pub(crate) struct Screened<'a> {
 ///
 /// # Errors
 /// If a result cannot be read.
-pub(crate) fn screened<'a>(plan: &'a Plan, folder: &Folder, fine: usize) -> Result<Screened<'a>, SweepError> {
+pub(crate) fn screened<'a>(
+    plan: &'a SweepPlan,
+    folder: &Folder,
+    fine: usize,
+) -> Result<Screened<'a>, SweepError> {
     let (mut workloads, mut ran) = (BTreeMap::<String, Vec<Design<'a>>>::new(), HashSet::new());
     for (coarse, point) in plan.of_level(fine - 1).iter().zip(plan.of_level(fine)) {
         let outcome = |point: &Point| folder.result(point).map(|result| result.map(|result| result.outcome));
@@ -310,7 +314,7 @@ mod tests {
         ],
     "#;
 
-    /// Plan of these designs with further fields or at a level, run in a folder: costs by settings without
+    /// SweepPlan of these designs with further fields or at a level, run in a folder: costs by settings without
     /// the level, at the last level.
     fn costs(scene: &str, size: &str, more: &str) -> (HashMap<String, Cost>, Status, f64) {
         let folder = tempfile::tempdir().unwrap();
@@ -322,7 +326,7 @@ mod tests {
         };
         let text = DESIGNS.replace("SCENE", scene).replace("SIZE", size).replace("LEVEL", &level);
         std::fs::write(&file, format!("({text}{more})")).unwrap();
-        let plan = Plan::load(&file, false, None).unwrap();
+        let plan = SweepPlan::load(&file, false, None).unwrap();
         let into = Folder::at(folder.path().join("out"));
         into.write_plan(&plan).unwrap();
         let started = cpu_time::ProcessTime::now();

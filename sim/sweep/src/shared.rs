@@ -8,11 +8,11 @@ use std::iter::Sum;
 use cpu_time::ProcessTime;
 use output::terminal::Progress;
 use rayon::prelude::*;
-use run::{Distinct, MACHINES_IN_TURN, Recording, RunError, TimedFrames};
+use run::{Distinct, DrawnFrames, MACHINES_IN_TURN, RunError, TimedFrames};
 
 use crate::SweepError;
 use crate::execute::{Measured, Outcome, PointResult, execute, guarded, measured};
-use crate::plan::{Plan, Point};
+use crate::plan::{Point, SweepPlan};
 use crate::setting::{self, Setting, Stage};
 
 /// Most bytes of the packets that are kept for a group. Points of a larger one are drawn one by one.
@@ -60,7 +60,7 @@ impl<'a> Group<'a> {
     /// Those of `done`.
     pub fn run(
         &self,
-        plan: &Plan,
+        plan: &SweepPlan,
         stop: &(dyn Fn() -> bool + Sync),
         done: &(impl Fn(&Point, PointResult) -> Result<(), SweepError> + Sync),
     ) -> Result<(), SweepError> {
@@ -100,7 +100,7 @@ fn machine<'p>(points: &'p [PlannedPoint<'_>]) -> Option<&'p run::Plan> {
     points.iter().find_map(|point| point.run.as_ref().ok())
 }
 
-fn run_of(plan: &Plan, point: &Point) -> Result<run::Plan, RunError> {
+fn run_of(plan: &SweepPlan, point: &Point) -> Result<run::Plan, RunError> {
     setting::planned(&plan.settings_of(point))
 }
 
@@ -109,16 +109,16 @@ struct Drawing {
     /// A run that draws them.
     run: run::Plan,
     distinct: Distinct,
-    recording: Recording,
+    recording: DrawnFrames,
 }
 
 impl Drawing {
     /// The frames of the first point that can run; `None` if there is none, or the frames are too large to be kept.
-    fn new<'a>(plan: &Plan, mut points: impl Iterator<Item = &'a Point>) -> Option<Self> {
+    fn new<'a>(plan: &SweepPlan, mut points: impl Iterator<Item = &'a Point>) -> Option<Self> {
         let run = points.find_map(|point| run_of(plan, point).ok())?;
         let draw = || {
             let distinct = Distinct::new(&*run.job)?;
-            let recording = Recording::draw(&run, distinct.numbers(), MAX_BYTES, &Progress::new(true))?;
+            let recording = DrawnFrames::draw(&run, distinct.numbers(), MAX_BYTES, &Progress::new(true))?;
             Ok(recording.map(|recording| Self { run, distinct, recording }))
         };
         // What fails here fails again with the reason of each point.
@@ -126,7 +126,7 @@ impl Drawing {
     }
 
     /// The run of a point; what it draws is not loaded again.
-    fn planned<'a>(&self, plan: &Plan, point: &'a Point) -> PlannedPoint<'a> {
+    fn planned<'a>(&self, plan: &SweepPlan, point: &'a Point) -> PlannedPoint<'a> {
         PlannedPoint { point, run: guarded(|| setting::planned_beside(&self.run, &plan.settings_of(point))) }
     }
 
@@ -168,7 +168,7 @@ pub(crate) struct Costs {
 
 impl Costs {
     /// Costs of a point; none if it cannot run.
-    pub fn of(plan: &Plan, point: &Point) -> Self {
+    pub fn of(plan: &SweepPlan, point: &Point) -> Self {
         let mut started = ProcessTime::now();
         let mut lap_s = || std::mem::replace(&mut started, ProcessTime::now()).elapsed().as_secs_f64();
         let stages = guarded(|| {
@@ -176,7 +176,7 @@ impl Costs {
             let resolved_s = lap_s();
             let distinct = Distinct::new(&*run.job)?;
             // Nothing is drawn twice for the probe, so all of it may be kept.
-            let recording = Recording::draw(&run, distinct.numbers(), usize::MAX, &Progress::new(true))?;
+            let recording = DrawnFrames::draw(&run, distinct.numbers(), usize::MAX, &Progress::new(true))?;
             let drawing_s = lap_s();
             let timed = recording.as_ref().map(|recording| recording.timed(&[&run])).transpose()?;
             let timing_s = lap_s();
@@ -230,7 +230,7 @@ mod tests {
         [("samples", "2"), ("pacing", "free")],
     ];
 
-    fn plan() -> Plan {
+    fn plan() -> SweepPlan {
         let settings = |pairs: &[(&str, &str)]| -> Vec<Setting> {
             pairs.iter().map(|(path, value)| Setting::new(*path, *value)).collect()
         };
@@ -239,11 +239,11 @@ mod tests {
             settings: settings(pairs),
         };
         let points = SETTINGS.iter().enumerate().map(point).collect();
-        Plan {
+        SweepPlan {
             name: "a".to_owned(),
             settings: settings(&[("scene", "tiny"), ("frames", "0..2")]),
             points,
-            ..Plan::default()
+            ..SweepPlan::default()
         }
     }
 

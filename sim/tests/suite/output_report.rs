@@ -1,8 +1,8 @@
 //! The report: whole without a network, harmless for any text in it, complete without what is missing.
 
 use output::report::{
-    CounterRow, FactRow, FileLink, FrameNumbers, FrameRow, Headline, PartRow, PassRow, Report, ReportImage,
-    ReportPlot, UnitRow, WarningRow, WorkRow,
+    CounterRow, FactRow, FileLink, FrameNumbers, FrameRow, Headline, PartRow, PassRow, ReportImage,
+    ReportPlot, RunReport, UnitRow, WarningRow, WorkRow,
 };
 use output::{Claim, Destination, MeanSd, plot};
 use power_model::Part;
@@ -43,7 +43,7 @@ fn counter(text: &str, number: f64) -> CounterRow {
 }
 
 /// Every text in it is `text`, every number `number`.
-fn report(text: &str, number: f64) -> Report<'static> {
+fn report(text: &str, number: f64) -> RunReport<'static> {
     let owned = || text.to_owned();
     let stats = Some(MeanSd { mean: number, sd: Some(number) });
     let fact = FactRow { name: owned(), value: owned(), note: owned() };
@@ -56,7 +56,7 @@ fn report(text: &str, number: f64) -> Report<'static> {
         dram_bytes: 64,
         waits: owned(),
     };
-    Report {
+    RunReport {
         title: owned().into(),
         facts: vec![fact.clone()],
         warnings: vec![WarningRow { code: owned(), message: owned(), details: vec![owned(), owned()] }],
@@ -156,7 +156,7 @@ fn numbers_that_are_none_do_not_break_the_page() {
 
 #[test]
 fn an_empty_report_is_a_page_without_empty_sections() {
-    let page = Report::default().html().unwrap();
+    let page = RunReport::default().html().unwrap();
     assert!(page.contains("<h1></h1>") && !page.contains("<section"), "{page}");
 }
 

@@ -1,7 +1,7 @@
 //! Chunks of a JLS file, written and read: a header and a payload, each with a checksum.
 
 use crate::{
-    FILE_HEADER_BYTES, HEADER_BYTES, IDENTIFICATION, MAX_PAYLOAD_BYTES, ReadError, VERSION, field, on_disk,
+    FILE_HEADER_BYTES, HEADER_BYTES, IDENTIFICATION, JlsReadError, MAX_PAYLOAD_BYTES, VERSION, field, on_disk,
 };
 use crc32c::crc32c;
 use std::fs::File;
@@ -179,46 +179,46 @@ pub(crate) struct ChunkFile {
 }
 
 impl ChunkFile {
-    pub fn open(path: &Path) -> Result<Self, ReadError> {
+    pub fn open(path: &Path) -> Result<Self, JlsReadError> {
         let file = File::open(path)?;
         let size_bytes = file.metadata()?.len();
         let mut file = Self { file, size_bytes };
         let header: [u8; FILE_HEADER_BYTES as usize] = file.fixed(0)?;
         if header[..16] != *IDENTIFICATION || crc32c(&header[..28]) != u32::from_le_bytes(field(&header, 28))
         {
-            return Err(ReadError::damaged(0, "the header of the file is wrong"));
+            return Err(JlsReadError::damaged(0, "the header of the file is wrong"));
         }
         if header[27] > 1 {
-            return Err(ReadError::NewerVersion);
+            return Err(JlsReadError::NewerVersion);
         }
         match u64::from_le_bytes(field(&header, 16)) {
-            0 => Err(ReadError::damaged(size_bytes, &format!("the recording was not closed; {REPAIR}"))),
+            0 => Err(JlsReadError::damaged(size_bytes, &format!("the recording was not closed; {REPAIR}"))),
             length if length != size_bytes => {
                 let reason = format!("the file ends here, but was closed with {length} bytes; {REPAIR}");
-                Err(ReadError::damaged(size_bytes, &reason))
+                Err(JlsReadError::damaged(size_bytes, &reason))
             }
             _ => Ok(file),
         }
     }
 
-    fn exact(&mut self, at: u64, into: &mut [u8]) -> Result<(), ReadError> {
+    fn exact(&mut self, at: u64, into: &mut [u8]) -> Result<(), JlsReadError> {
         let read = self.file.seek(SeekFrom::Start(at)).and_then(|_| self.file.read_exact(into));
         read.map_err(|error| match error.kind() {
             ErrorKind::UnexpectedEof => {
-                ReadError::damaged(self.size_bytes, &format!("the file ends here; {REPAIR}"))
+                JlsReadError::damaged(self.size_bytes, &format!("the file ends here; {REPAIR}"))
             }
             _ => error.into(),
         })
     }
 
-    fn fixed<const N: usize>(&mut self, at: u64) -> Result<[u8; N], ReadError> {
+    fn fixed<const N: usize>(&mut self, at: u64) -> Result<[u8; N], JlsReadError> {
         let mut bytes = [0; N];
         self.exact(at, &mut bytes)?;
         Ok(bytes)
     }
 
     /// The first chunk with one of these tags, from the beginning of the file on.
-    pub fn first(&mut self, tag: u8) -> Result<Option<ChunkHeader>, ReadError> {
+    pub fn first(&mut self, tag: u8) -> Result<Option<ChunkHeader>, JlsReadError> {
         let mut at = FILE_HEADER_BYTES;
         while at < self.size_bytes {
             let head = self.head(at)?;
@@ -231,27 +231,27 @@ impl ChunkFile {
     }
 
     /// The header at a place. A list that points backwards is refused: it might be circular.
-    pub fn head(&mut self, at: u64) -> Result<ChunkHeader, ReadError> {
+    pub fn head(&mut self, at: u64) -> Result<ChunkHeader, JlsReadError> {
         let bytes: [u8; HEADER_BYTES] = self.fixed(at)?;
         if crc32c(&bytes[..28]) != u32::from_le_bytes(field(&bytes, 28)) {
-            return Err(ReadError::damaged(at, "the checksum of a chunk's header is wrong"));
+            return Err(JlsReadError::damaged(at, "the checksum of a chunk's header is wrong"));
         }
         let next = Some(u64::from_le_bytes(field(&bytes, 0))).filter(|&next| next != 0);
         let (meta, bytes, tag) =
             (u16::from_le_bytes(field(&bytes, 18)), u32::from_le_bytes(field(&bytes, 20)), bytes[16]);
         let head = ChunkHeader { at, next, tag, meta, bytes };
         if head.end() > self.size_bytes {
-            return Err(ReadError::damaged(at, "a chunk is longer than the file"));
+            return Err(JlsReadError::damaged(at, "a chunk is longer than the file"));
         }
         match next {
-            Some(next) if next <= at => Err(ReadError::damaged(at, "a list of chunks leads back")),
+            Some(next) if next <= at => Err(JlsReadError::damaged(at, "a list of chunks leads back")),
             _ => Ok(head),
         }
     }
 
     /// The next chunk of a list. In a recording that was cut off and repaired, the last chunk of a list may
     /// still point to where the next one was: beyond the end, or into other chunks. The list ends there.
-    pub fn follow(&mut self, head: &ChunkHeader) -> Result<Option<ChunkHeader>, ReadError> {
+    pub fn follow(&mut self, head: &ChunkHeader) -> Result<Option<ChunkHeader>, JlsReadError> {
         let Some(next) = head.next.filter(|&next| next < self.size_bytes) else { return Ok(None) };
         match self.head(next) {
             Err(_) if !self.begins(next, head)? => Ok(None),
@@ -260,7 +260,7 @@ impl ChunkFile {
     }
 
     /// Whether a chunk begins at a place, counted from one before.
-    fn begins(&mut self, at: u64, before: &ChunkHeader) -> Result<bool, ReadError> {
+    fn begins(&mut self, at: u64, before: &ChunkHeader) -> Result<bool, JlsReadError> {
         let mut place = before.end();
         while place < at {
             place = self.head(place)?.end();
@@ -269,10 +269,10 @@ impl ChunkFile {
     }
 
     /// Reads the payload of a chunk over what was in `into`.
-    pub fn payload(&mut self, head: &ChunkHeader, into: &mut Vec<u8>) -> Result<(), ReadError> {
+    pub fn payload(&mut self, head: &ChunkHeader, into: &mut Vec<u8>) -> Result<(), JlsReadError> {
         into.clear();
         if head.bytes > MAX_PAYLOAD_BYTES {
-            return Err(ReadError::damaged(head.at, "a chunk of more than 64 MiB"));
+            return Err(JlsReadError::damaged(head.at, "a chunk of more than 64 MiB"));
         }
         let from = head.at + HEADER_BYTES as u64;
         into.resize((head.end() - from) as usize, 0);
@@ -280,7 +280,7 @@ impl ChunkFile {
         let length = head.bytes as usize;
         let stated = into.last_chunk().map(|crc| u32::from_le_bytes(*crc));
         if stated.is_some_and(|stated| stated != crc32c(&into[..length])) {
-            return Err(ReadError::damaged(head.at, "the checksum of a chunk is wrong"));
+            return Err(JlsReadError::damaged(head.at, "the checksum of a chunk is wrong"));
         }
         into.truncate(length);
         Ok(())

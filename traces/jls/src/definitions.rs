@@ -4,8 +4,8 @@
 use crate::chunk::{ChunkFile, ChunkHeader, ChunkWriter, List};
 use crate::{
     ANNOTATIONS, DATA_SAMPLES, DEFINITION, ENTRIES_PER_ENTRY, ENTRY_SAMPLES, F32, FIXED_RATE, HEAD, JSON,
-    LEVELS, ReadError, SIGNAL, SIGNAL_MASK, SIGNAL_TEXTS, SOURCE, SOURCE_TEXTS, SUMMARY_ENTRIES, USER_DATA,
-    UTC, VARIABLE_RATE, field,
+    JlsReadError, LEVELS, SIGNAL, SIGNAL_MASK, SIGNAL_TEXTS, SOURCE, SOURCE_TEXTS, SUMMARY_ENTRIES,
+    USER_DATA, UTC, VARIABLE_RATE, field,
 };
 use std::collections::BTreeMap;
 use std::io::{self, Seek, Write};
@@ -214,7 +214,7 @@ fn texts(payload: &[u8], from: usize) -> Vec<String> {
 }
 
 impl Definitions {
-    pub fn read(file: &mut ChunkFile) -> Result<Self, ReadError> {
+    pub fn read(file: &mut ChunkFile) -> Result<Self, JlsReadError> {
         let mut sources = BTreeMap::new();
         each(file, SOURCE, |head, payload| {
             if head.meta < MAX_NUMBER {
@@ -242,7 +242,7 @@ pub(crate) fn each(
     file: &mut ChunkFile,
     tag: u8,
     mut visit: impl FnMut(&ChunkHeader, &[u8]),
-) -> Result<(), ReadError> {
+) -> Result<(), JlsReadError> {
     let mut payload = Vec::new();
     let mut at = file.first(tag)?;
     while let Some(head) = at {

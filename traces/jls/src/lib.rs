@@ -216,7 +216,7 @@ impl Timestamp {
 
 /// Why a JLS file could not be read.
 #[derive(Debug, Error)]
-pub enum ReadError {
+pub enum JlsReadError {
     /// The file could not be opened or read.
     #[error("cannot read the file: {0}")]
     Io(#[from] io::Error),
@@ -250,7 +250,7 @@ pub enum ReadError {
     },
 }
 
-impl ReadError {
+impl JlsReadError {
     /// An error at a place in the file.
     pub(crate) fn damaged(at: u64, reason: &str) -> Self {
         Self::Damaged(format!("byte {at}: {reason}"))

@@ -2,7 +2,7 @@
 
 use crate::chunk::{ChunkFile, ChunkHeader};
 use crate::definitions::{self, Definitions, Signal, Source};
-use crate::{DATA, FIXED_RATE, FRONT, INDEX, JSON, ReadError, SIGNAL_MASK, Sample, USER_DATA, field};
+use crate::{DATA, FIXED_RATE, FRONT, INDEX, JSON, JlsReadError, SIGNAL_MASK, Sample, USER_DATA, field};
 use std::path::{Path, PathBuf};
 
 const FIXED_RATE_DATA: u8 = FIXED_RATE + DATA;
@@ -22,8 +22,8 @@ impl Reader {
     /// Opens a file and reads its definitions.
     ///
     /// # Errors
-    /// [`ReadError`] if it cannot be read, is of a newer version, was not closed, or is damaged.
-    pub fn open(path: &Path) -> Result<Self, ReadError> {
+    /// [`JlsReadError`] if it cannot be read, is of a newer version, was not closed, or is damaged.
+    pub fn open(path: &Path) -> Result<Self, JlsReadError> {
         let mut file = ChunkFile::open(path)?;
         let definitions = Definitions::read(&mut file)?;
         Ok(Self { path: path.to_owned(), file, definitions })
@@ -43,16 +43,16 @@ impl Reader {
     /// read side by side.
     ///
     /// # Errors
-    /// [`ReadError`] if samples are of a type that is not read, or the index is damaged.
-    pub fn samples(&self, signal: &Signal) -> Result<SampleReader, ReadError> {
+    /// [`JlsReadError`] if samples are of a type that is not read, or the index is damaged.
+    pub fn samples(&self, signal: &Signal) -> Result<SampleReader, JlsReadError> {
         SampleReader::open(&self.path, signal)
     }
 
     /// Visits the JSON texts among the user data.
     ///
     /// # Errors
-    /// [`ReadError`] if the file cannot be read or is damaged.
-    pub fn each_json(&mut self, mut visit: impl FnMut(&str)) -> Result<(), ReadError> {
+    /// [`JlsReadError`] if the file cannot be read or is damaged.
+    pub fn each_json(&mut self, mut visit: impl FnMut(&str)) -> Result<(), JlsReadError> {
         definitions::each(&mut self.file, USER_DATA, |head, payload| {
             if head.tag == USER_DATA && head.meta & USER_DATA_KIND == JSON {
                 let text = payload.split(|&byte| byte == 0).next().unwrap_or_default();
@@ -92,9 +92,9 @@ fn entries(payload: &[u8]) -> (i64, usize, u16) {
 }
 
 impl SampleReader {
-    fn open(path: &Path, signal: &Signal) -> Result<Self, ReadError> {
+    fn open(path: &Path, signal: &Signal) -> Result<Self, JlsReadError> {
         let sample = Sample::of(signal.data_type)
-            .map_err(|found| ReadError::SampleType { signal: signal.name.clone(), found })?;
+            .map_err(|found| JlsReadError::SampleType { signal: signal.name.clone(), found })?;
         let mut reader = Self {
             file: ChunkFile::open(path)?,
             name: signal.name.clone(),
@@ -114,7 +114,7 @@ impl SampleReader {
             let (last, count, _) = reader.front(last)?;
             let count = i128::from(last) + count as i128 - i128::from(first);
             reader.count =
-                u64::try_from(count).map_err(|_| ReadError::damaged(at, "sample numbers go back"))?;
+                u64::try_from(count).map_err(|_| JlsReadError::damaged(at, "sample numbers go back"))?;
             (reader.first, reader.end_position) = (first, reader.count);
             reader.payload.clear();
         }
@@ -150,7 +150,7 @@ impl SampleReader {
     ///
     /// # Errors
     /// As [`Self::read`].
-    pub fn limit_to(&mut self, from: i128, to: i128) -> Result<(), ReadError> {
+    pub fn limit_to(&mut self, from: i128, to: i128) -> Result<(), JlsReadError> {
         let within =
             |number: i128| u64::try_from(number - i128::from(self.first)).unwrap_or(0).min(self.count);
         let (from, end) = (within(from), within(to));
@@ -159,10 +159,10 @@ impl SampleReader {
     }
 
     /// The header of a chunk that must be of this signal.
-    fn head(&mut self, at: u64, tag: u8) -> Result<ChunkHeader, ReadError> {
+    fn head(&mut self, at: u64, tag: u8) -> Result<ChunkHeader, JlsReadError> {
         let head = self.file.head(at)?;
         if head.tag != tag || head.meta & SIGNAL_MASK != self.number {
-            return Err(ReadError::damaged(
+            return Err(JlsReadError::damaged(
                 at,
                 &format!("no chunk of signal {} where one must be", self.name),
             ));
@@ -171,19 +171,19 @@ impl SampleReader {
     }
 
     /// Reads a chunk of data: the number of its first sample, and how many there are.
-    fn front(&mut self, at: u64) -> Result<(i64, usize, ChunkHeader), ReadError> {
+    fn front(&mut self, at: u64) -> Result<(i64, usize, ChunkHeader), JlsReadError> {
         let head = self.head(at, FIXED_RATE_DATA)?;
         self.file.payload(&head, &mut self.payload)?;
         let (first, count, bits) = entries(&self.payload);
         let bytes = self.sample.bytes();
         if usize::from(bits) != 8 * bytes || self.payload.len() != FRONT + count * bytes {
-            return Err(ReadError::damaged(at, "a chunk of data is not of the length it says"));
+            return Err(JlsReadError::damaged(at, "a chunk of data is not of the length it says"));
         }
         Ok((first, count, head))
     }
 
     /// The last chunk of data, down from the highest index: the last entry of each leads to the level below.
-    fn last(&mut self, signal: &Signal) -> Result<u64, ReadError> {
+    fn last(&mut self, signal: &Signal) -> Result<u64, JlsReadError> {
         let top = (1..signal.heads.len()).rev().find(|&level| signal.heads[level] != 0).unwrap_or(0);
         let mut at = signal.heads[top];
         for _ in 0..top {
@@ -194,13 +194,13 @@ impl SampleReader {
             let entry = count.checked_sub(1).map(|last| FRONT + 8 * last);
             at = match entry.and_then(|entry| self.payload.get(entry..)?.first_chunk()) {
                 Some(below) if (1..at).contains(&u64::from_le_bytes(*below)) => u64::from_le_bytes(*below),
-                _ => return Err(ReadError::damaged(at, "an index leads nowhere")),
+                _ => return Err(JlsReadError::damaged(at, "an index leads nowhere")),
             };
         }
         self.end_of_list(at, FIXED_RATE_DATA)
     }
 
-    fn end_of_list(&mut self, at: u64, tag: u8) -> Result<u64, ReadError> {
+    fn end_of_list(&mut self, at: u64, tag: u8) -> Result<u64, JlsReadError> {
         let mut head = self.head(at, tag)?;
         while let Some(next) = self.follow(&head)? {
             head = next;
@@ -210,20 +210,20 @@ impl SampleReader {
 
     /// The next chunk of the same list. A list of a repaired file that leads to another chunk ends there; the
     /// numbers of samples show whether any are missing before the end.
-    fn follow(&mut self, head: &ChunkHeader) -> Result<Option<ChunkHeader>, ReadError> {
+    fn follow(&mut self, head: &ChunkHeader) -> Result<Option<ChunkHeader>, JlsReadError> {
         let next = self.file.follow(head)?;
         Ok(next.filter(|next| next.tag == head.tag && next.meta & SIGNAL_MASK == self.number))
     }
 
     /// Loads the next chunk; `false` at the end.
-    fn advance(&mut self) -> Result<bool, ReadError> {
+    fn advance(&mut self) -> Result<bool, JlsReadError> {
         let Some(at) = self.next else { return self.check_end() };
         let (first, count, head) = self.front(at)?;
         self.used = FRONT;
         self.next = self.follow(&head)?.map(|next| next.at);
         let jump = i128::from(first) - i128::from(self.first) - i128::from(self.position);
         if jump != 0 {
-            return Err(ReadError::Gap {
+            return Err(JlsReadError::Gap {
                 signal: self.name.clone(),
                 samples: self.position,
                 jump,
@@ -232,24 +232,24 @@ impl SampleReader {
         }
         // Signals of a position must end together: what the index knows nothing of is not given out.
         if self.position.checked_add(count as u64).is_none_or(|end| end > self.count) {
-            return Err(ReadError::damaged(at, "there are more samples than the index says"));
+            return Err(JlsReadError::damaged(at, "there are more samples than the index says"));
         }
         Ok(true)
     }
 
-    fn check_end(&self) -> Result<bool, ReadError> {
+    fn check_end(&self) -> Result<bool, JlsReadError> {
         if self.position == self.count {
             return Ok(false);
         }
         let (name, position, count) = (&self.name, self.position, self.count);
-        Err(ReadError::Damaged(format!("signal {name} ends after {position} of {count} samples")))
+        Err(JlsReadError::Damaged(format!("signal {name} ends after {position} of {count} samples")))
     }
 
     /// Reads up to `limit` samples and appends them; returns how many, 0 at the end.
     ///
     /// # Errors
-    /// [`ReadError::Damaged`] and [`ReadError::Gap`] name the place.
-    pub fn read(&mut self, limit: usize, into: &mut Vec<f32>) -> Result<usize, ReadError> {
+    /// [`JlsReadError::Damaged`] and [`JlsReadError::Gap`] name the place.
+    pub fn read(&mut self, limit: usize, into: &mut Vec<f32>) -> Result<usize, JlsReadError> {
         let before = into.len();
         let limit = limit.min(usize::try_from(self.remaining()).unwrap_or(usize::MAX));
         while into.len() - before < limit {
@@ -271,7 +271,7 @@ impl SampleReader {
     ///
     /// # Errors
     /// As [`Self::read`].
-    pub fn skip(&mut self, mut samples: u64) -> Result<(), ReadError> {
+    pub fn skip(&mut self, mut samples: u64) -> Result<(), JlsReadError> {
         let bytes = self.sample.bytes() as u64;
         while samples > 0 {
             let pending = self.payload.len().saturating_sub(self.used) as u64 / bytes;

@@ -55,7 +55,7 @@ const ROW_BYTES: usize = 136;
 
 /// Why a table could not be built or written.
 #[derive(Debug, Error)]
-pub enum TableError {
+pub enum FrameTableError {
     /// The truth has another number of rows than the frames.
     #[error("{frames} frames but {truths} true frames: give one (or none) per frame")]
     Truth {
@@ -109,10 +109,10 @@ impl FrameTable {
     /// Adds the ground truth of each frame (`None` for a false one).
     ///
     /// # Errors
-    /// [`TableError::Truth`] unless there is one entry per frame.
-    pub fn with_truth(self, truth: Vec<Option<TrueFrame>>) -> Result<Self, TableError> {
+    /// [`FrameTableError::Truth`] unless there is one entry per frame.
+    pub fn with_truth(self, truth: Vec<Option<TrueFrame>>) -> Result<Self, FrameTableError> {
         if truth.len() != self.frames.len() {
-            return Err(TableError::Truth { frames: self.frames.len(), truths: truth.len() });
+            return Err(FrameTableError::Truth { frames: self.frames.len(), truths: truth.len() });
         }
         Ok(Self { truth, ..self })
     }
@@ -120,11 +120,11 @@ impl FrameTable {
     /// Adds columns at the end.
     ///
     /// # Errors
-    /// [`TableError::Column`] unless each has one cell per frame.
-    pub fn with_columns(self, extra: Vec<ExtraColumn>) -> Result<Self, TableError> {
+    /// [`FrameTableError::Column`] unless each has one cell per frame.
+    pub fn with_columns(self, extra: Vec<ExtraColumn>) -> Result<Self, FrameTableError> {
         if let Some(column) = extra.iter().find(|column| column.cells.len() != self.frames.len()) {
             let (name, cells, frames) = (column.name, column.cells.len(), self.frames.len());
-            return Err(TableError::Column { name, cells, frames });
+            return Err(FrameTableError::Column { name, cells, frames });
         }
         Ok(Self { extra, ..self })
     }
@@ -143,8 +143,8 @@ impl FrameTable {
     /// the shortest form that reads back the same.
     ///
     /// # Errors
-    /// [`TableError`] if the writer fails.
-    pub fn write_csv<W: Write>(&self, mut out: W) -> Result<(), TableError> {
+    /// [`FrameTableError`] if the writer fails.
+    pub fn write_csv<W: Write>(&self, mut out: W) -> Result<(), FrameTableError> {
         let extra = self.extra.iter().map(|column| column.name);
         writeln!(out, "{}", TABLE_COLUMNS.into_iter().chain(extra).collect::<Vec<_>>().join(","))?;
         // Numbers take longer to write down than to find: many rows at once on every thread, the next while

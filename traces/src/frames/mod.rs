@@ -27,7 +27,7 @@ pub use find::{Options, Proposal, Step, find, find_with, marked_only, propose};
 use marks::Placed;
 pub(crate) use marks::Placement;
 pub use marks::{MarkError, Marks, Window, default_window};
-pub(crate) use matched::{Matched, Plan as MatchPlan, Samples, noise_deviation};
+pub(crate) use matched::{MatchPlan, Matched, Samples, noise_deviation};
 pub(crate) use periodicity::repetition_samples;
 use serde::Serialize;
 pub use threshold::{Population, Rule, Threshold};

@@ -171,20 +171,20 @@ struct Track {
 }
 
 /// An error of the crate `jls` as one that names the file.
-fn read_error(path: &Path, error: ::jls::ReadError) -> ReadError {
+fn read_error(path: &Path, error: ::jls::JlsReadError) -> ReadError {
     let path = path.to_owned();
     match error {
-        ::jls::ReadError::Io(source) => ReadError::Io { path, source },
-        ::jls::ReadError::NewerVersion => ReadError::Format {
+        ::jls::JlsReadError::Io(source) => ReadError::Io { path, source },
+        ::jls::JlsReadError::NewerVersion => ReadError::Format {
             path,
             found: "a JLS recording of a newer version",
             remedy: "export it with pyjls or the Joulescope UI to CSV or Parquet".to_owned(),
         },
-        ::jls::ReadError::Damaged(reason) => ReadError::Damaged { path, format: "JLS", reason },
-        ::jls::ReadError::SampleType { signal, found } => {
+        ::jls::JlsReadError::Damaged(reason) => ReadError::Damaged { path, format: "JLS", reason },
+        ::jls::JlsReadError::SampleType { signal, found } => {
             ReadError::ColumnType { path, column: signal, found, must: SAMPLE_TYPES }
         }
-        ::jls::ReadError::Gap { samples, jump, rate_hz, .. } => ReadError::Uneven {
+        ::jls::JlsReadError::Gap { samples, jump, rate_hz, .. } => ReadError::Uneven {
             path,
             row: samples + 1,
             time_s: (samples as f64 + jump as f64) / f64::from(rate_hz),

@@ -2,7 +2,7 @@
 //!
 //! [`FORMATS`] lists all of them: one table for readers, writers, the command, its help and its errors.
 //! [`read`] reads a file, as [`ReadOptions`] say; [`Rows`] reads one in pieces that does not fit into memory.
-//! [`save`] and the modules of the formats write a [`TraceReader`]: a trace in memory, or a [`Recording`], a
+//! [`save`] and the modules of the formats write a [`TraceReader`]: a trace in memory, or a [`TraceFile`], a
 //! file of any length. [`perfetto`] also writes timelines of frames and units.
 
 pub mod atomic;
@@ -22,7 +22,7 @@ use columns::Open;
 use std::path::{Path, PathBuf};
 
 pub use error::{ReadError, WriteError};
-pub use recording::{Loaded, Recording, open, read};
+pub use recording::{Loaded, TraceFile, open, read};
 pub use repair::{Repair, RepairKind};
 pub use rows::{Rows, SumOfRails, rail_of_sums, unread_power_ratio};
 #[cfg(test)]

@@ -16,7 +16,7 @@ const PIECE_ROWS: usize = 1 << 18;
 /// A file that was checked once and is a trace: finite samples at an even rate, as many as it states. It
 /// holds what [`read`](super::read()) would return, except the samples.
 #[derive(Clone, Debug)]
-pub struct Recording {
+pub struct TraceFile {
     path: PathBuf,
     options: ReadOptions,
     /// Rows read at once.
@@ -25,7 +25,7 @@ pub struct Recording {
     repairs: Vec<Repair>,
 }
 
-impl Recording {
+impl TraceFile {
     /// Reads a file through, once.
     ///
     /// # Errors
@@ -115,7 +115,7 @@ impl Piece {
     }
 }
 
-impl TraceReader for Recording {
+impl TraceReader for TraceFile {
     fn header(&self) -> TraceHeader {
         self.header.clone()
     }
@@ -158,13 +158,13 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<Loaded, ReadError> {
     load(Rows::open(path, options)?)
 }
 
-/// Opens a trace of any length: as a [`Recording`], or in memory where it has to be repaired, as repairs
+/// Opens a trace of any length: as a [`TraceFile`], or in memory where it has to be repaired, as repairs
 /// depend on all of it. Also returns the repairs.
 ///
 /// # Errors
 /// As [`read`].
 pub fn open(path: &Path, options: &ReadOptions) -> Result<(Box<dyn TraceReader>, Vec<Repair>), ReadError> {
-    match Recording::open(path, options) {
+    match TraceFile::open(path, options) {
         Ok(recording) => {
             let repairs = recording.repairs().to_vec();
             Ok((Box::new(recording), repairs))
@@ -288,7 +288,7 @@ mod tests {
     fn both(path: &Path, options: &ReadOptions, piece: usize) -> Result<(), TestCaseError> {
         let folder = tempfile::tempdir().unwrap();
         let whole = read(path, options).map(|loaded| loaded.trace);
-        let pieces = Recording::in_pieces(path, options, piece);
+        let pieces = TraceFile::in_pieces(path, options, piece);
         match (whole, pieces) {
             (Ok(whole), Ok(pieces)) => {
                 prop_assert_eq!(whole.header(), pieces.header());
@@ -348,7 +348,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let (path, out) = (folder.path().join("t.csv"), folder.path().join("out.parquet"));
         fs::write(&path, text(1000.0, 9, &[])).unwrap();
-        let recording = Recording::open(&path, &ReadOptions::default()).unwrap();
+        let recording = TraceFile::open(&path, &ReadOptions::default()).unwrap();
         fs::write(&path, text(1000.0, 9, &[]) + "5.5,1,1\n").unwrap();
         let message = parquet::save(&recording, &out).unwrap_err().to_string();
         assert!(message.contains("t.csv: changed while it was read"), "{message}");

@@ -6,7 +6,7 @@
 //! A seed makes another device of the same kind: most quantities are drawn anew with it.
 
 use super::layers::{Dice, Drawn, Layers, on_demand, pipelined};
-use super::{Recording, Scene};
+use super::{RecorderSpec, Scene};
 use crate::CurveError;
 use crate::energy::TrueFrame;
 use core::f64::consts::TAU;
@@ -18,7 +18,7 @@ pub struct HeldOutDevice {
     pub name: &'static str,
     /// What it does, in a line.
     pub about: &'static str,
-    recorder: Recording,
+    recorder: RecorderSpec,
     /// Makes a number of frames with a seed.
     make: fn(usize, u64) -> Drawn,
 }
@@ -28,25 +28,25 @@ pub const HELD_OUT_DEVICES: [HeldOutDevice; 4] = [
     HeldOutDevice {
         name: "one process",
         about: "a game with passes, scene cuts and a clock governor",
-        recorder: Recording { rate_hz: 50e3, bits: 14, snr_db: 25.0, seed: 0 },
+        recorder: RecorderSpec { rate_hz: 50e3, bits: 14, snr_db: 25.0, seed: 0 },
         make: one_process,
     },
     HeldOutDevice {
         name: "several processes",
         about: "an application, the compositor, sound, radio and a pulsed backlight on one rail",
-        recorder: Recording { rate_hz: 40e3, bits: 12, snr_db: 22.0, seed: 0 },
+        recorder: RecorderSpec { rate_hz: 40e3, bits: 12, snr_db: 22.0, seed: 0 },
         make: several_processes,
     },
     HeldOutDevice {
         name: "on demand",
         about: "an interface that draws while something moves and sleeps between",
-        recorder: Recording { rate_hz: 25e3, bits: 12, snr_db: 28.0, seed: 0 },
+        recorder: RecorderSpec { rate_hz: 25e3, bits: 12, snr_db: 28.0, seed: 0 },
         make: on_demand,
     },
     HeldOutDevice {
         name: "pipelined",
         about: "a tiler that bins the next frame and simulates the one after while it shades",
-        recorder: Recording { rate_hz: 100e3, bits: 13, snr_db: 20.0, seed: 0 },
+        recorder: RecorderSpec { rate_hz: 100e3, bits: 13, snr_db: 20.0, seed: 0 },
         make: pipelined,
     },
 ];
@@ -66,8 +66,8 @@ impl HeldOutDevice {
     }
 
     /// How it is recorded.
-    pub fn recording(&self, seed: u64) -> Recording {
-        Recording { seed, ..self.recorder }
+    pub fn recorder(&self, seed: u64) -> RecorderSpec {
+        RecorderSpec { seed, ..self.recorder }
     }
 }
 
@@ -410,7 +410,7 @@ mod tests {
                 let other = device.scene(80, seed + 1).unwrap();
                 assert_ne!(scene, other);
                 assert_eq!(scene, device.scene(80, seed).unwrap());
-                assert_eq!(scene.record(&device.recording(seed)).unwrap().lost_samples(), 0);
+                assert_eq!(scene.record(&device.recorder(seed)).unwrap().lost_samples(), 0);
             }
         }
     }

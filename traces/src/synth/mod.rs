@@ -3,7 +3,7 @@
 //! The model stands for no particular GPU. A frame is a front end, a clear, and draws with a length and a
 //! power each. A [`Scenario`] makes its frames hard to find: free running or V-sync, idle gaps within the
 //! frame, changing content, clock steps, a launch transient, disturbances, drifting idle power.
-//! [`Scenario::scene`] makes a curve of it, and [`Recording`] samples that with a recorder of some rate,
+//! [`Scenario::scene`] makes a curve of it, and [`RecorderSpec`] samples that with a recorder of some rate,
 //! resolution and noise. All random numbers are functions of (seed, purpose, frame, draw), so a longer scene
 //! begins like a shorter one.
 //!
@@ -112,7 +112,7 @@ const RAIL_V: f64 = 4.0;
 
 /// How a scene is recorded: a 4 V rail without resistance, currents of +-4 A, voltages of +-6 V.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Recording {
+pub struct RecorderSpec {
     /// Samples per second.
     pub rate_hz: f64,
     /// Resolution of current and voltage.
@@ -124,7 +124,7 @@ pub struct Recording {
     pub seed: u64,
 }
 
-impl Default for Recording {
+impl Default for RecorderSpec {
     /// 50 kHz, 14 bits, 30 dB.
     fn default() -> Self {
         Self { rate_hz: 50e3, bits: 14, snr_db: 30.0, seed: 1 }
@@ -146,7 +146,7 @@ impl Scene {
     ///
     /// # Errors
     /// [`SynthError`] where rate, bits or noise are out of range.
-    pub fn record(&self, recording: &Recording) -> Result<Trace, SynthError> {
+    pub fn record(&self, recording: &RecorderSpec) -> Result<Trace, SynthError> {
         let noise_w = libm::sqrt(self.variance_w2()) * libm::pow(10.0, -recording.snr_db / 20.0);
         let device = Device::new(DeviceSpec {
             name: "synthetic".to_owned(),
@@ -478,7 +478,8 @@ mod tests {
     #[test]
     fn noise_is_as_asked_and_the_same_seed_gives_the_same_trace() {
         let scene = SCENARIOS[1].scene(100, 2).unwrap();
-        let at = |snr_db: f64| scene.record(&Recording { snr_db, seed: 9, ..Recording::default() }).unwrap();
+        let at =
+            |snr_db: f64| scene.record(&RecorderSpec { snr_db, seed: 9, ..RecorderSpec::default() }).unwrap();
         let powers = |trace: &Trace| trace.powers_w().collect::<Vec<_>>();
         let (noisy, clean) = (powers(&at(0.0)), powers(&at(200.0)));
         let inner = 20_000..40_000;
@@ -490,14 +491,14 @@ mod tests {
         let ratio = variance(inner.map(|i| clean[i]).collect()) / noise;
         assert!((0.8..1.25).contains(&ratio), "{ratio}");
         assert_eq!(at(0.0), at(0.0));
-        assert!(scene.record(&Recording { bits: 99, ..Recording::default() }).is_err());
+        assert!(scene.record(&RecorderSpec { bits: 99, ..RecorderSpec::default() }).is_err());
     }
 
     #[test]
     fn auto_tracks_unless_the_window_has_hardly_any_samples() {
         let scene = SCENARIOS[1].scene(40, 2).unwrap();
         let method = |rate_hz: f64| {
-            let trace = scene.record(&Recording { rate_hz, ..Recording::default() }).unwrap();
+            let trace = scene.record(&RecorderSpec { rate_hz, ..RecorderSpec::default() }).unwrap();
             let window = default_window(0.0, rate_hz);
             find(&trace, &Marks::one(scene.truth[15].start_s, window, trace.end_s())).unwrap().method
         };
@@ -508,6 +509,6 @@ mod tests {
     fn no_frames_are_idle_alone() {
         let scene = SCENARIOS[0].scene(0, 1).unwrap();
         assert!(scene.truth.is_empty() && scene.curve.watts() == [0.55]);
-        assert!(scene.record(&Recording::default()).is_ok());
+        assert!(scene.record(&RecorderSpec::default()).is_ok());
     }
 }

@@ -294,7 +294,7 @@ fn of_several_faults_a_recording_names_the_one_that_a_trace_in_memory_names() {
 fn says_both(path: &Path, part: &str) {
     let options = ReadOptions::default();
     says(&io::read(path, &options).unwrap_err(), &[part]);
-    says(&io::Recording::open(path, &options).unwrap_err(), &[part]);
+    says(&io::TraceFile::open(path, &options).unwrap_err(), &[part]);
 }
 
 #[test]
@@ -352,7 +352,7 @@ fn surplus_fields_that_repair_drops_are_reported_with_their_place() {
     let (_folder, path) = in_folder("surplus.csv", rows.as_bytes());
     let options = ReadOptions { repair: true, ..ReadOptions::default() };
     let reported = io::read(&path, &options).unwrap().repairs;
-    assert_eq!(io::Recording::open(&path, &options).unwrap().repairs(), reported);
+    assert_eq!(io::TraceFile::open(&path, &options).unwrap().repairs(), reported);
     let [reported] = &reported[..] else { panic!("{reported:?}") };
     assert_eq!(
         (reported.code, reported.row, reported.time_s, reported.count),

@@ -302,7 +302,7 @@ pub struct ImageDensity {
 /// Reason why an image cannot be a density.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{file}: {message}")]
-pub struct ImageError {
+pub struct DensityError {
     file: String,
     message: String,
 }
@@ -311,9 +311,9 @@ impl ImageDensity {
     /// Loads a PNG or JPEG file.
     ///
     /// # Errors
-    /// [`ImageError`] if it cannot be read or decoded.
-    pub fn load(path: &Path) -> Result<Self, ImageError> {
-        let refused = |message: String| ImageError { file: path.display().to_string(), message };
+    /// [`DensityError`] if it cannot be read or decoded.
+    pub fn load(path: &Path) -> Result<Self, DensityError> {
+        let refused = |message: String| DensityError { file: path.display().to_string(), message };
         let unread = |error: std::io::Error| refused(format!("cannot read it: {error}; check the path"));
         let unknown = |error| refused(format!("unrecognized image format ({error}); give a PNG or JPEG"));
         let picture =

@@ -15,7 +15,7 @@ use glam::{Affine3A, DVec2, DVec3};
 use pipeline::geometry::Projection;
 use pipeline::random::{mix, unit};
 use pipeline::sample_test::{Hits, Target, test_run};
-use pipeline::sampling::{SampleSource, TableError, TileSamples};
+use pipeline::sampling::{SampleSource, SampleTableError, TileSamples};
 use pipeline::setup::{SetupResult, Triangle, set_up};
 use pipeline::traversal::{Box5, TileRect};
 use pipeline::{
@@ -82,7 +82,7 @@ pub enum StressError {
     Camera(#[from] CameraError),
     /// The samples are invalid.
     #[error(transparent)]
-    Samples(#[from] TableError),
+    Samples(#[from] SampleTableError),
     /// The vertices are invalid.
     #[error(transparent)]
     Draw(#[from] DrawError),

@@ -2,7 +2,7 @@
 //! module; a row of the list of claims is a function.
 //!
 //! ```text
-//! settings -> scenes -> Stage (pipeline, clock, watts) -> Recording (pacing, surroundings, recorder, analysis) -> Row, Figure
+//! settings -> scenes -> Stage (pipeline, clock, watts) -> TracedRun (pacing, surroundings, recorder, analysis) -> Row, Figure
 //! ```
 //!
 //! Inputs come from the papers only. A committed file of settings for each paper has what it states and what
@@ -24,7 +24,7 @@ use run::RunError;
 use serde::Serialize;
 use settings::Form;
 
-pub use report::{Figure, Report};
+pub use report::{Figure, PaperReport};
 pub use row::{Band, Case, Number, Row, Turn, Verdict};
 pub use settings::{About, Kind, Listed, Origin};
 
@@ -135,14 +135,14 @@ impl Done {
 ///
 /// # Errors
 /// If settings are invalid or a simulation fails. A row that differs is no error.
-pub fn compute(paper: Paper, options: &Options, progress: &Progress) -> Result<Report, RunError> {
+pub fn compute(paper: Paper, options: &Options, progress: &Progress) -> Result<PaperReport, RunError> {
     options.check(paper)?;
     let (origin, done) = match paper {
         Paper::Two => paper2::rows(options, progress),
         Paper::Three => paper3::rows(options, progress),
         Paper::Six => paper6::rows(options, progress),
     }?;
-    Ok(Report::new(paper, options.form(), origin, done))
+    Ok(PaperReport::new(paper, options.form(), origin, done))
 }
 
 /// Computes the requested rows and writes table and figures into `out`.
@@ -154,7 +154,7 @@ pub fn reproduce(
     options: &Options,
     out: &Destination,
     progress: &Progress,
-) -> Result<Report, RunError> {
+) -> Result<PaperReport, RunError> {
     options.check(paper)?;
     report::check_earlier(paper, options, out)?;
     // The folder first: that it cannot be made is better known before the work than after it.

@@ -15,7 +15,7 @@ use super::row::{Cases, Number, Row, Verdict, With, numbers, one_at_a_time};
 use super::settings::{
     About, Form, Origin, Setting, load, paper_settings, reduced, row_settings, settings_group,
 };
-use super::stage::{Frames, MARKED, Recording, Stage, looped};
+use super::stage::{Frames, MARKED, Stage, TracedRun, looped};
 use super::{Done, Figure, Options, Paper};
 
 /// The ids of its rows.
@@ -40,7 +40,7 @@ pub(super) fn rows(options: &Options, progress: &Progress) -> Result<(Origin, Ve
     }
     if options.wants("II-2") {
         let frames = pc.pc_animation(*settings.work.pc_frames.get(form), progress)?;
-        let recording = Recording::new(&pc, &looped(&frames, recorded), pc.capped()?, circumstances)?;
+        let recording = TracedRun::new(&pc, &looped(&frames, recorded), pc.capped()?, circumstances)?;
         let with = With { settings: &settings.ii_2, form, sha256: &origin.sha256, shared_less: less };
         done.push(inverses(&with, &recording, &recording.find(MARKED)?));
     }
@@ -48,7 +48,7 @@ pub(super) fn rows(options: &Options, progress: &Progress) -> Result<(Origin, Ve
 }
 
 /// Recorded frames.
-fn ran(recording: &Recording, found: usize) -> Vec<Number> {
+fn ran(recording: &TracedRun, found: usize) -> Vec<Number> {
     numbers([
         ("frames_drawn", recording.truth.frames.len() as f64),
         ("samples_recorded", recording.trace.samples() as f64),
@@ -57,7 +57,7 @@ fn ran(recording: &Recording, found: usize) -> Vec<Number> {
 }
 
 /// II-2: the mean of inverses is not the inverse of the mean.
-fn inverses(with: &With<'_, Inverses>, recording: &Recording, frames: &Frames) -> Done {
+fn inverses(with: &With<'_, Inverses>, recording: &TracedRun, frames: &Frames) -> Done {
     let same = *with.settings.same.get(with.form);
     let per_pixel: Vec<f64> = frames.found.iter().map(|frame| frame.energy_j / PIXELS).collect();
     let count = per_pixel.len() as f64;
@@ -194,7 +194,7 @@ impl Split {
 
 /// Frames of a point, their recording and their energies.
 struct Measured {
-    recording: Recording,
+    recording: TracedRun,
     /// Ends of the G-buffer and the lighting pass of each drawn frame, s from its start.
     ends_s: Vec<[f64; 2]>,
     split: Split,
@@ -219,7 +219,7 @@ impl Bench<'_> {
         let frames = frames.collect::<Result<Vec<JobFrame>, RunError>>()?;
         let shown: Vec<&FramePower> =
             frames.iter().map(|frame| &frame.power).cycle().take(self.recorded).collect();
-        let recording = Recording::new(self.pc, &shown, self.pc.capped()?, self.circumstances)?;
+        let recording = TracedRun::new(self.pc, &shown, self.pc.capped()?, self.circumstances)?;
         let split = self.split(&frames, &recording).scaled(1.0 / point.pixels());
         let facts = frames.iter().flat_map(|frame| &frame.drawn.facts);
         let invocations =
@@ -228,7 +228,7 @@ impl Bench<'_> {
     }
 
     /// Mean energies of the recorded frames.
-    fn split(&self, frames: &[JobFrame], recording: &Recording) -> Split {
+    fn split(&self, frames: &[JobFrame], recording: &TracedRun) -> Split {
         let idle_w = self.pc.platform.idle_w.value();
         let (truth, stamps) = (&recording.truth, PowerIntegral::new(&recording.trace));
         let mut split = Split::default();

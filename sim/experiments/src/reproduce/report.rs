@@ -15,7 +15,7 @@ use super::{Done, Options, Paper};
 
 /// The rows of a paper.
 #[derive(Serialize)]
-pub struct Report {
+pub struct PaperReport {
     /// Which paper.
     pub paper: Paper,
     /// Its title.
@@ -45,7 +45,7 @@ pub(super) fn stem(paper: Paper) -> String {
     format!("reproduce_{}", paper.number())
 }
 
-impl Report {
+impl PaperReport {
     pub(super) fn new(paper: Paper, form: Form, settings: Origin, done: Vec<Done>) -> Self {
         let (mut rows, mut figures) = (Vec::new(), Vec::new());
         for Done { mut row, figures: drawn } in done {
@@ -323,10 +323,10 @@ mod tests {
         Done { row: row(id, kind, verdict), figures }
     }
 
-    fn report(verdict: Verdict) -> Report {
+    fn report(verdict: Verdict) -> PaperReport {
         let rows = vec![done("III-8", Kind::Equality, verdict), done("III-9", Kind::Order, Verdict::Differs)];
         let origin = Origin { file: "paper.ron".to_owned(), sha256: "abc".to_owned(), committed: false };
-        Report::new(Paper::Three, Form::Quick, origin, rows)
+        PaperReport::new(Paper::Three, Form::Quick, origin, rows)
     }
 
     #[test]

@@ -214,7 +214,7 @@ const METHOD: FinderMethod = FinderMethod::Tracking;
 pub(super) const MARKED: usize = 3;
 
 /// A trace and its ground truth.
-pub(super) struct Recording {
+pub(super) struct TracedRun {
     /// Drawn frames with the timestamps of the application.
     pub truth: Surrounded,
     /// Recorded trace.
@@ -236,7 +236,7 @@ impl Frames {
     }
 }
 
-impl Recording {
+impl TracedRun {
     /// Draws `frames` on the stage and records them.
     pub fn new(
         stage: &Stage,

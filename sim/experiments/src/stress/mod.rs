@@ -3,7 +3,7 @@
 //! - [`truth`]: when a triangle truly touches a tile.
 //! - [`measure`]: the sets of tests compared, what they are tried on, and all of it for one value of a family.
 //! - [`choice`]: `auto` against every fixed choice of tests.
-//! - [`Report`]: every row, as a study with tables, CSV and pictures.
+//! - [`StressChart`]: every row, as a study with tables, CSV and pictures.
 
 pub mod choice;
 pub mod measure;
@@ -48,7 +48,7 @@ pub struct StressEffort {
 }
 
 /// Everything a sweep found out.
-pub struct Report {
+pub struct StressChart {
     /// The families swept.
     pub families: Vec<&'static Family>,
     /// Size of their scenes.
@@ -75,13 +75,13 @@ pub struct StressSummary<'a> {
 }
 
 /// As JSON a report is its summary.
-impl Serialize for Report {
+impl Serialize for StressChart {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         self.summary().serialize(serializer)
     }
 }
 
-impl Study for Report {
+impl Study for StressChart {
     const NAME: &'static str = "stress";
     const ABOUT: &'static str =
         "Each tile test on families of triangles from harmless to hopeless: samples lost, efficiency, cost";
@@ -161,7 +161,7 @@ fn stem(name: &str) -> String {
     format!("plots/stress_{}", name.replace('-', "_"))
 }
 
-impl Report {
+impl StressChart {
     /// The part of `summary.json`.
     pub fn summary(&self) -> StressSummary<'_> {
         StressSummary {
@@ -270,7 +270,7 @@ impl Report {
 }
 
 /// Cost over that of the best method, by method and family: at the first and at the worst value.
-fn matrix(report: &Report, plot_style: &PlotStyle) -> Picture {
+fn matrix(report: &StressChart, plot_style: &PlotStyle) -> Picture {
     let panel = |name, first| MatrixPanel {
         name,
         rows: METHODS
@@ -333,7 +333,7 @@ const MEASURES: [Measure; 2] = [
 
 /// A measure of one family along its parameter: a small panel for each method, the other methods as grey
 /// lines behind it.
-fn curves(report: &Report, family: &Family, measure: &Measure, plot_style: &PlotStyle) -> Picture {
+fn curves(report: &StressChart, family: &Family, measure: &Measure, plot_style: &PlotStyle) -> Picture {
     let rows: Vec<&StressRow> = report.of(family).collect();
     let line = |name: &str| -> Vec<(f64, f64)> {
         let values = rows.iter().filter(|row| row.method == name).map(|row| (measure.of)(row)).enumerate();
@@ -364,7 +364,7 @@ fn values(rows: &[&StressRow]) -> Vec<String> {
 }
 
 /// Width of the boxes that the side planes leave, and of the true ones.
-fn intervals(report: &Report, family: &Family, plot_style: &PlotStyle) -> Picture {
+fn intervals(report: &StressChart, family: &Family, plot_style: &PlotStyle) -> Picture {
     let rows: Vec<&StressRow> = report.of(family).collect();
     let curve = |name: &str, of: fn(&StressRow) -> f64| {
         let sides = rows.iter().filter(|row| row.method == "sides").enumerate();
@@ -421,7 +421,7 @@ mod tests {
         run(&Subject { camera, viewport, samples, draws: &draws, spec: &gpu.pipeline })
     }
 
-    fn text(report: &Report) -> String {
+    fn text(report: &StressChart) -> String {
         report.tables()[0].text().unwrap()
     }
 
@@ -477,7 +477,7 @@ mod tests {
         let family = family("speed").unwrap();
         let gpu = GpuSpec::load("reference").unwrap();
         let rows = measure::measure(family, 0.1, SIZE, &gpu, &METHODS).unwrap();
-        let mut report = Report { families: vec![family], size: SIZE, rows, auto: Choices::default() };
+        let mut report = StressChart { families: vec![family], size: SIZE, rows, auto: Choices::default() };
         assert!(report.is_clean(), "{}", text(&report));
         assert_eq!(report.rows[0].compared_with, "brute force");
         let scene = family.scene(0.1, SIZE, 1).unwrap();

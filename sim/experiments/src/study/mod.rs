@@ -270,7 +270,7 @@ pub enum StudyError {
     #[error(transparent)]
     Pass(#[from] pipeline::PassError),
     #[error(transparent)]
-    Samples(#[from] pipeline::sampling::TableError),
+    Samples(#[from] pipeline::sampling::SampleTableError),
     #[error(transparent)]
     Gpu(#[from] GpuError),
     #[error(transparent)]

@@ -7,7 +7,7 @@ mod edit;
 use std::path::Path;
 
 use activity::spec::{self, SpecError, suggestion};
-use power_model::{EnergyTable, Platform, PlatformError, TableError};
+use power_model::{EnergyTable, EnergyTableError, Platform, PlatformError};
 use workloads::{LoadError, Scene};
 
 use crate::gpu::{GpuError, GpuSpec};
@@ -255,7 +255,7 @@ impl Changes<'_> {
     /// As [`Self::gpu`].
     pub fn table(&mut self, name: &Path) -> Result<Option<EnergyTable>, ChangeError> {
         let in_words = |error| match error {
-            TableError::Spec(error) => without_place(error),
+            EnergyTableError::Spec(error) => without_place(error),
             error => without_name(&error, name),
         };
         self.input((InputFile::Table, name), EnergyTable::builtin_text, EnergyTable::parse, in_words)

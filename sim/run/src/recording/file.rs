@@ -18,14 +18,14 @@ use traces::io::atomic;
 use workloads::Settings;
 use workloads::job::{Drawn, Draws, JobError};
 
-use super::{RecordedFrame, Recording, TimedFrames};
+use super::{DrawnFrames, RecordedFrame, TimedFrames};
 use crate::frame::DrawnFrame;
 use crate::{Change, Distinct, InputFile, Plan, RunError, RunOptions};
 
 /// All frames of a run as drawn.
 pub struct RecordedRun {
     about: About,
-    recording: Recording,
+    recording: DrawnFrames,
     /// The file that it was read from.
     path: PathBuf,
 }
@@ -91,8 +91,8 @@ impl RecordedRun {
     /// If a frame cannot be drawn.
     pub fn draw(plan: &Plan, progress: &Progress) -> Result<Self, RunError> {
         let distinct = Distinct::new(&*plan.job)?;
-        let recording = Recording::draw(plan, distinct.numbers(), usize::MAX, progress)?;
-        let recording = recording.unwrap_or(Recording { frames: Vec::new() });
+        let recording = DrawnFrames::draw(plan, distinct.numbers(), usize::MAX, progress)?;
+        let recording = recording.unwrap_or(DrawnFrames { frames: Vec::new() });
         let settings = plan.job.settings();
         let about = About {
             recording: FORMAT,
@@ -173,7 +173,7 @@ impl RecordedRun {
         if unzipped.read(&mut [0]).map_err(unreadable)? > 0 {
             return Err(damaged("it goes on after its last frame; record the frames again".to_owned()));
         }
-        Ok(Self { about, recording: Recording { frames }, path: path.to_owned() })
+        Ok(Self { about, recording: DrawnFrames { frames }, path: path.to_owned() })
     }
 
     /// The run on the GPU, platform and energy table of `options`, at their timing level. Scene and view are

@@ -17,7 +17,7 @@ use crate::{Plan, RunError, RunFrame};
 
 /// Frames of a job as a pipeline drew them. What the pipeline does depends on neither time nor power, so the
 /// frames of any GPU with this pipeline follow from their packets.
-pub struct Recording {
+pub struct DrawnFrames {
     frames: Vec<RecordedFrame>,
 }
 
@@ -27,7 +27,7 @@ struct RecordedFrame {
     packets: PacketStream,
 }
 
-impl Recording {
+impl DrawnFrames {
     /// Draws the frames `numbers` of a plan; `None` if their packets take more than `max_bytes`.
     ///
     /// # Errors
@@ -132,13 +132,13 @@ impl PacketBuffer {
 
 /// Frames of a recording with their times on a machine.
 pub struct TimedFrames<'a> {
-    recording: &'a Recording,
+    recording: &'a DrawnFrames,
     timed: Vec<Timed>,
     level: Level,
 }
 
 impl<'a> TimedFrames<'a> {
-    const fn new(recording: &'a Recording, level: Level) -> Self {
+    const fn new(recording: &'a DrawnFrames, level: Level) -> Self {
         Self { recording, timed: Vec::new(), level }
     }
 
@@ -165,8 +165,8 @@ mod tests {
             .unwrap()
     }
 
-    fn recorded(plan: &Plan, max_bytes: usize) -> Option<Recording> {
-        Recording::draw(plan, &[0, 1], max_bytes, &Progress::new(true)).unwrap()
+    fn recorded(plan: &Plan, max_bytes: usize) -> Option<DrawnFrames> {
+        DrawnFrames::draw(plan, &[0, 1], max_bytes, &Progress::new(true)).unwrap()
     }
 
     #[test]

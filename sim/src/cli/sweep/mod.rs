@@ -10,8 +10,8 @@ use rayon::ThreadPool;
 use run::Input;
 use serde::Serialize;
 use sweep::{
-    Answer, Expected, Folder, Plan, Question, RatedDesign, Report, ReportOptions, Scripts, Search, Shard,
-    SlurmArray, SlurmJob, Status, Work, merge, submit,
+    Answer, Expected, Folder, Question, RatedDesign, ReportOptions, Scripts, Search, Shard, SlurmArray,
+    SlurmJob, Status, SweepPlan, SweepReport, Work, merge, submit,
 };
 
 use self::args::{
@@ -47,7 +47,7 @@ pub(super) fn run(args: &SweepArgs, terminal: &Terminal, stop: &Stop) -> Result<
 
 /// A sweep that is planned.
 struct Opened {
-    plan: Plan,
+    plan: SweepPlan,
     folder: Folder,
     pool: ThreadPool,
     progress: Progress,
@@ -57,8 +57,8 @@ impl Opened {
     /// Plans the sweep of these arguments.
     fn new(args: &FileArgs, terminal: &Terminal) -> Result<Self, Failure> {
         let (pool, progress) = (args.threads.pool()?, Progress::on(terminal, args.json));
-        let plan =
-            pool.install(|| Plan::load_with_progress(&args.file, args.quick, Some(&program()), &progress))?;
+        let plan = pool
+            .install(|| SweepPlan::load_with_progress(&args.file, args.quick, Some(&program()), &progress))?;
         let folder = Folder::at(&args.out);
         folder.check(&plan)?;
         Ok(Self { plan, folder, pool, progress })
@@ -283,7 +283,7 @@ fn print_status(out: &Path, json: bool, state: &InShard) -> Result<(), Failure> 
 
 fn report(args: &ReportArgs, terminal: &Terminal) -> Result<(), Failure> {
     let folder = opened(&args.folder, terminal)?;
-    let report = Report::of(&folder, ReportOptions { within: args.within })?;
+    let report = SweepReport::of(&folder, ReportOptions { within: args.within })?;
     let page = report.write(&folder, &args.plot_style.plot_style())?;
     let name = folder.path().display().to_string();
     if args.folder.json {
@@ -306,7 +306,7 @@ fn report(args: &ReportArgs, terminal: &Terminal) -> Result<(), Failure> {
 }
 
 /// Designs on the frontier, the fastest first.
-fn frontiers(report: &Report) -> Table {
+fn frontiers(report: &SweepReport) -> Table {
     let mut table = Table::new([
         "workload",
         "busy time",
@@ -339,7 +339,7 @@ fn frontiers(report: &Report) -> Table {
 }
 
 /// Best designs, and how many others they cannot be distinguished from.
-fn winners(report: &Report) -> Table {
+fn winners(report: &SweepReport) -> Table {
     let mut table = Table::new(["workload", "best by", "cost", "undecided", "design"]);
     for winner in &report.winners {
         let undecided = format!("{} of {}", winner.undecided, winner.designs.saturating_sub(1));

@@ -14,7 +14,7 @@ use tempfile::TempDir;
 use traces::Trace;
 use traces::frames::{FinderMethod, Window};
 use traces::io::{
-    FORMATS, ReadOptions, Recording, Repair, Rows, TraceFormat, TraceReader, open, rail_of_sums, read,
+    FORMATS, ReadOptions, Repair, Rows, TraceFile, TraceFormat, TraceReader, open, rail_of_sums, read,
     readable, unread_power_ratio,
 };
 use traces::search::{FrameSet, Search};
@@ -306,7 +306,7 @@ impl FindArgs {
     ) -> Result<(Frames, Box<dyn TraceReader>), Failure> {
         let search = self.search()?;
         if search.reads_in_pieces(path, &input.options()?)? {
-            let recording = Recording::open(path, &input.options()?)?;
+            let recording = TraceFile::open(path, &input.options()?)?;
             return Ok((in_pieces(&search, input, path, terminal)?, Box::new(recording)));
         }
         let (trace, repairs) = input.load_other(path, terminal)?;

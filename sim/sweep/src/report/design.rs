@@ -7,7 +7,7 @@ use output::MeanSd;
 use serde::Serialize;
 
 use crate::execute::Measured;
-use crate::plan::{Plan, Point};
+use crate::plan::{Point, SweepPlan};
 use crate::setting::Setting;
 
 /// A measured point.
@@ -110,7 +110,7 @@ fn last_name(path: &str) -> &str {
 }
 
 /// The last name of each path that varies, or the whole path where two end in the same one.
-pub(crate) fn short_names(plan: &Plan) -> BTreeMap<&str, &str> {
+pub(crate) fn short_names(plan: &SweepPlan) -> BTreeMap<&str, &str> {
     let settings = plan.points.iter().flat_map(|point| &point.settings);
     let paths: BTreeSet<&str> = settings.map(|setting| &*setting.path).collect();
     let name = |path: &&'_ str| {
@@ -302,7 +302,7 @@ mod tests {
         let paths = ["gpu.a.queue", "gpu.b.queue", "gpu.core_hz"];
         let settings = paths.map(|path| Setting::new(path, "1")).into();
         let points = vec![Point { id: String::new(), settings }];
-        let plan = Plan { points, ..Plan::default() };
+        let plan = SweepPlan { points, ..SweepPlan::default() };
         let names: Vec<&str> = short_names(&plan).into_values().collect();
         assert_eq!(names, ["gpu.a.queue", "gpu.b.queue", "core_hz"]);
     }

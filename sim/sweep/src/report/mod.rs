@@ -1,7 +1,7 @@
 //! What a sweep found: frontiers, winners, effects, and the confidence in all of that.
 //!
 //! ```text
-//! results -> Row -> Design (runs that differ in their seed are one) -> frontier, ranks, winners, effects -> Report -> files, page
+//! results -> Row -> Design (runs that differ in their seed are one) -> frontier, ranks, winners, effects -> SweepReport -> files, page
 //! ```
 
 mod design;
@@ -49,7 +49,7 @@ impl Default for ReportOptions {
 
 /// Report of a sweep.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Report {
+pub struct SweepReport {
     /// Name of the sweep.
     pub sweep: String,
     /// How far from the best the designs in `near_best` may be.
@@ -102,7 +102,7 @@ pub struct Failure {
 /// Name of the effects over all workloads.
 const ALL_WORKLOADS: &str = "all workloads";
 
-impl Report {
+impl SweepReport {
     /// Report of the sweep in `folder`.
     ///
     /// # Errors

@@ -8,7 +8,7 @@ use output::table::si;
 use serde::Serialize;
 use traces::pareto::nondominated;
 
-use super::{RatedDesign, Report};
+use super::{RatedDesign, SweepReport};
 
 /// Template of the page.
 const TEMPLATE: &str = include_str!("../../assets/report.html");
@@ -41,7 +41,7 @@ struct WinnerView<'a> {
     platform_mismatch: bool,
 }
 
-impl Report {
+impl SweepReport {
     /// The page.
     ///
     /// # Errors
@@ -92,7 +92,7 @@ const AREA: Quantity = ("area", "mm2", |rated| rated.design.area_mm2);
 /// Most designs on the frontier that are named.
 const MAX_NAMES: usize = 12;
 
-impl Report {
+impl SweepReport {
     /// Designs over each two of time, energy and area. The frontier is over all three; steps are that of the
     /// two that are shown.
     pub(super) fn picture(&self, plot_style: &PlotStyle) -> Picture {
@@ -145,7 +145,7 @@ fn steps(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
 /// Writes a table.
 type Table<'a> = Box<dyn Fn(&mut dyn Write) -> io::Result<()> + 'a>;
 
-impl Report {
+impl SweepReport {
     /// Tables by the names of their files.
     pub(super) fn tables(&self) -> Vec<(&'static str, Table<'_>)> {
         vec![
@@ -244,7 +244,7 @@ mod tests {
         let mut design = exact(&[("gpu.a", "2")], 2.0, 1.0);
         design.warnings = vec!["platform-mismatch".to_owned()];
         let mut report =
-            Report::of_designs([("w".to_owned(), vec![design])].into(), ReportOptions::default());
+            SweepReport::of_designs([("w".to_owned(), vec![design])].into(), ReportOptions::default());
         let html = report.html(&PlotStyle::default()).unwrap();
         assert!(
             html.contains("gpu.a=2 *")
@@ -262,7 +262,8 @@ mod tests {
     #[test]
     fn a_page_holds_its_designs_and_escapes_their_names() {
         let designs = vec![exact(&[("gpu.a", "1</script>")], 1.0, 2.0), exact(&[("gpu.a", "2")], 2.0, 1.0)];
-        let report = Report::of_designs([("a < b".to_owned(), designs)].into(), ReportOptions::default());
+        let report =
+            SweepReport::of_designs([("a < b".to_owned(), designs)].into(), ReportOptions::default());
         let html = report.html(&PlotStyle::default()).unwrap();
         assert!(html.contains("2 designs in 1 workload;") && html.contains("a &lt; b"), "{html}");
         assert!(!html.contains("1</script>") && html.contains("<svg"));
@@ -280,7 +281,7 @@ mod tests {
 
     #[test]
     fn empty_tables_have_the_header_of_full_ones() {
-        let texts = |report: &Report| -> Vec<String> {
+        let texts = |report: &SweepReport| -> Vec<String> {
             let text = |table: Table<'_>| {
                 let mut bytes = Vec::new();
                 table(&mut bytes).unwrap();
@@ -290,8 +291,8 @@ mod tests {
         };
         let design = |a: &str, b: &str| exact(&[("gpu.a", a), ("gpu.b", b)], 1.0 + a.len() as f64, 1.0);
         let designs = vec![design("1", "1"), design("1", "2"), design("22", "1"), design("22", "2")];
-        let full = Report::of_designs([("w".to_owned(), designs)].into(), ReportOptions::default());
-        let (full, empty) = (texts(&full), texts(&Report::default()));
+        let full = SweepReport::of_designs([("w".to_owned(), designs)].into(), ReportOptions::default());
+        let (full, empty) = (texts(&full), texts(&SweepReport::default()));
         for (full, empty) in full.iter().zip(&empty) {
             assert!(full.lines().count() > 1, "{full}");
             assert_eq!(format!("{}\n", full.lines().next().unwrap()), *empty);

@@ -23,7 +23,7 @@ use core::convert::Infallible;
 use core::ops::Range;
 use multiversion::multiversion;
 use pass::Candidate;
-pub(crate) use pass::{Gathered, Plan, Samples};
+pub(crate) use pass::{Gathered, MatchPlan, Samples};
 use rayon::prelude::*;
 
 /// How far, in samples, refinement may move a start from the lowest offset of the profile.
@@ -79,7 +79,7 @@ pub(super) fn find_matched(trace: &Trace, marks: &Marks, method: FinderMethod) -
         powers.map(|(&volts, &amperes)| f64::from(volts) * f64::from(amperes)).collect()
     };
     let windows = placement.marks.iter().map(window).collect();
-    let plan = Plan::new(clock, placement, windows, marks, method);
+    let plan = MatchPlan::new(clock, placement, windows, marks, method);
     let Ok(gathered) = plan.gather(&mut InMemory(trace));
     Ok(plan.conclude(marks, gathered).found)
 }
@@ -87,7 +87,7 @@ pub(super) fn find_matched(trace: &Trace, marks: &Marks, method: FinderMethod) -
 /// A start and the sum of powers (W) before it.
 type Summed = (FrameStart, PairSum);
 
-impl Plan {
+impl MatchPlan {
     /// From minima to frames.
     pub fn conclude(&self, marks: &Marks, mut gathered: Gathered) -> Matched {
         let clock = Clock { samples: Some(gathered.samples), ..self.clock };

@@ -72,7 +72,7 @@ pub(crate) struct Gathered {
 }
 
 /// The parameters of a pass.
-pub(crate) struct Plan {
+pub(crate) struct MatchPlan {
     pub(super) clock: Clock,
     pub(super) placement: Placement,
     /// The marks' windows.
@@ -86,7 +86,7 @@ pub(crate) struct Plan {
     positions: Vec<f64>,
 }
 
-impl Plan {
+impl MatchPlan {
     /// To find what resembles `windows`, the powers (W) of the marks, by [`FinderMethod::Normalized`] or else
     /// by squares.
     pub fn new(

@@ -506,7 +506,7 @@ mod tests {
     fn runs_of_frames_lone_frames_and_pauses_are_found_by_what_all_frames_begin_with() {
         let device = HELD_OUT_DEVICES.iter().find(|device| device.name == "on demand").unwrap();
         let scene = device.scene(80, 3).unwrap();
-        let trace = scene.record(&device.recording(3)).unwrap();
+        let trace = scene.record(&device.recorder(3)).unwrap();
         let truth_s: Vec<f64> = scene.truth.iter().map(|frame| frame.start_s).collect();
         // Frames from the end mark on are not searched for.
         let (end_s, truth_s) = (truth_s[70], &truth_s[..70]);

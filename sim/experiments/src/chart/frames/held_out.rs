@@ -75,7 +75,7 @@ pub(super) fn measure(frames: usize, seeds: &[u64]) -> Result<Vec<HeldOutRow>, S
     for device in &HELD_OUT_DEVICES {
         for &seed in seeds {
             let scene = device.scene(frames, seed)?;
-            let trace = scene.record(&device.recording(seed))?;
+            let trace = scene.record(&device.recorder(seed))?;
             for method in FinderMethod::ALL {
                 rows.push(row(device, seed, method, &scene, &trace)?);
             }

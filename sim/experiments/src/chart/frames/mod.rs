@@ -15,7 +15,7 @@ use serde::Serialize;
 use traces::Trace;
 use traces::energy::{FrameEnergy, PowerIntegral, TOLERANCE_S, score, true_frames};
 use traces::frames::{FinderMethod, Marks, Options, default_window, find_with};
-use traces::synth::{Recording, SCENARIOS, Scenario, Scene};
+use traces::synth::{RecorderSpec, SCENARIOS, Scenario, Scene};
 
 use self::held_out::{HeldOutRow, HeldOutSummary};
 use crate::study::table::{Sheet, Table, fixed, optional, plain, share};
@@ -111,17 +111,17 @@ impl Axis {
         }
     }
 
-    fn recordings(self, effort: &FramesEffort) -> Vec<(f64, Recording)> {
-        let usual = Recording::default();
+    fn recordings(self, effort: &FramesEffort) -> Vec<(f64, RecorderSpec)> {
+        let usual = RecorderSpec::default();
         match self {
             Self::Rate => {
-                effort.rates_hz.iter().map(|&rate_hz| (rate_hz, Recording { rate_hz, ..usual })).collect()
+                effort.rates_hz.iter().map(|&rate_hz| (rate_hz, RecorderSpec { rate_hz, ..usual })).collect()
             }
             Self::Noise => {
-                effort.snrs_db.iter().map(|&snr_db| (snr_db, Recording { snr_db, ..usual })).collect()
+                effort.snrs_db.iter().map(|&snr_db| (snr_db, RecorderSpec { snr_db, ..usual })).collect()
             }
             Self::Bits => {
-                effort.bits.iter().map(|&bits| (f64::from(bits), Recording { bits, ..usual })).collect()
+                effort.bits.iter().map(|&bits| (f64::from(bits), RecorderSpec { bits, ..usual })).collect()
             }
         }
     }
@@ -190,7 +190,7 @@ impl Study for FramesChart {
         let settings = Axis::ALL.into_iter().flat_map(|axis| {
             axis.recordings(&effort).into_iter().map(move |(value, recording)| (axis, value, recording))
         });
-        let settings: Vec<(Axis, f64, Recording)> = settings.collect();
+        let settings: Vec<(Axis, f64, RecorderSpec)> = settings.collect();
         let bar = progress.bar("recordings", (settings.len() * subjects.len()) as u64);
         let mut rows = Vec::new();
         // One after another: host times are part of what is measured.
@@ -453,10 +453,10 @@ impl Subject {
     }
 
     /// By each method, the outcome with each seed.
-    pub fn analyse(&self, recording: &Recording) -> Result<Vec<(Way, Vec<FinderScore>)>, StudyError> {
+    pub fn analyse(&self, recording: &RecorderSpec) -> Result<Vec<(Way, Vec<FinderScore>)>, StudyError> {
         let mut of = Way::ALL.map(|way| (way, Vec::new()));
         for (seed, scene) in &self.scenes {
-            let trace = scene.record(&Recording { seed: *seed, ..*recording })?;
+            let trace = scene.record(&RecorderSpec { seed: *seed, ..*recording })?;
             for (way, outcomes) in &mut of {
                 outcomes.push(analyse(&trace, scene, *way)?);
             }

@@ -15,7 +15,7 @@ use super::row::{Row, Verdict, With, numbers};
 use super::settings::{
     About, Form, Origin, Setting, load, paper_settings, reduced, row_settings, settings_group,
 };
-use super::stage::{Frames, MARKED, Recording, Stage, looped};
+use super::stage::{Frames, MARKED, Stage, TracedRun, looped};
 use super::{Done, Figure, Options, Paper};
 
 /// Both machines, with their simulated frames.
@@ -76,7 +76,7 @@ impl Bench<'_> {
     }
 
     /// Recording of the phone, which draws `frames` at its frame rate cap.
-    fn on_phone(&self, frames: &[&FramePower], circumstances: Circumstances) -> Result<Recording, RunError> {
+    fn on_phone(&self, frames: &[&FramePower], circumstances: Circumstances) -> Result<TracedRun, RunError> {
         self.on(&self.phone, frames, circumstances)
     }
 
@@ -86,14 +86,14 @@ impl Bench<'_> {
         stage: &Stage,
         frames: &[&FramePower],
         circumstances: Circumstances,
-    ) -> Result<Recording, RunError> {
-        Recording::new(stage, frames, stage.capped()?, circumstances)
+    ) -> Result<TracedRun, RunError> {
+        TracedRun::new(stage, frames, stage.capped()?, circumstances)
     }
 
     /// Recording of the PC, which draws its animation.
-    fn on_pc(&self, pacing: Pacing, circumstances: Circumstances) -> Result<Recording, RunError> {
+    fn on_pc(&self, pacing: Pacing, circumstances: Circumstances) -> Result<TracedRun, RunError> {
         let shown = looped(&self.pc_frames, self.recorded_frames());
-        Recording::new(&self.pc, &shown, pacing, circumstances)
+        TracedRun::new(&self.pc, &shown, pacing, circumstances)
     }
 }
 
@@ -304,7 +304,7 @@ fn missed(found: &[Found; 4]) -> String {
 }
 
 /// A recording and what was found in it.
-type Searched = (Recording, Frames);
+type Searched = (TracedRun, Frames);
 
 /// Recordings of the PC's animation with one mark each: the first, and how well all of them are found by
 /// either method.

@@ -6,7 +6,7 @@ use traces::energy::{Spread, WarmUp, mean_over_discarded, outliers, warm_up as k
 
 use super::super::report::{ENERGY, POWER, TIME, by_place, dots, level, line};
 use super::super::row::{Cases, Row, numbers};
-use super::super::stage::{MARKED, Recording, looped};
+use super::super::stage::{MARKED, TracedRun, looped};
 use super::super::{Done, Figure};
 use super::{Bench, settled, unflagged};
 
@@ -33,7 +33,7 @@ fn settles(energies_j: &[f64]) -> WarmUp {
 
 /// Recordings of one frame drawn again and again on a machine that draws more for so long after launch.
 struct Planted {
-    recordings: Vec<Recording>,
+    recordings: Vec<TracedRun>,
     energies: Vec<Vec<f64>>,
     knees: Vec<WarmUp>,
     /// Frames that it draws more for.
@@ -45,7 +45,7 @@ impl Planted {
         let stage = bench.phone.clone().launching(planted_s)?;
         let shown = vec![bench.frame(); *bench.settings.iii_3.recorded.get(bench.form)];
         let recordings = (1..=bench.repeats()).map(|seed| bench.on(&stage, &shown, launched(seed)));
-        let recordings: Vec<Recording> = recordings.collect::<Result<_, _>>()?;
+        let recordings: Vec<TracedRun> = recordings.collect::<Result<_, _>>()?;
         let energies = recordings.iter().map(|recording| Ok(recording.find(1)?.energies_j()));
         let energies: Vec<Vec<f64>> = energies.collect::<Result<_, RunError>>()?;
         let knees = energies.iter().map(|energies| settles(energies)).collect();
@@ -130,7 +130,7 @@ pub(super) fn warm_up(bench: &Bench<'_>) -> Result<Done, RunError> {
 }
 
 /// Figure 5a: nine frames about the drop.
-fn drop(recording: &Recording) -> Figure {
+fn drop(recording: &TracedRun) -> Figure {
     let frames = &recording.truth.frames;
     let (from_s, to_s) = (frames[44].start_s, frames[52].end_s);
     let points = recording.points(from_s, to_s);
@@ -183,12 +183,12 @@ fn discarded(energies: &[f64], knee: usize) -> Figure {
 const SHORT: usize = 24;
 
 /// The disturbances of the kind that is listed first: those every five seconds.
-fn five_second_ones(recording: &Recording) -> Vec<&Pulse> {
+fn five_second_ones(recording: &TracedRun) -> Vec<&Pulse> {
     recording.truth.pulses.iter().filter(|pulse| pulse.cause == Cause::Disturbance(0)).collect()
 }
 
 /// For each true frame, how much of it is disturbed, s.
-fn overlaps_s(recording: &Recording) -> Vec<f64> {
+fn overlaps_s(recording: &TracedRun) -> Vec<f64> {
     let pulses = five_second_ones(recording);
     let frames = recording.truth.frames.iter();
     frames.map(|frame| pulses.iter().map(|pulse| pulse.overlap_s(frame.start_s, frame.end_s)).sum()).collect()
@@ -204,7 +204,7 @@ struct Tally {
     disturbances: usize,
 }
 
-fn tally(recording: &Recording, flags: &[bool]) -> Tally {
+fn tally(recording: &TracedRun, flags: &[bool]) -> Tally {
     let touched: Vec<bool> = overlaps_s(recording).iter().map(|overlap_s| *overlap_s > 0.0).collect();
     let counts: Vec<usize> = five_second_ones(recording)
         .into_iter()
@@ -229,7 +229,7 @@ fn tally(recording: &Recording, flags: &[bool]) -> Tally {
 
 /// One frame drawn again and again, with what the analysis makes of it.
 struct Still {
-    recording: Recording,
+    recording: TracedRun,
     energies: Vec<f64>,
     flags: Vec<bool>,
     tally: Tally,
@@ -329,7 +329,7 @@ fn reason(still: &Still) -> Option<String> {
 }
 
 /// Figure 8, lower right: power over a group of disturbed frames.
-fn hit(recording: &Recording) -> Figure {
+fn hit(recording: &TracedRun) -> Figure {
     let inside = |pulse: &&&Pulse| {
         pulse.start_s > recording.truth.start_s + 0.2 && pulse.end_s < recording.truth.end_s - 0.2
     };
