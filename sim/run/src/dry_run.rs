@@ -306,7 +306,7 @@ impl Probe<'_> {
         let recorder = Recorder::new(crate::BIN_PS, frame::MIN_FRAME_BINS);
         let mut clock = FrameClock::new(level, plan.gpu.machine()?, recorder);
         let emit = |packet: &_, lines: &_| clock.push(packet, lines);
-        let mut gpu = Gpu::new(&plan.gpu.pipeline, emit).map_err(RunError::setting)?;
+        let mut gpu = Gpu::new(&plan.gpu.pipeline, emit)?;
         ready.draw(&mut gpu).map_err(RunError::on(&plan.gpu))?;
         let triangles = gpu.finish().triangles();
         clock.finish()?;

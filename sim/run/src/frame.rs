@@ -202,7 +202,7 @@ fn simulate_frame(plan: &Plan, number: u32, max_bins: usize) -> Result<(RunFrame
 
 /// Error of simulating a run without a timing level.
 fn not_timed() -> RunError {
-    RunError::setting("timing: none; cycles and joules need a timing level, such as packet")
+    RunError::invalid("timing", "none; cycles and joules need a timing level, such as packet")
 }
 
 fn busy_shares(timeline: &Timeline) -> Vec<[f32; Unit::COUNT]> {
@@ -276,7 +276,7 @@ pub(crate) fn draw_on<'a>(
     stop: Option<&'a Cell<bool>>,
     emit: impl FnMut(&Packet, &[LineAccess]) + 'a,
 ) -> Result<(Drawn, FrameReport), RunError> {
-    let mut on = Gpu::new(&gpu.pipeline, emit).map_err(RunError::setting)?;
+    let mut on = Gpu::new(&gpu.pipeline, emit)?;
     if let Some((events, viewport)) = heat {
         on = on.with_heat(events, viewport);
     }

@@ -43,6 +43,8 @@ pub mod visibility;
 mod warn;
 mod write;
 
+use std::fmt::Display;
+
 use output::image::ImageError;
 use output::plot::PlotError;
 use output::terminal::Progress;
@@ -299,6 +301,14 @@ pub enum RunError {
     #[error("GPU `{gpu}`: {source}")]
     Groups { gpu: String, source: JobError },
     #[error(transparent)]
+    Pass(#[from] PassError),
+    #[error(transparent)]
+    Draw(#[from] pipeline::DrawError),
+    #[error(transparent)]
+    Camera(#[from] pipeline::CameraError),
+    #[error(transparent)]
+    Stress(#[from] workloads::stress::StressError),
+    #[error(transparent)]
     Gpu(#[from] GpuError),
     #[error(transparent)]
     Change(#[from] ChangeError),
@@ -348,8 +358,13 @@ pub enum RunError {
 
 impl RunError {
     /// Invalid setting, with the message of `why`.
-    pub fn setting(why: impl std::fmt::Display) -> Self {
+    pub fn setting(why: impl Display) -> Self {
         Self::Setting(why.to_string())
+    }
+
+    /// What is wrong with `name`: a setting, a file or what is drawn.
+    pub fn invalid(name: impl Display, why: impl Display) -> Self {
+        Self::Setting(format!("{name}: {why}"))
     }
 
     /// Error of a frame on `gpu`, with its name where it is the GPU that cannot run groups.

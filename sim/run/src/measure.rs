@@ -101,11 +101,9 @@ fn too_slow(plan: &Plan, resolution: &Resolution, run: &Run) -> RunError {
         None => "draw a larger image".to_owned(),
     };
     let default = if plan.options.trace_rate_hz.is_some() { ", or leave it out" } else { "" };
-    RunError::Setting(format!(
-        "trace rate: {} is too low to find frames of {}: {remedy}{default}",
-        si(resolution.rate_hz, "Hz"),
-        si(frame_s, "s")
-    ))
+    let [rate, frame] = [si(resolution.rate_hz, "Hz"), si(frame_s, "s")];
+    let why = format!("{rate} is too low to find frames of {frame}: {remedy}{default}");
+    RunError::invalid("trace rate", why)
 }
 
 /// Length of the shortest frame in seconds.

@@ -88,8 +88,9 @@ impl Plan {
         let mut changes = Changes::new(&options.changes)?;
         let (name, job) = load_job(&options, &mut changes)?;
         let settings = job.settings();
-        let viewport = Viewport::new(settings.width, settings.height)
-            .ok_or_else(|| RunError::Setting(format!("size: {}x{}", settings.width, settings.height)))?;
+        let viewport = Viewport::new(settings.width, settings.height).ok_or_else(|| {
+            RunError::invalid("size", format_args!("{}x{}", settings.width, settings.height))
+        })?;
         let pacing = match options.pacing {
             PacingChoice::Vsync => Pacing::vsync(settings.frame_rate_hz)?,
             PacingChoice::Free => Pacing::FreeRunning,
@@ -202,13 +203,13 @@ impl Powered {
 /// Checks rate and packet loss of the recorder.
 fn check_recorder(options: &RunOptions) -> Result<(), RunError> {
     if let Some(rate) = options.trace_rate_hz.filter(|rate| !RATES_HZ.contains(rate)) {
-        return Err(RunError::Setting(format!(
-            "trace rate: {rate}; a recorder takes 1 to 1e7 samples a second"
-        )));
+        let why = format!("{rate}; a recorder takes 1 to 1e7 samples a second");
+        return Err(RunError::invalid("trace rate", why));
     }
     if !(0.0..1.0).contains(&options.packet_loss) {
         let loss = options.packet_loss;
-        return Err(RunError::Setting(format!("packet loss: {loss}; a share from 0 to below 1 can be lost")));
+        let why = format!("{loss}; a share from 0 to below 1 can be lost");
+        return Err(RunError::invalid("packet loss", why));
     }
     Ok(())
 }
@@ -243,14 +244,15 @@ fn check_images(options: &RunOptions) -> Result<(), RunError> {
 ///
 /// # Errors
 /// [`RunError::Setting`] with their names, if there are any.
-pub fn refuse_beside_images(asked: &[String]) -> Result<(), RunError> {
-    if asked.is_empty() {
+pub fn refuse_beside_images(requested: &[String]) -> Result<(), RunError> {
+    if requested.is_empty() {
         return Ok(());
     }
-    Err(RunError::Setting(format!(
-        "--timing none: it draws images and counts nothing, and {} needs counts or time; leave one of both out",
-        asked.join(", ")
-    )))
+    let why = format!(
+        "it draws images and counts nothing, and {} needs counts or time; leave one of both out",
+        requested.join(", ")
+    );
+    Err(RunError::invalid("--timing none", why))
 }
 
 /// Size of a run, from the parts of a plan.
@@ -314,12 +316,13 @@ const MAX_FRAMES: u32 = 100_000;
 pub fn fits_memory(what: &str, pixels: u64, samples: u32, bytes_per_sample: u64) -> Result<(), RunError> {
     let bytes = pixels * u64::from(samples) * bytes_per_sample;
     let (needed, limit) = (bytes >> 30, MAX_SAMPLE_BYTES >> 30);
-    let message = || {
-        format!(
-            "{what}: {pixels} pixels of {samples} samples take {needed} GiB, more than {limit} GiB; ask for fewer"
-        )
-    };
-    if bytes > MAX_SAMPLE_BYTES { Err(RunError::Setting(message())) } else { Ok(()) }
+    if bytes <= MAX_SAMPLE_BYTES {
+        return Ok(());
+    }
+    let why = format!(
+        "{pixels} pixels of {samples} samples take {needed} GiB, more than {limit} GiB; ask for fewer"
+    );
+    Err(RunError::invalid(what, why))
 }
 
 /// Quantities that determine memory and disk space of a run.
@@ -336,13 +339,10 @@ pub(super) struct Size {
 impl Size {
     /// Checks memory, number of frames and length of the trace.
     pub fn check(&self) -> Result<(), RunError> {
-        let refuse = |message| Err(RunError::Setting(message));
         fits_memory("size and samples", self.pixels, self.samples, BYTES_PER_SAMPLE)?;
         if self.frames > MAX_FRAMES {
-            return refuse(format!(
-                "frames: {} in one run; at most {MAX_FRAMES}, ask for fewer",
-                self.frames
-            ));
+            let why = format!("{} in one run; at most {MAX_FRAMES}, ask for fewer", self.frames);
+            return Err(RunError::invalid("frames", why));
         }
         trace_fits(self.recorded_s(), self.trace_rate_hz)
     }
@@ -369,10 +369,11 @@ pub(super) fn trace_fits(length_s: f64, rate_hz: f64) -> Result<(), RunError> {
     if samples <= MAX_TRACE_SAMPLES {
         return Ok(());
     }
-    Err(RunError::Setting(format!(
-        "the trace: {length_s:.0} s at {rate_hz} samples a second are {samples:.1e} samples, more than {MAX_TRACE_SAMPLES:.0e}; ask \
+    let why = format!(
+        "{length_s:.0} s at {rate_hz} samples a second are {samples:.1e} samples, more than {MAX_TRACE_SAMPLES:.0e}; ask \
          for fewer frames, a lower --trace-rate, a higher --rate, or less lead_in_s and tail_s in the platform file"
-    )))
+    );
+    Err(RunError::invalid("the trace", why))
 }
 
 #[cfg(test)]

@@ -155,7 +155,7 @@ pub fn again(
     let path = if path.is_dir() { &path.join("summary.json") } else { path };
     let name = path.display();
     let text = fs::read(path).map_err(|source| RunError::Input { path: name.to_string(), source })?;
-    let refuse = |message: String| RunError::Setting(format!("{name}: {message}"));
+    let refuse = |message: String| RunError::invalid(&name, message);
     let damaged = |error: serde_json::Error| RunError::Damaged {
         path: name.to_string(),
         message: format!("it is cut off or damaged: {error}; get the file again"),

@@ -310,7 +310,7 @@ impl<'a> Previewer<'a> {
         let recorder = Recorder::new(crate::BIN_PS, TIMELINE_BINS);
         let mut clock = FrameClock::new(self.level, self.plan.gpu.machine()?, recorder);
         let emit = |packet: &_, lines: &_| clock.push(packet, lines);
-        let mut gpu = Gpu::new(&self.plan.gpu.pipeline, emit).map_err(RunError::setting)?;
+        let mut gpu = Gpu::new(&self.plan.gpu.pipeline, emit)?;
         let drawn = self.job.frame(number, &mut gpu).map_err(RunError::on(&self.plan.gpu))?;
         let report = gpu.finish();
         let timed = clock.finish()?;

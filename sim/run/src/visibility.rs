@@ -230,10 +230,11 @@ pub(super) fn check_job(plan: &Plan) -> Result<(), RunError> {
     if is_rendering(plan) {
         return Ok(());
     }
-    Err(RunError::Setting(format!(
-        "--timing none: it draws scenes, and `{}` is a workload, whose results are counts; take another timing level",
+    let why = format!(
+        "it draws scenes, and `{}` is a workload, whose results are counts; take another timing level",
         plan.name
-    )))
+    );
+    Err(RunError::invalid("--timing none", why))
 }
 
 /// A frame as drawn.
@@ -275,7 +276,7 @@ impl Prepared {
 fn frame(plan: &Plan, distinct: &Distinct, group: usize, dir: &OutDir) -> Result<Frame, RunError> {
     let numbers = distinct.numbers();
     let number = numbers[group];
-    let mut gpu = Gpu::images_only(&plan.gpu.pipeline).map_err(RunError::setting)?;
+    let mut gpu = Gpu::images_only(&plan.gpu.pipeline)?;
     let Drawn { image, warnings, .. } = plan.job.frame(number, &mut gpu).map_err(RunError::on(&plan.gpu))?;
     distinct.members(group).try_for_each(|number| write_image(plan, dir, number, &image))?;
     let shown = [numbers[0], numbers[numbers.len() / 2], numbers[numbers.len() - 1]];

@@ -194,9 +194,8 @@ fn timed(args: &TimeArgs, recorded: &RecordedRun, gpus: &[PathBuf]) -> Result<Ve
 /// The recorded run on a GPU.
 fn planned(args: &TimeArgs, recorded: &RecordedRun, gpu: &Path) -> Result<Plan, RunError> {
     if let Some((name, value)) = args.set.iter().find(|(path, _)| !path.contains('.')) {
-        return Err(RunError::Setting(format!(
-            "--set {name}={value}: it is of the drawing; only gpu., platform. and table. can be set here"
-        )));
+        let why = "it is of the drawing; only gpu., platform. and table. can be set here";
+        return Err(RunError::invalid(format_args!("--set {name}={value}"), why));
     }
     let changes = args.set.iter().cloned().map(|(path, value)| Change { path, value }).collect();
     recorded.plan(RunOptions {

@@ -138,7 +138,7 @@ impl Setting {
     }
 
     fn refused(&self, message: impl std::fmt::Display) -> RunError {
-        RunError::Setting(format!("{}: `{}`: {message}", self.path, self.value))
+        RunError::invalid(format_args!("{}: `{}`", self.path, self.value), message)
     }
 }
 
@@ -332,10 +332,8 @@ fn check_scene(settings: &[Setting]) -> Result<(), RunError> {
         name if VIEW.contains(&name) => format!("`{name}`"),
         _ => format!("the settings {}, or `workload.NAME` of a workload", VIEW.join(", ")),
     };
-    Err(RunError::Setting(format!(
-        "{}={}: `{scene}` is not a scene in a .ron file: use {instead} in its place",
-        inside.path, inside.value
-    )))
+    let why = format!("`{scene}` is not a scene in a .ron file: use {instead} in its place");
+    Err(RunError::invalid(format_args!("{}={}", inside.path, inside.value), why))
 }
 
 #[cfg(test)]

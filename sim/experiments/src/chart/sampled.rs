@@ -304,11 +304,12 @@ fn plan(scene: &str, effort: SampledEffort) -> Result<Plan, RunError> {
     if distinct.numbers().len() == distinct.groups().len() {
         return Ok(plan);
     }
-    Err(RunError::Setting(format!(
-        "{scene}: {} of its {} frames differ, so there is too little to predict; name an animated scene",
+    let why = format!(
+        "{} of its {} frames differ, so there is too little to predict; name an animated scene",
         distinct.numbers().len(),
         distinct.groups().len()
-    )))
+    );
+    Err(RunError::invalid(scene, why))
 }
 
 /// Values over all frames: cycles a frame, joules a frame while busy, watts while busy.

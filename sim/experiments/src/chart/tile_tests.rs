@@ -6,8 +6,9 @@ use pipeline::{LensShape, PassError, SampleTable, Viewport};
 use rayon::prelude::*;
 use serde::Serialize;
 use workloads::Overrides;
-use workloads::stress::{Size, family};
+use workloads::stress::Size;
 
+use crate::stress::family_named;
 use crate::stress::measure::{Pairs, SWITCHES, Subject, Work, combinations, differing, on_subject};
 use crate::study::table::{Sheet, Table, fixed, plain, share};
 use crate::study::tradeoff::{Metric, TradeoffPoint, front};
@@ -169,8 +170,9 @@ fn of_family(
     gpu: &GpuSpec,
 ) -> Result<Vec<TileTestsRow>, RunError> {
     let label = format!("{name} at {value}");
-    let family = family(name).ok_or_else(|| RunError::Setting(format!("{label}: unknown family")))?;
-    on_subject(family, value, effort.families, 1, gpu, |subject| rows(&label, subject, effort.pairs))
+    on_subject(family_named(name)?, value, effort.families, 1, gpu, |subject| {
+        rows(&label, subject, effort.pairs)
+    })
 }
 
 fn of_scene(name: &str, effort: &TileTestsEffort, gpu: &GpuSpec) -> Result<Vec<TileTestsRow>, RunError> {
@@ -181,12 +183,12 @@ fn of_scene(name: &str, effort: &TileTestsEffort, gpu: &GpuSpec) -> Result<Vec<T
     let frame = scene.frame(frames.start + (frames.end - frames.start) / 2)?;
     let draws = frame.draws(&scene)?;
     let samples = SampleTable::low_discrepancy(4, 1, LensShape::Disk)?;
-    let viewport = Viewport::new(size.0, size.1).ok_or_else(|| RunError::Setting("size: none".to_owned()))?;
+    let viewport = Viewport::new(size.0, size.1).ok_or_else(|| RunError::invalid("size", "none"))?;
     let label = Path::new(name).file_name().map_or(name.into(), |file| file.to_string_lossy());
     let (camera, spec) = (&frame.camera, &gpu.pipeline);
     let subject = Subject { camera, viewport, samples: &samples, draws: &draws, spec };
     let rows = rows(&label, &subject, effort.pairs);
-    rows.map_err(|error| RunError::Setting(format!("{label}: {error}")))
+    rows.map_err(|error| RunError::invalid(label, error))
 }
 
 fn rows(scene: &str, subject: &Subject<'_>, pairs: u64) -> Result<Vec<TileTestsRow>, PassError> {

@@ -104,15 +104,18 @@ impl Options {
         let ids = paper.rows();
         let unknown = self.rows.iter().find(|row| !ids.iter().any(|id| id.eq_ignore_ascii_case(row)));
         if let Some(row) = unknown {
-            let message = format!("no row `{row}` in Paper {}; its rows: {}", paper.number(), ids.join(", "));
-            return Err(RunError::Setting(message));
+            return Err(RunError::setting(format_args!(
+                "no row `{row}` in Paper {}; its rows: {}",
+                paper.number(),
+                ids.join(", ")
+            )));
         }
         if self.collision_data.is_some() && !(paper == Paper::Six && self.wants(paper6::READS_COLLISION_DATA))
         {
             let row = paper6::READS_COLLISION_DATA;
-            let message =
-                format!("--collision-data is read by row {row} alone: leave it out, or compute that row");
-            return Err(RunError::Setting(message));
+            return Err(RunError::setting(format_args!(
+                "--collision-data is read by row {row} alone: leave it out, or compute that row"
+            )));
         }
         Ok(())
     }

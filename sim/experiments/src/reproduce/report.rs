@@ -223,14 +223,14 @@ pub(super) fn check_earlier(paper: Paper, options: &Options, out: &Destination) 
         0 => "this is the quick form".to_owned(),
         lost => format!("{lost} of them are not computed now"),
     };
-    Err(RunError::Setting(format!(
-        "{}: holds a {} result of Paper {} with {} rows ({}), and {why}; give another folder with --out, or --force to lose it",
-        out.folder.display(),
+    let why = format!(
+        "holds a {} result of Paper {} with {} rows ({}), and {why}; give another folder with --out, or --force to lose it",
         form.name(),
         paper.number(),
         ids.len(),
         ids.join(", ")
-    )))
+    );
+    Err(RunError::invalid(out.folder.display(), why))
 }
 
 /// A picture and its name.

@@ -323,10 +323,10 @@ fn parse<T: PaperSettings>(text: &str, name: &str) -> Result<(T, Origin), RunErr
     let settings: T = spec::parse(text, name)?;
     let (paper, number) = (settings.paper(), T::PAPER.number());
     if paper != number {
-        let message = format!("{name}: `paper` is \"{paper}\"; settings of Paper {number} have \"{number}\"");
-        return Err(RunError::Setting(message));
+        let why = format!("`paper` is \"{paper}\"; settings of Paper {number} have \"{number}\"");
+        return Err(RunError::invalid(name, why));
     }
-    settings.check().map_err(|message| RunError::Setting(format!("{name}: {message}")))?;
+    settings.check().map_err(|message| RunError::invalid(name, message))?;
     Ok((settings, Origin { file: name.to_owned(), sha256: sha256_of_text(text), committed: text == T::TEXT }))
 }
 

@@ -129,7 +129,7 @@ impl Stage {
     }
 
     fn without(&self, what: &str) -> RunError {
-        RunError::Setting(format!("platform `{}` has no `system.{what}`", self.platform.name))
+        RunError::setting(format_args!("platform `{}` has no `system.{what}`", self.platform.name))
     }
 
     /// Power over time of frame `number` of a scene, with a shader for each of its own.
@@ -149,8 +149,7 @@ impl Stage {
             FrameClock::new(Level::default(), self.gpu.machine()?, Recorder::new(BIN_PS, MAX_BINS));
         RasterPass::new(&frame.camera, &draws, &settings)
             .without_image()
-            .render(|packet, lines| clock.push(packet, lines))
-            .map_err(RunError::setting)?;
+            .render(|packet, lines| clock.push(packet, lines))?;
         let timeline = clock.finish()?.timeline;
         self.model.frame(&timeline).map_err(|source| RunError::Timeline { frame: number, source })
     }

@@ -419,12 +419,12 @@ pub fn on_subject<T>(
     gpu: &GpuSpec,
     run: impl FnOnce(&Subject<'_>) -> Result<T, PassError>,
 ) -> Result<T, RunError> {
-    let failed = |message: String| RunError::Setting(format!("{} at {value}: {message}", family.name));
-    let scene = family.scene(value, size, seed).map_err(|error| failed(error.to_string()))?;
-    let draws = [scene.draw(&Unshaded).map_err(|error| failed(error.to_string()))?];
+    let name = format!("{} at {value}", family.name);
+    let scene = family.scene(value, size, seed).map_err(|error| RunError::invalid(&name, error))?;
+    let draws = [scene.draw(&Unshaded).map_err(|error| RunError::invalid(&name, error))?];
     let (camera, viewport, samples) = (&scene.camera, scene.viewport, &scene.samples);
     let subject = Subject { camera, viewport, samples, draws: &draws, spec: &gpu.pipeline };
-    run(&subject).map_err(|error| failed(error.to_string()))
+    run(&subject).map_err(|error| RunError::invalid(&name, error))
 }
 
 /// The triangle of each sample and the bits of its depth.

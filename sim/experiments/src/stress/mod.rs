@@ -33,7 +33,7 @@ const SEED: u64 = 1;
 pub fn family_named(name: &str) -> Result<&'static Family, RunError> {
     let unknown = || {
         let names: Vec<_> = families().map(|family| family.name).collect();
-        RunError::Setting(format!("no family called `{name}`; there are {}", names.join(", ")))
+        RunError::setting(format_args!("no family called `{name}`; there are {}", names.join(", ")))
     };
     family(name).ok_or_else(unknown)
 }

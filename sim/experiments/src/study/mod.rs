@@ -300,6 +300,15 @@ impl StudyError {
     }
 }
 
+impl From<StudyError> for RunError {
+    fn from(error: StudyError) -> Self {
+        match error {
+            StudyError::Run(error) => error,
+            other => Self::setting(other),
+        }
+    }
+}
+
 /// Counts of what ran.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Ran {

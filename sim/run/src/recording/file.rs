@@ -185,9 +185,8 @@ impl RecordedRun {
         let of_scene = |change: &&Change| InputFile::of(&change.path) == Some(InputFile::Scene);
         if let Some(change) = options.changes.iter().find(of_scene) {
             let file = self.path.display();
-            return Err(RunError::Setting(format!(
-                "--set {change}: the frames of {file} are drawn: record them anew"
-            )));
+            let why = format!("the frames of {file} are drawn: record them anew");
+            return Err(RunError::invalid(format_args!("--set {change}"), why));
         }
         let About { width, height, samples, frame_rate_hz, frames: [start, end], seed, .. } = self.about;
         let settings =
@@ -196,12 +195,13 @@ impl RecordedRun {
         let plan = Plan::of_job(options, &self.about.scene, Arc::new(RecordedJob { settings }))?;
         match first_difference("pipeline", &self.about.pipeline, &pipeline_of(&plan)) {
             None => Ok(plan),
-            Some((path, [drawn, asked])) => Err(RunError::Setting(format!(
-                "{}: GPU `{}` has {path} {asked}, and the frames were drawn on `{}` with {drawn}: record them on this GPU",
-                self.path.display(),
-                plan.gpu.name,
-                self.about.gpu
-            ))),
+            Some((path, [drawn, requested])) => {
+                let why = format!(
+                    "GPU `{}` has {path} {requested}, and the frames were drawn on `{}` with {drawn}: record them on this GPU",
+                    plan.gpu.name, self.about.gpu
+                );
+                Err(RunError::invalid(self.path.display(), why))
+            }
         }
     }
 

@@ -132,12 +132,12 @@ impl Bench {
         let (gpu, options) =
             (GpuSpec::load(GPU)?, ComputeOptions { list: LIST, ..ComputeOptions::default() });
         let job = job(&options, size)?;
-        let frame = DrawsScene::scene(&job).frame(0).map_err(RunError::setting)?;
-        let mut on = Gpu::without_packets(&gpu.pipeline).map_err(RunError::setting)?;
-        let depth = job.depths(&frame, &mut on).map_err(RunError::setting)?;
+        let frame = DrawsScene::scene(&job).frame(0)?;
+        let mut on = Gpu::without_packets(&gpu.pipeline)?;
+        let depth = job.depths(&frame, &mut on)?;
         let depths = on.contents(depth).unwrap_or_default();
         drop(on);
-        let lights = job.lights(&frame).map_err(RunError::setting)?;
+        let lights = job.lights(&frame)?;
         let table = job.samples();
         let mut samples = vec![Sample::default(); (size.0 * size.1) as usize];
         for (pixel, sample) in (0..).zip(samples.chunks_mut(1)) {
@@ -177,8 +177,8 @@ impl Bench {
                 Some((mean / self.mean - 1.0).abs())
             }
             (Sweep::Step, Kernel::MipChain) => {
-                let mut gpu = Gpu::without_packets(&self.gpu.pipeline).map_err(RunError::setting)?;
-                let chain = job.chain(frame, &mut gpu).map_err(RunError::setting)?;
+                let mut gpu = Gpu::without_packets(&self.gpu.pipeline)?;
+                let chain = job.chain(frame, &mut gpu)?;
                 Some((f64::from(chain.mean) / self.mean - 1.0).abs())
             }
             (Sweep::Step, _) => {
@@ -196,12 +196,12 @@ impl Bench {
     }
 
     fn lists(&self, job: &Compute, options: &ComputeOptions) -> Result<TileLights, RunError> {
-        let mut gpu = Gpu::without_packets(&self.gpu.pipeline).map_err(RunError::setting)?;
-        let depth = job.depths(&self.frame, &mut gpu).map_err(RunError::setting)?;
+        let mut gpu = Gpu::without_packets(&self.gpu.pipeline)?;
+        let depth = job.depths(&self.frame, &mut gpu)?;
         let view = gpu.surface_view(depth).ok_or_else(|| RunError::setting("no depths"))?;
-        let viewport = job.viewport().map_err(RunError::setting)?;
-        let mut kernels = Kernels::new(&mut gpu, options).map_err(RunError::setting)?;
-        kernels.light_lists(&view, (&self.frame.camera, viewport), &self.lights).map_err(RunError::setting)
+        let viewport = job.viewport()?;
+        let mut kernels = Kernels::new(&mut gpu, options)?;
+        Ok(kernels.light_lists(&view, (&self.frame.camera, viewport), &self.lights)?)
     }
 
     /// Share of the lights in lists that reach no sample of their tile.
@@ -291,11 +291,11 @@ fn found<T>(
     options: &ComputeOptions,
     run: impl Fn(&mut Kernels<'_, '_>, &pipeline::SurfaceView) -> Result<T, pipeline::PassError>,
 ) -> Result<T, RunError> {
-    let mut gpu = Gpu::without_packets(&gpu.pipeline).map_err(RunError::setting)?;
-    let image = job.image(frame, None, &mut gpu).map_err(RunError::setting)?;
+    let mut gpu = Gpu::without_packets(&gpu.pipeline)?;
+    let image = job.image(frame, None, &mut gpu)?;
     let view = gpu.surface_view(image).ok_or_else(|| RunError::setting("no image"))?;
-    let mut kernels = Kernels::new(&mut gpu, options).map_err(RunError::setting)?;
-    run(&mut kernels, &view).map_err(RunError::setting)
+    let mut kernels = Kernels::new(&mut gpu, options)?;
+    Ok(run(&mut kernels, &view)?)
 }
 
 fn histogram(

@@ -178,7 +178,7 @@ fn errors(
         let (timed, _) = timed(level, spec, &written)?;
         let failed = |error| {
             let (subject, gpu, level) = (subject.name(), &spec.name, level.name());
-            RunError::Setting(format!("{subject} on the GPU `{gpu}` at `{level}`: {error}"))
+            RunError::invalid(format_args!("{subject} on the GPU `{gpu}` at `{level}`"), error)
         };
         let power = model.frame(&timed.timeline).map_err(failed)?;
         Ok((timed, power.energy().total_j()))

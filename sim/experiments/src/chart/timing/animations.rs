@@ -15,9 +15,11 @@ use run::{
 use serde::Serialize;
 use timing::Level;
 use workloads::job::{OptionSource, Reduction, Request};
-use workloads::stress::{Size, StressScene, family};
+use workloads::stress::{Size, StressScene};
 use workloads::visibility::Unshaded;
 use workloads::{Job, Overrides, catalog};
+
+use crate::stress::family_named;
 
 /// The name of the level that simulates few frames and predicts the others.
 pub(super) const SAMPLED: &str = "sampled";
@@ -303,11 +305,11 @@ fn middle_frame(job: Box<dyn Job>) -> What {
 }
 
 fn of_family(name: &'static str, value: f64) -> Result<Subject, RunError> {
-    let failed = |message: String| RunError::Setting(format!("{name} at {value}: {message}"));
-    let family = family(name).ok_or_else(|| failed("unknown family".to_owned()))?;
-    let scene = family.scene(value, Size::QUICK, 1).map_err(|error| failed(error.to_string()))?;
+    let family = family_named(name)?;
+    let name = format!("{name} at {value}");
+    let scene = family.scene(value, Size::QUICK, 1).map_err(|error| RunError::invalid(&name, error))?;
     let what = What::Family(Box::new(scene));
-    Ok(Subject { name: format!("{name} at {value}"), kind: SubjectKind::Family, what })
+    Ok(Subject { name, kind: SubjectKind::Family, what })
 }
 
 impl Subject {
@@ -332,16 +334,15 @@ impl Subject {
 
     /// Renders the frame, every packet to `emit`.
     pub fn render(&self, gpu: &GpuSpec, emit: impl FnMut(&Packet, &[LineAccess])) -> Result<(), RunError> {
-        let failed = |error: String| RunError::Setting(format!("{}: {error}", self.name));
-        let mut on = Gpu::new(&gpu.pipeline, emit).map_err(|error| failed(error.to_string()))?;
+        let mut on = Gpu::new(&gpu.pipeline, emit).map_err(|error| RunError::invalid(&self.name, error))?;
         match &self.what {
             What::Job { job, frame } => drop(job.frame(*frame, &mut on)?),
             What::Family(scene) => {
-                let draws = [scene.draw(&Unshaded).map_err(|error| failed(error.to_string()))?];
+                let draws = [scene.draw(&Unshaded).map_err(|error| RunError::invalid(&self.name, error))?];
                 let (viewport, samples) = (scene.viewport, &scene.samples);
                 let settings = Settings { spec: &gpu.pipeline, viewport, samples, background: Vec3::ZERO };
                 let pass = RasterPass::new(&scene.camera, &draws, &settings);
-                on.draw(&pass).map_err(|error| failed(error.to_string()))?;
+                on.draw(&pass).map_err(|error| RunError::invalid(&self.name, error))?;
             }
         }
         on.finish();

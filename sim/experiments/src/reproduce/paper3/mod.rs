@@ -320,7 +320,7 @@ fn scored(bench: &Bench<'_>, pacing: Pacing, first_seed: u64) -> Result<(Searche
         tracking.push(recording.score(&tracked, within_s));
         first.get_or_insert((recording, tracked));
     }
-    let none = || RunError::Setting("no recording was requested".to_owned());
+    let none = || RunError::setting("no recording was requested");
     Ok((first.ok_or_else(none)?, [Found::of(&squares), Found::of(&tracking)]))
 }
 

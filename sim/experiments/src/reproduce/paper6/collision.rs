@@ -92,8 +92,7 @@ impl Drawn {
         for &method in methods {
             let one = |passes: &mut PlainPasses, pair: &Pair| passes.pair_on(pair, method, hardware);
             let each = pairs.par_iter().with_max_len(1).map_init(|| PlainPasses::new(resolution), one);
-            let each: Vec<(Overlaps, PassWork)> =
-                each.collect::<Result<_, _>>().map_err(RunError::setting)?;
+            let each: Vec<(Overlaps, PassWork)> = each.collect::<Result<_, _>>()?;
             let cleared = each.iter().filter(|(overlaps, _)| !overlaps.may_collide()).count();
             drawn.cleared.push(cleared as u64);
             drawn.work = each.iter().fold(drawn.work, |all, (_, one)| all.and(one));
@@ -372,7 +371,7 @@ pub(super) fn dodged(task: &Task<'_>) -> Result<Done, RunError> {
         let base = *row.resolution_px.get(form);
         if let Some(at) = each.iter().find(|at| at.resolution == base) {
             let on =
-                |method| PlainPasses::new(base).pair_on(&pair, method, &hardware).map_err(RunError::setting);
+                |method| PlainPasses::new(base).pair_on(&pair, method, &hardware).map_err(RunError::from);
             let ((ours, work), (depth, depth_work)) = (on(methods[0])?, on(Method::DepthOnly)?);
             there = there.and(&work).and(&depth_work);
             let same = if is_distinguished(case, &ours, &depth) { "does the same" } else { "does not" };

@@ -32,7 +32,7 @@ fn drawn(
     asked: u32,
 ) -> Result<Vec<Drawn>, RunError> {
     let one = |seed| Drawn::new([size.0, size.1], &change(kind.spec(asked, seed)), samples);
-    (0..scenes).map(one).collect::<Result<_, _>>().map_err(RunError::setting)
+    Ok((0..scenes).map(one).collect::<Result<_, _>>()?)
 }
 
 /// Answers of queries by intervals: objects hidden, those of them found, and those called hidden that a sample sees.
@@ -50,7 +50,7 @@ impl Share {
     fn of(scenes: &[Drawn], boxes: [u32; 3], tile_px: u32) -> Result<Self, RunError> {
         let mut share = Self::default();
         for scene in scenes {
-            let asked = scene.ask(boxes, tile_px).map_err(RunError::setting)?;
+            let asked = scene.ask(boxes, tile_px)?;
             share.ran += asked.ran;
             for (answer, seen) in asked.answers.iter().zip(&scene.seen) {
                 let hidden = seen.passed == 0;
@@ -223,7 +223,7 @@ pub(super) fn cost(task: &Task<'_>) -> Result<Done, RunError> {
         for &samples in row.samples.get(form) {
             let scenes = drawn(kind, *row.yards.get(form), |spec| spec, size, samples, asked)?;
             let answered = |scene: Drawn| {
-                let answered = scene.ask(kind.typical(), tile_px).map_err(RunError::setting)?;
+                let answered = scene.ask(kind.typical(), tile_px)?;
                 Ok((scene, answered))
             };
             queried.push(scenes.into_iter().map(answered).collect::<Result<Vec<_>, RunError>>()?);
@@ -305,12 +305,12 @@ impl Compared {
     fn of(scene: &StressScene, spec: &PipelineSpec) -> Result<Self, RunError> {
         let mut all = Self::default();
         for cull in [Cull::None, Cull::Back] {
-            let draws = [scene.draw(&Unshaded).map_err(RunError::setting)?.culling(cull)];
+            let draws = [scene.draw(&Unshaded)?.culling(cull)];
             let truth = brute_force(&scene.camera, &draws, scene.viewport, &scene.samples);
             let settings =
                 Settings { spec, viewport: scene.viewport, samples: &scene.samples, background: Vec3::ZERO };
             let pass = RasterPass::new(&scene.camera, &draws, &settings).onto(Target::Depth).with_visible();
-            let Rendered { visible: seen, counts, .. } = pass.render(|_, _| ()).map_err(RunError::setting)?;
+            let Rendered { visible: seen, counts, .. } = pass.render(|_, _| ())?;
             all.samples += seen.len() as u64;
             // A sample that one of them does not have differs as well.
             let missing = seen.len().abs_diff(truth.len());

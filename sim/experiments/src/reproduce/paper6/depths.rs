@@ -253,11 +253,11 @@ impl<'a> Scenes<'a> {
         let spec = GpuSpec::load("reference")?.pipeline;
         let one = |scene: &StressScene| -> Result<Ran, RunError> {
             let StressScene { camera, viewport, samples, .. } = scene;
-            let draws = [scene.draw(&Unshaded).map_err(RunError::setting)?];
+            let draws = [scene.draw(&Unshaded)?];
             let settings = Settings { spec: &spec, viewport: *viewport, samples, background: Vec3::ZERO };
-            let mut gpu = Gpu::without_packets(&spec).map_err(RunError::setting)?;
+            let mut gpu = Gpu::without_packets(&spec)?;
             let pass = RasterPass::new(camera, &draws, &settings).onto(Target::Depth);
-            gpu.draw(&pass).map_err(RunError::setting)?;
+            gpu.draw(&pass)?;
             Ok(Ran::of(&gpu.finish()))
         };
         self.catalogue.par_iter().chain([&self.random]).map(one).sum()
@@ -290,7 +290,7 @@ impl<'a> Scenes<'a> {
 
 /// Triangles through a pinhole: of every two one has both ends anywhere, the other drifts and wobbles a little.
 fn random(count: u32, side_px: u32, seed: u64) -> Result<StressScene, RunError> {
-    let camera = Camera::new(Affine3A::IDENTITY, 1.0, NEAR).map_err(RunError::setting)?;
+    let camera = Camera::new(Affine3A::IDENTITY, 1.0, NEAR)?;
     let viewport = Viewport::new(side_px, side_px)
         .ok_or_else(|| RunError::setting(format!("VI-15: {}", workloads::job::IMAGE_SIZE)))?;
     let samples = SampleTable::low_discrepancy(4, seed, LensShape::Disk)?;
@@ -535,9 +535,8 @@ impl Tiles {
 
 fn draw<'a>(scene: &'a StressScene, corners: &'a [u32; 3]) -> Result<Draw<'a>, RunError> {
     let close = if scene.open == scene.close { &scene.open } else { &scene.close };
-    let geometry =
-        Geometry::new(&scene.open, close, std::slice::from_ref(corners)).map_err(RunError::setting)?;
-    Ok(Draw { geometry, ..scene.draw(&Unshaded).map_err(RunError::setting)? })
+    let geometry = Geometry::new(&scene.open, close, std::slice::from_ref(corners))?;
+    Ok(Draw { geometry, ..scene.draw(&Unshaded)? })
 }
 
 /// Instants at which the facing is looked at.

@@ -42,9 +42,9 @@ fn drawn(
     let (options, request) = (OptionSource { file: None, set }, Request { overrides, seed: 1 });
     let (_, job) = catalog::load(Path::new(name), &options, &request)?;
     let gpu = GpuSpec::load("reference")?;
-    let mut on = Gpu::without_packets(&gpu.pipeline).map_err(RunError::setting)?;
+    let mut on = Gpu::without_packets(&gpu.pipeline)?;
     let first = job.settings().frames.start;
-    let image = job.frame(first, &mut on).map_err(RunError::setting)?.image;
+    let image = job.frame(first, &mut on)?.image;
     let size = [job.settings().width, job.settings().height];
     let pixels = image.iter().map(|color| color.to_array()).collect();
     Ok(CaptionedImage { size, pixels, caption: caption.to_owned() })
@@ -175,8 +175,8 @@ pub(super) fn balls_and_uncovered(darts: &Rasterized<3>, radius: f64) -> Result<
         shown.add(&cube, place(region.low.map(|at| at + 0.5 * region.side)), REGION);
     }
     let Shown { corners, triangles, colors } = shown;
-    let geometry = Geometry::new(&corners, &corners, &triangles).map_err(RunError::setting)?;
-    let geometry = geometry.with_colors(&colors).map_err(RunError::setting)?;
+    let geometry = Geometry::new(&corners, &corners, &triangles)?;
+    let geometry = geometry.with_colors(&colors)?;
     let light = SceneLight { toward: Some(Vec3::new(0.3, 0.9, 0.4).normalize()), ..SceneLight::default() };
     let shader = SurfaceShader::new(&Material::colored("ball", Vec3::ONE), &light).with_vertex_colors();
     let draws = [Draw::new(geometry, &shader, Cull::Back)];
@@ -185,9 +185,9 @@ pub(super) fn balls_and_uncovered(darts: &Rasterized<3>, radius: f64) -> Result<
     let viewport = Viewport::new(SPACE_PX, SPACE_PX).ok_or_else(|| RunError::setting("no pixels"))?;
     let settings =
         pipeline::Settings { spec: &gpu.pipeline, viewport, samples: &samples, background: Vec3::ONE };
-    let camera = corner_view().map_err(RunError::setting)?;
+    let camera = corner_view()?;
     let pass = RasterPass::new(&camera, &draws, &settings).named("points");
-    let image = pass.uncounted().map_err(RunError::setting)?;
+    let image = pass.uncounted()?;
     let pixels = image.into_image().iter().map(|color| color.to_array()).collect();
     let caption = format!(
         "{} points and {} uncovered regions of a corner of the cube, {:.1} r along each side",
@@ -352,8 +352,8 @@ pub(super) fn light(form: Form) -> Result<[Figure; 2], RunError> {
     let (cells, [width, height]) = if form == Form::Quick { (48, [128, 72]) } else { (128, [256, 144]) };
     let water = Ocean { overshoot: 0.02, ..measure::water(cells, measure::SLOPE) };
     let beams = water.beams(0.0);
-    let aside = measure::aside([width, height]).map_err(RunError::setting)?;
-    let above = measure::above(height).map_err(RunError::setting)?;
+    let aside = measure::aside([width, height])?;
+    let above = measure::above(height)?;
     let floor = Light::Floor(Floor { height_m: -measure::DEPTH_M });
     let image = |name, what: &str, label: &str, eye: &Eye, light| {
         let picture = draw(&beams, eye, Method::Moving, Some(light));

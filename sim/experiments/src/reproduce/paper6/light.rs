@@ -37,8 +37,7 @@ pub(super) fn executions(task: &Task<'_>) -> Result<Done, RunError> {
     let (row, form) = (with.settings, with.form);
     let size = *row.size_px.get(form);
     let count = |slope: f64, depth_m: f64| {
-        ocean(*row.cells.get(form), [slope, depth_m], [size.0, size.1], task.progress)
-            .map_err(RunError::setting)
+        ocean(*row.cells.get(form), [slope, depth_m], [size.0, size.1], task.progress).map_err(RunError::from)
     };
     let (slope, depth_m) = (*row.slope.get(form), *row.depth_m.get(form));
     let base = count(slope, depth_m)?;
@@ -107,7 +106,7 @@ fn base_on_hardware(
     size: [u32; 2],
 ) -> Result<(Ran, [u64; 4]), RunError> {
     let water = Ocean { depth_m, ..water(cells, slope) };
-    let eye = aside_of(depth_m, size).map_err(RunError::setting)?;
+    let eye = aside_of(depth_m, size)?;
     let (beams, mut work) = (water.beams(0.0), Ran::default());
     let mut executions = [0; 4];
     for (method, executions) in Method::ALL.into_iter().zip(&mut executions) {
@@ -121,8 +120,8 @@ fn base_on_hardware(
 /// What the modelled hardware draws of beams.
 fn on_hardware(beams: &[Beam], eye: &Eye, method: Method, light: Light) -> Result<(Picture, Ran), RunError> {
     let spec = GpuSpec::load("reference")?.pipeline;
-    let mut gpu = Gpu::without_packets(&spec).map_err(RunError::setting)?;
-    let (picture, _) = draw_on(&mut gpu, beams, eye, method, light).map_err(RunError::setting)?;
+    let mut gpu = Gpu::without_packets(&spec)?;
+    let (picture, _) = draw_on(&mut gpu, beams, eye, method, light)?;
     Ok((picture, Ran::of(&gpu.finish())))
 }
 
@@ -285,7 +284,7 @@ impl Found {
 pub(super) fn glossy_row(task: &Task<'_>) -> Result<Done, RunError> {
     let with = task.with(|settings| &settings.vi_11);
     let (row, form) = (with.settings, with.form);
-    let found = |settings| Found::new(row, form, settings).map_err(RunError::setting);
+    let found = |settings| Found::new(row, form, settings).map_err(RunError::from);
     let (radius, index) = (*row.lens_radius.get(form), *row.index.get(form));
     let mut tried = Cases::new(
         "error of many samples over that of few",
@@ -377,7 +376,7 @@ pub(super) fn shadow_row(task: &Task<'_>) -> Result<Done, RunError> {
             1,
         )?;
         let hardware = GpuSpec::load("reference")?.pipeline;
-        let mut gpu = Gpu::without_packets(&hardware).map_err(RunError::setting)?;
+        let mut gpu = Gpu::without_packets(&hardware)?;
         Ok((job.frame(*row.frame.get(form), &mut gpu)?, gpu.finish()))
     };
     let [(one, one_report), (many, many_report)] = [draw(false)?, draw(true)?];

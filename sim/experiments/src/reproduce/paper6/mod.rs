@@ -114,7 +114,7 @@ fn catalogue(size: Size, of_each: usize, seed: u64) -> Result<Vec<StressScene>, 
             many => (0, (values.len() / (many - 1).max(1)).max(1)),
         };
         for value in values.iter().skip(first).step_by(step) {
-            scenes.push(family.scene(*value, size, seed).map_err(RunError::setting)?);
+            scenes.push(family.scene(*value, size, seed)?);
         }
     }
     Ok(scenes)
@@ -147,10 +147,6 @@ struct Public {
     pub kept_closer: usize,
 }
 
-fn wrong(message: String) -> RunError {
-    RunError::Setting(message)
-}
-
 /// Refuses a folder without any case that is read.
 fn check_public(folder: &Path, scenes: &[PublicScene]) -> Result<(), RunError> {
     let scene = scenes.iter().any(|scene| folder.join(&scene.file).is_file());
@@ -162,7 +158,7 @@ fn check_public(folder: &Path, scenes: &[PublicScene]) -> Result<(), RunError> {
         return Ok(());
     }
     let known: Vec<&str> = scenes.iter().map(|scene| scene.file.as_str()).collect();
-    Err(wrong(format!(
+    Err(RunError::setting(format_args!(
         "--collision-data {}: no public case in it ({}, or *.csv.gz in a folder called queries); name the folder that has them",
         folder.display(),
         known.join(", ")
@@ -172,7 +168,8 @@ fn check_public(folder: &Path, scenes: &[PublicScene]) -> Result<(), RunError> {
 /// Every file in a folder and below, in order.
 fn files_below(folder: &Path) -> Result<Vec<PathBuf>, RunError> {
     let failed = |error: std::io::Error| {
-        wrong(format!("--collision-data {}: cannot read it: {error}; name a folder", folder.display()))
+        let name = format_args!("--collision-data {}", folder.display());
+        RunError::invalid(name, format_args!("cannot read it: {error}; name a folder"))
     };
     let mut entries = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(failed)? {
@@ -213,12 +210,12 @@ impl Public {
         if meshes.len() != scene.objects {
             let message =
                 format!("{}: {} objects, {} are known", path.display(), meshes.len(), scene.objects);
-            return Err(wrong(format!("{message}; get the file of the data set anew")));
+            return Err(RunError::setting(format_args!("{message}; get the file of the data set anew")));
         }
         let object = |mesh| Object::new(mesh, 0.0);
         let objects: Option<Vec<Object>> = meshes.iter().map(object).collect();
         let objects = objects.ok_or_else(|| {
-            wrong(format!("{}: a coordinate is beyond 1e60 or not a number", path.display()))
+            RunError::invalid(path.display(), "a coordinate is beyond 1e60 or not a number")
         })?;
         let answers = detect(&objects, &Search::default());
         let kept = answers.iter().filter(|answer| answer.verdict.may_collide());
@@ -238,7 +235,7 @@ impl Public {
         let vertex_face = path.parent().is_some_and(|folder| folder.ends_with("vertex-face"));
         let pair = |query: &[([f64; 3], bool)]| query_pair(query, vertex_face);
         let pairs: Option<Vec<Pair>> = rows.chunks_exact(8).map(pair).collect();
-        let pairs = pairs.ok_or_else(|| wrong(format!("{}: a coordinate is beyond 1e60", path.display())))?;
+        let pairs = pairs.ok_or_else(|| RunError::invalid(path.display(), "a coordinate is beyond 1e60"))?;
         let cases: Vec<&[Object]> = pairs.iter().map(Pair::as_slice).collect();
         let kept: Vec<bool> =
             detect_each(&cases, &Search::default(), || ()).iter().map(|answers| any_kept(answers)).collect();
@@ -276,7 +273,8 @@ fn query_pair(query: &[([f64; 3], bool)], vertex_face: bool) -> Option<Pair> {
 /// The rows of a file of queries: a point, and whether the truth of its query is a collision.
 fn query_rows(path: &Path) -> Result<Vec<([f64; 3], bool)>, RunError> {
     let failed = |line: usize, what: &str| {
-        wrong(format!("{}:{line}: {what}; get the file of the data set anew", path.display()))
+        let name = format_args!("{}:{line}", path.display());
+        RunError::invalid(name, format_args!("{what}; get the file of the data set anew"))
     };
     let file = std::fs::File::open(path).map_err(|error| failed(1, &error.to_string()))?;
     let mut rows = Vec::new();

@@ -26,7 +26,7 @@ use crate::reproduce::settings::Form;
 use crate::study::Ran;
 
 fn failed(error: impl std::fmt::Display) -> RunError {
-    RunError::Setting(format!("sampling: {error}"))
+    RunError::invalid("sampling", error)
 }
 
 /// Maximal points and what is wrong with them: pairs that are closer than r, and whether a hole is larger.

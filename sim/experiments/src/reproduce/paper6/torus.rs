@@ -14,7 +14,7 @@ use super::Task;
 use crate::study::Ran;
 
 fn failed(error: impl std::fmt::Display) -> RunError {
-    RunError::Setting(format!("torus: {error}"))
+    RunError::invalid("torus", error)
 }
 
 /// Samples found in a torus, and how many standard errors count and integral are off.

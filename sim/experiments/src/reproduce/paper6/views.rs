@@ -123,7 +123,7 @@ struct Tried<'a> {
 impl Tried<'_> {
     /// Shader lanes of all views over those of one, less one, in %.
     fn increase(&mut self, point: &Point) -> Result<f64, RunError> {
-        let lanes = point.lanes(shape(self.row, self.form)).map_err(RunError::setting)?;
+        let lanes = point.lanes(shape(self.row, self.form))?;
         self.ran += lanes.ran;
         Ok(100.0 * (lanes.all as f64 / lanes.one as f64 - 1.0))
     }
@@ -361,7 +361,7 @@ fn entries(row: &Views, form: Form, base: &Point) -> Result<Vec<Entries>, RunErr
     let shape = shape(row, form);
     let pixels = f64::from(base.size_px.0) * f64::from(base.size_px.1);
     let at = |&quads: &u32| {
-        let lanes = Point { quads, ..base.clone() }.lanes(shape).map_err(RunError::setting)?;
+        let lanes = Point { quads, ..base.clone() }.lanes(shape)?;
         Ok((quads, lanes.all as f64 / pixels, lanes.one as f64 / pixels))
     };
     row.curve_entries.get(form).iter().map(at).collect()
