@@ -64,6 +64,9 @@ impl Station {
 pub const CLIENTS: [Unit; 7] =
     [Unit::Command, Unit::Depth, Unit::Texture, Unit::Colour, Unit::Compute, Unit::Setup, Unit::Traversal];
 
+/// Port of the colour unit.
+pub const COLOUR_PORT: usize = 3;
+
 /// Port of a client of the L2; `None` for other units.
 pub fn port(unit: Unit) -> Option<usize> {
     CLIENTS.iter().position(|&client| client == unit)
@@ -417,6 +420,7 @@ mod tests {
 
     #[test]
     fn ports_and_events_belong_to_the_data_units() {
+        assert_eq!(port(Unit::Colour), Some(COLOUR_PORT));
         for (unit, number) in DataUnit::ALL.into_iter().zip(0..) {
             assert_eq!((unit as usize, port(unit.unit())), (number, Some(unit.port())));
             assert!(unit.events().iter().all(|event| event.unit() == unit.unit()));

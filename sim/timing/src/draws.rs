@@ -125,11 +125,6 @@ impl DrawTimes {
         self.advance(departure);
     }
 
-    /// Record that the last tile leaves later than it was said to.
-    pub fn delayed(&mut self, tile: Departure) {
-        self.advance(tile);
-    }
-
     fn advance(&mut self, departure: Departure) {
         if departure.at <= self.now {
             return;

@@ -1,14 +1,13 @@
 //! Shader cores and data units of the level `packet`.
 
 use super::calendar::{Calendar, QueueTimes};
-use super::drain::{Drain, OnCores};
 use super::memory::Memory;
+use super::residents::Residents;
 use super::slots::{Occupancy, Slots, Turns, Wait};
 use super::station::{Service, aligned};
 use super::{Span, Visit};
 use crate::clock::{Clocks, Time};
 use crate::demand::{CYCLE, DemandBuilder, Server, ServiceDemand, Station, Work, share, time_of};
-use crate::draws::Departure;
 use crate::spec::{DataUnit, MachineSpec};
 
 /// Cycles per slot of the calendars.
@@ -37,10 +36,6 @@ pub(super) struct Run {
     pub done: Time,
     /// When the packet leaves the cores.
     pub departed: Time,
-    /// How long its last warps wait for their data.
-    pub waited: Time,
-    /// When the first and the last warp have them.
-    pub ready: Span,
     /// When its data unit works on it, from the first cycle to the last.
     pub data: Option<Service>,
     /// When its lines pass the L2 and memory.
@@ -59,12 +54,17 @@ impl Run {
     }
 }
 
-/// State of one kind of packets (vertices or pixels) on the cores. Packets of a kind leave in order.
-#[derive(Clone, Debug)]
-struct PacketFifo {
-    /// When its next warp may be sent, and how many warps of that cycle have been.
+/// Sending of the warps of one kind of packets (vertices or pixels): when the next may be sent, and how many of
+/// that cycle have been.
+#[derive(Clone, Debug, Default)]
+struct Sender {
     sent: Time,
-    sender: Server,
+    server: Server,
+}
+
+/// Packets of vertices on the cores. They leave in order.
+#[derive(Clone, Debug)]
+struct Vertices {
     departed: Time,
     flights: QueueTimes,
     /// Warp slots of the cores. Each kind has its own, as the times of the two kinds are not sorted together.
@@ -104,7 +104,9 @@ impl DataState {
 /// All cores and data units.
 #[derive(Clone, Debug)]
 pub(super) struct Cores {
-    fifos: [PacketFifo; 2],
+    senders: [Sender; 2],
+    vertices: Vertices,
+    residents: Residents,
     /// Warps sent, and the part of a cycle that one takes.
     sends: Calendar,
     send_work: Work,
@@ -119,7 +121,6 @@ pub(super) struct Cores {
     lanes_of_core: u32,
     warp_lanes: u32,
     machine: MachineSpec,
-    drain: Drain,
     data: [DataState; DataUnit::ALL.len()],
 }
 
@@ -129,15 +130,10 @@ impl Cores {
         let period = clocks.period(spec.clock);
         let alu = period * Time::from(spec.alu_latency_cycles);
         let slots = Slots::new(spec.cores.get() * spec.warps.get());
-        let fifo = PacketFifo {
-            sent: 0,
-            sender: Server::default(),
-            departed: 0,
-            flights: QueueTimes::new(spec.in_flight.get()),
-            slots,
-        };
         Self {
-            fifos: [fifo.clone(), fifo],
+            senders: Default::default(),
+            vertices: Vertices { departed: 0, flights: QueueTimes::new(spec.in_flight.get()), slots },
+            residents: Residents::new(machine, clocks),
             sends: Calendar::new(Time::from(SLOT_CYCLES) * period, spec.warps_per_cycle.get()),
             send_work: CYCLE.div_ceil(spec.warps_per_cycle.get().into()),
             lanes: Calendar::new(Time::from(SLOT_CYCLES) * period, spec.cores.get() * spec.lanes.get()),
@@ -147,7 +143,6 @@ impl Cores {
             period,
             alu,
             machine: machine.clone(),
-            drain: Drain::new(machine, clocks),
             lanes_of_core: spec.lanes.get(),
             warp_lanes: spec.warp_lanes.get(),
             data: DataUnit::ALL.map(|unit| DataState::new(machine, clocks, unit)),
@@ -164,57 +159,92 @@ impl Cores {
         self.lanes.yielded().max(self.slots.yielded())
     }
 
-    /// Simulate a packet of vertices or pixels, or a group.
+    /// When a packet of pixels or a group that comes at `arrive` is taken, and when there is room for it. `None`
+    /// if the oldest one has to leave before.
+    ///
+    /// Groups need room but for their warps; all groups under way are taken to need as much.
+    pub fn admits(&self, demand: &ServiceDemand, arrive: Time) -> Option<(Time, Time)> {
+        let align = |at| aligned(at, self.period);
+        let taken = arrive.max(align(self.residents.room(usize::MAX)?));
+        let Some(group) = demand.group else { return Some((taken, taken)) };
+        let warps = demand.warps(self.warp_lanes);
+        let per_core = self.machine.groups_per_core(warps, group.shared_bytes).max(1);
+        let room = self.residents.room((self.cores * per_core) as usize)?;
+        Some((taken, taken.max(align(room))))
+    }
+
+    /// Whether it is known when the oldest packet of pixels or groups is done.
+    pub fn oldest_is_done(&self) -> bool {
+        self.residents.oldest_is_done()
+    }
+
+    /// Let the oldest packet of pixels or groups leave, for which the next unit has room from `room` on. Returns
+    /// when it does.
+    pub fn leave(&mut self, room: Time) -> Time {
+        aligned(self.residents.leave(room), self.period)
+    }
+
+    /// Simulate a packet of vertices or pixels, or a group. Vertices leave at the time that this returns, others
+    /// when [`Self::leave`] says so.
     pub fn run(&mut self, visit: &Visit<'_>, builder: &DemandBuilder, memory: &mut Memory) -> Run {
         let demand = visit.demand;
         let kind = usize::from(visit.station == Station::Pixel);
         let warps = demand.warps(self.warp_lanes);
-        let fifo = &mut self.fifos[kind];
-        let came = visit.arrive.max(fifo.flights.room_at());
-        let taken = came.max(fifo.sent);
+        let came = if kind == 0 { visit.arrive.max(self.vertices.flights.room_at()) } else { visit.arrive };
+        let taken = came.max(self.senders[kind].sent);
         let mut room = taken;
         if kind == 1 {
-            let admitted = self.drain.admits(visit.arrive, self.most(demand, warps));
-            room = room.max(aligned(admitted.round() as Time, self.period));
+            room = taken.max(visit.room);
+            self.residents.enter(demand, warps);
         }
-        let mut run = Run {
-            taken,
-            done: taken,
-            departed: taken,
-            waited: 0,
-            ready: Span::NONE,
-            data: None,
-            memory: Span::NONE,
-        };
-        let uses_data = kind == 1 && demand.uses_data();
-        for first in (0..warps).step_by(WARPS_PER_CHUNK as usize) {
-            let chunk = Chunk { first, count: WARPS_PER_CHUNK.min(warps - first), of: warps };
-            let mut from = room.max(self.fifos[kind].sent);
-            if kind == 0 {
-                from = (0..chunk.count).fold(from, |at, _| self.turns.after(came, at));
-            }
-            let sent = self.send(kind, from, chunk.count, uses_data.then_some(demand.data_unit()));
+        let mut run = Run { taken, done: taken, departed: taken, data: None, memory: Span::NONE };
+        let data_unit = (kind == 1 && demand.uses_data()).then(|| demand.data_unit());
+        let mut first = 0;
+        while first < warps {
+            let from = room.max(self.senders[kind].sent);
+            let (chunk, from, slots) =
+                self.next(visit, Chunk { first, count: warps - first, of: warps }, came, from);
+            let sent = self.send(kind, from, chunk.count, slots, data_unit);
             if kind == 1 && came < sent.from {
                 self.note_turns(demand, &chunk, came, sent);
             }
             let mut ready = Span { from: sent.from + self.period, to: sent.to + self.period };
-            if uses_data {
+            if data_unit.is_some() {
                 ready = self.data(visit, &chunk, ready, builder, memory, &mut run);
             }
-            run.ready = run.ready.with(ready.from, ready.to);
-            run.waited = ready.to - (sent.to + self.period).min(ready.to);
             let done = self.operate(visit, &chunk, sent.from, ready);
-            self.fifos[kind].slots.hold(chunk.count, done.from, done.to);
+            match kind {
+                0 => {
+                    self.vertices.slots.hold(chunk.count, done.from, done.to);
+                    self.residents.share(demand, warps, chunk.count, ready);
+                }
+                _ => self.residents.start(chunk.count, ready),
+            }
             run.done = run.done.max(done.to);
+            first += chunk.count;
         }
         if kind == 1 {
-            self.drain.note(demand, self.on_cores(visit, warps, &run));
+            self.residents.done_after(run.done);
+            return run;
         }
-        let fifo = &mut self.fifos[kind];
-        run.departed = aligned(run.done.max(fifo.departed).max(visit.room), self.period);
-        fifo.departed = run.departed;
-        fifo.flights.note(run.departed);
+        let vertices = &mut self.vertices;
+        run.departed = aligned(run.done.max(vertices.departed).max(visit.room), self.period);
+        vertices.departed = run.departed;
+        vertices.flights.note(run.departed);
         run
+    }
+
+    /// The next warps of those of `rest` that are sent together, from when on, and when the first and the last
+    /// have slots. They come at `came`, and those before them are sent by `from`.
+    fn next(&mut self, visit: &Visit<'_>, rest: Chunk, came: Time, from: Time) -> (Chunk, Time, Span) {
+        let count = WARPS_PER_CHUNK.min(rest.count);
+        if visit.station == Station::Pixel {
+            let (count, slots) = self.residents.send(count, from);
+            return (Chunk { count, ..rest }, from, slots);
+        }
+        let from = (0..count).fold(from, |at, _| self.turns.after(came, at));
+        let free = &self.vertices.slots;
+        (Chunk { count, ..rest }, from, Span { from: free.room_for(1), to: free.room_for(count) })
     }
 
     /// Record that some warps waited since `since` for slots and were sent at `sent`. A group has all its
@@ -231,56 +261,20 @@ impl Cores {
         }
     }
 
-    /// Packets like that of `demand` that have room on the cores at once. Only groups need room but for their
-    /// warps; all groups under way are taken to need as much.
-    fn most(&self, demand: &ServiceDemand, warps: u32) -> usize {
-        demand.group.map_or(usize::MAX, |group| {
-            let per_core = self.machine.groups_per_core(warps, group.shared_bytes).max(1);
-            self.machine.shader.cores.get() as usize * per_core as usize
-        })
-    }
-
-    fn on_cores(&self, visit: &Visit<'_>, warps: u32, run: &Run) -> OnCores {
-        let demand = visit.demand;
-        OnCores {
-            arrive: visit.arrive,
-            data: run.waited,
-            ready: if warps > 0 { run.ready } else { Span { from: 0, to: 0 } },
-            warps,
-            threads: demand.threads,
-            ops: demand.ops,
-            steps: demand.steps(),
-            room: self.most(demand, warps),
-            behind: 0,
-            latency: 0,
-        }
-    }
-
-    /// When the last packets of pixels and groups have left, if none comes any more; in the calendars they
-    /// have left at `calendar`.
-    pub fn drain(&mut self, calendar: Time) -> Option<Departure> {
-        self.drain.end(calendar)
-    }
-
-    /// When the last packets of pixels and groups of the batches up to `batch` have left; in the calendars
-    /// they have at `calendar`.
-    pub fn departs(&mut self, batch: u32, calendar: Time) -> Time {
-        self.drain.departs(batch, calendar)
-    }
-
     /// Send warps, as many in a cycle as the machine can, as slots on the cores and in front of the data unit
     /// become free. Returns when the first and the last warp are sent.
-    fn send(&mut self, kind: usize, from: Time, warps: u32, unit: Option<DataUnit>) -> Span {
+    fn send(&mut self, kind: usize, from: Time, warps: u32, slots: Span, unit: Option<DataUnit>) -> Span {
         let room = |count| {
-            let slots = self.fifos[kind].slots.room_for(count);
+            let slots = if count == 1 { slots.from } else { slots.to };
             unit.map_or(slots, |unit| slots.max(self.data[unit as usize].queue.room_for(count)))
         };
         let (first, last) = (room(1), room(warps));
         let (begin, sent) = self.sends.reserve(from.max(first), u64::from(warps) * self.period);
-        let (fifo, work) = (&mut self.fifos[kind], self.send_work);
-        let end = begin + self.period * ((fifo.sender.used_at(begin) + Work::from(warps - 1) * work) / CYCLE);
+        let (sender, work) = (&mut self.senders[kind], self.send_work);
+        let end =
+            begin + self.period * ((sender.server.used_at(begin) + Work::from(warps - 1) * work) / CYCLE);
         let to = sent.saturating_sub(self.period).max(end).max(last);
-        fifo.sent = fifo.sender.serve(begin, self.period, Work::from(warps) * work) + (to - end);
+        sender.sent = sender.server.serve(begin, self.period, Work::from(warps) * work) + (to - end);
         Span { from: begin, to }
     }
 

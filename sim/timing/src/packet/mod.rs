@@ -14,8 +14,9 @@
 //!
 //! This is the recurrence of tandem queues with finite buffers and blocking after service (Dallery and
 //! Gershwin 1992). For units that share nothing it equals the level `stepped`, to the cycle. Shared resources
-//! (lanes of the cores, the L2, buses and banks of memory) are calendars; ports of the L2 take turns in its.
-//! The front end overlaps tiles that are simulated before it, and gets up to half of a slot that they fill.
+//! (the L2, buses and banks of memory) are calendars; ports of the L2 take turns in its. The cores serve warps
+//! in turn, so when a packet of pixels or a group leaves them depends on packets that come later. It goes on
+//! once that is known. The front end overlaps tiles that are simulated before it, and gets up to half of a slot that they fill.
 //!
 //! Packets arrive at their first unit when their gates open. With `tiles(b)` the time when all tiles of batch `b`
 //! have left, `front(b)` likewise, and barrier `i` done at `barrier(i)`:
@@ -25,31 +26,31 @@
 //! tiles of batch b       max(front(b), barrier(last))
 //! barrier                when all packets before it in the stream have left
 //! ```
-//!
-//! Events of packets in bins of time. Consecutive packets of a bin are written together.
 
 mod arbiter;
 mod bank;
 mod calendar;
 mod cores;
-mod drain;
 mod dram;
 mod memory;
+mod residents;
+mod sharing;
 mod slots;
 mod station;
+mod tally;
 
 use std::collections::VecDeque;
 
-use activity::{Counts, LineAccess, Packet, PacketCounts, Unit, Waits};
-use calendar::{Calendar, Turn};
+use activity::{LineAccess, Packet, PacketCounts, Unit, Waits};
+use calendar::Turn;
 use cores::Cores;
 use memory::Memory;
-use station::{Service, StationState};
+use station::StationState;
+use tally::Tally;
 
 use crate::clock::{Clocks, Time};
-use crate::demand::{CYCLE, DemandBuilder, ServiceDemand, Station, Work};
+use crate::demand::{CLIENTS, COLOUR_PORT, DemandBuilder, ServiceDemand, Station};
 use crate::draws::{DrawTimes, Passes};
-use crate::recorder::part;
 use crate::spec::MachineSpec;
 use crate::stepped::Stream;
 use crate::{Clock, Recorder, Timed};
@@ -61,7 +62,7 @@ struct Visit<'a> {
     demand: &'a ServiceDemand,
     /// All its lines, grouped by client.
     lines: &'a [LineAccess],
-    /// When it arrives, and when the next station has room for it.
+    /// When it arrives, and when the next station has room for it; at [`Station::Pixel`], when the cores have.
     arrive: Time,
     room: Time,
     turn: Turn,
@@ -82,6 +83,18 @@ impl Span {
     }
 }
 
+/// A packet of pixels or a group on the cores.
+#[derive(Clone, Debug)]
+struct OnCores {
+    /// Of its lines, only those of the colour unit.
+    demand: ServiceDemand,
+    counts: PacketCounts,
+    turn: Turn,
+    /// When it began, and when its lines so far pass the L2 and memory.
+    begin: Time,
+    memory: Span,
+}
+
 /// A front-end packet that is not simulated yet.
 #[derive(Debug)]
 struct WaitingPacket {
@@ -100,6 +113,10 @@ pub struct PacketClock {
     /// Whether the clocks of the stations differ.
     clocks_differ: bool,
     cores: Cores,
+    /// Packets of pixels and groups on the cores, and their lines.
+    on_cores: VecDeque<OnCores>,
+    lines_on_cores: VecDeque<LineAccess>,
+    leaving: Vec<LineAccess>,
     memory: Memory,
     tally: Tally,
     gates: Gates,
@@ -131,6 +148,8 @@ struct Gates {
     /// When the last barrier was done, and the last one that the front end waits for.
     barrier: Time,
     front_barrier: Time,
+    /// Whether tiles are on their way.
+    tiles_began: bool,
 }
 
 impl Gates {
@@ -146,7 +165,7 @@ impl Gates {
 
     /// The front end overlaps tiles that are simulated before it, so it takes turns with them.
     fn turn(&self, demand: &ServiceDemand) -> Turn {
-        if demand.front && !self.traversed.is_empty() { Turn::Late } else { Turn::InOrder }
+        if demand.front && self.tiles_began { Turn::Late } else { Turn::InOrder }
     }
 
     /// The last tiles so far, or the barrier after them, end no earlier than `at`.
@@ -184,6 +203,9 @@ impl PacketClock {
             clocks_differ: stations.iter().any(|station| station.period() != stations[0].period()),
             stations,
             cores: Cores::new(machine, &clocks),
+            on_cores: VecDeque::new(),
+            lines_on_cores: VecDeque::new(),
+            leaving: Vec::new(),
             memory: Memory::new(machine, &clocks),
             tally: Tally::new(recorder, clocks),
             gates: Gates::default(),
@@ -249,10 +271,10 @@ impl PacketClock {
                 return;
             }
             if let Some(WaitingPacket { demand, counts, lines }) = self.ahead.pop_front() {
-                if let Some(before) = demand.batch.checked_sub(2)
-                    && let Some(at) = self.gates.traversed.get_mut(before as usize)
+                while let Some(before) = demand.batch.checked_sub(2)
+                    && self.on_cores.front().is_some_and(|oldest| oldest.demand.batch <= before)
                 {
-                    *at = self.cores.departs(before, *at);
+                    self.depart();
                 }
                 self.walk(&demand, &counts, &lines);
             }
@@ -271,34 +293,29 @@ impl PacketClock {
         if self.is_too_long {
             return;
         }
+        self.builder.add_work(demand, counts, self.passes.work(demand.pass));
         let turn = self.gates.turn(demand);
         let mut memory = Span::NONE;
         let begin = self.stations[first as usize].starts(arrive);
         for &station in &Station::ALL[first as usize..=demand.last as usize] {
-            if self.clocks_differ {
-                arrive = self.stations[station as usize].edge(arrive);
+            if station == Station::Pixel {
+                let (arrive, room) = self.admit(demand, arrive);
+                let visit = Visit { station, demand, lines, arrive: self.edge(station, arrive), room, turn };
+                self.cores(&visit, counts, &mut memory);
+                return self.stay(visit, counts, begin, memory);
             }
             // A packet leaves when the next queue has room, which it sees one cycle later.
-            let room =
-                if station == demand.last { 0 } else { self.stations[station as usize + 1].queue.room_at() };
-            let visit = Visit { station, demand, lines, arrive, room, turn };
+            let next = (station != demand.last).then(|| &self.stations[station as usize + 1]);
+            let room = next.map_or(0, |next| next.queue.room_at());
+            let visit = Visit { station, demand, lines, arrive: self.edge(station, arrive), room, turn };
             let leave = match station.unit() {
                 Unit::Shader => self.cores(&visit, counts, &mut memory),
                 _ => self.serve(&visit, counts, &mut memory),
             };
             arrive = leave + self.stations[station as usize].latency;
         }
-        self.end = self.end.max(arrive);
-        self.gates.note(demand, arrive);
-        self.passes.note(demand.pass, begin, arrive);
-        self.draws.departed(demand, arrive);
-        self.builder.add_work(demand, counts, self.passes.work(demand.pass));
-        if memory.from <= memory.to {
-            let units = [Unit::L2, Unit::Llc, Unit::Edram, Unit::Dram];
-            for unit in units.into_iter().filter(|&unit| self.machine.has(unit)) {
-                self.tally.count(unit, counts, memory.from, memory.to);
-            }
-        }
+        self.done(demand, begin, arrive);
+        self.count_memory(counts, memory);
         self.tally.packet_done(counts);
         if turn == Turn::Late {
             let yielded = self.cores.yielded().max(self.memory.yielded());
@@ -307,14 +324,84 @@ impl PacketClock {
         }
     }
 
-    /// The cores run empty.
-    fn drain(&mut self) {
-        let Some(drained) = self.cores.drain(self.end).filter(|drained| drained.at > self.end) else {
+    /// When the cores take a packet of pixels or a group that comes at `arrive`, and when they have room for it.
+    fn admit(&mut self, demand: &ServiceDemand, arrive: Time) -> (Time, Time) {
+        loop {
+            if let Some(admitted) = self.cores.admits(demand, arrive) {
+                return admitted;
+            }
+            self.depart();
+        }
+    }
+
+    /// First edge of the clock of a station at or after `at`.
+    fn edge(&self, station: Station, at: Time) -> Time {
+        if self.clocks_differ { self.stations[station as usize].edge(at) } else { at }
+    }
+
+    /// A packet that began at `begin` leaves the machine at `at`.
+    fn done(&mut self, demand: &ServiceDemand, begin: Time, at: Time) {
+        self.end = self.end.max(at);
+        self.gates.note(demand, at);
+        self.passes.note(demand.pass, begin, at);
+        self.draws.departed(demand, at);
+    }
+
+    fn count_memory(&mut self, counts: &PacketCounts, memory: Span) {
+        if memory.from <= memory.to {
+            let units = [Unit::L2, Unit::Llc, Unit::Edram, Unit::Dram];
+            for unit in units.into_iter().filter(|&unit| self.machine.has(unit)) {
+                self.tally.count(unit, counts, memory.from, memory.to);
+            }
+        }
+    }
+
+    /// A packet is on the cores until it is known when it leaves; a barrier leaves at once.
+    fn stay(&mut self, visit: Visit<'_>, counts: &PacketCounts, begin: Time, memory: Span) {
+        let Visit { demand, lines, turn, .. } = visit;
+        self.tally.packet_passed(counts);
+        self.gates.tiles_began = true;
+        let range = demand.lines_of(COLOUR_PORT);
+        let lines = &lines[range.start - demand.first_line..range.end - demand.first_line];
+        self.lines_on_cores.extend(lines);
+        let mut demand = demand.clone();
+        demand.lines = [0; CLIENTS.len()];
+        demand.lines[COLOUR_PORT] = lines.len() as u32;
+        let is_barrier = demand.barrier.is_some();
+        self.on_cores.push_back(OnCores { demand, counts: *counts, turn, begin, memory });
+        while self.cores.oldest_is_done() || (is_barrier && !self.on_cores.is_empty()) {
+            self.depart();
+        }
+    }
+
+    /// Let the oldest packet leave the cores.
+    fn depart(&mut self) {
+        let Some(OnCores { demand, counts, turn, begin, mut memory }) = self.on_cores.pop_front() else {
             return;
         };
-        self.end = drained.at;
-        self.passes.note(drained.pass, Time::MAX, drained.at);
-        self.draws.delayed(drained);
+        let goes_on = demand.last == Station::Colour;
+        let room = if goes_on { self.stations[Station::Colour as usize].queue.room_at() } else { 0 };
+        let mut at = self.cores.leave(room) + self.stations[Station::Pixel as usize].latency;
+        if goes_on {
+            let station = Station::Colour;
+            let mut lines = std::mem::take(&mut self.leaving);
+            lines.clear();
+            lines.extend(self.lines_on_cores.drain(..demand.lines[COLOUR_PORT] as usize));
+            let arrive = self.edge(station, at);
+            let visit = Visit { station, demand: &demand, lines: &lines, arrive, room: 0, turn };
+            at = self.serve(&visit, &counts, &mut memory) + self.stations[station as usize].latency;
+            self.leaving = lines;
+        }
+        self.done(&demand, begin, at);
+        self.count_memory(&counts, memory);
+        self.tally.packet_left(&counts);
+    }
+
+    /// The cores run empty.
+    fn drain(&mut self) {
+        while !self.on_cores.is_empty() {
+            self.depart();
+        }
     }
 
     fn serve(&mut self, visit: &Visit<'_>, counts: &PacketCounts, memory: &mut Span) -> Time {
@@ -350,13 +437,13 @@ impl PacketClock {
         let Self { machine, tally, clocks, cores, memory, passes, draws, packets, .. } = self;
         let mut recorder = tally.finish();
         recorder.lasts(end_ps);
-        write(&mut recorder, &clocks, Unit::Shader, cores.lanes(), 1, end_ps);
-        write(&mut recorder, &clocks, Unit::L2, memory.l2(), 1, end_ps);
+        tally::write(&mut recorder, &clocks, Unit::Shader, cores.lanes(), 1, end_ps);
+        tally::write(&mut recorder, &clocks, Unit::L2, memory.l2(), 1, end_ps);
         for (unit, calendar) in memory.levels() {
-            write(&mut recorder, &clocks, unit, calendar, 1, end_ps);
+            tally::write(&mut recorder, &clocks, unit, calendar, 1, end_ps);
         }
         for bus in memory.buses() {
-            write(&mut recorder, &clocks, Unit::Dram, bus, channels, end_ps);
+            tally::write(&mut recorder, &clocks, Unit::Dram, bus, channels, end_ps);
         }
         let timeline = recorder.finish();
         let rows = crate::ratio_to_busiest(clocks.ps(memory.rows()), &timeline);
@@ -375,184 +462,6 @@ impl PacketClock {
             disputed: Some(disputed),
             short_queues,
             overlap: None,
-        }
-    }
-}
-
-/// Write the busy time of one of `servers` servers of a unit from its calendar, bin by bin. Slots may end
-/// after the frame; their work is moved before its end.
-fn write(
-    recorder: &mut Recorder,
-    clocks: &Clocks,
-    unit: Unit,
-    calendar: &Calendar,
-    servers: u64,
-    end_ps: u64,
-) {
-    // Work of the bin at `at_ps` that is not yet written, and the end of that bin.
-    let (mut work, mut at_ps, mut end) = (0, 0, 0);
-    let flush = |recorder: &mut Recorder, work: u64, at_ps| {
-        let busy_ps = clocks.ps_below(work / (calendar.servers() * servers));
-        recorder.busy(unit, at_ps, at_ps + busy_ps, 1, 1);
-    };
-    for (from, to, used, room) in calendar.slots() {
-        if to <= end {
-            work += used;
-            continue;
-        }
-        flush(recorder, std::mem::take(&mut work), at_ps);
-        let (from_ps, to_ps) = (clocks.ps(from), clocks.ps(to));
-        let done = part(to_ps - from_ps, used, room);
-        let last_ps = to_ps.min(end_ps.max(from_ps + done));
-        recorder.busy(unit, from_ps, last_ps, done, (last_ps - from_ps).max(1) * servers);
-        let bin_ps = recorder.bin_ps();
-        at_ps = to_ps / bin_ps * bin_ps;
-        end = if at_ps + bin_ps <= end_ps { clocks.grain_up_to(at_ps + bin_ps) } else { 0 };
-    }
-    flush(recorder, work, at_ps);
-}
-
-/// Position of a unit: its current bin, and its work in that bin.
-#[derive(Clone, Copy, Debug, Default)]
-struct Cursor {
-    /// The bin in grains, shrunk to times that are surely inside: work that begins in `from..to` and ends by
-    /// `to`.
-    from: Time,
-    to: Time,
-    start_ps: u64,
-    /// Grains of work in the bin, and the part of a grain beyond them, in units of 1 / [`CYCLE`].
-    busy: Time,
-    part: Work,
-}
-
-impl Cursor {
-    /// Add work in cycles of `period` grains.
-    fn work(&mut self, work: Work, period: Time) {
-        let part = self.part + work % CYCLE * period;
-        self.busy += work / CYCLE * period + part / CYCLE;
-        self.part = part % CYCLE;
-    }
-}
-
-/// Events over time. A packet whose work is inside the current bin of a unit costs one comparison: its events
-/// go to the running total. The growth of the total is written when the unit moves to another bin.
-#[derive(Debug)]
-struct Tally {
-    recorder: Recorder,
-    clocks: Clocks,
-    cursors: [Cursor; Unit::COUNT],
-    /// Events of all packets so far.
-    total: Counts,
-    /// The part of them that has been written, by unit.
-    written: Counts,
-}
-
-impl Tally {
-    pub fn new(recorder: Recorder, clocks: Clocks) -> Self {
-        let (total, written) = Default::default();
-        Self { recorder, clocks, cursors: Default::default(), total, written }
-    }
-
-    /// Record that `unit` did its part of `counts` evenly between two times.
-    pub fn count(&mut self, unit: Unit, counts: &PacketCounts, from: Time, to: Time) {
-        let at = &self.cursors[unit as usize];
-        if from < at.from || from >= at.to || to > at.to {
-            self.count_outside_bin(unit, counts, from, to);
-        }
-    }
-
-    /// Record the events of a service, and that `unit` was busy with it.
-    pub fn serve(&mut self, unit: Unit, counts: &PacketCounts, service: &Service) {
-        let Service { from, to, used, work, period } = *service;
-        let at = &mut self.cursors[unit as usize];
-        if from >= at.from && to + period <= at.to {
-            return at.work(work, period);
-        }
-        self.count(unit, counts, from, to);
-        let [begin_ps, end_ps] =
-            [(from, used[0]), (to, used[1])].map(|(at, used)| self.clocks.ps_after(at, used * period, CYCLE));
-        // A data unit that serves a packet in parts waits for lines between them.
-        let (span_ps, work_ps) = (end_ps - begin_ps, self.clocks.ps_after(0, work * period, CYCLE));
-        self.recorder.busy(unit, begin_ps, end_ps, work_ps.min(span_ps), span_ps.max(1));
-    }
-
-    /// Record the end of a packet: all units have done their part of `counts`.
-    pub fn packet_done(&mut self, counts: &PacketCounts) {
-        self.total += counts;
-    }
-
-    #[cold]
-    fn count_outside_bin(&mut self, unit: Unit, counts: &PacketCounts, from: Time, to: Time) {
-        let (from_ps, to_ps) = (self.clocks.ps(from), self.clocks.ps(to));
-        self.recorder.count(unit, counts, from_ps, to_ps);
-        if from >= self.cursors[unit as usize].from {
-            self.write(unit);
-            self.move_to_bin(unit, to_ps);
-        }
-        for (written, &count) in self.written.of_mut(unit).iter_mut().zip(counts.of(unit)) {
-            *written += u64::from(count);
-        }
-    }
-
-    /// Write the work of `unit` in its bin.
-    fn write(&mut self, unit: Unit) {
-        let Self { recorder, total, written, cursors, .. } = self;
-        let cursor = &mut cursors[unit as usize];
-        let (total, written) = (total.of_mut(unit), written.of_mut(unit));
-        if total == written && cursor.busy == 0 && cursor.part == 0 {
-            return;
-        }
-        recorder.add(unit, cursor.start_ps, |at| total[at] - written[at]);
-        written.copy_from_slice(total);
-        let (busy, part) = (std::mem::take(&mut cursor.busy), std::mem::take(&mut cursor.part));
-        let busy_ps = self.clocks.ps_below(busy) + self.clocks.ps_below(part) / CYCLE;
-        recorder.busy(unit, cursor.start_ps, cursor.start_ps + busy_ps, 1, 1);
-    }
-
-    /// Move `unit` to the bin of `at_ps`.
-    fn move_to_bin(&mut self, unit: Unit, at_ps: u64) {
-        let bin_ps = self.recorder.bin_ps();
-        let start_ps = at_ps / bin_ps * bin_ps;
-        let (from, to) = (self.clocks.grain_from(start_ps), self.clocks.grain_up_to(start_ps + bin_ps));
-        self.cursors[unit as usize] = Cursor { from, to, start_ps, ..Cursor::default() };
-    }
-
-    /// The recorder, with everything written.
-    pub fn finish(mut self) -> Recorder {
-        Unit::ALL.into_iter().for_each(|unit| self.write(unit));
-        self.recorder
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use activity::Event;
-
-    /// Packets in and out of time order, through a tally and directly through a recorder.
-    #[test]
-    fn bins_equal_those_of_a_recorder() {
-        for hz in [(1e9, 1e9), (925e6, 1375e6)] {
-            let clocks = Clocks::new(hz.0, hz.1).unwrap();
-            let bins = || Recorder::new(10_000, 16);
-            let (mut tally, mut plain) = (Tally::new(bins(), clocks), bins());
-            let mut counts = PacketCounts::default();
-            for (step, jump) in
-                [3, 0, 40, 7, 1, 90, 2, 500, 3, 9, 1000].into_iter().cycle().take(400).zip(0..)
-            {
-                counts[Event::SamplesTested] = 1000 + step;
-                counts[Event::SamplesHit] = step;
-                let from = u64::from(step) * 13 + jump * 20;
-                let to = from + u64::from(step % 50);
-                tally.count(Unit::SampleTest, &counts, from, to);
-                tally.packet_done(&counts);
-                plain.count(Unit::SampleTest, &counts, clocks.ps(from), clocks.ps(to));
-            }
-            let mut tally = tally.finish();
-            // The clock sets the end of the frame.
-            tally.lasts(100_000_000);
-            plain.lasts(100_000_000);
-            assert_eq!(tally.finish(), plain.finish(), "{hz:?}");
         }
     }
 }

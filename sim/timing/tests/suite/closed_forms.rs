@@ -320,3 +320,29 @@ fn short_programs_pass_a_long_one_on_the_other_slot() {
     assert_eq!(truth, 5 + 20 * 101 + 2);
     assert!(found.abs_diff(truth) <= 2, "{found} of {truth}");
 }
+
+/// Programs of one operation and of two thousand on a few cores. What waits behind the long ones in order keeps
+/// others from coming, and a core with more of them than another takes longer. Which core that is hangs on
+/// single cycles, so `packet` is exact for one core, and where each long program has a slot.
+#[test]
+fn uneven_programs_on_few_cores() {
+    for (cores, most) in [(1, 0.005), (2, 0.06), (3, 0.06), (4, 0.005), (6, 0.005)] {
+        let mut machine = plain();
+        let shader = &mut machine.shader;
+        (shader.lanes, shader.warp_lanes, shader.warps) = (size(32), size(32), size(16));
+        (shader.cores, shader.in_flight, shader.alu_latency_cycles) = (size(cores), size(32), size(8));
+        let tile = |at: u32| {
+            let (ops, pixels) = (if at * at % 11 < 4 { 2000 } else { 1 }, 24 + at * 7 % 40);
+            vec![
+                (Event::PixelInvocations, pixels),
+                (Event::ShaderOps, pixels * ops),
+                (Event::ColourWrites, pixels),
+            ]
+        };
+        let packets = tiles((0..90).map(tile));
+        let truth = stepped(&machine, &packets).cycles;
+        let found = packet_level(&machine, clocks(), &packets).cycles;
+        let off = found as f64 / truth as f64 - 1.0;
+        assert!(off.abs() < most, "{cores} cores: {found} of {truth}");
+    }
+}

@@ -1,0 +1,308 @@
+//! Cores that serve their warps in turn: processor sharing (Kleinrock 1967), with a speed limit, as a warp makes
+//! a step in no less than its latency.
+
+use std::cmp::Reverse;
+use std::collections::{BinaryHeap, VecDeque};
+
+use crate::clock::Time;
+use crate::spec::ShaderSpec;
+
+/// Parts of a step and of a lane.
+const PARTS: f64 = 1024.0;
+
+/// Warps of a packet that run together.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Warps {
+    /// Number of their packet; `None` for vertices.
+    pub packet: Option<usize>,
+    pub count: u32,
+    /// Steps of each, one after another, and its lanes in a step.
+    pub steps: u32,
+    pub lanes: f64,
+}
+
+/// Warps that have ended.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ended {
+    pub packet: Option<usize>,
+    pub count: u32,
+    pub at: f64,
+}
+
+/// A place for warps on a core, which is free from `at` on.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place {
+    core: usize,
+    pub at: f64,
+}
+
+/// All cores. A warp stays on its core.
+#[derive(Clone, Debug)]
+pub(super) struct Sharing {
+    cores: Vec<Core>,
+    speed: Speed,
+    slots: u32,
+    /// Free slots of each core, and when its next one becomes free; infinite if that is not known.
+    free: Vec<u32>,
+    frees: Vec<f64>,
+    /// When the next warps end on each core, and the core where they end first.
+    next: Vec<f64>,
+    first: usize,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Speed {
+    period: f64,
+    alu: f64,
+    lanes: f64,
+}
+
+/// Active warps by the steps at which they end, in parts: the number of their packet, how many there are, and
+/// the parts of a lane of all.
+type Active = Reverse<(u64, Option<usize>, u32, u64)>;
+
+#[derive(Clone, Debug)]
+struct Core {
+    now: f64,
+    /// Steps so far of a warp that was there from the beginning.
+    steps: f64,
+    /// Parts of a lane in a step of all active warps.
+    lanes: u64,
+    active: BinaryHeap<Active>,
+    /// Slots that become free later, by time.
+    later: VecDeque<(f64, u32)>,
+}
+
+impl Sharing {
+    pub fn new(spec: &ShaderSpec, period: Time) -> Self {
+        let slots = spec.warps.get();
+        let core = Core { now: 0.0, steps: 0.0, lanes: 0, active: BinaryHeap::new(), later: VecDeque::new() };
+        let cores = spec.cores.get() as usize;
+        Self {
+            cores: vec![core; cores],
+            speed: Speed {
+                period: period as f64,
+                alu: (period * Time::from(spec.alu_latency_cycles)) as f64,
+                lanes: spec.lanes.get().into(),
+            },
+            slots,
+            free: vec![slots; cores],
+            frees: vec![f64::INFINITY; cores],
+            next: vec![f64::INFINITY; cores],
+            first: 0,
+        }
+    }
+
+    /// Latency of a step.
+    pub fn latency(&self) -> f64 {
+        self.speed.alu
+    }
+
+    /// The core with most free slots of those that have `count` from `from` on; if none has, the one that has
+    /// them first, as far as is known before more warps end.
+    pub fn place(&mut self, count: u32, from: f64) -> Option<Place> {
+        let (mut most, mut core) = (0, 0);
+        for at in 0..self.cores.len() {
+            if self.frees[at] <= from {
+                self.pass(at, from);
+            }
+            if self.free[at] > most {
+                (most, core) = (self.free[at], at);
+            }
+        }
+        if most >= count {
+            return Some(Place { core, at: from });
+        }
+        let room =
+            |core: usize| Some(Place { core, at: self.cores[core].room_for(count - self.free[core])? });
+        (0..self.cores.len()).filter_map(room).min_by(|a, b| a.at.total_cmp(&b.at))
+    }
+
+    /// Slots of a core that are free by `at` are free.
+    fn pass(&mut self, core: usize, at: f64) {
+        let later = &mut self.cores[core].later;
+        while let Some(&(_, count)) = later.front().filter(|(free, _)| *free <= at) {
+            self.free[core] += count;
+            later.pop_front();
+        }
+        self.frees[core] = later.front().map_or(f64::INFINITY, |(free, _)| *free);
+    }
+
+    /// Slots that warps need which are sent together.
+    pub fn slots_for(&self, warps: u32) -> u32 {
+        warps.min(self.slots)
+    }
+
+    /// Take slots at a place.
+    pub fn take(&mut self, place: Place, count: u32) {
+        let now = count.min(self.free[place.core]);
+        self.free[place.core] -= now;
+        self.cores[place.core].take(count - now);
+        self.pass(place.core, 0.0);
+    }
+
+    /// Warps at a place begin at `at`, no earlier than others before.
+    pub fn start(&mut self, place: Place, at: f64, warps: &Warps) {
+        let core = &mut self.cores[place.core];
+        core.advance(at, &self.speed);
+        let lanes = ((warps.lanes * f64::from(warps.count)) * PARTS).round() as u64;
+        let ends = ((core.steps + f64::from(warps.steps)) * PARTS).round() as u64;
+        core.lanes += lanes;
+        core.active.push(Reverse((ends, warps.packet, warps.count, lanes)));
+        let next = core.next(&self.speed);
+        self.ends_at(place.core, next);
+    }
+
+    /// The next warps of a core end at `next`.
+    fn ends_at(&mut self, core: usize, next: f64) {
+        self.next[core] = next;
+        if core == self.first {
+            let first = |best: usize, at: usize| if self.next[at] < self.next[best] { at } else { best };
+            self.first = (1..self.next.len()).fold(0, first);
+        } else if next < self.next[self.first] {
+            self.first = core;
+        }
+    }
+
+    /// Warps at a place end without a step.
+    pub fn end(&mut self, place: Place, at: f64, count: u32) {
+        self.give(place.core, at, count);
+    }
+
+    /// Slots of a core are free from `at` on.
+    fn give(&mut self, core: usize, at: f64, count: u32) {
+        self.cores[core].give(at, count.min(self.slots));
+        self.frees[core] = self.frees[core].min(at);
+    }
+
+    /// When the next warps end, if no more come; infinite if there are none.
+    pub fn next(&self) -> f64 {
+        self.next[self.first]
+    }
+
+    /// The next warps that end no later than `to`.
+    pub fn end_next(&mut self, to: f64) -> Option<Ended> {
+        let at = self.first;
+        if self.next[at] > to {
+            return None;
+        }
+        let core = &mut self.cores[at];
+        let Reverse((ends, packet, count, lanes)) = core.active.pop()?;
+        (core.steps, core.now) = (core.steps.max(ends as f64 / PARTS), self.next[at]);
+        core.lanes -= lanes;
+        let (now, next) = (core.now, core.next(&self.speed));
+        let ended = Ended { packet, count, at: now };
+        self.give(at, now, count);
+        self.ends_at(at, next);
+        Some(ended)
+    }
+}
+
+impl Core {
+    /// Time of a step of all warps, of which those that end first have `lanes` parts of a lane each.
+    fn step(&self, speed: &Speed) -> f64 {
+        let &Reverse((_, _, count, lanes)) = self.active.peek().unwrap_or(&Reverse((0, None, 1, 0)));
+        // A warp wider than a core takes several cycles per operation.
+        let of_warp = (lanes as f64 / PARTS / f64::from(count.max(1))).ceil();
+        let wide = ((of_warp / speed.lanes).ceil() - 1.0).max(0.0) * speed.period;
+        (self.lanes as f64 / PARTS * speed.period / speed.lanes).max(speed.alu + wide)
+    }
+
+    /// When the next warps end; infinite if there are none.
+    fn next(&self, speed: &Speed) -> f64 {
+        let ends = |&Reverse((ends, ..)): &Active| ends as f64 / PARTS;
+        let steps = self.active.peek().map(|first| (ends(first) - self.steps).max(0.0));
+        steps.map_or(f64::INFINITY, |steps| self.now + steps * self.step(speed))
+    }
+
+    /// Serve until `to`, when or before which no warp ends.
+    fn advance(&mut self, to: f64, speed: &Speed) {
+        if to > self.now {
+            if !self.active.is_empty() {
+                self.steps += (to - self.now) / self.step(speed);
+            }
+            self.now = to;
+        }
+    }
+
+    /// When `missing` slots more are free; `None` if that is not known.
+    fn room_for(&self, mut missing: u32) -> Option<f64> {
+        self.later.iter().find_map(|&(at, slots)| {
+            missing = missing.saturating_sub(slots);
+            (missing == 0).then_some(at)
+        })
+    }
+
+    /// Take the first slots that become free.
+    fn take(&mut self, mut missing: u32) {
+        while let Some((_, slots)) = self.later.front_mut().filter(|_| missing > 0) {
+            let taken = missing.min(*slots);
+            *slots -= taken;
+            missing -= taken;
+            if *slots == 0 {
+                self.later.pop_front();
+            }
+        }
+    }
+
+    fn give(&mut self, at: f64, count: u32) {
+        let after = self.later.iter().rposition(|&(before, _)| before <= at).map_or(0, |last| last + 1);
+        self.later.insert(after, (at, count));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Cores of four lanes and two slots, with steps of at least two cycles.
+    fn cores(count: u32) -> Sharing {
+        let mut spec: ShaderSpec = activity::spec::parse(
+            "(latency_cycles: 1, queue: 8, in_flight: 8, cores: 1, lanes: 4, warp_lanes: 4, warps: 2, \
+             alu_latency_cycles: 2, shared_bytes: 1024)",
+            "test",
+        )
+        .unwrap();
+        spec.cores = activity::Bounded::new(count).unwrap();
+        Sharing::new(&spec, 1)
+    }
+
+    fn start(cores: &mut Sharing, packet: usize, at: f64, steps: u32) -> usize {
+        let place = cores.place(1, at).unwrap();
+        cores.take(place, 1);
+        cores.start(place, at, &Warps { packet: Some(packet), count: 1, steps, lanes: 4.0 });
+        place.core
+    }
+
+    fn ends(cores: &mut Sharing) -> Vec<(Option<usize>, f64)> {
+        std::iter::from_fn(|| cores.end_next(f64::INFINITY)).map(|ended| (ended.packet, ended.at)).collect()
+    }
+
+    #[test]
+    fn warps_share_the_lanes_of_their_core_alone() {
+        let mut cores = cores(2);
+        // Three full warps: two of them have a step in two cycles, as one alone has.
+        let of = [(0, 10), (1, 10), (2, 30)].map(|(packet, steps)| start(&mut cores, packet, 0.0, steps));
+        assert_eq!(of, [0, 1, 0]);
+        assert_eq!(ends(&mut cores), [(Some(0), 20.0), (Some(1), 20.0), (Some(2), 60.0)]);
+        // Warps of eight lanes beside one of four take three cycles.
+        let place = cores.place(1, 60.0).unwrap();
+        cores.take(place, 1);
+        cores.start(place, 60.0, &Warps { packet: Some(3), count: 1, steps: 10, lanes: 8.0 });
+        assert_eq!(ends(&mut cores), [(Some(3), 90.0)]);
+    }
+
+    #[test]
+    fn a_place_is_on_the_core_with_most_room_or_where_a_slot_is_free_first() {
+        let mut cores = cores(2);
+        let of =
+            [(0, 40), (1, 10), (2, 20), (3, 5)].map(|(packet, steps)| start(&mut cores, packet, 0.0, steps));
+        assert_eq!(of, [0, 1, 0, 1]);
+        assert!(cores.place(1, 0.0).is_none());
+        // The core of the shortest is known to be free once that has ended.
+        assert_eq!(cores.end_next(f64::INFINITY).map(|ended| ended.at), Some(10.0));
+        assert_eq!(cores.place(1, 3.0).map(|place| (place.core, place.at)), Some((1, 10.0)));
+        assert_eq!(start(&mut cores, 4, 12.0, 1), 1);
+        assert_eq!(cores.next(), 14.0);
+    }
+}
