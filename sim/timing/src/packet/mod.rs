@@ -264,18 +264,19 @@ impl PacketClock {
     /// is behind the tiles in time.
     fn catch_up(&mut self, batch: Option<u32>) {
         while let Some(WaitingPacket { demand, .. }) = self.ahead.front() {
+            let before = demand.batch.checked_sub(2);
+            let waits = |oldest: &OnCores| before.is_some_and(|before| oldest.demand.batch <= before);
             let needed = batch.is_none_or(|batch| demand.batch <= batch);
-            let behind = self.stations[0].free().max(self.gates.opens(demand))
-                <= self.stations[Station::Traversal as usize].free();
+            let behind = !self.on_cores.front().is_some_and(waits)
+                && self.stations[0].free().max(self.gates.opens(demand))
+                    <= self.stations[Station::Traversal as usize].free();
             if !(needed || behind) {
                 return;
             }
+            while self.on_cores.front().is_some_and(waits) {
+                self.depart();
+            }
             if let Some(WaitingPacket { demand, counts, lines }) = self.ahead.pop_front() {
-                while let Some(before) = demand.batch.checked_sub(2)
-                    && self.on_cores.front().is_some_and(|oldest| oldest.demand.batch <= before)
-                {
-                    self.depart();
-                }
                 self.walk(&demand, &counts, &lines);
             }
         }

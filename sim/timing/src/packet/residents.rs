@@ -43,8 +43,20 @@ pub(super) struct Residents {
     /// The place of the last group, and those of the warps that are sent and have not begun.
     group: Option<Place>,
     sending: Vec<Place>,
+    /// Warps of vertices that have not begun, by time.
+    vertices: VecDeque<Vertices>,
     cores: Sharing,
 }
+
+/// Warps of vertices, which take slots and lanes, too.
+#[derive(Clone, Copy, Debug)]
+struct Vertices {
+    from: f64,
+    warps: Warps,
+}
+
+/// Most warps of vertices that wait for those of pixels to come as far in time.
+const MAX_AHEAD: usize = 1 << 12;
 
 impl Residents {
     pub fn new(machine: &MachineSpec, clocks: &Clocks) -> Self {
@@ -56,6 +68,7 @@ impl Residents {
             sent: 0.0,
             group: None,
             sending: Vec::new(),
+            vertices: VecDeque::new(),
             cores: Sharing::new(spec, clocks.period(spec.clock)),
         }
     }
@@ -83,6 +96,7 @@ impl Residents {
     /// last are free. A group has the slots of all its warps at once.
     pub fn send(&mut self, count: u32, from: Time) -> (u32, Span) {
         self.sent = self.sent.max(from as f64);
+        while self.begin_vertices(self.sent.min(self.cores.next())) {}
         let at = |place: &Place| (place.at.round() as Time).max(from);
         if let Some(group) = self.packets.back().filter(|last| last.is_group) {
             let warps = group.warps;
@@ -106,7 +120,7 @@ impl Residents {
         let slots = self.cores.slots_for(count);
         loop {
             let place = self.cores.place(slots, from);
-            if place.is_some_and(|place| place.at <= self.cores.next()) || !self.end_next(f64::INFINITY) {
+            if place.is_some_and(|place| place.at <= self.cores.next()) || !self.end_first(f64::INFINITY) {
                 return place.inspect(|&place| self.cores.take(place, slots));
             }
         }
@@ -134,16 +148,27 @@ impl Residents {
         self.sending.clear();
     }
 
-    /// `count` warps of vertices take slots and lanes, too, the first and the last from `ready` on.
+    /// `count` warps of a packet of `warps` warps of vertices begin, the first and the last at `ready`.
     pub fn share(&mut self, demand: &ServiceDemand, warps: u32, count: u32, ready: Span) {
         let Resident { steps, lanes, .. } = Resident::new(demand, warps);
         for warp in 0..Time::from(count) {
             let from = (ready.from + (ready.to - ready.from) * warp / Time::from(count)) as f64;
-            let Some(place) = self.take(1, from) else { return };
-            let begin = from.max(place.at);
-            while self.end_next(begin) {}
-            self.cores.start(place, begin, &Warps { packet: None, count: 1, steps, lanes });
+            self.vertices.push_back(Vertices { from, warps: Warps { packet: None, count: 1, steps, lanes } });
         }
+        while self.vertices.len() > MAX_AHEAD && self.end_next(f64::INFINITY) {}
+    }
+
+    /// Begin with the next warp of vertices if it comes no later than `to`, when or before which no warp ends.
+    fn begin_vertices(&mut self, to: f64) -> bool {
+        let Some(Vertices { from, warps }) = self.vertices.front().copied().filter(|first| first.from <= to)
+        else {
+            return false;
+        };
+        self.vertices.pop_front();
+        if let Some(place) = self.take(1, from) {
+            self.cores.start(place, from.max(place.at), &warps);
+        }
+        true
     }
 
     /// The last packet is done no earlier than `at`.
@@ -167,8 +192,13 @@ impl Residents {
         at.round() as Time
     }
 
-    /// Serve until warps end. Returns whether some end no later than `to`.
+    /// Serve until warps begin or end. Returns whether some do no later than `to`.
     fn end_next(&mut self, to: f64) -> bool {
+        self.begin_vertices(to.min(self.cores.next())) || self.end_first(to)
+    }
+
+    /// Serve until warps end, if no more begin. Returns whether some end no later than `to`.
+    fn end_first(&mut self, to: f64) -> bool {
         let Some(ended) = self.cores.end_next(to) else { return false };
         if let Some(packet) = ended.packet {
             self.ended(packet, ended.count, ended.at);
