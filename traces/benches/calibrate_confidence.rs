@@ -2,8 +2,8 @@
 //! whether a map would make it one: fits a logistic map (Platt 1999) of confidence, of how far methods agree
 //! and of how even gaps are, on all kinds of devices but one, and judges it on that one.
 //!
-//! `calibrate_confidence FIRST_SEED LAST_SEED [METHOD|STEP]`: METHOD in place of `auto`, or `auto` without
-//! STEP, one of `traces::frames::Step`.
+//! `cargo bench -p traces --bench calibrate_confidence -- FIRST_SEED LAST_SEED [METHOD|STEP]`: METHOD in place
+//! of `auto`, or `auto` without STEP, one of `traces::frames::Step`.
 
 use std::error::Error;
 use std::process::ExitCode;
@@ -43,7 +43,7 @@ fn main() -> ExitCode {
 }
 
 fn run() -> Result<(), Box<dyn Error>> {
-    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let arguments: Vec<String> = std::env::args().skip(1).filter(|arg| arg != "--bench").collect();
     let [first, last, which @ ..] = arguments.as_slice() else {
         return Err("usage: calibrate_confidence FIRST_SEED LAST_SEED [METHOD|STEP]".into());
     };

@@ -1,8 +1,8 @@
 //! What each step of the finder is worth: all of it, and with one step left out, on the eight scenes and on
 //! the devices of other structure.
 //!
-//! `ablation FIRST_SEED LAST_SEED`: mean F1 with the first mark, median energy error, and how many wrong and
-//! right frames carry a flag.
+//! `cargo bench -p traces --bench ablation -- FIRST_SEED LAST_SEED`: mean F1 with the first mark, median energy
+//! error, and how many wrong and right frames carry a flag.
 
 use std::error::Error;
 use traces::Trace;
@@ -27,7 +27,8 @@ struct Sum {
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let arguments: Vec<u64> = std::env::args().skip(1).map(|text| text.parse()).collect::<Result<_, _>>()?;
+    let arguments = std::env::args().skip(1).filter(|arg| arg != "--bench");
+    let arguments: Vec<u64> = arguments.map(|text| text.parse()).collect::<Result<_, _>>()?;
     let &[first, last] = arguments.as_slice() else {
         return Err("usage: ablation FIRST_SEED LAST_SEED".into());
     };
