@@ -160,22 +160,21 @@ pub const fn screen_setup_madds(moving: bool, lens: bool, whole: bool) -> u32 {
 mod testing {
     use super::{Box5, TileRect};
     use crate::geometry::{Cull, MovingVertex, Shear};
-    use crate::random::mix;
+    use crate::random::{GOLDEN, SplitMix, mix};
     use crate::setup::{SetupResult, Triangle, set_up};
 
     pub const NEAR: f32 = 0.25;
 
-    /// Counter-based uniform numbers.
-    pub struct Uniform(u64);
+    /// Uniform numbers.
+    pub struct Uniform(SplitMix);
 
     impl Uniform {
         pub fn new(seed: u64) -> Self {
-            Self(mix(seed.wrapping_add(0x9E37_79B9_7F4A_7C15)))
+            Self(SplitMix::new(mix(seed.wrapping_add(GOLDEN))))
         }
 
         pub fn within(&mut self, lo: f32, hi: f32) -> f32 {
-            self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-            lo + (hi - lo) * ((mix(self.0) >> 40) as f32 / 16_777_216.0)
+            lo + (hi - lo) * ((self.0.next_word() >> 40) as f32 / 16_777_216.0)
         }
 
         /// A number of a range, often an end of it.

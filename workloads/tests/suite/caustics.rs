@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use crate::curved::BallLens;
 use glam::{DVec2, DVec3};
-use pipeline::random::{mix, unit};
+use pipeline::random::SplitMix;
 use workloads::caustics::generator::{Ocean, Wave};
 use workloads::caustics::{Beam, Eye, Floor, Light, Method, Squares, crossing, draw, error, receivers};
 
@@ -118,12 +118,11 @@ fn energy_is_kept() {
     }
 }
 
-struct Photons(u64);
+struct Photons(SplitMix);
 
 impl Photons {
     fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        unit(mix(self.0))
+        self.0.next_unit()
     }
 
     /// Start and end of a photon of a random beam, in proportion to flux.
@@ -169,7 +168,7 @@ fn photons_on_the_floor_follow_the_image() {
         let [x, y] = [place % side, place / side].map(|at| at / fine as usize);
         expected[y * bins as usize + x] += light * pixel_m2 / per_photon;
     }
-    let (mut counts, mut random) = (vec![0.0; expected.len()], Photons(9));
+    let (mut counts, mut random) = (vec![0.0; expected.len()], Photons(SplitMix::new(9)));
     for _ in 0..photons {
         let [from, to] = random.ray(&beams, &until);
         let at = from + (to - from) * ((FLOOR.height_m - from.y) / (to.y - from.y));
@@ -202,7 +201,7 @@ fn photon_paths_follow_the_image_of_the_volume() {
     let image = draw(&beams, &eye, Method::Moving, Some(Light::Volume));
     // Random positions on rays, each of which represents a part of the path.
     let places = 200_000;
-    let mut random = Photons(4);
+    let mut random = Photons(SplitMix::new(4));
     let (mut counts, mut expected) = (vec![0.0; 24 * 16], vec![0.0; 24 * 16]);
     let mut path = 0.0;
     for _ in 0..places {

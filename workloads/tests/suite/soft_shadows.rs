@@ -3,6 +3,7 @@
 use activity::{Event, Unit};
 use glam::{DVec3, Vec3};
 use pipeline::geometry::Projection;
+use pipeline::random::{GOLDEN, mix};
 use pipeline::sampling::{Pattern, Sample, SampleSpec};
 use pipeline::{Clip, Cull, Draw, Geometry, Gpu, Lane, Viewport};
 use proptest::prelude::*;
@@ -137,7 +138,7 @@ proptest! {
     ) {
         let mut state = seed;
         let mut number = || {
-            state = pipeline::random::mix(state.wrapping_add(0x9E37_79B9_7F4A_7C15));
+            state = mix(state.wrapping_add(GOLDEN));
             (state >> 40) as f32 / 8_388_608.0 - 1.0
         };
         let mut points = |spread: f32| -> Vec<Vec3> {

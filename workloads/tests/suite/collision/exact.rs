@@ -2,6 +2,7 @@
 //! time and quarters of a triangle, so both triangles share a point exactly. There is no allowance for
 //! rounding.
 
+use pipeline::random::SplitMix;
 use rayon::prelude::*;
 use workloads::collision::{Method, Object, Search};
 
@@ -15,12 +16,11 @@ type Triangle = [[Point; 3]; 2];
 const UNIT: i64 = 32;
 
 /// Sequence of random integers.
-struct Rng(u64);
+struct Rng(SplitMix);
 
 impl Rng {
     fn below(&mut self, end: u64) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        mix(self.0) % end
+        self.0.next_word() % end
     }
 
     fn one_in(&mut self, count: u64) -> bool {
@@ -206,7 +206,7 @@ fn search(rng: &mut Rng, triangles: usize) -> Search {
 /// aside.
 fn separated_when_moved(seeds: std::ops::Range<u64>, searches: usize) -> usize {
     let checked = |seed: u64| {
-        let mut rng = Rng(mix(seed));
+        let mut rng = Rng(SplitMix::new(mix(seed)));
         let (exact, unit) = case(&mut rng);
         let objects = scaled(&exact, [unit; 3], 0);
         for _ in 0..searches {
@@ -230,7 +230,7 @@ fn no_exact_contact_is_missed() {
 #[test]
 fn no_exact_contact_is_missed_with_any_units_per_axis() {
     (0..1500_u64).into_par_iter().for_each(|seed| {
-        let mut rng = Rng(mix(seed ^ 0x5EED));
+        let mut rng = Rng(SplitMix::new(mix(seed ^ 0x5EED)));
         let (exact, _) = case(&mut rng);
         let unit = |rng: &mut Rng| {
             let exponent = rng.below(1170) as i32 - 1070;
