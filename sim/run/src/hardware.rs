@@ -138,12 +138,21 @@ fn fixed(gpu: &GpuSpec) -> Vec<Memory> {
 
 /// Caches above memory.
 fn caches(gpu: &GpuSpec) -> Vec<Memory> {
-    let access = Charge::access;
-    let entries = |cache: CacheSpec| f64::from(cache.entries);
+    let mut all = Vec::from(line_caches(gpu));
+    all.extend(shaded_quads(gpu));
     let cache = &gpu.pipeline.memory;
-    let quads = entries(gpu.pipeline.shading_cache);
-    let [data, tag] = QUAD_BYTES;
-    let mut all = vec![
+    let units = [Unit::Llc, Unit::Edram].into_iter().zip(cache.levels()).zip(gpu.units.levels());
+    all.extend(units.filter_map(|((unit, size), spec)| {
+        Some(level(unit, f64::from(size?.entries) * LINE, f64::from(spec?.lines_per_cycle.get())))
+    }));
+    all
+}
+
+/// Caches of lines, the L2 among them.
+fn line_caches(gpu: &GpuSpec) -> [Memory; 4] {
+    let access = Charge::access;
+    let cache = &gpu.pipeline.memory;
+    [
         of_lines(
             "depth_cache",
             cache.depth,
@@ -183,6 +192,14 @@ fn caches(gpu: &GpuSpec) -> Vec<Memory> {
                 access(Event::L2Misses),
             ],
         ),
+    ]
+}
+
+/// The cache of shaded quads, their colours and their tags.
+fn shaded_quads(gpu: &GpuSpec) -> [Memory; 2] {
+    let quads = f64::from(gpu.pipeline.shading_cache.entries);
+    let [data, tag] = QUAD_BYTES;
+    [
         Memory {
             accesses: rate(gpu, Event::QuadsShaded),
             ..memory(
@@ -190,7 +207,7 @@ fn caches(gpu: &GpuSpec) -> Vec<Memory> {
                 Unit::ShadingCache,
                 quads * data,
                 data,
-                vec![access(Event::ShadingHits), access(Event::QuadsShaded)],
+                vec![Charge::access(Event::ShadingHits), Charge::access(Event::QuadsShaded)],
             )
         },
         Memory {
@@ -203,12 +220,7 @@ fn caches(gpu: &GpuSpec) -> Vec<Memory> {
                 vec![Charge::shares(Event::ShadingLookups, 0.88, 0.0)],
             )
         },
-    ];
-    let units = [Unit::Llc, Unit::Edram].into_iter().zip(cache.levels()).zip(gpu.units.levels());
-    all.extend(units.filter_map(|((unit, size), spec)| {
-        Some(level(unit, entries(size?) * LINE, f64::from(spec?.lines_per_cycle.get())))
-    }));
-    all
+    ]
 }
 
 /// A cache of lines of 64 bytes. Its unit is that of the first event it is charged for.

@@ -48,6 +48,18 @@ impl Spread {
         let ((x, y), [x0, x1], [y0, y1]) = (self.at, self.across, self.up);
         [[(x0, y), (x1, y)], [(x, y0), (x, y1)]]
     }
+
+    /// Draws its cross and its marker, both with an edge in the colour of the background.
+    fn draw(&self, panel: &Panel, style: Style, picture: &mut Picture) {
+        for line in self.cross() {
+            let line: Vec<Point> = line.iter().filter_map(|&point| panel.place(point)).collect();
+            picture.polyline(line.clone(), BACKGROUND, 4.5);
+            picture.polyline(line, style.colour, 2.0);
+        }
+        let Some(at) = panel.place(self.at) else { return };
+        Style { colour: BACKGROUND, ..style }.marker(picture, at, RADII[2] + 1.5);
+        style.marker(picture, at, RADII[2]);
+    }
 }
 
 /// Choice of colour and marker of a series.
@@ -258,17 +270,7 @@ impl Mark {
                     }
                 }
             }
-            Self::Spreads(spreads) => {
-                for spread in spreads {
-                    for line in spread.cross().map(|line| path(&line)) {
-                        picture.polyline(line.clone(), BACKGROUND, 4.5);
-                        picture.polyline(line, colour, 2.0);
-                    }
-                    let Some(at) = panel.place(spread.at) else { continue };
-                    Style { colour: BACKGROUND, ..style }.marker(picture, at, RADII[2] + 1.5);
-                    style.marker(picture, at, RADII[2]);
-                }
-            }
+            Self::Spreads(spreads) => spreads.iter().for_each(|spread| spread.draw(panel, style, picture)),
             Self::Steps(points) => picture.polyline(stairs(&path(points)), colour, 1.3),
             Self::Bars(bars) => {
                 for &(from, to, y) in bars {

@@ -15,12 +15,12 @@ use workloads::soft_shadows::{SoftShadowOptions, SoftShadows};
 
 use super::Task;
 use super::figures::{self, light, warped};
-use super::settings::{Glossy, Lost, Size};
+use super::settings::{Executions, Glossy, Lost, Size};
 use crate::chart::caustics::measure::{DEPTH_M, SIDE_M, WAVE_M, aside_of, water};
 use crate::chart::caustics::{OceanCounts, ocean};
 use crate::chart::glossy::{Bench, Blur, GlossyEffort, GlossyRow as Measured};
 use crate::reproduce::report::line;
-use crate::reproduce::row::{Cases, Row, Verdict, numbers, one_at_a_time, ran};
+use crate::reproduce::row::{Band, Cases, Number, Row, Verdict, numbers, one_at_a_time, ran};
 use crate::reproduce::settings::Form;
 use crate::reproduce::{Done, Figure};
 use crate::study::{Ran, StudyError};
@@ -31,35 +31,66 @@ fn over_fewer(counted: &OceanCounts) -> f64 {
     moving as f64 / refined.min(prism) as f64
 }
 
+/// Oceans of several slopes and depths, one varied at a time about the values given.
+struct Oceans {
+    base: OceanCounts,
+    slopes: Vec<(f64, OceanCounts)>,
+    depths: Vec<(f64, OceanCounts)>,
+}
+
+impl Oceans {
+    fn new(task: &Task<'_>, row: &Executions, form: Form) -> Result<Self, RunError> {
+        let (slope, depth_m) = (*row.slope.get(form), *row.depth_m.get(form));
+        let size = *row.size_px.get(form);
+        let count = |slope: f64, depth_m: f64| -> Result<OceanCounts, RunError> {
+            Ok(ocean(*row.cells.get(form), [slope, depth_m], [size.0, size.1], task.progress)?)
+        };
+        let base = count(slope, depth_m)?;
+        let of_slope = |at: f64| Ok((at, if at == slope { base.clone() } else { count(at, depth_m)? }));
+        let of_depth = |&at: &f64| Ok((at, if at == depth_m { base.clone() } else { count(slope, at)? }));
+        let mut slopes = row.slope.all(form).to_vec();
+        slopes.sort_by(f64::total_cmp);
+        let slopes = slopes.into_iter().map(of_slope).collect::<Result<_, RunError>>()?;
+        let depths = row.depth_m.all(form).iter().map(of_depth).collect::<Result<_, RunError>>()?;
+        Ok(Self { base, slopes, depths })
+    }
+
+    /// Whether the moving triangles have the fewest executions in every one.
+    fn band(&self, row: &Executions, form: Form) -> Result<Band, RunError> {
+        let mut tried = Cases::new(
+            "executions over those of the bounding volume with fewer",
+            "slope and depth_m one at a time about the values given",
+        );
+        let judged =
+            |(at, counted): &(f64, OceanCounts)| (*at, over_fewer(counted), over_fewer(counted) < 1.0);
+        tried.along("slope", self.slopes.iter().map(judged)).with_base(*row.slope.get(form));
+        tried.along("depth_m", self.depths.iter().map(judged)).with_base(*row.depth_m.get(form));
+        tried.band(one_at_a_time([row.slope.values(), row.depth_m.values()]))
+    }
+
+    /// Work on the host. The ocean of the values given is in both sweeps and was drawn once.
+    fn ran(&self, depth_m: f64) -> Vec<Number> {
+        let others = self.depths.iter().filter(|(at, _)| *at != depth_m).chain(&self.slopes);
+        let drawn: Vec<&OceanCounts> = others.map(|(_, counted)| counted).collect();
+        let draws: u64 = drawn.iter().map(|counted| counted.draws).sum();
+        let fragments: u64 = drawn.iter().flat_map(|counted| counted.executions).sum();
+        numbers([
+            ("draws_on_the_host", draws as f64),
+            ("fragments_on_the_host", fragments as f64),
+            ("volumes", self.base.volumes as f64),
+            ("oceans_on_the_host", drawn.len() as f64),
+        ])
+    }
+}
+
 /// VI-6: shader executions by method on an ocean of 130,050 volumes.
 pub(super) fn executions(task: &Task<'_>) -> Result<Done, RunError> {
     let with = task.with(|settings| &settings.vi_6);
     let (row, form) = (with.settings, with.form);
-    let size = *row.size_px.get(form);
-    let count = |slope: f64, depth_m: f64| {
-        ocean(*row.cells.get(form), [slope, depth_m], [size.0, size.1], task.progress).map_err(RunError::from)
-    };
-    let (slope, depth_m) = (*row.slope.get(form), *row.depth_m.get(form));
-    let base = count(slope, depth_m)?;
-    let mut slopes = row.slope.all(form).to_vec();
-    slopes.sort_by(f64::total_cmp);
-    let counted = |at: f64| if at == slope { Ok(base.clone()) } else { count(at, depth_m) };
-    let slopes: Vec<(f64, OceanCounts)> =
-        slopes.into_iter().map(|at| Ok((at, counted(at)?))).collect::<Result<_, RunError>>()?;
-    let mut depths = Vec::new();
-    for &at in row.depth_m.all(form) {
-        let counted = if at == depth_m { base.clone() } else { count(slope, at)? };
-        depths.push((at, counted));
-    }
-    let mut tried = Cases::new(
-        "executions over those of the bounding volume with fewer",
-        "slope and depth_m one at a time about the values given",
-    );
-    let judged = |(at, counted): &(f64, OceanCounts)| (*at, over_fewer(counted), over_fewer(counted) < 1.0);
-    tried.along("slope", slopes.iter().map(judged)).with_base(slope);
-    tried.along("depth_m", depths.iter().map(judged)).with_base(depth_m);
-    let full = one_at_a_time([row.slope.values(), row.depth_m.values()]);
-    let band = tried.band(full)?;
+    let oceans = Oceans::new(task, row, form)?;
+    let band = oceans.band(row, form)?;
+    let base = &oceans.base;
+    let (size, slope, depth_m) = (*row.size_px.get(form), *row.slope.get(form), *row.depth_m.get(form));
     let [moving, refined, hull, prism] = base.executions;
     let part = |total: u64| total as f64 / prism as f64;
     let ours = format!(
@@ -80,23 +111,13 @@ pub(super) fn executions(task: &Task<'_>) -> Result<Done, RunError> {
         ("most_of_a_pixel_moving", f64::from(base.most[0])),
         ("most_of_a_pixel_prism", f64::from(base.most[3])),
     ]);
-    // The ocean of the values given is in both sweeps and was drawn once.
-    let others = depths.iter().filter(|(at, _)| *at != depth_m).chain(&slopes).map(|(_, counted)| counted);
-    let drawn: Vec<&OceanCounts> = others.collect();
-    let draws: u64 = drawn.iter().map(|counted| counted.draws).sum();
-    let fragments: u64 = drawn.iter().flat_map(|counted| counted.executions).sum();
     let (there, on_hardware) = base_on_hardware(*row.cells.get(form), [slope, depth_m], [size.0, size.1])?;
     let same = if on_hardware == base.executions { "the same" } else { "others" };
     let ours = format!("{ours}; the modelled hardware counts {same} by all methods");
     let mut ran = ran(&there);
-    ran.extend(numbers([
-        ("draws_on_the_host", draws as f64),
-        ("fragments_on_the_host", fragments as f64),
-        ("volumes", base.volumes as f64),
-        ("oceans_on_the_host", drawn.len() as f64),
-    ]));
+    ran.extend(oceans.ran(depth_m));
     let row = Row { numbers: facts, ran, ..with.banded(&row.about, ours, band) };
-    Ok(Done { row, figures: figures(&base, &slopes, form)? })
+    Ok(Done { row, figures: figures(base, &oceans.slopes, form)? })
 }
 
 /// Work and executions of the modelled hardware on the ocean of the values given, by method as in [`Method::ALL`].
@@ -281,9 +302,8 @@ impl Found {
     }
 }
 
-pub(super) fn glossy_row(task: &Task<'_>) -> Result<Done, RunError> {
-    let with = task.with(|settings| &settings.vi_11);
-    let (row, form) = (with.settings, with.form);
+/// What is found by the values given, what by others about them, and how many settings were drawn.
+fn varied(row: &Glossy, form: Form) -> Result<(Found, Band, u32), RunError> {
     let found = |settings| Found::new(row, form, settings).map_err(RunError::from);
     let (radius, index) = (*row.lens_radius.get(form), *row.index.get(form));
     let mut tried = Cases::new(
@@ -314,8 +334,14 @@ pub(super) fn glossy_row(task: &Task<'_>) -> Result<Done, RunError> {
         at.push((one, found.ratio(), found.falls() && found.hardens(off)));
     }
     tried.along("index", at).with_base(index);
-    let full = one_at_a_time([row.lens_radius.values(), row.index.values()]);
-    let band = tried.band(full)?;
+    let band = tried.band(one_at_a_time([row.lens_radius.values(), row.index.values()]))?;
+    Ok((base, band, runs))
+}
+
+pub(super) fn glossy_row(task: &Task<'_>) -> Result<Done, RunError> {
+    let with = task.with(|settings| &settings.vi_11);
+    let (row, form) = (with.settings, with.form);
+    let (base, band, runs) = varied(row, form)?;
     let [reflected, refracted] = base.errors.map(|both| both.map(|row| row.rmse));
     let (first, last) = (&base.blurs[0], &base.blurs[base.blurs.len() - 1]);
     let ours = format!(
@@ -343,6 +369,7 @@ pub(super) fn glossy_row(task: &Task<'_>) -> Result<Done, RunError> {
         ("vertices", measured().map(|row| row.vertices as f64).sum()),
         ("samples_tested", measured().map(|row| row.samples_tested as f64).sum()),
     ]));
+    let (radius, index) = (*row.lens_radius.get(form), *row.index.get(form));
     let pictures = figures::glossy(*row.texels.get(form), radius, index, *row.samples.get(form))?;
     Ok(Done {
         row: Row { numbers: facts, ran, ..with.banded(&row.about, ours, band) },
