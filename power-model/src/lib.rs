@@ -176,7 +176,7 @@ pub enum ModelError {
     Voltage {
         /// Platform.
         platform: String,
-        /// Its core voltage, V.
+        /// Core voltage of the platform, V.
         v_v: f64,
         /// Table.
         table: String,

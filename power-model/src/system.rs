@@ -40,7 +40,7 @@ impl Pulse {
         (self.end_s.min(to_s) - self.start_s.max(from_s)).max(0.0)
     }
 
-    /// Its energy in an interval, J.
+    /// Energy of the pulse in an interval, J.
     pub fn energy_j(&self, from_s: f64, to_s: f64) -> f64 {
         self.extra_w * self.overlap_s(from_s, to_s)
     }
@@ -105,7 +105,7 @@ pub struct SurroundedFrame {
     pub end_s: f64,
     /// Energy from start to end, J.
     pub energy_j: f64,
-    /// Its part caused by launch, finish and disturbances, J.
+    /// Part of the energy caused by launch, finish and disturbances, J.
     pub extra_j: f64,
 }
 

@@ -11,7 +11,7 @@ use thiserror::Error;
 /// One setting, measured.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Point {
-    /// Its name.
+    /// Name of the point.
     pub label: String,
     /// Time, s.
     pub time_s: f64,

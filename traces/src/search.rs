@@ -39,7 +39,7 @@ pub struct Search {
 pub struct FrameSet {
     /// The frames.
     pub found: Found,
-    /// Their energies, in order.
+    /// Energies of the frames, in order.
     pub energies: Vec<FrameEnergy>,
     /// The metadata of the trace.
     pub metadata: Metadata,

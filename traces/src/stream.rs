@@ -23,7 +23,7 @@ const BATCH_ROWS: usize = 1 << 16;
 pub struct Streamed {
     /// The frames.
     pub found: Found,
-    /// Their energies, in order.
+    /// Energies of the frames, in order.
     pub energies: Vec<FrameEnergy>,
     /// When samples were taken, and how many.
     pub clock: Clock,

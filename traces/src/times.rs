@@ -55,7 +55,7 @@ pub enum TimesError {
         path: PathBuf,
         /// The line, from 1.
         line: usize,
-        /// Its text.
+        /// Text of the line.
         text: String,
         /// The error.
         reason: String,

@@ -284,9 +284,9 @@ pub(super) struct Plane {
 
 /// Values before the first draw of a pass.
 pub(super) enum First {
-    /// Each the same.
+    /// The same value everywhere.
     Cleared(Vec4),
-    /// Those of an earlier pass.
+    /// The values that an earlier pass left.
     Loaded(Arc<Texels>),
 }
 

@@ -172,7 +172,6 @@ fn sample_madds(moving: bool, lens: bool) -> u64 {
 }
 
 /// Invariants of every frame.
-#[allow(clippy::too_many_lines, reason = "a list")]
 fn agree(frame: &Frame) {
     let mut sum = Counts::default();
     frame.packets.iter().for_each(|packet| sum += &packet.counts);

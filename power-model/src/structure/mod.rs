@@ -29,7 +29,7 @@ pub struct Structure {
 pub struct Memory {
     /// Name, one of its unit. A memory is compared with the one of its name on another GPU.
     pub name: &'static str,
-    /// Its unit.
+    /// Unit of the memory.
     pub unit: Unit,
     /// Bytes of one copy.
     pub bytes: f64,

@@ -153,7 +153,7 @@ fn kept<'a>(designs: &[Design<'a>], calibrated: usize) -> Vec<&'a Point> {
 pub(crate) struct Screened<'a> {
     /// Number of points that have to run.
     pub kept: usize,
-    /// Those of them that have not.
+    /// Points that have to run and have not.
     pub pending: Vec<&'a Point>,
     /// Others, with the reason.
     pub dropped: Vec<(&'a Point, Outcome)>,

@@ -36,7 +36,7 @@ pub enum Section {
 }
 
 impl Section {
-    /// Its heading in the book.
+    /// Heading of the section in the book.
     pub const fn heading(self) -> &'static str {
         match self {
             Self::Simulator => "From the simulator",
@@ -307,7 +307,7 @@ impl PartialEq<&str> for Code {
 /// asks for.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 pub struct Warning {
-    /// Its subject.
+    /// Subject of the warning.
     pub code: Code,
     /// The event, the number of things it concerns, and its effect on the results; one line.
     pub message: String,

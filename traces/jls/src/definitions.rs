@@ -142,7 +142,7 @@ fn track<W: Write + Seek>(
 /// A signal of fixed rate.
 #[derive(Clone, Debug, Default)]
 pub struct Signal {
-    /// Its number in the file.
+    /// Number of the signal in the file.
     pub number: u16,
     /// The number of its source.
     pub source: u16,
@@ -176,22 +176,22 @@ impl Source {
         self.texts.get(index).map_or("", String::as_str)
     }
 
-    /// Its name in the file.
+    /// Name of the source in the file.
     pub fn name(&self) -> &str {
         self.text(0)
     }
 
-    /// Its vendor.
+    /// Vendor of the source.
     pub fn vendor(&self) -> &str {
         self.text(1)
     }
 
-    /// Its model.
+    /// Model of the source.
     pub fn model(&self) -> &str {
         self.text(2)
     }
 
-    /// Its serial number.
+    /// Serial number of the source.
     pub fn serial_number(&self) -> &str {
         self.text(4)
     }

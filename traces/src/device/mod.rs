@@ -32,7 +32,7 @@ impl Device {
         })
     }
 
-    /// Its specification.
+    /// Specification of the device.
     pub fn spec(&self) -> &DeviceSpec {
         &self.spec
     }

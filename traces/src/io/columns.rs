@@ -33,7 +33,7 @@ pub(super) struct Layout {
     pub time: Option<Picked>,
     pub values: Vec<Picked>,
     pub rails: Vec<Rail>,
-    /// Their names, in order.
+    /// Names of the rails, in order.
     pub names: Vec<String>,
     /// Columns of power that are not read, as their rails have voltage and current.
     pub unread: Vec<String>,
@@ -77,7 +77,7 @@ impl Rail {
 /// Rows of a file, as they are in it.
 #[derive(Debug)]
 pub(crate) struct RowBatch {
-    /// Their times; absent in files without.
+    /// Times of the rows; absent in files without.
     pub stamps: Stamps,
     /// One list per column of the layout, in the units of the file.
     pub values: Vec<Vec<f32>>,

@@ -26,9 +26,9 @@ const EDGE_SAMPLES: f64 = 1e-6;
 /// A segment of time and the powers in it, W.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Column {
-    /// Its begin, s.
+    /// Begin of the column, s.
     pub from_s: f64,
-    /// Its end, s.
+    /// End of the column, s.
     pub to_s: f64,
     /// The lowest power of any sample in it.
     pub low_w: f32,

@@ -14,7 +14,7 @@ use core::f64::consts::TAU;
 /// A kind of device, with the recorder that is used on it.
 #[derive(Clone, Copy, Debug)]
 pub struct HeldOutDevice {
-    /// Its name.
+    /// Name of the device.
     pub name: &'static str,
     /// What it does, in a line.
     pub about: &'static str,

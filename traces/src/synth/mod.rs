@@ -25,7 +25,7 @@ use thiserror::Error;
 /// The properties that make a recording easy or hard.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scenario {
-    /// Its name.
+    /// Name of the scenario.
     pub name: &'static str,
     /// Frames wait for a tick of this rate, Hz; `None` lets them run on.
     pub sync_hz: Option<f64>,

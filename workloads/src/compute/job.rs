@@ -247,7 +247,7 @@ pub const CHAIN: &str = "mean";
 pub struct Chain {
     /// The surface, at its finest level.
     pub pixels: SurfaceId,
-    /// Its last level, of one texel.
+    /// Last level of the chain, of one texel.
     pub last: SurfaceId,
     /// Luminance of that texel.
     pub mean: f32,

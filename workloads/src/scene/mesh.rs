@@ -34,7 +34,7 @@ pub struct Influences {
     pub per_vertex: usize,
     /// Indices into the skin's joints, `per_vertex` for each vertex.
     pub joints: Vec<u16>,
-    /// Their weights, adding up to one for each vertex.
+    /// Weights of the joints, adding up to one for each vertex.
     pub weights: Vec<f32>,
 }
 

@@ -46,7 +46,7 @@ pub enum Way {
 }
 
 impl Way {
-    /// Its name in the tables.
+    /// Name of the method in the tables.
     pub fn name(&self) -> String {
         match self {
             Self::ObjectBoxes => "swept boxes of objects".to_owned(),
@@ -79,7 +79,7 @@ pub enum Set {
 }
 
 impl Set {
-    /// Its name in tables.
+    /// Name of the set in tables.
     pub fn name(self) -> &'static str {
         match self {
             Self::Families => "families",

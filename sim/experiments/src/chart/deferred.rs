@@ -108,7 +108,7 @@ const WAYS: [Way; 5] = {
 pub struct DeferredRow {
     /// What varies.
     pub sweep: Sweep,
-    /// Its value.
+    /// Value of the varied setting.
     pub value: u32,
     /// The way.
     pub method: &'static str,

@@ -232,18 +232,18 @@ pub struct GlossyRow {
     pub accumulated_rmse: f64,
     /// Vertex shader runs of one pass.
     pub vertices: u64,
-    /// Those of accumulation.
+    /// Vertex shader runs of accumulation.
     pub accumulated_vertices: u64,
     /// Samples tested in one pass.
     pub samples_tested: u64,
-    /// Those of accumulation.
+    /// Samples tested in accumulation.
     pub accumulated_samples_tested: u64,
     /// Passes, draws and fragments of both.
     #[serde(skip)]
     pub ran: Ran,
     /// Seconds of the host for one pass.
     pub host_s: f64,
-    /// Those for accumulation.
+    /// Seconds of the host for accumulation.
     pub accumulated_host_s: f64,
     /// Ray tracing with the samples of the one pass.
     pub traced: Traced,
@@ -252,7 +252,7 @@ pub struct GlossyRow {
 /// An image by ray tracing.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Traced {
-    /// Its error.
+    /// Error of the image.
     pub rmse: f64,
     /// Boxes and triangles tested.
     pub tests: u64,
@@ -283,9 +283,9 @@ impl Traced {
 pub struct Blur {
     /// Above the plane, scene units.
     pub height: f64,
-    /// Its width on the plane as found in the map, scene units.
+    /// Width of the blur on the plane as found in the map, scene units.
     pub width: f64,
-    /// That of geometry.
+    /// Width by geometry.
     pub expected: f64,
 }
 

@@ -101,7 +101,7 @@ pub struct GrowthChart {
 impl Sweep {
     const ALL: [Self; 3] = [Self::Triangles, Self::Samples, Self::Blur];
 
-    /// Its name in tables.
+    /// Name of the sweep in tables.
     pub fn name(self) -> &'static str {
         match self {
             Self::Triangles => "triangles",
@@ -133,7 +133,7 @@ impl Sweep {
 impl Kind {
     const ALL: [Self; 4] = [Self::Still, Self::Motion, Self::Defocus, Self::Both];
 
-    /// Its name in tables and pictures.
+    /// Name of the kind in tables and pictures.
     pub fn name(self) -> &'static str {
         match self {
             Self::Still => "still",

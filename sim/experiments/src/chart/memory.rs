@@ -42,7 +42,7 @@ pub struct MemoryRow {
     pub work: &'static str,
     /// The level whose size changes.
     pub level: &'static str,
-    /// Its size in megabytes of 1,048,576 bytes.
+    /// Size of the level in megabytes of 1,048,576 bytes.
     pub size_mb: f64,
     /// Bytes read from and written to memory.
     pub dram_bytes: u64,

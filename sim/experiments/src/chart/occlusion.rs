@@ -54,7 +54,7 @@ impl Kind {
     /// Every kind.
     pub const ALL: [Self; 3] = [Self::Motion, Self::Defocus, Self::Both];
 
-    /// Its name in tables and pictures.
+    /// Name of the kind in tables and pictures.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Motion => "motion",
@@ -79,9 +79,9 @@ pub struct OcclusionRow {
     pub boxes: Option<[u32; 3]>,
     /// Objects.
     pub objects: u64,
-    /// Of these hidden from every sample.
+    /// Objects hidden from every sample.
     pub hidden: u64,
-    /// Of these found.
+    /// Hidden objects that were found.
     pub found: u64,
     /// Objects called hidden that a sample sees: there must be none.
     pub wrong: u64,

@@ -69,9 +69,9 @@ pub struct Trial {
 pub struct Cost {
     /// The animation.
     pub scene: String,
-    /// Its frames.
+    /// Frames of the scene.
     pub frames: usize,
-    /// Those that were simulated.
+    /// Frames that were simulated.
     pub simulated: usize,
     /// Frames for one that was simulated.
     pub times_fewer: f64,

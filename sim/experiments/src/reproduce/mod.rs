@@ -46,7 +46,7 @@ impl Paper {
     /// All papers.
     pub const ALL: [Self; 3] = [Self::Two, Self::Three, Self::Six];
 
-    /// Its number.
+    /// Number of the paper.
     pub const fn number(self) -> &'static str {
         match self {
             Self::Two => "II",
@@ -55,7 +55,7 @@ impl Paper {
         }
     }
 
-    /// Its title.
+    /// Title of the paper.
     pub const fn title(self) -> &'static str {
         match self {
             Self::Two => "Performance per What?",

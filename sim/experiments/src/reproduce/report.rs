@@ -18,7 +18,7 @@ use super::{Done, Options, Paper};
 pub struct PaperReport {
     /// Which paper.
     pub paper: Paper,
-    /// Its title.
+    /// Title of the paper.
     pub title: &'static str,
     /// How much was computed.
     pub form: Form,
@@ -235,7 +235,7 @@ pub(super) fn check_earlier(paper: Paper, options: &Options, out: &Destination) 
 
 /// A picture and its name.
 pub struct Figure {
-    /// Its name without ending, for example `III_fig3`.
+    /// Name of the figure without ending, for example `III_fig3`.
     pub name: &'static str,
     /// Picture.
     pub picture: Picture,

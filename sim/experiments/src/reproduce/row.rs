@@ -44,9 +44,9 @@ pub struct Row {
 /// A computed number.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Number {
-    /// Its name, with its unit.
+    /// Name of the number, with its unit.
     pub name: &'static str,
-    /// Its value.
+    /// Value of the number.
     pub value: f64,
 }
 
@@ -167,7 +167,7 @@ impl Row {
 pub struct Case {
     /// The varied setting; empty if all have their given values.
     pub setting: String,
-    /// Its value.
+    /// Value of the varied setting.
     pub value: String,
     /// The number in the condition.
     pub number: f64,

@@ -40,7 +40,7 @@ impl Form {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct About {
-    /// Its name in the list of claims.
+    /// Name of the row in the list of claims.
     pub id: String,
     /// Kind of agreement.
     pub kind: Kind,
@@ -283,7 +283,7 @@ pub trait PaperSettings: DeserializeOwned {
     const PAPER: Paper;
     /// The committed file, from the root of the repository.
     const FILE: &str;
-    /// Its text.
+    /// Text of the committed file.
     const TEXT: &str;
 
     /// The number of the paper that the file names.
@@ -333,7 +333,7 @@ fn parse<T: PaperSettings>(text: &str, name: &str) -> Result<(T, Origin), RunErr
 /// A setting as a report lists it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Listed {
-    /// Its name in the file.
+    /// Name of the setting in the file.
     pub name: String,
     /// `stated`, `open` or `ours`.
     pub basis: &'static str,

@@ -18,7 +18,7 @@ pub struct Trial {
     pub value: f64,
     /// Multiply-adds of `auto`.
     pub auto: u64,
-    /// Those of each of [`combinations`], in their order.
+    /// Multiply-adds of each of [`combinations`], in their order.
     pub fixed: Vec<u64>,
 }
 
@@ -33,7 +33,7 @@ pub struct Choice {
     pub auto_madds: u64,
     /// The letters of the best fixed choice.
     pub best: String,
-    /// Its multiply-adds.
+    /// Multiply-adds of the best choice.
     pub best_madds: u64,
     /// Multiply-adds with every test on.
     pub all_madds: u64,

@@ -33,9 +33,9 @@ pub struct StressRow {
     pub samples_lost: u64,
     /// Source of the reference: `brute force` or `no tests`.
     pub compared_with: &'static str,
-    /// Its cost.
+    /// Cost of the method.
     pub work: Work,
-    /// Its multiply-adds over those of the best method at this value.
+    /// Multiply-adds of the method over those of the best method at this value.
     pub over_best: f64,
     /// Source of the true intervals: `exact roots` or `dense sampling`.
     pub truth: &'static str,
@@ -273,7 +273,7 @@ fn holds(found: &Hulls, truth: &Hulls) -> bool {
 /// A named set of tests.
 #[derive(Clone, Copy, Debug)]
 pub struct TestMethod {
-    /// Its name in tables and charts.
+    /// Name of the method in tables and charts.
     pub name: &'static str,
     /// The tests that are on.
     pub features: Features,
@@ -305,9 +305,9 @@ pub const METHODS: [TestMethod; 14] = [
 /// A test that can be switched on: its letter in charts, its name, and how.
 #[derive(Clone, Copy, Debug)]
 pub struct Switch {
-    /// Its letter in charts.
+    /// Letter of the switch in charts.
     pub letter: char,
-    /// Its name, as in a GPU file.
+    /// Name of the switch, as in a GPU file.
     pub name: &'static str,
     /// Switches it on.
     pub on: fn(&mut Features),

@@ -24,13 +24,13 @@ use tradeoff::TradeoffPoint;
 
 /// The result of a study: measured once, then drawn, written and printed. As JSON it is everything that was found.
 pub trait Study: Serialize + Sized {
-    /// Its name on the command line.
+    /// Name of the study on the command line.
     const NAME: &'static str;
-    /// Its subject, in one line.
+    /// Subject of the study, in one line.
     const ABOUT: &'static str;
     /// Paths of its pictures, without endings.
     const PICTURES: &'static [&'static str];
-    /// Its CSV files, and its JSON file, which is written last. Tables in Markdown are in `NAME.md`.
+    /// CSV files, and the JSON file, which is written last. Tables in Markdown are in `NAME.md`.
     const FILES: &'static [&'static str];
     /// Whether other scenes than its own can be given.
     const TAKES_SCENES: bool = false;
@@ -62,10 +62,10 @@ pub trait Study: Serialize + Sized {
     /// Those of the folder.
     fn draw(&self, to: &Gallery<'_>) -> Result<(), OutputError>;
 
-    /// Its tables, in the order in which they are printed.
+    /// Tables, in the order in which they are printed.
     fn tables(&self) -> Vec<Sheet>;
 
-    /// Its methods and their levels between speed and accuracy.
+    /// Methods and their levels between speed and accuracy.
     fn tradeoff(&self) -> Vec<TradeoffPoint> {
         Vec::new()
     }
@@ -141,11 +141,11 @@ pub struct Request<'a> {
 /// A study that is measured, drawn and written.
 #[derive(Clone, Debug)]
 pub struct Done {
-    /// Its tables and what else is to be said of it, in whole lines.
+    /// Tables and what else is to be said of the study, in whole lines.
     pub text: String,
     /// Everything it found.
     pub json: String,
-    /// Its methods and their levels between speed and accuracy.
+    /// Methods and their levels between speed and accuracy.
     pub tradeoff: Vec<TradeoffPoint>,
     /// A promise that it found broken.
     pub fault: Option<String>,
@@ -185,9 +185,9 @@ fn write<S: Study>(
 /// A study in a list of studies.
 #[derive(Clone, Copy, Debug)]
 pub struct Entry {
-    /// Its name on the command line.
+    /// Name of the study on the command line.
     pub name: &'static str,
-    /// Its subject, in one line.
+    /// Subject of the study, in one line.
     pub about: &'static str,
     /// Whether other scenes than its own can be given.
     pub takes_scenes: bool,

@@ -12,13 +12,13 @@ use super::table::{Sheet, Table, plain};
 /// A measured quantity of which less is better, beside that of the reference.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Metric {
-    /// Its name, for example `RMSE`.
+    /// Name of the metric, for example `RMSE`.
     pub name: &'static str,
-    /// Its unit; empty for a number without one.
+    /// Unit of the metric; empty for a number without one.
     pub unit: &'static str,
-    /// Its value.
+    /// Value of the metric.
     pub value: f64,
-    /// That of the reference, where it is known.
+    /// Value of the reference, where it is known.
     pub reference: Option<f64>,
 }
 
@@ -64,11 +64,11 @@ pub struct TradeoffPoint {
     pub subject: String,
     /// The method, for example `packet`.
     pub method: String,
-    /// Its level, for example `16 samples a pixel`; empty where it has one alone.
+    /// Level of the method, for example `16 samples a pixel`; empty where it has one alone.
     pub level: String,
     /// Error.
     pub error: Metric,
-    /// Its cost.
+    /// Cost of the method.
     pub cost: Metric,
 }
 
@@ -121,7 +121,7 @@ pub struct Tradeoff {
 pub const PICTURE: &str = "tradeoff";
 
 impl Tradeoff {
-    /// Its files.
+    /// Adds the files of the trade-off to a claim.
     pub fn add_to(claim: Claim) -> Claim {
         claim.plots([PICTURE]).files(["tradeoff.csv", "tradeoff.md", "tradeoff.json"])
     }
@@ -243,15 +243,15 @@ const TEMPLATE_NAME: &str = "charts.html";
 /// A study on the page.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Section {
-    /// Its name on the command line.
+    /// Name of the study on the command line.
     pub name: String,
-    /// Its subject, in one line.
+    /// Subject of the study, in one line.
     pub about: String,
-    /// Its tables, as printed.
+    /// Tables, as printed.
     pub text: String,
-    /// Its pictures: paths relative to the page, without ending; each is there as `.svg` and `.png`.
+    /// Pictures: paths relative to the page, without ending; each is there as `.svg` and `.png`.
     pub pictures: Vec<String>,
-    /// Its other files, relative to the page.
+    /// Other files, relative to the page.
     pub files: Vec<String>,
     /// Seconds of the clock on the wall that it took.
     pub took_s: f64,
@@ -266,7 +266,7 @@ pub struct Index {
     pub sections: Vec<Section>,
     /// Names of those that are still to come.
     pub missing: Vec<String>,
-    /// Their methods between speed and accuracy.
+    /// Methods of all studies between speed and accuracy.
     #[serde(skip)]
     pub tradeoff: Tradeoff,
 }

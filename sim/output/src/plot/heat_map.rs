@@ -12,11 +12,11 @@ use crate::table::digits;
 /// A rectangle of the image with a value.
 #[derive(Clone, Copy, Debug)]
 pub struct HeatTile {
-    /// Its first pixel.
+    /// First pixel of the tile.
     pub origin: [u32; 2],
-    /// Its pixels across and down.
+    /// Pixels across and down.
     pub size: [u32; 2],
-    /// Its value.
+    /// Value of the tile.
     pub value: f64,
 }
 

@@ -68,7 +68,7 @@ pub enum Paint {
     /// By its index in the panel.
     #[default]
     Own,
-    /// Those of the series with this index.
+    /// Colour and marker of the series with this index.
     Like(usize),
     /// The colour of text.
     Ink,
@@ -85,7 +85,7 @@ pub struct Series {
     pub note: String,
     /// Data. Connected points are ordered from left to right. Points that an axis cannot show are omitted.
     pub mark: Mark,
-    /// Its colour and marker.
+    /// Colour and marker.
     pub paint: Paint,
 }
 

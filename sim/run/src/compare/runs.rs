@@ -281,9 +281,9 @@ const ROUNDING: f64 = 1e-13;
 pub struct Change {
     /// Group of the quantity.
     pub group: String,
-    /// Its name.
+    /// Name of the number.
     pub name: String,
-    /// Its unit; empty for counts and shares.
+    /// Unit of the number; empty for counts and shares.
     pub unit: String,
     /// Value in A, if present.
     pub a: Option<f64>,

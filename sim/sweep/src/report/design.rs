@@ -45,7 +45,7 @@ pub struct Cost {
 /// A design of a workload.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Design {
-    /// Its settings in short.
+    /// Settings of the design in short.
     pub design: String,
     /// Settings of the hardware that vary, by path.
     pub settings: BTreeMap<String, String>,

@@ -35,7 +35,7 @@ pub struct Effect {
     pub workload: String,
     /// The setting; linked settings are one, with ` + `.
     pub setting: String,
-    /// Its value, or the first and the last of a group of values.
+    /// Value of the setting, or the first and the last of a group of values.
     pub value: String,
     /// Designs with this value.
     pub points: usize,
@@ -60,11 +60,11 @@ pub struct Interaction {
     pub workload: String,
     /// First setting.
     pub setting: String,
-    /// Its value.
+    /// Value of the setting.
     pub value: String,
     /// Second setting.
     pub with_setting: String,
-    /// Its value.
+    /// Value of the other setting.
     pub with_value: String,
     /// Designs with both values.
     pub points: usize,

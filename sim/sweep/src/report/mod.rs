@@ -74,7 +74,7 @@ pub struct SweepReport {
     pub failed: Vec<Failure>,
     /// Points that are left out; the sum of the next four.
     pub left_out: usize,
-    /// Of these, points that failed.
+    /// Points left out that failed.
     pub left_out_failed: usize,
     /// Points that a coarser timing level left out.
     pub left_out_screened: usize,
@@ -89,7 +89,7 @@ pub struct SweepReport {
 /// A point that failed, was screened out or is undecided.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Failure {
-    /// Its settings.
+    /// Settings of the point.
     pub settings: String,
     /// Why.
     pub reason: String,

@@ -121,9 +121,9 @@ pub struct NearBest {
     pub design: String,
     /// Designs to choose from.
     pub candidates: usize,
-    /// Its cost by `near` over that of the best.
+    /// Cost of the design by `near` over that of the best.
     pub near_ratio: f64,
-    /// Its cost by `cheapest` over that of the best by `near`.
+    /// Cost of the design by `cheapest` over that of the best by `near`.
     pub cheapest_ratio: f64,
     /// Whether platform and energy table are not those of its GPU.
     pub platform_mismatch: bool,

@@ -222,7 +222,7 @@ pub struct Crossed {
     /// Mean difference of the light on the floor from photons refracted at the waves themselves, as a part of
     /// its mean.
     pub floor_error: f64,
-    /// That of other photons of that kind.
+    /// Error of other photons of that kind.
     pub noise: f64,
     /// Mean difference of the light in the volume from photons through the same triangles, as a part of its mean.
     pub volume_error: f64,

@@ -31,7 +31,7 @@ pub struct CausticsEffort {
     pub coarse_cells: &'static [u32],
     /// Squares along a side of oceans whose triangles are pleated along the light.
     pub pleated_cells: &'static [u32],
-    /// Their pleats.
+    /// Pleats of the pleated oceans.
     pub pleats: &'static [f64],
     /// Photons across and down that surfaces are compared with.
     pub rays: u32,
@@ -77,7 +77,7 @@ pub struct Coarse {
     pub crossing: f64,
     /// Mean difference from photons refracted at the waves themselves, as a part of its mean.
     pub error: f64,
-    /// That of other photons of that kind.
+    /// Error of other photons of that kind.
     pub noise: f64,
     /// Whether the run warns.
     pub warned: bool,

@@ -55,7 +55,7 @@ impl Sweep {
 pub struct ComputeRow {
     /// What changes.
     pub sweep: Sweep,
-    /// Its value.
+    /// Value of the varied setting.
     pub value: f64,
     /// The method.
     pub method: &'static str,

@@ -23,7 +23,7 @@ pub struct HeldOutRow {
     /// The kind of device.
     #[serde(rename = "witness")]
     pub device: &'static str,
-    /// Its seed.
+    /// Seed of the device.
     pub seed: u64,
     /// The method.
     pub method: &'static str,

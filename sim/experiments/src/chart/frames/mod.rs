@@ -65,7 +65,7 @@ impl Way {
     /// All of them, in the order of their colours.
     pub const ALL: [Self; 5] = [Self::Squares, Self::Normalized, Self::Templates, Self::Tracking, Self::Auto];
 
-    /// Its name.
+    /// Name of the method.
     pub fn name(self) -> &'static str {
         match self {
             Self::Squares => "squares",
@@ -93,7 +93,7 @@ impl Axis {
     /// All of them.
     pub const ALL: [Self; 3] = [Self::Rate, Self::Noise, Self::Bits];
 
-    /// Its name.
+    /// Name of the axis.
     pub fn name(self) -> &'static str {
         match self {
             Self::Rate => "rate",
@@ -132,7 +132,7 @@ impl Axis {
 pub struct FramesRow {
     /// The property that is changed.
     pub axis: Axis,
-    /// Its value.
+    /// Value on the axis.
     pub value: f64,
     /// The scene.
     pub scene: &'static str,

@@ -59,7 +59,7 @@ pub struct Cached {
     pub entries: u32,
     /// Pixel shader lanes run for all views, for each pixel of one.
     pub invocations_per_pixel: f64,
-    /// Those of one view alone.
+    /// Invocations a pixel of one view alone.
     pub one_view_per_pixel: f64,
     /// The first over the second, less one.
     pub increase: f64,
@@ -79,7 +79,7 @@ pub struct Lanes {
 /// One length of the camera line.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Angle {
-    /// Its length over the distance of what is in focus.
+    /// Length of the camera line over the distance of what is in focus.
     pub baseline: f64,
     /// The angle under which a point in focus sees it, in degrees.
     pub degrees: f64,

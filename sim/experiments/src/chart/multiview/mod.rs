@@ -81,7 +81,7 @@ const KINDS: [&str; 3] = ["two eyes", "seven lenses", "seven overlapping views"]
 /// Views for which caches are tried.
 #[derive(Clone, Debug, Serialize)]
 pub struct Case {
-    /// Their name.
+    /// Name of the views.
     pub name: &'static str,
     /// By policy and entries of the cache.
     pub rows: Vec<Cached>,

@@ -285,7 +285,7 @@ impl PointsChart {
 pub struct PointsRow {
     /// In how many dimensions.
     pub dimensions: usize,
-    /// Its name.
+    /// Name of the method.
     pub method: &'static str,
     /// How long it may go on: misses in a row, or candidates around a point; 0 where it ends by itself.
     pub effort: u64,

@@ -30,11 +30,11 @@ pub struct Accuracy {
     pub energy_p95_percent: f64,
     /// Runs more than 8 % off in cycles, with a warning.
     pub far_warned: usize,
-    /// Those without.
+    /// Runs more than 8 % off in cycles, without a warning.
     pub far_silent: usize,
     /// Runs within 8 %, with a warning.
     pub near_warned: usize,
-    /// Those without.
+    /// Runs within 8 %, without a warning.
     pub near_silent: usize,
 }
 
@@ -83,7 +83,7 @@ pub struct Group {
     pub runs: usize,
     /// The error of cycles to state from these runs; infinite with too few of them.
     pub cycles: f64,
-    /// That of energy.
+    /// Error of energy.
     pub energy: f64,
     /// Share of runs whose cycles are within the error that the program states; `None` without runs.
     pub held_cycles: Option<f64>,

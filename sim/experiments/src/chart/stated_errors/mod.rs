@@ -52,7 +52,7 @@ pub struct StatedErrorsEffort {
 pub struct ErrorRow {
     /// The scene, family or workload.
     pub subject: String,
-    /// Its place in the list of subjects.
+    /// Place of the subject in the list of subjects.
     pub subject_number: usize,
     /// Number of the GPU.
     pub gpu: u64,

@@ -317,7 +317,7 @@ impl Subject {
         &self.name
     }
 
-    /// Its packets as the pipeline of `gpu` emits them.
+    /// Packets of the subject as the pipeline of `gpu` emits them.
     pub fn stream(&self, gpu: &GpuSpec) -> Result<Packets, RunError> {
         let mut stream = Packets::default();
         self.render(gpu, |packet, lines| {

@@ -28,7 +28,7 @@ const TIMES: usize = 5;
 pub struct TimingRow {
     /// The scene, family or workload.
     pub scene: String,
-    /// Its kind; `None` for a stream that no pipeline emitted.
+    /// Kind of the scene; `None` for a stream that no pipeline emitted.
     pub kind: Option<SubjectKind>,
     /// The GPU.
     pub gpu: String,
