@@ -149,7 +149,7 @@ impl Lines {
     }
 }
 
-/// A lane of a warp. It computes what a shader asks for and counts the operations: a multiply-add, or
+/// A lane of a warp. It computes what a shader requests and counts the operations: a multiply-add, or
 /// anything simpler, of one component is one operation; so are a comparison, a reciprocal and a square root,
 /// as in the shader cores of the GPU files. Constants and the choice between programs that is the same for a
 /// whole draw are free.

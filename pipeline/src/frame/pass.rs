@@ -451,7 +451,7 @@ pub(super) fn resident<'s>(
     })
 }
 
-/// An occlusion query: what is asked about the samples of a draw.
+/// An occlusion query: what is found about the samples of a draw.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Query {
     /// How many samples pass.
@@ -477,7 +477,7 @@ pub struct Draw<'a> {
     pub bindings: &'a [Binding<'a>],
     /// Addresses of its data, if an earlier pass of the frame has used them.
     pub resident: Resident,
-    /// What is asked about its samples, if anything.
+    /// What is found about its samples, if it is an occlusion query.
     pub query: Option<Query>,
 }
 
@@ -502,7 +502,7 @@ impl<'a> Draw<'a> {
 
     /// The draw as an occlusion query, which stores nothing. Depths are compared as its state says.
     #[must_use]
-    pub fn asking(self, query: Query) -> Self {
+    pub fn with_query(self, query: Query) -> Self {
         let depth = DepthState { write: false, ..self.state.depth };
         let others = Default::default();
         let state = DrawState { depth, colour_mask: [false; 4], others, ..self.state };

@@ -9,7 +9,7 @@
 //! - [`Shard`]: which points a task runs. [`Work`]: runs those that are not finished.
 //! - [`merge()`]: all results in one table, the same bytes for any number of shards and threads.
 //! - [`SweepReport`]: designs on the frontier of time and energy, and main effects.
-//! - [`Search`]: points that an optimizer asks for.
+//! - [`Search`]: points that an optimizer requests.
 //!
 //! A point has no state but its file, so a sweep may be stopped at any moment and continued anywhere.
 

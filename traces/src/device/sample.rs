@@ -21,9 +21,9 @@ pub enum SampleError {
         "cannot sample {start_s} s to {end_s} s: the power curve covers {curve_start_s} s to {curve_end_s} s"
     )]
     Span {
-        /// Asked start, s.
+        /// Requested start, s.
         start_s: f64,
-        /// Asked end, s.
+        /// Requested end, s.
         end_s: f64,
         /// Start of the curve, s.
         curve_start_s: f64,
@@ -35,9 +35,9 @@ pub enum SampleError {
         "{start_s} s to {end_s} s is shorter than one sample at {rate_hz} Hz: raise the rate or sample longer"
     )]
     TooShort {
-        /// Asked start, s.
+        /// Requested start, s.
         start_s: f64,
-        /// Asked end, s.
+        /// Requested end, s.
         end_s: f64,
         /// The device's rate, Hz.
         rate_hz: f64,
@@ -48,9 +48,9 @@ pub enum SampleError {
          lower the rate or sample a part"
     )]
     TooLong {
-        /// Asked start, s.
+        /// Requested start, s.
         start_s: f64,
-        /// Asked end, s.
+        /// Requested end, s.
         end_s: f64,
         /// The device's rate, Hz.
         rate_hz: f64,

@@ -68,7 +68,7 @@ pub(super) struct PassesOnGpu<'a, 'e> {
     boxes: [MemoryRange; 2],
     /// Answers about the objects of a pass, and how many there are so far.
     answers: MemoryRange,
-    asked: u64,
+    answered: u64,
     method: Method,
     fragments: u64,
 }
@@ -92,21 +92,21 @@ impl<'a, 'e> PassesOnGpu<'a, 'e> {
         let boxes = [(); 2].map(|()| gpu.allocate(layout.bytes()));
         let picture = Picture::new(objects, viewport.width() as usize);
         let answers = gpu.allocate(objects.len() as u64 * ANSWER_BYTES);
-        let (pass, asked, fragments) = Default::default();
-        Self { gpu, pass, vertices, picture, viewport, layout, boxes, answers, asked, method, fragments }
+        let (pass, answered, fragments) = Default::default();
+        Self { gpu, pass, vertices, picture, viewport, layout, boxes, answers, answered, method, fragments }
     }
 
     /// The answers of a pass are in memory when it ends, for the host to read.
     fn end_pass(&mut self) {
-        if std::mem::take(&mut self.asked) > 0 {
+        if std::mem::take(&mut self.answered) > 0 {
             self.gpu.keep(self.answers);
         }
     }
 
     /// Where the next answer is.
     fn next_answer(&mut self) -> u64 {
-        self.asked += 1;
-        (self.asked - 1) * ANSWER_BYTES
+        self.answered += 1;
+        (self.answered - 1) * ANSWER_BYTES
     }
 
     /// Writes the image and returns the totals.

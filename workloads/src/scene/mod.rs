@@ -79,7 +79,7 @@ pub struct Scene {
     centre: DVec3,
 }
 
-/// Vertices and triangles of all instances together: a small file that asks for more is broken.
+/// Vertices and triangles of all instances together: a small file that requests more is broken.
 const MAX_ELEMENTS: usize = 100_000_000;
 
 /// The automatic near depth, in depths of the camera's target.

@@ -35,8 +35,8 @@ fn query(wall_scene: &WallScene, size: [u32; 2], per_pixel: u32, grids: &[([u32;
     let depths = depths_of(&pass.uncounted().unwrap().visible);
     let sampled =
         SampledQueries { occluders: RasterPass::new(&wall_scene.camera, &walls, &settings), any: false };
-    let all = sampled.ask(&wall_scene.boxes).unwrap().answers;
-    let any = SampledQueries { any: true, ..sampled }.ask(&wall_scene.boxes).unwrap().answers;
+    let all = sampled.query(&wall_scene.boxes).unwrap().answers;
+    let any = SampledQueries { any: true, ..sampled }.query(&wall_scene.boxes).unwrap().answers;
     for (all, any) in all.iter().zip(&any) {
         assert_eq!(all.passed == 0, any.passed == 0, "both kinds agree");
         assert!(any.tests() <= all.tests() && any.madds <= all.madds);
@@ -50,7 +50,7 @@ fn query(wall_scene: &WallScene, size: [u32; 2], per_pixel: u32, grids: &[([u32;
         let pyramid = Pyramid::new(viewport, &samples, &depths, tile_px, grid);
         half_covered = pyramid.half_covered();
         let queries = IntervalQueries::new(&pyramid, &projection);
-        wall_scene.boxes.iter().map(|object| queries.ask(object).hidden).collect()
+        wall_scene.boxes.iter().map(|object| queries.query(object).hidden).collect()
     });
     let by_intervals: Vec<Vec<bool>> = by_intervals.collect();
     for hidden in &by_intervals {

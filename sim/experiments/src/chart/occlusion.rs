@@ -336,7 +336,7 @@ pub(crate) struct Drawn {
     pub ran: Ran,
 }
 
-/// Answers of interval queries, and the farthest depths that they were asked against.
+/// Answers of interval queries, and the farthest depths that they were compared with.
 pub(crate) struct QueryAnswers {
     /// By box.
     pub answers: Vec<IntervalAnswer>,
@@ -366,10 +366,10 @@ impl Drawn {
         let occluders = RasterPass::new(&scene.camera, &walls, &settings);
         let mut alone = Gpu::without_packets(&gpu.pipeline)?;
         let depths = depths_of(&alone.draw(&occluders.onto(Target::Depth).with_visible())?.visible);
-        let ask = |any: bool| SampledQueries { occluders, any }.ask(&scene.boxes);
-        let (seen, counted) = (ask(true)?, ask(false)?);
+        let query = |any: bool| SampledQueries { occluders, any }.query(&scene.boxes);
+        let (seen, counted) = (query(true)?, query(false)?);
         let ran = [&alone.finish(), &seen.report, &counted.report].map(Ran::of).into_iter().sum();
-        let [seen, counted] = [seen, counted].map(|asked| asked.answers);
+        let [seen, counted] = [seen, counted].map(|queried| queried.answers);
         Ok(Self { scene, viewport, table, spec: gpu.pipeline, depths, seen, counted, ran })
     }
 
@@ -377,7 +377,7 @@ impl Drawn {
     ///
     /// # Errors
     /// When the caches of the GPU cannot be built.
-    pub fn ask(&self, boxes: [u32; 3], tile_px: u32) -> Result<QueryAnswers, StudyError> {
+    pub fn query(&self, boxes: [u32; 3], tile_px: u32) -> Result<QueryAnswers, StudyError> {
         let grid = BoxGrid::new(boxes, self.scene.camera.lens().is_some()).unwrap_or_default();
         let pyramid = Pyramid::new(self.viewport, &self.table, &self.depths, tile_px, grid);
         let projection = Projection::new(&self.scene.camera, self.viewport);
@@ -446,9 +446,9 @@ fn by_intervals(
 ) -> Result<OcclusionRow, StudyError> {
     let (mut answered, mut half_covered) = (Vec::new(), 0.0);
     for drawn in scenes {
-        let asked = drawn.ask(boxes, tile_px)?;
-        half_covered += asked.half_covered / scenes.len() as f64;
-        let all = asked.answers.iter().zip(&drawn.seen).map(|(answer, seen)| {
+        let queried = drawn.query(boxes, tile_px)?;
+        half_covered += queried.half_covered / scenes.len() as f64;
+        let all = queried.answers.iter().zip(&drawn.seen).map(|(answer, seen)| {
             ((answer.hidden, [answer.tests(), answer.bytes(), answer.all_madds()]), seen.passed == 0)
         });
         answered.extend(all);

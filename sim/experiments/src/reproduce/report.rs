@@ -393,6 +393,6 @@ mod tests {
         assert!(check_earlier(Paper::Six, &options(true, &["VI-2"]), &forced).is_ok());
         assert!(check_earlier(Paper::Two, &options(true, &[]), &out).is_ok(), "a result of another paper");
         fs::write(&file, "mine").unwrap();
-        assert_eq!(refusal(&options(true, &["VI-2"])), None, "no result; whose it is is asked elsewhere");
+        assert_eq!(refusal(&options(true, &["VI-2"])), None, "no result; whose it is is checked elsewhere");
     }
 }

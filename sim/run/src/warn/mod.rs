@@ -455,8 +455,8 @@ mod tests {
     #[test]
     fn a_level_that_was_chosen_is_not_to_be_chosen_again() {
         let message = |chosen| AccuracyWarning::MemoryRows(0.5).warning(3, Level::Packet, chosen).message;
-        let (asked, chosen) = (message(None), message(Some(0.012)));
-        assert!(asked.ends_with("use --timing stepped, or let --accuracy choose"), "{asked}");
+        let (requested, chosen) = (message(None), message(Some(0.012)));
+        assert!(requested.ends_with("use --timing stepped, or let --accuracy choose"), "{requested}");
         let remedy = "`packet` was chosen with an error of 1.20 % on a probe; give a smaller --accuracy, or --timing stepped";
         assert!(chosen.ends_with(remedy), "{chosen}");
     }

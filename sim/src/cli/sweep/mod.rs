@@ -98,8 +98,8 @@ fn run_points(args: &RunStepArgs, terminal: &Terminal, stop: &Stop) -> Result<()
     }
     let Opened { plan, folder, pool, progress } = opened;
     folder.write_plan(&plan)?;
-    let is_asked = || stop.is_asked();
-    let work = Work::new(&plan, &folder, shard, args.retry)?.until(&is_asked);
+    let is_requested = || stop.is_requested();
+    let work = Work::new(&plan, &folder, shard, args.retry)?.until(&is_requested);
     let status = pool.install(|| work.run(&progress))?;
     print_status(
         &args.sweep.out,

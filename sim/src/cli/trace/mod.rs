@@ -429,7 +429,7 @@ impl SampleArgs {
 
     /// Puts the options that are given into `spec`; ranges are there already.
     fn change(&self, spec: &mut DeviceSpec) {
-        let set = |field: &mut f64, asked: Option<f64>| *field = asked.unwrap_or(*field);
+        let set = |field: &mut f64, given: Option<f64>| *field = given.unwrap_or(*field);
         set(&mut spec.rate_hz, self.device_rate);
         set(&mut spec.rail_v, self.rail_voltage);
         set(&mut spec.rail_ohm, self.rail_ohm);

@@ -378,7 +378,7 @@ fn judged<const D: usize>(
     radius: f64,
     sets: &[Vec<[f64; D]>],
     points_per_s: f64,
-    asked: &PointsEffort,
+    amounts: &PointsEffort,
 ) -> PointsRow {
     let (set, torus) = (&sets[0], Domain::Torus);
     let rate = (set.len() as f64).powf(1.0 / D as f64);
@@ -396,7 +396,7 @@ fn judged<const D: usize>(
         closer_pairs: closer_than(set, radius, torus),
         least_over_r: least_distance(set, torus) / radius,
         hole_over_r: largest_hole(set, torus).radius / radius,
-        free_share: free_share(set, radius, torus, asked.darts),
+        free_share: free_share(set, radius, torus, amounts.darts),
         low_power: spectrum.low(),
         peak: spectrum.peak(),
         spectrum: spectrum.curve(),

@@ -396,12 +396,12 @@ impl TimingChart {
             .detail("packet", error(LEVELS[0]), signed(1))
             .detail("bound", error(LEVELS[1]), signed(1))
             .detail("warns", warns, plain);
-        let asked: Vec<f64> = self
+        let requested: Vec<f64> = self
             .failures
             .first()
             .map_or(Vec::new(), |row| row.chosen.iter().map(|chosen| chosen.asked_percent).collect());
-        for (place, asked) in asked.into_iter().enumerate() {
-            table = table.detail(&format!("{asked} %"), |row| row.chosen[place].level.name(), plain);
+        for (place, percent) in requested.into_iter().enumerate() {
+            table = table.detail(&format!("{percent} %"), |row| row.chosen[place].level.name(), plain);
         }
         table.sheet()
     }
