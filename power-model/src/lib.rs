@@ -56,11 +56,11 @@ pub use quantity::{
     Share, Source, Sourced, Volts, Watts,
 };
 pub use structure::{
-    Charge, Cost, Estimate, INTERPOLATION, LANE_MADDS, Memory, REGISTER_BYTES, Scaling, Sram, SramRun,
-    Structure, madds,
+    Charge, INTERPOLATION, IntervalNumber, LANE_MADDS, Memory, MemoryCost, REGISTER_BYTES, Scaling, Sram,
+    SramRun, Structure, madds,
 };
 pub use system::{Cause, Circumstances, Pulse, Surrounded, SurroundedFrame, overlay};
-pub use table::{EnergyRow, EnergyTable, Entry, Supply};
+pub use table::{EnergyRow, EnergyTable, Supply, TableEntry};
 
 /// Why an energy table cannot be used.
 #[derive(Debug, thiserror::Error)]

@@ -7,7 +7,7 @@
 use std::error::Error;
 use traces::Trace;
 use traces::energy::{PowerIntegral, TOLERANCE_S, score, true_frames};
-use traces::frames::{Marks, Options, Step, default_window, find_with};
+use traces::frames::{FinderOptions, Marks, Step, default_window, find_with};
 use traces::synth::{HELD_OUT_DEVICES, RecorderSpec, SCENARIOS, Scene};
 
 const FRAMES: usize = 200;
@@ -33,8 +33,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         return Err("usage: ablation FIRST_SEED LAST_SEED".into());
     };
     let steps = core::iter::once(("nothing", None)).chain(Step::ALL.map(|(name, step)| (name, Some(step))));
-    let options: Vec<(&str, Options)> =
-        steps.map(|(name, without)| (name, Options { without, ..Options::default() })).collect();
+    let options: Vec<(&str, FinderOptions)> =
+        steps.map(|(name, without)| (name, FinderOptions { without, ..FinderOptions::default() })).collect();
     println!("on: without: F1, energy error in percent, wrong frames with a flag, right frames with a flag");
     for name in
         SCENARIOS.map(|scenario| scenario.name).into_iter().chain(HELD_OUT_DEVICES.map(|kind| kind.name))
@@ -70,7 +70,7 @@ fn recorded(name: &str, seed: u64) -> Result<(Scene, Trace), Box<dyn Error>> {
 }
 
 impl Sum {
-    fn add(&mut self, scene: &Scene, trace: &Trace, options: &Options) -> Result<(), Box<dyn Error>> {
+    fn add(&mut self, scene: &Scene, trace: &Trace, options: &FinderOptions) -> Result<(), Box<dyn Error>> {
         let truth_s: Vec<f64> = scene.truth.iter().map(|frame| frame.start_s).collect();
         let mark_s = truth_s[(MARKED * truth_s.len() as f64) as usize] + HAND_S;
         let marks = Marks::one(mark_s, default_window(0.0, trace.rate_hz()), trace.end_s());

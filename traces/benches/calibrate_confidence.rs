@@ -9,7 +9,7 @@ use std::error::Error;
 use std::process::ExitCode;
 use traces::Trace;
 use traces::energy::{TOLERANCE_S, pairs, true_frames};
-use traces::frames::{FinderMethod, Found, MarkError, Marks, Options, Step, default_window, find_with};
+use traces::frames::{FinderMethod, FinderOptions, Found, MarkError, Marks, Step, default_window, find_with};
 use traces::synth::{HELD_OUT_DEVICES, Scene};
 
 /// Frames of each device.
@@ -48,7 +48,7 @@ fn run() -> Result<(), Box<dyn Error>> {
         return Err("usage: calibrate_confidence FIRST_SEED LAST_SEED [METHOD|STEP]".into());
     };
     let step = |name: &str| Step::ALL.into_iter().find(|step| step.0 == name).map(|step| step.1);
-    let mut options = Options::default();
+    let mut options = FinderOptions::default();
     if let Some(name) = which.first() {
         options.without = step(name);
         if options.without.is_none() {
@@ -114,7 +114,7 @@ fn cases_of(
     kind: &'static str,
     scene: &Scene,
     trace: &Trace,
-    options: &Options,
+    options: &FinderOptions,
     cases: &mut Vec<Case>,
 ) -> Result<Vec<f64>, MarkError> {
     let truth_s: Vec<f64> = scene.truth.iter().map(|frame| frame.start_s).collect();
@@ -126,7 +126,7 @@ fn cases_of(
         let mark_s = truth_s[(share * truth_s.len() as f64) as usize] + hand_s;
         let marks = Marks::one(mark_s, default_window(0.0, trace.rate_hz()), trace.end_s());
         let found = find_with(trace, &marks, options)?;
-        let by = |method| find_with(trace, &marks, &Options { method, ..*options });
+        let by = |method| find_with(trace, &marks, &FinderOptions { method, ..*options });
         let [squares, normalized] = [by(FinderMethod::SumOfSquares)?, by(FinderMethod::Normalized)?]
             .map(|other| agreement(&found, &other));
         let found_s = times_s(&found);

@@ -10,7 +10,7 @@ use thiserror::Error;
 
 /// One setting, measured.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Point {
+pub struct ParetoPoint {
     /// Name of the point.
     pub label: String,
     /// Time, s.
@@ -28,7 +28,7 @@ pub struct Point {
 pub struct RatedPoint {
     /// The point; its energy is as given.
     #[serde(flatten)]
-    pub point: Point,
+    pub point: ParetoPoint,
     /// Energy including idling until the slowest setting is done, J: without idle power the energy as given.
     pub compensated_j: f64,
     /// Whether it is Pareto-optimal: no other is at least as good in both and better in one.
@@ -42,7 +42,7 @@ pub const DRAWS: u32 = 4096;
 
 /// Which points are on the frontier. With `idle_w`, the faster of two is charged idling for the time it saves
 /// (Paper IV, section 5): all are charged up to the slowest, so that any two are compared in the same way.
-pub fn frontier(points: &[Point], idle_w: f64, seed: u64) -> Vec<RatedPoint> {
+pub fn frontier(points: &[ParetoPoint], idle_w: f64, seed: u64) -> Vec<RatedPoint> {
     let slowest_s = points.iter().map(|point| point.time_s).fold(0.0, f64::max);
     let compensated = |time_s: f64, energy_j: f64| energy_j + idle_w * (slowest_s - time_s);
     let pairs: Vec<(f64, f64)> =
@@ -59,7 +59,7 @@ pub fn frontier(points: &[Point], idle_w: f64, seed: u64) -> Vec<RatedPoint> {
         let moved: Vec<(f64, f64)> = moved.collect();
         nondominated(&moved).iter().zip(&mut counts).for_each(|(on, count)| *count += u32::from(*on));
     }
-    let tradeoff = |(index, point): (usize, &Point)| RatedPoint {
+    let tradeoff = |(index, point): (usize, &ParetoPoint)| RatedPoint {
         point: point.clone(),
         compensated_j: pairs[index].1,
         on_frontier: on[index],
@@ -93,7 +93,7 @@ fn normal(seed: u64, draw: u64) -> (f64, f64) {
     crate::stats::Random::new(seed, 0).normals(draw)
 }
 
-impl Point {
+impl ParetoPoint {
     /// Mean power, W.
     pub fn power_w(&self) -> f64 {
         self.energy_j / self.time_s
@@ -184,11 +184,11 @@ pub fn frontiers(
     let labels = columns.label.as_ref().map(texts).transpose()?;
     let keys = columns.groups.iter().map(texts).collect::<Result<Vec<_>, _>>()?;
     check_settings(table, &columns.time, &times, [&time_deviations, &energy_deviations])?;
-    let mut groups: BTreeMap<String, Vec<Point>> = BTreeMap::new();
+    let mut groups: BTreeMap<String, Vec<ParetoPoint>> = BTreeMap::new();
     for row in 0..table.rows() {
         let named =
             columns.groups.iter().zip(&keys).map(|(column, values)| format!("{column}={}", values[row]));
-        groups.entry(named.collect::<Vec<_>>().join(", ")).or_default().push(Point {
+        groups.entry(named.collect::<Vec<_>>().join(", ")).or_default().push(ParetoPoint {
             label: labels.as_ref().map_or_else(|| (row + 1).to_string(), |labels| labels[row].clone()),
             time_s: times[row],
             energy_j: energies[row],
@@ -262,9 +262,9 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn point(time_s: f64, energy_j: f64, deviation: f64) -> Point {
+    fn point(time_s: f64, energy_j: f64, deviation: f64) -> ParetoPoint {
         let label = String::new();
-        Point { label, time_s, energy_j, time_deviation_s: deviation, energy_deviation_j: deviation }
+        ParetoPoint { label, time_s, energy_j, time_deviation_s: deviation, energy_deviation_j: deviation }
     }
 
     #[test]

@@ -2,8 +2,8 @@
 
 use crate::energy::{FrameEnergy, PowerIntegral, clipped_current, negative_power};
 use crate::frames::{
-    FinderMethod, Found, MarkError, Marks, Options, Proposal, Window, default_window, find_with, propose,
-    repetition_samples,
+    FinderMethod, FinderOptions, Found, MarkError, Marks, Proposal, Window, default_window, find_with,
+    propose, repetition_samples,
 };
 use crate::io::{ReadError, ReadOptions, Rows};
 use crate::stream::{self, AnalysisError};
@@ -132,7 +132,7 @@ impl Search {
         let window =
             self.window.unwrap_or_else(|| default_window(repetition_s.unwrap_or(0.0), trace.rate_hz()));
         let marks = Marks { starts_s, window, end_s };
-        let mut found = find_with(trace, &marks, &Options { method: self.method, without: None })?;
+        let mut found = find_with(trace, &marks, &FinderOptions { method: self.method, without: None })?;
         if let Some(Proposal { mark_s, .. }) = proposal.filter(|_| found.starts.len() < 2) {
             return Err(SearchError::NoRepetition { mark_s });
         }

@@ -15,7 +15,7 @@ use crate::sampling::TileSamples;
 use crate::setup::Corner;
 use crate::shader::{Program, Shader};
 use crate::state::{Clear, DepthState, DrawState};
-use crate::surface::{Bound, Format, MAX_TARGETS, Texels};
+use crate::surface::{BoundSlot, Format, MAX_TARGETS, Texels};
 use crate::texture::{Sampler, Texture};
 use crate::traversal::{LensSpans, at_rest, blur_px, motion_px};
 
@@ -48,7 +48,7 @@ pub(super) struct Pass<'a> {
     /// Operations of the shader of each draw.
     pub programs: Vec<Program>,
     /// What the shader of each draw reads, by slot.
-    pub bound: Vec<Vec<Bound<'a>>>,
+    pub bound: Vec<Vec<BoundSlot<'a>>>,
     /// Depths of samples. Without a place they are not in memory.
     pub depth: Plane,
     /// Colours of samples, by target. Without any the pass computes depths only.
@@ -381,14 +381,14 @@ fn bound<'a>(
     addresses: &AddressMap,
     (surfaces, buffers): (&Surfaces, &Buffers),
     space: &mut AddressSpace,
-) -> Vec<Vec<Bound<'a>>> {
+) -> Vec<Vec<BoundSlot<'a>>> {
     let own = draws.iter().map(|draw| draw.shader.texture());
     let own =
         own.zip(&addresses.textures).filter_map(|(texture, at)| Some((std::ptr::from_ref(texture?), (*at)?)));
     let mut known = TextureAddresses(own.collect());
     let mut bind = |binding: &Binding<'a>| match *binding {
         Binding::Texture(texture) => {
-            Some(Bound::texture(Sampler::new(texture, known.of(texture, None, space))))
+            Some(BoundSlot::texture(Sampler::new(texture, known.of(texture, None, space))))
         }
         Binding::Surface(_) | Binding::Levels(_) => {
             let stored = |id| {
@@ -396,9 +396,9 @@ fn bound<'a>(
                 Some((Arc::clone(state.texels.as_ref()?), state.layout))
             };
             let levels = surfaces.read_by(binding).into_iter().map(stored);
-            Some(Bound::surface(levels.collect::<Option<_>>()?))
+            Some(BoundSlot::surface(levels.collect::<Option<_>>()?))
         }
-        Binding::Buffer(ref binding) => Some(Bound::buffer(buffers.bound(binding)?)),
+        Binding::Buffer(ref binding) => Some(BoundSlot::buffer(buffers.bound(binding)?)),
     };
     draws.iter().map(|draw| draw.bindings.iter().filter_map(&mut bind).collect()).collect()
 }

@@ -8,7 +8,9 @@ use output::table::{Table, grouped};
 use output::terminal::{Progress, Terminal};
 use rayon::prelude::*;
 use serde::Serialize;
-use workloads::collision::{Answer, CaseFiles, Method, Object, Search, Verdict, candidates, detect_each};
+use workloads::collision::{
+    CaseFiles, CollisionMethod, Object, PairAnswer, Search, Verdict, candidates, detect_each,
+};
 
 use super::{Failure, print, print_json};
 use crate::cli::args::ThreadArgs;
@@ -67,9 +69,9 @@ pub enum MethodArg {
 impl CcdArgs {
     fn search(&self) -> Search {
         let method = match self.method {
-            MethodArg::FragmentBox => Method::FragmentBox,
-            MethodArg::BoxBox => Method::BoxBox,
-            MethodArg::DepthOnly => Method::DepthOnly,
+            MethodArg::FragmentBox => CollisionMethod::FragmentBox,
+            MethodArg::BoxBox => CollisionMethod::BoxBox,
+            MethodArg::DepthOnly => CollisionMethod::DepthOnly,
         };
         Search { resolution: self.resolution, bins: self.bins, method, zoom: !self.no_refinement }
     }
@@ -120,7 +122,7 @@ enum CaseResult {
 }
 
 impl CaseResult {
-    fn new(case: &CaseFiles, objects: Result<Vec<Object>, String>, answers: &[Answer]) -> Self {
+    fn new(case: &CaseFiles, objects: Result<Vec<Object>, String>, answers: &[PairAnswer]) -> Self {
         let case_id = case.id.clone();
         match objects {
             Ok(objects) => Self::Found(Found::new(case_id, &objects, answers)),
@@ -151,7 +153,7 @@ fn objects(files: &CaseFiles) -> Result<Vec<Object>, String> {
 }
 
 impl Found {
-    fn new(case_id: String, objects: &[Object], answers: &[Answer]) -> Self {
+    fn new(case_id: String, objects: &[Object], answers: &[PairAnswer]) -> Self {
         Self {
             case_id,
             objects: objects.len(),
@@ -162,7 +164,7 @@ impl Found {
     }
 }
 
-fn pair(answer: &Answer) -> Option<Pair> {
+fn pair(answer: &PairAnswer) -> Option<Pair> {
     let Verdict::Maybe { bounds, tiles, seen } = answer.verdict else { return None };
     let pixels = (tiles > 0).then_some(tiles);
     Some(Pair { a: answer.a, b: answer.b, time: bounds.time, space: bounds.space, pixels, seen })

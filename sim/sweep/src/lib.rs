@@ -30,7 +30,7 @@ mod shared;
 mod slurm;
 mod spec;
 
-pub use self::run::{Expected, Shard, Status, Work};
+pub use self::run::{ExpectedRuns, Shard, Status, Work};
 pub use ask::{Answer, Dimension, Question, Search};
 pub use axis::Axis;
 pub use error::SweepError;
@@ -40,8 +40,8 @@ pub use merge::{RESULTS, merge};
 pub use plan::{Point, SweepPlan};
 pub use points::combinations;
 pub use report::{
-    Cost, Design, Effect, Failure, Interaction, Measure, NearBest, NoEffect, Pair, RatedDesign,
-    ReportOptions, Share, SweepReport, Winner,
+    Cost, Effect, Interaction, Measure, NearBest, NoEffect, Pair, PointFailure, RatedDesign, ReportOptions,
+    Share, SweepDesign, SweepReport, Winner,
 };
 pub use setting::{Setting, Text, is_option, misspelt, with};
 pub use slurm::{Scripts, SlurmArray, SlurmJob, submit};

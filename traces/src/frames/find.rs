@@ -26,12 +26,12 @@ use serde::Serialize;
 /// # Errors
 /// [`MarkError`] if the marks do not fit the trace.
 pub fn find(trace: &Trace, marks: &Marks) -> Result<Found, MarkError> {
-    find_with(trace, marks, &Options::default())
+    find_with(trace, marks, &FinderOptions::default())
 }
 
 /// How to search.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Options {
+pub struct FinderOptions {
     /// Which method.
     pub method: FinderMethod,
     /// A step that is left out, to measure what it is worth.
@@ -71,7 +71,7 @@ impl Step {
 ///
 /// # Errors
 /// [`MarkError`] if the marks do not fit the trace.
-pub fn find_with(trace: &Trace, marks: &Marks, options: &Options) -> Result<Found, MarkError> {
+pub fn find_with(trace: &Trace, marks: &Marks, options: &FinderOptions) -> Result<Found, MarkError> {
     match options.method {
         FinderMethod::SumOfSquares | FinderMethod::Normalized => find_matched(trace, marks, options.method),
         FinderMethod::Tracking => find_tracked(trace, marks, options.without),
@@ -117,7 +117,7 @@ const MAX_TRACKED_SAMPLES: usize = 1 << 24;
 const MIN_COVERAGE_GAIN: f64 = 0.02;
 
 /// [`FinderMethod::Auto`] and [`FinderMethod::Consensus`].
-fn find_auto(trace: &Trace, marks: &Marks, options: &Options) -> Result<Found, MarkError> {
+fn find_auto(trace: &Trace, marks: &Marks, options: &FinderOptions) -> Result<Found, MarkError> {
     let without = options.without;
     let squares = find_matched(trace, marks, FinderMethod::SumOfSquares)?;
     let samples = marks.place(trace)?.samples;
@@ -147,7 +147,7 @@ fn find_auto(trace: &Trace, marks: &Marks, options: &Options) -> Result<Found, M
         return Ok(tracked);
     }
     let search =
-        |part: &Trace, marks: &Marks, method| find_with(part, marks, &Options { method, without }).ok();
+        |part: &Trace, marks: &Marks, method| find_with(part, marks, &FinderOptions { method, without }).ok();
     Ok(more_agreed(trace, marks, [tracked, squares], search))
 }
 
@@ -155,8 +155,8 @@ fn find_auto(trace: &Trace, marks: &Marks, options: &Options) -> Result<Found, M
 const MAX_SEGMENTED_SAMPLES: usize = 1 << 20;
 
 /// [`FinderMethod::Segments`]: segmentation up to the end mark, with the results of the other methods as proposals.
-fn find_segments(trace: &Trace, marks: &Marks, options: &Options) -> Result<Found, MarkError> {
-    let auto = find_auto(trace, marks, &Options { method: FinderMethod::Auto, ..*options })?;
+fn find_segments(trace: &Trace, marks: &Marks, options: &FinderOptions) -> Result<Found, MarkError> {
+    let auto = find_auto(trace, marks, &FinderOptions { method: FinderMethod::Auto, ..*options })?;
     let placement = marks.place(trace)?;
     if placement.samples < COARSE_WINDOW_SAMPLES || trace.samples() > MAX_SEGMENTED_SAMPLES {
         return Ok(auto);
@@ -286,7 +286,8 @@ pub fn propose(trace: &Trace) -> Option<Proposal> {
         let window = default_window(0.0, part.rate_hz());
         let marks = Marks::one(mark_s, window, part.end_s());
         let found =
-            find_with(&part, &marks, &Options { method: FinderMethod::SumOfSquares, without: None }).ok()?;
+            find_with(&part, &marks, &FinderOptions { method: FinderMethod::SumOfSquares, without: None })
+                .ok()?;
         let (regularity, similar_starts) = (found.threshold.regularity, found.starts.len());
         Some(Proposal { mark_s, regularity, similar_starts, tried })
     });
@@ -492,7 +493,7 @@ mod tests {
             window: Window { pre_s: 1e-3, post_s: 4e-3 },
             end_s: trace.end_s(),
         };
-        find_auto(&trace, &marks, &Options::default()).unwrap()
+        find_auto(&trace, &marks, &FinderOptions::default()).unwrap()
     }
 
     fn noise(sample: usize) -> f32 {

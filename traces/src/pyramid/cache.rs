@@ -1,7 +1,7 @@
 //! The cache file of a pyramid: a header, checksums of groups of entries, and the entries, level by level.
 
 use super::{BLOCK, ENTRY_BYTES, Entry, FANOUT, Pyramid, Store};
-use crate::clock::Clock;
+use crate::clock::SampleClock;
 use crate::io::{ReadOptions, WriteError, atomic};
 use crc32c::crc32c;
 use std::fs;
@@ -102,7 +102,7 @@ pub(super) fn kept(path: &Path, stamp: u64) -> Cached {
         return Cached::Other;
     }
     let sums = sums.as_chunks().0.iter().map(|sum| u32::from_le_bytes(*sum)).collect();
-    let clock = Clock { start_s, rate_hz, samples: Some(samples) };
+    let clock = SampleClock { start_s, rate_hz, samples: Some(samples) };
     let store = Store::File(Kept { path: path.to_owned(), sizes, sums });
     Cached::Whole(Pyramid { clock, samples, store, was_damaged: false })
 }

@@ -7,7 +7,7 @@ mod cache;
 use core::ops::Range;
 use std::path::{Path, PathBuf};
 
-use crate::clock::{Clock, clock};
+use crate::clock::{SampleClock, clock};
 use crate::io::{ReadError, ReadOptions, RowBatch, Rows, Stamps, rate_of_steps_hz, read};
 use crate::pyramid::cache::Cached;
 use crate::trace::Trace;
@@ -48,7 +48,7 @@ struct Entry {
 /// Blocks of a trace's power.
 #[derive(Debug)]
 pub struct Pyramid {
-    clock: Clock,
+    clock: SampleClock,
     samples: u64,
     store: Store,
     /// Whether what was kept was damaged, so that this was made in its place.
@@ -140,11 +140,12 @@ impl Pyramid {
     /// The pyramid of a trace in memory.
     pub fn of_trace(trace: &Trace) -> Self {
         let samples = trace.samples() as u64;
-        let clock = Clock { start_s: trace.start_s(), rate_hz: trace.rate_hz(), samples: Some(samples) };
+        let clock =
+            SampleClock { start_s: trace.start_s(), rate_hz: trace.rate_hz(), samples: Some(samples) };
         Self::of_blocks(clock, samples, blocks(trace.voltage_v(), trace.current_a()).collect())
     }
 
-    fn of_blocks(clock: Clock, samples: u64, base: Vec<Entry>) -> Self {
+    fn of_blocks(clock: SampleClock, samples: u64, base: Vec<Entry>) -> Self {
         let mut levels = vec![base];
         while levels[levels.len() - 1].len() > FANOUT {
             levels.push(levels[levels.len() - 1].chunks(FANOUT).map(Entry::of_entries).collect());

@@ -13,7 +13,7 @@ use pipeline::sampling::SampleSpec;
 use pipeline::{Cull, Gpu, LensShape, PipelineSpec, SampleTable, Viewport};
 use workloads::accumulation::SharedSamples;
 use workloads::multiview::{Layout, Rig, Target};
-use workloads::soft_shadows::{AreaLight, LightSpec, Method, ShadowMap};
+use workloads::soft_shadows::{AreaLight, LightSpec, ShadowMap, ShadowMethod};
 use workloads::{Overrides, glossy, soft_shadows};
 
 const RUNS: usize = 3;
@@ -74,7 +74,8 @@ fn gloss(spec: &PipelineSpec) {
     let draws: Vec<_> =
         frame.draws(&scene).unwrap().into_iter().map(|draw| draw.culling(Cull::None)).collect();
     let eye = (DVec3::new(0.3, 2.0, 3.0), DVec3::new(-0.1, -1.0, -0.8));
-    let map = glossy::Map::new(&glossy::receiver(), eye, glossy::Effect::Reflection, 0.25, 128).unwrap();
+    let map =
+        glossy::Map::new(&glossy::receiver(), eye, glossy::GlossyEffect::Reflection, 0.25, 128).unwrap();
     for count in [16, 64] {
         let table = SampleTable::new(&SampleSpec::default(), count, 1).unwrap();
         let set = SharedSamples::interleaved(&SampleSpec::default(), count, 1).unwrap();
@@ -98,7 +99,7 @@ fn shadows(spec: &PipelineSpec) {
     let disk = SampleSpec { lens: LensShape::Disk, ..SampleSpec::default() };
     for count in [16, 64] {
         let set = SharedSamples::interleaved(&disk, count, 1).unwrap();
-        let [one, many] = [Method::OnePass, Method::Accumulation].map(|method| {
+        let [one, many] = [ShadowMethod::OnePass, ShadowMethod::Accumulation].map(|method| {
             time(|| {
                 let gpu = &mut Gpu::without_packets(spec).unwrap();
                 _ = ShadowMap::new(&light, &draws, 256, &set, method, gpu).unwrap();

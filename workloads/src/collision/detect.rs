@@ -3,13 +3,13 @@
 use rayon::prelude::*;
 
 use super::object::Object;
-use super::pair::{Method, Pair, Search, Verdict};
+use super::pair::{CollisionMethod, Pair, Search, Verdict};
 use super::pass::{FragmentBudget, Part, PassBackend, Resources, Scratch};
 use super::{Bounds, contact_probe};
 
 /// Verdict on objects `a` and `b`, `a < b`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Answer {
+pub struct PairAnswer {
     /// Index of one object.
     pub a: usize,
     /// Index of the other object, which is greater.
@@ -20,22 +20,22 @@ pub struct Answer {
 
 /// Verdicts on all pairs whose swept boxes touch, in order; all other pairs are apart. Runs on the current
 /// thread pool; the results do not depend on the number of threads.
-pub fn detect(objects: &[Object], search: &Search) -> Vec<Answer> {
+pub fn detect(objects: &[Object], search: &Search) -> Vec<PairAnswer> {
     detect_each(&[objects], search, || ()).pop().unwrap_or_default()
 }
 
 /// The same for the objects of several cases, whose pairs share the threads. `done` is called by any thread
 /// after each pair.
-pub fn detect_each(cases: &[&[Object]], search: &Search, done: impl Fn() + Sync) -> Vec<Vec<Answer>> {
+pub fn detect_each(cases: &[&[Object]], search: &Search, done: impl Fn() + Sync) -> Vec<Vec<PairAnswer>> {
     let of_case =
         |(case, objects): (usize, &&[Object])| candidates(objects).into_iter().map(move |pair| (case, pair));
     let pairs: Vec<_> = cases.iter().enumerate().flat_map(of_case).collect();
     let search_pair = |scratch: &mut Scratch, &(case, (a, b)): &(usize, (usize, usize))| {
         let verdict = search.pair(&cases[case][a], &cases[case][b], scratch);
         done();
-        Answer { a, b, verdict }
+        PairAnswer { a, b, verdict }
     };
-    let found: Vec<Answer> =
+    let found: Vec<PairAnswer> =
         pairs.par_iter().with_max_len(1).map_init(Scratch::default, search_pair).collect();
     let mut answers = vec![Vec::new(); cases.len()];
     for ((case, _), answer) in pairs.into_iter().zip(found) {
@@ -98,7 +98,7 @@ impl Search {
     /// Draws a pair once, at the requested resolution. A pair that exceeds the budget stays.
     fn unrefined(&self, objects: [&Object; 2], resources: &mut Resources<'_, impl PassBackend>) -> Verdict {
         let Some(mut pair) = Pair::new(objects, [0.0, 1.0], self) else { return Verdict::Apart };
-        if self.method == Method::DepthOnly {
+        if self.method == CollisionMethod::DepthOnly {
             return pair.by_depth(resources);
         }
         if pair.tighten() { pair.once(resources) } else { Verdict::Apart }
@@ -134,7 +134,7 @@ impl Search {
 
     /// Refines what remains of a pair, in the frame of the larger object if that moves.
     fn closer(&self, pair: &mut Pair<'_>, scratch: &mut Scratch, backend: &mut impl PassBackend) -> Verdict {
-        if self.method == Method::DepthOnly {
+        if self.method == CollisionMethod::DepthOnly {
             return pair.refine_by_depth(scratch, backend);
         }
         let Some(seen) = InFrame::new(pair.parts(), &pair.window) else {

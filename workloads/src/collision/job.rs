@@ -11,7 +11,7 @@ use super::families::swarm_of;
 use super::object::load_objects;
 use super::on_gpu::{Emitted, PassesOnGpu};
 use super::pass::Scratch;
-use super::{Method, Object, Search, Sweeps, candidates};
+use super::{CollisionMethod, Object, Search, Sweeps, candidates};
 use crate::error::LoadError;
 use crate::job::{
     Drawn, Draws, Fact, Flag, Flags, Job, JobError, JobOptions, Need, OptionSource, Request, facts, must_hold,
@@ -31,7 +31,7 @@ pub struct CollisionOptions {
     /// Time bins per tile, 1 to 256.
     pub bins: u32,
     /// What a pass compares.
-    pub method: Method,
+    pub method: CollisionMethod,
     /// Whether pairs whose swept boxes touch are drawn one by one within the space they share, of which the
     /// CPU narrows more from axis to axis, instead of two sweeps over all objects.
     pub narrow: bool,
@@ -43,7 +43,14 @@ impl JobOptions for CollisionOptions {
 
 impl Default for CollisionOptions {
     fn default() -> Self {
-        Self { file: None, balls: 12, resolution: 64, bins: 1, method: Method::FragmentBox, narrow: false }
+        Self {
+            file: None,
+            balls: 12,
+            resolution: 64,
+            bins: 1,
+            method: CollisionMethod::FragmentBox,
+            narrow: false,
+        }
     }
 }
 
@@ -217,9 +224,9 @@ mod tests {
     #[test]
     fn packets_add_up_and_the_answer_is_that_of_the_search_and_of_the_sweeps() {
         for (name, method) in [
-            ("fragment_box", Method::FragmentBox),
-            ("box_box", Method::BoxBox),
-            ("depth_only", Method::DepthOnly),
+            ("fragment_box", CollisionMethod::FragmentBox),
+            ("box_box", CollisionMethod::BoxBox),
+            ("depth_only", CollisionMethod::DepthOnly),
         ] {
             for narrow in ["false", "true"] {
                 let job = made(&[("resolution", "16"), ("balls", "6"), ("method", name), ("narrow", narrow)])

@@ -12,7 +12,7 @@ use super::pass::{
 /// What a pass compares in a tile.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Method {
+pub enum CollisionMethod {
     /// Each fragment of one object with the box of the other (thesis, Paper VI, Fig. 5, right).
     #[default]
     FragmentBox,
@@ -30,14 +30,14 @@ pub struct Search {
     /// Time bins per tile, 1 to 256.
     pub bins: u32,
     /// What is compared.
-    pub method: Method,
+    pub method: CollisionMethod,
     /// Whether to refine: search the remaining space and time again with smaller tiles.
     pub zoom: bool,
 }
 
 impl Default for Search {
     fn default() -> Self {
-        Self { resolution: 128, bins: 16, method: Method::FragmentBox, zoom: true }
+        Self { resolution: 128, bins: 16, method: CollisionMethod::FragmentBox, zoom: true }
     }
 }
 
@@ -239,7 +239,7 @@ impl<'a> Pair<'a> {
         for bins in remaining.chunks((MAX_TILES_IN_MEMORY / pass.tiles()).max(1)) {
             let comparison = Comparison { pass, parts: self.parts(), bins };
             all.join(match self.search.method {
-                Method::BoxBox => comparison.boxes_against_boxes(resources),
+                CollisionMethod::BoxBox => comparison.boxes_against_boxes(resources),
                 _ => comparison.fragments_against_boxes(resources),
             }?);
         }
@@ -407,7 +407,7 @@ mod tests {
     use super::super::detect::UNREFINED_FRAGMENTS;
     use super::super::families::slide;
     use super::super::pass::{Fragment, Pass};
-    use super::super::{Method, Object, Search, detect};
+    use super::super::{CollisionMethod, Object, Search, detect};
     use super::*;
 
     /// Counts fragments.
@@ -425,7 +425,7 @@ mod tests {
     fn refinement_ends_with_every_method() {
         let slanted = |x: f64| [[x, 0.0, 0.0], [x + 1.0, 0.0, 1.0], [x, 1.0, 1.0]];
         let object = |x: f64| Object::from_ends(vec![[slanted(x); 2]], 0.0).unwrap();
-        for method in [Method::FragmentBox, Method::BoxBox, Method::DepthOnly] {
+        for method in [CollisionMethod::FragmentBox, CollisionMethod::BoxBox, CollisionMethod::DepthOnly] {
             let search = Search { resolution: 1024, bins: 16, method, zoom: true };
             let mut drawn = Drawn(0);
             let verdict =

@@ -24,7 +24,7 @@ use crate::shapes;
 /// How surfaces are lit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum Method {
+pub enum LightingMethod {
     /// From a G-buffer.
     #[default]
     Deferred,
@@ -61,7 +61,7 @@ pub struct DeferredOptions {
     /// A built-in scene or a file.
     pub scene: String,
     /// How surfaces are lit.
-    pub method: Method,
+    pub method: LightingMethod,
     /// Point lights besides the light of the scene.
     pub lights: u32,
     /// Range of a point light, scene units.
@@ -156,7 +156,7 @@ impl Deferred {
 
     fn regime_warnings(&self, frame: &Frame) -> Vec<Warning> {
         let mut warnings = Vec::new();
-        if self.options.method == Method::Forward {
+        if self.options.method == LightingMethod::Forward {
             return warnings;
         }
         if self.options.rate == Rate::Pixel && self.samples.per_pixel() > 1 {
@@ -189,13 +189,13 @@ impl DrawsScene for Deferred {
         let stage = Stage { job: self, frame, viewport, lit, screen: Corners::of(frame, viewport) };
         let surfaces = stage.surfaces(gpu)?;
         let lit_runs = match self.options.method {
-            Method::Forward => stage.forward(&surfaces, gpu)?,
-            Method::Deferred => stage.deferred(&surfaces, gpu)?,
+            LightingMethod::Forward => stage.forward(&surfaces, gpu)?,
+            LightingMethod::Deferred => stage.deferred(&surfaces, gpu)?,
         };
         let image = stage.resolve(gpu)?.into_image();
         let bytes = match self.options.method {
-            Method::Forward => 0,
-            Method::Deferred => GBuffer::bytes(self.options.normals) * u64::from(samples),
+            LightingMethod::Forward => 0,
+            LightingMethod::Deferred => GBuffer::bytes(self.options.normals) * u64::from(samples),
         };
         let facts = Fact::all([
             (fact::point_lights, self.lights.len() as f64),

@@ -8,7 +8,7 @@ use pipeline::{Camera, Cull, Draw, Geometry, Gpu, RasterPass, Rendered, SampleSp
 use serde::{Deserialize, Serialize};
 use warnings::{Code, Warning};
 
-use super::{Effect, Map, Receiver, ReceiverShader};
+use super::{GlossyEffect, Map, Receiver, ReceiverShader};
 use crate::error::LoadError;
 use crate::job::{
     Drawn, DrawsScene, Fact, Flag, Flags, Job, JobError, JobOptions, OptionSource, Request, facts,
@@ -132,8 +132,8 @@ impl Glossy {
         Ok(job)
     }
 
-    fn effect(&self) -> Effect {
-        self.options.index.map_or(Effect::Reflection, Effect::Refraction)
+    fn effect(&self) -> GlossyEffect {
+        self.options.index.map_or(GlossyEffect::Reflection, GlossyEffect::Refraction)
     }
 
     fn map(&self, frame: &Frame) -> Result<Map, LoadError> {

@@ -21,7 +21,7 @@ use super::poisson::{
     poisson_disk_drawn,
 };
 use super::volume::{Blurred, Torus, Volume, fill};
-use super::white::{Named, columns_for};
+use super::white::{NamedDensity, columns_for};
 use super::{DrawnNoise, NoiseSpec, draw_noise};
 use crate::error::LoadError;
 use crate::job::{
@@ -335,7 +335,7 @@ impl Sampling {
 
     fn noise<const D: usize>(&self, seed: u64, gpu: &mut Gpu<'_>) -> Result<Drawn, JobError> {
         let spec = NoiseSpec { count: self.options.count, seed, across: columns_for(D) };
-        let found: DrawnNoise<D> = draw_noise(&Named::Gauss, &spec, gpu).map_err(JobError::setting)?;
+        let found: DrawnNoise<D> = draw_noise(&NamedDensity::Gauss, &spec, gpu).map_err(JobError::setting)?;
         let facts = Fact::all([
             (fact::points, found.points.len() as f64),
             (fact::candidates, found.candidates as f64),

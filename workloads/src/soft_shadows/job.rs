@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use warnings::{Code, Warning};
 
 use super::shade::{Shadows, VisibleTriangles, World, look_ups};
-use super::{AreaLight, LightSpec, Method, SceneView, ShadowMap};
+use super::{AreaLight, LightSpec, SceneView, ShadowMap, ShadowMethod};
 use crate::accumulation::SharedSamples;
 use crate::error::LoadError;
 use crate::job::{
@@ -100,8 +100,8 @@ impl SoftShadows {
         Ok(Self { scene, light, set, options })
     }
 
-    fn method(&self) -> Method {
-        if self.options.accumulate { Method::Accumulation } else { Method::OnePass }
+    fn method(&self) -> ShadowMethod {
+        if self.options.accumulate { ShadowMethod::Accumulation } else { ShadowMethod::OnePass }
     }
 
     /// Number of passes for the map.

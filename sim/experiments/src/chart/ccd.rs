@@ -7,7 +7,7 @@ use output::plot::{ChartPanel, Scale, Series};
 use output::terminal::Progress;
 use serde::Serialize;
 use workloads::collision::families::{Case, cases, reference_cases, slide, triangles_boxes_touch};
-use workloads::collision::{Method, Search, Sweeps, candidates, detect};
+use workloads::collision::{CollisionMethod, Search, Sweeps, candidates, detect};
 
 use crate::study::table::{Sheet, Table, fixed, millis, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
@@ -53,8 +53,10 @@ impl Way {
             Self::TriangleBoxes => "swept boxes of triangles".to_owned(),
             Self::Sweeps(Sweeps { bins, .. }) => format!("two sweeps, bins {bins}"),
             Self::Images(Search { zoom: true, .. }) => "with refinement".to_owned(),
-            Self::Images(Search { method: Method::DepthOnly, .. }) => "depth only".to_owned(),
-            Self::Images(Search { method: Method::BoxBox, bins, .. }) => format!("box-box, bins {bins}"),
+            Self::Images(Search { method: CollisionMethod::DepthOnly, .. }) => "depth only".to_owned(),
+            Self::Images(Search { method: CollisionMethod::BoxBox, bins, .. }) => {
+                format!("box-box, bins {bins}")
+            }
             Self::Images(Search { bins, .. }) => format!("fragment-box, bins {bins}"),
         }
     }
@@ -144,8 +146,9 @@ const REFERENCE_PIXELS: u32 = 128;
 
 /// The ways of the reference cases.
 fn reference_ways(effort: &CcdEffort) -> Vec<Way> {
-    let once = Search { resolution: REFERENCE_PIXELS, bins: 1, method: Method::FragmentBox, zoom: false };
-    let depth_only = Search { method: Method::DepthOnly, ..once };
+    let once =
+        Search { resolution: REFERENCE_PIXELS, bins: 1, method: CollisionMethod::FragmentBox, zoom: false };
+    let depth_only = Search { method: CollisionMethod::DepthOnly, ..once };
     let binned = effort.reference_bins.iter().map(|&bins| Search { bins, ..once });
     let images = [depth_only].into_iter().chain(binned).chain([Search::default()]).map(Way::Images);
     let sweeps = effort.reference_bins.iter().map(|&bins| sweeps(REFERENCE_PIXELS, bins));
@@ -154,18 +157,18 @@ fn reference_ways(effort: &CcdEffort) -> Vec<Way> {
 
 /// Two sweeps over all objects.
 fn sweeps(resolution: u32, bins: u32) -> Way {
-    Way::Sweeps(Sweeps { method: Method::FragmentBox, resolution, bins })
+    Way::Sweeps(Sweeps { method: CollisionMethod::FragmentBox, resolution, bins })
 }
 
 /// All ways, from the cheapest on.
 fn ways(effort: &CcdEffort) -> Vec<Way> {
-    let search = Search { resolution: 0, bins: 1, method: Method::FragmentBox, zoom: false };
+    let search = Search { resolution: 0, bins: 1, method: CollisionMethod::FragmentBox, zoom: false };
     let each = effort.resolutions.iter().flat_map(|&resolution| {
         let search = Search { resolution, ..search };
         let binned = effort.bins.iter().map(move |&bins| Search { bins, ..search });
         let others = [
-            Search { method: Method::DepthOnly, ..search },
-            Search { method: Method::BoxBox, ..search },
+            Search { method: CollisionMethod::DepthOnly, ..search },
+            Search { method: CollisionMethod::BoxBox, ..search },
             Search { zoom: true, bins: Search::default().bins, ..search },
         ];
         let swept = effort.bins.iter().map(move |&bins| sweeps(resolution, bins));

@@ -12,7 +12,7 @@ use power_model::{EnergyTable, Platform, PowerModel};
 use rayon::prelude::*;
 use run::{GpuSpec, JobFrame, RunError};
 use serde::Serialize;
-use workloads::deferred::{Deferred, DeferredOptions, LightPass, Method, NormalFormat, Rate};
+use workloads::deferred::{Deferred, DeferredOptions, LightPass, LightingMethod, NormalFormat, Rate};
 use workloads::scene::{Local, Node, Parts, Rig, Scene, SceneCamera, Trs};
 use workloads::{Alpha, Material, Overrides, shapes};
 
@@ -79,7 +79,7 @@ impl Sweep {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Way {
     name: &'static str,
-    method: Method,
+    method: LightingMethod,
     lighting: LightPass,
     normals: NormalFormat,
     rate: Rate,
@@ -89,13 +89,13 @@ struct Way {
 const WAYS: [Way; 5] = {
     let deferred = Way {
         name: "deferred",
-        method: Method::Deferred,
+        method: LightingMethod::Deferred,
         lighting: LightPass::Screen,
         normals: NormalFormat::Rgba16f,
         rate: Rate::Sample,
     };
     [
-        Way { name: "forward", method: Method::Forward, ..deferred },
+        Way { name: "forward", method: LightingMethod::Forward, ..deferred },
         deferred,
         Way { name: "light volumes", lighting: LightPass::Volumes, ..deferred },
         Way { name: "normals in bytes", normals: NormalFormat::Rgba8, ..deferred },

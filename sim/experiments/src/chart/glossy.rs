@@ -15,8 +15,8 @@ use pipeline::sampling::SampleSource;
 use pipeline::{Cull, Draw, Geometry, Gpu, LensShape, SampleSpec, SampleTable};
 use run::GpuSpec;
 use serde::Serialize;
-use workloads::accumulation::{RayWork, Rays, SharedSamples};
-use workloads::glossy::{Effect, Lobe, Map, default_scene, receiver};
+use workloads::accumulation::{RayCaster, RayWork, SharedSamples};
+use workloads::glossy::{GlossyEffect, Lobe, Map, default_scene, receiver};
 use workloads::{Frame, Scene};
 
 use crate::chart::{White, errors, mean_square};
@@ -38,8 +38,8 @@ pub struct GlossyEffort {
 /// Radius of the lens where it does not vary, scene units.
 const ROUGHNESS: f64 = 0.25;
 /// Both effects, each with its name.
-const EFFECTS: [(&str, Effect); 2] =
-    [("reflection", Effect::Reflection), ("refraction", Effect::Refraction(1.33))];
+const EFFECTS: [(&str, GlossyEffect); 2] =
+    [("reflection", GlossyEffect::Reflection), ("refraction", GlossyEffect::Refraction(1.33))];
 
 /// Everything the chart found.
 #[derive(Clone, Debug, Serialize)]
@@ -71,14 +71,14 @@ impl Study for GlossyChart {
         let bar = progress.bar("glossy", (EFFECTS.len() * counts.len() + 2) as u64);
         let mut rows = Vec::new();
         for effect in EFFECTS {
-            let bench = Bench::new(effect, effort)?;
+            let bench = GlossyBench::new(effect, effort)?;
             let reference = bench.reference(ROUGHNESS)?;
             for &samples in &counts {
                 rows.push(bench.row(samples, &reference)?);
                 bar.inc();
             }
         }
-        let bench = Bench::new(EFFECTS[0], effort)?;
+        let bench = GlossyBench::new(EFFECTS[0], effort)?;
         let blurs = bench.blurs()?;
         bar.inc();
         let wides = bench.wides()?;
@@ -302,11 +302,11 @@ pub struct Wide {
 }
 
 /// The stage for an effect.
-pub struct Bench {
+pub struct GlossyBench {
     scene: Scene,
     frame: Frame,
     gpu: GpuSpec,
-    effect: (&'static str, Effect),
+    effect: (&'static str, GlossyEffect),
     effort: GlossyEffort,
     radius: f64,
 }
@@ -319,13 +319,13 @@ const RADII: [f64; 7] = [0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 4.0];
 /// Samples of a texel where radii are compared.
 const FEW: u32 = 16;
 
-impl Bench {
+impl GlossyBench {
     /// The stage.
     ///
     /// # Errors
     /// None that is expected.
-    pub fn new(effect: (&'static str, Effect), effort: GlossyEffort) -> Result<Self, StudyError> {
-        let scene = default_scene(effect.1 != Effect::Reflection)?;
+    pub fn new(effect: (&'static str, GlossyEffect), effort: GlossyEffort) -> Result<Self, StudyError> {
+        let scene = default_scene(effect.1 != GlossyEffect::Reflection)?;
         let frame = scene.frame(0)?;
         Ok(Self { scene, frame, gpu: GpuSpec::load("reference")?, effect, effort, radius: ROUGHNESS })
     }
@@ -372,7 +372,7 @@ impl Bench {
     ) -> Result<(Vec<Vec3>, RayWork), StudyError> {
         let colour = |mesh: &workloads::FrameMesh| self.scene.materials()[mesh.material].base_color;
         let colours: Vec<Vec3> = self.frame.meshes.iter().map(colour).collect();
-        let rays = Rays::new(&self.draws()?);
+        let rays = RayCaster::new(&self.draws()?);
         Ok(map.by_rays((&rays, &colours), tables, self.scene.background(), lobe))
     }
 

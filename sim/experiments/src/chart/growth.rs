@@ -61,7 +61,7 @@ pub enum Sweep {
 /// The source of blur.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Kind {
+pub enum GrowthBlur {
     /// Nothing.
     Still,
     /// Motion: three dimensions.
@@ -78,7 +78,7 @@ pub struct GrowthRow {
     /// The quantity that grows.
     pub sweep: Sweep,
     /// The source of blur.
-    pub kind: Kind,
+    pub kind: GrowthBlur,
     /// Exponent of time over what grows, from `fitted_from` on.
     pub exponent: Option<f64>,
     /// Exponent of the number of sample tests, likewise.
@@ -86,7 +86,7 @@ pub struct GrowthRow {
     /// Where the upper half of the curve begins on its logarithmic axis.
     pub fitted_from: f64,
     /// From little to much.
-    pub points: Vec<Point>,
+    pub points: Vec<GrowthPoint>,
 }
 
 /// Everything the chart found.
@@ -111,7 +111,7 @@ impl Sweep {
     }
 
     /// The value of a point that grows.
-    pub fn of(self, point: &Point) -> f64 {
+    pub fn of(self, point: &GrowthPoint) -> f64 {
         match self {
             Self::Triangles => f64::from(point.triangles),
             Self::Samples => f64::from(point.samples_per_pixel),
@@ -130,7 +130,7 @@ impl Sweep {
     }
 }
 
-impl Kind {
+impl GrowthBlur {
     const ALL: [Self; 4] = [Self::Still, Self::Motion, Self::Defocus, Self::Both];
 
     /// Name of the kind in tables and pictures.
@@ -180,12 +180,12 @@ impl Study for GrowthChart {
     };
 
     fn measure(effort: GrowthEffort, _scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
-        let curves = || Sweep::ALL.into_iter().flat_map(|sweep| Kind::ALL.map(|kind| (sweep, kind)));
+        let curves = || Sweep::ALL.into_iter().flat_map(|sweep| GrowthBlur::ALL.map(|kind| (sweep, kind)));
         // What stands still has no blur to sweep.
-        let curves = || curves().filter(|curve| *curve != (Sweep::Blur, Kind::Still));
+        let curves = || curves().filter(|curve| *curve != (Sweep::Blur, GrowthBlur::Still));
         let steps: usize = curves().map(|(sweep, _)| sweep.trials(&effort).len()).sum();
         let (bar, timer) = (progress.bar("growth", steps as u64), Timer::new(&effort)?);
-        let row = |(sweep, kind): (Sweep, Kind)| {
+        let row = |(sweep, kind): (Sweep, GrowthBlur)| {
             let point = |trial: Base| {
                 let point = timer.point(trial, kind);
                 bar.inc();
@@ -253,12 +253,12 @@ impl GrowthChart {
             Sweep::Blur => ("motion or circle of confusion (px)", format!("{triangles}, {samples}")),
         };
         let scale = if sweep == Sweep::Triangles { Scale::Decades } else { Scale::Doublings };
-        let curves = Kind::ALL.map(|kind| self.curve(sweep, kind)).into();
+        let curves = GrowthBlur::ALL.map(|kind| self.curve(sweep, kind)).into();
         ChartPanel::new(&title, [across, "CPU time (ms)"], curves).on(scale, Scale::Decades)
     }
 
     /// A curve without points where there is none, so that the others keep their colours.
-    fn curve(&self, sweep: Sweep, kind: Kind) -> Series {
+    fn curve(&self, sweep: Sweep, kind: GrowthBlur) -> Series {
         let row = self.rows.iter().find(|row| row.sweep == sweep && row.kind == kind);
         let points = row.iter().flat_map(|row| &row.points);
         let note = row.and_then(|row| row.exponent).map_or(String::new(), |p| format!("{p:.2}"));
@@ -270,11 +270,11 @@ impl GrowthChart {
 }
 
 impl GrowthRow {
-    fn new(sweep: Sweep, kind: Kind, points: Vec<Point>) -> Self {
+    fn new(sweep: Sweep, kind: GrowthBlur, points: Vec<GrowthPoint>) -> Self {
         let across = || points.iter().map(|point| sweep.of(point)).filter(|x| *x > 0.0);
         let ends = across().reduce(f64::min).zip(across().reduce(f64::max));
         let fitted_from = ends.map_or(0.0, |(low, high)| upper_half(low, high));
-        let fit = |of: fn(&Point) -> f64| {
+        let fit = |of: fn(&GrowthPoint) -> f64| {
             let all = points.iter().map(|point| (sweep.of(point), of(point)));
             exponent(all.filter(|(x, _)| *x >= fitted_from))
         };
@@ -291,7 +291,7 @@ impl GrowthRow {
 
 /// One measurement.
 #[derive(Clone, Copy, Debug, Serialize)]
-pub struct Point {
+pub struct GrowthPoint {
     /// Triangles.
     pub triangles: u32,
     /// Samples in a pixel.
@@ -324,12 +324,12 @@ impl<'a> Timer<'a> {
         Ok(Self { effort, thread: ThreadPoolBuilder::new().num_threads(1).build()? })
     }
 
-    pub fn point(&self, trial: Base, kind: Kind) -> Result<Point, StudyError> {
+    pub fn point(&self, trial: Base, kind: GrowthBlur) -> Result<GrowthPoint, StudyError> {
         let [motion_px, defocus_px] = kind.blur_px(trial.blur_px);
         let size = Size { side_px: self.effort.side_px, triangles: trial.triangles };
         let scene = Soup { size, layers: LAYERS, motion_px, defocus_px }.scene(SEED)?;
         let (cpu_s, tally) = self.time(&scene, trial.samples)?;
-        Ok(Point {
+        Ok(GrowthPoint {
             triangles: trial.triangles,
             samples_per_pixel: trial.samples,
             motion_px,
@@ -379,9 +379,17 @@ mod tests {
         base: Base { triangles: 50, samples: 4, blur_px: 4.0 },
     };
 
-    fn point(triangles: u32, cpu_s: f64) -> Point {
+    fn point(triangles: u32, cpu_s: f64) -> GrowthPoint {
         let (motion_px, defocus_px) = (0.0, 0.0);
-        Point { triangles, samples_per_pixel: 1, motion_px, defocus_px, cpu_s, sample_tests: 7, hits: 0 }
+        GrowthPoint {
+            triangles,
+            samples_per_pixel: 1,
+            motion_px,
+            defocus_px,
+            cpu_s,
+            sample_tests: 7,
+            hits: 0,
+        }
     }
 
     #[test]
@@ -389,11 +397,11 @@ mod tests {
         // A floor of 1 s up to a hundred, beyond it n^1.5.
         let time = |n: u32| (n, f64::from(n).powf(1.5) / 1e3);
         let points = [1, 10, 100, 1_000, 10_000].map(time).map(|(n, s)| point(n, s.max(1.0)));
-        let row = GrowthRow::new(Sweep::Triangles, Kind::Still, points.into());
+        let row = GrowthRow::new(Sweep::Triangles, GrowthBlur::Still, points.into());
         assert!((row.fitted_from - 100.0).abs() < 1e-9);
         assert!((row.exponent.unwrap() - 1.5).abs() < 1e-12, "{:?}", row.exponent);
         assert!(row.tests_exponent.unwrap().abs() < 1e-12);
-        assert_eq!(GrowthRow::new(Sweep::Triangles, Kind::Still, Vec::new()).exponent, None);
+        assert_eq!(GrowthRow::new(Sweep::Triangles, GrowthBlur::Still, Vec::new()).exponent, None);
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use activity::{Event, Unit};
 use output::OutputError;
-use output::plot::{AxisSpec, ChartPanel, Mark, Paint, Scale, Series};
+use output::plot::{AxisSpec, ChartPanel, Paint, PlotMark, Scale, Series};
 use output::terminal::Progress;
 use pipeline::CacheSpec;
 use power_model::Part;
@@ -207,7 +207,7 @@ impl MemoryChart {
         let series = self.sweeps().enumerate().map(|(number, rows)| {
             let points = rows.iter().map(|row| (row.size_mb * BYTES_PER_MB, of(row))).collect();
             let label = format!("{} ({})", rows[0].level, rows[0].work);
-            Series::new(&label, Mark::Curve(points)).painted(Paint::Like(number))
+            Series::new(&label, PlotMark::Curve(points)).painted(Paint::Like(number))
         });
         let across = AxisSpec {
             name: "size of the level".to_owned(),

@@ -41,7 +41,7 @@ pub struct OcclusionEffort {
 /// The source of blur.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Kind {
+pub enum OcclusionBlur {
     /// Walls and what is behind them move.
     Motion,
     /// All is out of focus.
@@ -50,7 +50,7 @@ pub enum Kind {
     Both,
 }
 
-impl Kind {
+impl OcclusionBlur {
     /// Every kind.
     pub const ALL: [Self; 3] = [Self::Motion, Self::Defocus, Self::Both];
 
@@ -68,7 +68,7 @@ impl Kind {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct OcclusionRow {
     /// The source of blur.
-    pub kind: Kind,
+    pub kind: OcclusionBlur,
     /// Slats of a wall.
     pub slats: u32,
     /// Samples in a pixel.
@@ -151,7 +151,7 @@ impl Study for OcclusionChart {
         let samples = self.effort.samples[0];
         let title = "Occlusion queries: by intervals and by samples";
         let subject = self.subject();
-        to.chart("occlusion", [title, &subject], Kind::ALL.map(|kind| self.rates(kind)).into())?;
+        to.chart("occlusion", [title, &subject], OcclusionBlur::ALL.map(|kind| self.rates(kind)).into())?;
         let title = "Where occlusion queries fail: many small occluders";
         let subject = format!(
             "walls of more and narrower slats, {:.0} % of a wall being gaps; motion, {samples} samples a pixel, 8 boxes of time. Marked: where a \
@@ -228,7 +228,7 @@ impl OcclusionChart {
         self.intervals.iter().chain(&self.samples).chain(&self.failing)
     }
 
-    fn rates(&self, kind: Kind) -> ChartPanel {
+    fn rates(&self, kind: OcclusionBlur) -> ChartPanel {
         let of_tile = |&tile: &u32| {
             let rows = self.intervals.iter().filter(|row| row.kind == kind && row.tile_px == Some(tile));
             let mut points: Vec<_> = rows.map(|row| (row.bytes, row.rate())).collect();
@@ -292,7 +292,7 @@ const LENS: f32 = 0.15;
 /// The part of a wall of slats that is gaps.
 const GAPS: f32 = 0.02;
 
-impl Kind {
+impl OcclusionBlur {
     /// A scene of this kind with so many boxes, its walls whole.
     pub(crate) fn spec(self, boxes: u32, seed: u64) -> WallSceneSpec {
         let motion = if self == Self::Defocus { 0.0 } else { MOTION };
@@ -420,7 +420,7 @@ fn row(like: OcclusionRow, answers: &[(Answered, bool)]) -> OcclusionRow {
     }
 }
 
-fn blank(kind: Kind, slats: u32, samples: u32) -> OcclusionRow {
+fn blank(kind: OcclusionBlur, slats: u32, samples: u32) -> OcclusionRow {
     OcclusionRow {
         kind,
         slats,
@@ -468,7 +468,7 @@ fn measure(effort: OcclusionEffort, progress: &Progress) -> Result<OcclusionChar
     let bar = progress.bar("occlusion", (3 * effort.samples.len() + effort.slats.len()) as u64);
     let mut chart =
         OcclusionChart { effort, intervals: Vec::new(), samples: Vec::new(), failing: Vec::new() };
-    for kind in Kind::ALL {
+    for kind in OcclusionBlur::ALL {
         for &samples in effort.samples {
             let scenes = drawn(&effort, kind, 1, samples, &bar)?;
             let like = blank(kind, 1, samples);
@@ -486,8 +486,8 @@ fn measure(effort: OcclusionEffort, progress: &Progress) -> Result<OcclusionChar
         }
     }
     for &slats in effort.slats {
-        let scenes = drawn(&effort, Kind::Motion, slats, SAMPLES, &bar)?;
-        let like = blank(Kind::Motion, slats, SAMPLES);
+        let scenes = drawn(&effort, OcclusionBlur::Motion, slats, SAMPLES, &bar)?;
+        let like = blank(OcclusionBlur::Motion, slats, SAMPLES);
         chart.failing.push(by_samples(&scenes, like));
         for tile_px in FAILING_TILES {
             chart.failing.push(by_intervals(&scenes, like, [1, 1, 8], tile_px)?);
@@ -498,7 +498,7 @@ fn measure(effort: OcclusionEffort, progress: &Progress) -> Result<OcclusionChar
 
 fn drawn(
     effort: &OcclusionEffort,
-    kind: Kind,
+    kind: OcclusionBlur,
     slats: u32,
     samples: u32,
     bar: &Bar,

@@ -14,7 +14,7 @@ use crate::study::table::{Sheet, Table, fixed, plain, share};
 use crate::study::tradeoff::{Metric, TradeoffPoint, front};
 use crate::study::{Gallery, Study, StudyError};
 use output::OutputError;
-use output::plot::{AxisSpec, ChartPanel, Mark, Paint, Scale, Series};
+use output::plot::{AxisSpec, ChartPanel, Paint, PlotMark, Scale, Series};
 use output::terminal::Progress;
 use run::{GpuSpec, RunError};
 
@@ -238,10 +238,10 @@ impl TileTests {
         let mut steps: Vec<(f64, f64)> = best().map(|mean| (mean.cost, 100.0 * mean.gain)).collect();
         steps.sort_by(|a, b| a.0.total_cmp(&b.0));
         let series = vec![
-            Series::new("frontier", Mark::Steps(steps)).painted(Paint::Ink),
+            Series::new("frontier", PlotMark::Steps(steps)).painted(Paint::Ink),
             Series::new(
                 "a combination of tests",
-                Mark::Rings(
+                PlotMark::Rings(
                     others
                         .map(|m| point(m, if named(m) { words(&m.tests) } else { String::new() }))
                         .collect(),
@@ -250,7 +250,7 @@ impl TileTests {
             .painted(Paint::Like(0)),
             Series::new(
                 "on the frontier",
-                Mark::Dots(best().map(|mean| point(mean, words(&mean.tests))).collect()),
+                PlotMark::Dots(best().map(|mean| point(mean, words(&mean.tests))).collect()),
             )
             .painted(Paint::Like(1)),
         ];

@@ -43,7 +43,7 @@ pub struct About {
     /// Name of the row in the list of claims.
     pub id: String,
     /// Kind of agreement.
-    pub kind: Kind,
+    pub kind: RowKind,
     /// The claim, in full.
     pub claim: String,
     /// Statement of the paper, with the passage.
@@ -56,7 +56,7 @@ pub struct About {
 
 /// Kind of agreement that a row needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
-pub enum Kind {
+pub enum RowKind {
     /// An equality that holds exactly.
     Equality,
     /// A number with a tolerance.
@@ -65,7 +65,7 @@ pub enum Kind {
     Order,
 }
 
-impl Kind {
+impl RowKind {
     /// The letter of the list of claims.
     pub const fn letter(self) -> &'static str {
         match self {
@@ -76,7 +76,7 @@ impl Kind {
     }
 }
 
-impl Serialize for Kind {
+impl Serialize for RowKind {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.serialize_str(self.letter())
     }
@@ -298,7 +298,7 @@ pub trait PaperSettings: DeserializeOwned {
 
 /// Settings file of a result.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Origin {
+pub struct SettingsOrigin {
     /// Name of the file, as given.
     pub file: String,
     /// SHA-256 of its bytes, as `sha256sum` prints it.
@@ -311,7 +311,7 @@ pub struct Origin {
 ///
 /// # Errors
 /// If the file cannot be read or a value is invalid, with its place.
-pub fn load<T: PaperSettings>(file: Option<&Path>) -> Result<(T, Origin), RunError> {
+pub fn load<T: PaperSettings>(file: Option<&Path>) -> Result<(T, SettingsOrigin), RunError> {
     let Some(path) = file else { return parse(T::TEXT, T::FILE) };
     let name = path.display().to_string();
     let text =
@@ -319,7 +319,7 @@ pub fn load<T: PaperSettings>(file: Option<&Path>) -> Result<(T, Origin), RunErr
     parse(&text, &name)
 }
 
-fn parse<T: PaperSettings>(text: &str, name: &str) -> Result<(T, Origin), RunError> {
+fn parse<T: PaperSettings>(text: &str, name: &str) -> Result<(T, SettingsOrigin), RunError> {
     let settings: T = spec::parse(text, name)?;
     let (paper, number) = (settings.paper(), T::PAPER.number());
     if paper != number {
@@ -327,7 +327,10 @@ fn parse<T: PaperSettings>(text: &str, name: &str) -> Result<(T, Origin), RunErr
         return Err(RunError::invalid(name, why));
     }
     settings.check().map_err(|message| RunError::invalid(name, message))?;
-    Ok((settings, Origin { file: name.to_owned(), sha256: sha256_of_text(text), committed: text == T::TEXT }))
+    Ok((
+        settings,
+        SettingsOrigin { file: name.to_owned(), sha256: sha256_of_text(text), committed: text == T::TEXT },
+    ))
 }
 
 /// A setting as a report lists it.
@@ -415,7 +418,7 @@ mod tests {
         }
         let about = About {
             id: "X-1".to_owned(),
-            kind: Kind::Order,
+            kind: RowKind::Order,
             claim: String::new(),
             paper: String::new(),
             holds_when: String::new(),

@@ -24,7 +24,7 @@ pub struct Trial {
 
 /// `auto` against the best fixed choice, at one value or over a whole family.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Choice {
+pub struct TestChoice {
     /// The family.
     pub family: &'static str,
     /// The value of its parameter; `None` for all of them added up.
@@ -81,7 +81,7 @@ fn fixed<E>(lens: bool, madds: impl Fn(Features) -> Result<u64, E>) -> Result<Ve
     .collect()
 }
 
-impl Choice {
+impl TestChoice {
     /// Of one value.
     pub fn of(trial: &Trial) -> Self {
         Self::new(trial.family, Some(trial.value), trial.auto, &trial.fixed)
@@ -113,9 +113,9 @@ impl Choice {
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Choices {
     /// Each family as a whole, one fixed choice for all of its values.
-    pub families: Vec<Choice>,
+    pub families: Vec<TestChoice>,
     /// Each value, with the best choice for it alone.
-    pub values: Vec<Choice>,
+    pub values: Vec<TestChoice>,
 }
 
 impl Choices {
@@ -123,8 +123,8 @@ impl Choices {
     pub fn new(trials: &[Trial]) -> Self {
         let families = trials.chunk_by(|a, b| a.family == b.family);
         Self {
-            families: families.filter_map(Choice::over).collect(),
-            values: trials.iter().map(Choice::of).collect(),
+            families: families.filter_map(TestChoice::over).collect(),
+            values: trials.iter().map(TestChoice::of).collect(),
         }
     }
 
@@ -161,12 +161,12 @@ impl Choices {
     /// `auto` and every test on, over the best fixed choice: of each family as a whole, and at the value that
     /// is worst for it.
     pub(super) fn picture(&self, plot_style: &PlotStyle) -> Picture {
-        type Cost = fn(&Choice) -> f64;
+        type Cost = fn(&TestChoice) -> f64;
         let costs: [(&str, Cost); 2] = [
             ("auto", |choice| choice.over_best),
             ("all", |choice| choice.all_madds.max(1) as f64 / choice.best_madds.max(1) as f64),
         ];
-        let worst = |family: &Choice, cost: Cost| {
+        let worst = |family: &TestChoice, cost: Cost| {
             let values = self.values.iter().filter(|value| value.family == family.family);
             values.map(cost).reduce(f64::max)
         };
@@ -203,11 +203,11 @@ impl Choices {
     }
 }
 
-fn over(choices: &[Choice]) -> usize {
+fn over(choices: &[TestChoice]) -> usize {
     choices.iter().filter(|choice| choice.over_best > MAX_OVER_BEST).count()
 }
 
-fn worst(choices: &[Choice]) -> Option<&Choice> {
+fn worst(choices: &[TestChoice]) -> Option<&TestChoice> {
     choices.iter().max_by(|a, b| a.over_best.total_cmp(&b.over_best))
 }
 

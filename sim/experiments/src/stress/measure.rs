@@ -130,7 +130,7 @@ pub struct Pairs {
 
 struct Pair {
     triangle: Triangle,
-    place: Place,
+    place: TilePlace,
     truth: Option<Hulls>,
 }
 
@@ -185,7 +185,7 @@ impl Pairs {
             for tile in (0..here).filter(|tile| chosen(passed + tile, stride)) {
                 let [column, row] = [tile % across, tile / across].map(|step| step as u32);
                 let origin = [(rect.x0 + column) * side, (rect.y0 + row) * side];
-                let place = Place::new(subject.viewport, projection.shear, projection.near, origin, side);
+                let place = TilePlace::new(subject.viewport, projection.shear, projection.near, origin, side);
                 let truth = Truth::new(triangle, &projection.shear, &place.tile, projection.near);
                 // The truth asks where a triangle is, not which face it shows; so must the tests.
                 let triangle = Triangle { faces: [true; 2], ..*triangle };
@@ -209,7 +209,7 @@ impl Pairs {
     }
 
     /// Intervals under `bound`.
-    pub fn bounded(&self, bound: impl Fn(&Place, &Triangle) -> Option<Box5>) -> Intervals {
+    pub fn bounded(&self, bound: impl Fn(&TilePlace, &Triangle) -> Option<Box5>) -> Intervals {
         let mut sum = Intervals { pairs: self.pairs.len() as u64, ..Intervals::default() };
         let (mut volume, mut true_volume) = (0.0, 0.0);
         for pair in &self.pairs {
@@ -345,7 +345,7 @@ pub fn combinations() -> Vec<(String, Features)> {
 
 /// A tile with what the tests need to know of the camera.
 #[derive(Clone, Copy, Debug)]
-pub struct Place {
+pub struct TilePlace {
     /// The tile.
     pub tile: TileRect,
     /// The lens.
@@ -354,7 +354,7 @@ pub struct Place {
     pub near: f32,
 }
 
-impl Place {
+impl TilePlace {
     /// The tile of `side_px` pixels whose first pixel is `origin`.
     pub fn new(viewport: Viewport, shear: Shear, near: f32, origin: [u32; 2], side_px: u32) -> Self {
         Self { tile: TileRect::new(viewport, origin, side_px), shear, near }

@@ -12,7 +12,9 @@ pub mod truth;
 use choice::{Choices, Trial};
 use measure::{METHODS, StressRow, TestMethod};
 use output::dir::SUMMARY;
-use output::plot::{Chart, ChartPanel, Mark, Matrix, MatrixPanel, Paint, Picture, PlotStyle, Scale, Series};
+use output::plot::{
+    Chart, ChartPanel, Matrix, MatrixPanel, Paint, Picture, PlotMark, PlotStyle, Scale, Series,
+};
 use output::terminal::Progress;
 use output::{Claim, OutputError};
 use rayon::prelude::*;
@@ -341,7 +343,7 @@ fn curves(report: &StressChart, family: &Family, measure: &Measure, plot_style: 
     };
     let all: Vec<Vec<(f64, f64)>> = METHODS.iter().map(|method| line(method.name)).collect();
     let panel = |(method, own): (&TestMethod, &Vec<(f64, f64)>)| {
-        let others = Series::new("", Mark::Faint(all.clone())).painted(Paint::Grey);
+        let others = Series::new("", PlotMark::Faint(all.clone())).painted(Paint::Grey);
         let own = Series::curve("", own.iter().copied()).painted(Paint::Like(0));
         ChartPanel::new(method.name, ["", measure.name], vec![others, own])
             .on(Scale::Even, measure.scale.clone())

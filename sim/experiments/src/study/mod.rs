@@ -1,7 +1,7 @@
 //! Studies: something is measured, drawn and written in one go. A chart of the book and the failure catalogue
 //! are studies.
 //!
-//! - [`Study`]: what a study is; [`Entry`]: one of them in a list.
+//! - [`Study`]: what a study is; [`StudyEntry`]: one of them in a list.
 //! - [`table`]: tables whose columns are declared once.
 //! - [`tradeoff`]: speed against accuracy, the same few numbers for every method; one page of all studies.
 //! - [`Ran`]: work that a measurement ran, added up from the reports of its frames.
@@ -184,7 +184,7 @@ fn write<S: Study>(
 
 /// A study in a list of studies.
 #[derive(Clone, Copy, Debug)]
-pub struct Entry {
+pub struct StudyEntry {
     /// Name of the study on the command line.
     pub name: &'static str,
     /// Subject of the study, in one line.
@@ -197,7 +197,7 @@ pub struct Entry {
     run: fn(&Request<'_>) -> Result<Done, StudyError>,
 }
 
-impl Entry {
+impl StudyEntry {
     /// The entry of a study.
     pub const fn of<S: Study>() -> Self {
         Self {

@@ -1,7 +1,7 @@
 //! Speed against accuracy, the same few numbers for every method of every study, and the page of all studies.
 
 use minijinja::{Environment, context};
-use output::plot::{AxisSpec, Chart, ChartPanel, Mark, Paint, Picture, PlotStyle, Scale, Series};
+use output::plot::{AxisSpec, Chart, ChartPanel, Paint, Picture, PlotMark, PlotStyle, Scale, Series};
 use output::report::ReportError;
 use output::table::digits;
 use output::{Claim, OutDir, OutputError};
@@ -188,11 +188,11 @@ impl Tradeoff {
         let fronts = groups(points.iter().copied(), TradeoffPoint::competes_with);
         let fronts: Vec<Vec<(f64, f64)>> = fronts.iter().map(|points| self.front(points)).collect();
         let lines = fronts.into_iter().filter(|front| front.len() > 1);
-        let lines = lines.map(|front| Series::new("", Mark::Steps(front)).painted(Paint::Grey));
+        let lines = lines.map(|front| Series::new("", PlotMark::Steps(front)).painted(Paint::Grey));
         let methods = groups(points.iter().copied(), |a, b| a.method == b.method);
         let dots = methods.iter().enumerate().map(|(place, points)| {
             let place_of = |point: &&TradeoffPoint| (point.cost.value, point.error.value, String::new());
-            let dots = Mark::Dots(points.iter().map(place_of).collect());
+            let dots = PlotMark::Dots(points.iter().map(place_of).collect());
             Series::new(points[0].method.as_str(), dots).painted(Paint::Like(place))
         });
         let [error, cost] = [&points[0].error, &points[0].cost];

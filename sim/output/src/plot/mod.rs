@@ -41,7 +41,7 @@ pub use heat_map::{CaptionedImage, HeatMapPlot, HeatTile, Images, Matrix, Matrix
 pub use picture::{COLUMN_MM, Picture, PlotStyle, undrawable};
 pub use render::PlotError;
 pub use run_plots::{FrameEnergyPlot, FrameEnergyPoint, PowerRun};
-pub use series::{Mark, Paint, Series, Spread};
+pub use series::{Paint, PlotMark, Series, Spread};
 
 /// An sRGB colour with opacity.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -6,7 +6,7 @@ use super::{BACKGROUND, FAINT, INK};
 
 /// Kind and data of a series.
 #[derive(Clone, Debug)]
-pub enum Mark {
+pub enum PlotMark {
     /// A filled band from the lowest to the highest value at each position.
     Band(Vec<(f64, f64, f64)>),
     /// A line through points.
@@ -84,20 +84,20 @@ pub struct Series {
     /// Note in the panel, for example an exponent.
     pub note: String,
     /// Data. Connected points are ordered from left to right. Points that an axis cannot show are omitted.
-    pub mark: Mark,
+    pub mark: PlotMark,
     /// Colour and marker.
     pub paint: Paint,
 }
 
 impl Series {
     /// A series in the default style.
-    pub fn new(name: impl Into<String>, mark: Mark) -> Self {
+    pub fn new(name: impl Into<String>, mark: PlotMark) -> Self {
         Self { name: name.into(), note: String::new(), mark, paint: Paint::Own }
     }
 
     /// A line with markers.
     pub fn curve(name: impl Into<String>, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
-        Self::new(name, Mark::Curve(points.into_iter().collect()))
+        Self::new(name, PlotMark::Curve(points.into_iter().collect()))
     }
 
     /// The same with another style.
@@ -140,7 +140,7 @@ fn dot_radius(count: usize, above: usize) -> f64 {
     RADII[usize::from(count <= MANY)] + RIM_PX * above.min(MAX_ABOVE) as f64
 }
 
-impl Mark {
+impl PlotMark {
     /// All values of `x` and `y` that the axes must include.
     pub(super) fn values(&self) -> [Vec<f64>; 2] {
         let points: Vec<Point> = match self {

@@ -10,7 +10,7 @@ use rayon::ThreadPool;
 use run::Input;
 use serde::Serialize;
 use sweep::{
-    Answer, Expected, Folder, Question, RatedDesign, ReportOptions, Scripts, Search, Shard, SlurmArray,
+    Answer, ExpectedRuns, Folder, Question, RatedDesign, ReportOptions, Scripts, Search, Shard, SlurmArray,
     SlurmJob, Status, SweepPlan, SweepReport, Work, merge, submit,
 };
 
@@ -65,7 +65,7 @@ impl Opened {
     }
 
     /// Expected time of all points that are not finished, by running two of them.
-    fn probe(&self, shard: Shard, retry: bool) -> Result<Expected, Failure> {
+    fn probe(&self, shard: Shard, retry: bool) -> Result<ExpectedRuns, Failure> {
         let work = Work::new(&self.plan, &self.folder, shard, retry)?;
         self.progress.note(&format!(
             "{} planned; running two for the expected time",
@@ -250,7 +250,7 @@ fn merged(args: &MergeArgs, terminal: &Terminal) -> Result<(), Failure> {
     }
 }
 
-fn print_expected(args: &FileArgs, expected: &Expected) -> Result<(), Failure> {
+fn print_expected(args: &FileArgs, expected: &ExpectedRuns) -> Result<(), Failure> {
     match args.json {
         true => print_json(&Printed { out: args.out.display().to_string(), done: expected }, true),
         false => print(&expected.line()),

@@ -28,7 +28,7 @@ pub struct PerfettoTimeline<'a> {
     /// Name of the process, for example `quintile default on hd7970`.
     pub process: &'a str,
     /// Frames in order.
-    pub frames: Vec<FrameSpan>,
+    pub frames: Vec<FrameSlice>,
     /// Units in the order of display.
     pub units: Vec<UnitTrack<'a>>,
     /// Counters in the order of display.
@@ -37,7 +37,7 @@ pub struct PerfettoTimeline<'a> {
 
 /// A frame from its start to the start of the next.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct FrameSpan {
+pub struct FrameSlice {
     /// The number of the frame.
     pub frame: u64,
     /// Start.
@@ -202,7 +202,7 @@ impl Trace<'_> {
         self.packet(Message::new().uint(13, INCREMENTAL_STATE_CLEARED).message(60, &descriptor))
     }
 
-    fn frames(&mut self, frames: &[FrameSpan]) -> io::Result<()> {
+    fn frames(&mut self, frames: &[FrameSlice]) -> io::Result<()> {
         self.track(&child_track(FRAMES_UUID, "frames", 0))?;
         for frame in frames {
             self.begin(FRAMES_UUID, &format!("frame {}", frame.frame), frame.start_ns, &frame.numbers)?;

@@ -100,7 +100,7 @@ impl Volume for Blurred {
 
 /// Samples of the rasterizer that were found inside.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Covered {
+pub struct CoveredSamples {
     /// Samples inside the volume.
     pub points: Vec<Point>,
     /// Number of samples that a triangle covers.
@@ -163,9 +163,9 @@ pub fn fill(
     side: u32,
     samples: &dyn SampleSource,
     gpu: &mut Gpu<'_>,
-) -> Result<Covered, PassError> {
+) -> Result<CoveredSamples, PassError> {
     let (Some(camera), Some(viewport)) = (camera(domain.lens()), Viewport::new(side, side)) else {
-        return Ok(Covered::default());
+        return Ok(CoveredSamples::default());
     };
     let (spec, background) = (gpu.spec(), Vec3::ZERO);
     let settings = Settings { spec, viewport, samples, background };
@@ -174,10 +174,11 @@ pub fn fill(
     let pass = RasterPass::new(&camera, &draws, &settings).named("volume").with_visible().shaded_per_sample();
     let drawn = gpu.draw(&pass)?;
     let hits = gpu.counts_of_pass()[activity::Event::SamplesHit];
-    let mut found = Covered { covered: hits, samples: drawn.visible.len() as u64, ..Covered::default() };
+    let mut found =
+        CoveredSamples { covered: hits, samples: drawn.visible.len() as u64, ..CoveredSamples::default() };
     let is_hit = |number: usize| drawn.visible[number].0 != u32::MAX;
     each_sample(side, samples, |number, point| found.points.extend(is_hit(number).then_some(point)));
-    Ok(Covered { image: drawn.into_image(), ..found })
+    Ok(CoveredSamples { image: drawn.into_image(), ..found })
 }
 
 /// The same on a GPU of its own, and its work.
@@ -189,7 +190,7 @@ pub fn standard_mode(
     side: u32,
     samples: &dyn SampleSource,
     spec: &PipelineSpec,
-) -> Result<(Covered, FrameReport), PassError> {
+) -> Result<(CoveredSamples, FrameReport), PassError> {
     let mut gpu = Gpu::without_packets(spec)?;
     let found = fill(domain, side, samples, &mut gpu)?;
     Ok((found, gpu.finish()))

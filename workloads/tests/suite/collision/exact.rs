@@ -4,7 +4,7 @@
 
 use pipeline::random::SplitMix;
 use rayon::prelude::*;
-use workloads::collision::{Method, Object, Search};
+use workloads::collision::{CollisionMethod, Object, Search};
 
 use super::{mix, objects_may_collide};
 
@@ -196,8 +196,13 @@ fn scaled([first, second]: &[Vec<Triangle>; 2], units: [f64; 3], aside: i64) -> 
 fn search(rng: &mut Rng, triangles: usize) -> Search {
     let zoom = rng.one_in(6);
     let finest = if triangles > 60 && !zoom { 8 } else { 64 };
-    let method =
-        [Method::FragmentBox, Method::FragmentBox, Method::BoxBox, Method::BoxBox, Method::DepthOnly];
+    let method = [
+        CollisionMethod::FragmentBox,
+        CollisionMethod::FragmentBox,
+        CollisionMethod::BoxBox,
+        CollisionMethod::BoxBox,
+        CollisionMethod::DepthOnly,
+    ];
     let resolution = 1 + rng.below(finest) as u32;
     Search { resolution, bins: 1 + rng.below(16) as u32, method: method[rng.below(5) as usize], zoom }
 }

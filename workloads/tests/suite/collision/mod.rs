@@ -8,19 +8,19 @@ mod reference_rates;
 mod refinement;
 
 use pipeline::random::{mix, unit};
-use workloads::collision::{Method, Object, Search, detect};
+use workloads::collision::{CollisionMethod, Object, Search, detect};
 
 type Ends = [[[f64; 3]; 3]; 2];
 
 /// Searches from the coarsest to the finest; none may miss a collision.
 const SEARCHES: [Search; 7] = [
-    Search { resolution: 1, bins: 1, method: Method::FragmentBox, zoom: false },
-    Search { resolution: 8, bins: 1, method: Method::BoxBox, zoom: false },
-    Search { resolution: 8, bins: 4, method: Method::FragmentBox, zoom: false },
-    Search { resolution: 32, bins: 16, method: Method::BoxBox, zoom: false },
-    Search { resolution: 16, bins: 1, method: Method::DepthOnly, zoom: false },
-    Search { resolution: 32, bins: 8, method: Method::BoxBox, zoom: true },
-    Search { resolution: 64, bins: 16, method: Method::FragmentBox, zoom: true },
+    Search { resolution: 1, bins: 1, method: CollisionMethod::FragmentBox, zoom: false },
+    Search { resolution: 8, bins: 1, method: CollisionMethod::BoxBox, zoom: false },
+    Search { resolution: 8, bins: 4, method: CollisionMethod::FragmentBox, zoom: false },
+    Search { resolution: 32, bins: 16, method: CollisionMethod::BoxBox, zoom: false },
+    Search { resolution: 16, bins: 1, method: CollisionMethod::DepthOnly, zoom: false },
+    Search { resolution: 32, bins: 8, method: CollisionMethod::BoxBox, zoom: true },
+    Search { resolution: 64, bins: 16, method: CollisionMethod::FragmentBox, zoom: true },
 ];
 
 fn may_collide(a: Ends, b: Ends, search: &Search) -> bool {

@@ -1,7 +1,7 @@
 //! Pairs that are separated or kept, and an oracle of many instants.
 
 use proptest::prelude::*;
-use workloads::collision::{Method, Search};
+use workloads::collision::{CollisionMethod, Search};
 
 use super::{Ends, SEARCHES, may_collide, random};
 
@@ -11,9 +11,9 @@ fn paths_that_cross_at_different_times_are_separated_by_time_alone() {
     let square = |x: f64, y: f64| [[x, y, 0.0], [x + 0.2, y, 0.1], [x, y + 0.2, 0.2]];
     let a = [square(-2.0, 0.0), square(2.0, 0.0)];
     let b = [square(0.0, -1.0), square(0.0, 3.0)];
-    let plain = Search { resolution: 128, bins: 1, method: Method::FragmentBox, zoom: false };
+    let plain = Search { resolution: 128, bins: 1, method: CollisionMethod::FragmentBox, zoom: false };
     assert!(!may_collide(a, b, &plain));
-    assert!(may_collide(a, b, &Search { method: Method::DepthOnly, ..plain }));
+    assert!(may_collide(a, b, &Search { method: CollisionMethod::DepthOnly, ..plain }));
 }
 
 /// A tip that approaches a face, stops at a gap and turns aside.

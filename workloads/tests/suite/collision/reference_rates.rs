@@ -2,10 +2,10 @@
 
 use rayon::prelude::*;
 use workloads::collision::families::{Case, reference_cases, triangles_boxes_touch};
-use workloads::collision::{Method, Object, Search, candidates, detect};
+use workloads::collision::{CollisionMethod, Object, Search, candidates, detect};
 
 /// A single search with 128 tiles.
-const ONCE: Search = Search { resolution: 128, bins: 1, method: Method::FragmentBox, zoom: false };
+const ONCE: Search = Search { resolution: 128, bins: 1, method: CollisionMethod::FragmentBox, zoom: false };
 
 /// Cases of each kind of two objects.
 const PAIRS: usize = 30;
@@ -44,7 +44,7 @@ fn below_limits(many: bool, limits: [(u32, f64); 3]) {
     let triangles = near.iter().filter(|[a, b]| triangles_boxes_touch(a, b)).count();
     println!("{count} do not collide");
     println!("boxes of objects {:.4}, of triangles {:.4}", share(near.len()), share(triangles));
-    let depth_only = Search { method: Method::DepthOnly, ..ONCE };
+    let depth_only = Search { method: CollisionMethod::DepthOnly, ..ONCE };
     println!("depth only {:.4}", share(kept(&near, &depth_only)));
     let closer = share(kept(&near, &Search::default()));
     println!("looking closer {closer:.4}");

@@ -4,7 +4,7 @@
 mod measure;
 
 use output::OutputError;
-use output::plot::{AxisSpec, ChartPanel, Mark, Paint, Scale, Series};
+use output::plot::{AxisSpec, ChartPanel, Paint, PlotMark, Scale, Series};
 use output::terminal::Progress;
 use rayon::prelude::*;
 use run::RunError;
@@ -204,7 +204,7 @@ impl ComputeChart {
     ) -> ChartPanel {
         let curve = |(number, (method, rows)): (usize, (&'static str, Vec<&ComputeRow>))| {
             let points = rows.iter().map(|row| (row.value, row.cycles)).collect();
-            Series::new(method, Mark::Curve(points)).painted(Paint::Like(number))
+            Series::new(method, PlotMark::Curve(points)).painted(Paint::Like(number))
         };
         let axes = [
             AxisSpec { name: across.to_owned(), scale, ..AxisSpec::default() },
@@ -218,7 +218,7 @@ impl ComputeChart {
         let curve = |(number, (method, rows)): (usize, (&'static str, Vec<&ComputeRow>))| {
             let point = |row: &&ComputeRow| Some((row.cycles, row.error_percent?, format!("{}", row.value)));
             let points = rows.iter().filter_map(point).collect();
-            Series::new(method, Mark::Dots(points)).painted(Paint::Like(number))
+            Series::new(method, PlotMark::Dots(points)).painted(Paint::Like(number))
         };
         let axes = [
             AxisSpec { name: "cycles".to_owned(), ..AxisSpec::default() },

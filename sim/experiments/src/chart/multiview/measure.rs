@@ -67,7 +67,7 @@ pub struct Cached {
 
 /// Pixel shader lanes of views.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Lanes {
+pub struct ViewLanes {
     /// Of all views in one pass.
     pub all: u64,
     /// Of one view alone.
@@ -121,7 +121,7 @@ pub struct RegionTests {
 const EXPONENT: i32 = 64;
 
 /// A scene and hardware to draw it with.
-pub struct Bench {
+pub struct MultiviewBench {
     scene: Scene,
     frame: Frame,
     gpu: GpuSpec,
@@ -129,7 +129,7 @@ pub struct Bench {
     focus: f32,
 }
 
-impl Bench {
+impl MultiviewBench {
     /// Frame of a built-in scene, for views of a size.
     ///
     /// # Errors
@@ -244,7 +244,12 @@ impl Bench {
     ///
     /// # Errors
     /// When the cache cannot be built.
-    pub fn lanes(&self, layout: Layout, shading_cache: CacheSpec, samples: u32) -> Result<Lanes, StudyError> {
+    pub fn lanes(
+        &self,
+        layout: Layout,
+        shading_cache: CacheSpec,
+        samples: u32,
+    ) -> Result<ViewLanes, StudyError> {
         let spec = PipelineSpec { shading_cache, ..self.gpu.pipeline };
         let (rig, to) = (self.rig(&layout, samples)?, self.target(&spec));
         let draws = self.frame.draws(&self.scene)?;
@@ -253,7 +258,7 @@ impl Bench {
         let mut ran = Ran::of(&gpu.finish());
         let (one, of_one) = self.one_view(&rig, &layout, &draws, &to)?;
         ran += of_one;
-        Ok(Lanes { all: counts[Event::PixelInvocations], one, ran })
+        Ok(ViewLanes { all: counts[Event::PixelInvocations], one, ran })
     }
 
     /// Views of a kind on a camera line of a length, with and without separate tests of the regions of the lens.

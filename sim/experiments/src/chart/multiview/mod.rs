@@ -16,7 +16,7 @@ use output::OutputError;
 use output::plot::{ChartPanel, Scale, Series};
 use output::terminal::{Bar, Progress};
 
-pub use measure::{Angle, Bench, Cached, Lanes, RegionTests, Run, TileTests, ViewsRow};
+pub use measure::{Angle, Cached, MultiviewBench, RegionTests, Run, TileTests, ViewLanes, ViewsRow};
 
 /// Effort of the measurement.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -67,7 +67,7 @@ pub struct MultiviewChart {
     /// By number of views.
     pub rows: Vec<ViewsRow>,
     /// Views near to each other and far apart, by policy and entries of the cache.
-    pub caches: Vec<Case>,
+    pub caches: Vec<CacheCase>,
     /// Error of shading for the middle of the line, by its length.
     pub angles: Vec<Angle>,
     /// Separate tests of the regions of the lens, by views and length of the camera line.
@@ -80,7 +80,7 @@ const KINDS: [&str; 3] = ["two eyes", "seven lenses", "seven overlapping views"]
 
 /// Views for which caches are tried.
 #[derive(Clone, Debug, Serialize)]
-pub struct Case {
+pub struct CacheCase {
     /// Name of the views.
     pub name: &'static str,
     /// By policy and entries of the cache.
@@ -126,7 +126,7 @@ impl Study for MultiviewChart {
         let steps =
             effort.views.len() + 3 * POLICIES.len() * effort.entries.len() + (1 + KINDS.len()) * lengths;
         let bar = progress.bar("multiview", steps as u64);
-        let bench = Bench::new(effort.scene, effort.size)?;
+        let bench = MultiviewBench::new(effort.scene, effort.size)?;
         let rows = effort.views.iter().map(|&views| ticked(bench.row(views), &bar));
         let rows = rows.collect::<Result<_, _>>()?;
         let mut caches = Vec::new();
@@ -135,7 +135,7 @@ impl Study for MultiviewChart {
                 .into_iter()
                 .flat_map(|policy| effort.entries.iter().map(move |&entries| (policy, entries)));
             let rows = each.map(|(policy, entries)| ticked(bench.cached(layout, policy, entries), &bar));
-            caches.push(Case { name, rows: rows.collect::<Result<_, _>>()? });
+            caches.push(CacheCase { name, rows: rows.collect::<Result<_, _>>()? });
         }
         let angles = effort.baselines.iter().map(|&baseline| ticked(bench.angle(baseline), &bar));
         let angles = angles.collect::<Result<_, _>>()?;
@@ -154,7 +154,7 @@ impl Study for MultiviewChart {
         let marked = format!(
             "{subject}. Marked: a cache smaller than what is in use at a time, where a run warns (shading-cache-small)"
         );
-        let caches = self.caches.iter().map(Case::panel).collect();
+        let caches = self.caches.iter().map(CacheCase::panel).collect();
         to.chart("multiview_cache", [title, &marked], caches)?;
         let title = "Where one pass fails: shading that depends on who looks";
         to.chart("multiview_failures", [title, &subject], vec![self.failures()])?;
@@ -294,7 +294,7 @@ impl MultiviewChart {
     }
 }
 
-impl Case {
+impl CacheCase {
     /// Caches in which what is in use at a time has no room are marked.
     fn panel(&self) -> ChartPanel {
         let curve = |(policy, _): &(&'static str, _)| {

@@ -12,7 +12,9 @@ use workloads::points::poisson::{Domain, PoissonError, PoissonSpec, Spacing, bal
 use workloads::points::quality::{
     Spectrum, chi_square, closer_than, free_share, largest_hole, least_distance,
 };
-use workloads::points::white::{Density, Named, Numbers, WhiteError, WhiteSpec, counts, shares, white_noise};
+use workloads::points::white::{
+    Density, NamedDensity, Numbers, WhiteError, WhiteSpec, counts, shares, white_noise,
+};
 use workloads::points::{bridson, plain_darts};
 
 use crate::study::table::{Sheet, Table, count, fixed, plain};
@@ -47,7 +49,7 @@ pub struct PointsChart {
     /// Dimension by dimension, method by method.
     pub rows: Vec<PointsRow>,
     /// Uncovered regions thinner than an ulp.
-    pub coarse: Vec<Coarse>,
+    pub coarse: Vec<CoarsePoints>,
     /// Candidates for a point that follows a density.
     pub columns: Vec<Columns>,
     /// Rasterization beside the CPU sampler.
@@ -251,10 +253,10 @@ impl PointsChart {
 
     /// Numbers too coarse for the disks, and columns too few for the density.
     fn failures(&self) -> Vec<ChartPanel> {
-        let coarse = |title: &str, up: &str, of: fn(&Coarse) -> f64| {
+        let coarse = |title: &str, up: &str, of: fn(&CoarsePoints) -> f64| {
             let curve =
                 Series::curve("uncovered regions, 2D", self.coarse.iter().map(|c| (c.radius_ulp, of(c))));
-            let warned = |c: &&Coarse| c.thin_regions as f64 > MAX_THIN_PER_POINT * c.points as f64;
+            let warned = |c: &&CoarsePoints| c.thin_regions as f64 > MAX_THIN_PER_POINT * c.points as f64;
             let last = self.coarse.iter().rfind(warned);
             ChartPanel::new(title, ["r in spacings of numbers", up], vec![curve])
                 .on(Scale::Doublings, Scale::Decades)
@@ -405,7 +407,7 @@ fn judged<const D: usize>(
 
 /// Poisson-disk points of the plane on coarse numbers.
 #[derive(Clone, Debug, Serialize)]
-pub struct Coarse {
+pub struct CoarsePoints {
     /// Coordinates are multiples of 2 to the power of minus this.
     pub bits: u32,
     /// The least distance in spacings of numbers.
@@ -424,13 +426,13 @@ const COARSE_RADIUS: f64 = 1.0 / 64.0;
 const COARSEST_BITS: u32 = 12;
 
 /// Finer and finer numbers, from disks on that are as few numbers wide as may be.
-fn coarse(effort: &PointsEffort) -> Result<Vec<Coarse>, PoissonError> {
+fn coarse(effort: &PointsEffort) -> Result<Vec<CoarsePoints>, PoissonError> {
     let each = (COARSEST_BITS..=effort.finest_bits).step_by(2).map(|bits| {
         let spacing = Spacing::Bits(bits);
         let spec = PoissonSpec { radius: COARSE_RADIUS, domain: Domain::Torus, seed: 1, spacing };
         let found = poisson_disk::<2>(&spec)?;
         let hole = largest_hole(&found.points, Domain::Torus);
-        Ok(Coarse {
+        Ok(CoarsePoints {
             bits,
             radius_ulp: COARSE_RADIUS * spacing.per_unit(),
             points: found.points.len(),
@@ -466,7 +468,7 @@ fn columns(effort: &PointsEffort) -> Result<Vec<Columns>, WhiteError> {
 }
 
 fn of<const D: usize>(effort: &PointsEffort, across: &[u32], cells: u64) -> Result<Vec<Columns>, WhiteError> {
-    let bell: &dyn Density<D> = &Named::Gauss;
+    let bell: &dyn Density<D> = &NamedDensity::Gauss;
     let expected = shares(bell, cells, 8);
     let measure = |&across: &u32| {
         let spec = WhiteSpec { count: effort.white, seed: 1, across, numbers: Numbers::Independent };

@@ -74,7 +74,7 @@ impl Accuracy {
 
 /// Runs at a level, with or without a warning. Errors are factors less one.
 #[derive(Clone, Debug, Serialize)]
-pub struct Group {
+pub struct ErrorGroup {
     /// The level.
     pub level: Level,
     /// Whether it warns.
@@ -129,14 +129,14 @@ fn held_out(rows: &[&ErrorRow], log: Log) -> Option<f64> {
 }
 
 /// All groups.
-pub(super) fn groups(rows: &[ErrorRow]) -> Vec<Group> {
+pub(super) fn groups(rows: &[ErrorRow]) -> Vec<ErrorGroup> {
     let of = |(level, warns): (Level, bool)| {
         let rows: Vec<&ErrorRow> =
             rows.iter().filter(|row| (row.level, row.is_warned()) == (level, warns)).collect();
         let sizes = |log: Log| rows.iter().map(move |row| size(log(row)));
         let (cycles, energy): (Log, Log) = (|row| row.cycles_log, |row| row.energy_log);
         let stated = StatedError::at(level, warns);
-        Group {
+        ErrorGroup {
             level,
             warns,
             runs: rows.len(),

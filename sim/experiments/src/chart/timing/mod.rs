@@ -29,7 +29,7 @@ const GPUS: [&str; 5] = ["mobile", "reference", "hd_4000", "iris_pro", "discrete
 
 /// A level in a few numbers. Errors are against `stepped`, in percent, over all rows.
 #[derive(Clone, Debug, Default, Serialize)]
-pub struct Figures {
+pub struct LevelFigures {
     /// Of the cycles of a frame: median, 95th percentile and worst.
     pub cycle_error_median_percent: f64,
     /// See above.
@@ -77,7 +77,7 @@ pub struct TimingChart {
     /// Whether it is the short one.
     pub quick: bool,
     /// The levels by name.
-    pub levels: BTreeMap<&'static str, Figures>,
+    pub levels: BTreeMap<&'static str, LevelFigures>,
     /// Speed of the reference.
     pub reference: Reference,
     /// Animations at every level, drawn and timed, on every GPU.
@@ -159,7 +159,7 @@ impl Study for TimingChart {
     }
 
     fn tradeoff(&self) -> Vec<TradeoffPoint> {
-        let both = |(level, f): (&&'static str, &Figures)| {
+        let both = |(level, f): (&&'static str, &LevelFigures)| {
             let cost = Metric::new(HOST_TIME, "", 1.0 / f.speedup_over_stepped);
             let errors = [
                 Metric::new("median error of cycles", "%", f.cycle_error_median_percent),
@@ -216,16 +216,20 @@ fn animated(
     Ok(rows)
 }
 
-fn figures(level: Level, rows: &[TimingRow], added: &[AddedRow]) -> Figures {
+fn figures(level: Level, rows: &[TimingRow], added: &[AddedRow]) -> LevelFigures {
     if level == Level::Stepped {
-        return Figures { speedup_over_stepped: 1.0, speedup_over_stepped_least: 1.0, ..Figures::default() };
+        return LevelFigures {
+            speedup_over_stepped: 1.0,
+            speedup_over_stepped_least: 1.0,
+            ..LevelFigures::default()
+        };
     }
     let of = |pick: fn(&TimingRow) -> f64| quantiles(rows.iter().filter(|row| row.level == level).map(pick));
     let added = quantiles(added.iter().filter(|row| row.level == level).map(|row| row.added_percent));
     let (cycles, energy) =
         (of(|row| row.cycle_error_percent.abs()), of(|row| row.energy_error_percent.abs()));
     let (busy, speedup) = (of(|row| row.busy_error_percent), of(|row| row.speedup_over_stepped));
-    Figures {
+    LevelFigures {
         cycle_error_median_percent: cycles(0.5),
         cycle_error_p95_percent: cycles(0.95),
         cycle_error_worst_percent: cycles(1.0),
@@ -259,7 +263,7 @@ impl TimingChart {
             self.reference.unit_cycles_per_s / 1e6,
             self.reference.cycles_per_s / 1e6
         );
-        let added = |(name, f): &(&&'static str, &Figures)| match **name == Level::Stepped.name() {
+        let added = |(name, f): &(&&'static str, &LevelFigures)| match **name == Level::Stepped.name() {
             true => "-".to_owned(),
             false => format!("{:.0} %", f.added_percent),
         };

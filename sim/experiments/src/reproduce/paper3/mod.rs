@@ -13,16 +13,16 @@ use traces::frames::FinderMethod;
 use super::report::{POWER, TIME, dots, line};
 use super::row::{Row, Verdict, With, numbers};
 use super::settings::{
-    About, Form, Origin, Setting, load, paper_settings, reduced, row_settings, settings_group,
+    About, Form, Setting, SettingsOrigin, load, paper_settings, reduced, row_settings, settings_group,
 };
 use super::stage::{Frames, MARKED, Stage, TracedRun, looped};
-use super::{Done, Figure, Options, Paper};
+use super::{Done, Figure, Paper, ReproduceOptions};
 
 /// Both machines, with their simulated frames.
 struct Bench<'a> {
     settings: Settings,
     form: Form,
-    origin: Origin,
+    origin: SettingsOrigin,
     pc: Stage,
     pc_frames: Vec<FramePower>,
     phone: Stage,
@@ -113,7 +113,10 @@ pub(super) fn ids() -> Vec<&'static str> {
     ROWS.iter().map(|(id, _)| *id).collect()
 }
 
-pub(super) fn rows(options: &Options, progress: &Progress) -> Result<(Origin, Vec<Done>), RunError> {
+pub(super) fn rows(
+    options: &ReproduceOptions,
+    progress: &Progress,
+) -> Result<(SettingsOrigin, Vec<Done>), RunError> {
     let (settings, origin) = load::<Settings>(options.settings.as_deref())?;
     let form = options.form();
     let (pc, phone) = (Stage::pc()?, Stage::phone()?);

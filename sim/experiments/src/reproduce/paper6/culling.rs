@@ -16,15 +16,15 @@ use workloads::visibility::Unshaded;
 
 use super::settings::{Bound, Hardware, QueriedObjects};
 use super::{Task, catalogue};
-use crate::chart::occlusion::{Drawn, Kind, QueryAnswers};
+use crate::chart::occlusion::{Drawn, OcclusionBlur, QueryAnswers};
 use crate::reproduce::Done;
 use crate::reproduce::report::{Figure, over_doublings};
-use crate::reproduce::row::{Cases, Number, Row, Verdict, numbers, one_at_a_time, ran, short};
+use crate::reproduce::row::{Cases, Row, RowNumber, Verdict, numbers, one_at_a_time, ran, short};
 use crate::study::Ran;
 
 /// Draws the scenes of a kind, with `queries` queried boxes in each.
 fn drawn(
-    kind: Kind,
+    kind: OcclusionBlur,
     scenes: u64,
     change: impl Fn(WallSceneSpec) -> WallSceneSpec,
     size: (u32, u32),
@@ -82,8 +82,14 @@ pub(super) fn rate(task: &Task<'_>) -> Result<Done, RunError> {
     let mut total = Share::default();
     let mut measure = |motion: f32, tile_px: u32| -> Result<Vec<(f64, f64)>, RunError> {
         let change = |spec| WallSceneSpec { motion, ..spec };
-        let scenes =
-            drawn(Kind::Motion, *row.yards.get(form), change, size, *row.samples.get(form), queries)?;
+        let scenes = drawn(
+            OcclusionBlur::Motion,
+            *row.yards.get(form),
+            change,
+            size,
+            *row.samples.get(form),
+            queries,
+        )?;
         total.ran += scenes.iter().map(|scene| scene.ran).sum();
         let at = |&boxes: &u32| {
             let share = Share::of(&scenes, [1, 1, boxes], tile_px)?;
@@ -130,7 +136,7 @@ pub(super) fn rate(task: &Task<'_>) -> Result<Done, RunError> {
 }
 
 /// The result in words and in numbers, with tiles of `tile_px`.
-fn rates_found(curves: &[Rates], tile_px: u32, wrong: u64) -> (String, Vec<Number>) {
+fn rates_found(curves: &[Rates], tile_px: u32, wrong: u64) -> (String, Vec<RowNumber>) {
     let base = curves.iter().find(|rates| rates.tile_px == tile_px).map(|rates| &rates.found);
     let listed: Vec<String> =
         base.into_iter().flatten().map(|(boxes, rate)| format!("{boxes}: {rate:.3}")).collect();
@@ -220,7 +226,7 @@ pub(super) fn cost(task: &Task<'_>) -> Result<Done, RunError> {
     let (row, form) = (with.settings, with.form);
     let (size, queries, tile_px) = (*row.size_px.get(form), *row.asked.get(form), *row.tile_px.get(form));
     let mut queried = Vec::new();
-    for kind in Kind::ALL {
+    for kind in OcclusionBlur::ALL {
         for &samples in row.samples.get(form) {
             let scenes = drawn(kind, *row.yards.get(form), |spec| spec, size, samples, queries)?;
             let answered = |scene: Drawn| {

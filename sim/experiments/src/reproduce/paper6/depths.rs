@@ -22,7 +22,7 @@ use crate::reproduce::report::line;
 use crate::reproduce::row::{Band, Cases, Row, numbers, ran};
 use crate::reproduce::settings::Form;
 use crate::reproduce::{Done, Figure};
-use crate::stress::measure::Place;
+use crate::stress::measure::TilePlace;
 use crate::study::Ran;
 
 /// Widths of depth intervals in tiles, over those of the vertices.
@@ -404,8 +404,13 @@ impl<'a> Alone<'a> {
             if count == 0 {
                 continue;
             }
-            let place =
-                Place::new(self.scene.viewport, self.projection.shear, self.projection.near, [x, y], side_px);
+            let place = TilePlace::new(
+                self.scene.viewport,
+                self.projection.shear,
+                self.projection.near,
+                [x, y],
+                side_px,
+            );
             let Some(within) = place.bound(&Features::ALL, &self.triangle) else {
                 widths.violations += 1;
                 continue;

@@ -8,8 +8,10 @@ use pipeline::{FrameReport, Gpu};
 use run::{GpuSpec, RunError};
 use workloads::Overrides;
 use workloads::caustics::generator::{Ocean, turned_beams};
-use workloads::caustics::{Beam, Coverage, Eye, Floor, Light, Method, Picture, draw_on, receivers};
-use workloads::glossy::Effect;
+use workloads::caustics::{
+    Beam, BeamMethod, Coverage, DrawnLight, Eye, Floor, LightPicture, draw_on, receivers,
+};
+use workloads::glossy::GlossyEffect;
 use workloads::job::{Drawn, Job};
 use workloads::soft_shadows::{SoftShadowOptions, SoftShadows};
 
@@ -18,9 +20,9 @@ use super::figures::{self, light, warped};
 use super::settings::{Executions, Glossy, Lost, Size};
 use crate::chart::caustics::measure::{DEPTH_M, SIDE_M, WAVE_M, aside_of, water};
 use crate::chart::caustics::{OceanCounts, ocean};
-use crate::chart::glossy::{Bench, Blur, GlossyEffort, GlossyRow as Measured};
+use crate::chart::glossy::{Blur, GlossyBench, GlossyEffort, GlossyRow as Measured};
 use crate::reproduce::report::line;
-use crate::reproduce::row::{Band, Cases, Number, Row, Verdict, numbers, one_at_a_time, ran};
+use crate::reproduce::row::{Band, Cases, Row, RowNumber, Verdict, numbers, one_at_a_time, ran};
 use crate::reproduce::settings::Form;
 use crate::reproduce::{Done, Figure};
 use crate::study::{Ran, StudyError};
@@ -69,7 +71,7 @@ impl Oceans {
     }
 
     /// Work on the host. The ocean of the values given is in both sweeps and was drawn once.
-    fn ran(&self, depth_m: f64) -> Vec<Number> {
+    fn ran(&self, depth_m: f64) -> Vec<RowNumber> {
         let others = self.depths.iter().filter(|(at, _)| *at != depth_m).chain(&self.slopes);
         let drawn: Vec<&OceanCounts> = others.map(|(_, counted)| counted).collect();
         let draws: u64 = drawn.iter().map(|counted| counted.draws).sum();
@@ -120,7 +122,7 @@ pub(super) fn executions(task: &Task<'_>) -> Result<Done, RunError> {
     Ok(Done { row, figures: figures(base, &oceans.slopes, form)? })
 }
 
-/// Work and executions of the modelled hardware on the ocean of the values given, by method as in [`Method::ALL`].
+/// Work and executions of the modelled hardware on the ocean of the values given, by method as in [`BeamMethod::ALL`].
 fn base_on_hardware(
     cells: u32,
     [slope, depth_m]: [f64; 2],
@@ -130,8 +132,8 @@ fn base_on_hardware(
     let eye = aside_of(depth_m, size)?;
     let (beams, mut work) = (water.beams(0.0), Ran::default());
     let mut executions = [0; 4];
-    for (method, executions) in Method::ALL.into_iter().zip(&mut executions) {
-        let (picture, of_method) = on_hardware(&beams, &eye, method, Light::Volume)?;
+    for (method, executions) in BeamMethod::ALL.into_iter().zip(&mut executions) {
+        let (picture, of_method) = on_hardware(&beams, &eye, method, DrawnLight::Volume)?;
         work += of_method;
         *executions = picture.total_runs();
     }
@@ -139,7 +141,12 @@ fn base_on_hardware(
 }
 
 /// What the modelled hardware draws of beams.
-fn on_hardware(beams: &[Beam], eye: &Eye, method: Method, light: Light) -> Result<(Picture, Ran), RunError> {
+fn on_hardware(
+    beams: &[Beam],
+    eye: &Eye,
+    method: BeamMethod,
+    light: DrawnLight,
+) -> Result<(LightPicture, Ran), RunError> {
     let spec = GpuSpec::load("reference")?.pipeline;
     let mut gpu = Gpu::without_packets(&spec)?;
     let (picture, _) = draw_on(&mut gpu, beams, eye, method, light)?;
@@ -148,9 +155,9 @@ fn on_hardware(beams: &[Beam], eye: &Eye, method: Method, light: Light) -> Resul
 
 fn figures(base: &OceanCounts, slopes: &[(f64, OceanCounts)], form: Form) -> Result<Vec<Figure>, RunError> {
     let maps = [
-        ("VI_fig8_moving", Method::Moving),
-        ("VI_fig8_refined", Method::Refined),
-        ("VI_fig8_prism", Method::Prism),
+        ("VI_fig8_moving", BeamMethod::Moving),
+        ("VI_fig8_refined", BeamMethod::Refined),
+        ("VI_fig8_prism", BeamMethod::Prism),
     ];
     let mut figures = vec![warped()?, over_slopes(slopes)];
     figures
@@ -161,7 +168,7 @@ fn figures(base: &OceanCounts, slopes: &[(f64, OceanCounts)], form: Form) -> Res
 
 /// The sweep of slopes: executions over those of the prism.
 fn over_slopes(slopes: &[(f64, OceanCounts)]) -> Figure {
-    let of = |(place, method): (usize, Method)| -> Series {
+    let of = |(place, method): (usize, BeamMethod)| -> Series {
         let part = |counted: &OceanCounts| counted.executions[place] as f64 / counted.executions[3] as f64;
         line(method.name(), slopes.iter().map(|(slope, counted)| (*slope, part(counted))).collect())
     };
@@ -170,7 +177,7 @@ fn over_slopes(slopes: &[(f64, OceanCounts)]) -> Figure {
         "Shader executions over the slope of the waves (Paper VI, section 4)",
         "over those of the prism; the paper does not give the slope of its ocean",
         [("root mean square slope", ""), ("executions over the prism's", "")],
-        Method::ALL.into_iter().enumerate().map(of).collect(),
+        BeamMethod::ALL.into_iter().enumerate().map(of).collect(),
     )
 }
 
@@ -257,8 +264,8 @@ fn turned(row: &Lost, form: Form, height_m: f64) -> Result<(Coverage, Ran), RunE
 /// Which receivers on a floor are covered, which the host finds, and what the modelled hardware draws of the
 /// same beams.
 fn covered(beams: &[Beam], eye: &Eye, floor: Floor) -> Result<(Coverage, Ran), RunError> {
-    let (_, drawn) = on_hardware(beams, eye, Method::Moving, Light::Floor(floor))?;
-    Ok((receivers(beams, eye, Method::Moving, &floor), drawn))
+    let (_, drawn) = on_hardware(beams, eye, BeamMethod::Moving, DrawnLight::Floor(floor))?;
+    Ok((receivers(beams, eye, BeamMethod::Moving, &floor), drawn))
 }
 
 /// Errors of the map by few and by many samples, of reflection and of refraction, and blurs by height.
@@ -275,14 +282,14 @@ impl Found {
             most_samples: many,
             reference_tables: *row.reference_tables.get(form),
         };
-        let bench = |effect| Bench::new(effect, size).map(|bench| bench.with_radius(radius));
+        let bench = |effect| GlossyBench::new(effect, size).map(|bench| bench.with_radius(radius));
         let errors = |effect| -> Result<[Measured; 2], StudyError> {
             let bench = bench(effect)?;
             let reference = bench.reference(radius)?;
             Ok([bench.row(few, &reference)?, bench.row(many, &reference)?])
         };
-        let reflection = ("reflection", Effect::Reflection);
-        let errors = [errors(reflection)?, errors(("refraction", Effect::Refraction(index)))?];
+        let reflection = ("reflection", GlossyEffect::Reflection);
+        let errors = [errors(reflection)?, errors(("refraction", GlossyEffect::Refraction(index)))?];
         Ok(Self { errors, blurs: bench(reflection)?.blurs()? })
     }
 

@@ -20,20 +20,20 @@ use flate2::read::GzDecoder;
 use output::terminal::Progress;
 use run::RunError;
 use settings::Settings;
-use workloads::collision::{Answer, Object, Search, detect, detect_each};
+use workloads::collision::{Object, PairAnswer, Search, detect, detect_each};
 use workloads::stress::{Size, StressScene, families};
 use workloads::visibility::load_mts;
 
 use self::settings::PublicScene;
 use super::row::With;
-use super::settings::{Form, Origin, load};
-use super::{Done, Options};
+use super::settings::{Form, SettingsOrigin, load};
+use super::{Done, ReproduceOptions};
 
 /// Input of every row.
 struct Task<'a> {
     settings: Settings,
     form: Form,
-    origin: Origin,
+    origin: SettingsOrigin,
     /// Public cases of collision detection.
     collision_data: Option<&'a Path>,
     progress: &'a Progress,
@@ -80,7 +80,10 @@ pub(super) fn ids() -> Vec<&'static str> {
     ROWS.iter().map(|(id, _)| *id).collect()
 }
 
-pub(super) fn rows(options: &Options, progress: &Progress) -> Result<(Origin, Vec<Done>), RunError> {
+pub(super) fn rows(
+    options: &ReproduceOptions,
+    progress: &Progress,
+) -> Result<(SettingsOrigin, Vec<Done>), RunError> {
     let (settings, origin) = load::<Settings>(options.settings.as_deref())?;
     let task = Task {
         settings,
@@ -224,7 +227,7 @@ impl Public {
         self.known += scene.collide;
         self.seen += seen.len().min(scene.collide);
         self.missed_closer += scene.collide.saturating_sub(kept.count());
-        let pair = |answer: &&Answer| [answer.a, answer.b].map(|n| objects[n].clone());
+        let pair = |answer: &&PairAnswer| [answer.a, answer.b].map(|n| objects[n].clone());
         self.collide.extend(seen.iter().map(pair));
         Ok(())
     }
@@ -255,7 +258,7 @@ impl Public {
 }
 
 /// Whether a pair of objects may collide.
-fn any_kept(answers: &[Answer]) -> bool {
+fn any_kept(answers: &[PairAnswer]) -> bool {
     answers.iter().any(|answer| answer.verdict.may_collide())
 }
 

@@ -8,7 +8,7 @@ use workloads::multiview::Layout;
 use super::Task;
 use super::figures::{self, Line};
 use super::settings::{Policy, Size, Views};
-use crate::chart::multiview::{Bench, Lanes};
+use crate::chart::multiview::{MultiviewBench, ViewLanes};
 use crate::reproduce::report::{level, line, over_doublings};
 use crate::reproduce::row::{Cases, Row, With, numbers, one_at_a_time, ran};
 use crate::reproduce::settings::Form;
@@ -97,7 +97,7 @@ impl Point {
     }
 
     /// Lanes of all views and of one.
-    fn lanes(&self, shape: [u32; 2]) -> Result<Lanes, StudyError> {
+    fn lanes(&self, shape: [u32; 2]) -> Result<ViewLanes, StudyError> {
         let layout = self.layout(shape);
         let replacement = match self.policy {
             Policy::Lru => Replacement::Lru,
@@ -105,7 +105,8 @@ impl Point {
         };
         let cache = CacheSpec { replacement, ..CacheSpec::lru(self.quads, self.ways) };
         let size = [self.size_px.0, self.size_px.1];
-        let bench = Bench::with_shutter((self.scene.0.as_str(), self.scene.1), size, Some(self.shutter))?;
+        let bench =
+            MultiviewBench::with_shutter((self.scene.0.as_str(), self.scene.1), size, Some(self.shutter))?;
         bench.lanes(layout, cache, self.samples)
     }
 }
