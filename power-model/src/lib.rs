@@ -46,10 +46,10 @@ mod table;
 use activity::spec::SpecError;
 
 pub use model::{Energy, FramePower, PARTS, Part, PowerModel};
-pub use pacing::{PacedFrame, Pacing, Run, pace};
+pub use pacing::{PacedFrame, PacedRun, Pacing, pace};
 pub use platform::{
-    Disturbance, Finish, Launch, Leakage, Platform, Provenance, Rail, Range, Ranges, ScaledFrom, System,
-    UnitPower,
+    Disturbance, Finish, Launch, Leakage, NumberProvenance, Platform, Rail, Range, Ranges, ScaledFrom,
+    System, UnitPower,
 };
 pub use quantity::{
     Basis, Bound, Celsius, Exponent, Hertz, Interval, OutOfRange, Picojoules, Quantity, Ratio, Seconds,

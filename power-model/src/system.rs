@@ -7,7 +7,7 @@
 use traces::{Curve, CurveError, stats};
 
 use crate::PacingError;
-use crate::pacing::{PacedFrame, Run};
+use crate::pacing::{PacedFrame, PacedRun};
 use crate::platform::{Disturbance, System};
 
 /// Cause of extra power.
@@ -132,7 +132,7 @@ impl System {
     ///
     /// # Errors
     /// [`PacingError::TooDisturbed`] if there would be more than `MAX_PULSES` disturbances.
-    pub fn surround(&self, run: &Run, circumstances: &Circumstances) -> Result<Surrounded, PacingError> {
+    pub fn surround(&self, run: &PacedRun, circumstances: &Circumstances) -> Result<Surrounded, PacingError> {
         let mut pulses = self.disturbances(run.curve.start_s(), run.curve.end_s(), circumstances.seed)?;
         if let Some(launch) = self.launch.as_ref().filter(|_| circumstances.launch) {
             let (start_s, extra_w) = (run.start_s, launch.extra_w.value());

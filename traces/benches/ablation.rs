@@ -7,8 +7,8 @@
 use std::error::Error;
 use traces::Trace;
 use traces::energy::{PowerIntegral, TOLERANCE_S, score, true_frames};
-use traces::frames::{FinderOptions, Marks, Step, default_window, find_with};
-use traces::synth::{HELD_OUT_DEVICES, RecorderSpec, SCENARIOS, Scene};
+use traces::frames::{FinderOptions, FinderStep, Marks, default_window, find_with};
+use traces::synth::{HELD_OUT_DEVICES, RecorderSpec, SCENARIOS, SynthScene};
 
 const FRAMES: usize = 200;
 /// The marked frame, as a share of all, and the error of the mark, s.
@@ -32,7 +32,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let &[first, last] = arguments.as_slice() else {
         return Err("usage: ablation FIRST_SEED LAST_SEED".into());
     };
-    let steps = core::iter::once(("nothing", None)).chain(Step::ALL.map(|(name, step)| (name, Some(step))));
+    let steps =
+        core::iter::once(("nothing", None)).chain(FinderStep::ALL.map(|(name, step)| (name, Some(step))));
     let options: Vec<(&str, FinderOptions)> =
         steps.map(|(name, without)| (name, FinderOptions { without, ..FinderOptions::default() })).collect();
     println!("on: without: F1, energy error in percent, wrong frames with a flag, right frames with a flag");
@@ -55,7 +56,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-fn recorded(name: &str, seed: u64) -> Result<(Scene, Trace), Box<dyn Error>> {
+fn recorded(name: &str, seed: u64) -> Result<(SynthScene, Trace), Box<dyn Error>> {
     let kind = HELD_OUT_DEVICES.iter().find(|kind| kind.name == name);
     let scenario = SCENARIOS.iter().find(|scenario| scenario.name == name);
     let (scene, recording) = match (kind, scenario) {
@@ -70,7 +71,12 @@ fn recorded(name: &str, seed: u64) -> Result<(Scene, Trace), Box<dyn Error>> {
 }
 
 impl Sum {
-    fn add(&mut self, scene: &Scene, trace: &Trace, options: &FinderOptions) -> Result<(), Box<dyn Error>> {
+    fn add(
+        &mut self,
+        scene: &SynthScene,
+        trace: &Trace,
+        options: &FinderOptions,
+    ) -> Result<(), Box<dyn Error>> {
         let truth_s: Vec<f64> = scene.truth.iter().map(|frame| frame.start_s).collect();
         let mark_s = truth_s[(MARKED * truth_s.len() as f64) as usize] + HAND_S;
         let marks = Marks::one(mark_s, default_window(0.0, trace.rate_hz()), trace.end_s());

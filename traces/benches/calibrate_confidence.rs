@@ -9,8 +9,10 @@ use std::error::Error;
 use std::process::ExitCode;
 use traces::Trace;
 use traces::energy::{TOLERANCE_S, pairs, true_frames};
-use traces::frames::{FinderMethod, FinderOptions, Found, MarkError, Marks, Step, default_window, find_with};
-use traces::synth::{HELD_OUT_DEVICES, Scene};
+use traces::frames::{
+    FinderMethod, FinderOptions, FinderStep, Found, MarkError, Marks, default_window, find_with,
+};
+use traces::synth::{HELD_OUT_DEVICES, SynthScene};
 
 /// Frames of each device.
 const FRAMES: usize = 200;
@@ -47,7 +49,7 @@ fn run() -> Result<(), Box<dyn Error>> {
     let [first, last, which @ ..] = arguments.as_slice() else {
         return Err("usage: calibrate_confidence FIRST_SEED LAST_SEED [METHOD|STEP]".into());
     };
-    let step = |name: &str| Step::ALL.into_iter().find(|step| step.0 == name).map(|step| step.1);
+    let step = |name: &str| FinderStep::ALL.into_iter().find(|step| step.0 == name).map(|step| step.1);
     let mut options = FinderOptions::default();
     if let Some(name) = which.first() {
         options.without = step(name);
@@ -112,7 +114,7 @@ fn report(cases: &[Case]) {
 /// F1 with each mark; adds the frames found.
 fn cases_of(
     kind: &'static str,
-    scene: &Scene,
+    scene: &SynthScene,
     trace: &Trace,
     options: &FinderOptions,
     cases: &mut Vec<Case>,

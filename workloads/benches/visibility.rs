@@ -11,7 +11,7 @@ use cpu_time::ProcessTime;
 use glam::{Affine3A, Vec3};
 use pipeline::random::{GOLDEN, SplitMix};
 use pipeline::sampling::HashedSamples;
-use pipeline::visibility::{SampleLayout, Tally, Visibility, resolve};
+use pipeline::visibility::{SampleLayout, StepTally, Visibility, resolve};
 use pipeline::{Camera, Cull, Geometry, Lens, LensShape, Viewport};
 
 /// Moving triangles and their camera.
@@ -103,7 +103,7 @@ fn real_scene(path: &Path) -> Scene {
 }
 
 /// Median and best of several runs on so many threads.
-fn measure(scene: &Scene, threads: usize) -> (f64, f64, Tally) {
+fn measure(scene: &Scene, threads: usize) -> (f64, f64, StepTally) {
     const RUNS: usize = 7;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
     pool.install(|| {
@@ -114,7 +114,7 @@ fn measure(scene: &Scene, threads: usize) -> (f64, f64, Tally) {
         let close = if moving { &scene.close } else { &scene.open };
         let geometry = Geometry::new(&scene.open, close, &scene.triangles).unwrap();
         let mut visibility = Visibility::new(&layout);
-        let mut tally = Tally::default();
+        let mut tally = StepTally::default();
         let mut seconds: Vec<f64> = (0..RUNS)
             .map(|_| {
                 let start = ProcessTime::now();

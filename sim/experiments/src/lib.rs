@@ -36,7 +36,7 @@ use self::chart::sampled::SampledChart;
 use self::chart::sampling::SamplingChart;
 use self::chart::soft_shadows::SoftShadowsChart;
 use self::chart::stated_errors::StatedErrorsChart;
-use self::chart::tile_tests::TileTests;
+use self::chart::tile_tests::TileTestsChart;
 use self::chart::timing::TimingChart;
 use self::stress::StressChart;
 use self::study::StudyEntry;
@@ -59,7 +59,7 @@ pub static CHARTS: &[StudyEntry] = &[
     StudyEntry::of::<SamplingChart>(),
     StudyEntry::of::<SoftShadowsChart>(),
     StudyEntry::of::<StatedErrorsChart>(),
-    StudyEntry::of::<TileTests>(),
+    StudyEntry::of::<TileTestsChart>(),
     StudyEntry::of::<TimingChart>(),
 ];
 

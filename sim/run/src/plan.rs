@@ -8,7 +8,7 @@ use pipeline::Viewport;
 use power_model::{Bound, EnergyTable, ModelError, Pacing, Platform, PowerModel, Scaling};
 use traces::device::RATES_HZ;
 use warnings::Warning;
-use workloads::job::{Reduction, Request};
+use workloads::job::{JobRequest, Reduction};
 use workloads::{Job, Rendering, Settings, catalog};
 
 use crate::RunError;
@@ -285,8 +285,8 @@ fn load_job(options: &RunOptions, changes: &mut Changes<'_>) -> Result<(String, 
     }
 }
 
-fn request(options: &RunOptions) -> Request<'_> {
-    Request { overrides: &options.overrides, seed: options.seed }
+fn request(options: &RunOptions) -> JobRequest<'_> {
+    JobRequest { overrides: &options.overrides, seed: options.seed }
 }
 
 fn file_or_name<T, E>(

@@ -30,7 +30,7 @@ use crate::{Distinct, Host, Input, Plan, Prepared, Provenance, RunError, RunOpti
 
 /// Rates in samples of the image per second.
 #[derive(Clone, Copy, Debug, Serialize)]
-pub struct Rates {
+pub struct SampleRates {
     /// By CPU time per thread in set-up, binning, tests and depth: median of all runs.
     pub samples_per_s: f64,
     /// The same of the fastest run.
@@ -48,7 +48,7 @@ pub struct VisibilityResult {
     /// Triangle and depth of each sample, in the order `(y width + x) per_pixel + index`.
     pub seen: Vec<VisibleTriangle>,
     /// Rates.
-    pub rates: Rates,
+    pub rates: SampleRates,
 }
 
 /// Time of one run: CPU seconds of all threads, and wall-clock seconds.
@@ -160,12 +160,12 @@ fn timed<T>(work: impl FnOnce() -> T) -> (T, RunTime) {
 }
 
 /// Rates of runs over `samples`. `outside_s` are the seconds before and after the runs.
-fn rates(samples: usize, mut runs: Vec<RunTime>, outside_s: f64) -> Rates {
+fn rates(samples: usize, mut runs: Vec<RunTime>, outside_s: f64) -> SampleRates {
     let (samples, threads) = (samples as f64, rayon::current_num_threads());
     runs.sort_by(|a, b| a.cpu_s.total_cmp(&b.cpu_s));
     let rate = |run: &RunTime| samples * threads as f64 / run.cpu_s.max(f64::MIN_POSITIVE);
     let median = &runs[runs.len() / 2];
-    Rates {
+    SampleRates {
         samples_per_s: rate(median),
         best_samples_per_s: rate(&runs[0]),
         end_to_end_samples_per_s: samples / (outside_s + median.wall_s),

@@ -9,7 +9,7 @@ use output::terminal::{Progress, Terminal};
 use rayon::prelude::*;
 use serde::Serialize;
 use workloads::collision::{
-    CaseFiles, CollisionMethod, Object, PairAnswer, Search, Verdict, candidates, detect_each,
+    CaseFiles, CollisionMethod, Object, PairAnswer, PairSearch, PairVerdict, candidates, detect_each,
 };
 
 use super::{Failure, print, print_json};
@@ -67,13 +67,13 @@ pub enum MethodArg {
 }
 
 impl CcdArgs {
-    fn search(&self) -> Search {
+    fn search(&self) -> PairSearch {
         let method = match self.method {
             MethodArg::FragmentBox => CollisionMethod::FragmentBox,
             MethodArg::BoxBox => CollisionMethod::BoxBox,
             MethodArg::DepthOnly => CollisionMethod::DepthOnly,
         };
-        Search { resolution: self.resolution, bins: self.bins, method, zoom: !self.no_refinement }
+        PairSearch { resolution: self.resolution, bins: self.bins, method, zoom: !self.no_refinement }
     }
 }
 
@@ -165,7 +165,7 @@ impl Found {
 }
 
 fn pair(answer: &PairAnswer) -> Option<Pair> {
-    let Verdict::Maybe { bounds, tiles, seen } = answer.verdict else { return None };
+    let PairVerdict::Maybe { bounds, tiles, seen } = answer.verdict else { return None };
     let pixels = (tiles > 0).then_some(tiles);
     Some(Pair { a: answer.a, b: answer.b, time: bounds.time, space: bounds.space, pixels, seen })
 }
@@ -196,7 +196,7 @@ pub(super) fn run(args: &CcdArgs, terminal: &Terminal) -> Result<(), Failure> {
 }
 
 /// Results of all cases, in order. The threads share the pairs of all cases.
-fn answered(cases: &[CaseFiles], search: &Search, progress: &Progress) -> Vec<CaseResult> {
+fn answered(cases: &[CaseFiles], search: &PairSearch, progress: &Progress) -> Vec<CaseResult> {
     let all: Vec<_> = cases.par_iter().map(objects).collect();
     let known: Vec<&[Object]> = all.iter().map(|case| case.as_deref().unwrap_or_default()).collect();
     let pairs = known.iter().map(|objects| candidates(objects).len() as u64).sum();

@@ -9,8 +9,8 @@ use clap::error::{ContextKind, ContextValue};
 use clap::{Arg, Args, Command};
 use experiments::reproduce::{self, Paper, ReproduceOptions};
 use experiments::stress::{StressChart, StressEffort, family_named};
-use experiments::study::tradeoff::{self, Index, Section};
-use experiments::study::{Done, Request, Study, StudyEntry, StudyError};
+use experiments::study::tradeoff::{self, Index, StudySection};
+use experiments::study::{Done, Study, StudyEntry, StudyError, StudyRequest};
 use experiments::{ALL, CHARTS, all};
 use output::plot::PlotStyle;
 use output::terminal::{Progress, Terminal};
@@ -173,7 +173,7 @@ pub(super) fn run(args: &ChartArgs, terminal: &Terminal) -> Result<(), Failure> 
     let make = |study: &StudyEntry, dir: &OutDir| {
         let ChartArgs { quick, ref scene, seed, .. } = *args;
         let request =
-            Request { quick, scenes: scene, seed, dir, plot_style: &plot_style, progress: &progress };
+            StudyRequest { quick, scenes: scene, seed, dir, plot_style: &plot_style, progress: &progress };
         Ok(study.run(&request)?)
     };
     match args.chart {
@@ -227,7 +227,8 @@ fn run_all(
         let files = dir.publish()?;
         let (name, about) = (study.name.to_owned(), study.about.to_owned());
         let took_s = started.elapsed().as_secs_f64();
-        page.sections.push(Section { name, about, text, took_s, ..Section::default() }.with_files(files));
+        page.sections
+            .push(StudySection { name, about, text, took_s, ..StudySection::default() }.with_files(files));
         page.tradeoff.points.extend(tradeoff);
         // After each, so that what there is can be looked at while the next one runs.
         page.write(dir, plot_style).map_err(|error| Failure { message: error.to_string(), code: 1 })?;

@@ -6,7 +6,7 @@
 //!
 //! - [`SweepSpec`]: the sweep file. [`SweepPlan`]: its points with ids, every value tried.
 //! - [`Folder`]: the plan and the results on disk, each file whole or absent.
-//! - [`Shard`]: which points a task runs. [`Work`]: runs those that are not finished.
+//! - [`Shard`]: which points a task runs. [`ShardWork`]: runs those that are not finished.
 //! - [`merge()`]: all results in one table, the same bytes for any number of shards and threads.
 //! - [`SweepReport`]: designs on the frontier of time and energy, and main effects.
 //! - [`Search`]: points that an optimizer requests.
@@ -30,7 +30,7 @@ mod shared;
 mod slurm;
 mod spec;
 
-pub use self::run::{ExpectedRuns, Shard, Status, Work};
+pub use self::run::{ExpectedRuns, Shard, ShardWork, Status};
 pub use ask::{Answer, Dimension, Question, Search};
 pub use axis::Axis;
 pub use error::SweepError;

@@ -92,7 +92,7 @@ fn of_other_build(count: usize) -> Option<String> {
 }
 
 /// The points of a shard that are not finished.
-pub struct Work<'a> {
+pub struct ShardWork<'a> {
     plan: &'a SweepPlan,
     folder: &'a Folder,
     runs: usize,
@@ -105,7 +105,7 @@ pub struct Work<'a> {
     stop: &'a (dyn Fn() -> bool + Sync),
 }
 
-impl<'a> Work<'a> {
+impl<'a> ShardWork<'a> {
     /// Points of `plan` in `shard` without a whole result in `folder`; with `retry` also those that failed.
     ///
     /// # Errors

@@ -35,12 +35,12 @@ pub struct FinderOptions {
     /// Which method.
     pub method: FinderMethod,
     /// A step that is left out, to measure what it is worth.
-    pub without: Option<Step>,
+    pub without: Option<FinderStep>,
 }
 
 /// A step of tracking that can be left out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Step {
+pub enum FinderStep {
     /// Frames of both sides of a clock step aligned.
     ClockSteps,
     /// Starts that split frames taken out.
@@ -55,7 +55,7 @@ pub enum Step {
     PhaseSlips,
 }
 
-impl Step {
+impl FinderStep {
     /// All of them, with their names.
     pub const ALL: [(&'static str, Self); 6] = [
         ("clock-steps", Self::ClockSteps),
@@ -362,15 +362,15 @@ fn correlation(a: &[f64], b: &[f64]) -> f64 {
 }
 
 /// Finds the sequence of starts with the most evidence.
-fn find_tracked(trace: &Trace, marks: &Marks, without: Option<Step>) -> Result<Found, MarkError> {
-    let with = |step: Step| without != Some(step);
+fn find_tracked(trace: &Trace, marks: &Marks, without: Option<FinderStep>) -> Result<Found, MarkError> {
+    let with = |step: FinderStep| without != Some(step);
     let placement = marks.place(trace)?;
     let power: Vec<f64> = trace.powers_w().collect();
-    let mut tracked = track(&power, &placement, with(Step::ClockSteps)).starts;
-    if !with(Step::PhaseSlips) {
+    let mut tracked = track(&power, &placement, with(FinderStep::ClockSteps)).starts;
+    if !with(FinderStep::PhaseSlips) {
         tracked.iter_mut().for_each(|start| start.confidence_factor = 1.0);
     }
-    if with(Step::SplitFrames) {
+    if with(FinderStep::SplitFrames) {
         tracked = without_false_starts(&power, tracked, &placement);
     }
     let offsets: Vec<usize> = tracked.iter().map(|start| start.offset).collect();
@@ -379,7 +379,7 @@ fn find_tracked(trace: &Trace, marks: &Marks, without: Option<Step>) -> Result<F
     let fixed: Vec<bool> = marked.iter().map(Option::is_some).collect();
     let anchor = placement.marks.first().map_or(0.0, |mark| mark.anchor);
     let positions = register(&power, &offsets, &fixed, libm::round(anchor) as usize, placement.samples);
-    let positions = match with(Step::StartRefinement) {
+    let positions = match with(FinderStep::StartRefinement) {
         true => refine_starts(&power, positions, &fixed, anchor, placement.samples),
         false => positions,
     };
@@ -430,7 +430,7 @@ fn in_phase(
     starts: &[Start],
     fixed: &[bool],
     placement: &Placement,
-    without: Option<Step>,
+    without: Option<FinderStep>,
 ) -> (Vec<f64>, Vec<f64>) {
     let anchor = placement.marks.first().map_or(0.0, |mark| mark.anchor);
     let width = placement.samples;
@@ -438,14 +438,14 @@ fn in_phase(
         |positions: &[f64]| -> Vec<f64> { positions.iter().map(|position| position + anchor).collect() };
     let first_mark = fixed.iter().position(|fixed| *fixed);
     let (positions, in_phase) = match first_mark
-        .filter(|_| without != Some(Step::DisplayTicks))
+        .filter(|_| without != Some(FinderStep::DisplayTicks))
         .and_then(|mark| snap_to_ticks(&positions, mark, width))
     {
         // What begins on a tick is in the phase of the mark, whatever happened on the way.
         Some(Snapped { positions, off_tick }) => {
             (positions, off_tick.iter().map(|off| if *off { SUSPECT_CONFIDENCE } else { 1.0 }).collect())
         }
-        None if without == Some(Step::IdleGaps) => {
+        None if without == Some(FinderStep::IdleGaps) => {
             (positions, starts.iter().map(|start| start.confidence_factor).collect())
         }
         None => {
@@ -456,7 +456,7 @@ fn in_phase(
             (positions, product(starts.iter().map(|start| start.confidence_factor), factors))
         }
     };
-    if without == Some(Step::IdleGaps) {
+    if without == Some(FinderStep::IdleGaps) {
         return (positions, in_phase);
     }
     let with_gap = spread_from_unmarked(

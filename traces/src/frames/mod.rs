@@ -23,7 +23,7 @@ mod track;
 use crate::stats::upper_median;
 use core::fmt;
 use core::str::FromStr;
-pub use find::{FinderOptions, Proposal, Step, find, find_with, marked_only, propose};
+pub use find::{FinderOptions, FinderStep, Proposal, find, find_with, marked_only, propose};
 use marks::Placed;
 pub(crate) use marks::Placement;
 pub use marks::{MarkError, Marks, Window, default_window};

@@ -12,7 +12,7 @@ use glam::{DVec3, Vec3};
 use pipeline::sampling::SampleSpec;
 use pipeline::{Cull, Gpu, LensShape, PipelineSpec, SampleTable, Viewport};
 use workloads::accumulation::SharedSamples;
-use workloads::multiview::{Layout, Rig, Target};
+use workloads::multiview::{Layout, MultiviewRig, ViewTarget};
 use workloads::soft_shadows::{AreaLight, LightSpec, ShadowMap, ShadowMethod};
 use workloads::{Overrides, glossy, soft_shadows};
 
@@ -47,7 +47,7 @@ fn views(spec: &PipelineSpec) {
     let scene = workloads::load("default").unwrap().with_overrides(&size).unwrap();
     let frame = scene.frame(18).unwrap();
     let draws = frame.draws(&scene).unwrap();
-    let to = Target {
+    let to = ViewTarget {
         viewport: Viewport::new(160, 90).unwrap(),
         spec,
         background: scene.background(),
@@ -55,7 +55,7 @@ fn views(spec: &PipelineSpec) {
     };
     let focus = frame.camera.lens().unwrap().focus();
     for layout in [Layout::stereo(0.28, 0.11), Layout::line(7, 0.5, 0.11)] {
-        let rig = Rig::new(&frame.camera, focus, &layout, 8, 1).unwrap();
+        let rig = MultiviewRig::new(&frame.camera, focus, &layout, 8, 1).unwrap();
         let passes = [layout.views as usize, rig.samples() as usize];
         let one =
             time(|| _ = rig.one_pass(&draws, &to, &mut Gpu::without_packets(to.spec).unwrap()).unwrap());

@@ -33,7 +33,7 @@ use warnings::{Code, Warning};
 
 use crate::error::LoadError;
 use crate::job::{
-    Drawn, Draws, Fact, Flag, Flags, Job, JobError, JobOptions, OptionSource, Request, facts, must_hold,
+    Drawn, Draws, Fact, Flag, Flags, Job, JobError, JobOptions, JobRequest, OptionSource, facts, must_hold,
 };
 use crate::scene::Settings;
 pub use beam::{Beam, Hit};
@@ -126,7 +126,7 @@ pub(crate) const FLAGS: Flags = Flags { uses: &[Flag::Size], instead: &[] };
 ///
 /// # Errors
 /// [`LoadError`] for an invalid option or setting.
-pub fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<dyn Job>, LoadError> {
+pub fn job(options: &OptionSource, request: &JobRequest<'_>) -> Result<Box<dyn Job>, LoadError> {
     let options: CausticsOptions = options.read()?;
     options.check()?;
     let settings = Settings {
@@ -368,7 +368,7 @@ mod tests {
     fn drawn(set: &[(&str, &str)]) -> (Drawn, Counts) {
         let set = set.iter().map(|(name, value)| ((*name).to_owned(), (*value).to_owned())).collect();
         let overrides = Overrides { size: Some((96, 54)), ..Overrides::default() };
-        let request = Request { overrides: &overrides, seed: 1 };
+        let request = JobRequest { overrides: &overrides, seed: 1 };
         let job = job(&OptionSource { file: None, set }, &request).unwrap();
         let hardware = hardware();
         let mut gpu = Gpu::without_packets(&hardware).unwrap();
@@ -453,7 +453,7 @@ mod tests {
             ("method", "\"uncut\""),
         ] {
             let set = vec![(name.to_owned(), value.to_owned())];
-            let made = job(&OptionSource { file: None, set }, &Request { overrides: &overrides, seed: 1 });
+            let made = job(&OptionSource { file: None, set }, &JobRequest { overrides: &overrides, seed: 1 });
             let error = made.err().map(|error| error.to_string()).unwrap_or_default();
             assert!(error.contains(name), "{name}: {error}");
         }

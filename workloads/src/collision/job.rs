@@ -11,10 +11,11 @@ use super::families::swarm_of;
 use super::object::load_objects;
 use super::on_gpu::{Emitted, PassesOnGpu};
 use super::pass::Scratch;
-use super::{CollisionMethod, Object, Search, Sweeps, candidates};
+use super::{CollisionMethod, Object, PairSearch, Sweeps, candidates};
 use crate::error::LoadError;
 use crate::job::{
-    Drawn, Draws, Fact, Flag, Flags, Job, JobError, JobOptions, Need, OptionSource, Request, facts, must_hold,
+    Drawn, Draws, Fact, Flag, Flags, Job, JobError, JobOptions, JobRequest, Need, OptionSource, facts,
+    must_hold,
 };
 use crate::scene::Settings;
 
@@ -90,7 +91,7 @@ impl CollisionOptions {
 
 /// The job and its objects.
 struct Collision {
-    search: Search,
+    search: PairSearch,
     narrow: bool,
     viewport: Viewport,
     objects: Vec<Object>,
@@ -112,7 +113,7 @@ pub(crate) const FLAGS: Flags = Flags { uses: &[], instead: &[(Flag::Size, "reso
 ///
 /// # Errors
 /// [`LoadError`] for an invalid option, or a file that cannot be read.
-pub fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<dyn Job>, LoadError> {
+pub fn job(options: &OptionSource, request: &JobRequest<'_>) -> Result<Box<dyn Job>, LoadError> {
     let options: CollisionOptions = options.read()?;
     options.check()?;
     let CollisionOptions { resolution, bins, method, narrow, .. } = options;
@@ -123,7 +124,7 @@ pub fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<dyn Job>
         table: "none".to_owned(),
         ..Settings::default()
     };
-    let search = Search { resolution, bins, method, zoom: false };
+    let search = PairSearch { resolution, bins, method, zoom: false };
     let settings = settings.with(request.overrides)?;
     let refused = || LoadError::Setting { setting: "resolution", message: "1 to 1024 pixels".to_owned() };
     let viewport = Viewport::new(resolution, resolution).ok_or_else(refused)?;
@@ -154,7 +155,7 @@ impl Draws for Collision {
     }
 
     fn draw(&self, (): &(), gpu: &mut Gpu<'_>) -> Result<Drawn, JobError> {
-        let Search { method, bins, resolution, .. } = self.search;
+        let PairSearch { method, bins, resolution, .. } = self.search;
         let mut passes = PassesOnGpu::new((method, self.viewport, bins), &self.objects, gpu);
         let pairs = candidates(&self.objects);
         let (may_collide, kept) = if self.narrow {
@@ -218,7 +219,7 @@ mod tests {
 
     fn made(set: &[(&str, &str)]) -> Result<Box<dyn Job>, LoadError> {
         let set = set.iter().map(|(name, value)| ((*name).to_owned(), (*value).to_owned())).collect();
-        job(&OptionSource { file: None, set }, &Request { overrides: &Overrides::default(), seed: 1 })
+        job(&OptionSource { file: None, set }, &JobRequest { overrides: &Overrides::default(), seed: 1 })
     }
 
     #[test]
@@ -242,7 +243,7 @@ mod tests {
                 assert!(counts[Event::PixelInvocations] >= fact("fragments") as u64, "{name}");
                 let objects = swarm_of(6, 1);
                 let kept = if narrow == "true" {
-                    let search = Search { resolution: 16, bins: 1, method, zoom: false };
+                    let search = PairSearch { resolution: 16, bins: 1, method, zoom: false };
                     let found = detect(&objects, &search);
                     found.iter().filter(|answer| answer.verdict.may_collide()).count()
                 } else {

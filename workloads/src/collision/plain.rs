@@ -399,7 +399,7 @@ mod tests {
 
     use super::super::contact_probe::cross;
     use super::super::families::{Case, cases};
-    use super::super::{Search, detect};
+    use super::super::{PairSearch, detect};
     use super::*;
 
     const METHODS: [CollisionMethod; 3] =
@@ -434,7 +434,8 @@ mod tests {
     /// A pair that the passes separate is separated with narrowing on the CPU as well.
     #[test]
     fn pairs_that_plain_passes_separate_are_separated_by_the_search() {
-        let search = Search { resolution: 32, bins: 1, method: CollisionMethod::FragmentBox, zoom: false };
+        let search =
+            PairSearch { resolution: 32, bins: 1, method: CollisionMethod::FragmentBox, zoom: false };
         let (mut alone, mut helped) = (0, 0);
         for case in cases(5, 3).iter().filter(|case| case.objects.len() == 2) {
             let pair = [&case.objects[0], &case.objects[1]];

@@ -15,7 +15,7 @@ use super::luminance::Show;
 use super::{ComputeOptions, Kernel};
 use crate::error::LoadError;
 use crate::job::{
-    Drawn, DrawsScene, Fact, Flag, Flags, IMAGE_SIZE, Job, JobError, OptionSource, Request, facts,
+    Drawn, DrawsScene, Fact, Flag, Flags, IMAGE_SIZE, Job, JobError, JobRequest, OptionSource, facts,
 };
 use crate::scene::{Frame, Overrides, Scene};
 
@@ -38,7 +38,7 @@ pub(crate) const FLAGS: Flags =
 ///
 /// # Errors
 /// As [`Compute::new`].
-pub fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<dyn Job>, LoadError> {
+pub fn job(options: &OptionSource, request: &JobRequest<'_>) -> Result<Box<dyn Job>, LoadError> {
     Ok(Box::new(Compute::new(options.read()?, request.overrides, request.seed)?))
 }
 

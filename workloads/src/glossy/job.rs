@@ -11,7 +11,7 @@ use warnings::{Code, Warning};
 use super::{GlossyEffect, Map, Receiver, ReceiverShader};
 use crate::error::LoadError;
 use crate::job::{
-    Drawn, DrawsScene, Fact, Flag, Flags, Job, JobError, JobOptions, OptionSource, Request, facts,
+    Drawn, DrawsScene, Fact, Flag, Flags, Job, JobError, JobOptions, JobRequest, OptionSource, facts,
 };
 use crate::material::Material;
 use crate::scene::{
@@ -223,7 +223,7 @@ pub(crate) const FLAGS: Flags = Flags {
 ///
 /// # Errors
 /// As [`Glossy::new`].
-pub fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<dyn Job>, LoadError> {
+pub fn job(options: &OptionSource, request: &JobRequest<'_>) -> Result<Box<dyn Job>, LoadError> {
     Ok(Box::new(Glossy::new(options.read()?, request.overrides, request.seed)?))
 }
 

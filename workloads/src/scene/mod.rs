@@ -25,7 +25,7 @@ pub use info::{
 };
 pub(crate) use measure::lens_leaves_view;
 pub(crate) use mesh::Bounds;
-pub use mesh::{Influences, Instance, Mesh, Normals, Skin, Target};
+pub use mesh::{Influences, Instance, Mesh, MorphTarget, Normals, Skin};
 pub use settings::{Overrides, Settings};
 pub use track::{Instant, Interpolation, Track};
 pub(crate) use track::{rotation, unit_quat};

@@ -15,7 +15,7 @@ use super::{AreaLight, LightSpec, SceneView, ShadowMap, ShadowMethod};
 use crate::accumulation::SharedSamples;
 use crate::error::LoadError;
 use crate::job::{
-    Drawn, DrawsScene, Fact, Flag, Flags, Job, JobError, JobOptions, OptionSource, Request, facts,
+    Drawn, DrawsScene, Fact, Flag, Flags, Job, JobError, JobOptions, JobRequest, OptionSource, facts,
 };
 use crate::material::{Alpha, Material};
 use crate::scene::{
@@ -224,7 +224,7 @@ pub(crate) const FLAGS: Flags = Flags {
 ///
 /// # Errors
 /// As [`SoftShadows::new`].
-pub fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<dyn Job>, LoadError> {
+pub fn job(options: &OptionSource, request: &JobRequest<'_>) -> Result<Box<dyn Job>, LoadError> {
     Ok(Box::new(SoftShadows::new(options.read()?, request.overrides, request.seed)?))
 }
 

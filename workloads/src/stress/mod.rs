@@ -14,7 +14,7 @@ use std::ops::Range;
 use glam::{Affine3A, DVec2, DVec3};
 use pipeline::geometry::Projection;
 use pipeline::random::{SplitMix, mix};
-use pipeline::sample_test::{Hits, Target, test_run};
+use pipeline::sample_test::{Hits, StoredSamples, test_run};
 use pipeline::sampling::{SampleSource, SampleTableError, TileSamples};
 use pipeline::setup::{SetupResult, Triangle, set_up};
 use pipeline::traversal::{Box5, TileRect};
@@ -196,7 +196,7 @@ pub fn within_bounds(
         let rect = TileRect::new(viewport, origin, SIDE_PX);
         samples.fill(source, viewport, &projection.shear, origin, SIDE_PX);
         let (mut depth, mut owner) = (vec![f32::INFINITY; samples.len], vec![u32::MAX; samples.len]);
-        let mut target = Target { depth: &mut depth, triangle: &mut owner };
+        let mut target = StoredSamples { depth: &mut depth, triangle: &mut owner };
         for triangle in &triangles {
             let Some(within) = bound(triangle, &rect) else { continue };
             hits.clear();

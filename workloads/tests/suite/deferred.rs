@@ -3,7 +3,7 @@
 use activity::Event;
 use glam::{DVec3, Vec3};
 use pipeline::{FrameReport, Gpu};
-use workloads::deferred::{Deferred, DeferredOptions, LightPass, LightingMethod, NormalFormat, Rate};
+use workloads::deferred::{Deferred, DeferredOptions, LightPass, LightingMethod, LightingRate, NormalFormat};
 use workloads::job::{Drawn, Job};
 use workloads::scene::{Local, Node, Parts, Rig, Scene, SceneCamera, Settings, Trs};
 use workloads::{Alpha, Material, Overrides, shapes};
@@ -159,7 +159,7 @@ fn one_lit_sample_does_not_stand_for_a_pixel() {
     let options = DeferredOptions { lights: 4, ..DeferredOptions::default() };
     let wanted = forward(&options, 4);
     let (each, _) = with(options.clone(), 4);
-    let (one, _) = with(DeferredOptions { rate: Rate::Pixel, ..options }, 4);
+    let (one, _) = with(DeferredOptions { rate: LightingRate::Pixel, ..options }, 4);
     let codes = |drawn: &Drawn| drawn.warnings.iter().map(|warning| warning.code.name()).collect::<Vec<_>>();
     assert_eq!((codes(&each), codes(&one)), (vec![], vec!["deferred-one-surface"]));
     let errors = [&each, &one].map(|drawn| rms(&drawn.image, &wanted));
@@ -214,7 +214,8 @@ fn moving_objects_have_a_surface_for_every_sample() {
     let fast = DVec3::new(20.0, 0.0, 0.0);
     let image = |options: DeferredOptions| of(pane(fast), options, &overrides).0;
     let wanted = image(DeferredOptions { method: LightingMethod::Forward, ..options.clone() });
-    let (each, one) = (image(options.clone()), image(DeferredOptions { rate: Rate::Pixel, ..options }));
+    let (each, one) =
+        (image(options.clone()), image(DeferredOptions { rate: LightingRate::Pixel, ..options }));
     assert!(each.moving && each.warnings.is_empty(), "{:?}", each.warnings);
     let errors = [&each, &one].map(|drawn| rms(&drawn.image, &wanted.image));
     assert!(errors[1] > 3.0 * errors[0], "{errors:?}");

@@ -11,7 +11,7 @@ use pipeline::{
 use proptest::prelude::*;
 use workloads::Overrides;
 use workloads::catalog::find;
-use workloads::job::{Job, OptionSource, Request};
+use workloads::job::{Job, JobRequest, OptionSource};
 use workloads::occlusion::{WallScene, WallSceneSpec, depths_of};
 use workloads::visibility::Unshaded;
 
@@ -153,7 +153,7 @@ fn job(query: &str) -> Box<dyn Job> {
         set: vec![("query".into(), query.into()), ("objects".into(), "40".into())],
     };
     let overrides = Overrides { size: Some((128, 72)), samples: Some(8), ..Overrides::default() };
-    find("occlusion", &options, &Request { overrides: &overrides, seed: 1 }).unwrap().unwrap()
+    find("occlusion", &options, &JobRequest { overrides: &overrides, seed: 1 }).unwrap().unwrap()
 }
 
 /// Image and facts, and the work of the GPU.

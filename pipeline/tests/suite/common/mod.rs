@@ -9,7 +9,7 @@ use glam::{Affine3A, Vec3, Vec4};
 use pipeline::conservative::{Grid, MovingTriangle, Rasterizer, Rect, Region, Touch};
 use pipeline::depth::DepthSpec;
 use pipeline::random::{GOLDEN, SplitMix, mix};
-use pipeline::sample_test::{Hits, Target, test_run};
+use pipeline::sample_test::{Hits, StoredSamples, test_run};
 use pipeline::sampling::{Sample, TileSamples};
 use pipeline::setup::{SetupResult, Triangle, set_up};
 use pipeline::traversal::Box5;
@@ -241,7 +241,7 @@ impl TileOfSoup<'_> {
     pub fn test(&self, id: usize, cull: Cull, depth: &mut [f32], triangle: &mut [u32]) -> Vec<u16> {
         let mut hits = Hits::default();
         if let Some(ready) = (self.set_up)(id, cull) {
-            let mut target = Target { depth, triangle };
+            let mut target = StoredSamples { depth, triangle };
             test_run(&ready, self.samples, &Box5::whole(true), 0.25, &mut target, &mut hits);
         }
         hits.written

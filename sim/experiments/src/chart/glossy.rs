@@ -20,7 +20,7 @@ use workloads::glossy::{GlossyEffect, Lobe, Map, default_scene, receiver};
 use workloads::{Frame, Scene};
 
 use crate::chart::{White, errors, mean_square};
-use crate::study::table::{Sheet, Table, count, fixed, plain};
+use crate::study::table::{Sheet, TableBuilder, count, fixed, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
 use crate::study::{Gallery, Ran, Study, StudyError};
 
@@ -100,7 +100,7 @@ impl Study for GlossyChart {
     }
 
     fn tables(&self) -> Vec<Sheet> {
-        let rows = Table::of(&self.rows)
+        let rows = TableBuilder::of(&self.rows)
             .column("effect", "effect", |row| row.effect, plain)
             .column("samples", "samples", |row| row.samples, plain)
             .column("rmse", "RMSE", |row| row.rmse, fixed(5))
@@ -115,11 +115,11 @@ impl Study for GlossyChart {
             .column("traced_host_s", "(host s)", |row| row.traced.host_s, fixed(3))
             .column("nodes_per_ray", "nodes a ray", |row| row.traced.nodes_per_ray, fixed(1))
             .column("triangles_per_ray", "triangles a ray", |row| row.traced.triangles_per_ray, fixed(1));
-        let blurs = Table::of(&self.blurs)
+        let blurs = TableBuilder::of(&self.blurs)
             .shown("height", |blur| blur.height, plain)
             .shown("blur", |blur| blur.width, fixed(4))
             .shown("expected", |blur| blur.expected, fixed(4));
-        let wides = Table::of(&self.wides)
+        let wides = TableBuilder::of(&self.wides)
             .shown("lens over half of the receiver", |wide| wide.over_half, plain)
             .shown("RMSE of 16 samples", |wide| wide.rmse_of_samples, fixed(4))
             .shown("RMSE of the lobe", |wide| wide.rmse_of_lobe, fixed(4));

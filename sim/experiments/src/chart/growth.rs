@@ -8,14 +8,14 @@ use output::OutputError;
 use output::plot::{ChartPanel, Scale, Series};
 use output::terminal::Progress;
 use pipeline::sampling::HashedSamples;
-use pipeline::visibility::{SampleLayout, Tally, Visibility, resolve};
+use pipeline::visibility::{SampleLayout, StepTally, Visibility, resolve};
 use pipeline::{Cull, Geometry, LensShape};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde::Serialize;
 use workloads::stress::{Size, Soup, StressError, StressScene};
 
 use super::{exponent, upper_half};
-use crate::study::table::{Sheet, Table, fixed, millis, optional, plain};
+use crate::study::table::{Sheet, TableBuilder, fixed, millis, optional, plain};
 use crate::study::{Gallery, Study, StudyError};
 
 /// Effort of the measurement.
@@ -49,7 +49,7 @@ pub struct Base {
 /// The quantity that grows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Sweep {
+pub enum GrowthSweep {
     /// Triangles that cover the same area, finer and finer.
     Triangles,
     /// Samples in a pixel.
@@ -76,7 +76,7 @@ pub enum GrowthBlur {
 #[derive(Clone, Debug, Serialize)]
 pub struct GrowthRow {
     /// The quantity that grows.
-    pub sweep: Sweep,
+    pub sweep: GrowthSweep,
     /// The source of blur.
     pub kind: GrowthBlur,
     /// Exponent of time over what grows, from `fitted_from` on.
@@ -98,7 +98,7 @@ pub struct GrowthChart {
     pub rows: Vec<GrowthRow>,
 }
 
-impl Sweep {
+impl GrowthSweep {
     const ALL: [Self; 3] = [Self::Triangles, Self::Samples, Self::Blur];
 
     /// Name of the sweep in tables.
@@ -180,12 +180,13 @@ impl Study for GrowthChart {
     };
 
     fn measure(effort: GrowthEffort, _scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
-        let curves = || Sweep::ALL.into_iter().flat_map(|sweep| GrowthBlur::ALL.map(|kind| (sweep, kind)));
+        let curves =
+            || GrowthSweep::ALL.into_iter().flat_map(|sweep| GrowthBlur::ALL.map(|kind| (sweep, kind)));
         // What stands still has no blur to sweep.
-        let curves = || curves().filter(|curve| *curve != (Sweep::Blur, GrowthBlur::Still));
+        let curves = || curves().filter(|curve| *curve != (GrowthSweep::Blur, GrowthBlur::Still));
         let steps: usize = curves().map(|(sweep, _)| sweep.trials(&effort).len()).sum();
         let (bar, timer) = (progress.bar("growth", steps as u64), Timer::new(&effort)?);
-        let row = |(sweep, kind): (Sweep, GrowthBlur)| {
+        let row = |(sweep, kind): (GrowthSweep, GrowthBlur)| {
             let point = |trial: Base| {
                 let point = timer.point(trial, kind);
                 bar.inc();
@@ -199,12 +200,12 @@ impl Study for GrowthChart {
     }
 
     fn draw(&self, to: &Gallery<'_>) -> Result<(), OutputError> {
-        let panels = Sweep::ALL.map(|sweep| self.panel(sweep)).into();
+        let panels = GrowthSweep::ALL.map(|sweep| self.panel(sweep)).into();
         to.chart("growth", ["Time of the visibility engine", &self.subject()], panels)
     }
 
     fn tables(&self) -> Vec<Sheet> {
-        let exponents = Table::of(&self.rows)
+        let exponents = TableBuilder::of(&self.rows)
             .shown("growing", |row| row.sweep.name(), plain)
             .shown("what blurs", |row| row.kind.name(), plain)
             .shown("exponent of time", |row| row.exponent, optional(fixed(2)))
@@ -214,7 +215,7 @@ impl Study for GrowthChart {
             .shown("ms, last", |row| row.points.last().map(|point| point.cpu_s), optional(millis(2)))
             .after(format!("\n{}\n", self.subject()));
         let each = self.rows.iter().flat_map(|row| row.points.iter().map(move |point| (row, point)));
-        let points = Table::of(each)
+        let points = TableBuilder::of(each)
             .data("sweep", |(row, _)| row.sweep.name())
             .data("kind", |(row, _)| row.kind.name())
             .data("exponent", |(row, _)| row.exponent)
@@ -240,7 +241,7 @@ impl GrowthChart {
         )
     }
 
-    fn panel(&self, sweep: Sweep) -> ChartPanel {
+    fn panel(&self, sweep: GrowthSweep) -> ChartPanel {
         let base = &self.effort.base;
         let (triangles, samples, blur) = (
             format!("{} triangles", base.triangles),
@@ -248,17 +249,17 @@ impl GrowthChart {
             format!("blur {} px", base.blur_px),
         );
         let (across, title) = match sweep {
-            Sweep::Triangles => ("triangles", format!("{samples}, {blur}")),
-            Sweep::Samples => ("samples a pixel", format!("{triangles}, {blur}")),
-            Sweep::Blur => ("motion or circle of confusion (px)", format!("{triangles}, {samples}")),
+            GrowthSweep::Triangles => ("triangles", format!("{samples}, {blur}")),
+            GrowthSweep::Samples => ("samples a pixel", format!("{triangles}, {blur}")),
+            GrowthSweep::Blur => ("motion or circle of confusion (px)", format!("{triangles}, {samples}")),
         };
-        let scale = if sweep == Sweep::Triangles { Scale::Decades } else { Scale::Doublings };
+        let scale = if sweep == GrowthSweep::Triangles { Scale::Decades } else { Scale::Doublings };
         let curves = GrowthBlur::ALL.map(|kind| self.curve(sweep, kind)).into();
         ChartPanel::new(&title, [across, "CPU time (ms)"], curves).on(scale, Scale::Decades)
     }
 
     /// A curve without points where there is none, so that the others keep their colours.
-    fn curve(&self, sweep: Sweep, kind: GrowthBlur) -> Series {
+    fn curve(&self, sweep: GrowthSweep, kind: GrowthBlur) -> Series {
         let row = self.rows.iter().find(|row| row.sweep == sweep && row.kind == kind);
         let points = row.iter().flat_map(|row| &row.points);
         let note = row.and_then(|row| row.exponent).map_or(String::new(), |p| format!("{p:.2}"));
@@ -270,7 +271,7 @@ impl GrowthChart {
 }
 
 impl GrowthRow {
-    fn new(sweep: Sweep, kind: GrowthBlur, points: Vec<GrowthPoint>) -> Self {
+    fn new(sweep: GrowthSweep, kind: GrowthBlur, points: Vec<GrowthPoint>) -> Self {
         let across = || points.iter().map(|point| sweep.of(point)).filter(|x| *x > 0.0);
         let ends = across().reduce(f64::min).zip(across().reduce(f64::max));
         let fitted_from = ends.map_or(0.0, |(low, high)| upper_half(low, high));
@@ -340,7 +341,7 @@ impl<'a> Timer<'a> {
         })
     }
 
-    fn time(&self, scene: &StressScene, samples: u32) -> Result<(f64, Tally), StudyError> {
+    fn time(&self, scene: &StressScene, samples: u32) -> Result<(f64, StepTally), StudyError> {
         let refused = |what: &str| StudyError::Pipeline(what.to_owned());
         let samples = HashedSamples::new(SEED, self.effort.side_px, samples, LensShape::Disk)
             .ok_or_else(|| refused("1 to 256 samples a pixel"))?;
@@ -397,11 +398,11 @@ mod tests {
         // A floor of 1 s up to a hundred, beyond it n^1.5.
         let time = |n: u32| (n, f64::from(n).powf(1.5) / 1e3);
         let points = [1, 10, 100, 1_000, 10_000].map(time).map(|(n, s)| point(n, s.max(1.0)));
-        let row = GrowthRow::new(Sweep::Triangles, GrowthBlur::Still, points.into());
+        let row = GrowthRow::new(GrowthSweep::Triangles, GrowthBlur::Still, points.into());
         assert!((row.fitted_from - 100.0).abs() < 1e-9);
         assert!((row.exponent.unwrap() - 1.5).abs() < 1e-12, "{:?}", row.exponent);
         assert!(row.tests_exponent.unwrap().abs() < 1e-12);
-        assert_eq!(GrowthRow::new(Sweep::Triangles, GrowthBlur::Still, Vec::new()).exponent, None);
+        assert_eq!(GrowthRow::new(GrowthSweep::Triangles, GrowthBlur::Still, Vec::new()).exponent, None);
     }
 
     #[test]
@@ -418,7 +419,7 @@ mod tests {
         assert_eq!(tests(&chart), tests(&with(3)));
         for row in &chart.rows {
             assert!(row.points.iter().all(|point| point.cpu_s > 0.0 && point.hits > 0), "{row:?}");
-            if row.sweep == Sweep::Blur {
+            if row.sweep == GrowthSweep::Blur {
                 let [still, .., much] = &row.points[..] else { panic!("{row:?}") };
                 assert_eq!(still.motion_px + still.defocus_px, 0.0);
                 assert!(much.sample_tests > still.sample_tests, "{row:?}");

@@ -11,7 +11,7 @@ use run::{GpuSpec, Plan, RunError, RunFrame, RunOptions, frames_of};
 use serde::Serialize;
 use workloads::Overrides;
 
-use crate::study::table::{Sheet, Table, fixed, plain, share};
+use crate::study::table::{Sheet, TableBuilder, fixed, plain, share};
 use crate::study::{Gallery, Study, StudyError};
 
 /// Drawn: a scene of one pass, and a workload whose passes read what earlier ones wrote.
@@ -105,7 +105,7 @@ impl Study for MemoryChart {
             let (MemoryRow { work, level, .. }, best) = (&rows[0], pays_up_to(rows));
             format!("\n{level} for {work}: the energy of a frame stops falling at {best} MB")
         });
-        let rows = Table::of(&self.rows)
+        let rows = TableBuilder::of(&self.rows)
             .column("work", "work", |row| row.work, plain)
             .column("level", "level", |row| row.level, plain)
             .column("size_mb", "MB", |row| row.size_mb, plain)

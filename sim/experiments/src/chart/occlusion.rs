@@ -17,7 +17,7 @@ use serde::Serialize;
 use workloads::occlusion::{MAX_HALF_COVERED_SHARE, WallScene, WallSceneSpec, depths_of};
 use workloads::visibility::Unshaded;
 
-use crate::study::table::{Sheet, Table, fixed, optional, plain};
+use crate::study::table::{Sheet, TableBuilder, fixed, optional, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
 use crate::study::{Gallery, Ran, Study, StudyError};
 
@@ -163,7 +163,7 @@ impl Study for OcclusionChart {
     }
 
     fn tables(&self) -> Vec<Sheet> {
-        let rows = Table::of(self.rows())
+        let rows = TableBuilder::of(self.rows())
             .column("kind", "blur", |row| row.kind.name(), plain)
             .column("slats", "slats", |row| row.slats, plain)
             .column("samples", "samples", |row| row.samples, plain)

@@ -9,14 +9,14 @@ use output::OutputError;
 use output::plot::{AxisSpec, ChartPanel, Paint, PlotMark, Series};
 use output::terminal::Progress;
 use run::{
-    Distinct, Forecast, Plan, Previews, Quantity, RunError, RunFrame, RunOptions, Sampling, Signatures,
+    Distinct, Forecast, Plan, Previews, RunError, RunFrame, RunOptions, RunQuantity, Sampling, Signatures,
     frames_of,
 };
 use serde::Serialize;
 use workloads::Overrides;
 
 use super::quantiles;
-use crate::study::table::{Sheet, Table, fixed, percent, plain};
+use crate::study::table::{Sheet, TableBuilder, fixed, percent, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
 use crate::study::{Gallery, Study, StudyError};
 
@@ -150,7 +150,7 @@ impl Study for SampledChart {
     }
 
     fn tables(&self) -> Vec<Sheet> {
-        let figures = Table::of(&self.figures)
+        let figures = TableBuilder::of(&self.figures)
             .shown("quantity", |f| f.quantity, plain)
             .shown("trials", |f| f.trials, plain)
             .shown("inside", |f| f.inside_percent, percent(1))
@@ -159,14 +159,14 @@ impl Study for SampledChart {
             .shown("worst", |f| f.error_worst_percent, percent(2))
             .shown("half-width: median", |f| f.half_width_median_percent, percent(2));
         let seconds = |s: f64| format!("{s:.2} s");
-        let costs = Table::of(&self.costs)
+        let costs = TableBuilder::of(&self.costs)
             .shown("animation", |cost| cost.scene.as_str(), plain)
             .shown("frames", |cost| cost.frames, plain)
             .shown("simulated", |cost| cost.simulated, plain)
             .shown("all", |cost| cost.all_s, seconds)
             .shown("sampled", |cost| cost.sampled_s, seconds)
             .shown("times less host time", |cost| cost.times_faster, fixed(1));
-        let trials = Table::of(&self.trials)
+        let trials = TableBuilder::of(&self.trials)
             .data("scene", |trial| trial.scene.as_str())
             .data("seed", |trial| trial.seed)
             .data("simulated", |trial| trial.simulated)
@@ -320,7 +320,7 @@ fn truth(frames: &[RunFrame], core_hz: f64) -> [f64; 3] {
     [cycles / count, energy_j / count, energy_j / cycles * core_hz]
 }
 
-fn trial(quantity: &'static str, truth: f64, found: Quantity) -> Trial {
+fn trial(quantity: &'static str, truth: f64, found: RunQuantity) -> Trial {
     Trial {
         scene: String::new(),
         seed: 0,

@@ -26,7 +26,7 @@ use workloads::{Frame, Overrides, Scene};
 
 use crate::chart::glossy::Traced;
 use crate::chart::{errors, mean_square, neighbours};
-use crate::study::table::{Sheet, Table, count, fixed, plain};
+use crate::study::table::{Sheet, TableBuilder, count, fixed, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
 use crate::study::{Gallery, Study, StudyError};
 
@@ -113,7 +113,7 @@ impl Study for SoftShadowsChart {
     }
 
     fn tables(&self) -> Vec<Sheet> {
-        let rows = Table::of(&self.rows)
+        let rows = TableBuilder::of(&self.rows)
             .shown("places", |row| row.points, plain)
             .shown("RMSE", |row| row.rmse, fixed(5))
             .shown("neighbours", |row| row.neighbour_correlation, fixed(2))
@@ -125,7 +125,7 @@ impl Study for SoftShadowsChart {
             .shown("host s", |row| row.one_pass.host_s, fixed(3))
             .shown("(accumulated)", |row| row.accumulation.host_s, fixed(3))
             .shown("shading s", |row| row.shade_s, fixed(3));
-        let traced = Table::of(&self.rows)
+        let traced = TableBuilder::of(&self.rows)
             .column("points", "rays a pixel", |row| row.points, plain)
             .column("rmse", "RMSE", |row| row.traced.rmse, fixed(5))
             .column("neighbour_correlation", "neighbours", |row| row.traced_correlation, fixed(2))
@@ -133,11 +133,11 @@ impl Study for SoftShadowsChart {
             .column("triangles_per_ray", "triangles a ray", |row| row.traced.triangles_per_ray, fixed(1))
             .column("host_s", "host s", |row| row.traced.host_s, fixed(3))
             .csv("soft_shadows_rays.csv");
-        let biases = Table::of(&self.biases)
+        let biases = TableBuilder::of(&self.biases)
             .shown("bias, texels", |bias| bias.texels, plain)
             .shown("acne %", |bias| 100.0 * bias.acne, fixed(2))
             .shown("leak %", |bias| 100.0 * bias.leak, fixed(2));
-        let by_method = Table::of(self.rows.iter().flat_map(methods))
+        let by_method = TableBuilder::of(self.rows.iter().flat_map(methods))
             .data("points", |(row, ..)| row.points)
             .data("rmse", |(row, ..)| row.rmse)
             .data("neighbour_correlation", |(row, ..)| row.neighbour_correlation)

@@ -25,7 +25,7 @@ use serde::Serialize;
 use settings::Form;
 
 pub use report::{Figure, PaperReport};
-pub use row::{Band, Row, RowNumber, TriedCase, Turn, Verdict};
+pub use row::{Band, ClaimRow, RowNumber, TriedCase, Turn, Verdict};
 pub use settings::{About, Listed, RowKind, SettingsOrigin};
 
 /// Papers with reproduced claims.
@@ -123,13 +123,13 @@ impl ReproduceOptions {
 
 /// A row with its figures.
 struct Done {
-    row: Row,
+    row: ClaimRow,
     figures: Vec<Figure>,
 }
 
 impl Done {
     /// A row without a figure.
-    fn bare(row: Row) -> Self {
+    fn bare(row: ClaimRow) -> Self {
         Self { row, figures: Vec::new() }
     }
 }

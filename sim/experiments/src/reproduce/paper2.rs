@@ -11,9 +11,9 @@ use workloads::Overrides;
 use workloads::deferred::{Deferred, DeferredOptions, LightPass, NormalFormat};
 
 use super::report::{POWER, TIME, line};
-use super::row::{Cases, Row, RowNumber, Verdict, With, numbers, one_at_a_time};
+use super::row::{Cases, ClaimRow, RowNumber, Verdict, With, numbers, one_at_a_time};
 use super::settings::{
-    About, Form, Setting, SettingsOrigin, load, paper_settings, reduced, row_settings, settings_group,
+    About, Form, RowSetting, SettingsOrigin, load, paper_settings, reduced, row_settings, settings_group,
 };
 use super::stage::{Frames, MARKED, Stage, TracedRun, looped};
 use super::{Done, Figure, Paper, ReproduceOptions};
@@ -87,7 +87,7 @@ fn inverses(with: &With<'_, Inverses>, recording: &TracedRun, frames: &Frames) -
         ("whole_animation_pixels_per_J", whole),
     ]);
     let made = with.row(&with.settings.about, (ours, Verdict::of(holds), note));
-    Done::bare(Row { numbers: facts, ran: ran(recording, frames.found.len()), ..made })
+    Done::bare(ClaimRow { numbers: facts, ran: ran(recording, frames.found.len()), ..made })
 }
 
 paper_settings!(Paper::Two, "paper2.ron" {
@@ -284,7 +284,7 @@ impl Tried<'_> {
     fn along<T: Clone>(
         &mut self,
         setting: &'static str,
-        values: &Setting<T>,
+        values: &RowSetting<T>,
         name: fn(&T) -> String,
         change: Change<T>,
     ) -> Result<(), RunError> {
@@ -352,7 +352,7 @@ fn row(with: &With<'_, Passes>, bench: &Bench<'_>, progress: &Progress) -> Resul
         ("samples_recorded", base.recording.trace.samples() as f64),
     ]);
     let figure = figure(&base, bench.pc.platform.idle_w.value());
-    Ok(Done { row: Row { numbers: facts(&base.split, largest), ran, ..made }, figures: vec![figure] })
+    Ok(Done { row: ClaimRow { numbers: facts(&base.split, largest), ran, ..made }, figures: vec![figure] })
 }
 
 fn ours(split: &Split, row: &Passes, form: Form) -> String {

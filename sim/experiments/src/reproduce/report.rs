@@ -9,7 +9,7 @@ use output::{Claim, Destination, OutDir, OutputError};
 use run::RunError;
 use serde::{Deserialize, Serialize};
 
-use super::row::{Row, Verdict};
+use super::row::{ClaimRow, Verdict};
 use super::settings::{Form, Listed, SettingsOrigin};
 use super::{Done, Paper, ReproduceOptions};
 
@@ -27,7 +27,7 @@ pub struct PaperReport {
     /// Whether every row of kind E holds.
     pub equalities_hold: bool,
     /// The rows in order.
-    pub rows: Vec<Row>,
+    pub rows: Vec<ClaimRow>,
     /// Figures.
     #[serde(skip)]
     figures: Vec<Figure>,
@@ -54,7 +54,7 @@ impl PaperReport {
             rows.push(row.judged());
             figures.extend(drawn);
         }
-        let equalities_hold = !rows.iter().any(Row::is_unequal);
+        let equalities_hold = !rows.iter().any(ClaimRow::is_unequal);
         Self { paper, title: paper.title(), form, settings, equalities_hold, rows, figures }
     }
 
@@ -143,7 +143,7 @@ impl PaperReport {
 }
 
 /// Text of a row.
-fn described(row: &Row) -> String {
+fn described(row: &ClaimRow) -> String {
     let about = &row.about;
     let mut text = format!("\n{}: {}\n", about.id, row.verdict_text);
     let mut line = |name: &str, what: &str| {
@@ -167,7 +167,7 @@ fn described(row: &Row) -> String {
 }
 
 /// Amount of work of a row.
-fn ran(row: &Row) -> String {
+fn ran(row: &ClaimRow) -> String {
     let each = row.ran.iter().map(|number| format!("{} {}", number.name.replace('_', " "), number.value));
     each.collect::<Vec<_>>().join(", ")
 }
@@ -183,7 +183,7 @@ fn settings(all: &[Listed], basis: &str) -> String {
 }
 
 /// Letter of the row's kind, with an F if it has figures.
-fn letters(row: &Row) -> String {
+fn letters(row: &ClaimRow) -> String {
     let drawn = if row.figures.is_empty() { "" } else { ",F" };
     format!("{}{drawn}", row.about.kind.letter())
 }

@@ -9,7 +9,7 @@ use crate::study::Ran;
 
 /// A row of the list of claims.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Row {
+pub struct ClaimRow {
     /// The claim, and the condition of the verdict.
     #[serde(flatten)]
     pub about: About,
@@ -80,9 +80,9 @@ pub(super) struct With<'a, S> {
 
 impl<S: Serialize> With<'_, S> {
     /// The row with its result: `ours`, the verdict and a note.
-    pub fn row(&self, about: &About, (ours, verdict, note): (String, Verdict, String)) -> Row {
+    pub fn row(&self, about: &About, (ours, verdict, note): (String, Verdict, String)) -> ClaimRow {
         let own = reduced(self.settings, self.form);
-        Row {
+        ClaimRow {
             about: about.clone(),
             ours,
             verdict,
@@ -101,13 +101,13 @@ impl<S: Serialize> With<'_, S> {
     }
 
     /// The same with the verdict of the band over all settings tried.
-    pub fn banded(&self, about: &About, ours: String, band: Band) -> Row {
+    pub fn banded(&self, about: &About, ours: String, band: Band) -> ClaimRow {
         let row = self.row(about, (ours, band.verdict(), band.text()));
-        Row { band: Some(band), ..row }
+        ClaimRow { band: Some(band), ..row }
     }
 }
 
-impl Row {
+impl ClaimRow {
     /// Whether a required amount of work is 0.
     pub fn ran_nothing(&self) -> bool {
         self.ran.is_empty() || self.ran.iter().any(RowNumber::is_nothing)
@@ -358,7 +358,7 @@ impl Verdict {
 pub(super) mod tests {
     use super::*;
 
-    pub fn row(id: &str, kind: RowKind, verdict: Verdict) -> Row {
+    pub fn row(id: &str, kind: RowKind, verdict: Verdict) -> ClaimRow {
         let about = About {
             id: id.to_owned(),
             kind,
@@ -369,7 +369,7 @@ pub(super) mod tests {
         };
         let with = With { settings: &(), form: Form::Full, sha256: "abc", shared_less: Vec::new() };
         let row = with.row(&about, ("two".to_owned(), verdict, "because".to_owned()));
-        Row { ran: numbers([("draws", 3.0)]), numbers: numbers([("n", 2.0)]), ..row }
+        ClaimRow { ran: numbers([("draws", 3.0)]), numbers: numbers([("n", 2.0)]), ..row }
     }
 
     #[test]
@@ -391,34 +391,34 @@ pub(super) mod tests {
     fn a_row_that_ran_nothing_fails_and_shows_nothing() {
         for ran in [Vec::new(), numbers([("draws", 3.0), ("fragments", 0.0)]), numbers([("draws", f64::NAN)])]
         {
-            let empty = Row { ran, ..row("X-1", RowKind::Order, Verdict::Holds) };
+            let empty = ClaimRow { ran, ..row("X-1", RowKind::Order, Verdict::Holds) };
             assert!(empty.fails());
             let judged = empty.judged();
             assert_eq!(judged.verdict, Verdict::Differs);
             assert!(judged.note.starts_with("nothing was run"), "{}", judged.note);
         }
         let good = row("X-1", RowKind::Order, Verdict::Holds);
-        assert_eq!(good.clone().judged(), Row { verdict_text: "holds".to_owned(), ..good });
+        assert_eq!(good.clone().judged(), ClaimRow { verdict_text: "holds".to_owned(), ..good });
     }
 
     /// The quick form may omit the values at which a condition changes.
     #[test]
     fn a_quick_verdict_says_at_how_many_settings_it_was_reached() {
-        let quick = Row { form: Form::Quick, ..row("X-1", RowKind::Order, Verdict::Holds) };
+        let quick = ClaimRow { form: Form::Quick, ..row("X-1", RowKind::Order, Verdict::Holds) };
         assert_eq!(quick.clone().judged().verdict_text, "holds (quick form)");
         let mut cases = Cases::new("share", "tiles alone");
         cases.along("tiles", [(4, 0.5, true), (8, 0.2, true)]);
         let less_work = vec!["yards".to_owned()];
-        let banded = Row { band: cases.band(6).ok(), less_work, ..quick };
+        let banded = ClaimRow { band: cases.band(6).ok(), less_work, ..quick };
         let text = "holds at 2 of 6 settings (quick form, less work)";
         assert_eq!(banded.clone().judged().verdict_text, text);
-        assert_eq!(Row { form: Form::Full, ..banded.clone() }.judged().verdict_text, "holds");
-        assert_eq!(Row { verdict: Verdict::NotYet, ..banded }.judged().verdict_text, "not yet");
+        assert_eq!(ClaimRow { form: Form::Full, ..banded.clone() }.judged().verdict_text, "holds");
+        assert_eq!(ClaimRow { verdict: Verdict::NotYet, ..banded }.judged().verdict_text, "not yet");
     }
 
     #[test]
     fn numbers_that_were_not_measured_are_left_out() {
-        let some = Row {
+        let some = ClaimRow {
             numbers: numbers([("n", 2.0), ("at_64", f64::NAN)]),
             ..row("X-1", RowKind::Order, Verdict::Holds)
         };

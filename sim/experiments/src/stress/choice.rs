@@ -4,14 +4,14 @@ use pipeline::Features;
 use serde::Serialize;
 use workloads::stress::{Family, Size};
 
-use super::measure::{Work, combinations, on_subject};
-use crate::study::table::{Sheet, Table};
+use super::measure::{MethodWork, combinations, on_subject};
+use crate::study::table::{Sheet, TableBuilder};
 use output::plot::{Matrix, MatrixPanel, Picture, PlotStyle};
 use run::{GpuSpec, RunError};
 
 /// Multiply-adds at one value of a family.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Trial {
+pub struct TestTrial {
     /// The family.
     pub family: &'static str,
     /// The value of its parameter.
@@ -54,12 +54,12 @@ pub fn trial(
     size: Size,
     seed: u64,
     gpu: &GpuSpec,
-) -> Result<Trial, RunError> {
+) -> Result<TestTrial, RunError> {
     on_subject(family, value, size, seed, gpu, |subject| {
-        let madds = |features| subject.counts(features).map(|counts| Work::new(&counts).madds());
+        let madds = |features| subject.counts(features).map(|counts| MethodWork::new(&counts).madds());
         let auto = madds(Features { auto: true, ..Features::ALL })?;
         let fixed = fixed(subject.camera.lens().is_some(), madds)?;
-        Ok(Trial { family: family.name, value, auto, fixed })
+        Ok(TestTrial { family: family.name, value, auto, fixed })
     })
 }
 
@@ -83,12 +83,12 @@ fn fixed<E>(lens: bool, madds: impl Fn(Features) -> Result<u64, E>) -> Result<Ve
 
 impl TestChoice {
     /// Of one value.
-    pub fn of(trial: &Trial) -> Self {
+    pub fn of(trial: &TestTrial) -> Self {
         Self::new(trial.family, Some(trial.value), trial.auto, &trial.fixed)
     }
 
     /// Of all values of a family, one choice for all of them; `None` where there is none.
-    pub fn over(trials: &[Trial]) -> Option<Self> {
+    pub fn over(trials: &[TestTrial]) -> Option<Self> {
         let family = trials.first()?.family;
         let sum = |at: usize| trials.iter().map(|trial| trial.fixed[at]).sum();
         let fixed: Vec<u64> = (0..trials[0].fixed.len()).map(sum).collect();
@@ -120,7 +120,7 @@ pub struct Choices {
 
 impl Choices {
     /// Of the trials, those of a family one after the other.
-    pub fn new(trials: &[Trial]) -> Self {
+    pub fn new(trials: &[TestTrial]) -> Self {
         let families = trials.chunk_by(|a, b| a.family == b.family);
         Self {
             families: families.filter_map(TestChoice::over).collect(),
@@ -190,7 +190,7 @@ impl Choices {
 
     /// Families and values as a table.
     pub(super) fn sheet(&self) -> Sheet {
-        Table::of(self.families.iter().chain(&self.values))
+        TableBuilder::of(self.families.iter().chain(&self.values))
             .data("family", |choice| choice.family)
             .data("value", |choice| choice.value)
             .data("auto_madds", |choice| choice.auto_madds)
@@ -218,8 +218,8 @@ mod tests {
 
     use super::*;
 
-    fn trial(value: f64, auto: u64, fixed: [u64; 2]) -> Trial {
-        Trial { family: "speed", value, auto, fixed: fixed.to_vec() }
+    fn trial(value: f64, auto: u64, fixed: [u64; 2]) -> TestTrial {
+        TestTrial { family: "speed", value, auto, fixed: fixed.to_vec() }
     }
 
     #[test]

@@ -8,7 +8,7 @@ use pipeline::random::mix;
 use pipeline::sampling::SampleSource;
 use pipeline::setup::{Triangle, bounds};
 use pipeline::traversal::{
-    Box5, EdgeBounds, Edges, Facing, LensLines, Piece, TileRect, TimePieces, View, narrow,
+    Box5, EdgeBounds, Edges, Facing, LensLines, Piece, TileRect, TileView, TimePieces, narrow,
 };
 use pipeline::{Camera, Draw, Features, PassError, PipelineSpec, RasterPass, Settings, Shear, Viewport};
 use run::{GpuSpec, RunError};
@@ -34,7 +34,7 @@ pub struct StressRow {
     /// Source of the reference: `brute force` or `no tests`.
     pub compared_with: &'static str,
     /// Cost of the method.
-    pub work: Work,
+    pub work: MethodWork,
     /// Multiply-adds of the method over those of the best method at this value.
     pub over_best: f64,
     /// Source of the true intervals: `exact roots` or `dense sampling`.
@@ -45,7 +45,7 @@ pub struct StressRow {
 
 /// Counted work of a method.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Work {
+pub struct MethodWork {
     /// Samples tested.
     pub samples_tested: u64,
     /// Samples found inside.
@@ -56,7 +56,7 @@ pub struct Work {
     pub sample_madds: u64,
 }
 
-impl Work {
+impl MethodWork {
     /// The work in `counts`.
     pub fn new(counts: &Counts) -> Self {
         Self {
@@ -104,7 +104,7 @@ pub fn measure(
                 triangles: subject.triangles(),
                 samples_lost: differing(&seen, &reference),
                 compared_with: if brute { "brute force" } else { "no tests" },
-                work: Work::new(&subject.counts(method.features)?),
+                work: MethodWork::new(&subject.counts(method.features)?),
                 over_best: 1.0,
                 truth: pairs.source(),
                 intervals: pairs.under(&method.features),
@@ -380,7 +380,7 @@ impl TilePlace {
 
     /// The times at which facing and edges let the triangle be seen.
     fn times(&self, features: &Features, triangle: &Triangle, within: &Box5) -> TimePieces {
-        let edges = Edges::<f64>::new(View::new(triangle, &self.shear, &self.tile, within));
+        let edges = Edges::<f64>::new(TileView::new(triangle, &self.shear, &self.tile, within));
         let mut times = TimePieces::one(Piece { t: within.t, faces: [true; 2] });
         if features.facing {
             times = Facing::new(&edges).timeline(within.t, triangle.faces, features.facing_splits).0;
@@ -428,7 +428,7 @@ pub fn on_subject<T>(
 }
 
 /// The triangle of each sample and the bits of its depth.
-pub type Seen = Vec<(u32, u32)>;
+pub type SeenSamples = Vec<(u32, u32)>;
 
 /// The most tests of a sample against a triangle that brute force may take.
 const MAX_TESTS: u64 = 200_000_000;
@@ -440,7 +440,7 @@ impl Subject<'_> {
     }
 
     /// The triangle that every sample sees with the tests of `features`.
-    pub fn seen(&self, features: Features) -> Result<Seen, PassError> {
+    pub fn seen(&self, features: Features) -> Result<SeenSamples, PassError> {
         self.with(features, |settings| RasterPass::new(self.camera, self.draws, settings).visibility())
     }
 
@@ -453,7 +453,7 @@ impl Subject<'_> {
 
     /// The triangle that every sample has to see: from all triangles against all samples where that is not
     /// too much, else from the pipeline with every test off. Also returns whether it was brute force.
-    pub fn reference(&self) -> Result<(Seen, bool), PassError> {
+    pub fn reference(&self) -> Result<(SeenSamples, bool), PassError> {
         let samples = self.viewport.pixels() as u64 * u64::from(self.samples.per_pixel());
         if samples * self.triangles() <= MAX_TESTS {
             Ok((brute_force(self.camera, self.draws, self.viewport, self.samples), true))
@@ -470,7 +470,7 @@ impl Subject<'_> {
 }
 
 /// Samples that differ: lost to another triangle, to none, or gained.
-pub fn differing(a: &Seen, b: &Seen) -> u64 {
+pub fn differing(a: &SeenSamples, b: &SeenSamples) -> u64 {
     a.iter().zip(b).filter(|(a, b)| a != b).count() as u64 + a.len().abs_diff(b.len()) as u64
 }
 

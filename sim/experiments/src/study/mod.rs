@@ -123,7 +123,7 @@ impl Gallery<'_> {
 
 /// A request for a study.
 #[derive(Clone, Copy, Debug)]
-pub struct Request<'a> {
+pub struct StudyRequest<'a> {
     /// Whether a preview will do.
     pub quick: bool,
     /// Scenes besides its own.
@@ -194,7 +194,7 @@ pub struct StudyEntry {
     /// Whether a seed can be given.
     pub takes_seed: bool,
     claim: fn() -> Claim,
-    run: fn(&Request<'_>) -> Result<Done, StudyError>,
+    run: fn(&StudyRequest<'_>) -> Result<Done, StudyError>,
 }
 
 impl StudyEntry {
@@ -219,12 +219,12 @@ impl StudyEntry {
     ///
     /// # Errors
     /// [`StudyError`], above all when the folder cannot be written to.
-    pub fn run(&self, request: &Request<'_>) -> Result<Done, StudyError> {
+    pub fn run(&self, request: &StudyRequest<'_>) -> Result<Done, StudyError> {
         (self.run)(request)
     }
 }
 
-fn run<S: Study>(request: &Request<'_>) -> Result<Done, StudyError> {
+fn run<S: Study>(request: &StudyRequest<'_>) -> Result<Done, StudyError> {
     let started = Instant::now();
     let effort = if request.quick { S::QUICK } else { S::FULL };
     let effort = match request.seed {

@@ -7,7 +7,7 @@ use output::table::digits;
 use output::{Claim, OutDir, OutputError};
 use serde::Serialize;
 
-use super::table::{Sheet, Table, plain};
+use super::table::{Sheet, TableBuilder, plain};
 
 /// A measured quantity of which less is better, beside that of the reference.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -133,7 +133,7 @@ impl Tradeoff {
 
     /// All numbers.
     pub fn sheet(&self) -> Sheet {
-        Table::of(&self.points)
+        TableBuilder::of(&self.points)
             .column("study", "study", |point| point.study, plain)
             .column("subject", "what is found", |point| point.subject.as_str(), plain)
             .column("method", "method", |point| point.method.as_str(), plain)
@@ -242,7 +242,7 @@ const TEMPLATE_NAME: &str = "charts.html";
 
 /// A study on the page.
 #[derive(Clone, Debug, Default, Serialize)]
-pub struct Section {
+pub struct StudySection {
     /// Name of the study on the command line.
     pub name: String,
     /// Subject of the study, in one line.
@@ -263,7 +263,7 @@ pub struct Index {
     /// The command that makes it.
     pub command: String,
     /// The studies, in the order in which they were made.
-    pub sections: Vec<Section>,
+    pub sections: Vec<StudySection>,
     /// Names of those that are still to come.
     pub missing: Vec<String>,
     /// Methods of all studies between speed and accuracy.
@@ -284,7 +284,7 @@ struct Line<'a> {
     optimal: bool,
 }
 
-impl Section {
+impl StudySection {
     /// Adds the files of the study, by their names relative to the page.
     #[must_use]
     pub fn with_files(mut self, files: Vec<String>) -> Self {
@@ -388,7 +388,8 @@ mod tests {
     #[test]
     fn names_are_escaped_and_speed_against_accuracy_is_there() {
         let folder = tempfile::tempdir().unwrap();
-        let section = Section { name: "<b>".into(), text: "1 < 2".into(), took_s: 1.0, ..Section::default() };
+        let section =
+            StudySection { name: "<b>".into(), text: "1 < 2".into(), took_s: 1.0, ..StudySection::default() };
         let section = section.with_files(["p.csv", "p.png", "p.svg"].map(str::to_owned).into());
         assert_eq!(
             (&section.pictures[..], &section.files[..]),

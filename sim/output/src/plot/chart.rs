@@ -183,7 +183,7 @@ impl<'a> Chart<'a> {
 mod tests {
     use super::super::axis::{AxisSpec, Scale};
     use super::super::picture::Shape;
-    use super::super::series::{Paint, PlotMark, Series, Spread};
+    use super::super::series::{Paint, PlotMark, Series, SpreadPoint};
     use super::*;
 
     fn texts(picture: &Picture) -> Vec<&str> {
@@ -259,7 +259,7 @@ mod tests {
     fn markers_of_every_kind_stay_within_their_panel() {
         let places = [(0.0, 0.0), (1.0, 5.0), (19.0, 1e-3), (19.0, 900.0)];
         let named = || places.map(|(x, y)| (x, y, String::new())).to_vec();
-        let spread = |(x, y)| Spread { at: (x, y), across: [x, x], up: [y, y], name: String::new() };
+        let spread = |(x, y)| SpreadPoint { at: (x, y), across: [x, x], up: [y, y], name: String::new() };
         let marks = || {
             [
                 PlotMark::Dots(named()),

@@ -20,7 +20,7 @@ pub enum PlotMark {
     /// Hollow markers, each with a name that may be empty.
     Rings(Vec<(f64, f64, String)>),
     /// Large markers, each with a cross that shows its spread.
-    Spreads(Vec<Spread>),
+    Spreads(Vec<SpreadPoint>),
     /// Pareto frontier as a staircase: level until the next point.
     Steps(Vec<(f64, f64)>),
     /// Bars from zero, `(from, to, height)`.
@@ -31,7 +31,7 @@ pub enum PlotMark {
 
 /// A point with its spread.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Spread {
+pub struct SpreadPoint {
     /// Position.
     pub at: (f64, f64),
     /// Horizontal range.
@@ -42,7 +42,7 @@ pub struct Spread {
     pub name: String,
 }
 
-impl Spread {
+impl SpreadPoint {
     /// The lines of its cross.
     fn cross(&self) -> [[(f64, f64); 2]; 2] {
         let ((x, y), [x0, x1], [y0, y1]) = (self.at, self.across, self.up);
@@ -222,7 +222,7 @@ impl PlotMark {
                 dots.iter().filter_map(|&(x, y, _)| panel.place((x, y))).collect()
             }
             Self::Spreads(spreads) => {
-                spreads.iter().flat_map(Spread::cross).flat_map(|line| along(&path(&line))).collect()
+                spreads.iter().flat_map(SpreadPoint::cross).flat_map(|line| along(&path(&line))).collect()
             }
             Self::Line(points) | Self::Curve(points) => along(&path(points)),
             Self::Steps(points) => along(&stairs(&path(points))),

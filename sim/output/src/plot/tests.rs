@@ -226,7 +226,7 @@ fn every_mark_is_drawn_and_nothing_says_so() {
         PlotMark::Dots(points("named")),
         PlotMark::Rings(points("ring")),
         PlotMark::Bars(vec![(0.0, 1.0, 3.0)]),
-        PlotMark::Spreads(vec![Spread {
+        PlotMark::Spreads(vec![SpreadPoint {
             at: (0.5, 1.5),
             across: [0.4, 0.8],
             up: [1.0, 2.0],
@@ -268,7 +268,7 @@ fn heat_maps_of_any_shape_fit() {
         let (title, subject) =
             ("samples_tested per pixel, frame 12", "default on reference: 6,364,653 in all");
         for shading in
-            [Shading::Even, Shading::Clipped, Shading::UpTo(4.0), Shading::Classes(&["none", "some"])]
+            [HeatScale::Even, HeatScale::Clipped, HeatScale::UpTo(4.0), HeatScale::Classes(&["none", "some"])]
         {
             let label = "events per pixel";
             let plot = HeatMapPlot { title, subject, label, size, tiles: &tiles, shading, brightness: &[] };

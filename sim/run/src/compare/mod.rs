@@ -16,7 +16,7 @@ use output::image::{LinearImage, encode_png};
 use pipeline::texture::{linear_to_srgb8, srgb8_to_linear};
 use serde::Serialize;
 
-pub use runs::{RunComparison, Setting, TableComparison, ValueChange, shown};
+pub use runs::{ComparedSetting, RunComparison, TableComparison, ValueChange, shown};
 
 /// Error of a comparison.
 #[derive(Debug, thiserror::Error)]

@@ -22,14 +22,14 @@ pub struct RunComparison {
     /// Quantities whose order the stated errors of the runs leave open.
     pub undecided: Vec<String>,
     /// Settings and inputs that differ.
-    pub settings: Vec<Setting>,
+    pub settings: Vec<ComparedSetting>,
     /// All numbers of both runs, in the order of the file.
     pub values: Vec<ValueChange>,
 }
 
 /// A setting or input of both runs.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Setting {
+pub struct ComparedSetting {
     /// Path of the key in the file.
     pub name: String,
     /// Value in A; null if missing.
@@ -193,14 +193,14 @@ pub fn shown(value: &Value) -> String {
     }
 }
 
-fn settings(runs: &[Value; 2]) -> Vec<Setting> {
+fn settings(runs: &[Value; 2]) -> Vec<ComparedSetting> {
     let pairs = SETTINGS.iter().flat_map(|key| leaves(key, [&runs[0][key], &runs[1][key]]));
     let differs = |(name, [a, b]): &(String, [&Value; 2])| {
         a != b && !RESULTS.iter().any(|result| name.starts_with(result))
     };
-    let made = |(name, [a, b]): (String, [&Value; 2])| Setting { name, a: a.clone(), b: b.clone() };
+    let made = |(name, [a, b]): (String, [&Value; 2])| ComparedSetting { name, a: a.clone(), b: b.clone() };
     let [a, b] = runs.each_ref().map(options);
-    let options = (a != b).then(|| Setting { name: "options".to_owned(), a, b });
+    let options = (a != b).then(|| ComparedSetting { name: "options".to_owned(), a, b });
     pairs.filter(differs).map(made).chain(options).collect()
 }
 
@@ -408,7 +408,10 @@ mod tests {
     fn settings_have_paths_and_numbers_have_units() {
         let runs = [run("a", 4, 2.0), run("a", 8, 3.0)];
         let differ = settings(&runs);
-        assert_eq!(differ, [Setting { name: "settings.samples".to_owned(), a: json!(4), b: json!(8) }]);
+        assert_eq!(
+            differ,
+            [ComparedSetting { name: "settings.samples".to_owned(), a: json!(4), b: json!(8) }]
+        );
         let values = values(&runs);
         let energy = values.iter().find(|change| change.name == "energy_j.mean").unwrap();
         assert_eq!((energy.unit.as_str(), energy.difference, energy.ratio), ("J", Some(1.0), Some(1.5)));
@@ -440,8 +443,11 @@ mod tests {
         runs[1]["request"] =
             json!({"options": {"file": null, "set": [["method", "forward"], ["lights", "3"]]}});
         let differ = settings(&runs);
-        let options =
-            Setting { name: "options".to_owned(), a: Value::Null, b: json!("method=forward lights=3") };
+        let options = ComparedSetting {
+            name: "options".to_owned(),
+            a: Value::Null,
+            b: json!("method=forward lights=3"),
+        };
         assert_eq!(differ, [options]);
     }
 

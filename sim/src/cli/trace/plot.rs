@@ -14,7 +14,7 @@ use traces::energy::{FrameEnergy, Histogram, Repeats, mean_over_discarded, whole
 use traces::io::atomic::write_file;
 use traces::io::{ReadError, ReadOptions};
 use traces::pareto::{ParetoPoint, RatedPoint, SettingColumns, frontiers, write_csv};
-use traces::pyramid::{Column, Pyramid, moving_means_w, pyramid_path};
+use traces::pyramid::{Column, PowerPyramid, moving_means_w, pyramid_path};
 use traces::table::InputTable;
 use traces::trace::check_span;
 
@@ -122,7 +122,7 @@ fn span(args: &PlotArgs, start_s: f64, end_s: f64) -> Result<[f64; 2], Failure> 
     Ok([from_s.max(start_s), to_s.min(end_s)])
 }
 
-type Make = fn(&Path, &ReadOptions) -> Result<Pyramid, ReadError>;
+type Make = fn(&Path, &ReadOptions) -> Result<PowerPyramid, ReadError>;
 
 /// The shown time and its columns: from the pyramid beside the file, or from the samples where these are few.
 fn columns(args: &PlotArgs, terminal: &Terminal) -> Result<([f64; 2], Vec<Column>), Failure> {
@@ -130,14 +130,14 @@ fn columns(args: &PlotArgs, terminal: &Terminal) -> Result<([f64; 2], Vec<Column
         // Repairs are listed, so they are made anew each time.
         let trace = args.input.load(terminal)?.0;
         let shown = span(args, trace.start_s(), trace.end_s())?;
-        let columns = Pyramid::of_trace(&trace).columns_of_trace(&trace, shown, COLUMNS);
+        let columns = PowerPyramid::of_trace(&trace).columns_of_trace(&trace, shown, COLUMNS);
         return Ok((shown, columns.unwrap_or_default()));
     }
     let (path, options) = (args.input.trace.as_path(), args.input.options()?);
     args.input.warn_of_columns(path, terminal)?;
     let (pyramid, make): (_, Make) = match args.keep_pyramid {
-        true => (Pyramid::of_file(path, &options)?, Pyramid::anew),
-        false => (Pyramid::look(path, &options)?, Pyramid::build),
+        true => (PowerPyramid::of_file(path, &options)?, PowerPyramid::anew),
+        false => (PowerPyramid::look(path, &options)?, PowerPyramid::build),
     };
     let note = || terminal.note(&format!("{}: damaged; made anew", pyramid_path(path).display()));
     if pyramid.was_damaged() {

@@ -371,7 +371,7 @@ impl Inside for Torus {
 }
 
 impl Volume for Torus {
-    fn has(&self, lane: &Lane, &[x, y, t, ..]: &Point) -> bool {
+    fn has(&self, lane: &Lane, &[x, y, t, ..]: &SamplePoint) -> bool {
         let [x, y, t] = [x, y, t].map(|at| lane.sub(at, 0.5));
         let from_ring = lane.sub(lane.root(lane.madd(y, y, lane.mul(x, x))), self.ring);
         lane.branch(lane.madd(t, t, lane.mul(from_ring, from_ring)) <= self.tube * self.tube)
@@ -421,7 +421,7 @@ impl Prisms {
 }
 
 /// The space of samples: x and y (up) of the unit square, time, and both axes of the lens, -1 to 1.
-pub type Point = [f64; 5];
+pub type SamplePoint = [f64; 5];
 
 mod standard;
 pub use standard::{Blurred, CoveredSamples, Volume, every_sample, fill, standard_mode};

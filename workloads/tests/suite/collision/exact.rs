@@ -4,7 +4,7 @@
 
 use pipeline::random::SplitMix;
 use rayon::prelude::*;
-use workloads::collision::{CollisionMethod, Object, Search};
+use workloads::collision::{CollisionMethod, Object, PairSearch};
 
 use super::{mix, objects_may_collide};
 
@@ -193,7 +193,7 @@ fn scaled([first, second]: &[Vec<Triangle>; 2], units: [f64; 3], aside: i64) -> 
 }
 
 /// A random search. Many triangles are drawn by edges in few tiles only, as that is slow.
-fn search(rng: &mut Rng, triangles: usize) -> Search {
+fn search(rng: &mut Rng, triangles: usize) -> PairSearch {
     let zoom = rng.one_in(6);
     let finest = if triangles > 60 && !zoom { 8 } else { 64 };
     let method = [
@@ -204,7 +204,7 @@ fn search(rng: &mut Rng, triangles: usize) -> Search {
         CollisionMethod::DepthOnly,
     ];
     let resolution = 1 + rng.below(finest) as u32;
-    Search { resolution, bins: 1 + rng.below(16) as u32, method: method[rng.below(5) as usize], zoom }
+    PairSearch { resolution, bins: 1 + rng.below(16) as u32, method: method[rng.below(5) as usize], zoom }
 }
 
 /// Checks that several searches find each contact; counts the pairs separated after one object was moved
@@ -218,7 +218,7 @@ fn separated_when_moved(seeds: std::ops::Range<u64>, searches: usize) -> usize {
             let search = search(&mut rng, objects[0].len() + objects[1].len());
             assert!(objects_may_collide(&objects, &search), "{seed} is missed by {search:?}");
         }
-        let closer = Search { resolution: 64, ..Search::default() };
+        let closer = PairSearch { resolution: 64, ..PairSearch::default() };
         seed.is_multiple_of(20) && !objects_may_collide(&scaled(&exact, [unit; 3], 20 * UNIT), &closer)
     };
     seeds.into_par_iter().map(|seed| usize::from(checked(seed))).sum()

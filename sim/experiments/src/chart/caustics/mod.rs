@@ -4,12 +4,12 @@
 pub(crate) mod measure;
 
 use output::OutputError;
-use output::plot::{ChartPanel, HeatMapPlot, HeatTile, Picture, PlotStyle, Scale, Series, Shading};
+use output::plot::{ChartPanel, HeatMapPlot, HeatScale, HeatTile, Picture, PlotStyle, Scale, Series};
 use output::terminal::Progress;
 use serde::Serialize;
 use workloads::caustics::{BeamMethod, MAX_CROSSED_SHARE};
 
-use crate::study::table::{Sheet, Table, count, fixed, millis, plain};
+use crate::study::table::{Sheet, TableBuilder, count, fixed, millis, plain};
 use crate::study::{Gallery, Study, StudyError};
 
 pub use measure::{Crossed, MethodFrame, OceanCounts, ocean};
@@ -180,27 +180,27 @@ impl Study for CausticsChart {
     fn tables(&self) -> Vec<Sheet> {
         let (ocean, yes_no) = (&self.ocean, |yes: bool| if yes { "yes" } else { "no" }.to_owned());
         let pixels = f64::from(ocean.size[0] * ocean.size[1]);
-        let methods = Table::of(BeamMethod::ALL.into_iter().enumerate())
+        let methods = TableBuilder::of(BeamMethod::ALL.into_iter().enumerate())
             .shown("ocean", |(_, method)| method.name(), plain)
             .shown("executions", |(place, _)| ocean.executions[*place], count)
             .shown("a pixel", |(place, _)| ocean.executions[*place] as f64 / pixels, fixed(1))
             .shown("most", |(place, _)| ocean.most[*place], count)
             .shown("of the prism's", |(place, _)| ocean.of_the_prism(*place), fixed(3))
             .before(format!("{} volumes\n", ocean.volumes));
-        let sweep = Table::of(&self.rows)
+        let sweep = TableBuilder::of(&self.rows)
             .shown("slope", |row| row.slope, plain)
             .shown("crossed", |row| row.crossing, fixed(4))
             .shown("method", |row| row.method.name(), plain)
             .shown("executions", |row| row.executions, count)
             .shown("find light", |row| row.useful, fixed(3))
             .shown("CPU ms", |row| row.cpu_s, millis(1));
-        let coarse = Table::of(&self.coarse)
+        let coarse = TableBuilder::of(&self.coarse)
             .shown("slope", |row| row.slope, plain)
             .shown("cells", |row| row.cells, plain)
             .shown("crossed", |row| row.crossing, fixed(4))
             .shown("error", |row| row.error, fixed(3))
             .shown("warns", |row| row.warned, yes_no);
-        let mut crossed = Table::of(&self.crossed)
+        let mut crossed = TableBuilder::of(&self.crossed)
             .shown("cells", |row| row.cells, plain)
             .shown("pleat", |row| row.pleat, plain)
             .shown("crossed", |row| row.crossing, fixed(4))
@@ -213,7 +213,7 @@ impl Study for CausticsChart {
             crossed = crossed.shown(method, |row| row.useful[place], fixed(3));
         }
         let crossed = crossed.shown("warns", |row| row.warned, yes_no).after("\n");
-        let frames = Table::of(&self.frames)
+        let frames = TableBuilder::of(&self.frames)
             .column("slope", "slope", |row| row.slope, plain)
             .column("method", "method", |row| row.method.name(), plain)
             .column("triangles", "triangles", |row| row.triangles as u64, count)
@@ -295,7 +295,7 @@ impl CausticsChart {
     fn lines(&self) -> Sheet {
         let slopes = self.rows.iter().map(|row| Line::of_slope(row, self.effort.sweep_cells));
         let lines = slopes.chain(self.coarse.iter().map(Line::of_cells));
-        Table::of(lines.chain(self.crossed.iter().flat_map(Line::of_pleat)))
+        TableBuilder::of(lines.chain(self.crossed.iter().flat_map(Line::of_pleat)))
             .data("sweep", |line| line.sweep)
             .data("slope_or_pleat", |line| line.slope_or_pleat)
             .data("cells", |line| line.cells)
@@ -373,7 +373,7 @@ impl OceanCounts {
             label: "executions",
             size: self.size,
             tiles: &self.tiles(place),
-            shading: Shading::UpTo(values.fold(0.0, f64::max)),
+            shading: HeatScale::UpTo(values.fold(0.0, f64::max)),
             brightness: &[],
         }
         .picture(plot_style)

@@ -5,7 +5,7 @@ use serde::Serialize;
 use traces::Trace;
 use traces::energy::{PowerIntegral, TOLERANCE_S, score, true_frames};
 use traces::frames::{FinderMethod, FinderOptions, Marks, default_window, find_with};
-use traces::synth::{HELD_OUT_DEVICES, HeldOutDevice, Scene};
+use traces::synth::{HELD_OUT_DEVICES, HeldOutDevice, SynthScene};
 
 use super::{FAILS_BELOW, HAND_S, MARKED};
 use crate::study::StudyError;
@@ -88,7 +88,7 @@ fn row(
     device: &HeldOutDevice,
     seed: u64,
     method: FinderMethod,
-    scene: &Scene,
+    scene: &SynthScene,
     trace: &Trace,
 ) -> Result<HeldOutRow, StudyError> {
     let truth_s: Vec<f64> = scene.truth.iter().map(|frame| frame.start_s).collect();

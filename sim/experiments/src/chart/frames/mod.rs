@@ -15,10 +15,10 @@ use serde::Serialize;
 use traces::Trace;
 use traces::energy::{FrameEnergy, PowerIntegral, TOLERANCE_S, score, true_frames};
 use traces::frames::{FinderMethod, FinderOptions, Marks, default_window, find_with};
-use traces::synth::{RecorderSpec, SCENARIOS, Scenario, Scene};
+use traces::synth::{RecorderSpec, SCENARIOS, Scenario, SynthScene};
 
 use self::held_out::{HeldOutRow, HeldOutSummary};
-use crate::study::table::{Sheet, Table, fixed, optional, plain, share};
+use crate::study::table::{Sheet, TableBuilder, fixed, optional, plain, share};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
 use crate::study::{Gallery, Study, StudyError};
 
@@ -48,7 +48,7 @@ pub struct FramesEffort {
 /// Search for frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Way {
+pub enum FramesMethod {
     /// Sum of squares to one mark (Paper III).
     Squares,
     /// z-normalized distance to one mark.
@@ -61,7 +61,7 @@ pub enum Way {
     Auto,
 }
 
-impl Way {
+impl FramesMethod {
     /// All of them, in the order of their colours.
     pub const ALL: [Self; 5] = [Self::Squares, Self::Normalized, Self::Templates, Self::Tracking, Self::Auto];
 
@@ -137,7 +137,7 @@ pub struct FramesRow {
     /// The scene.
     pub scene: &'static str,
     /// The method.
-    pub way: Way,
+    pub way: FramesMethod,
     /// Quality of the starts found.
     #[serde(flatten)]
     pub outcome: FinderScore,
@@ -231,7 +231,7 @@ impl Study for FramesChart {
     }
 
     fn tables(&self) -> Vec<Sheet> {
-        let rows = Table::of(&self.rows)
+        let rows = TableBuilder::of(&self.rows)
             .data("axis", |row| row.axis.name())
             .data("value", |row| row.value)
             .data("scene", |row| row.scene)
@@ -245,7 +245,7 @@ impl Study for FramesChart {
             .data("right_flagged", |row| row.outcome.flags.right_with)
             .data("host_s_per_1e6", |row| row.outcome.host_s_per_1e6)
             .csv("frame_finding.csv");
-        let devices = Table::of(&self.held_out)
+        let devices = TableBuilder::of(&self.held_out)
             .data("witness", |row| row.device)
             .data("seed", |row| row.seed)
             .data("method", |row| row.method)
@@ -266,7 +266,7 @@ impl Study for FramesChart {
 
     /// Every method at each ratio of signal to noise, over all scenes.
     fn tradeoff(&self) -> Vec<TradeoffPoint> {
-        let at = |snr_db: f64, way: Way| {
+        let at = |snr_db: f64, way: FramesMethod| {
             let mean = |of: fn(&FinderScore) -> Option<f64>| self.mean(FramesAxis::Noise, snr_db, way, of);
             let cost = mean(|o| Some(o.host_s_per_1e6));
             let f1 =
@@ -282,7 +282,7 @@ impl Study for FramesChart {
             [f1, energy].into_iter().flatten().filter_map(point).collect::<Vec<_>>()
         };
         let values = self.values(FramesAxis::Noise).into_iter();
-        values.flat_map(|snr_db| Way::ALL.map(|way| at(snr_db, way))).flatten().collect()
+        values.flat_map(|snr_db| FramesMethod::ALL.map(|way| at(snr_db, way))).flatten().collect()
     }
 }
 
@@ -296,7 +296,7 @@ impl FramesChart {
     }
 
     /// The rows of one method at one value, a row for each scene.
-    fn at(&self, axis: FramesAxis, value: f64, way: Way) -> impl Iterator<Item = &FramesRow> {
+    fn at(&self, axis: FramesAxis, value: f64, way: FramesMethod) -> impl Iterator<Item = &FramesRow> {
         self.rows.iter().filter(move |row| row.axis == axis && row.value == value && row.way == way)
     }
 
@@ -305,7 +305,7 @@ impl FramesChart {
         &self,
         axis: FramesAxis,
         value: f64,
-        way: Way,
+        way: FramesMethod,
         of: fn(&FinderScore) -> Option<f64>,
     ) -> Option<f64> {
         let values: Vec<f64> = self.at(axis, value, way).filter_map(|row| of(&row.outcome)).collect();
@@ -313,7 +313,7 @@ impl FramesChart {
     }
 
     /// A curve over the places of the values, without those at which nothing is known.
-    fn along(&self, axis: FramesAxis, way: Way, of: fn(&FinderScore) -> Option<f64>) -> Series {
+    fn along(&self, axis: FramesAxis, way: FramesMethod, of: fn(&FinderScore) -> Option<f64>) -> Series {
         let means = self.values(axis).into_iter().map(|value| self.mean(axis, value, way, of)).enumerate();
         Series::curve(way.name(), means.filter_map(|(place, mean)| Some((place as f64, mean?))))
     }
@@ -322,37 +322,38 @@ impl FramesChart {
     fn found(&self, axis: FramesAxis) -> ChartPanel {
         let last = self.values(axis).len().saturating_sub(1) as f64;
         let limit = Series::new("fails below", PlotMark::Line(vec![(0.0, FAILS_BELOW), (last, FAILS_BELOW)]));
-        let curves = Way::ALL.into_iter().map(|way| self.along(axis, way, |o| Some(o.f1)));
+        let curves = FramesMethod::ALL.into_iter().map(|way| self.along(axis, way, |o| Some(o.f1)));
         let series = curves.chain([limit.painted(Paint::Ink)]).collect();
         ChartPanel::new("", ["", "F1 of starts within 0.5 ms"], series).on(Scale::Even, Scale::FromZero)
     }
 
     fn energy(&self, axis: FramesAxis) -> ChartPanel {
         let percent: fn(&FinderScore) -> Option<f64> = |o| o.energy_error.map(|error| 100.0 * error);
-        let curves = Way::ALL.into_iter().map(|way| self.along(axis, way, percent)).collect();
+        let curves = FramesMethod::ALL.into_iter().map(|way| self.along(axis, way, percent)).collect();
         ChartPanel::new("", ["", "median energy error (%)"], curves)
     }
 
     fn host_time(&self) -> ChartPanel {
-        let of = |way: Way| self.timed(way).into_iter().map(|(rate_hz, host_s, _)| (rate_hz, host_s));
+        let of =
+            |way: FramesMethod| self.timed(way).into_iter().map(|(rate_hz, host_s, _)| (rate_hz, host_s));
         let axes = ["sampling rate, Hz", "host seconds for a million samples"];
-        let curves = Way::ALL.map(|way| Series::curve(way.name(), of(way)));
+        let curves = FramesMethod::ALL.map(|way| Series::curve(way.name(), of(way)));
         ChartPanel::new("time over sampling rate", axes, curves.into())
     }
 
     fn found_over_time(&self) -> ChartPanel {
-        let curve = |way: Way| {
+        let curve = |way: FramesMethod| {
             let mut points: Vec<(f64, f64)> =
                 self.timed(way).into_iter().map(|(_, host_s, f1)| (host_s, f1)).collect();
             points.sort_by(|a, b| a.0.total_cmp(&b.0));
             Series::curve(way.name(), points)
         };
         let axes = ["host seconds for a million samples", "F1"];
-        ChartPanel::new("F1 over time, a dot for each rate", axes, Way::ALL.map(curve).into())
+        ChartPanel::new("F1 over time, a dot for each rate", axes, FramesMethod::ALL.map(curve).into())
     }
 
     /// Rate, host seconds for a million samples, and F1.
-    fn timed(&self, way: Way) -> Vec<(f64, f64, f64)> {
+    fn timed(&self, way: FramesMethod) -> Vec<(f64, f64, f64)> {
         let point = |rate_hz: f64| {
             let mean = |of| self.mean(FramesAxis::Rate, rate_hz, way, of);
             Some((rate_hz, mean(|o| Some(o.host_s_per_1e6))?, mean(|o| Some(o.f1))?))
@@ -365,17 +366,17 @@ impl FramesChart {
         let each = FramesAxis::ALL
             .into_iter()
             .flat_map(|axis| self.values(axis).into_iter().map(move |at| (axis, at)));
-        let mut table = Table::of(each).shown("axis", |(axis, _)| axis.name(), plain).shown(
+        let mut table = TableBuilder::of(each).shown("axis", |(axis, _)| axis.name(), plain).shown(
             "value",
             |(axis, value)| axis.shown(*value),
             plain,
         );
-        for way in Way::ALL {
+        for way in FramesMethod::ALL {
             table = table.shown(way.name(), |(axis, value)| self.cell(*axis, *value, way), plain);
         }
-        let energy = |axis, value| self.mean(axis, value, Way::Auto, |o| o.energy_error);
+        let energy = |axis, value| self.mean(axis, value, FramesMethod::Auto, |o| o.energy_error);
         let flags = |(axis, value): &(FramesAxis, f64)| {
-            AlarmCount::sum(self.at(*axis, *value, Way::Auto).map(|row| &row.outcome.flags))
+            AlarmCount::sum(self.at(*axis, *value, FramesMethod::Auto).map(|row| &row.outcome.flags))
         };
         table
             .detail("energy error, auto", |(axis, value)| energy(*axis, *value), optional(share(3)))
@@ -388,7 +389,7 @@ impl FramesChart {
     /// Every method on every kind of device.
     fn by_device(&self) -> Sheet {
         let below = |of: &HeldOutSummary| format!("{} of {}", of.below_simple, of.devices);
-        Table::of(held_out::summaries(&self.held_out))
+        TableBuilder::of(held_out::summaries(&self.held_out))
             .detail("device", |of| of.device, plain)
             .detail("method", |of| of.method, plain)
             .detail("F1, first mark", |of| of.first, fixed(3))
@@ -403,7 +404,7 @@ impl FramesChart {
     }
 
     /// F1 with the number of scenes that fail; marked where the mean does.
-    fn cell(&self, axis: FramesAxis, value: f64, way: Way) -> String {
+    fn cell(&self, axis: FramesAxis, value: f64, way: FramesMethod) -> String {
         let f1 = self.mean(axis, value, way, |o| Some(o.f1)).unwrap_or(0.0);
         let failed = self.at(axis, value, way).filter(|row| row.fails).count();
         let mark = if f1 < FAILS_BELOW { "*" } else { "" };
@@ -415,11 +416,14 @@ impl FramesChart {
     fn by_scene(&self) -> Sheet {
         let usual =
             self.values(FramesAxis::Rate).into_iter().rfind(|&rate_hz| rate_hz <= 50e3).unwrap_or(0.0);
-        let at = |way: Way| self.at(FramesAxis::Rate, usual, way).collect::<Vec<_>>();
+        let at = |way: FramesMethod| self.at(FramesAxis::Rate, usual, way).collect::<Vec<_>>();
         let f1 = |row: &FramesRow| format!("{:.3}{}", row.outcome.f1, if row.fails { "*" } else { "" });
-        let mut table =
-            Table::of(at(Way::Auto).into_iter().enumerate()).detail("scene", |(_, row)| row.scene, plain);
-        for way in Way::ALL {
+        let mut table = TableBuilder::of(at(FramesMethod::Auto).into_iter().enumerate()).detail(
+            "scene",
+            |(_, row)| row.scene,
+            plain,
+        );
+        for way in FramesMethod::ALL {
             let rows = at(way);
             table = table.detail(way.name(), |(place, _)| f1(rows[*place]), plain);
         }
@@ -450,7 +454,7 @@ pub struct FinderScore {
 /// A scenario with every seed.
 struct Subject {
     pub name: &'static str,
-    scenes: Vec<(u64, Scene)>,
+    scenes: Vec<(u64, SynthScene)>,
 }
 
 impl Subject {
@@ -461,8 +465,11 @@ impl Subject {
     }
 
     /// By each method, the outcome with each seed.
-    pub fn analyse(&self, recording: &RecorderSpec) -> Result<Vec<(Way, Vec<FinderScore>)>, StudyError> {
-        let mut of = Way::ALL.map(|way| (way, Vec::new()));
+    pub fn analyse(
+        &self,
+        recording: &RecorderSpec,
+    ) -> Result<Vec<(FramesMethod, Vec<FinderScore>)>, StudyError> {
+        let mut of = FramesMethod::ALL.map(|way| (way, Vec::new()));
         for (seed, scene) in &self.scenes {
             let trace = scene.record(&RecorderSpec { seed: *seed, ..*recording })?;
             for (way, outcomes) in &mut of {
@@ -474,13 +481,13 @@ impl Subject {
 }
 
 /// Marks some frames, finds the others and holds them against the truth.
-fn analyse(trace: &Trace, scene: &Scene, way: Way) -> Result<FinderScore, StudyError> {
+fn analyse(trace: &Trace, scene: &SynthScene, way: FramesMethod) -> Result<FinderScore, StudyError> {
     let (count, method) = match way {
-        Way::Squares => (1, FinderMethod::SumOfSquares),
-        Way::Normalized => (1, FinderMethod::Normalized),
-        Way::Templates => (MARKED.len(), FinderMethod::SumOfSquares),
-        Way::Tracking => (1, FinderMethod::Tracking),
-        Way::Auto => (1, FinderMethod::Auto),
+        FramesMethod::Squares => (1, FinderMethod::SumOfSquares),
+        FramesMethod::Normalized => (1, FinderMethod::Normalized),
+        FramesMethod::Templates => (MARKED.len(), FinderMethod::SumOfSquares),
+        FramesMethod::Tracking => (1, FinderMethod::Tracking),
+        FramesMethod::Auto => (1, FinderMethod::Auto),
     };
     let frame = |share: f64| &scene.truth[(share * scene.truth.len() as f64) as usize];
     let marks_s = MARKED.iter().zip(HAND_S).map(|(&share, hand_s)| frame(share).start_s + hand_s);
@@ -504,7 +511,7 @@ fn analyse(trace: &Trace, scene: &Scene, way: Way) -> Result<FinderScore, StudyE
 
 /// How many frames are wrong and right, and how many of each carry a flag. The last one ends at the end mark
 /// and is left out.
-fn flags(frames: &[FrameEnergy], scene: &Scene) -> AlarmCount {
+fn flags(frames: &[FrameEnergy], scene: &SynthScene) -> AlarmCount {
     let found_s: Vec<f64> = frames.iter().map(|frame| frame.start_s).collect();
     let truth_s: Vec<f64> = scene.truth.iter().map(|frame| frame.start_s).collect();
     let mut flags = AlarmCount::default();
@@ -549,8 +556,9 @@ mod tests {
     #[test]
     fn tracking_finds_the_frames_of_every_scene_and_few_samples_leave_hardly_any() {
         let (dir, chart) = small();
-        assert_eq!(chart.rows.len(), 3 * SCENARIOS.len() * Way::ALL.len());
-        let f1 = |rate_hz| chart.mean(FramesAxis::Rate, rate_hz, Way::Tracking, |o| Some(o.f1)).unwrap();
+        assert_eq!(chart.rows.len(), 3 * SCENARIOS.len() * FramesMethod::ALL.len());
+        let f1 =
+            |rate_hz| chart.mean(FramesAxis::Rate, rate_hz, FramesMethod::Tracking, |o| Some(o.f1)).unwrap();
         assert!(f1(20e3) > 0.95 && f1(1e3) < f1(20e3), "{} {}", f1(1e3), f1(20e3));
         for row in &chart.rows {
             assert_eq!(row.fails, row.outcome.f1 < FAILS_BELOW);

@@ -9,7 +9,7 @@ use pipeline::{
 };
 use run::GpuSpec;
 use serde::Serialize;
-use workloads::multiview::{Layout, Rig, Target, Views};
+use workloads::multiview::{Layout, MultiviewRig, ViewTarget, Views};
 use workloads::{Frame, Overrides, Scene};
 
 use super::{SAMPLES, line, stereo};
@@ -18,7 +18,7 @@ use crate::study::{Ran, StudyError};
 
 /// Cost of one way to render all views.
 #[derive(Clone, Copy, Debug, Serialize)]
-pub struct Run {
+pub struct ViewsRun {
     /// Passes over the geometry.
     pub passes: u32,
     /// Pixel shader lanes run, helpers included.
@@ -41,11 +41,11 @@ pub struct ViewsRow {
     /// Samples for each view of a pixel; fewer where all of them do not fit in a pixel.
     pub samples_per_view: u32,
     /// All in one pass.
-    pub one_pass: Run,
+    pub one_pass: ViewsRun,
     /// A pass each.
-    pub view_by_view: Run,
+    pub view_by_view: ViewsRun,
     /// A pass for each sample.
-    pub accumulation: Run,
+    pub accumulation: ViewsRun,
 }
 
 /// One shading cache.
@@ -91,7 +91,7 @@ pub struct Angle {
 
 /// Tile tests of all views in one pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-pub struct TileTests {
+pub struct TileTestCosts {
     /// Tiles culled by the tests of the sides and of the lens, coarse and fine ones.
     pub tiles_culled: u64,
     /// Multiply-adds of tile tests.
@@ -110,9 +110,9 @@ pub struct RegionTests {
     /// Length of the camera line over the distance of what is in focus.
     pub baseline: f64,
     /// One test over the whole lens.
-    pub whole: TileTests,
+    pub whole: TileTestCosts,
     /// A test of `u` over each region.
-    pub each: TileTests,
+    pub each: TileTestCosts,
     /// Whether the images are equal to the bit.
     pub equal: bool,
 }
@@ -162,14 +162,14 @@ impl MultiviewBench {
         f64::from(self.focus)
     }
 
-    fn rig(&self, layout: &Layout, samples: u32) -> Result<Rig, StudyError> {
+    fn rig(&self, layout: &Layout, samples: u32) -> Result<MultiviewRig, StudyError> {
         let strips = layout.overlap.max(1);
         let per_strip = (samples / strips).min(256 / layout.strips());
-        Ok(Rig::new(&self.frame.camera, self.focus, layout, per_strip * strips, 1)?)
+        Ok(MultiviewRig::new(&self.frame.camera, self.focus, layout, per_strip * strips, 1)?)
     }
 
-    fn target<'a>(&self, spec: &'a PipelineSpec) -> Target<'a> {
-        Target { viewport: self.viewport, spec, background: self.scene.background(), places: &[] }
+    fn target<'a>(&self, spec: &'a PipelineSpec) -> ViewTarget<'a> {
+        ViewTarget { viewport: self.viewport, spec, background: self.scene.background(), places: &[] }
     }
 
     /// All ways of rendering so many views: two are apart as eyes are, others overlap.
@@ -184,7 +184,7 @@ impl MultiviewBench {
             let host_s = started.elapsed().as_secs_f64();
             let counts = &views.counts;
             let invocations = counts[Event::PixelInvocations];
-            Ok::<_, StudyError>(Run {
+            Ok::<_, StudyError>(ViewsRun {
                 passes: views.passes,
                 invocations,
                 over_one_view: invocations as f64 / one as f64,
@@ -205,10 +205,10 @@ impl MultiviewBench {
     /// Lanes that the view nearest to the middle takes alone, and its work.
     fn one_view(
         &self,
-        rig: &Rig,
+        rig: &MultiviewRig,
         layout: &Layout,
         draws: &[Draw<'_>],
-        to: &Target<'_>,
+        to: &ViewTarget<'_>,
     ) -> Result<(u64, Ran), StudyError> {
         let middle = (layout.views as usize - 1) / 2;
         let mut gpu = Gpu::without_packets(to.spec)?;
@@ -306,10 +306,10 @@ impl MultiviewBench {
     }
 }
 
-fn tests(counts: &Counts) -> TileTests {
+fn tests(counts: &Counts) -> TileTestCosts {
     // With screens every sample that is left is screened.
     let samples = counts[Event::SamplesScreened].max(counts[Event::SamplesTested]);
-    TileTests {
+    TileTestCosts {
         tiles_culled: counts[Event::TilesCulledSides] + counts[Event::TilesCulledLens],
         tile_madds: counts[Event::TileMadds],
         samples,

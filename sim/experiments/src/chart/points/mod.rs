@@ -17,7 +17,7 @@ use workloads::points::white::{
 };
 use workloads::points::{bridson, plain_darts};
 
-use crate::study::table::{Sheet, Table, count, fixed, plain};
+use crate::study::table::{Sheet, TableBuilder, count, fixed, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
 use crate::study::{Gallery, Study, StudyError};
 use workloads::points::job::{MAX_CANDIDATES_PER_POINT, MIN_DRAWN_SHARE};
@@ -103,7 +103,7 @@ impl Study for PointsChart {
 
     fn tables(&self) -> Vec<Sheet> {
         let free = |free_share: f64| format!("{free_share:.1e}");
-        let rows = Table::of(&self.rows)
+        let rows = TableBuilder::of(&self.rows)
             .column("dimensions", "D", |row| row.dimensions, plain)
             .data("method", |row| row.method)
             .data("effort", |row| row.effort)
@@ -122,18 +122,18 @@ impl Study for PointsChart {
             .column("peak_power", "peak", |row| row.peak.1, fixed(2))
             .detail("at", |row| row.peak.0, fixed(2))
             .csv("points.csv");
-        let coarse = Table::of(&self.coarse)
+        let coarse = TableBuilder::of(&self.coarse)
             .shown("r in spacings of numbers", |c| c.radius_ulp, fixed(0))
             .shown("points", |c| c.points, count)
             .shown("thin regions", |c| c.thin_regions, count)
             .shown("hole beyond r", |c| c.beyond, |beyond| format!("{beyond:.1e} r"));
-        let columns = Table::of(&self.columns)
+        let columns = TableBuilder::of(&self.columns)
             .detail("D", |c| c.dimensions, plain)
             .detail("columns", |c| c.across, plain)
             .detail("candidates a point", |c| c.candidates_each, fixed(3))
             .detail("p", |c| c.p, fixed(3))
             .detail("p, low discrepancy", |c| c.p_low_discrepancy, fixed(4));
-        let drawn = Table::of(&self.drawn)
+        let drawn = TableBuilder::of(&self.drawn)
             .column("kind", "points", |row| row.kind, plain)
             .column("dimensions", "D", |row| row.dimensions, plain)
             .column("points", "number", |row| row.points, count)

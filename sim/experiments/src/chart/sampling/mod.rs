@@ -13,7 +13,7 @@ use output::terminal::Progress;
 use serde::Serialize;
 
 use super::exponent;
-use crate::study::table::{Sheet, Table, fixed, optional, plain};
+use crate::study::table::{Sheet, TableBuilder, fixed, optional, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
 use crate::study::{Gallery, Study, StudyError};
 
@@ -137,7 +137,7 @@ impl Study for SamplingChart {
         let exponents = self.rows.iter().chain(&self.failures.many_edges);
         let most = format!("RMSE at {} samples", self.effort.most_samples);
         let rmse = |point: Option<&SamplingPoint>| point.map(|point| point.rmse);
-        let mut exponents = Table::of(exponents)
+        let mut exponents = TableBuilder::of(exponents)
             .shown("scene", |row| row.scene, plain)
             .shown("table", |row| row.table, plain)
             .shown("exponent", |row| row.exponent, optional(fixed(2)))
@@ -148,12 +148,12 @@ impl Study for SamplingChart {
             let heading = format!("n = {}", point.samples_per_pixel);
             exponents = exponents.detail(&heading, |row| rmse(row.points.get(place)), optional(fixed(4)));
         }
-        let shared = Table::of(&self.failures.shared)
+        let shared = TableBuilder::of(&self.failures.shared)
             .detail("table", |row| row.table, plain)
             .detail("samples", |row| row.samples_per_pixel, plain)
             .detail("RMSE", |row| row.rmse, fixed(4))
             .detail("correlation of neighbours' errors", |row| row.neighbour_correlation, fixed(2));
-        let points = Table::of(self.points())
+        let points = TableBuilder::of(self.points())
             .data("chart", |(chart, ..)| *chart)
             .data("scene", |(_, row, _)| row.scene)
             .data("table", |(_, row, _)| row.table)

@@ -6,7 +6,7 @@ use timing::Level;
 
 use super::{ErrorRow, LEVELS, StatedErrorsChart};
 use crate::chart::quantiles;
-use crate::study::table::{Sheet, Table, optional, percent, plain, share};
+use crate::study::table::{Sheet, TableBuilder, optional, percent, plain, share};
 
 /// Error of cycles that `packet` promises to warn of, as a share.
 const FAR: f64 = 0.08;
@@ -203,7 +203,7 @@ fn flips_by(rows: &[ErrorRow], level: Level, by: &'static str) -> Flips {
 impl StatedErrorsChart {
     /// Errors and warnings of the levels.
     pub(super) fn level_sheet(&self) -> Sheet {
-        Table::of(&self.levels)
+        TableBuilder::of(&self.levels)
             .shown("level", |row| row.level.name(), plain)
             .shown("runs", |row| row.runs, plain)
             .shown("cycles: median", |row| row.cycles_median_percent, percent(2))
@@ -220,7 +220,7 @@ impl StatedErrorsChart {
 
     /// Stated errors. The file is the one that the program reads.
     pub(super) fn group_sheet(&self) -> Sheet {
-        Table::of(&self.groups)
+        TableBuilder::of(&self.groups)
             .column("level", "level", |row| row.level.name(), plain)
             .column("warns", "warns", |row| row.warns.to_string(), plain)
             .column("runs", "runs", |row| row.runs, plain)
@@ -236,7 +236,7 @@ impl StatedErrorsChart {
 
     /// Pairs of GPUs.
     pub(super) fn flip_sheet(&self) -> Sheet {
-        Table::of(&self.flips)
+        TableBuilder::of(&self.flips)
             .shown("level", |row| row.level.name(), plain)
             .shown("order by", |row| row.by, plain)
             .shown("pairs of GPUs", |row| row.pairs, plain)
@@ -247,7 +247,7 @@ impl StatedErrorsChart {
 
     /// Every run.
     pub(super) fn row_sheet(&self) -> Sheet {
-        Table::of(&self.rows)
+        TableBuilder::of(&self.rows)
             .data("subject", |row| row.subject.as_str())
             .data("gpu", |row| row.gpu)
             .data("level", |row| row.level.name())

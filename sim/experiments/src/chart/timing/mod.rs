@@ -14,7 +14,7 @@ use serde::Serialize;
 use timing::Level;
 
 use super::quantiles;
-use crate::study::table::{Sheet, Table, fixed, percent, plain};
+use crate::study::table::{Sheet, TableBuilder, fixed, percent, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
 use crate::study::{Gallery, Study, StudyError};
 
@@ -267,7 +267,7 @@ impl TimingChart {
             true => "-".to_owned(),
             false => format!("{:.0} %", f.added_percent),
         };
-        Table::of(&self.levels)
+        TableBuilder::of(&self.levels)
             .shown("level", |(name, _)| **name, plain)
             .shown("cycles: median", |(_, f)| f.cycle_error_median_percent, percent(2))
             .shown("95 %", |(_, f)| f.cycle_error_p95_percent, percent(2))
@@ -293,7 +293,7 @@ impl TimingChart {
             });
             each.collect::<Vec<_>>().join(", ")
         };
-        Table::of(self.subjects())
+        TableBuilder::of(self.subjects())
             .detail("frame", |row| row.scene.as_str(), plain)
             .detail("cycles", |row| row.stepped_cycles, plain)
             .detail(&format!("packet, % on {}", GPUS.join(", ")), |row| of(&row.scene, LEVELS[0]), plain)
@@ -314,7 +314,7 @@ impl TimingChart {
 
     /// Every scene on every GPU at every level but the reference.
     fn row_sheet(&self) -> Sheet {
-        Table::of(&self.rows)
+        TableBuilder::of(&self.rows)
             .data("scene", |row| row.scene.as_str())
             .data("gpu", |row| row.gpu.as_str())
             .data("level", |row| row.level.name())
@@ -353,7 +353,7 @@ impl TimingChart {
             let of = ["frame, timing alone", &row.scene, &row.gpu, row.level.name()];
             (of, None, 1.0 / row.speedup_over_stepped, row.cycle_error_percent)
         });
-        Table::of(animations.chain(frames))
+        TableBuilder::of(animations.chain(frames))
             .data("kind", |(of, ..)| of[0])
             .data("scene", |(of, ..)| of[1])
             .data("gpu", |(of, ..)| of[2])
@@ -368,7 +368,7 @@ impl TimingChart {
     /// Streams that break levels, a row for each level.
     fn failure_sheet(&self) -> Sheet {
         let each = self.failures.iter().flat_map(|row| row.levels.iter().map(move |found| (row, found)));
-        Table::of(each)
+        TableBuilder::of(each)
             .data("stream", |(row, _)| row.stream)
             .data("gpu", |(row, _)| row.gpu.as_str())
             .data("stepped_cycles", |(row, _)| row.stepped_cycles)
@@ -393,7 +393,7 @@ impl TimingChart {
                 .flat_map(|(level, found)| found.warns.iter().map(move |code| format!("{code} at {level}")));
             each.collect::<Vec<_>>().join(", ")
         };
-        let mut table = Table::of(&self.failures)
+        let mut table = TableBuilder::of(&self.failures)
             .detail("stream", |row| row.stream, plain)
             .detail("GPU", |row| row.gpu.as_str(), plain)
             .detail("cycles", |row| row.stepped_cycles, plain)
@@ -415,7 +415,7 @@ impl TimingChart {
         let of =
             |level: Level| move |row: &&RateRow| row.giga_per_s.get(level.name()).copied().unwrap_or(0.0);
         let [stepped, packet, bound] = Level::ALL;
-        Table::of(&self.rates)
+        TableBuilder::of(&self.rates)
             .detail("rate", |row| row.rate, plain)
             .detail("stepped", |row| format!("{:.1} G{}", of(stepped)(row), row.unit), plain)
             .detail("packet", of(packet), fixed(1))

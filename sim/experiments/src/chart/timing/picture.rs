@@ -1,6 +1,8 @@
 //! Speed against accuracy of all levels in one picture.
 
-use output::plot::{AxisSpec, Chart, ChartPanel, Paint, Picture, PlotMark, PlotStyle, Scale, Series, Spread};
+use output::plot::{
+    AxisSpec, Chart, ChartPanel, Paint, Picture, PlotMark, PlotStyle, Scale, Series, SpreadPoint,
+};
 use timing::Level;
 
 use super::animations::SAMPLED;
@@ -75,7 +77,7 @@ impl TimingChart {
     fn medians(&self) -> String {
         let one = |level: &&str| {
             let points = self.animations_at(level);
-            let Spread { at, up, .. } = spread(&points, level)?;
+            let SpreadPoint { at, up, .. } = spread(&points, level)?;
             let (median, [low, high]) = (at.1, up);
             Some(format!("{level} {median:.3} % ({low:.3} to {high:.3} %, {})", points.len()))
         };
@@ -97,12 +99,12 @@ impl TimingChart {
 }
 
 /// Median and the ends of the middle half of both.
-fn spread(points: &[Point], level: &str) -> Option<Spread> {
+fn spread(points: &[Point], level: &str) -> Option<SpreadPoint> {
     points.first()?;
     let (x, y) =
         (quantiles(points.iter().map(|point| point.0)), quantiles(points.iter().map(|point| point.1)));
     let name = level.to_owned();
-    Some(Spread { at: (x(0.5), y(0.5)), across: [x(0.25), x(0.75)], up: [y(0.25), y(0.75)], name })
+    Some(SpreadPoint { at: (x(0.5), y(0.5)), across: [x(0.25), x(0.75)], up: [y(0.25), y(0.75)], name })
 }
 
 #[cfg(test)]

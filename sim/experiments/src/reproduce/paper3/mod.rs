@@ -11,9 +11,9 @@ use traces::energy::{PowerIntegral, Score};
 use traces::frames::FinderMethod;
 
 use super::report::{POWER, TIME, dots, line};
-use super::row::{Row, Verdict, With, numbers};
+use super::row::{ClaimRow, Verdict, With, numbers};
 use super::settings::{
-    About, Form, Setting, SettingsOrigin, load, paper_settings, reduced, row_settings, settings_group,
+    About, Form, RowSetting, SettingsOrigin, load, paper_settings, reduced, row_settings, settings_group,
 };
 use super::stage::{Frames, MARKED, Stage, TracedRun, looped};
 use super::{Done, Figure, Paper, ReproduceOptions};
@@ -246,7 +246,7 @@ fn found(bench: &Bench<'_>) -> Result<Done, RunError> {
         shown_frames("III_fig3", "Two frames at 30 Hz (Paper III, Figure 3)", &capped, 2),
         shown_frames("III_fig4", "Three frames without V-sync (Paper III, Figure 4)", &free, 3),
     ];
-    Ok(Done { row: Row { numbers: facts, ran, ..made }, figures })
+    Ok(Done { row: ClaimRow { numbers: facts, ran, ..made }, figures })
 }
 
 /// How well starts were found over several recordings.
@@ -375,5 +375,5 @@ fn sums(bench: &Bench<'_>) -> Result<Done, RunError> {
     ]);
     let verdict = Verdict::of(new < same && old.abs() > same);
     let made = with.row(&with.settings.about, (ours, verdict, String::new()));
-    Ok(Done::bare(Row { numbers: facts, ran, ..made }))
+    Ok(Done::bare(ClaimRow { numbers: facts, ran, ..made }))
 }

@@ -7,12 +7,12 @@ use rayon::prelude::*;
 use run::{GpuSpec, RunError};
 use workloads::collision::families::{Case, cases};
 use workloads::collision::{
-    CollisionMethod, Object, Overlaps, PassWork, PlainPasses, Search, Sweeps, candidates, detect_each,
+    CollisionMethod, Object, Overlaps, PairSearch, PassWork, PlainPasses, Sweeps, candidates, detect_each,
 };
 use workloads::shapes;
 
 use super::super::report::over_doublings;
-use super::super::row::{Cases, Row, RowNumber, numbers};
+use super::super::row::{Cases, ClaimRow, RowNumber, numbers};
 use super::super::{Done, Figure};
 use super::figures::{Ends, overlaps};
 use super::settings::{Moving, Shape, TwoObjects};
@@ -273,7 +273,7 @@ pub(super) fn missed(task: &Task<'_>) -> Result<Done, RunError> {
         ("generated_cases", own.len() as f64),
     ];
     let facts = numbers(counted).into_iter().chain(facts(&comparisons, &public)).collect();
-    Ok(Done::bare(Row { numbers: facts, ran: comparisons.ran(&on_hardware.work), note, ..made }))
+    Ok(Done::bare(ClaimRow { numbers: facts, ran: comparisons.ran(&on_hardware.work), note, ..made }))
 }
 
 /// How many cases of each kind there are, and how many of those that do not collide are kept.
@@ -319,7 +319,7 @@ fn public_text(public: &Public, given: bool) -> String {
 /// Pairs that collide and that `quintile ccd` misses.
 fn missed_closer(pairs: &[Pair]) -> usize {
     let cases: Vec<&[Object]> = pairs.iter().map(Pair::as_slice).collect();
-    let answers = detect_each(&cases, &Search::default(), || ());
+    let answers = detect_each(&cases, &PairSearch::default(), || ());
     answers.iter().filter(|answers| !any_kept(answers)).count()
 }
 
@@ -387,7 +387,7 @@ pub(super) fn dodged(task: &Task<'_>) -> Result<Done, RunError> {
         overlaps(&case.name, [&first, &second], *row.resolution_px.get(form))
     };
     let figures = shown.map(figure).into_iter().collect();
-    Ok(Done { row: Row { ran: ran(&there, &drawn), ..made }, figures })
+    Ok(Done { row: ClaimRow { ran: ran(&there, &drawn), ..made }, figures })
 }
 
 /// Whether boxes of time and depth, and of depth alone, say of a case what they have to.
@@ -486,8 +486,11 @@ pub(super) fn tighter(task: &Task<'_>) -> Result<Done, RunError> {
         ("fragments_on_the_modelled_hardware", kept_there[1] as f64),
     ]);
     let figure = curves(&resolutions, [("fragment against box", &fragments), ("box against box", &boxes)]);
-    let row =
-        Row { numbers: facts, ran: ran(&on_hardware.work, &drawn), ..with.banded(&row.about, ours, band) };
+    let row = ClaimRow {
+        numbers: facts,
+        ran: ran(&on_hardware.work, &drawn),
+        ..with.banded(&row.about, ours, band)
+    };
     Ok(Done { row, figures: vec![figure] })
 }
 

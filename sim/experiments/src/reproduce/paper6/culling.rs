@@ -19,7 +19,7 @@ use super::{Task, catalogue};
 use crate::chart::occlusion::{Drawn, OcclusionBlur, QueryAnswers};
 use crate::reproduce::Done;
 use crate::reproduce::report::{Figure, over_doublings};
-use crate::reproduce::row::{Cases, Row, RowNumber, Verdict, numbers, one_at_a_time, ran, short};
+use crate::reproduce::row::{Cases, ClaimRow, RowNumber, Verdict, numbers, one_at_a_time, ran, short};
 use crate::study::Ran;
 
 /// Draws the scenes of a kind, with `queries` queried boxes in each.
@@ -131,7 +131,7 @@ pub(super) fn rate(task: &Task<'_>) -> Result<Done, RunError> {
     let mut ran = ran(&total.ran);
     let queried = [("hidden_objects_queried", total.hidden as f64), ("tiles", total.tiles as f64)];
     ran.extend(numbers(queried));
-    let row = Row { numbers: facts, ran, ..with.banded(&row.about, ours, band) };
+    let row = ClaimRow { numbers: facts, ran, ..with.banded(&row.about, ours, band) };
     Ok(Done { row, figures: vec![rate_figure(curves)] })
 }
 
@@ -281,7 +281,7 @@ pub(super) fn cost(task: &Task<'_>) -> Result<Done, RunError> {
         ("sampled_tests", base.iter().map(|costs| costs.sampled[0]).sum()),
         ("interval_tests", base.iter().map(|costs| costs.interval[0]).sum()),
     ]));
-    Ok(Done::bare(Row { numbers: facts, ran, ..with.banded(&row.about, ours, band) }))
+    Ok(Done::bare(ClaimRow { numbers: facts, ran, ..with.banded(&row.about, ours, band) }))
 }
 
 impl Hardware {
@@ -492,7 +492,7 @@ pub(super) fn unchanged(task: &Task<'_>) -> Result<Done, RunError> {
     ]);
     let made =
         with.row(&row.about, (ours, Verdict::of(total.differ == 0 && total.samples > 0), String::new()));
-    Ok(Done::bare(Row { numbers: facts, ran, ..made }))
+    Ok(Done::bare(ClaimRow { numbers: facts, ran, ..made }))
 }
 
 #[cfg(test)]

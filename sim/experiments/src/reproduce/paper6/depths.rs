@@ -19,7 +19,7 @@ use workloads::visibility::Unshaded;
 use super::settings::{Depths, Mode, Planes, Triangles};
 use super::{Task, catalogue};
 use crate::reproduce::report::line;
-use crate::reproduce::row::{Band, Cases, Row, numbers, ran};
+use crate::reproduce::row::{Band, Cases, ClaimRow, numbers, ran};
 use crate::reproduce::settings::Form;
 use crate::reproduce::{Done, Figure};
 use crate::stress::measure::TilePlace;
@@ -228,7 +228,7 @@ pub(super) fn tighter(task: &Task<'_>) -> Result<Done, RunError> {
     let figures = figure.into_iter().collect();
     let made = with.banded(&row.about, ours, band);
     let note = format!("{}; {}", made.note, against_null.text());
-    Ok(Done { row: Row { numbers: facts, ran, note, ..made }, figures })
+    Ok(Done { row: ClaimRow { numbers: facts, ran, note, ..made }, figures })
 }
 
 const OF: &str = "width where the facing changes over that elsewhere";

@@ -4,13 +4,13 @@
 use std::path::Path;
 
 use glam::{Affine3A, DVec3, Vec3, dvec3};
-use output::plot::{CaptionedImage, HeatMapPlot, HeatTile, Images, PlotStyle, Shading};
+use output::plot::{CaptionedImage, HeatMapPlot, HeatScale, HeatTile, Images, PlotStyle};
 use pipeline::conservative::{Grid, MovingTriangle, Rasterizer, View};
 use pipeline::{Camera, Cull, Draw, Geometry, Gpu, LensShape, RasterPass, SampleTable, Viewport};
 use run::{GpuSpec, RunError};
 use workloads::caustics::generator::Ocean;
 use workloads::caustics::{Beam, BeamMethod, DrawnLight, Eye, Floor, LightPicture, draw};
-use workloads::job::{OptionSource, Request};
+use workloads::job::{JobRequest, OptionSource};
 use workloads::material::Light as SceneLight;
 use workloads::material::{Material, SurfaceShader};
 use workloads::points::job::Rasterized;
@@ -39,7 +39,7 @@ fn drawn(
     caption: &str,
 ) -> Result<CaptionedImage, RunError> {
     let set = set.iter().map(|(option, value)| ((*option).to_owned(), value.clone())).collect();
-    let (options, request) = (OptionSource { file: None, set }, Request { overrides, seed: 1 });
+    let (options, request) = (OptionSource { file: None, set }, JobRequest { overrides, seed: 1 });
     let (_, job) = catalog::load(Path::new(name), &options, &request)?;
     let gpu = GpuSpec::load("reference")?;
     let mut on = Gpu::without_packets(&gpu.pipeline)?;
@@ -310,7 +310,7 @@ pub(super) fn warped() -> Result<Figure, RunError> {
         label: "",
         size: [4 * PANEL_PX[0], PANEL_PX[1]],
         tiles: &tiles,
-        shading: Shading::Classes(&["not shaded", "shaded without light", "shaded with light"]),
+        shading: HeatScale::Classes(&["not shaded", "shaded without light", "shaded with light"]),
         brightness: &[],
     };
     Ok(Figure { name: "VI_fig7", picture: map.picture(&PlotStyle::default()) })
@@ -363,7 +363,7 @@ pub(super) fn light(form: Form) -> Result<[Figure; 2], RunError> {
         let title = "Caustics under waves (Paper VI, section 4)";
         let tiles = &tiles(&picture.light, size[0]);
         // Next to a focus light has no bound.
-        let shading = Shading::Clipped;
+        let shading = HeatScale::Clipped;
         let map = HeatMapPlot { title, subject: &subject, label, size, tiles, shading, brightness: &[] };
         Figure { name, picture: map.picture(&PlotStyle::default()) }
     };

@@ -22,7 +22,7 @@ use crate::chart::caustics::measure::{DEPTH_M, SIDE_M, WAVE_M, aside_of, water};
 use crate::chart::caustics::{OceanCounts, ocean};
 use crate::chart::glossy::{Blur, GlossyBench, GlossyEffort, GlossyRow as Measured};
 use crate::reproduce::report::line;
-use crate::reproduce::row::{Band, Cases, Row, RowNumber, Verdict, numbers, one_at_a_time, ran};
+use crate::reproduce::row::{Band, Cases, ClaimRow, RowNumber, Verdict, numbers, one_at_a_time, ran};
 use crate::reproduce::settings::Form;
 use crate::reproduce::{Done, Figure};
 use crate::study::{Ran, StudyError};
@@ -118,7 +118,7 @@ pub(super) fn executions(task: &Task<'_>) -> Result<Done, RunError> {
     let ours = format!("{ours}; the modelled hardware counts {same} by all methods");
     let mut ran = ran(&there);
     ran.extend(oceans.ran(depth_m));
-    let row = Row { numbers: facts, ran, ..with.banded(&row.about, ours, band) };
+    let row = ClaimRow { numbers: facts, ran, ..with.banded(&row.about, ours, band) };
     Ok(Done { row, figures: figures(base, &oceans.slopes, form)? })
 }
 
@@ -235,7 +235,7 @@ pub(super) fn no_light_is_lost(task: &Task<'_>) -> Result<Done, RunError> {
         ("fragments_on_the_host", all.fragments as f64),
     ]));
     ran.extend(numbers(pairs));
-    Ok(Done::bare(Row { numbers: facts, ran, ..with.banded(&row.about, ours, band) }))
+    Ok(Done::bare(ClaimRow { numbers: facts, ran, ..with.banded(&row.about, ours, band) }))
 }
 
 fn eye(place: [DVec3; 3], half_height: f64, size: &Size) -> Result<Eye, RunError> {
@@ -379,7 +379,7 @@ pub(super) fn glossy_row(task: &Task<'_>) -> Result<Done, RunError> {
     let (radius, index) = (*row.lens_radius.get(form), *row.index.get(form));
     let pictures = figures::glossy(*row.texels.get(form), radius, index, *row.samples.get(form))?;
     Ok(Done {
-        row: Row { numbers: facts, ran, ..with.banded(&row.about, ours, band) },
+        row: ClaimRow { numbers: facts, ran, ..with.banded(&row.about, ours, band) },
         figures: vec![contact(&base.blurs), pictures],
     })
 }
@@ -445,5 +445,5 @@ pub(super) fn shadow_row(task: &Task<'_>) -> Result<Done, RunError> {
         ("fragments_of_accumulation", of_many.fragments as f64),
     ]));
     let made = with.row(&row.about, (ours, Verdict::of(same), String::new()));
-    Ok(Done::bare(Row { numbers: facts, ran, ..made }))
+    Ok(Done::bare(ClaimRow { numbers: facts, ran, ..made }))
 }

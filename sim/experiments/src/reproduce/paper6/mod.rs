@@ -20,7 +20,7 @@ use flate2::read::GzDecoder;
 use output::terminal::Progress;
 use run::RunError;
 use settings::Settings;
-use workloads::collision::{Object, PairAnswer, Search, detect, detect_each};
+use workloads::collision::{Object, PairAnswer, PairSearch, detect, detect_each};
 use workloads::stress::{Size, StressScene, families};
 use workloads::visibility::load_mts;
 
@@ -220,7 +220,7 @@ impl Public {
         let objects = objects.ok_or_else(|| {
             RunError::invalid(path.display(), "a coordinate is beyond 1e60 or not a number")
         })?;
-        let answers = detect(&objects, &Search::default());
+        let answers = detect(&objects, &PairSearch::default());
         let kept = answers.iter().filter(|answer| answer.verdict.may_collide());
         let seen: Vec<_> = kept.clone().filter(|answer| answer.verdict.is_contact()).collect();
         self.scenes += 1;
@@ -240,8 +240,10 @@ impl Public {
         let pairs: Option<Vec<Pair>> = rows.chunks_exact(8).map(pair).collect();
         let pairs = pairs.ok_or_else(|| RunError::invalid(path.display(), "a coordinate is beyond 1e60"))?;
         let cases: Vec<&[Object]> = pairs.iter().map(Pair::as_slice).collect();
-        let kept: Vec<bool> =
-            detect_each(&cases, &Search::default(), || ()).iter().map(|answers| any_kept(answers)).collect();
+        let kept: Vec<bool> = detect_each(&cases, &PairSearch::default(), || ())
+            .iter()
+            .map(|answers| any_kept(answers))
+            .collect();
         self.queries += pairs.len();
         self.query_files += 1;
         for ((pair, kept), query) in pairs.into_iter().zip(kept).zip(rows.chunks_exact(8)) {

@@ -17,7 +17,7 @@ use workloads::points::white::{
 use workloads::points::{NoiseSpec, draw_noise};
 
 use super::super::report::{dots, line};
-use super::super::row::{self, Cases, Row, Verdict, numbers};
+use super::super::row::{self, Cases, ClaimRow, Verdict, numbers};
 use super::super::{Done, Figure};
 use super::Task;
 use super::figures::balls_and_uncovered;
@@ -154,7 +154,7 @@ pub(super) fn darts(task: &Task<'_>) -> Result<Done, RunError> {
     );
     let made = with.row(&row.about, (ours, Verdict::of(holds), note));
     let in_cube = balls_and_uncovered(&deep.darts, *row.radius_3d.get(form))?;
-    Ok(Done { row: Row { numbers: facts, ran, ..made }, figures: vec![figure, in_cube] })
+    Ok(Done { row: ClaimRow { numbers: facts, ran, ..made }, figures: vec![figure, in_cube] })
 }
 
 /// The outline of an uncovered region in the plane.
@@ -312,7 +312,7 @@ pub(super) fn densities(task: &Task<'_>) -> Result<Done, RunError> {
         ("points", sum(|tested| tested.points)),
         ("candidates", sum(|tested| tested.candidates)),
     ]));
-    Ok(Done { row: Row { numbers: facts, ran, note, ..made }, figures: vec![histogram(points)?] })
+    Ok(Done { row: ClaimRow { numbers: facts, ran, note, ..made }, figures: vec![histogram(points)?] })
 }
 
 /// Figure 12: points on a line against the density.

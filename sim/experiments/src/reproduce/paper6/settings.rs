@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use workloads::collision::CollisionMethod;
 
 use super::super::Paper;
-use super::super::settings::{About, Form, Setting, paper_settings, row_settings};
+use super::super::settings::{About, Form, RowSetting, paper_settings, row_settings};
 
 /// Width and height of an image in pixels.
 pub(super) type Size = (u32, u32);

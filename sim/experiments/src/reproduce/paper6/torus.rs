@@ -5,10 +5,10 @@ use pipeline::Lane;
 use pipeline::sampling::{HashedSamples, LensShape};
 use run::{GpuSpec, RunError};
 use workloads::points::quality::upper_tail;
-use workloads::points::volume::{Blurred, CoveredSamples, Point, Torus, every_sample, standard_mode};
+use workloads::points::volume::{Blurred, CoveredSamples, SamplePoint, Torus, every_sample, standard_mode};
 
 use super::super::report::dots;
-use super::super::row::{self, Cases, Row, RowNumber, numbers};
+use super::super::row::{self, Cases, ClaimRow, RowNumber, numbers};
 use super::super::{Done, Figure};
 use super::Task;
 use crate::study::Ran;
@@ -29,12 +29,12 @@ struct Filled {
     differing: usize,
 }
 
-fn from_axis([x, y, ..]: &Point) -> f64 {
+fn from_axis([x, y, ..]: &SamplePoint) -> f64 {
     (x - 0.5).powi(2) + (y - 0.5).powi(2)
 }
 
 /// How many points are in one list alone, or in another place. Both are in the order of pixels.
-fn differing(a: &[Point], b: &[Point]) -> usize {
+fn differing(a: &[SamplePoint], b: &[SamplePoint]) -> usize {
     a.len().abs_diff(b.len()) + a.iter().zip(b).filter(|(a, b)| a != b).count()
 }
 
@@ -243,7 +243,7 @@ pub(super) fn row(task: &Task<'_>) -> Result<Done, RunError> {
         ("differing_from_cpu", differing as f64),
     ]));
     let ran = ran(&filled, &disks);
-    Ok(Done { row: Row { numbers, note, ran, ..made }, figures: vec![slice(&first.found)] })
+    Ok(Done { row: ClaimRow { numbers, note, ran, ..made }, figures: vec![slice(&first.found)] })
 }
 
 fn ours(first: &Filled, torus: &Torus) -> String {
@@ -343,7 +343,7 @@ mod tests {
         let honest: Vec<Filled> = seeds.map(|seed| Filled::new(&torus, seed, [128, 4]).unwrap()).collect();
         let repeated = |one: &Filled| {
             let kept = one.found.points.iter().step_by(4);
-            let points: Vec<Point> = kept.flat_map(|point| [*point; 4]).collect();
+            let points: Vec<SamplePoint> = kept.flat_map(|point| [*point; 4]).collect();
             Filled { found: CoveredSamples { points, ..one.found.clone() }, ..*one }
         };
         let scatter =

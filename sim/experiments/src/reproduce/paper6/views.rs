@@ -10,7 +10,7 @@ use super::figures::{self, Line};
 use super::settings::{Policy, Size, Views};
 use crate::chart::multiview::{MultiviewBench, ViewLanes};
 use crate::reproduce::report::{level, line, over_doublings};
-use crate::reproduce::row::{Cases, Row, With, numbers, one_at_a_time, ran};
+use crate::reproduce::row::{Cases, ClaimRow, With, numbers, one_at_a_time, ran};
 use crate::reproduce::settings::Form;
 use crate::reproduce::{Done, Figure};
 use crate::study::{Ran, StudyError};
@@ -261,7 +261,7 @@ fn done(with: &With<'_, Views>, figures: [&'static str; 3]) -> Result<Done, RunE
     let images = base.images(figures[2], shape(row, form))?;
     let figures =
         vec![over_entries(figures[0], row, &entries), banded(figures[1], row, form, &curves), images];
-    let judged = Row { numbers: facts, ran, ..with.banded(&row.about, text, band) };
+    let judged = ClaimRow { numbers: facts, ran, ..with.banded(&row.about, text, band) };
     Ok(Done { row: judged.limited(&cache_sizes(row, form, &entries)), figures })
 }
 
