@@ -165,7 +165,7 @@ impl PowerPyramid {
 
     /// About `columns` columns from one time to another, snapped outwards to blocks, which are of at least 64
     /// samples. Lowest and highest are those of all samples within (as f32), none missed. `None` where what
-    /// was kept cannot be read or is damaged: it is to be made [anew](Pyramid::anew).
+    /// was kept cannot be read or is damaged: it is to be made [anew](PowerPyramid::anew).
     pub fn columns(&self, from_s: f64, to_s: f64, columns: usize) -> Option<Vec<Column>> {
         let (from, to) = self.places(from_s, to_s);
         let wanted = (to.saturating_sub(from) / columns.max(1) as u64).max(1);

@@ -4,9 +4,9 @@
 //! value serves all views, the whole lens and the shutter, through the shading cache.
 //!
 //! - [`Layout`]: views on the camera line, as two small lenses or with overlapping box filters.
-//! - [`MultiviewRig`]: all views in [one pass](Rig::one_pass), and for comparison [view by view](Rig::view_by_view),
-//!   by [accumulation](Rig::accumulated), and with [separate cameras](Rig::own_cameras), the ground truth of
-//!   shading.
+//! - [`MultiviewRig`]: all views in [one pass](MultiviewRig::one_pass), and for comparison [view by
+//!   view](MultiviewRig::view_by_view), by [accumulation](MultiviewRig::accumulated), and with [separate
+//!   cameras](MultiviewRig::own_cameras), the ground truth of shading.
 //! - [`Panel`]: interlacing for a display behind lenticular lenses.
 //! - [`job()`]: the workload.
 

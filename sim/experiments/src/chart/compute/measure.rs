@@ -60,12 +60,8 @@ impl Case {
         for group in GROUPS {
             let kernels = [("reduction", &reduction), ("histogram", &histogram), ("light culling", &culling)];
             for (method, kernel) in kernels {
-                add(
-                    ComputeSweep::Group,
-                    f64::from(group),
-                    method,
-                    ComputeOptions { group, ..kernel.clone() },
-                );
+                let options = ComputeOptions { group, ..kernel.clone() };
+                add(ComputeSweep::Group, f64::from(group), method, options);
             }
         }
         let layouts = [
@@ -104,12 +100,8 @@ impl Case {
                 add(ComputeSweep::Step, f64::from(step), method, ComputeOptions { step, ..kernel.clone() });
             }
         }
-        add(
-            ComputeSweep::Step,
-            1.0,
-            CHAIN_METHOD,
-            ComputeOptions { kernel: Kernel::MipChain, ..ComputeOptions::default() },
-        );
+        let chain = ComputeOptions { kernel: Kernel::MipChain, ..ComputeOptions::default() };
+        add(ComputeSweep::Step, 1.0, CHAIN_METHOD, chain);
         for tile_px in TILES {
             for (method, depth_bounds) in [("depth bounds", true), ("frustum", false)] {
                 let options = ComputeOptions { tile_px, depth_bounds, ..culling.clone() };
