@@ -1,7 +1,7 @@
 //! What a sweep found: frontiers, winners, effects, and the confidence in all of that.
 //!
 //! ```text
-//! results -> Row -> Design (runs that differ in their seed are one) -> frontier, ranks, winners, effects -> SweepReport -> files, page
+//! results -> Row -> SweepDesign (runs that differ in their seed are one) -> frontier, ranks, winners, effects -> SweepReport -> files, page
 //! ```
 
 mod design;
